@@ -1,0 +1,25 @@
+# Third-party libraries, all from Debian 12 (packages.txt says why each is there).
+find_package(OpenMP REQUIRED COMPONENTS CXX)
+find_package(Threads REQUIRED)
+find_package(hwy REQUIRED)
+set(HDF5_PREFER_PARALLEL OFF)
+find_package(HDF5 REQUIRED COMPONENTS C)
+find_package(PNG REQUIRED)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(tomlplusplus REQUIRED)
+
+add_library(tomofield_hdf5 INTERFACE)
+target_include_directories(tomofield_hdf5 SYSTEM INTERFACE ${HDF5_INCLUDE_DIRS})
+target_link_libraries(tomofield_hdf5 INTERFACE ${HDF5_C_LIBRARIES})
+
+set(TOMOFIELD_LIBRARIES
+  OpenMP::OpenMP_CXX Threads::Threads hwy::hwy tomofield_hdf5 PNG::PNG fmt::fmt spdlog::spdlog
+  nlohmann_json::nlohmann_json)
+set(TOMOFIELD_CLI_LIBRARIES CLI11::CLI11 tomlplusplus::tomlplusplus)
+
+add_library(tomofield_warnings INTERFACE)
+target_compile_options(tomofield_warnings INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -fno-math-errno -ffp-contract=fast)

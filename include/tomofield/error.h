@@ -1,0 +1,17 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace tomofield {
+
+/// A failure that the user or the system caused: bad input, an unwritable
+/// file, too little memory. The message is one sentence or a few that say
+/// what is wrong, where, and what to do about it. The program prints it and
+/// exits with status 2; any other exception is a bug of ours and exits 1.
+class Error : public std::runtime_error {
+ public:
+  explicit Error(const std::string& message) : std::runtime_error(message) {}
+};
+
+}  // namespace tomofield

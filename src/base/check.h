@@ -1,0 +1,21 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace tomofield::base {
+
+[[noreturn]] inline void check_failed(const char* condition, const char* file, int line,
+                                      const std::string& context) {
+  throw std::logic_error(std::string(file) + ":" + std::to_string(line) + ": '" + condition +
+                         "' does not hold: " + context);
+}
+
+}  // namespace tomofield::base
+
+/// Guards an invariant of ours (never the user's input: that is tomofield::Error).
+/// `context` is evaluated on failure only and says what a maintainer needs.
+#define TOMOFIELD_CHECK(condition, context)                                              \
+  do {                                                                                   \
+    if (!(condition)) ::tomofield::base::check_failed(#condition, __FILE__, __LINE__, context); \
+  } while (false)

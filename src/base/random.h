@@ -1,0 +1,59 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+namespace tomofield::base {
+
+/// Random numbers that are the same on every machine and for every thread
+/// count: xoshiro256** (Blackman and Vigna 2018), seeded by splitmix64 from a
+/// seed and a stream number, so that independent parts of the work each own a
+/// stream and never share a generator.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed, std::uint64_t stream = 0) {
+    std::uint64_t s = seed * 0x9e3779b97f4a7c15ULL ^ (stream + 0x632be59bd9b4e019ULL);
+    for (auto& word : state_) word = splitmix(s);
+  }
+
+  /// 64 uniformly distributed bits.
+  std::uint64_t bits() {
+    const std::uint64_t result = rotate_left(state_[1] * 5, 7) * 9;
+    const std::uint64_t t = state_[1] << 17;
+    state_[2] ^= state_[0];
+    state_[3] ^= state_[1];
+    state_[1] ^= state_[2];
+    state_[0] ^= state_[3];
+    state_[2] ^= t;
+    state_[3] = rotate_left(state_[3], 45);
+    return result;
+  }
+
+  /// Uniform in [0, 1).
+  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
+  double uniform(double low, double high) { return low + (high - low) * uniform(); }
+
+  /// Uniform in {0, …, count − 1}; the bias of the modulo is below count / 2^64.
+  std::uint64_t below(std::uint64_t count) { return bits() % count; }
+
+  /// Standard normal (Box–Muller, one of the pair).
+  double normal() {
+    const double radius = std::sqrt(-2.0 * std::log1p(-uniform()));
+    return radius * std::cos(2.0 * std::numbers::pi * uniform());
+  }
+
+ private:
+  static std::uint64_t rotate_left(std::uint64_t x, int k) { return (x << k) | (x >> (64 - k)); }
+  static std::uint64_t splitmix(std::uint64_t& s) {
+    s += 0x9e3779b97f4a7c15ULL;
+    std::uint64_t z = s;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+    return z ^ (z >> 31);
+  }
+  std::array<std::uint64_t, 4> state_{};
+};
+
+}  // namespace tomofield::base

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace tomofield::cli {
+
+// Each adds one subcommand to the program; the subcommand's callback does the
+// work and throws tomofield::Error for the user's mistakes. One file each:
+// src/cli/NAME_command.cc.
+void add_evaluate_command(CLI::App& program);
+void add_simulate_command(CLI::App& program);
+
+}  // namespace tomofield::cli
