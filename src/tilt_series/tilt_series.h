@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace tomofield::tilt_series {
+
+enum class Contrast { kDark, kBright };
+
+/// Where a tilt series is and how its intensities are to be read.
+struct TiltSeriesOptions {
+  std::filesystem::path stack;                  ///< MRC stack, raw or aligned
+  std::optional<std::filesystem::path> tlt;     ///< .tlt or .rawtlt, one angle in degrees a section
+  std::optional<std::filesystem::path> xf;      ///< IMOD raw → aligned transforms
+  std::optional<std::filesystem::path> xtilt;   ///< IMOD x-axis tilt, degrees a section
+  std::optional<std::filesystem::path> aln;     ///< AreTomo alignment (angles, rotation, shifts)
+  std::optional<std::filesystem::path> mdoc;    ///< SerialEM metadata (angles, pixel size)
+  std::string exclude;                          ///< 1-based sections left out: "1-3,40"
+  double bin = 1.0;                             ///< reduce views by this factor, >= 1
+  std::optional<double> angpix;                 ///< or to this pixel size in Å
+  std::optional<double> pixel_size_A;           ///< overrides the header's pixel size
+  Contrast contrast = Contrast::kDark;
+  bool take_log = false;                        ///< −ln(I / I0) instead of I0 − I; dark only
+};
+
+/// One view of the series.
+struct View {
+  std::int64_t section = 0;  ///< zero-based section of the stack
+  double tilt_deg = 0.0;     ///< rotation about +Y
+  double x_tilt_deg = 0.0;   ///< rotation about +X, before the tilt
+};
+
+/// An aligned tilt series: views whose tilt axis is the +Y direction through
+/// the image centre, dense specimen high, ready to be fitted. Images stay in
+/// the file and are read a view at a time: aligned, binned, converted.
+class TiltSeries {
+ public:
+  /// Opens and checks everything: counts, angles, sizes, every pixel of every
+  /// view once. Throws Error as docs/errors.md lists; warnings go to base/log.h.
+  explicit TiltSeries(const TiltSeriesOptions& options);
+  ~TiltSeries();
+  TiltSeries(TiltSeries&&) noexcept;
+
+  const std::vector<View>& views() const;  ///< in the stack's order, excluded ones absent
+  std::int64_t width() const;              ///< pixels of an aligned, binned view
+  std::int64_t height() const;
+  double pixel_size_A() const;             ///< of an aligned, binned view
+  double bin_factor() const;               ///< unbinned pixels a pixel, exact
+
+  /// View `view` (an index into views()) as height × width line integrals in
+  /// the data's units (I0 − I, −ln(I/I0), or as stored), and which pixels are
+  /// measurements: false for NaN, infinity and fill outside a rotated image.
+  /// Pixels that are not measurements are 0. Thread-safe.
+  void read_view(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) const;
+
+  /// Standard deviation of the noise of each view, in the units of read_view.
+  const std::vector<double>& noise_sigma() const;
+
+  /// Intensity that stands for an empty beam (I0), in the stack's units; for
+  /// kBright 0, where none is needed.
+  double empty_beam() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tomofield::tilt_series
