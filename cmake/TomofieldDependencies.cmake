@@ -11,12 +11,8 @@ find_package(nlohmann_json REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(tomlplusplus REQUIRED)
 
-add_library(tomofield_hdf5 INTERFACE)
-target_include_directories(tomofield_hdf5 SYSTEM INTERFACE ${HDF5_INCLUDE_DIRS})
-target_link_libraries(tomofield_hdf5 INTERFACE ${HDF5_C_LIBRARIES})
-
 set(TOMOFIELD_LIBRARIES
-  OpenMP::OpenMP_CXX Threads::Threads hwy::hwy tomofield_hdf5 PNG::PNG fmt::fmt spdlog::spdlog
+  OpenMP::OpenMP_CXX Threads::Threads hwy::hwy HDF5::HDF5 PNG::PNG fmt::fmt spdlog::spdlog
   nlohmann_json::nlohmann_json)
 set(TOMOFIELD_CLI_LIBRARIES CLI11::CLI11 tomlplusplus::tomlplusplus)
 

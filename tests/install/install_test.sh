@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# Installs a build into a scratch prefix, then builds and runs a consumer that
+# knows nothing but that prefix.
+#   install_test.sh BUILD_DIR CONSUMER_DIR SCRATCH_DIR EXPECTED_VERSION
+set -euo pipefail
+build=$1 consumer=$2 scratch=$3 version=$4
+
+fail() {
+  echo "install test: $1" >&2
+  exit 1
+}
+
+rm -rf "$scratch"
+mkdir -p "$scratch"
+cmake --install "$build" --prefix "$scratch/prefix" >"$scratch/install.log"
+
+[ "$("$scratch/prefix/bin/tomofield" --version)" = "tomofield $version" ] ||
+  fail "the installed program does not say that it is version $version"
+
+# Nothing in the package may point back into the source or build tree.
+source_dir=$(cd "$consumer/../.." && pwd)
+if grep -rlF -e "$source_dir/" -e "$(cd "$build" && pwd)/" \
+  --include='*.cmake' --include='*.h' "$scratch/prefix" |
+  grep . >&2; then
+  fail "the files above name the source or build tree"
+fi
+
+cmake -S "$consumer" -B "$scratch/consumer" -G Ninja -DCMAKE_BUILD_TYPE=Release \
+  -DCMAKE_PREFIX_PATH="$scratch/prefix" -DCMAKE_FIND_PACKAGE_NO_PACKAGE_REGISTRY=ON
+cmake --build "$scratch/consumer"
+output=$("$scratch/consumer/consumer") || fail "the consumer failed"
+echo "$output"
+grep -qx "tomofield $version" <<<"$output" || fail "the consumer linked another version"
+grep -q '^caught ' <<<"$output" || fail "the consumer did not catch tomofield::Error"
