@@ -15,7 +15,7 @@ namespace tomofield::base {
 
 /// Guards an invariant of ours (never the user's input: that is tomofield::Error).
 /// `context` is evaluated on failure only and says what a maintainer needs.
-#define TOMOFIELD_CHECK(condition, context)                                              \
-  do {                                                                                   \
+#define TOMOFIELD_CHECK(condition, context)                                                     \
+  do {                                                                                          \
     if (!(condition)) ::tomofield::base::check_failed(#condition, __FILE__, __LINE__, context); \
   } while (false)

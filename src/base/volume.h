@@ -23,7 +23,8 @@ struct Volume {
   std::vector<float> data;
 
   Volume() = default;
-  explicit Volume(Shape3 s, double size_A = 1.0) : shape(s), voxel_size_A(size_A), data(s.voxels()) {}
+  explicit Volume(Shape3 s, double size_A = 1.0)
+      : shape(s), voxel_size_A(size_A), data(s.voxels()) {}
   std::size_t index(std::int64_t x, std::int64_t y, std::int64_t z) const {
     return static_cast<std::size_t>((z * shape.ny + y) * shape.nx + x);
   }

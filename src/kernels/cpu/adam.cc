@@ -1,0 +1,47 @@
+#include "kernels/adam.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kernels/cpu/adam.cc"
+#include <hwy/foreach_target.h>
+// Highway's own order of includes: foreach_target first.
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace tomofield::kernels::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class D>
+HWY_INLINE void update(D d, const AdamStep& s, float* p, float* g, float* m, float* v) {
+  const auto gradient = hn::LoadU(d, g);
+  const auto mean =
+      hn::MulAdd(hn::Set(d, s.beta1), hn::LoadU(d, m), hn::Mul(hn::Set(d, 1 - s.beta1), gradient));
+  const auto square = hn::MulAdd(hn::Set(d, s.beta2), hn::LoadU(d, v),
+                                 hn::Mul(hn::Set(d, 1 - s.beta2), hn::Mul(gradient, gradient)));
+  const auto scale = hn::MulAdd(hn::Sqrt(square), hn::Set(d, s.rate_v), hn::Set(d, s.epsilon));
+  const auto change = hn::Div(hn::Mul(mean, hn::Set(d, s.rate_m)), scale);
+  hn::StoreU(hn::Sub(hn::LoadU(d, p), change), d, p);
+  hn::StoreU(mean, d, m);
+  hn::StoreU(square, d, v);
+  hn::StoreU(hn::Zero(d), d, g);
+}
+
+void adam_step(const AdamStep& s, std::ptrdiff_t count, float* p, float* g, float* m, float* v) {
+  const hn::ScalableTag<float> d;
+  const std::ptrdiff_t lanes = static_cast<std::ptrdiff_t>(hn::Lanes(d));
+  std::ptrdiff_t i = 0;
+  for (; i + lanes <= count; i += lanes) update(d, s, p + i, g + i, m + i, v + i);
+  for (; i < count; ++i) update(hn::CappedTag<float, 1>(), s, p + i, g + i, m + i, v + i);
+}
+
+}  // namespace tomofield::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace tomofield::kernels {
+HWY_EXPORT(adam_step);
+void adam_step(const AdamStep& step, std::ptrdiff_t count, float* parameters, float* gradient,
+               float* m, float* v) {
+  HWY_DYNAMIC_DISPATCH(adam_step)(step, count, parameters, gradient, m, v);
+}
+}  // namespace tomofield::kernels
+#endif

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+
+namespace tomofield::kernels {
+
+// Joseph's projector, line by line. A line is a row of samples along x (views
+// up to 45°) or a column along z (steeper views); each sample is kLanes floats
+// (the slab's detector rows). Detector pixel u of a view crosses the line at
+//
+//   position(u) = offset + step u        in samples of the line, |step| > 0
+//
+// and takes weight · hat(position(u) − j) of sample j, hat(t) = max(0, 1 − |t|).
+// Pixels with position outside [low, high) or index outside
+// [first_pixel, end_pixel) do not see the line. Forward and adjoint evaluate
+// the same expression, so they are each other's exact transpose.
+
+/// One line as one view sees it.
+struct LineCrossing {
+  float* samples = nullptr;   ///< sample 0; samples −1 and num_samples must be readable (padding)
+  float* detector = nullptr;  ///< pixel 0 of the view, [pixel, lane]
+  float offset = 0, step = 1;
+  float low = 0, high = 0;  ///< within [−1, num_samples]
+  int first_pixel = 0, end_pixel = 0;
+  float weight = 0;
+};
+
+/// detector[u, lane] += Σ_lines weight Σ_j hat(position(u) − j) samples_j[lane],
+/// for pixels [first, end). All lines belong to one view: same detector, same step.
+/// `stride` is the distance between samples in floats.
+/// Traffic a pixel and line: two cache lines of samples; the detector once for all lines.
+void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stride, int first,
+                   int end);
+
+/// The adjoint: samples[j, lane] += Σ_views weight Σ_u hat(position_view(u) − j) detector_view[u,
+/// lane] for samples j in [first, end), padding included. All crossings belong to one line. Traffic
+/// a sample and view: 2/|step| cache lines of the detector; the sample once for all views.
+void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t stride, int first,
+                       int end);
+
+}  // namespace tomofield::kernels
