@@ -1,0 +1,152 @@
+#include "simulate/phantom.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "base/random.h"
+#include "tomofield/error.h"
+
+namespace tomofield::simulate {
+namespace {
+
+using Vector3 = std::array<double, 3>;
+
+constexpr double kLargestSum = 1.18;  // slab 0.2 + the densest wall 0.98
+constexpr double kSlabDensity = 0.2;
+constexpr std::uint64_t kCellStream = 1;
+constexpr std::uint64_t kBeadStream = 2;
+// A bead that found no free place so often means that the slab is full.
+constexpr int kTriesPerBead = 1000;
+
+double dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/// Three orthonormal vectors, uniformly distributed over all orientations:
+/// Gram–Schmidt on normal deviates.
+std::array<Vector3, 3> random_axes(base::Random& random) {
+  std::array<Vector3, 3> axes;
+  for (std::size_t i = 0; i < 3; ++i) {
+    double length = 0.0;
+    do {
+      for (double& v : axes[i]) v = random.normal();
+      for (std::size_t j = 0; j < i; ++j) {
+        const double overlap = dot(axes[i], axes[j]);
+        for (std::size_t k = 0; k < 3; ++k) axes[i][k] -= overlap * axes[j][k];
+      }
+      length = std::sqrt(dot(axes[i], axes[i]));
+    } while (length < 1e-3);  // nearly in the span of the others: rounding would show
+    for (double& v : axes[i]) v /= length;
+  }
+  return axes;
+}
+
+bool touches_any(const std::vector<Ellipsoid>& bodies, std::size_t first, const Vector3& center,
+                 double radius) {
+  return std::any_of(bodies.begin() + static_cast<std::ptrdiff_t>(first), bodies.end(),
+                     [&](const Ellipsoid& e) {
+                       const double dx = e.center[0] - center[0];
+                       const double dy = e.center[1] - center[1];
+                       const double dz = e.center[2] - center[2];
+                       const double reach = e.radius + radius;
+                       return dx * dx + dy * dy + dz * dz < reach * reach;
+                     });
+}
+
+/// An ellipsoid of the recipe with its largest semi-axis `radius`, at the origin.
+Ellipsoid random_ellipsoid(double radius, base::Random& random) {
+  Vector3 semi_axes;
+  for (double& a : semi_axes) a = random.uniform(0.7 * radius, radius);
+  semi_axes[random.below(3)] = radius;
+  const auto axes = random_axes(random);
+  Ellipsoid e;
+  e.radius = radius;
+  e.ratio = random.uniform(0.85, 0.95);
+  e.wall_density = random.uniform(0.5, 0.98) / kLargestSum;
+  e.inside_density = random.uniform(0.1, 0.5) / kLargestSum;
+  constexpr std::array<std::array<std::size_t, 2>, 6> kEntries{
+      {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
+  for (std::size_t n = 0; n < kEntries.size(); ++n) {  // Q = Σ axis axisᵀ / semi_axis²
+    const auto [row, column] = kEntries[n];
+    for (std::size_t i = 0; i < 3; ++i)
+      e.q[n] += axes[i][row] * axes[i][column] / (semi_axes[i] * semi_axes[i]);
+  }
+  return e;
+}
+
+/// One lot of the recipe: `num_tries` radii in [low, high), largest first.
+void place_ellipsoids(int num_tries, double low, double high, base::Random& random,
+                      Phantom& phantom) {
+  std::vector<double> radii(static_cast<std::size_t>(num_tries));
+  for (double& r : radii) r = random.uniform(low, high);
+  std::sort(radii.begin(), radii.end(), std::greater<>());
+  const double half_height = static_cast<double>(phantom.shape.ny) / 2.0;
+  const double half_thickness = static_cast<double>(phantom.shape.nz) / 2.0;
+  for (const double r : radii) {
+    Ellipsoid e = random_ellipsoid(r, random);
+    const double x = phantom.half_width_px - r;
+    const double y = phantom.is_extended ? half_height + r : half_height - r;
+    const double z = half_thickness - r;
+    if (x < 0.0 || y < 0.0) continue;  // a thick slab in a small box: it cannot fit
+    e.center = {random.uniform(-x, x), random.uniform(-y, y), random.uniform(-z, z)};
+    if (!touches_any(phantom.bodies, 0, e.center, r)) phantom.bodies.push_back(e);
+  }
+}
+
+void place_beads(const CellOptions& options, Phantom& phantom) {
+  base::Random random(options.seed, kBeadStream);
+  const double half_field = static_cast<double>(options.size_px) / 2.0;
+  const double radius = options.bead_diameter_px / 2.0;
+  const double x = phantom.half_width_px - radius;
+  const double y = half_field - radius;
+  const double z = static_cast<double>(options.thickness_px) / 2.0 - radius;
+  const std::size_t first_bead = phantom.bodies.size();
+  phantom.num_beads =
+      std::llround(static_cast<double>(options.num_beads) * phantom.half_width_px / half_field);
+  for (std::int64_t bead = 0; bead < phantom.num_beads; ++bead) {
+    Vector3 center;
+    int tries = 0;
+    do {
+      if (++tries > kTriesPerBead)
+        throw Error(
+            fmt::format("{} gold beads of {} voxels do not fit into the slab without touching each "
+                        "other: ask for fewer or smaller ones",
+                        options.num_beads, options.bead_diameter_px));
+      center = {random.uniform(-x, x), random.uniform(-y, y), 0.0};
+      const auto place = random.below(3);
+      center[2] = place == 0 ? -z : place == 1 ? z : random.uniform(-z, z);
+    } while (touches_any(phantom.bodies, first_bead, center, radius));
+    phantom.bodies.push_back(make_sphere(center, radius, options.bead_density));
+  }
+}
+
+}  // namespace
+
+Phantom make_cell_phantom(const CellOptions& options) {
+  const double size = static_cast<double>(options.size_px);
+  const double thickness = static_cast<double>(options.thickness_px);
+  const double max_tilt_rad = options.max_tilt_deg * std::numbers::pi / 180.0;
+  Phantom phantom;
+  phantom.shape = {options.size_px, options.size_px, options.thickness_px};
+  phantom.is_extended = options.is_extended;
+  phantom.slab_density = kSlabDensity / kLargestSum;
+  phantom.half_width_px = size / 2.0;
+  double more_tries = 1.0;
+  if (options.is_extended) {
+    phantom.half_width_px =
+        size / 2.0 / std::cos(max_tilt_rad) + thickness / 2.0 * std::tan(max_tilt_rad);
+    more_tries = 1.2 * phantom.half_width_px / (size / 2.0);
+  }
+  base::Random random(options.seed, kCellStream);
+  place_ellipsoids(static_cast<int>(125 * more_tries), 0.15 * thickness, 0.4 * thickness, random,
+                   phantom);
+  place_ellipsoids(static_cast<int>(2000 * more_tries), 0.05 * thickness, 0.25 * thickness, random,
+                   phantom);
+  if (options.num_beads > 0) place_beads(options, phantom);
+  return phantom;
+}
+
+}  // namespace tomofield::simulate

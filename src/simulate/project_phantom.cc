@@ -1,0 +1,153 @@
+#include "simulate/project_phantom.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/check.h"
+#include "base/parallel.h"
+
+namespace tomofield::simulate {
+namespace {
+
+constexpr std::int64_t kBandRows = 16;
+
+/// A view with what every pixel of it needs.
+struct Beam {
+  explicit Beam(const ViewFrame& v)
+      : view(v),
+        cosine(std::cos(v.tilt_deg * std::numbers::pi / 180.0)),
+        sine(std::sin(v.tilt_deg * std::numbers::pi / 180.0)) {}
+  /// Position of a pixel centre relative to the specimen's centre.
+  double x_of(std::int64_t pixel) const {
+    return static_cast<double>(pixel) + 0.5 - static_cast<double>(view.width) / 2.0 -
+           view.shift_x_px;
+  }
+  double y_of(std::int64_t row) const {
+    return static_cast<double>(row) + 0.5 - static_cast<double>(view.height) / 2.0 -
+           view.shift_y_px;
+  }
+  ViewFrame view;
+  double cosine;
+  double sine;
+};
+
+/// Adds one ellipsoid to one row. With o the point of the ray nearest to the
+/// body's centre in the plane through it and d the ray's direction, the ray
+/// meets pᵀ Q p = s where A t² + 2 B t + E − s = 0, A = dᵀQd, B = oᵀQd,
+/// E = oᵀQo: the chord is 2 √(B² − A (E − s)) / A.
+void add_ellipsoid_to_row(const Ellipsoid& body, const Beam& beam, double y, double* row) {
+  const double offset_y = y - body.center[1];
+  const double half_width_squared = body.radius * body.radius - offset_y * offset_y;
+  if (half_width_squared <= 0.0) return;
+  const double half_width = std::sqrt(half_width_squared);
+  const double center_u = body.center[0] * beam.cosine + body.center[2] * beam.sine;
+  // The pixels whose centres lie within the bounding sphere's chord of this row.
+  const double pixel_of_zero = -beam.x_of(0);
+  const double last_column = static_cast<double>(beam.view.width - 1);
+  const double first = std::max(std::ceil(center_u - half_width + pixel_of_zero), 0.0);
+  const double last = std::min(std::floor(center_u + half_width + pixel_of_zero), last_column);
+  if (first > last) return;
+
+  const auto& q = body.q;
+  const double c = beam.cosine, s = beam.sine;
+  const double qd_x = -q[0] * s + q[4] * c, qd_y = -q[3] * s + q[5] * c,
+               qd_z = -q[4] * s + q[2] * c;
+  const double a = -s * qd_x + c * qd_z;
+  const double b_per_u = c * qd_x + s * qd_z, b_from_y = offset_y * qd_y;
+  const double inner = body.ratio * body.ratio;
+  const double step_in = body.inside_density - body.wall_density;
+  for (auto i = static_cast<std::int64_t>(first); i <= static_cast<std::int64_t>(last); ++i) {
+    const double u = beam.x_of(i) - center_u;
+    const double b = b_per_u * u + b_from_y;
+    const double base = b * b - a * body.form(u * c, offset_y, u * s);
+    const double outer_chord = std::sqrt(std::max(base + a, 0.0));
+    const double inner_chord = std::sqrt(std::max(base + a * inner, 0.0));
+    row[i] += 2.0 / a * (body.wall_density * outer_chord + step_in * inner_chord);
+  }
+}
+
+/// Length of the ray x = u cos θ − t sin θ, z = u sin θ + t cos θ inside |x| <=
+/// half_width, |z| <= half_thickness.
+double box_chord(const Beam& beam, double u, double half_width, double half_thickness) {
+  double enter = -1e300, leave = 1e300;
+  const auto clip = [&](double origin, double direction, double half) {
+    if (std::abs(direction) < 1e-12) {
+      if (std::abs(origin) > half) leave = enter;
+      return;
+    }
+    const double t0 = (-half - origin) / direction, t1 = (half - origin) / direction;
+    enter = std::max(enter, std::min(t0, t1));
+    leave = std::min(leave, std::max(t0, t1));
+  };
+  clip(u * beam.cosine, -beam.sine, half_width);
+  clip(u * beam.sine, beam.cosine, half_thickness);
+  return std::max(leave - enter, 0.0);
+}
+
+void add_slab_to_row(const Phantom& phantom, const Beam& beam, double y, double* row) {
+  const double half_width = static_cast<double>(phantom.shape.nx) / 2.0;
+  const double half_height = static_cast<double>(phantom.shape.ny) / 2.0;
+  const double thickness = static_cast<double>(phantom.shape.nz);
+  if (!phantom.is_extended && std::abs(y) > half_height) return;
+  for (std::int64_t i = 0; i < beam.view.width; ++i) {
+    const double path = phantom.is_extended
+                            ? thickness / beam.cosine
+                            : box_chord(beam, beam.x_of(i), half_width, thickness / 2.0);
+    row[i] += phantom.slab_density * path;
+  }
+}
+
+/// The bodies that any of these rows can meet.
+std::vector<const Ellipsoid*> bodies_in_rows(std::span<const Ellipsoid> bodies, const Beam& beam,
+                                             std::int64_t first_row, std::int64_t num_rows) {
+  const double low = beam.y_of(first_row), high = beam.y_of(first_row + num_rows - 1);
+  std::vector<const Ellipsoid*> near;
+  for (const Ellipsoid& body : bodies) {
+    if (body.center[1] + body.radius < low || body.center[1] - body.radius > high) continue;
+    near.push_back(&body);
+  }
+  return near;
+}
+
+}  // namespace
+
+std::vector<double> project_ellipsoids(std::span<const Ellipsoid> bodies, const ViewFrame& view) {
+  const Beam beam(view);
+  std::vector<double> image(static_cast<std::size_t>(view.width * view.height));
+  for (std::int64_t row = 0; row < view.height; ++row) {
+    for (const Ellipsoid& body : bodies)
+      add_ellipsoid_to_row(body, beam, beam.y_of(row), image.data() + row * view.width);
+  }
+  return image;
+}
+
+void project_rows(const Phantom& phantom, const ViewFrame& view, std::int64_t first_row,
+                  std::int64_t num_rows, std::span<float> rows) {
+  TOMOFIELD_CHECK(static_cast<std::int64_t>(rows.size()) == num_rows * view.width,
+                  "the rows' buffer has another size");
+  const Beam beam(view);
+  const auto near = bodies_in_rows(phantom.bodies, beam, first_row, num_rows);
+  std::vector<double> sum(static_cast<std::size_t>(view.width));
+  for (std::int64_t row = 0; row < num_rows; ++row) {
+    std::fill(sum.begin(), sum.end(), 0.0);
+    const double y = beam.y_of(first_row + row);
+    add_slab_to_row(phantom, beam, y, sum.data());
+    for (const Ellipsoid* body : near) add_ellipsoid_to_row(*body, beam, y, sum.data());
+    std::transform(sum.begin(), sum.end(), rows.begin() + row * view.width,
+                   [](double value) { return static_cast<float>(value); });
+  }
+}
+
+void project_view(const Phantom& phantom, const ViewFrame& view, std::span<float> image) {
+  const std::int64_t num_bands = (view.height + kBandRows - 1) / kBandRows;
+  base::parallel_for(num_bands, [&](std::int64_t band) {
+    const std::int64_t first = band * kBandRows;
+    const std::int64_t count = std::min(kBandRows, view.height - first);
+    project_rows(phantom, view, first, count,
+                 image.subspan(static_cast<std::size_t>(first * view.width),
+                               static_cast<std::size_t>(count * view.width)));
+  });
+}
+
+}  // namespace tomofield::simulate
