@@ -11,7 +11,13 @@
 namespace tomofield::io {
 
 /// Storage modes of MRC2014 that tomofield reads and writes.
-enum class MrcMode : std::int32_t { kInt8 = 0, kInt16 = 1, kFloat32 = 2, kUint16 = 6, kFloat16 = 12 };
+enum class MrcMode : std::int32_t {
+  kInt8 = 0,
+  kInt16 = 1,
+  kFloat32 = 2,
+  kUint16 = 6,
+  kFloat16 = 12
+};
 
 /// What an MRC header says, in units that the program uses. Sections are the
 /// file's slowest axis, x the fastest.
@@ -23,9 +29,9 @@ struct MrcHeader {
   std::array<double, 3> voxel_size_A{1.0, 1.0, 1.0};
   std::array<double, 3> origin_A{0.0, 0.0, 0.0};
   double min = 0.0, max = 0.0, mean = 0.0, rms = 0.0;
-  bool is_volume = false;          ///< ISPG 1; 0 is a stack of images
-  bool is_byte_swapped = false;    ///< written on a machine of the other byte order
-  bool bytes_are_unsigned = false; ///< mode 0 with IMOD's stamp and without its signed flag
+  bool is_volume = false;           ///< ISPG 1; 0 is a stack of images
+  bool is_byte_swapped = false;     ///< written on a machine of the other byte order
+  bool bytes_are_unsigned = false;  ///< mode 0 with IMOD's stamp and without its signed flag
   std::int64_t extended_header_bytes = 0;
   std::string extended_header_type;
   std::vector<double> extended_tilt_deg;  ///< from a SERI header under flag 1, else empty

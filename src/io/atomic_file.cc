@@ -1,0 +1,107 @@
+#include "io/atomic_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "io/positioned_file.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace fs = std::filesystem;
+namespace {
+
+/// Where the data shall lie: replacing a symbolic link would lose the link.
+fs::path resolve_target(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    throw Error(
+        fmt::format("cannot write '{}': it exists and is not a regular file", path.string()));
+  }
+  if (path.filename().empty()) {
+    throw Error(fmt::format("cannot write '{}': a file name is missing", path.string()));
+  }
+  if (!fs::is_symlink(path, error)) return path;
+  const fs::path target = fs::weakly_canonical(path, error);
+  return error ? path : target;
+}
+
+fs::path directory_of(const fs::path& file) {
+  return file.has_parent_path() ? file.parent_path() : fs::path(".");
+}
+
+/// Creates an empty file that nobody else uses. Permissions come from the
+/// umask, which mkstemp would not honour.
+fs::path create_temporary(const fs::path& target) {
+  static std::atomic<unsigned> counter{0};
+  while (true) {
+    const fs::path candidate =
+        directory_of(target) /
+        fmt::format(".{}.tmp-{}-{}", target.filename().string(), ::getpid(), counter.fetch_add(1));
+    const int descriptor = ::open(candidate.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0666);
+    if (descriptor >= 0) {
+      ::close(descriptor);
+      return candidate;
+    }
+    if (errno != EEXIST) {
+      throw Error(fmt::format("cannot write '{}': no file can be created in the directory '{}': {}",
+                              target.string(), directory_of(target).string(),
+                              std::strerror(errno)));
+    }
+  }
+}
+
+void flush_to_disk(const fs::path& path, int open_flags) {
+  const int descriptor = ::open(path.c_str(), open_flags | O_CLOEXEC);
+  const bool flushed = descriptor >= 0 && ::fsync(descriptor) == 0;
+  // Some file systems cannot flush a directory; then the rename must do.
+  const bool unsupported = descriptor >= 0 && !flushed && (errno == EINVAL || errno == ENOTSUP);
+  const int error = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!flushed && !unsupported) {
+    throw Error(
+        fmt::format("cannot write '{}' to the disk: {}", path.string(), std::strerror(error)));
+  }
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(const fs::path& path)
+    : path_(path), target_(resolve_target(path)), temporary_path_(create_temporary(target_)) {}
+
+AtomicFile::~AtomicFile() {
+  if (!temporary_path_.empty()) ::unlink(temporary_path_.c_str());
+}
+
+AtomicFile::AtomicFile(AtomicFile&& other) noexcept
+    : path_(std::move(other.path_)),
+      target_(std::move(other.target_)),
+      temporary_path_(std::exchange(other.temporary_path_, {})) {}
+
+void AtomicFile::commit() {
+  flush_to_disk(temporary_path_, O_RDWR);
+  std::error_code error;
+  fs::rename(temporary_path_, target_, error);
+  if (error) {
+    throw Error(fmt::format("cannot replace '{}': {}", path_.string(), error.message()));
+  }
+  temporary_path_.clear();
+  flush_to_disk(directory_of(target_), O_RDONLY | O_DIRECTORY);
+}
+
+void write_text_file(const fs::path& path, std::string_view text) {
+  AtomicFile file(path);
+  PositionedFile contents(file.temporary_path(), PositionedFile::Access::kReadWrite);
+  contents.write_at(0, text.data(), text.size());
+  contents.close();
+  file.commit();
+}
+
+}  // namespace tomofield::io
