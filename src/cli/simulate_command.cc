@@ -1,0 +1,129 @@
+#include <fmt/core.h>
+
+#include <charconv>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/commands.h"
+#include "simulate/simulate_series.h"
+#include "tomofield/error.h"
+
+namespace tomofield::cli {
+namespace {
+
+struct SimulateArguments {
+  std::string directory;
+  simulate::SimulationOptions options;
+  std::optional<std::string> tilts;
+  std::optional<std::string> contrast;
+  std::optional<double> noise;
+  double gold_diameter_A = 100.0;
+  bool without_truth = false;
+  bool overwrite = false;
+};
+
+simulate::TiltRange parse_tilts(const std::string& text) {
+  simulate::TiltRange tilts;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  const auto take = [&](double& value, char separator) {
+    const auto [next, fault] = std::from_chars(at, end, value);
+    const bool ends_well = separator == '\0' ? next == end : next != end && *next == separator;
+    if (fault != std::errc() || !ends_well)
+      throw Error(
+          fmt::format("--tilts is '{}': give first:last:step in degrees, as -60:60:2", text));
+    at = separator == '\0' ? next : next + 1;
+  };
+  take(tilts.first_deg, ':');
+  take(tilts.last_deg, ':');
+  take(tilts.step_deg, '\0');
+  return tilts;
+}
+
+/// The contrast that is meant: counts of electrons are dark by nature.
+tilt_series::Contrast resolve_contrast(const SimulateArguments& arguments) {
+  const bool has_dose = arguments.options.dose.has_value();
+  if (has_dose && arguments.contrast == "bright")
+    throw Error(
+        "--dose counts transmitted electrons, which is dark contrast: leave out --contrast "
+        "bright");
+  return has_dose || arguments.contrast == "dark" ? tilt_series::Contrast::kDark
+                                                  : tilt_series::Contrast::kBright;
+}
+
+void run_simulate(SimulateArguments& arguments) {
+  simulate::SimulationOptions& options = arguments.options;
+  if (arguments.noise && options.dose)
+    throw Error("--noise and --dose are two kinds of noise: give one of them");
+  options.tilts = arguments.tilts ? parse_tilts(*arguments.tilts)
+                                  : simulate::default_tilts(options.cell.is_extended);
+  options.contrast = resolve_contrast(arguments);
+  options.noise = arguments.noise.value_or(options.noise);
+  options.write_truth = !arguments.without_truth;
+  options.cell.bead_diameter_px = arguments.gold_diameter_A / options.voxel_size_A;
+  const auto summary = simulate::simulate_series(arguments.directory, options, arguments.overwrite);
+  std::string line =
+      fmt::format("{} ellipsoids, {} views", summary.num_ellipsoids, summary.num_views);
+  if (summary.num_beads > 0) line += fmt::format(", {} gold beads", summary.num_beads);
+  if (summary.sigma) line += fmt::format(", sigma {:.4f}", *summary.sigma);
+  if (options.dose) line += fmt::format(", {} electrons per pixel and view", *options.dose);
+  if (summary.truth)
+    line += fmt::format(", truth max {:.3f} mean {:.3f}", summary.truth->max, summary.truth->mean);
+  fmt::print("{}\n", line);
+}
+
+}  // namespace
+
+void add_simulate_command(CLI::App& program) {
+  auto arguments = std::make_shared<SimulateArguments>();
+  simulate::SimulationOptions& options = arguments->options;
+  CLI::App* command = program.add_subcommand(
+      "simulate", "Make a cell phantom, its exact projections, and a noisy tilt series of it");
+  command->add_option("directory", arguments->directory, "Directory for the files, made if absent")
+      ->required();
+  command->add_option("--size", options.cell.size_px, "Width and height in pixels")
+      ->capture_default_str();
+  command->add_option("--thickness", options.cell.thickness_px, "Thickness in voxels")
+      ->capture_default_str();
+  command->add_option("--seed", options.cell.seed, "Seed of everything random")
+      ->capture_default_str();
+  command->add_flag("--extended", options.cell.is_extended,
+                    "The specimen leaves the field of view, as in a microscope");
+  command->add_option("--tilts", arguments->tilts,
+                      "first:last:step in degrees [-70:69.5:1.5, extended -60:60:2]");
+  command->add_option("--voxel-size", options.voxel_size_A, "Å")->capture_default_str();
+  command->add_option("--noise", arguments->noise,
+                      "Gaussian noise as a fraction of the range of the view at 0° [0.05]");
+  command->add_option("--dose", options.dose,
+                      "Poisson counts of so many electrons per pixel and view, instead of --noise");
+  command
+      ->add_option("--absorption", options.absorption_per_A,
+                   "Of counts: attenuation per unit of density and Å")
+      ->capture_default_str();
+  command
+      ->add_option("--contrast", arguments->contrast,
+                   "bright: line integrals (default); dark: an empty beam less the integrals")
+      ->check(CLI::IsMember({"dark", "bright"}));
+  command
+      ->add_option("--gain", options.gain_spread,
+                   "Spread of the logarithm of each view's random scale")
+      ->capture_default_str();
+  command
+      ->add_option("--shifts", options.shift_spread_px,
+                   "Spread of each view's random shift in pixels; writes an .xf that undoes it")
+      ->capture_default_str();
+  command->add_option("--gold", options.cell.num_beads, "Gold beads in the field of view")
+      ->capture_default_str();
+  command->add_option("--gold-diameter", arguments->gold_diameter_A, "Å")->capture_default_str();
+  command
+      ->add_option("--gold-density", options.cell.bead_density,
+                   "Density of gold (the cell's densest walls have 1)")
+      ->capture_default_str();
+  command->add_flag("--no-truth", arguments->without_truth, "Do not write truth.mrc");
+  command->add_flag("--overwrite", arguments->overwrite, "Replace files that exist");
+  command->callback([arguments] { run_simulate(*arguments); });
+}
+
+}  // namespace tomofield::cli

@@ -1,0 +1,196 @@
+#include "simulate/simulate_series.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "io/atomic_file.h"
+#include "io/mrc.h"
+#include "simulate/noise.h"
+#include "simulate/phantom.h"
+#include "simulate/phantom_json.h"
+#include "simulate/project_phantom.h"
+#include "simulate/rasterize.h"
+#include "tomofield/error.h"
+
+namespace tomofield::simulate {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Streams of the pixels' noise start here: one a row of a view.
+constexpr std::uint64_t kNoiseStream = std::uint64_t{1} << 32;
+constexpr std::int64_t kTruthBatchVoxels = std::int64_t{1} << 22;
+
+struct OutputFiles {
+  explicit OutputFiles(const fs::path& directory)
+      : series(directory / "tilt_series.mrc"),
+        clean(directory / "clean.mrc"),
+        truth(directory / "truth.mrc"),
+        angles(directory / "tilt_series.tlt"),
+        transforms(directory / "tilt_series.xf"),
+        record(directory / "phantom.json") {}
+  fs::path series, clean, truth, angles, transforms, record;
+};
+
+void prepare_directory(const fs::path& directory, const OutputFiles& files, bool overwrite) {
+  for (const fs::path* file : {&files.series, &files.clean, &files.truth, &files.angles,
+                               &files.transforms, &files.record}) {
+    if (!overwrite && fs::exists(*file))
+      throw Error(fmt::format("'{}' exists: give another directory, or --overwrite to replace it",
+                              file->string()));
+  }
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error || !fs::is_directory(directory))
+    throw Error(fmt::format("cannot make the directory '{}' ({}): give one that can be written",
+                            directory.string(),
+                            error ? error.message() : "something else has that name"));
+}
+
+io::MrcSpec mrc_spec(std::int64_t nx, std::int64_t ny, std::int64_t nz, bool is_volume,
+                     const SimulationOptions& options, const char* what) {
+  const double size = options.voxel_size_A;
+  return {.nx = nx,
+          .ny = ny,
+          .nz = nz,
+          .voxel_size_A = {size, size, size},
+          .is_volume = is_volume,
+          .label = fmt::format("tomofield simulate: {}, seed {}", what, options.cell.seed)};
+}
+
+SimulationSummary::Truth write_truth(const fs::path& path, const Phantom& phantom,
+                                     const SimulationOptions& options) {
+  const base::Shape3& shape = phantom.shape;
+  io::MrcWriter writer(path,
+                       mrc_spec(shape.nx, shape.ny, shape.nz, true, options, "truth of a cell"));
+  const std::int64_t section_voxels = shape.nx * shape.ny;
+  const std::int64_t batch = std::clamp<std::int64_t>(kTruthBatchVoxels / section_voxels, 1, 64);
+  std::vector<float> sections(static_cast<std::size_t>(section_voxels * batch));
+  SimulationSummary::Truth truth{.min = 1e30, .max = -1e30, .mean = 0.0};
+  for (std::int64_t first = 0; first < shape.nz; first += batch) {
+    const std::int64_t count = std::min(batch, shape.nz - first);
+    const auto used = std::span(sections).first(static_cast<std::size_t>(section_voxels * count));
+    rasterize_sections(phantom, first, count, used);
+    for (std::int64_t z = 0; z < count; ++z) {
+      const auto section = used.subspan(static_cast<std::size_t>(z * section_voxels),
+                                        static_cast<std::size_t>(section_voxels));
+      writer.write_section(first + z, section);
+      const auto [low, high] = std::minmax_element(section.begin(), section.end());
+      truth.min = std::min(truth.min, static_cast<double>(*low));
+      truth.max = std::max(truth.max, static_cast<double>(*high));
+      double sum = 0.0;
+      for (const float value : section) sum += static_cast<double>(value);
+      truth.mean += sum / static_cast<double>(section_voxels * shape.nz);
+    }
+  }
+  writer.close();
+  return truth;
+}
+
+ViewFrame frame_of(const SimulatedView& view, const Phantom& phantom) {
+  return {.width = phantom.shape.nx,
+          .height = phantom.shape.ny,
+          .tilt_deg = view.tilt_deg,
+          .shift_x_px = view.shift_x_px,
+          .shift_y_px = view.shift_y_px};
+}
+
+/// Standard deviation that the noise option stands for.
+double noise_sigma(const Phantom& phantom, const std::vector<SimulatedView>& views, double noise) {
+  const auto nearest = std::min_element(views.begin(), views.end(),
+                                        [](const SimulatedView& a, const SimulatedView& b) {
+                                          return std::abs(a.tilt_deg) < std::abs(b.tilt_deg);
+                                        });
+  std::vector<float> image(static_cast<std::size_t>(phantom.shape.nx * phantom.shape.ny));
+  project_view(phantom, frame_of(*nearest, phantom), image);
+  const double low = percentile(image, 0.5);
+  return noise * (percentile(std::move(image), 99.5) - low);
+}
+
+/// Both stacks, a view at a time; they appear under their names together.
+void write_views(const OutputFiles& files, const Phantom& phantom,
+                 const std::vector<SimulatedView>& views, const SimulationOptions& options,
+                 std::optional<double> sigma) {
+  const base::Shape3& shape = phantom.shape;
+  const auto num_views = static_cast<std::int64_t>(views.size());
+  io::MrcWriter clean(files.clean,
+                      mrc_spec(shape.nx, shape.ny, num_views, false, options, "noise-free views"));
+  io::MrcWriter series(files.series,
+                       mrc_spec(shape.nx, shape.ny, num_views, false, options, "tilt series"));
+  const Detector detector(options);
+  std::vector<float> image(static_cast<std::size_t>(shape.nx * shape.ny));
+  for (std::int64_t i = 0; i < num_views; ++i) {
+    const SimulatedView& view = views[static_cast<std::size_t>(i)];
+    project_view(phantom, frame_of(view, phantom), image);
+    detector.expose(image, view.gain);
+    clean.write_section(i, image);
+    const auto first_stream = kNoiseStream + static_cast<std::uint64_t>(i * shape.ny);
+    if (sigma) {
+      add_gaussian_noise(image, shape.nx, *sigma, options.cell.seed, first_stream);
+    } else {
+      draw_counts(image, shape.nx, options.cell.seed, first_stream);
+    }
+    series.write_section(i, image);
+  }
+  clean.close();
+  series.close();
+}
+
+void write_angles(const fs::path& path, const std::vector<SimulatedView>& views) {
+  std::string text;
+  for (const SimulatedView& view : views) text += fmt::format("{:.4f}\n", view.tilt_deg);
+  io::write_text_file(path, text);
+}
+
+/// The specimen was moved by the shift, so aligning moves the image back. Both
+/// images have the same size, hence the same centre, and no rotation.
+void write_transforms(const fs::path& path, const std::vector<SimulatedView>& views) {
+  std::string text;
+  for (const SimulatedView& view : views) {
+    text += fmt::format("{:12.7f}{:12.7f}{:12.7f}{:12.7f}{:12.3f}{:12.3f}\n", 1.0, 0.0, 0.0, 1.0,
+                        -view.shift_x_px, -view.shift_y_px);
+  }
+  io::write_text_file(path, text);
+}
+
+}  // namespace
+
+SimulationSummary simulate_series(const fs::path& directory, const SimulationOptions& options,
+                                  bool overwrite) {
+  const auto faults = options.validate();
+  if (!faults.empty()) throw Error(fmt::format("cannot simulate: {}", fmt::join(faults, "; ")));
+  const OutputFiles files(directory);
+  const auto views = plan_views(options);
+  CellOptions cell = options.cell;
+  cell.max_tilt_deg = 0.0;
+  for (const SimulatedView& view : views)
+    cell.max_tilt_deg = std::max(cell.max_tilt_deg, std::abs(view.tilt_deg));
+  const Phantom phantom = make_cell_phantom(cell);
+  prepare_directory(directory, files, overwrite);
+
+  SimulationSummary summary;
+  summary.num_beads = phantom.num_beads;
+  summary.num_ellipsoids = static_cast<std::int64_t>(phantom.bodies.size()) - phantom.num_beads;
+  summary.num_views = static_cast<std::int64_t>(views.size());
+  summary.empty_beam = Detector(options).empty_beam();
+  if (!options.dose) summary.sigma = noise_sigma(phantom, views, options.noise);
+  // What an earlier run left and this one does not write would belie the rest.
+  fs::remove(files.transforms);
+  if (options.write_truth) {
+    summary.truth = write_truth(files.truth, phantom, options);
+  } else {
+    fs::remove(files.truth);
+  }
+  write_views(files, phantom, views, options, summary.sigma);
+  write_angles(files.angles, views);
+  if (options.shift_spread_px > 0.0) write_transforms(files.transforms, views);
+  io::write_text_file(files.record, phantom_json(options, phantom, views, summary));
+  return summary;
+}
+
+}  // namespace tomofield::simulate

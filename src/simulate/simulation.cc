@@ -1,0 +1,122 @@
+#include "simulate/simulation.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/random.h"
+
+namespace tomofield::simulate {
+namespace {
+
+constexpr std::uint64_t kGainStream = 3;
+constexpr std::uint64_t kShiftStream = 4;
+constexpr double kMaxTilt_deg = 80.0;
+constexpr std::int64_t kMaxSize_px = 32768;
+constexpr std::int64_t kMaxViews = 10000;
+
+std::int64_t count_views(const TiltRange& tilts) {
+  return static_cast<std::int64_t>(
+             std::floor((tilts.last_deg - tilts.first_deg) / tilts.step_deg + 1e-6)) +
+         1;
+}
+
+double largest_tilt_deg(const TiltRange& tilts) {
+  return std::max(std::abs(tilts.first_deg), std::abs(tilts.last_deg));
+}
+
+std::optional<std::string> fault_of(const TiltRange& tilts) {
+  const bool is_finite = std::isfinite(tilts.first_deg) && std::isfinite(tilts.last_deg) &&
+                         std::isfinite(tilts.step_deg);
+  if (!is_finite || tilts.step_deg <= 0.0 || tilts.last_deg < tilts.first_deg)
+    return fmt::format("the tilts {}:{}:{} are no range: give first:last:step in degrees",
+                       tilts.first_deg, tilts.last_deg, tilts.step_deg);
+  if (largest_tilt_deg(tilts) > kMaxTilt_deg)
+    return fmt::format("tilts reach {}°: tomofield works up to ±{}°", largest_tilt_deg(tilts),
+                       kMaxTilt_deg);
+  if ((tilts.last_deg - tilts.first_deg) / tilts.step_deg > static_cast<double>(kMaxViews))
+    return fmt::format("a tilt step of {}° makes more than {} views", tilts.step_deg, kMaxViews);
+  return std::nullopt;
+}
+
+}  // namespace
+
+TiltRange default_tilts(bool is_extended) {
+  if (is_extended) return {.first_deg = -60.0, .last_deg = 60.0, .step_deg = 2.0};
+  return {};
+}
+
+std::vector<std::string> SimulationOptions::validate() const {
+  std::vector<std::string> faults;
+  const auto require = [&](bool holds, const char* name, double value, const std::string& range) {
+    if (!holds) faults.push_back(fmt::format("{} is {}, but must be {}", name, value, range));
+  };
+  const auto in_sizes = [](std::int64_t n) { return n >= 8 && n <= kMaxSize_px; };
+  const auto is_positive = [](double v) { return std::isfinite(v) && v > 0.0; };
+  const auto is_spread = [](double v, double most) { return v >= 0.0 && v <= most; };
+  const std::string sizes = fmt::format("8 to {} pixels", kMaxSize_px);
+  require(in_sizes(cell.size_px), "the size", static_cast<double>(cell.size_px), sizes);
+  require(in_sizes(cell.thickness_px), "the thickness", static_cast<double>(cell.thickness_px),
+          sizes);
+  require(is_positive(voxel_size_A), "the voxel size", voxel_size_A, "above 0 Å");
+  require(is_spread(noise, 1e6), "the noise", noise, "0 or more");
+  require(!dose || (is_positive(*dose) && *dose <= 1e9), "the dose", dose.value_or(0.0),
+          "above 0 electrons per pixel and view, and at most 1e9");
+  require(is_positive(absorption_per_A), "the absorption", absorption_per_A, "above 0 per Å");
+  require(is_spread(gain_spread, 2.0), "the gain's spread", gain_spread, "0 to 2");
+  require(is_spread(shift_spread_px, static_cast<double>(cell.size_px) / 4.0), "the shifts' spread",
+          shift_spread_px, "0 to a quarter of the size");
+  require(cell.num_beads >= 0 && cell.num_beads <= 100000, "the number of gold beads",
+          static_cast<double>(cell.num_beads), "0 to 100000");
+  if (cell.num_beads > 0) {
+    const auto room = static_cast<double>(std::min(cell.size_px, cell.thickness_px));
+    require(cell.bead_diameter_px > 0.0 && cell.bead_diameter_px <= room,
+            "the gold beads' diameter in voxels", cell.bead_diameter_px,
+            fmt::format("above 0 and at most {}", room));
+    require(std::isfinite(cell.bead_density), "the gold beads' density", cell.bead_density,
+            "finite");
+  }
+  if (const auto fault = fault_of(tilts)) faults.push_back(*fault);
+  return faults;
+}
+
+std::vector<SimulatedView> plan_views(const SimulationOptions& options) {
+  base::Random gains(options.cell.seed, kGainStream);
+  base::Random shifts(options.cell.seed, kShiftStream);
+  const auto draw_shift = [&] {
+    return std::round(options.shift_spread_px * shifts.normal() * 1000.0) / 1000.0;
+  };
+  std::vector<SimulatedView> views(static_cast<std::size_t>(count_views(options.tilts)));
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    views[i].tilt_deg = options.tilts.first_deg + options.tilts.step_deg * static_cast<double>(i);
+    views[i].gain = std::exp(options.gain_spread * gains.normal());
+    views[i].shift_x_px = draw_shift();
+    views[i].shift_y_px = draw_shift();
+  }
+  return views;
+}
+
+Detector::Detector(const SimulationOptions& options)
+    : counts_(options.dose.has_value()),
+      absorption_per_px_(options.absorption_per_A * options.voxel_size_A) {
+  if (counts_) {
+    empty_beam_ = *options.dose;
+  } else if (options.contrast == tilt_series::Contrast::kDark) {
+    const double tilt_rad = largest_tilt_deg(options.tilts) * std::numbers::pi / 180.0;
+    empty_beam_ = static_cast<double>(options.cell.thickness_px) / std::cos(tilt_rad);
+    sign_ = -1.0;
+  }
+}
+
+void Detector::expose(std::vector<float>& image, double gain) const {
+  for (float& value : image) {
+    const double integral = static_cast<double>(value);
+    value =
+        static_cast<float>(gain * (counts_ ? empty_beam_ * std::exp(-absorption_per_px_ * integral)
+                                           : empty_beam_ + sign_ * integral));
+  }
+}
+
+}  // namespace tomofield::simulate
