@@ -17,8 +17,10 @@ namespace tomofield::kernels {
 
 /// One line as one view sees it.
 struct LineCrossing {
-  float* samples = nullptr;   ///< sample 0; samples −1 and num_samples must be readable (padding)
-  float* detector = nullptr;  ///< pixel 0 of the view, [pixel, lane]
+  const float* samples = nullptr;  ///< source of project_lines: sample 0; −1 and num_samples must
+                                   ///< be readable (padding)
+  const float* detector =
+      nullptr;  ///< source of backproject_lines: pixel 0 of the view, [pixel, lane]
   float offset = 0, step = 1;
   float low = 0, high = 0;  ///< within [−1, num_samples]
   int first_pixel = 0, end_pixel = 0;
@@ -30,12 +32,12 @@ struct LineCrossing {
 /// `stride` is the distance between samples in floats.
 /// Traffic a pixel and line: two cache lines of samples; the detector once for all lines.
 void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stride, int first,
-                   int end);
+                   int end, float* detector);
 
 /// The adjoint: samples[j, lane] += Σ_views weight Σ_u hat(position_view(u) − j) detector_view[u,
 /// lane] for samples j in [first, end), padding included. All crossings belong to one line. Traffic
 /// a sample and view: 2/|step| cache lines of the detector; the sample once for all views.
 void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t stride, int first,
-                       int end);
+                       int end, float* samples);
 
 }  // namespace tomofield::kernels

@@ -62,7 +62,7 @@ HWY_INLINE void forward_taps(const LineCrossing& line, int first, TapTable& lowe
 }
 
 void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stride, int first,
-                   int end) {
+                   int end, float* detector) {
   constexpr int kMaxLines = 8;
   TapTable lower[kMaxLines];
   HWY_ALIGN float upper[kMaxLines][kTile];
@@ -73,7 +73,7 @@ void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stri
       for (int l = 0; l < count; ++l) forward_taps(g[l], tile, lower[l], upper[l]);
       const int in_tile = std::min(kTile, end - tile);
       for (int t = 0; t < in_tile; ++t) {
-        float* const out = g->detector + static_cast<std::ptrdiff_t>(tile + t) * kLanes;
+        float* const out = detector + static_cast<std::ptrdiff_t>(tile + t) * kLanes;
         Vec acc[kVecs];
         load_sample(out, acc);
         for (int l = 0; l < count; ++l) {
@@ -132,7 +132,7 @@ HWY_INLINE int num_taps(float step) {
 }
 
 void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t stride, int first,
-                       int end) {
+                       int end, float* samples) {
   constexpr int kMaxTables = 24;
   TapTable tables[kMaxTables];
   const float* sources[kMaxTables];
@@ -152,7 +152,7 @@ void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t 
       }
       if (count == 0) continue;
       for (int t = 0; t < in_tile; ++t) {
-        float* const out = views->samples + (tile + t) * stride;
+        float* const out = samples + (tile + t) * stride;
         Vec acc[kVecs];
         load_sample(out, acc);
         for (int k = 0; k < count; ++k) {
@@ -173,12 +173,12 @@ namespace tomofield::kernels {
 HWY_EXPORT(project_lines);
 HWY_EXPORT(backproject_lines);
 void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stride, int first,
-                   int end) {
-  HWY_DYNAMIC_DISPATCH(project_lines)(lines, num_lines, stride, first, end);
+                   int end, float* detector) {
+  HWY_DYNAMIC_DISPATCH(project_lines)(lines, num_lines, stride, first, end, detector);
 }
 void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t stride, int first,
-                       int end) {
-  HWY_DYNAMIC_DISPATCH(backproject_lines)(views, num_views, stride, first, end);
+                       int end, float* samples) {
+  HWY_DYNAMIC_DISPATCH(backproject_lines)(views, num_views, stride, first, end, samples);
 }
 }  // namespace tomofield::kernels
 #endif

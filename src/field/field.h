@@ -1,0 +1,117 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/aligned_buffer.h"
+#include "base/random.h"
+#include "field/quadtree.h"
+#include "kernels/lanes.h"
+#include "kernels/leaf_decoding.h"
+#include "kernels/total_variation.h"
+
+namespace tomofield::field {
+
+/// Vertices of a leaf on each axis, both faces included, and the ranks of its
+/// three modes (0 for fields that are not factorised).
+struct LeafShape {
+  int nx = 0, ny = 0, nz = 0;
+  int rank_x = 0, rank_y = 0, rank_z = 0;  ///< of VX⊗MYZ, VY⊗MXZ, VZ⊗MXY
+  bool operator==(const LeafShape&) const = default;
+  std::size_t vertices_xz() const { return static_cast<std::size_t>(nx) * nz; }
+};
+
+/// 16 positions in y as one leaf sees them: lane l interpolates y vertices
+/// lower[l] and lower[l] + 1 with weight fraction[l] on the upper one.
+struct LaneRows {
+  std::array<int, kernels::kLanes> lower{};
+  std::array<float, kernels::kLanes> fraction{};
+};
+
+/// A density field over a quadtree: vertex values a leaf at a time, and the
+/// gradient back to the parameters. Everything above this folder sees a field
+/// through this interface alone. Coordinates are pixels of the aligned view at
+/// zero tilt; z runs over [0, thickness). Densities are
+/// act(trilinear interpolation of vertex values), vertex values Σ… + bias (eq. 4).
+class Field {
+ public:
+  Field(Quadtree tree, double thickness, std::vector<LeafShape> shapes);
+  virtual ~Field() = default;
+  Field(const Field&) = delete;
+  Field& operator=(const Field&) = delete;
+
+  virtual std::string kind() const = 0;  ///< "vm" or "grid", as in --field
+
+  const Quadtree& tree() const { return tree_; }
+  double thickness() const { return thickness_; }
+  const LeafShape& shape(int leaf) const { return shapes_[static_cast<std::size_t>(leaf)]; }
+  const std::vector<LeafShape>& shapes() const { return shapes_; }
+
+  /// All parameters, leaf by leaf; [offset(leaf), offset(leaf + 1)) are a leaf's own.
+  std::span<float> parameters() { return parameters_; }
+  std::span<const float> parameters() const { return parameters_; }
+  std::size_t offset(int leaf) const { return offsets_[static_cast<std::size_t>(leaf)]; }
+  std::size_t num_parameters() const { return offsets_.back(); }
+
+  /// The decoder: its linear layer has weights 1 (else the factors' total
+  /// variation could be evaded by scaling) and this bias; then the activation.
+  float bias = 0.0f;
+  kernels::Activation activation;
+
+  LaneRows lane_rows(int leaf, std::span<const double, kernels::kLanes> y) const;
+
+  /// Vertex values of a leaf at 16 rows: values[x, z, lane], overwritten.
+  void slab_values(int leaf, const LaneRows& rows, float* values) const;
+  /// Adds dL/d parameters of this leaf, given dL/d values, to gradient[0 … count).
+  virtual void slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
+                             float* gradient) const = 0;
+  /// Vertex values at a single row: values[x, z], overwritten.
+  void row_values(int leaf, double y, float* values) const;
+  /// Density at a point; 0 outside the domain.
+  double density(double x, double y, double z) const;
+
+  /// Total variation of the parameters themselves (eq. 5): its value, and its
+  /// gradient added to gradient[0 … count).
+  virtual double parameter_variation(int leaf, const kernels::VariationPenalty& penalty,
+                                     double weight, float* gradient) const = 0;
+
+  /// Starting values: every density close to act(bias).
+  virtual void initialise(base::Random random, double scale) = 0;
+
+  /// Replaces a leaf by four that hold the same field to rounding.
+  void split_leaf(int leaf);
+
+ protected:
+  virtual std::size_t parameter_count(const LeafShape& shape) const = 0;
+  virtual void add_slab_values(int leaf, const LaneRows& rows, float* values) const = 0;
+  virtual void add_row_values(int leaf, int lower, float fraction, float* values) const = 0;
+  virtual double point_value(int leaf, double x, double y,
+                             double z) const = 0;  ///< vertex coordinates, no bias
+  /// Parameters of the quarter [x0, x0 + ½] × [y0, y0 + ½] (fractions of the leaf) of a leaf.
+  virtual void sample_quarter(const LeafShape& shape, const float* leaf, double x0, double y0,
+                              float* quarter) const = 0;
+
+  const float* leaf_parameters(int leaf) const { return parameters_.data() + offset(leaf); }
+  /// Fixes the parameter layout; derived constructors call it.
+  void allocate();
+
+ private:
+  double vertex_y(int leaf, double y) const;
+
+  Quadtree tree_;
+  double thickness_;
+  std::vector<LeafShape> shapes_;
+  std::vector<std::size_t> offsets_;
+  base::AlignedBuffer<float> parameters_;
+};
+
+/// kind "vm": vector–matrix factors; "grid": plain trilinear vertices.
+std::unique_ptr<Field> make_field(const std::string& kind, Quadtree tree, double thickness,
+                                  std::vector<LeafShape> shapes);
+
+}  // namespace tomofield::field

@@ -1,0 +1,116 @@
+#include "field/grid_field.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "field/resample.h"
+#include "field/variation_planes.h"
+#include "kernels/small_gemm.h"
+
+namespace tomofield::field {
+namespace {
+
+using kernels::kLanes;
+using kernels::small_gemm;
+
+// The interpolation along y as a small dense matrix over the vertices that the
+// slab's rows touch: [first, first + count).
+struct RowMatrix {
+  int first, count;
+  std::vector<float> by_vertex;  // [vertex, lane]
+  std::vector<float> by_lane;    // [lane, vertex]
+  explicit RowMatrix(const LaneRows& rows) {
+    const auto [low, high] = std::minmax_element(rows.lower.begin(), rows.lower.end());
+    first = *low;
+    count = *high + 2 - first;
+    by_vertex.assign(static_cast<std::size_t>(count) * kLanes, 0.0f);
+    by_lane.assign(by_vertex.size(), 0.0f);
+    for (int l = 0; l < kLanes; ++l) {
+      const int j = rows.lower[l] - first;
+      add(j, l, 1.0f - rows.fraction[l]);
+      add(j + 1, l, rows.fraction[l]);
+    }
+  }
+
+ private:
+  void add(int vertex, int lane, float weight) {
+    by_vertex[static_cast<std::size_t>(vertex * kLanes + lane)] += weight;
+    by_lane[static_cast<std::size_t>(lane * count + vertex)] += weight;
+  }
+};
+
+}  // namespace
+
+std::size_t GridField::parameter_count(const LeafShape& s) const { return s.vertices_xz() * s.ny; }
+
+void GridField::add_slab_values(int leaf, const LaneRows& rows, float* values) const {
+  const LeafShape& s = shape(leaf);
+  const RowMatrix m(rows);
+  small_gemm({.rows = static_cast<std::ptrdiff_t>(s.vertices_xz()),
+              .depth = m.count,
+              .width = kLanes,
+              .a = leaf_parameters(leaf) + m.first,
+              .a_row = s.ny,
+              .a_col = 1,
+              .b = m.by_vertex.data(),
+              .b_row = kLanes,
+              .c = values,
+              .c_row = kLanes});
+}
+
+void GridField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
+                              float* gradient) const {
+  const LeafShape& s = shape(leaf);
+  const RowMatrix m(rows);
+  small_gemm({.rows = static_cast<std::ptrdiff_t>(s.vertices_xz()),
+              .depth = kLanes,
+              .width = m.count,
+              .a = grad_values,
+              .a_row = kLanes,
+              .a_col = 1,
+              .b = m.by_lane.data(),
+              .b_row = m.count,
+              .c = gradient + m.first,
+              .c_row = s.ny});
+}
+
+void GridField::add_row_values(int leaf, int lower, float fraction, float* values) const {
+  const LeafShape& s = shape(leaf);
+  const float* p = leaf_parameters(leaf) + lower;
+  for (std::size_t i = 0; i < s.vertices_xz(); ++i, p += s.ny)
+    values[i] += p[0] + fraction * (p[1] - p[0]);
+}
+
+double GridField::point_value(int leaf, double x, double y, double z) const {
+  const LeafShape& s = shape(leaf);
+  const AxisPoint px(x, s.nx), py(y, s.ny), pz(z, s.nz);
+  const float* p = leaf_parameters(leaf);
+  double sum = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int i = corner & 1, j = corner >> 1 & 1, k = corner >> 2;
+    const double weight = (i ? px.fraction : 1 - px.fraction) *
+                          (j ? py.fraction : 1 - py.fraction) * (k ? pz.fraction : 1 - pz.fraction);
+    sum += weight *
+           static_cast<double>(p[((px.lower + i) * s.nz + pz.lower + k) * s.ny + py.lower + j]);
+  }
+  return sum;
+}
+
+double GridField::parameter_variation(int leaf, const kernels::VariationPenalty& penalty,
+                                      double weight, float* gradient) const {
+  const LeafShape& s = shape(leaf);
+  return array_variation(leaf_parameters(leaf), s.nx, s.nz, s.ny, 1, penalty, weight, gradient);
+}
+
+void GridField::initialise(base::Random random, double scale) {
+  for (float& value : parameters()) value = static_cast<float>(random.uniform(-scale, scale));
+}
+
+void GridField::sample_quarter(const LeafShape& s, const float* leaf, double x0, double y0,
+                               float* quarter) const {
+  std::vector<float> along_x(parameter_count(s));
+  halve_axis(leaf, 1, s.nx, s.nz * s.ny, x0 * (s.nx - 1), along_x.data());
+  halve_axis(along_x.data(), s.nx * s.nz, s.ny, 1, y0 * (s.ny - 1), quarter);
+}
+
+}  // namespace tomofield::field

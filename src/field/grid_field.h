@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "field/field.h"
+
+namespace tomofield::field {
+
+/// The simplest field on the same quadtree: the vertices themselves are the
+/// parameters, V [nx, nz, ny]. What the factorisation is measured against.
+class GridField final : public Field {
+ public:
+  GridField(Quadtree tree, double thickness, std::vector<LeafShape> shapes)
+      : Field(std::move(tree), thickness, std::move(shapes)) {
+    allocate();
+  }
+
+  std::string kind() const override { return "grid"; }
+  void slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
+                     float* gradient) const override;
+  double parameter_variation(int leaf, const kernels::VariationPenalty& penalty, double weight,
+                             float* gradient) const override;
+  void initialise(base::Random random, double scale) override;
+
+ protected:
+  std::size_t parameter_count(const LeafShape& shape) const override;
+  void add_slab_values(int leaf, const LaneRows& rows, float* values) const override;
+  void add_row_values(int leaf, int lower, float fraction, float* values) const override;
+  double point_value(int leaf, double x, double y, double z) const override;
+  void sample_quarter(const LeafShape& shape, const float* leaf, double x0, double y0,
+                      float* quarter) const override;
+};
+
+}  // namespace tomofield::field

@@ -1,0 +1,138 @@
+#include "field/quadtree.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/check.h"
+#include "kernels/lanes.h"
+#include "tomofield/error.h"
+
+namespace tomofield::field {
+
+Quadtree::Quadtree(const RootGrid& roots, const std::vector<Region>& region_of) : roots_(roots) {
+  TOMOFIELD_CHECK(roots.cell_size > 0 && roots.cell_size % kernels::kLanes == 0,
+                  fmt::format("root cell of {} px", roots.cell_size));
+  TOMOFIELD_CHECK(region_of.size() == static_cast<std::size_t>(roots.columns) * roots.rows,
+                  "regions and root cells");
+  for (int row = 0; row < roots.rows; ++row) {
+    for (int column = 0; column < roots.columns; ++column) {
+      QuadtreeNode node;
+      node.square = {roots.x0 + column * roots.cell_size, roots.y0 + row * roots.cell_size,
+                     roots.cell_size};
+      node.region = region_of[static_cast<std::size_t>(row) * roots.columns + column];
+      nodes_.push_back(node);
+    }
+  }
+  number_leaves();
+}
+
+Quadtree::Quadtree(const RootGrid& roots, std::vector<QuadtreeNode> nodes)
+    : roots_(roots), nodes_(std::move(nodes)) {
+  const auto fail = [](const char* what) {
+    throw Error(fmt::format("the stored quadtree is damaged: {}", what));
+  };
+  const int num_roots = roots.columns * roots.rows;
+  const int num_nodes = static_cast<int>(nodes_.size());
+  if (roots.columns <= 0 || roots.rows <= 0 || num_nodes < num_roots)
+    fail("fewer nodes than root cells");
+  for (int n = 0; n < num_nodes; ++n) {
+    const QuadtreeNode& node = nodes_[static_cast<std::size_t>(n)];
+    if ((node.parent < 0) != (n < num_roots) || node.parent >= n) fail("a node has a wrong parent");
+    if (!node.is_leaf() && (node.first_child <= n || node.first_child + 4 > num_nodes))
+      fail("a node has wrong children");
+    if (node.square.size <= 0 || node.square.size % kernels::kLanes != 0)
+      fail("a square has a wrong size");
+    for (int c = 0; !node.is_leaf() && c < 4; ++c) {
+      const QuadtreeNode& child = nodes_[static_cast<std::size_t>(node.first_child + c)];
+      const std::int64_t half = node.square.size / 2;
+      const Square expected{node.square.x0 + (c & 1) * half, node.square.y0 + (c >> 1) * half,
+                            half};
+      if (child.parent != n || child.square != expected)
+        fail("a child is not a quarter of its parent");
+    }
+  }
+  number_leaves();
+}
+
+void Quadtree::add_children(int index) {
+  const QuadtreeNode parent = nodes_[static_cast<std::size_t>(index)];
+  const std::int64_t half = parent.square.size / 2;
+  TOMOFIELD_CHECK(half % kernels::kLanes == 0 && half > 0,
+                  fmt::format("splitting a square of {} px", parent.square.size));
+  nodes_[static_cast<std::size_t>(index)].first_child = static_cast<int>(nodes_.size());
+  for (int c = 0; c < 4; ++c) {
+    QuadtreeNode child = parent;
+    child.square = {parent.square.x0 + (c & 1) * half, parent.square.y0 + (c >> 1) * half, half};
+    child.level = parent.level + 1;
+    child.parent = index;
+    child.first_child = -1;
+    nodes_.push_back(child);
+  }
+}
+
+void Quadtree::number_leaves() {
+  leaves_.clear();
+  leaf_of_node_.assign(nodes_.size(), -1);
+  std::vector<int> stack;
+  for (int root = roots_.columns * roots_.rows - 1; root >= 0; --root) stack.push_back(root);
+  while (!stack.empty()) {
+    const int n = stack.back();
+    stack.pop_back();
+    const QuadtreeNode& node = nodes_[static_cast<std::size_t>(n)];
+    if (node.is_leaf()) {
+      leaf_of_node_[static_cast<std::size_t>(n)] = static_cast<int>(leaves_.size());
+      leaves_.push_back(n);
+    } else {
+      for (int c = 3; c >= 0; --c) stack.push_back(node.first_child + c);
+    }
+  }
+}
+
+int Quadtree::band_of_leaf(int index) const {
+  return static_cast<int>((leaf(index).square.y0 - roots_.y0) / roots_.cell_size);
+}
+
+void Quadtree::split(int leaf_index) {
+  add_children(leaves_[static_cast<std::size_t>(leaf_index)]);
+  number_leaves();
+}
+
+void Quadtree::split_to_level(Region region, int level) {
+  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+    if (nodes_[n].is_leaf() && nodes_[n].region == region && nodes_[n].level < level)
+      add_children(static_cast<int>(n));
+  }
+  number_leaves();
+}
+
+std::vector<int> Quadtree::leaves_across(std::int64_t y0, std::int64_t y1) const {
+  std::vector<int> found;
+  for (int i = 0; i < num_leaves(); ++i) {
+    const Square& s = leaf(i).square;
+    if (s.y0 < y1 && s.y1() > y0) found.push_back(i);
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [this](int a, int b) { return leaf(a).square.x0 < leaf(b).square.x0; });
+  return found;
+}
+
+int Quadtree::find_leaf(double x, double y) const {
+  const double size = static_cast<double>(roots_.cell_size);
+  const double column = std::floor((x - static_cast<double>(roots_.x0)) / size);
+  const double row = std::floor((y - static_cast<double>(roots_.y0)) / size);
+  if (!(column >= 0 && column < roots_.columns && row >= 0 && row < roots_.rows)) return -1;
+  int n = static_cast<int>(row) * roots_.columns + static_cast<int>(column);
+  while (!nodes_[static_cast<std::size_t>(n)].is_leaf()) {
+    const QuadtreeNode& node = nodes_[static_cast<std::size_t>(n)];
+    const double half = static_cast<double>(node.square.size) / 2;
+    const int right = x >= static_cast<double>(node.square.x0) + half ? 1 : 0;
+    const int up = y >= static_cast<double>(node.square.y0) + half ? 2 : 0;
+    n = node.first_child + right + up;
+  }
+  return leaf_of_node_[static_cast<std::size_t>(n)];
+}
+
+}  // namespace tomofield::field

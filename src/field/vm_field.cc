@@ -1,0 +1,330 @@
+#include "field/vm_field.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "base/aligned_buffer.h"
+#include "field/resample.h"
+#include "field/variation_planes.h"
+#include "kernels/small_gemm.h"
+
+namespace tomofield::field {
+namespace {
+
+using kernels::kLanes;
+using kernels::small_gemm;
+
+// Positions of the six factors inside a leaf's parameters.
+struct Layout {
+  std::size_t vx, myz, vy, mxz, vz, mxy, count;
+  explicit Layout(const LeafShape& s) {
+    const auto size = [](int a, int b, int c) { return static_cast<std::size_t>(a) * b * c; };
+    vx = 0;
+    myz = vx + size(s.nx, 1, s.rank_x);
+    vy = myz + size(s.nz, s.ny, s.rank_x);
+    mxz = vy + size(s.ny, 1, s.rank_y);
+    vz = mxz + size(s.nx, s.nz, s.rank_y);
+    mxy = vz + size(s.nz, 1, s.rank_z);
+    count = mxy + size(s.nx, s.ny, s.rank_z);
+  }
+};
+
+// out[lane, r]: a factor [y, r] interpolated at the slab's rows.
+void interpolate_rows(const float* factor, const LaneRows& rows, int rank, float* out) {
+  for (int l = 0; l < kLanes; ++l) {
+    const float* lower = factor + static_cast<std::ptrdiff_t>(rows.lower[l]) * rank;
+    const float fraction = rows.fraction[l];
+    for (int r = 0; r < rank; ++r)
+      out[l * rank + r] = lower[r] + fraction * (lower[rank + r] - lower[r]);
+  }
+}
+
+// The same with the lane innermost: out[r, lane].
+void interpolate_rows_by_rank(const float* factor, const LaneRows& rows, int rank, float* out) {
+  for (int l = 0; l < kLanes; ++l) {
+    const float* lower = factor + static_cast<std::ptrdiff_t>(rows.lower[l]) * rank;
+    const float fraction = rows.fraction[l];
+    for (int r = 0; r < rank; ++r)
+      out[r * kLanes + l] = lower[r] + fraction * (lower[rank + r] - lower[r]);
+  }
+}
+
+// Adjoint of interpolate_rows: adds to a factor's gradient [y, r].
+void spread_rows(const float* grad_lanes, const LaneRows& rows, int rank, float* gradient) {
+  for (int l = 0; l < kLanes; ++l) {
+    float* lower = gradient + static_cast<std::ptrdiff_t>(rows.lower[l]) * rank;
+    const float fraction = rows.fraction[l];
+    for (int r = 0; r < rank; ++r) {
+      const float g = grad_lanes[l * rank + r];
+      lower[r] += g - fraction * g;
+      lower[rank + r] += fraction * g;
+    }
+  }
+}
+
+// Scratch that a thread keeps between calls.
+float* scratch(std::size_t size, int which) {
+  thread_local base::AlignedBuffer<float> buffers[3];
+  buffers[which].reserve(size);
+  return buffers[which].data();
+}
+
+}  // namespace
+
+std::size_t VmField::parameter_count(const LeafShape& shape) const { return Layout(shape).count; }
+
+void VmField::add_slab_values(int leaf, const LaneRows& rows, float* values) const {
+  const LeafShape& s = shape(leaf);
+  const Layout at(s);
+  const float* p = leaf_parameters(leaf);
+  const int max_rank = std::max({s.rank_x, s.rank_y, s.rank_z});
+  float* lanes = scratch(static_cast<std::size_t>(max_rank) * kLanes, 0);
+  const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(s.nz) * kLanes;
+
+  interpolate_rows_by_rank(p + at.vy, rows, s.rank_y, lanes);
+  small_gemm({.rows = static_cast<std::ptrdiff_t>(s.vertices_xz()),
+              .depth = s.rank_y,
+              .width = kLanes,
+              .a = p + at.mxz,
+              .a_row = s.rank_y,
+              .a_col = 1,
+              .b = lanes,
+              .b_row = kLanes,
+              .c = values,
+              .c_row = kLanes});
+  for (int k = 0; k < s.nz; ++k) {
+    interpolate_rows_by_rank(p + at.myz + static_cast<std::size_t>(k) * s.ny * s.rank_x, rows,
+                             s.rank_x, lanes);
+    small_gemm({.rows = s.nx,
+                .depth = s.rank_x,
+                .width = kLanes,
+                .a = p + at.vx,
+                .a_row = s.rank_x,
+                .a_col = 1,
+                .b = lanes,
+                .b_row = kLanes,
+                .c = values + k * kLanes,
+                .c_row = column});
+  }
+  for (int i = 0; i < s.nx; ++i) {
+    interpolate_rows_by_rank(p + at.mxy + static_cast<std::size_t>(i) * s.ny * s.rank_z, rows,
+                             s.rank_z, lanes);
+    small_gemm({.rows = s.nz,
+                .depth = s.rank_z,
+                .width = kLanes,
+                .a = p + at.vz,
+                .a_row = s.rank_z,
+                .a_col = 1,
+                .b = lanes,
+                .b_row = kLanes,
+                .c = values + i * column,
+                .c_row = kLanes});
+  }
+}
+
+// Every gradient is a matrix product whose columns are ranks: the sums over
+// lanes are part of the product's depth, so no register is ever summed across.
+void VmField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
+                            float* gradient) const {
+  const LeafShape& s = shape(leaf);
+  const Layout at(s);
+  const float* p = leaf_parameters(leaf);
+  const int max_rank = std::max({s.rank_x, s.rank_y, s.rank_z});
+  const std::size_t lane_size = static_cast<std::size_t>(max_rank) * kLanes;
+  float* lanes = scratch(lane_size, 0);
+  float* grad_lanes = scratch(lane_size, 1);
+  const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(s.nz) * kLanes;
+  const std::ptrdiff_t num_xz = static_cast<std::ptrdiff_t>(s.vertices_xz());
+
+  // VY ⊗ MXZ
+  interpolate_rows(p + at.vy, rows, s.rank_y, lanes);
+  std::fill_n(grad_lanes, lane_size, 0.0f);
+  small_gemm({.rows = num_xz,
+              .depth = kLanes,
+              .width = s.rank_y,
+              .a = grad_values,
+              .a_row = kLanes,
+              .a_col = 1,
+              .b = lanes,
+              .b_row = s.rank_y,
+              .c = gradient + at.mxz,
+              .c_row = s.rank_y});
+  small_gemm({.rows = kLanes,
+              .depth = num_xz,
+              .width = s.rank_y,
+              .a = grad_values,
+              .a_row = 1,
+              .a_col = kLanes,
+              .b = p + at.mxz,
+              .b_row = s.rank_y,
+              .c = grad_lanes,
+              .c_row = s.rank_y});
+  spread_rows(grad_lanes, rows, s.rank_y, gradient + at.vy);
+
+  // VX ⊗ MYZ
+  for (int k = 0; k < s.nz; ++k) {
+    const std::size_t plane = at.myz + static_cast<std::size_t>(k) * s.ny * s.rank_x;
+    const float* g = grad_values + k * kLanes;
+    interpolate_rows(p + plane, rows, s.rank_x, lanes);
+    std::fill_n(grad_lanes, lane_size, 0.0f);
+    small_gemm({.rows = s.nx,
+                .depth = kLanes,
+                .width = s.rank_x,
+                .a = g,
+                .a_row = column,
+                .a_col = 1,
+                .b = lanes,
+                .b_row = s.rank_x,
+                .c = gradient + at.vx,
+                .c_row = s.rank_x});
+    small_gemm({.rows = kLanes,
+                .depth = s.nx,
+                .width = s.rank_x,
+                .a = g,
+                .a_row = 1,
+                .a_col = column,
+                .b = p + at.vx,
+                .b_row = s.rank_x,
+                .c = grad_lanes,
+                .c_row = s.rank_x});
+    spread_rows(grad_lanes, rows, s.rank_x, gradient + plane);
+  }
+
+  // VZ ⊗ MXY
+  for (int i = 0; i < s.nx; ++i) {
+    const std::size_t plane = at.mxy + static_cast<std::size_t>(i) * s.ny * s.rank_z;
+    const float* g = grad_values + i * column;
+    interpolate_rows(p + plane, rows, s.rank_z, lanes);
+    std::fill_n(grad_lanes, lane_size, 0.0f);
+    small_gemm({.rows = s.nz,
+                .depth = kLanes,
+                .width = s.rank_z,
+                .a = g,
+                .a_row = kLanes,
+                .a_col = 1,
+                .b = lanes,
+                .b_row = s.rank_z,
+                .c = gradient + at.vz,
+                .c_row = s.rank_z});
+    small_gemm({.rows = kLanes,
+                .depth = s.nz,
+                .width = s.rank_z,
+                .a = g,
+                .a_row = 1,
+                .a_col = kLanes,
+                .b = p + at.vz,
+                .b_row = s.rank_z,
+                .c = grad_lanes,
+                .c_row = s.rank_z});
+    spread_rows(grad_lanes, rows, s.rank_z, gradient + plane);
+  }
+}
+
+void VmField::add_row_values(int leaf, int lower, float fraction, float* values) const {
+  const LeafShape& s = shape(leaf);
+  const Layout at(s);
+  const float* p = leaf_parameters(leaf);
+  const auto row_of = [&](const float* factor, int rank, int r) {
+    const float* a = factor + static_cast<std::ptrdiff_t>(lower) * rank + r;
+    return a[0] + fraction * (a[rank] - a[0]);
+  };
+  // [r, z] operands, so that the products run along z.
+  float* by_rank = scratch(static_cast<std::size_t>(std::max(s.rank_x, s.rank_z)) * s.nz, 0);
+  for (int k = 0; k < s.nz; ++k) {
+    const float* plane = p + at.myz + static_cast<std::size_t>(k) * s.ny * s.rank_x;
+    for (int r = 0; r < s.rank_x; ++r) by_rank[r * s.nz + k] = row_of(plane, s.rank_x, r);
+  }
+  small_gemm({.rows = s.nx,
+              .depth = s.rank_x,
+              .width = s.nz,
+              .a = p + at.vx,
+              .a_row = s.rank_x,
+              .a_col = 1,
+              .b = by_rank,
+              .b_row = s.nz,
+              .c = values,
+              .c_row = s.nz});
+  for (int k = 0; k < s.nz; ++k) {
+    for (int r = 0; r < s.rank_z; ++r)
+      by_rank[r * s.nz + k] = p[at.vz + static_cast<std::size_t>(k) * s.rank_z + r];
+  }
+  std::vector<float> row(static_cast<std::size_t>(std::max(s.rank_y, s.rank_z)));
+  for (int i = 0; i < s.nx; ++i) {
+    const float* plane = p + at.mxy + static_cast<std::size_t>(i) * s.ny * s.rank_z;
+    for (int r = 0; r < s.rank_z; ++r)
+      row[static_cast<std::size_t>(r)] = row_of(plane, s.rank_z, r);
+    small_gemm({.rows = 1,
+                .depth = s.rank_z,
+                .width = s.nz,
+                .a = row.data(),
+                .a_row = 0,
+                .a_col = 1,
+                .b = by_rank,
+                .b_row = s.nz,
+                .c = values + static_cast<std::ptrdiff_t>(i) * s.nz,
+                .c_row = 0});
+  }
+  for (int r = 0; r < s.rank_y; ++r)
+    row[static_cast<std::size_t>(r)] = row_of(p + at.vy, s.rank_y, r);
+  small_gemm({.rows = static_cast<std::ptrdiff_t>(s.vertices_xz()),
+              .depth = s.rank_y,
+              .width = 1,
+              .a = p + at.mxz,
+              .a_row = s.rank_y,
+              .a_col = 1,
+              .b = row.data(),
+              .b_row = 1,
+              .c = values,
+              .c_row = 1});
+}
+
+double VmField::point_value(int leaf, double x, double y, double z) const {
+  const LeafShape& s = shape(leaf);
+  const Layout at(s);
+  const float* p = leaf_parameters(leaf);
+  const AxisPoint px(x, s.nx), py(y, s.ny), pz(z, s.nz);
+  return sum_of_products(p + at.vx, p + at.myz, px, pz, py, s.ny, s.rank_x) +
+         sum_of_products(p + at.vy, p + at.mxz, py, px, pz, s.nz, s.rank_y) +
+         sum_of_products(p + at.vz, p + at.mxy, pz, px, py, s.ny, s.rank_z);
+}
+
+double VmField::parameter_variation(int leaf, const kernels::VariationPenalty& penalty,
+                                    double weight, float* gradient) const {
+  constexpr double kVectorShare = 0.1;  // α of eq. 5
+  const LeafShape& s = shape(leaf);
+  const Layout at(s);
+  const float* p = leaf_parameters(leaf);
+  const auto vector = [&](std::size_t where, int n, int rank) {
+    return array_variation(p + where, 1, 1, n, rank, penalty, kVectorShare * weight,
+                           gradient + where);
+  };
+  const auto matrix = [&](std::size_t where, int n0, int n1, int rank) {
+    return array_variation(p + where, 1, n0, n1, rank, penalty, weight, gradient + where);
+  };
+  return vector(at.vx, s.nx, s.rank_x) + matrix(at.myz, s.nz, s.ny, s.rank_x) +
+         vector(at.vy, s.ny, s.rank_y) + matrix(at.mxz, s.nx, s.nz, s.rank_y) +
+         vector(at.vz, s.nz, s.rank_z) + matrix(at.mxy, s.nx, s.ny, s.rank_z);
+}
+
+void VmField::initialise(base::Random random, double scale) {
+  for (float& value : parameters()) value = static_cast<float>(random.uniform(-scale, scale));
+}
+
+void VmField::sample_quarter(const LeafShape& s, const float* leaf, double x0, double y0,
+                             float* quarter) const {
+  const Layout at(s);
+  const double x_first = x0 * (s.nx - 1), y_first = y0 * (s.ny - 1);
+  const auto copy = [&](std::size_t from, std::size_t to) {
+    std::copy(leaf + from, leaf + to, quarter + from);
+  };
+  halve_axis(leaf + at.vx, 1, s.nx, s.rank_x, x_first, quarter + at.vx);
+  halve_axis(leaf + at.myz, s.nz, s.ny, s.rank_x, y_first, quarter + at.myz);
+  halve_axis(leaf + at.vy, 1, s.ny, s.rank_y, y_first, quarter + at.vy);
+  halve_axis(leaf + at.mxz, 1, s.nx, s.nz * s.rank_y, x_first, quarter + at.mxz);
+  copy(at.vz, at.mxy);
+  std::vector<float> along_x(static_cast<std::size_t>(s.nx) * s.ny * s.rank_z);
+  halve_axis(leaf + at.mxy, 1, s.nx, s.ny * s.rank_z, x_first, along_x.data());
+  halve_axis(along_x.data(), s.nx, s.ny, s.rank_z, y_first, quarter + at.mxy);
+}
+
+}  // namespace tomofield::field

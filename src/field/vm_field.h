@@ -1,0 +1,44 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "field/field.h"
+
+namespace tomofield::field {
+
+/// Vector–matrix factors (eq. 4): a leaf stores, with the rank innermost so that
+/// interpolation and gradients run over contiguous ranks,
+///
+///   VX [nx, Rx]   MYZ [nz, ny, Rx]   VY [ny, Ry]   MXZ [nx, nz, Ry]   VZ [nz, Rz]   MXY [nx, ny,
+///   Rz]
+///
+///   value(x, y, z) = Σ_r VX(x) MYZ(y, z) + Σ_r VY(y) MXZ(x, z) + Σ_r VZ(z) MXY(x, y)
+///
+/// in that order. A slab costs 3R FMAs a vertex and row forward and 6R back,
+/// all of them small matrix products.
+class VmField final : public Field {
+ public:
+  VmField(Quadtree tree, double thickness, std::vector<LeafShape> shapes)
+      : Field(std::move(tree), thickness, std::move(shapes)) {
+    allocate();
+  }
+
+  std::string kind() const override { return "vm"; }
+  void slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
+                     float* gradient) const override;
+  double parameter_variation(int leaf, const kernels::VariationPenalty& penalty, double weight,
+                             float* gradient) const override;
+  void initialise(base::Random random, double scale) override;
+
+ protected:
+  std::size_t parameter_count(const LeafShape& shape) const override;
+  void add_slab_values(int leaf, const LaneRows& rows, float* values) const override;
+  void add_row_values(int leaf, int lower, float fraction, float* values) const override;
+  double point_value(int leaf, double x, double y, double z) const override;
+  void sample_quarter(const LeafShape& shape, const float* leaf, double x0, double y0,
+                      float* quarter) const override;
+};
+
+}  // namespace tomofield::field

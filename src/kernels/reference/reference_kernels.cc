@@ -1,0 +1,158 @@
+#include "kernels/reference/reference_kernels.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "kernels/lanes.h"
+
+namespace tomofield::kernels::reference {
+
+void small_gemm(const SmallGemm& s, const double* a, const double* b, double* c) {
+  for (std::ptrdiff_t m = 0; m < s.rows; ++m) {
+    for (std::ptrdiff_t w = 0; w < s.width; ++w) {
+      for (std::ptrdiff_t n = 0; n < s.depth; ++n) {
+        c[m * s.c_row + w] += a[m * s.a_row + n * s.a_col] * b[n * s.b_row + w];
+      }
+    }
+  }
+}
+
+double line_weight(const LineCrossing& line, int pixel, int sample) {
+  const double position =
+      static_cast<double>(line.offset) + static_cast<double>(line.step) * pixel;
+  const bool sees = pixel >= line.first_pixel && pixel < line.end_pixel &&
+                    position >= static_cast<double>(line.low) &&
+                    position < static_cast<double>(line.high);
+  const double hat = std::max(0.0, 1.0 - std::abs(position - sample));
+  return sees ? static_cast<double>(line.weight) * hat : 0.0;
+}
+
+void project_line(const LineCrossing& line, int num_samples, std::ptrdiff_t stride, int first,
+                  int end, const double* samples, double* detector) {
+  for (int u = first; u < end; ++u) {
+    for (int j = -1; j <= num_samples; ++j) {
+      const double weight = line_weight(line, u, j);
+      for (int lane = 0; lane < kLanes; ++lane) {
+        detector[u * kLanes + lane] += weight * samples[j * stride + lane];
+      }
+    }
+  }
+}
+
+void backproject_line(const LineCrossing& line, std::ptrdiff_t stride, int first, int end,
+                      const double* detector, double* samples) {
+  for (int j = first; j < end; ++j) {
+    for (int u = line.first_pixel; u < line.end_pixel; ++u) {
+      const double weight = line_weight(line, u, j);
+      for (int lane = 0; lane < kLanes; ++lane) {
+        samples[j * stride + lane] += weight * detector[u * kLanes + lane];
+      }
+    }
+  }
+}
+
+double activation_value(Activation activation, double value) {
+  const double beta = static_cast<double>(activation.beta);
+  if (beta == 0.0) return value;
+  return beta * value > 0 ? value + std::log1p(std::exp(-beta * value)) / beta
+                          : std::log1p(std::exp(beta * value)) / beta;
+}
+
+double activation_derivative(Activation activation, double value) {
+  const double beta = static_cast<double>(activation.beta);
+  return beta == 0.0 ? 1.0 : 1.0 / (1.0 + std::exp(-beta * value));
+}
+
+namespace {
+
+// Calls visit(position of the sample, {positions of its four vertices}, {their weights}).
+template <typename Visit>
+void for_each_sample(const LeafPiece& piece, Visit&& visit) {
+  for (int x = 0; x < piece.x.count; ++x) {
+    for (int z = 0; z < piece.z.count; ++z) {
+      const double fx = static_cast<double>(piece.x.fraction[x]);
+      const double fz = static_cast<double>(piece.z.fraction[z]);
+      const auto vertex = [&](int i, int k) {
+        return (static_cast<std::ptrdiff_t>(piece.x.lower[x] + i) * piece.num_vertices_z +
+                piece.z.lower[z] + k) *
+               kLanes;
+      };
+      visit(z * piece.stride_z + x * kLanes,
+            std::array{vertex(0, 0), vertex(0, 1), vertex(1, 0), vertex(1, 1)},
+            std::array{(1 - fx) * (1 - fz), (1 - fx) * fz, fx * (1 - fz), fx * fz});
+    }
+  }
+}
+
+}  // namespace
+
+void decode_leaf(const LeafPiece& piece, const double* values, double* samples) {
+  for_each_sample(piece, [&](std::ptrdiff_t sample, const auto& vertices, const auto& weights) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      double value = 0.0;
+      for (int i = 0; i < 4; ++i) value += weights[i] * values[vertices[i] + lane];
+      samples[sample + lane] = activation_value(piece.activation, value);
+    }
+  });
+}
+
+double decode_leaf_adjoint(const LeafPiece& piece, const double* values,
+                           const double* grad_samples, double* grad_values) {
+  double bias = 0.0;
+  for_each_sample(piece, [&](std::ptrdiff_t sample, const auto& vertices, const auto& weights) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      double value = 0.0;
+      for (int i = 0; i < 4; ++i) value += weights[i] * values[vertices[i] + lane];
+      const double grad =
+          grad_samples[sample + lane] * activation_derivative(piece.activation, value);
+      for (int i = 0; i < 4; ++i) grad_values[vertices[i] + lane] += weights[i] * grad;
+      bias += grad;
+    }
+  });
+  return bias;
+}
+
+double volume_variation(const VolumeVariation& s, const double* volume, double* gradient) {
+  const double epsilon = static_cast<double>(s.penalty.epsilon);
+  const double tau = static_cast<double>(s.penalty.concavity);
+  const auto at = [&](int x, int y, int z) {
+    return (static_cast<std::ptrdiff_t>(z) * s.nx + x) * s.ny + y;
+  };
+  double value = 0.0;
+  for (int z = 0; z < s.nz; ++z) {
+    for (int x = 0; x < s.nx; ++x) {
+      for (int y = 0; y < s.ny; ++y) {
+        const auto here = at(x, y, z);
+        const auto right = at(std::min(x + 1, s.nx - 1), y, z);
+        const auto behind = at(x, std::min(y + 1, s.ny - 1), z);
+        const auto up = at(x, y, std::min(z + 1, s.nz - 1));
+        const double dx = s.per_hx * (volume[right] - volume[here]);
+        const double dy = volume[behind] - volume[here];
+        const double dz = s.per_hz * (volume[up] - volume[here]);
+        const double m = std::sqrt(dx * dx + dy * dy + dz * dz + epsilon * epsilon);
+        value += tau > 0 ? tau * std::log1p(m / tau) : m;
+        const double slope = s.weight * (tau > 0 ? 1.0 / (1.0 + m / tau) : 1.0);
+        gradient[right] += slope * s.per_hx * dx / m;
+        gradient[behind] += slope * dy / m;
+        gradient[up] += slope * s.per_hz * dz / m;
+        gradient[here] -= slope * (s.per_hx * dx + dy + s.per_hz * dz) / m;
+      }
+    }
+  }
+  return s.weight * value;
+}
+
+void adam_step(const AdamStep& s, std::ptrdiff_t count, double* p, double* g, double* m,
+               double* v) {
+  const double beta1 = static_cast<double>(s.beta1), beta2 = static_cast<double>(s.beta2);
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    m[i] = beta1 * m[i] + (1 - beta1) * g[i];
+    v[i] = beta2 * v[i] + (1 - beta2) * g[i] * g[i];
+    p[i] -= static_cast<double>(s.rate_m) * m[i] /
+            (std::sqrt(v[i]) * static_cast<double>(s.rate_v) + static_cast<double>(s.epsilon));
+    g[i] = 0.0;
+  }
+}
+
+}  // namespace tomofield::kernels::reference

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "geometry/tilt_geometry.h"
+#include "projection/sample_grid.h"
+
+namespace tomofield::projection {
+
+/// Line integrals of a sampled slab (16 detector rows) and their adjoint, after
+/// Joseph (1982): views up to 45° integrate along rows of z, steeper ones along
+/// columns of x, with linear interpolation across, so that no view steps by
+/// more than √2 samples. Lengths are in pixels. Forward and adjoint are exact
+/// transposes. Thread-safe.
+class SlabProjector {
+ public:
+  SlabProjector(const geometry::TiltGeometry& geometry, const SampleGrid& grid)
+      : geometry_(geometry), grid_(grid) {}
+
+  const geometry::TiltGeometry& geometry() const { return geometry_; }
+  const SampleGrid& grid() const { return grid_; }
+  /// Floats of the predicted rays of `num_views` views: [view, x, lane].
+  std::size_t detector_size(std::size_t num_views) const;
+
+  /// detector += A samples for the named views. Writes the padding of `samples`.
+  void forward(float* samples, std::span<const int> views, float* detector) const;
+  /// samples += Aᵀ detector. The padding of `samples` is zero before and after.
+  void backward(const float* detector, std::span<const int> views, float* samples) const;
+
+ private:
+  geometry::TiltGeometry geometry_;
+  SampleGrid grid_;
+};
+
+}  // namespace tomofield::projection
