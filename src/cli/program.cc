@@ -13,6 +13,7 @@ int run_program(int argc, char** argv) {
   CLI::App program{"tomofield: clean tomograms from aligned tilt series by continuous density fields"};
   program.set_version_flag("--version", "tomofield " TOMOFIELD_VERSION);
   program.require_subcommand(1);
+  add_evaluate_command(program);
   add_simulate_command(program);
   try {
     program.parse(argc, argv);
