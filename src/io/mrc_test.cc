@@ -11,7 +11,9 @@ namespace {
 TEST(Mrc, RoundTrip) {
   const auto path = std::filesystem::temp_directory_path() / "tomofield_mrc_test_io.mrc";
   MrcSpec spec;
-  spec.nx = 3; spec.ny = 2; spec.nz = 2;
+  spec.nx = 3;
+  spec.ny = 2;
+  spec.nz = 2;
   MrcWriter writer(path, spec);
   writer.write_section(0, std::vector<float>{1, 2, 3, 4, 5, 6});
   writer.close();

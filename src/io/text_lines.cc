@@ -1,0 +1,80 @@
+#include "io/text_lines.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+
+#include "io/positioned_file.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+constexpr std::string_view kWhiteSpace = " \t\r\n\v\f";
+constexpr std::int64_t kLargestTextFile = std::int64_t{64} << 20;
+
+std::string read_text(const std::filesystem::path& path) {
+  const PositionedFile file(path, PositionedFile::Access::kRead);
+  const std::int64_t bytes = file.size();
+  std::string text;
+  if (bytes <= kLargestTextFile) {
+    text.resize(static_cast<std::size_t>(bytes));
+    file.read_at(0, text.data(), text.size());
+  }
+  if (bytes > kLargestTextFile || text.find('\0') != std::string::npos) {
+    throw Error(fmt::format("'{}' is not a text file ({} bytes)", path.string(), bytes));
+  }
+  return text;
+}
+
+template <typename T>
+std::optional<T> parse_whole(std::string_view word) {
+  if (word.starts_with('+')) word.remove_prefix(1);  // from_chars knows no plus
+  T value{};
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error != std::errc{} || end != word.data() + word.size()) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+std::string_view trim(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(kWhiteSpace);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kWhiteSpace) - first + 1);
+}
+
+std::vector<std::string_view> split_words(std::string_view text) {
+  std::vector<std::string_view> words;
+  std::size_t at = text.find_first_not_of(kWhiteSpace);
+  while (at != std::string_view::npos) {
+    const std::size_t end = text.find_first_of(kWhiteSpace, at);
+    words.push_back(text.substr(at, end - at));
+    at = text.find_first_not_of(kWhiteSpace, end);
+  }
+  return words;
+}
+
+std::vector<TextLine> read_text_lines(const std::filesystem::path& path) {
+  const std::string text = read_text(path);
+  std::vector<TextLine> lines;
+  int number = 0;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    const std::string_view line = trim(std::string_view(text).substr(at, end - at));
+    ++number;
+    if (!line.empty()) lines.push_back({number, std::string(line)});
+    at = end + 1;
+  }
+  return lines;
+}
+
+std::optional<double> parse_number(std::string_view word) { return parse_whole<double>(word); }
+
+std::optional<long long> parse_integer(std::string_view word) {
+  return parse_whole<long long>(word);
+}
+
+}  // namespace tomofield::io
