@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "field/field.h"
+#include "projection/sample_grid.h"
+
+namespace tomofield::projection {
+
+/// Evaluates a field on the samples of a slab and carries gradients back: the
+/// bridge between leaves, which know nothing of sampling, and the projector,
+/// which knows nothing of leaves. Slab s covers rows
+/// [first_row + 16 s, first_row + 16 (s + 1)). Rebuild it when the tree changes.
+/// Thread-safe; `field` must outlive it and may change its parameters.
+class SlabSampler {
+ public:
+  SlabSampler(const field::Field& field, const SampleGrid& grid, std::int64_t first_row,
+              std::int64_t num_rows);
+
+  int num_slabs() const { return static_cast<int>(slabs_.size()); }
+  /// Rows of the volume in a slab: 16, or fewer in the last one.
+  int rows_in_slab(int slab) const;
+  /// Slabs [first, end) of a band of root cells, 0 <= band < num_bands().
+  struct Range {
+    int first, end;
+  };
+  int num_bands() const { return static_cast<int>(bands_.size()); }
+  Range band(int index) const { return bands_[static_cast<std::size_t>(index)]; }
+
+  /// Densities of a slab at every sample; padding is left alone.
+  void decode(int slab, float* samples) const;
+  /// gradient (all parameters) += dL/d parameters; returns dL/d bias.
+  double decode_adjoint(int slab, const float* samples, const float* grad_samples,
+                        float* gradient) const;
+  /// Densities of one row of the volume, [segment][x][z] without padding.
+  void decode_row(std::int64_t row, float* densities) const;
+  /// Floats that decode_row writes, and where each segment's begin.
+  std::size_t row_size() const { return row_origins_.back(); }
+  std::size_t row_origin(std::size_t segment) const { return row_origins_[segment]; }
+
+  /// Leaves that slabs of a band sample.
+  std::vector<int> leaves_of_band(int band) const;
+
+ private:
+  // The samples of one segment that lie in one leaf.
+  struct Piece {
+    int leaf = 0;
+    std::size_t segment = 0;
+    int first_sample = 0;
+    std::vector<int> lower_x;
+    std::vector<float> fraction_x;
+    field::LaneRows rows;
+  };
+  // Interpolation along z for a number of vertices, shared by pieces.
+  struct TapsZ {
+    std::size_t segment = 0;
+    int num_vertices = 0;
+    std::vector<int> lower;
+    std::vector<float> fraction;
+  };
+  std::vector<Piece> pieces_across(std::int64_t y0, std::int64_t y1) const;
+  const TapsZ& taps_z(std::size_t segment, int num_vertices) const;
+  kernels::LeafPiece kernel_piece(const Piece& piece) const;
+  std::ptrdiff_t sample_offset(const Piece& piece) const;
+
+  const field::Field& field_;
+  SampleGrid grid_;
+  std::int64_t first_row_, num_rows_;
+  std::vector<std::vector<Piece>> slabs_;
+  std::vector<Range> bands_;
+  std::vector<TapsZ> taps_z_;
+  std::vector<std::size_t> row_origins_;
+};
+
+}  // namespace tomofield::projection
