@@ -30,9 +30,11 @@ install_packages() {
     echo "setup: this is not a Debian system (no dpkg-query); install what packages.txt lists by other means, then run 'cmake --preset release' and 'cmake --build --preset release'." >&2
     return 1
   fi
+  local missing
   local -a packages
-  mapfile -t packages < <(missing_packages)
-  [ "${#packages[@]}" -gt 0 ] || return 0
+  missing=$(missing_packages)
+  [ -n "$missing" ] || return 0
+  mapfile -t packages <<<"$missing"
   if [ "$(id -u)" -ne 0 ] && ! command -v sudo >/dev/null; then
     echo "setup: these Debian packages are missing, and installing them needs root or sudo: ${packages[*]}. Run 'apt-get install ${packages[*]}' as root, then run this again." >&2
     return 1
