@@ -14,18 +14,18 @@ enum class Contrast { kDark, kBright };
 
 /// Where a tilt series is and how its intensities are to be read.
 struct TiltSeriesOptions {
-  std::filesystem::path stack;                  ///< MRC stack, raw or aligned
-  std::optional<std::filesystem::path> tlt;     ///< .tlt or .rawtlt, one angle in degrees a section
-  std::optional<std::filesystem::path> xf;      ///< IMOD raw → aligned transforms
-  std::optional<std::filesystem::path> xtilt;   ///< IMOD x-axis tilt, degrees a section
-  std::optional<std::filesystem::path> aln;     ///< AreTomo alignment (angles, rotation, shifts)
-  std::optional<std::filesystem::path> mdoc;    ///< SerialEM metadata (angles, pixel size)
-  std::string exclude;                          ///< 1-based sections left out: "1-3,40"
-  double bin = 1.0;                             ///< reduce views by this factor, >= 1
-  std::optional<double> angpix;                 ///< or to this pixel size in Å
-  std::optional<double> pixel_size_A;           ///< overrides the header's pixel size
+  std::filesystem::path stack;                 ///< MRC stack, raw or aligned
+  std::optional<std::filesystem::path> tlt;    ///< .tlt or .rawtlt, one angle in degrees a section
+  std::optional<std::filesystem::path> xf;     ///< IMOD raw → aligned transforms
+  std::optional<std::filesystem::path> xtilt;  ///< IMOD x-axis tilt, degrees a section
+  std::optional<std::filesystem::path> aln;    ///< AreTomo alignment (angles, rotation, shifts)
+  std::optional<std::filesystem::path> mdoc;   ///< SerialEM metadata (angles, pixel size)
+  std::string exclude;                         ///< 1-based sections left out: "1-3,40"
+  double bin = 1.0;                            ///< reduce views by this factor, >= 1
+  std::optional<double> angpix;                ///< or to this pixel size in Å
+  std::optional<double> pixel_size_A;          ///< overrides the header's pixel size
   Contrast contrast = Contrast::kDark;
-  bool take_log = false;                        ///< −ln(I / I0) instead of I0 − I; dark only
+  bool take_log = false;  ///< −ln(I / I0) instead of I0 − I; dark only
 };
 
 /// One view of the series.
@@ -49,8 +49,8 @@ class TiltSeries {
   const std::vector<View>& views() const;  ///< in the stack's order, excluded ones absent
   std::int64_t width() const;              ///< pixels of an aligned, binned view
   std::int64_t height() const;
-  double pixel_size_A() const;             ///< of an aligned, binned view
-  double bin_factor() const;               ///< unbinned pixels a pixel, exact
+  double pixel_size_A() const;  ///< of an aligned, binned view
+  double bin_factor() const;    ///< unbinned pixels a pixel, exact
 
   /// View `view` (an index into views()) as height × width line integrals in
   /// the data's units (I0 − I, −ln(I/I0), or as stored), and which pixels are

@@ -1,0 +1,72 @@
+#include "tilt_series/noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "tilt_series/binning.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+constexpr std::size_t kFewestDifferences = 64;
+
+double median_in_place(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// From mixed second differences at the image's own scale; 0 if there are too few.
+double sigma_of_differences(const MaskedImage& image) {
+  std::vector<float> differences;
+  differences.reserve(image.values.size());
+  for (std::int64_t y = 0; y + 1 < image.height; ++y) {
+    for (std::int64_t x = 0; x + 1 < image.width; ++x) {
+      const std::size_t here = image.index(x, y), above = image.index(x, y + 1);
+      if (!(image.valid[here] && image.valid[here + 1] && image.valid[above] &&
+            image.valid[above + 1])) {
+        continue;
+      }
+      differences.push_back(image.values[here] - image.values[here + 1] - image.values[above] +
+                            image.values[above + 1]);
+    }
+  }
+  if (differences.size() < kFewestDifferences) return 0.0;
+  const auto median = static_cast<float>(median_in_place(differences));
+  for (float& value : differences) value = std::fabs(value - median);
+  constexpr double kSigmaOfMad = 1.4826;  // for a normal distribution
+  return kSigmaOfMad * median_in_place(differences) / 2.0;
+}
+
+double standard_deviation(const MaskedImage& image) {
+  double sum = 0.0, squares = 0.0, count = 0.0;
+  for (std::size_t i = 0; i < image.values.size(); ++i) {
+    if (!image.valid[i]) continue;
+    sum += image.values[i];
+    count += 1.0;
+  }
+  if (count == 0.0) return 0.0;
+  for (std::size_t i = 0; i < image.values.size(); ++i) {
+    if (image.valid[i]) squares += std::pow(image.values[i] - sum / count, 2);
+  }
+  return std::sqrt(squares / count);
+}
+
+}  // namespace
+
+double estimate_noise_sigma(const MaskedImage& view) {
+  const double at_one = sigma_of_differences(view);
+  const MaskedImage half = reduce_image(view, 2.0);
+  const double at_two = 2.0 * sigma_of_differences(half);
+  const double at_four = 4.0 * sigma_of_differences(reduce_image(half, 2.0));
+  // at_four / at_two <= at_two / at_one, without dividing by zero
+  const bool levels_off = at_four * at_one <= at_two * at_two;
+  const double sigma = at_two > at_one && levels_off ? at_two : at_one;
+  constexpr double kSmallestPart = 1e-3;
+  return std::max({sigma, kSmallestPart * standard_deviation(view),
+                   static_cast<double>(std::numeric_limits<float>::min())});
+}
+
+}  // namespace tomofield::tilt_series

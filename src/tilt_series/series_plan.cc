@@ -1,0 +1,194 @@
+#include "tilt_series/series_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "base/log.h"
+#include "io/alignment_files.h"
+#include "tilt_series/binning.h"
+#include "tilt_series/tilt_angles.h"
+#include "tomofield/error.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+/// In-plane transform of each section, and the rotation of the tilt axis that it undoes.
+struct InPlaneAlignment {
+  std::vector<std::optional<RawFromAligned>> of_section;  ///< none: not aligned (dark frame)
+  double sum_cos = 0.0, sum_sin = 0.0;                    ///< over the sections, of the rotation
+
+  /// Whether the aligned images are as wide as the raw ones are high.
+  bool swaps_sizes() const { return std::fabs(sum_sin) > std::fabs(sum_cos); }
+};
+
+RawFromAligned invert(const io::ImodTransform& t) {
+  const double determinant = t.a11 * t.a22 - t.a12 * t.a21;
+  RawFromAligned inverse;
+  inverse.m11 = t.a22 / determinant;
+  inverse.m12 = -t.a12 / determinant;
+  inverse.m21 = -t.a21 / determinant;
+  inverse.m22 = t.a11 / determinant;
+  inverse.shift_x_px = -(inverse.m11 * t.shift_x_px + inverse.m12 * t.shift_y_px);
+  inverse.shift_y_px = -(inverse.m21 * t.shift_x_px + inverse.m22 * t.shift_y_px);
+  return inverse;
+}
+
+InPlaneAlignment alignment_of_imod(const std::filesystem::path& path, const io::MrcReader& stack) {
+  const auto transforms = io::read_imod_transforms(path);
+  require_count(transforms.size(), path, "transforms", stack);
+  InPlaneAlignment alignment;
+  for (const io::ImodTransform& t : transforms) {
+    alignment.of_section.emplace_back(invert(t));
+    // A pure rotation is R(−ROT): cos on the diagonal, +sin ROT above it.
+    const double cosine = t.a11 + t.a22, sine = t.a12 - t.a21;
+    const double length = std::hypot(cosine, sine);
+    if (length == 0.0) continue;
+    alignment.sum_cos += cosine / length;
+    alignment.sum_sin += sine / length;
+  }
+  return alignment;
+}
+
+AreTomoSections read_aretomo(const std::filesystem::path& path, const io::MrcReader& stack) {
+  AreTomoSections aretomo{io::read_aretomo_alignment(path), {}};
+  const io::MrcHeader& header = stack.header();
+  const auto& raw_size = aretomo.alignment.raw_size;
+  if (raw_size && ((*raw_size)[0] != header.nx || (*raw_size)[1] != header.ny)) {
+    throw Error(
+        fmt::format("'{}' aligns images of {} × {} pixels but '{}' has {} × {}; give the "
+                    "stack that AreTomo aligned, unbinned",
+                    path.string(), (*raw_size)[0], (*raw_size)[1], stack.path().string(), header.nx,
+                    header.ny));
+  }
+  const auto sections =
+      io::assign_aretomo_sections(aretomo.alignment, path, header.nz, stack.path());
+  aretomo.row_of_section.resize(static_cast<std::size_t>(header.nz));
+  for (std::size_t row = 0; row < sections.size(); ++row) {
+    aretomo.row_of_section[static_cast<std::size_t>(sections[row])] = row;
+  }
+  if (aretomo.alignment.num_local_rows > 0) {
+    base::log_warning(
+        fmt::format("'{}' has local alignment, which is not applied: views are aligned as a whole",
+                    path.string()));
+  }
+  return aretomo;
+}
+
+InPlaneAlignment alignment_of_aretomo(const AreTomoSections& aretomo) {
+  InPlaneAlignment alignment;
+  for (const auto& row_index : aretomo.row_of_section) {
+    alignment.of_section.emplace_back();
+    if (!row_index) continue;
+    const io::AreTomoRow& row = aretomo.alignment.rows[*row_index];
+    const double rotation_rad = row.rotation_deg * std::numbers::pi / 180.0;
+    const double cosine = std::cos(rotation_rad), sine = std::sin(rotation_rad);
+    alignment.of_section.back() =
+        RawFromAligned{cosine, -sine, sine, cosine, row.shift_x_px, row.shift_y_px};
+    alignment.sum_cos += cosine;
+    alignment.sum_sin += sine;
+  }
+  return alignment;
+}
+
+/// Å an unbinned pixel: --pixel-size, else the header's, else the mdoc's.
+double find_pixel_size(const TiltSeriesOptions& options, const io::MrcReader& stack,
+                       const std::optional<io::Mdoc>& mdoc) {
+  if (options.pixel_size_A) {
+    if (std::isfinite(*options.pixel_size_A) && *options.pixel_size_A > 0) {
+      return *options.pixel_size_A;
+    }
+    throw Error(fmt::format("the pixel size {} Å is not a positive number", *options.pixel_size_A));
+  }
+  const double in_header_A = stack.header().voxel_size_A[0];
+  const bool is_default = in_header_A == 0.0 || in_header_A == 1.0;
+  if (is_default && mdoc && mdoc->pixel_spacing_A.value_or(0.0) > 0) return *mdoc->pixel_spacing_A;
+  if (in_header_A > 0.0) return in_header_A;
+  base::log_warning(fmt::format(
+      "'{}' has no pixel size; 1 Å is assumed (give it with --pixel-size)", stack.path().string()));
+  return 1.0;
+}
+
+double find_bin_factor(const TiltSeriesOptions& options, const SeriesPlan& plan) {
+  if (options.angpix && options.bin != 1.0) {
+    throw Error("--bin and --angpix both set the size of the binned pixels; give one of them");
+  }
+  const double factor = options.angpix ? *options.angpix / plan.pixel_size_A : options.bin;
+  if (!std::isfinite(factor) || factor < 1.0 - 1e-6) {
+    throw Error(options.angpix
+                    ? fmt::format("--angpix {} is below the stack's pixel size of {} Å: views can "
+                                  "be reduced, not enlarged",
+                                  *options.angpix, plan.pixel_size_A)
+                    : fmt::format("--bin {} must be 1 or more", options.bin));
+  }
+  if (reduced_size(std::min(plan.aligned_width, plan.aligned_height), std::max(factor, 1.0)) < 1) {
+    throw Error(fmt::format("binning by {} leaves nothing of views of {} × {} pixels", factor,
+                            plan.aligned_width, plan.aligned_height));
+  }
+  return std::max(factor, 1.0);
+}
+
+std::vector<io::NumberLine> read_x_tilts(const TiltSeriesOptions& options,
+                                         const io::MrcReader& stack) {
+  if (!options.xtilt) {
+    return std::vector<io::NumberLine>(static_cast<std::size_t>(stack.header().nz));
+  }
+  auto x_tilts = io::read_number_column(*options.xtilt, "an x-axis tilt in degrees");
+  require_count(x_tilts.size(), *options.xtilt, "x-axis tilts", stack);
+  return x_tilts;
+}
+
+void require_compatible(const TiltSeriesOptions& options) {
+  if (options.xf && options.aln) {
+    throw Error(fmt::format("'{}' (--xf) and '{}' (--aln) both align the views; give one of them",
+                            options.xf->string(), options.aln->string()));
+  }
+  if (options.take_log && options.contrast == Contrast::kBright) {
+    throw Error("--log is for transmitted intensities (--contrast dark); bright data need none");
+  }
+}
+
+}  // namespace
+
+SeriesPlan plan_series(const TiltSeriesOptions& options, const io::MrcReader& stack) {
+  require_compatible(options);
+  const io::MrcHeader& header = stack.header();
+  const auto mdoc = options.mdoc ? std::optional(io::read_mdoc(*options.mdoc)) : std::nullopt;
+  const auto aretomo =
+      options.aln ? std::optional(read_aretomo(*options.aln, stack)) : std::nullopt;
+  const TiltAngles angles = find_tilt_angles(options, stack, aretomo, mdoc);
+  const std::vector<io::NumberLine> x_tilts = read_x_tilts(options, stack);
+  const auto excluded = io::parse_section_list(options.exclude, header.nz);
+
+  std::optional<InPlaneAlignment> alignment;
+  if (options.xf) alignment = alignment_of_imod(*options.xf, stack);
+  if (aretomo) alignment = alignment_of_aretomo(*aretomo);
+
+  SeriesPlan plan;
+  plan.angle_source = angles.source;
+  plan.is_raw = alignment.has_value();
+  const bool swaps_sizes = alignment && alignment->swaps_sizes();
+  plan.aligned_width = swaps_sizes ? header.ny : header.nx;
+  plan.aligned_height = swaps_sizes ? header.nx : header.ny;
+  plan.pixel_size_A = find_pixel_size(options, stack, mdoc);
+  plan.bin_factor = find_bin_factor(options, plan);
+  for (std::int64_t section = 0; section < header.nz; ++section) {
+    const auto at = static_cast<std::size_t>(section);
+    const bool is_dark = alignment && !alignment->of_section[at];
+    if (is_dark || std::binary_search(excluded.begin(), excluded.end(), section)) continue;
+    PlannedView planned;
+    planned.view = {section, require_usable_tilt(angles, section), x_tilts[at].value};
+    if (alignment) planned.raw_from_aligned = *alignment->of_section[at];
+    plan.views.push_back(planned);
+  }
+  if (plan.views.empty()) {
+    throw Error(fmt::format("no section of '{}' is left to reconstruct from; exclude fewer",
+                            stack.path().string()));
+  }
+  return plan;
+}
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "io/mrc.h"
+#include "tilt_series/align_image.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::tilt_series {
+
+/// A view that is kept, and how its aligned image comes from its section.
+struct PlannedView {
+  View view;
+  RawFromAligned raw_from_aligned;
+};
+
+/// Everything about a series that follows from the small files and the
+/// stack's header, before any pixel is read.
+struct SeriesPlan {
+  std::vector<PlannedView> views;  ///< in the stack's order
+  bool is_raw = false;             ///< images are resampled; else the stack is aligned already
+  std::int64_t aligned_width = 0;  ///< unbinned pixels
+  std::int64_t aligned_height = 0;
+  double pixel_size_A = 1.0;  ///< of an unbinned pixel
+  double bin_factor = 1.0;
+  std::string angle_source;  ///< for messages: a file name, or the stack's header
+};
+
+/// Brings the options, the files that they name and the stack together.
+/// Throws Error where they do not fit each other or cannot be right.
+SeriesPlan plan_series(const TiltSeriesOptions& options, const io::MrcReader& stack);
+
+}  // namespace tomofield::tilt_series

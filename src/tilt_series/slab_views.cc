@@ -1,0 +1,115 @@
+#include "tilt_series/slab_views.h"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "kernels/lanes.h"
+#include "tomofield/error.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+using kernels::kLanes;
+
+// Up to here a series is kept in memory: a 1K series of 60 views is 250 MB.
+constexpr std::size_t kInMemoryBytes = std::size_t{1} << 30;
+
+void* map_scratch_file(const std::filesystem::path& dir, std::size_t bytes) {
+  std::string name = (dir / "tomofield-rays-XXXXXX").string();
+  const int fd = mkstemp(name.data());
+  if (fd < 0) {
+    throw Error(
+        fmt::format("cannot make a scratch file in {} ({}): the prepared rays need {} bytes there",
+                    dir.string(), std::strerror(errno), bytes));
+  }
+  unlink(name.c_str());
+  void* memory = MAP_FAILED;
+  int code = posix_fallocate(fd, 0, static_cast<off_t>(bytes));
+  if (code == 0) {
+    memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+    code = errno;
+  }
+  close(fd);
+  if (memory == MAP_FAILED) {
+    throw Error(fmt::format(
+        "cannot reserve {} bytes for the prepared rays in {} ({}): free some space there", bytes,
+        dir.string(), std::strerror(code)));
+  }
+  return memory;
+}
+
+}  // namespace
+
+SlabViews::SlabViews(const Shape& shape, double unit, const ReadView& read_view,
+                     const std::filesystem::path& scratch_dir)
+    : shape_(shape), num_slabs_(static_cast<int>((shape.num_rows + kLanes - 1) / kLanes)) {
+  const std::size_t lines = static_cast<std::size_t>(num_slabs_) * shape.num_views *
+                            static_cast<std::size_t>(shape.width);
+  const std::size_t ray_bytes = lines * kLanes * sizeof(float);
+  bytes_ = ray_bytes + lines * sizeof(std::uint16_t);
+  if (bytes_ <= kInMemoryBytes) {
+    memory_ = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (memory_ == MAP_FAILED)
+      throw Error(fmt::format("not enough memory for the rays: {} bytes", bytes_));
+  } else {
+    memory_ = map_scratch_file(scratch_dir, bytes_);
+  }
+  rays_ = static_cast<float*>(memory_);
+  mask_ = reinterpret_cast<std::uint16_t*>(static_cast<char*>(memory_) + ray_bytes);
+  try {
+    fill(unit, read_view);
+  } catch (...) {
+    munmap(memory_, bytes_);
+    throw;
+  }
+}
+
+SlabViews::~SlabViews() { munmap(memory_, bytes_); }
+
+std::size_t SlabViews::line(int slab, int view) const {
+  return (static_cast<std::size_t>(slab) * shape_.num_views + static_cast<std::size_t>(view)) *
+         static_cast<std::size_t>(shape_.width);
+}
+
+const float* SlabViews::rays(int slab, int view) const { return rays_ + line(slab, view) * kLanes; }
+const std::uint16_t* SlabViews::mask(int slab, int view) const { return mask_ + line(slab, view); }
+
+void SlabViews::fill(double unit, const ReadView& read_view) {
+  const std::size_t width = static_cast<std::size_t>(shape_.width);
+  const std::size_t pixels = width * static_cast<std::size_t>(shape_.height);
+  std::vector<float> image(pixels);
+  std::vector<std::uint8_t> valid(pixels);
+  const float per_unit = static_cast<float>(1.0 / unit);
+  for (std::size_t v = 0; v < shape_.num_views; ++v) {
+    read_view(v, image, valid);
+    for (std::int64_t row = 0; row < shape_.num_rows; ++row) {
+      const std::size_t first = static_cast<std::size_t>(shape_.first_row + row) * width;
+      const std::size_t to = line(static_cast<int>(row / kLanes), static_cast<int>(v));
+      const int lane = static_cast<int>(row % kLanes);
+      for (std::size_t x = 0; x < width; ++x) {
+        if (!valid[first + x]) continue;
+        rays_[(to + x) * kLanes + static_cast<std::size_t>(lane)] = image[first + x] * per_unit;
+        mask_[to + x] = static_cast<std::uint16_t>(mask_[to + x] | 1u << lane);
+      }
+    }
+  }
+}
+
+std::int64_t SlabViews::num_valid(int view) const {
+  std::int64_t count = 0;
+  for (int slab = 0; slab < num_slabs_; ++slab) {
+    const std::uint16_t* m = mask(slab, view);
+    for (std::int64_t x = 0; x < shape_.width; ++x) count += std::popcount(m[x]);
+  }
+  return count;
+}
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <span>
+
+namespace tomofield::tilt_series {
+
+/// Reads a view as height × width floats and which pixels are measurements.
+using ReadView =
+    std::function<void(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid)>;
+
+/// The measured rays in the order in which slabs use them: [slab, view, x, lane]
+/// with 16 rows a slab, and a bit mask [slab, view, x] of the rays that count
+/// (rows past the last one are masked). Large series lie in an unlinked file
+/// in `scratch_dir` that the kernel pages; small ones in memory.
+class SlabViews {
+ public:
+  struct Shape {
+    std::size_t num_views = 0;
+    std::int64_t width = 0, height = 0;        ///< of a view
+    std::int64_t first_row = 0, num_rows = 0;  ///< rows of the view that slabs cover
+  };
+  /// Intensities are divided by `unit`. Throws Error if the scratch file cannot be made.
+  SlabViews(const Shape& shape, double unit, const ReadView& read_view,
+            const std::filesystem::path& scratch_dir);
+  ~SlabViews();
+  SlabViews(const SlabViews&) = delete;
+  SlabViews& operator=(const SlabViews&) = delete;
+
+  const Shape& shape() const { return shape_; }
+  int num_slabs() const { return num_slabs_; }
+  const float* rays(int slab, int view) const;          ///< [x, lane]
+  const std::uint16_t* mask(int slab, int view) const;  ///< [x], bit = lane
+  /// Rays that count in a view.
+  std::int64_t num_valid(int view) const;
+
+ private:
+  void fill(double unit, const ReadView& read_view);
+  std::size_t line(int slab, int view) const;
+
+  Shape shape_;
+  int num_slabs_ = 0;
+  std::size_t bytes_ = 0;
+  void* memory_ = nullptr;
+  float* rays_ = nullptr;
+  std::uint16_t* mask_ = nullptr;
+};
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,96 @@
+#include "tilt_series/tilt_angles.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tomofield/error.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+// Beyond it a ray crosses several times the specimen's thickness, and the
+// margin that it would need grows without bound.
+constexpr double kLargestTilt_deg = 80.0;
+
+TiltAngles angles_of_mdoc(const io::Mdoc& mdoc, const std::filesystem::path& path,
+                          const io::MrcReader& stack) {
+  require_count(mdoc.sections.size(), path, "sections", stack);
+  TiltAngles angles{path.string(), {}};
+  for (std::size_t i = 0; i < mdoc.sections.size(); ++i) {
+    const io::MdocSection& section = mdoc.sections[i];
+    if (section.section != static_cast<std::int64_t>(i)) {
+      throw Error(
+          fmt::format("'{}', line {}: after {} sections comes [ZValue = {}]; the sections "
+                      "must be numbered 0 to {} as those of '{}'",
+                      path.string(), section.line, i, section.section, mdoc.sections.size() - 1,
+                      stack.path().string()));
+    }
+    angles.of_section.emplace_back();
+    if (section.tilt_deg) angles.of_section.back() = {*section.tilt_deg, section.line};
+  }
+  return angles;
+}
+
+TiltAngles angles_of_aretomo(const AreTomoSections& aretomo, const std::filesystem::path& path) {
+  TiltAngles angles{path.string(), {}};
+  for (const auto& row : aretomo.row_of_section) {
+    angles.of_section.emplace_back();
+    if (!row) continue;
+    const io::AreTomoRow& found = aretomo.alignment.rows[*row];
+    angles.of_section.back() = {found.tilt_deg, found.line};
+  }
+  return angles;
+}
+
+}  // namespace
+
+void require_count(std::size_t found, const std::filesystem::path& file, const char* what,
+                   const io::MrcReader& stack) {
+  if (static_cast<std::int64_t>(found) == stack.header().nz) return;
+  throw Error(
+      fmt::format("'{}' has {} {} but the stack '{}' has {} sections; give the file that "
+                  "belongs to this stack (sections are left out with --exclude alone)",
+                  file.string(), found, what, stack.path().string(), stack.header().nz));
+}
+
+TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::MrcReader& stack,
+                            const std::optional<AreTomoSections>& aretomo,
+                            const std::optional<io::Mdoc>& mdoc) {
+  if (options.tlt) {
+    const auto numbers = io::read_number_column(*options.tlt, "a tilt angle in degrees");
+    require_count(numbers.size(), *options.tlt, "angles", stack);
+    return {options.tlt->string(), {numbers.begin(), numbers.end()}};
+  }
+  if (aretomo) return angles_of_aretomo(*aretomo, *options.aln);
+  if (mdoc) return angles_of_mdoc(*mdoc, *options.mdoc, stack);
+  const auto& extended = stack.header().extended_tilt_deg;
+  if (extended.empty()) {
+    throw Error(
+        fmt::format("no tilt angles for '{}': its header has none, so give them with --tlt FILE "
+                    "(.tlt or .rawtlt), --aln FILE (AreTomo) or --mdoc FILE (SerialEM)",
+                    stack.path().string()));
+  }
+  TiltAngles angles{fmt::format("extended header of {}", stack.path().string()), {}};
+  for (const double tilt_deg : extended) angles.of_section.push_back(io::NumberLine{tilt_deg, 0});
+  return angles;
+}
+
+double require_usable_tilt(const TiltAngles& angles, std::int64_t section) {
+  const auto& angle = angles.of_section[static_cast<std::size_t>(section)];
+  if (!angle) {
+    throw Error(fmt::format("'{}' has no tilt angle for section {}; leave it out with --exclude {}",
+                            angles.source, section + 1, section + 1));
+  }
+  if (std::fabs(angle->value) > kLargestTilt_deg) {
+    const std::string line = angle->line > 0 ? fmt::format(", line {}", angle->line) : "";
+    throw Error(
+        fmt::format("'{}'{}: the tilt angle {}° of section {} is beyond ±{:.0f}°, which "
+                    "cannot be reconstructed; correct it, or leave the section out with "
+                    "--exclude {}",
+                    angles.source, line, angle->value, section + 1, kLargestTilt_deg, section + 1));
+  }
+  return angle->value;
+}
+
+}  // namespace tomofield::tilt_series

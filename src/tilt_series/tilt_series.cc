@@ -1,0 +1,236 @@
+#include "tilt_series/tilt_series.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.h"
+#include "base/log.h"
+#include "io/mrc.h"
+#include "tilt_series/align_image.h"
+#include "tilt_series/binning.h"
+#include "tilt_series/flat_fill.h"
+#include "tilt_series/noise.h"
+#include "tilt_series/series_plan.h"
+#include "tomofield/error.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+/// What is wrong with the raw pixels of a section.
+struct PixelCensus {
+  std::int64_t num_not_finite = 0;
+  bool is_constant = true;
+};
+
+/// Marks pixels that are NaN or infinite as no measurements.
+PixelCensus mask_not_finite(MaskedImage* image) {
+  PixelCensus census;
+  const float* first_finite = nullptr;
+  for (std::size_t i = 0; i < image->values.size(); ++i) {
+    if (!std::isfinite(image->values[i])) {
+      image->valid[i] = 0;
+      image->values[i] = 0.0f;
+      ++census.num_not_finite;
+      continue;
+    }
+    if (first_finite == nullptr) first_finite = &image->values[i];
+    census.is_constant = census.is_constant && image->values[i] == *first_finite;
+  }
+  return census;
+}
+
+/// Means of square blocks of valid pixels, appended to `means`. They are much
+/// less noisy than pixels, so that a high percentile of them is an intensity
+/// of the specimen's thinnest places and not of the noise.
+void append_block_means(const MaskedImage& image, std::vector<float>* means) {
+  constexpr std::int64_t kLargestBlock = 8;
+  const std::int64_t block =
+      std::clamp<std::int64_t>(std::min(image.width, image.height) / 32, 1, kLargestBlock);
+  const MaskedImage blocks = reduce_image(image, static_cast<double>(block));
+  for (std::size_t i = 0; i < blocks.values.size(); ++i) {
+    if (blocks.valid[i]) means->push_back(blocks.values[i]);
+  }
+}
+
+double percentile_in_place(std::vector<float>& values, double fraction) {
+  const auto rank =
+      static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  return values[static_cast<std::size_t>(rank)];
+}
+
+// I0 is this percentile of the block means of all views together: the thinnest
+// half per cent of what was seen, beyond the reach of single hot pixels.
+constexpr double kEmptyBeamFraction = 0.995;
+
+// Intensities below this part of I0 are raised to it before the logarithm: a
+// transmission so low is never measured, it comes from noise and subtraction.
+constexpr double kLogFloor = 1e-3;
+
+constexpr double kMostNotFinite = 0.01;
+
+}  // namespace
+
+struct TiltSeries::Impl {
+  TiltSeriesOptions options;
+  io::MrcReader stack;
+  SeriesPlan plan;
+  std::vector<View> views;
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+  double empty_beam = 0.0;
+  std::vector<double> noise_sigma;
+
+  explicit Impl(const TiltSeriesOptions& given)
+      : options(given), stack(given.stack), plan(plan_series(given, stack)) {
+    for (const PlannedView& planned : plan.views) views.push_back(planned.view);
+    width = reduced_size(plan.aligned_width, plan.bin_factor);
+    height = reduced_size(plan.aligned_height, plan.bin_factor);
+    survey();
+    base::log_info(fmt::format(
+        "'{}': {} of {} sections, tilts {:.1f}° to {:.1f}° from {}, views of {} × {} pixels of {} "
+        "Å",
+        options.stack.string(), views.size(), stack.header().nz,
+        std::min_element(views.begin(), views.end(), by_tilt)->tilt_deg,
+        std::max_element(views.begin(), views.end(), by_tilt)->tilt_deg, plan.angle_source, width,
+        height, plan.pixel_size_A * plan.bin_factor));
+  }
+
+  static bool by_tilt(const View& a, const View& b) { return a.tilt_deg < b.tilt_deg; }
+
+  std::string describe(std::size_t view) const {
+    return fmt::format("section {} (tilt {}°) of '{}'", views[view].section + 1,
+                       views[view].tilt_deg, options.stack.string());
+  }
+
+  /// The aligned, binned intensities of a view, as stored.
+  MaskedImage load(std::size_t view, PixelCensus* census) const {
+    const io::MrcHeader& header = stack.header();
+    MaskedImage image(header.nx, header.ny);
+    stack.read_section(views[view].section, image.values);
+    *census = mask_not_finite(&image);
+    if (!plan.is_raw) mask_flat_fill(options.contrast, &image);
+    const RawFromAligned& transform = plan.views[view].raw_from_aligned;
+    const bool keeps_sizes = plan.aligned_width == header.nx && plan.aligned_height == header.ny;
+    if (!(transform.is_identity() && keeps_sizes)) {
+      image = align_image(image, transform, plan.aligned_width, plan.aligned_height);
+    }
+    return plan.bin_factor == 1.0 ? image : reduce_image(image, plan.bin_factor);
+  }
+
+  /// Intensities to line integrals; returns how many pixels the floor raised.
+  std::int64_t convert(MaskedImage* image) const {
+    if (options.contrast == Contrast::kBright) return 0;
+    std::int64_t num_raised = 0;
+    for (std::size_t i = 0; i < image->values.size(); ++i) {
+      if (!image->valid[i]) continue;
+      float& value = image->values[i];
+      if (!options.take_log) {
+        value = static_cast<float>(empty_beam - value);
+        continue;
+      }
+      const double transmission = value / empty_beam;
+      if (transmission < kLogFloor) ++num_raised;
+      value = static_cast<float>(-std::log(std::max(transmission, kLogFloor)));
+    }
+    return num_raised;
+  }
+
+  void require_measurements(std::size_t view, const PixelCensus& census,
+                            const MaskedImage& image) const {
+    const auto num_pixels = static_cast<double>(stack.header().nx * stack.header().ny);
+    const double part = static_cast<double>(census.num_not_finite) / num_pixels;
+    if (part > kMostNotFinite) {
+      throw Error(fmt::format(
+          "{} has {} NaN or infinite pixels, {:.1f} % of all and more than the "
+          "1 % that can be left out; repair it or give --exclude {}",
+          describe(view), census.num_not_finite, 100.0 * part, views[view].section + 1));
+    }
+    if (census.is_constant) {
+      throw Error(
+          fmt::format("{} is constant: every pixel has the same value; leave it out with "
+                      "--exclude {}",
+                      describe(view), views[view].section + 1));
+    }
+    if (std::find(image.valid.begin(), image.valid.end(), 1) == image.valid.end()) {
+      throw Error(
+          fmt::format("{} has no pixel left: its alignment moves it out of the view, or it "
+                      "is all flat fill; leave it out with --exclude {}",
+                      describe(view), views[view].section + 1));
+    }
+    if (census.num_not_finite > 0) {
+      base::log_warning(fmt::format("{} has {} NaN or infinite pixels, which are left out",
+                                    describe(view), census.num_not_finite));
+    }
+  }
+
+  /// Reads every view once: refuses what cannot be used, finds I0 and the
+  /// noise. The noise of I0 − I is that of I; only a logarithm needs I0 first.
+  void survey() {
+    std::vector<float> block_means;
+    for (std::size_t view = 0; view < views.size(); ++view) {
+      PixelCensus census;
+      const MaskedImage image = load(view, &census);
+      require_measurements(view, census, image);
+      if (options.contrast == Contrast::kDark) append_block_means(image, &block_means);
+      if (!options.take_log) noise_sigma.push_back(estimate_noise_sigma(image));
+    }
+    if (options.contrast == Contrast::kBright) return;
+    if (!block_means.empty()) empty_beam = percentile_in_place(block_means, kEmptyBeamFraction);
+    if (options.take_log) survey_logarithms();
+  }
+
+  void survey_logarithms() {
+    if (!(empty_beam > 0.0)) {
+      throw Error(
+          fmt::format("--log needs positive intensities, but the empty beam of '{}' is "
+                      "found at {}; the data may be normalised or line integrals already: "
+                      "leave --log out",
+                      options.stack.string(), empty_beam));
+    }
+    std::int64_t num_raised = 0;
+    for (std::size_t view = 0; view < views.size(); ++view) {
+      PixelCensus census;
+      MaskedImage image = load(view, &census);
+      num_raised += convert(&image);
+      noise_sigma.push_back(estimate_noise_sigma(image));
+    }
+    if (num_raised == 0) return;
+    base::log_warning(fmt::format(
+        "{} pixels of '{}' ({:.3g} %) are zero, negative or below a thousandth of the empty beam "
+        "({}); they are raised to it before the logarithm",
+        num_raised, options.stack.string(),
+        100.0 * static_cast<double>(num_raised) /
+            static_cast<double>(width * height * static_cast<std::int64_t>(views.size())),
+        empty_beam));
+  }
+};
+
+TiltSeries::TiltSeries(const TiltSeriesOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+TiltSeries::~TiltSeries() = default;
+TiltSeries::TiltSeries(TiltSeries&&) noexcept = default;
+
+const std::vector<View>& TiltSeries::views() const { return impl_->views; }
+std::int64_t TiltSeries::width() const { return impl_->width; }
+std::int64_t TiltSeries::height() const { return impl_->height; }
+double TiltSeries::pixel_size_A() const { return impl_->plan.pixel_size_A * bin_factor(); }
+double TiltSeries::bin_factor() const { return impl_->plan.bin_factor; }
+const std::vector<double>& TiltSeries::noise_sigma() const { return impl_->noise_sigma; }
+double TiltSeries::empty_beam() const { return impl_->empty_beam; }
+
+void TiltSeries::read_view(std::size_t view, std::span<float> image,
+                           std::span<std::uint8_t> valid) const {
+  TOMOFIELD_CHECK(view < impl_->views.size(), fmt::format("there is no view {}", view));
+  TOMOFIELD_CHECK(
+      image.size() == static_cast<std::size_t>(width() * height()) && valid.size() == image.size(),
+      "image and mask must have width × height elements");
+  PixelCensus census;
+  MaskedImage loaded = impl_->load(view, &census);
+  impl_->convert(&loaded);
+  std::copy(loaded.values.begin(), loaded.values.end(), image.begin());
+  std::copy(loaded.valid.begin(), loaded.valid.end(), valid.begin());
+}
+
+}  // namespace tomofield::tilt_series
