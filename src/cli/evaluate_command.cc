@@ -9,7 +9,7 @@
 
 #include "cli/commands.h"
 #include "evaluate/compare.h"
-#include "io/atomic_file.h"
+#include "io/json.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
@@ -47,8 +47,8 @@ void run_evaluate(const EvaluateArguments& arguments) {
   }
   const auto comparison = evaluate::compare_files(arguments.reconstruction, arguments.truth, box);
   if (!arguments.json.empty()) {
-    io::write_text_file(arguments.json, evaluate::comparison_json(
-                                            comparison, arguments.reconstruction, arguments.truth));
+    io::write_json(arguments.json, evaluate::comparison_json(comparison, arguments.reconstruction,
+                                                             arguments.truth));
   }
   print_table(comparison);
 }

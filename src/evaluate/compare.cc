@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
-#include <span>
+#include <string>
+#include <vector>
 
 #include "base/log.h"
 #include "io/mrc.h"
@@ -92,10 +92,6 @@ base::Volume read_box(const io::MrcReader& file, const Box& box) {
   return volume;
 }
 
-nlohmann::ordered_json number(double value) {
-  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
-}
-
 }  // namespace
 
 Comparison compare(const base::Volume& reconstruction, const base::Volume& truth) {
@@ -133,22 +129,21 @@ Comparison compare_files(const std::filesystem::path& reconstruction,
   return comparison;
 }
 
-std::string comparison_json(const Comparison& comparison,
-                            const std::filesystem::path& reconstruction,
-                            const std::filesystem::path& truth) {
-  const nlohmann::ordered_json json{{"reconstruction", reconstruction.string()},
-                                    {"truth", truth.string()},
-                                    {"psnr_raw_dB", number(comparison.psnr.raw_dB)},
-                                    {"psnr_affine_dB", number(comparison.psnr.affine_dB)},
-                                    {"ssim_raw", comparison.ssim.raw},
-                                    {"ssim_affine", comparison.ssim.affine},
-                                    {"correlation", comparison.psnr.correlation},
-                                    {"scale", comparison.psnr.scale},
-                                    {"offset", comparison.psnr.offset},
-                                    {"peak", comparison.psnr.peak},
-                                    {"box_first", comparison.box.first},
-                                    {"box_last", comparison.box.last}};
-  return json.dump(1) + "\n";
+nlohmann::json comparison_json(const Comparison& comparison,
+                               const std::filesystem::path& reconstruction,
+                               const std::filesystem::path& truth) {
+  return {{"reconstruction", reconstruction.string()},
+          {"truth", truth.string()},
+          {"psnr_raw_dB", comparison.psnr.raw_dB},
+          {"psnr_affine_dB", comparison.psnr.affine_dB},
+          {"ssim_raw", comparison.ssim.raw},
+          {"ssim_affine", comparison.ssim.affine},
+          {"correlation", comparison.psnr.correlation},
+          {"scale", comparison.psnr.scale},
+          {"offset", comparison.psnr.offset},
+          {"peak", comparison.psnr.peak},
+          {"box_first", comparison.box.first},
+          {"box_last", comparison.box.last}};
 }
 
 }  // namespace tomofield::evaluate

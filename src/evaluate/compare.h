@@ -3,8 +3,8 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
-#include <string>
 
 #include "base/volume.h"
 #include "evaluate/psnr.h"
@@ -43,9 +43,9 @@ Comparison compare(const base::Volume& reconstruction, const base::Volume& truth
 Comparison compare_files(const std::filesystem::path& reconstruction,
                          const std::filesystem::path& truth, const std::optional<Box>& box);
 
-/// The comparison as JSON text; infinite PSNR is null.
-std::string comparison_json(const Comparison& comparison,
-                            const std::filesystem::path& reconstruction,
-                            const std::filesystem::path& truth);
+/// The comparison as JSON; an infinite PSNR is written as null.
+nlohmann::json comparison_json(const Comparison& comparison,
+                               const std::filesystem::path& reconstruction,
+                               const std::filesystem::path& truth);
 
 }  // namespace tomofield::evaluate

@@ -1,10 +1,8 @@
 #include "simulate/noise.h"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "base/check.h"
 #include "base/parallel.h"
 
 namespace tomofield::simulate {
@@ -63,17 +61,6 @@ void for_each_pixel(std::span<float> image, std::int64_t width, std::uint64_t se
 }
 
 }  // namespace
-
-double percentile(std::vector<float> values, double percent) {
-  TOMOFIELD_CHECK(!values.empty(), "percentile of nothing");
-  const double position = percent / 100.0 * static_cast<double>(values.size() - 1);
-  const auto low = static_cast<std::ptrdiff_t>(position);
-  std::nth_element(values.begin(), values.begin() + low, values.end());
-  const double below = values[static_cast<std::size_t>(low)];
-  if (low + 1 == static_cast<std::ptrdiff_t>(values.size())) return below;
-  const double above = *std::min_element(values.begin() + low + 1, values.end());
-  return below + (above - below) * (position - static_cast<double>(low));
-}
 
 std::int64_t poisson(double mean, base::Random& random) {
   return mean < 30.0 ? poisson_by_products(mean, random) : poisson_by_rejection(mean, random);

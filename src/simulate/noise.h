@@ -2,15 +2,10 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "base/random.h"
 
 namespace tomofield::simulate {
-
-/// The value below which `percent` of the values lie, linear between neighbours
-/// (numpy's default). Takes a copy, which it reorders. `values` must not be empty.
-double percentile(std::vector<float> values, double percent);
 
 /// Poisson deviate of mean `mean` >= 0: products of uniforms below a mean of
 /// 30, transformed rejection (PTRS; Hörmann, Insurance Math. Econ. 12, 1993) above.

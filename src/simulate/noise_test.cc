@@ -10,14 +10,6 @@
 namespace tomofield::simulate {
 namespace {
 
-TEST(Noise, PercentileInterpolatesLikeNumpy) {
-  const std::vector<float> values{5.0f, 1.0f, 4.0f, 2.0f};
-  EXPECT_DOUBLE_EQ(percentile(values, 0.0), 1.0);
-  EXPECT_DOUBLE_EQ(percentile(values, 50.0), 3.0);
-  EXPECT_DOUBLE_EQ(percentile(values, 90.0), 4.7);
-  EXPECT_DOUBLE_EQ(percentile(values, 100.0), 5.0);
-}
-
 TEST(Noise, PoissonHasItsMomentsInBothRegimes) {
   for (const double mean : {0.0, 0.3, 4.0, 29.5, 30.5, 100.0, 12345.0}) {
     base::Random random(11);

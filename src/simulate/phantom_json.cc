@@ -1,11 +1,9 @@
 #include "simulate/phantom_json.h"
 
-#include <nlohmann/json.hpp>
-
 namespace tomofield::simulate {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = nlohmann::json;
 
 Json options_json(const SimulationOptions& options) {
   const CellOptions& cell = options.cell;
@@ -46,8 +44,9 @@ Json bead_json(const Ellipsoid& e) {
 
 }  // namespace
 
-std::string phantom_json(const SimulationOptions& options, const Phantom& phantom,
-                         std::span<const SimulatedView> views, const SimulationSummary& summary) {
+nlohmann::json phantom_json(const SimulationOptions& options, const Phantom& phantom,
+                            std::span<const SimulatedView> views,
+                            const SimulationSummary& summary) {
   Json json{{"options", options_json(options)},
             {"slab_density", phantom.slab_density},
             {"half_width_px", phantom.half_width_px},
@@ -75,7 +74,7 @@ std::string phantom_json(const SimulationOptions& options, const Phantom& phanto
       json["gold_beads"].push_back(bead_json(body));
     }
   }
-  return json.dump(1) + "\n";
+  return json;
 }
 
 }  // namespace tomofield::simulate

@@ -1,7 +1,7 @@
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <span>
-#include <string>
 
 #include "simulate/phantom.h"
 #include "simulate/simulate_series.h"
@@ -9,10 +9,10 @@
 
 namespace tomofield::simulate {
 
-/// The record beside a simulated series, as JSON text: what was asked for, what
+/// The record beside a simulated series, as JSON: what was asked for, what
 /// every view went through, and every ellipsoid, with doubles that read back
 /// exactly. Positions and lengths in voxels about the volume's centre, (X, Y, Z).
-std::string phantom_json(const SimulationOptions& options, const Phantom& phantom,
-                         std::span<const SimulatedView> views, const SimulationSummary& summary);
+nlohmann::json phantom_json(const SimulationOptions& options, const Phantom& phantom,
+                            std::span<const SimulatedView> views, const SimulationSummary& summary);
 
 }  // namespace tomofield::simulate

@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "base/percentile.h"
 #include "io/atomic_file.h"
+#include "io/json.h"
 #include "io/mrc.h"
 #include "simulate/noise.h"
 #include "simulate/phantom.h"
@@ -108,8 +110,8 @@ double noise_sigma(const Phantom& phantom, const std::vector<SimulatedView>& vie
                                         });
   std::vector<float> image(static_cast<std::size_t>(phantom.shape.nx * phantom.shape.ny));
   project_view(phantom, frame_of(*nearest, phantom), image);
-  const double low = percentile(image, 0.5);
-  return noise * (percentile(std::move(image), 99.5) - low);
+  const double low = base::percentile(image, 0.5);
+  return noise * (base::percentile(std::move(image), 99.5) - low);
 }
 
 /// Both stacks, a view at a time; they appear under their names together.
@@ -189,7 +191,7 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
   write_views(files, phantom, views, options, summary.sigma);
   write_angles(files.angles, views);
   if (options.shift_spread_px > 0.0) write_transforms(files.transforms, views);
-  io::write_text_file(files.record, phantom_json(options, phantom, views, summary));
+  io::write_json(files.record, phantom_json(options, phantom, views, summary));
   return summary;
 }
 

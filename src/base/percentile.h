@@ -1,0 +1,25 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "base/check.h"
+
+namespace tomofield::base {
+
+/// The value below which `percent` of the values lie, linear between neighbours
+/// (numpy's default). Takes a copy, which it reorders. `values` must not be empty
+/// and hold no NaN.
+inline double percentile(std::vector<float> values, double percent) {
+  TOMOFIELD_CHECK(!values.empty(), "percentile of nothing");
+  const double position = percent / 100.0 * static_cast<double>(values.size() - 1);
+  const auto low = static_cast<std::ptrdiff_t>(position);
+  std::nth_element(values.begin(), values.begin() + low, values.end());
+  const double below = values[static_cast<std::size_t>(low)];
+  if (low + 1 == static_cast<std::ptrdiff_t>(values.size())) return below;
+  const double above = *std::min_element(values.begin() + low + 1, values.end());
+  return below + (above - below) * (position - static_cast<double>(low));
+}
+
+}  // namespace tomofield::base
