@@ -141,10 +141,10 @@ double SlabSampler::decode_adjoint(int slab, const float* samples, const float* 
 }
 
 void SlabSampler::decode_row(std::int64_t row, float* densities) const {
-  for (const Piece& piece : slabs_[static_cast<std::size_t>((row - first_row_) / kLanes)]) {
+  for (const Piece& piece : slabs_[static_cast<std::size_t>(row / kLanes)]) {
     const field::LeafShape& shape = field_.shape(piece.leaf);
     float* values = scratch(shape.vertices_xz(), 0);
-    field_.row_values(piece.leaf, static_cast<double>(row) + 0.5, values);
+    field_.row_values(piece.leaf, static_cast<double>(first_row_ + row) + 0.5, values);
     const TapsZ& z = taps_z(piece.segment, shape.nz);
     const int nz = grid_.segments()[piece.segment].nz;
     float* out =

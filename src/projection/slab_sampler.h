@@ -34,7 +34,7 @@ class SlabSampler {
   /// gradient (all parameters) += dL/d parameters; returns dL/d bias.
   double decode_adjoint(int slab, const float* samples, const float* grad_samples,
                         float* gradient) const;
-  /// Densities of one row of the volume, [segment][x][z] without padding.
+  /// Densities of one row, counted from first_row, as [segment][x][z] without padding.
   void decode_row(std::int64_t row, float* densities) const;
   /// Floats that decode_row writes, and where each segment's begin.
   std::size_t row_size() const { return row_origins_.back(); }

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "kernels/total_variation.h"
+#include "loss/data_term.h"
+#include "projection/slab_projector.h"
+#include "projection/slab_sampler.h"
+#include "tilt_series/slab_views.h"
+
+namespace tomofield::reconstruct {
+
+/// Weights of the terms of eq. 9, in noise units: the data term is
+/// ½ Σ (residual / σ)², so that one weight serves every size (DESIGN §3).
+struct ObjectiveWeights {
+  double density_variation = 0.0;
+  double factor_variation = 0.0;
+  kernels::VariationPenalty density_penalty;
+  kernels::VariationPenalty factor_penalty;
+};
+
+/// What a pass over a band of slabs found.
+struct BandResult {
+  std::vector<loss::ViewSums> views;  ///< one each of the step's views
+  double variation = 0.0;             ///< both total variations, weighted
+  double grad_bias = 0.0;
+};
+
+/// The loss of a band of slabs (one row of root cells) for some of the views,
+/// and its gradient. A band writes the gradient of its own leaves alone and
+/// reads its neighbours' parameters for halos only, so bands may run in any
+/// order and on any thread.
+class SlabObjective {
+ public:
+  SlabObjective(const projection::SlabSampler& sampler, const projection::SlabProjector& projector,
+                const tilt_series::SlabViews& measured, const field::Field& field,
+                const ObjectiveWeights& weights);
+
+  /// `multiplicity` scales the views of this step up to the whole series.
+  BandResult accumulate_gradient(int band, std::span<const int> views,
+                                 std::span<const loss::ViewModel> models, double multiplicity,
+                                 float* gradient) const;
+
+ private:
+  struct Workspace;
+  void add_variation(int slab, const float* above, Workspace& w, BandResult& result) const;
+  void start_flux(int slab, Workspace& w) const;
+  const float* density_above(int slab, const projection::SlabSampler::Range& band,
+                             Workspace& w) const;
+  void copy_first_row(const float* samples, float* row) const;
+  kernels::SlabVariation variation_of(std::size_t segment) const;
+
+  const projection::SlabSampler& sampler_;
+  const projection::SlabProjector& projector_;
+  const tilt_series::SlabViews& measured_;
+  const field::Field& field_;
+  ObjectiveWeights weights_;
+};
+
+}  // namespace tomofield::reconstruct
