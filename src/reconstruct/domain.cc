@@ -1,0 +1,87 @@
+#include "reconstruct/domain.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/random.h"
+
+namespace tomofield::reconstruct {
+namespace {
+
+constexpr int kDepth = 1;  // of the uniform tree: margin leaves are root cells
+
+field::LeafShape leaf_shape(double size, double thickness, double spacing, int rank) {
+  const auto vertices = [spacing](double length) {
+    return std::max(2, static_cast<int>(std::lround(length / spacing)) + 1);
+  };
+  const int n = vertices(size);
+  return {
+      .nx = n, .ny = n, .nz = vertices(thickness), .rank_x = rank, .rank_y = rank, .rank_z = rank};
+}
+
+// Root cells from x_low on, so that the region of interest starts on a cell's face.
+field::RootGrid root_grid(const geometry::Roi& roi, double x_low, double x_high,
+                          std::int64_t cell) {
+  const auto cells = [cell](double length) {
+    return static_cast<std::int64_t>(std::ceil(length / static_cast<double>(cell)));
+  };
+  const std::int64_t left = cells(static_cast<double>(roi.x0) - x_low);
+  field::RootGrid grid;
+  grid.cell_size = cell;
+  grid.x0 = roi.x0 - left * cell;
+  grid.y0 = roi.y0;
+  grid.columns = static_cast<int>(left + cells(x_high - static_cast<double>(roi.x0)));
+  grid.rows = static_cast<int>(cells(static_cast<double>(roi.height())));
+  return grid;
+}
+
+}  // namespace
+
+Domain make_domain(const geometry::TiltGeometry& geometry, const geometry::Roi& roi,
+                   const FieldOptions& options) {
+  projection::SampleGrid grid = projection::make_sample_grid(
+      geometry, static_cast<double>(roi.x0), static_cast<double>(roi.x1),
+      options.with_margin ? options.margin_spacing : 0.0);
+  double low = static_cast<double>(roi.x0), high = static_cast<double>(roi.x1);
+  for (const projection::SampleSegment& s : grid.segments()) {
+    low = std::min(low, s.x0);
+    high = std::max(high, s.x1());
+  }
+  const field::RootGrid roots =
+      root_grid(roi, low, high, static_cast<std::int64_t>(options.leaf_size) << kDepth);
+  std::vector<field::Region> regions;
+  for (int row = 0; row < roots.rows; ++row) {
+    for (int column = 0; column < roots.columns; ++column) {
+      const std::int64_t x0 = roots.x0 + column * roots.cell_size;
+      const bool inside = x0 < roi.x1 && x0 + roots.cell_size > roi.x0;
+      regions.push_back(inside ? field::Region::kInterest : field::Region::kMargin);
+    }
+  }
+  field::Quadtree tree(roots, regions);
+  tree.split_to_level(field::Region::kInterest, kDepth);
+  std::vector<field::LeafShape> shapes;
+  for (int leaf = 0; leaf < tree.num_leaves(); ++leaf) {
+    const bool inside = tree.leaf(leaf).region == field::Region::kInterest;
+    shapes.push_back(leaf_shape(static_cast<double>(tree.leaf(leaf).square.size),
+                                geometry.thickness,
+                                inside ? options.vertex_spacing : options.margin_spacing,
+                                inside ? options.rank : options.margin_rank));
+  }
+  return {roi, std::move(grid), std::move(tree), std::move(shapes)};
+}
+
+std::unique_ptr<field::Field> make_initial_field(const Domain& domain, double thickness,
+                                                 double mean_density, const FieldOptions& options,
+                                                 std::uint64_t seed) {
+  auto field = field::make_field(options.kind, domain.tree, thickness, domain.shapes);
+  const double beta = options.activation == "softplus" ? options.sharpness : 0.0;
+  field->activation.beta = static_cast<float>(beta);
+  // The inverse of softplus; a mean density of zero or less has none, so a small one stands in.
+  const double positive = std::max(mean_density, 1e-3);
+  field->bias =
+      static_cast<float>(beta > 0 ? std::log(std::expm1(beta * positive)) / beta : mean_density);
+  field->initialise(base::Random(seed), options.initial_scale);
+  return field;
+}
+
+}  // namespace tomofield::reconstruct

@@ -1,0 +1,123 @@
+#include "reconstruct/fit.h"
+
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "base/parallel.h"
+#include "base/random.h"
+#include "reconstruct/slab_objective.h"
+
+namespace tomofield::reconstruct {
+namespace {
+
+// The bias moves every density at once, so it takes smaller steps than a factor.
+constexpr double kBiasRate = 0.02;
+
+// Streams of the seed: one for the starting values, one for each epoch's order.
+constexpr std::uint64_t kOrderStream = 1000;
+
+ObjectiveWeights objective_weights(const FitOptions& options) {
+  ObjectiveWeights weights;
+  weights.density_variation = options.density_variation;
+  weights.factor_variation = options.factor_variation;
+  weights.density_penalty.epsilon = static_cast<float>(options.gradient_floor);
+  weights.density_penalty.concavity =
+      options.penalty == "concave" ? static_cast<float>(options.concavity) : 0.0f;
+  weights.factor_penalty = weights.density_penalty;
+  return weights;
+}
+
+}  // namespace
+
+Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
+         const FitOptions& options)
+    : measurement_(measurement),
+      options_(options),
+      domain_(make_domain(measurement.geometry, measurement.roi, field_options)),
+      field_(make_initial_field(domain_, measurement.geometry.thickness, measurement.mean_density,
+                                field_options, options.seed)),
+      optimizer_(*field_, optimize::AdamOptions{}),
+      gradient_(field_->num_parameters()),
+      projector_(measurement.geometry, domain_.grid),
+      sampler_(*field_, domain_.grid, measurement.roi.y0, measurement.roi.height()) {
+  for (const double sigma : measurement.noise_sigma)
+    progress_.views.push_back({1.0, 0.0, 1.0 / (sigma * sigma)});
+  progress_.epoch_sums.resize(progress_.views.size());
+  for (int band = 0; band < sampler_.num_bands(); ++band) {
+    const auto leaves = sampler_.leaves_of_band(band);
+    touched_leaves_.insert(touched_leaves_.end(), leaves.begin(), leaves.end());
+  }
+}
+
+std::int64_t Fit::num_steps() const {
+  return static_cast<std::int64_t>(options_.epochs) * options_.subsets;
+}
+
+void Fit::run(const AfterStep& after_step) {
+  while (progress_.step < num_steps()) {
+    take_step(subset_of_step(progress_.step));
+    ++progress_.step;
+    if (progress_.step % options_.subsets == 0) end_epoch();
+    if (!after_step(*this)) return;
+  }
+}
+
+// Every subsets-th view, from a first one that visits each residue once an
+// epoch in random order: a subset covers the whole tilt range evenly.
+std::vector<int> Fit::subset_of_step(std::int64_t step) const {
+  const std::int64_t epoch = step / options_.subsets;
+  base::Random random(options_.seed, kOrderStream + static_cast<std::uint64_t>(epoch));
+  std::vector<int> order(static_cast<std::size_t>(options_.subsets));
+  std::iota(order.begin(), order.end(), 0);
+  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);
+  std::vector<int> views;
+  const int first = order[static_cast<std::size_t>(step % options_.subsets)];
+  for (int v = first; v < measurement_.geometry.num_views(); v += options_.subsets)
+    views.push_back(v);
+  return views;
+}
+
+double Fit::learning_rate(std::int64_t step) const {
+  const double done = static_cast<double>(step) / static_cast<double>(num_steps());
+  return options_.learning_rate * std::pow(options_.final_rate, done);
+}
+
+void Fit::take_step(const std::vector<int>& views) {
+  const SlabObjective objective(sampler_, projector_, *measurement_.rays, *field_,
+                                objective_weights(options_));
+  const double multiplicity =
+      static_cast<double>(measurement_.geometry.num_views()) / static_cast<double>(views.size());
+  std::vector<BandResult> bands(static_cast<std::size_t>(sampler_.num_bands()));
+  base::parallel_for(sampler_.num_bands(), [&](std::int64_t band) {
+    bands[static_cast<std::size_t>(band)] = objective.accumulate_gradient(
+        static_cast<int>(band), views, progress_.views, multiplicity, gradient_.data());
+  });
+  double grad_bias = 0.0;
+  for (const BandResult& band : bands) {  // in order: the same sums for any number of threads
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      progress_.epoch_sums[static_cast<std::size_t>(views[v])] += band.views[v];
+    }
+    progress_.epoch_variation += band.variation / options_.subsets;
+    grad_bias += band.grad_bias;
+  }
+  const double rate = learning_rate(progress_.step);
+  optimizer_.step(*field_, touched_leaves_, gradient_, rate);
+  optimizer_.step_bias(*field_, grad_bias, kBiasRate * rate);
+}
+
+void Fit::end_epoch() {
+  double squares = 0.0, rays = 0.0;
+  for (std::size_t v = 0; v < progress_.views.size(); ++v) {
+    squares +=
+        progress_.views[v].weight * progress_.epoch_sums[v].squared_residual(progress_.views[v]);
+    rays += progress_.epoch_sums[v].n;
+  }
+  progress_.data_loss.push_back(squares / rays);
+  if (options_.fit_view_scale)
+    loss::fit_nuisances(loss::NuisancePrior{}, progress_.epoch_sums, progress_.views);
+  progress_.epoch_sums.assign(progress_.views.size(), {});
+  progress_.epoch_variation = 0.0;
+}
+
+}  // namespace tomofield::reconstruct

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "field/field.h"
+#include "geometry/tilt_geometry.h"
+#include "loss/data_term.h"
+#include "optimize/adam.h"
+#include "projection/slab_projector.h"
+#include "projection/slab_sampler.h"
+#include "reconstruct/domain.h"
+#include "reconstruct/options.h"
+#include "tilt_series/slab_views.h"
+
+namespace tomofield::reconstruct {
+
+/// What is fitted: the geometry, the measured rays (divided by the density
+/// unit) and the noise of each view in the same units.
+struct Measurement {
+  geometry::TiltGeometry geometry;
+  geometry::Roi roi;
+  const tilt_series::SlabViews* rays = nullptr;
+  std::vector<double> noise_sigma;
+  double mean_density = 0.0;
+};
+
+/// Where a fit stands between two steps: everything that a resumed run needs
+/// beside the field and the optimiser.
+struct Progress {
+  std::int64_t step = 0;  ///< steps done
+  std::vector<loss::ViewModel> views;
+  std::vector<loss::ViewSums> epoch_sums;  ///< of the running epoch
+  double epoch_variation = 0.0;
+  std::vector<double> data_loss;  ///< mean squared residual in units of the noise, one an epoch
+};
+
+/// The loop of DESIGN §5 over (slabs × tilt subsets): one step uses every slab
+/// and one subset of the views.
+class Fit {
+ public:
+  Fit(const Measurement& measurement, const FieldOptions& field_options, const FitOptions& options);
+
+  /// Called after every step; returning false stops the fit there.
+  using AfterStep = std::function<bool(const Fit&)>;
+  void run(const AfterStep& after_step);
+
+  std::int64_t num_steps() const;
+  const field::Field& field() const { return *field_; }
+  field::Field& field() { return *field_; }
+  const optimize::Adam& optimizer() const { return optimizer_; }
+  optimize::Adam& optimizer() { return optimizer_; }
+  const Progress& progress() const { return progress_; }
+  Progress& progress() { return progress_; }
+
+ private:
+  std::vector<int> subset_of_step(std::int64_t step) const;
+  double learning_rate(std::int64_t step) const;
+  void take_step(const std::vector<int>& views);
+  void end_epoch();
+
+  const Measurement& measurement_;
+  FitOptions options_;
+  Domain domain_;
+  std::unique_ptr<field::Field> field_;
+  optimize::Adam optimizer_;
+  Progress progress_;
+  base::AlignedBuffer<float> gradient_;
+  projection::SlabProjector projector_;
+  projection::SlabSampler sampler_;
+  std::vector<int> touched_leaves_;
+};
+
+}  // namespace tomofield::reconstruct

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace tomofield::reconstruct {
+
+/// The field: how finely leaves resolve the specimen. Lengths in pixels of the binned view.
+struct FieldOptions {
+  std::string kind = "vm";      ///< vm or grid
+  int leaf_size = 32;           ///< side of a leaf, a multiple of 16
+  double vertex_spacing = 1.0;  ///< between vertices, all axes
+  int rank = 16;                ///< of each mode, vm only
+  bool with_margin = true;      ///< model what rays cross outside the region of interest
+  double margin_spacing = 2.0;  ///< of samples and vertices there
+  int margin_rank = 8;
+  std::string activation = "softplus";  ///< or identity, for densities of either sign
+  double sharpness = 10.0;              ///< β of softplus, per density unit
+  double initial_scale = 0.1;           ///< factors start uniform in ± this
+};
+
+/// The optimisation. Weights are in noise units (SlabObjective).
+struct FitOptions {
+  int epochs = 40;
+  int subsets = 8;              ///< interleaved tilt subsets: steps an epoch
+  double learning_rate = 0.05;  ///< falls exponentially to learning_rate · final_rate
+  double final_rate = 0.1;
+  double density_variation = 1.0;
+  double factor_variation = 0.0;
+  std::string penalty = "concave";  ///< or smooth, for both variations
+  double concavity = 0.1;           ///< τ of the concave penalty, in density units
+  double gradient_floor = 1e-3;     ///< ε of both penalties, in density units a pixel
+  bool fit_view_scale = false;      ///< per-view scale and offset as nuisances
+  std::uint64_t seed = 1;
+};
+
+}  // namespace tomofield::reconstruct
