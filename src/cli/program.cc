@@ -14,6 +14,7 @@ int run_program(int argc, char** argv) {
   program.set_version_flag("--version", "tomofield " TOMOFIELD_VERSION);
   program.require_subcommand(1);
   add_evaluate_command(program);
+  add_info_command(program);
   add_simulate_command(program);
   try {
     program.parse(argc, argv);
