@@ -5,8 +5,8 @@
 namespace tomofield::kernels {
 
 /// Where regularly spaced samples lie between vertices on one axis: sample s
-/// interpolates vertices lower[s] and lower[s] + 1 with weight fraction[s] on
-/// the upper one.
+/// interpolates vertices lower[s] and lower[s] + 1, which both exist, with weight
+/// fraction[s] on the upper one.
 struct AxisTaps {
   int count = 0;
   const int* lower = nullptr;

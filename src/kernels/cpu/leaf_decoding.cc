@@ -121,8 +121,10 @@ void activate_softplus(float beta, float* values, std::ptrdiff_t count) {
   std::ptrdiff_t i = 0;
   for (; i + kVecLanes <= count; i += kVecLanes)
     hn::StoreU(act(hn::LoadU(d, values + i)), d, values + i);
-  const auto rest = hn::FirstN(d, static_cast<size_t>(count - i));
-  if (i < count) hn::BlendedStore(act(hn::MaskedLoad(rest, d, values + i)), rest, d, values + i);
+  HWY_ALIGN float rest[kVecLanes] = {};
+  std::copy(values + i, values + count, rest);
+  hn::Store(act(hn::Load(d, rest)), d, rest);
+  std::copy_n(rest, count - i, values + i);
 }
 
 }  // namespace tomofield::kernels::HWY_NAMESPACE
@@ -135,10 +137,9 @@ HWY_EXPORT(decode_leaf_adjoint);
 HWY_EXPORT(activate_softplus);
 
 namespace {
-// One vertex row more than the leaf has: a sample on the last vertex reads it with weight 0.
 float* scratch_column(const LeafPiece& piece) {
   thread_local base::AlignedBuffer<float> column;
-  column.reserve(static_cast<std::size_t>(piece.num_vertices_z + 1) * kLanes);
+  column.reserve(static_cast<std::size_t>(piece.num_vertices_z) * kLanes);
   return column.data();
 }
 }  // namespace

@@ -128,7 +128,7 @@ HWY_INLINE bool reaches(const LineCrossing& view, int first, int end) {
 // coarser than pixels. Rounding of the first one can only lose a weight that
 // is itself of the size of the rounding.
 HWY_INLINE int num_taps(float step) {
-  return static_cast<int>(std::ceil(2.0f / std::abs(step) - 1e-4f));
+  return static_cast<int>(std::ceil((2.0f - 1e-6f) / std::abs(step)));
 }
 
 void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t stride, int first,

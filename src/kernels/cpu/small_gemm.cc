@@ -9,18 +9,14 @@
 HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-using Tag = hn::ScalableTag<float>;
-using Vec = hn::Vec<Tag>;
 
 // A block of kRows rows by kVecs vectors of C lives in registers: with 6 × 2
 // there are 12 accumulators, 2 vectors of B and one broadcast, all that SSE
 // and AVX2 have, and 12 independent FMAs cover their latency on two ports.
-template <int kRows, int kVecs, bool kPartial>
-HWY_INLINE void block(const SmallGemm& g, std::ptrdiff_t row, std::ptrdiff_t col,
-                      std::ptrdiff_t last) {
-  const Tag d;
+template <int kRows, int kVecs, class D>
+HWY_INLINE void block(D d, const SmallGemm& g, std::ptrdiff_t row, std::ptrdiff_t col) {
+  using Vec = hn::Vec<D>;
   const std::ptrdiff_t lanes = static_cast<std::ptrdiff_t>(hn::Lanes(d));
-  const auto mask = hn::FirstN(d, static_cast<size_t>(last));
   Vec acc[kRows][kVecs];
   for (int m = 0; m < kRows; ++m)
     for (int v = 0; v < kVecs; ++v) acc[m][v] = hn::Zero(d);
@@ -28,10 +24,7 @@ HWY_INLINE void block(const SmallGemm& g, std::ptrdiff_t row, std::ptrdiff_t col
   const float* b = g.b + col;
   for (std::ptrdiff_t n = 0; n < g.depth; ++n) {
     Vec bv[kVecs];
-    for (int v = 0; v < kVecs; ++v) {
-      bv[v] = kPartial && v == kVecs - 1 ? hn::MaskedLoad(mask, d, b + v * lanes)
-                                         : hn::LoadU(d, b + v * lanes);
-    }
+    for (int v = 0; v < kVecs; ++v) bv[v] = hn::LoadU(d, b + v * lanes);
     for (int m = 0; m < kRows; ++m) {
       const Vec am = hn::Set(d, a[m * g.a_row]);
       for (int v = 0; v < kVecs; ++v) acc[m][v] = hn::MulAdd(am, bv[v], acc[m][v]);
@@ -42,31 +35,35 @@ HWY_INLINE void block(const SmallGemm& g, std::ptrdiff_t row, std::ptrdiff_t col
   for (int m = 0; m < kRows; ++m) {
     float* c = g.c + (row + m) * g.c_row + col;
     for (int v = 0; v < kVecs; ++v) {
-      float* p = c + v * lanes;
-      if (kPartial && v == kVecs - 1) {
-        hn::BlendedStore(hn::Add(hn::MaskedLoad(mask, d, p), acc[m][v]), mask, d, p);
-      } else {
-        hn::StoreU(hn::Add(hn::LoadU(d, p), acc[m][v]), d, p);
-      }
+      hn::StoreU(hn::Add(hn::LoadU(d, c + v * lanes), acc[m][v]), d, c + v * lanes);
     }
   }
 }
 
-template <int kVecs, bool kPartial>
-HWY_INLINE void column_panel(const SmallGemm& g, std::ptrdiff_t col, std::ptrdiff_t last) {
+// Columns from `col` on, as many panels of kVecs vectors as fit; returns the
+// first column that is left.
+template <int kVecs, class D>
+HWY_INLINE std::ptrdiff_t panels(D d, const SmallGemm& g, std::ptrdiff_t col) {
   constexpr int kRows = kVecs == 1 ? 8 : 6;
-  std::ptrdiff_t row = 0;
-  for (; row + kRows <= g.rows; row += kRows) block<kRows, kVecs, kPartial>(g, row, col, last);
-  for (; row + 2 <= g.rows; row += 2) block<2, kVecs, kPartial>(g, row, col, last);
-  if (row < g.rows) block<1, kVecs, kPartial>(g, row, col, last);
+  const std::ptrdiff_t width = kVecs * static_cast<std::ptrdiff_t>(hn::Lanes(d));
+  for (; col + width <= g.width; col += width) {
+    std::ptrdiff_t row = 0;
+    for (; row + kRows <= g.rows; row += kRows) block<kRows, kVecs>(d, g, row, col);
+    for (; row + 2 <= g.rows; row += 2) block<2, kVecs>(d, g, row, col);
+    if (row < g.rows) block<1, kVecs>(d, g, row, col);
+  }
+  return col;
 }
 
+// Narrower vectors take what is left over at the right: masked loads and
+// stores may touch memory beside the row on targets without true masks.
 void small_gemm(const SmallGemm& g) {
-  const std::ptrdiff_t lanes = static_cast<std::ptrdiff_t>(hn::Lanes(Tag()));
-  std::ptrdiff_t col = 0;
-  for (; col + 2 * lanes <= g.width; col += 2 * lanes) column_panel<2, false>(g, col, 0);
-  for (; col + lanes <= g.width; col += lanes) column_panel<1, false>(g, col, 0);
-  if (col < g.width) column_panel<1, true>(g, col, g.width - col);
+  const hn::ScalableTag<float> full;
+  std::ptrdiff_t col = panels<2>(full, g, 0);
+  col = panels<1>(full, g, col);
+  col = panels<1>(hn::CappedTag<float, 8>(), g, col);
+  col = panels<1>(hn::CappedTag<float, 4>(), g, col);
+  panels<1>(hn::CappedTag<float, 1>(), g, col);
 }
 
 }  // namespace tomofield::kernels::HWY_NAMESPACE

@@ -27,17 +27,9 @@ struct RowMasks {
   }
 };
 
-// The value of up to kTermsPerLog concave terms is one logarithm of their
-// product; the factors 1 + m/τ are far too small to overflow it.
-constexpr int kTermsPerLog = 8;
-
-HWY_INLINE double sum_of_logs(Vec product) {
-  HWY_ALIGN float lanes[kVecLanes];
-  hn::Store(product, Tag(), lanes);
-  double sum = 0.0;
-  for (const float p : lanes) sum += std::log(static_cast<double>(p));
-  return sum;
-}
+// The value of kTermsPerLog concave terms is one logarithm of their product,
+// which holds factors 1 + m/τ up to 4e9.
+constexpr int kTermsPerLog = 4;
 
 class Penalty {
  public:
@@ -55,7 +47,7 @@ class Penalty {
     const Vec factor = hn::MulAdd(m, per_tau_, hn::Set(d, 1.0f));
     if (concave_) {
       product_ = hn::Mul(product_, hn::MulAdd(hn::Mul(m, per_tau_), rows, hn::Set(d, 1.0f)));
-      if (++terms_ == kTermsPerLog) flush();
+      if (++terms_ == kTermsPerLog) take_logarithm();
     } else {
       sum_ = hn::MulAdd(m, rows, sum_);
     }
@@ -63,18 +55,16 @@ class Penalty {
   }
 
   HWY_INLINE void end_row() {
-    if (concave_) {
-      flush();
-    } else {
-      value_ += static_cast<double>(hn::GetLane(hn::SumOfLanes(Tag(), sum_)));
-      sum_ = hn::Zero(Tag());
-    }
+    take_logarithm();
+    value_ += static_cast<double>(hn::GetLane(hn::SumOfLanes(Tag(), sum_)));
+    sum_ = hn::Zero(Tag());
   }
-  double value() const { return value_; }
+  // Σ φ over all rows that have ended.
+  double value() const { return concave_ ? static_cast<double>(tau_) * value_ : value_; }
 
  private:
-  HWY_INLINE void flush() {
-    value_ += static_cast<double>(tau_) * sum_of_logs(product_);
+  HWY_INLINE void take_logarithm() {
+    sum_ = hn::Add(sum_, log_above_one(product_));
     product_ = hn::Set(Tag(), 1.0f);
     terms_ = 0;
   }

@@ -19,8 +19,7 @@ void small_gemm(const SmallGemm& s, const double* a, const double* b, double* c)
 }
 
 double line_weight(const LineCrossing& line, int pixel, int sample) {
-  const double position =
-      static_cast<double>(line.offset) + static_cast<double>(line.step) * pixel;
+  const double position = static_cast<double>(line.offset) + static_cast<double>(line.step) * pixel;
   const bool sees = pixel >= line.first_pixel && pixel < line.end_pixel &&
                     position >= static_cast<double>(line.low) &&
                     position < static_cast<double>(line.high);
@@ -97,8 +96,8 @@ void decode_leaf(const LeafPiece& piece, const double* values, double* samples) 
   });
 }
 
-double decode_leaf_adjoint(const LeafPiece& piece, const double* values,
-                           const double* grad_samples, double* grad_values) {
+double decode_leaf_adjoint(const LeafPiece& piece, const double* values, const double* grad_samples,
+                           double* grad_values) {
   double bias = 0.0;
   for_each_sample(piece, [&](std::ptrdiff_t sample, const auto& vertices, const auto& weights) {
     for (int lane = 0; lane < kLanes; ++lane) {

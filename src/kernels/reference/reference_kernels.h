@@ -37,8 +37,8 @@ void decode_leaf(const LeafPiece& piece, const double* values, double* samples);
 
 /// grad_values += interpolationᵀ (grad_samples · act′(interpolated values)); returns
 /// Σ grad_samples · act′. The derivative is taken from the values, not from the samples.
-double decode_leaf_adjoint(const LeafPiece& piece, const double* values,
-                           const double* grad_samples, double* grad_values);
+double decode_leaf_adjoint(const LeafPiece& piece, const double* values, const double* grad_samples,
+                           double* grad_values);
 
 /// A whole volume [z, x, y], without slabs.
 struct VolumeVariation {
