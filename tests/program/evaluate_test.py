@@ -173,7 +173,8 @@ def test_existing_figures_are_kept_unless_asked():
 
 
 def main():
-    os.makedirs(SCRATCH, exist_ok=True)
+    shutil.rmtree(SCRATCH, ignore_errors=True)  # of an earlier run that failed
+    os.makedirs(SCRATCH)
     has_script = os.path.exists(SCRIPT)
     for name, test in list(globals().items()):
         if not name.startswith("test_"):

@@ -230,7 +230,8 @@ def test_bad_options_are_named_and_nothing_is_written():
 
 
 def main():
-    os.makedirs(SCRATCH, exist_ok=True)
+    shutil.rmtree(SCRATCH, ignore_errors=True)  # of an earlier run that failed
+    os.makedirs(SCRATCH)
     tests = [value for name, value in globals().items() if name.startswith("test_")]
     has_script = os.path.exists(SCRIPT)
     for test in tests:
