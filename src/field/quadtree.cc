@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <limits>
 #include <utility>
 
 #include "base/check.h"
@@ -11,6 +13,15 @@
 #include "tomofield/error.h"
 
 namespace tomofield::field {
+namespace {
+
+// Quarter c of a square, x fastest.
+Square quarter(const Square& square, int c) {
+  const std::int64_t half = square.size / 2;
+  return {square.x0 + (c & 1) * half, square.y0 + (c >> 1) * half, half};
+}
+
+}  // namespace
 
 Quadtree::Quadtree(const RootGrid& roots, const std::vector<Region>& region_of) : roots_(roots) {
   TOMOFIELD_CHECK(roots.cell_size > 0 && roots.cell_size % kernels::kLanes == 0,
@@ -31,41 +42,53 @@ Quadtree::Quadtree(const RootGrid& roots, const std::vector<Region>& region_of) 
 
 Quadtree::Quadtree(const RootGrid& roots, std::vector<QuadtreeNode> nodes)
     : roots_(roots), nodes_(std::move(nodes)) {
-  const auto fail = [](const char* what) {
-    throw Error(fmt::format("the stored quadtree is damaged: {}", what));
+  const auto require = [](bool condition, const char* what) {
+    if (!condition) throw Error(fmt::format("the stored quadtree is damaged: {}", what));
   };
-  const int num_roots = roots.columns * roots.rows;
-  const int num_nodes = static_cast<int>(nodes_.size());
-  if (roots.columns <= 0 || roots.rows <= 0 || num_nodes < num_roots)
-    fail("fewer nodes than root cells");
-  for (int n = 0; n < num_nodes; ++n) {
+  const auto num_nodes = static_cast<std::int64_t>(nodes_.size());
+  const std::int64_t num_roots = static_cast<std::int64_t>(roots.columns) * roots.rows;
+  require(roots.columns > 0 && roots.rows > 0 && num_nodes >= num_roots,
+          "fewer nodes than root cells");
+  require(num_nodes < std::numeric_limits<int>::max(), "too many nodes");
+  constexpr std::int64_t kFar = std::int64_t{1} << 30;  // pixels; no sum of these overflows
+  require(roots.cell_size > 0 && roots.cell_size <= kFar && std::abs(roots.x0) <= kFar &&
+              std::abs(roots.y0) <= kFar,
+          "its root cells have a wrong size or place");
+  // Children are unique because each names its one parent; so counting them
+  // finds nodes that nothing leads to.
+  std::int64_t num_reached = num_roots;
+  for (std::int64_t n = 0; n < num_nodes; ++n) {
     const QuadtreeNode& node = nodes_[static_cast<std::size_t>(n)];
-    if ((node.parent < 0) != (n < num_roots) || node.parent >= n) fail("a node has a wrong parent");
-    if (!node.is_leaf() && (node.first_child <= n || node.first_child + 4 > num_nodes))
-      fail("a node has wrong children");
-    if (node.square.size <= 0 || node.square.size % kernels::kLanes != 0)
-      fail("a square has a wrong size");
-    for (int c = 0; !node.is_leaf() && c < 4; ++c) {
+    require(node.square.size > 0 && node.square.size % kernels::kLanes == 0,
+            "a square has a wrong size");
+    if (n < num_roots) {
+      const Square expected{roots.x0 + n % roots.columns * roots.cell_size,
+                            roots.y0 + n / roots.columns * roots.cell_size, roots.cell_size};
+      require(node.parent == -1 && node.level == 0 && node.square == expected,
+              "a root cell is not in its place");
+    }
+    if (node.is_leaf()) continue;
+    require(node.first_child > n && node.first_child <= num_nodes - 4, "a node has wrong children");
+    num_reached += 4;
+    for (int c = 0; c < 4; ++c) {
       const QuadtreeNode& child = nodes_[static_cast<std::size_t>(node.first_child + c)];
-      const std::int64_t half = node.square.size / 2;
-      const Square expected{node.square.x0 + (c & 1) * half, node.square.y0 + (c >> 1) * half,
-                            half};
-      if (child.parent != n || child.square != expected)
-        fail("a child is not a quarter of its parent");
+      require(child.parent == n && child.level == node.level + 1 && child.region == node.region &&
+                  child.square == quarter(node.square, c),
+              "a child is not a quarter of its parent");
     }
   }
+  require(num_reached == num_nodes, "a node belongs to no parent");
   number_leaves();
 }
 
 void Quadtree::add_children(int index) {
   const QuadtreeNode parent = nodes_[static_cast<std::size_t>(index)];
-  const std::int64_t half = parent.square.size / 2;
-  TOMOFIELD_CHECK(half % kernels::kLanes == 0 && half > 0,
+  TOMOFIELD_CHECK(parent.square.size % (2 * kernels::kLanes) == 0,
                   fmt::format("splitting a square of {} px", parent.square.size));
   nodes_[static_cast<std::size_t>(index)].first_child = static_cast<int>(nodes_.size());
   for (int c = 0; c < 4; ++c) {
     QuadtreeNode child = parent;
-    child.square = {parent.square.x0 + (c & 1) * half, parent.square.y0 + (c >> 1) * half, half};
+    child.square = quarter(parent.square, c);
     child.level = parent.level + 1;
     child.parent = index;
     child.first_child = -1;

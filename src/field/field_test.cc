@@ -1,0 +1,329 @@
+#include "field/field.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "field/variation_planes.h"
+#include "random_arrays.h"
+#include "tomofield/error.h"
+
+namespace tomofield::field {
+namespace {
+
+using kernels::kLanes;
+using testing::expect_near;
+using testing::random_floats;
+
+constexpr double kThickness = 37.5;
+
+// Unequal vertex counts and ranks, even and odd ones, so that no axis can be
+// taken for another.
+constexpr LeafShape kFine{.nx = 5, .ny = 4, .nz = 7, .rank_x = 3, .rank_y = 1, .rank_z = 2};
+constexpr LeafShape kCoarse{.nx = 3, .ny = 2, .nz = 4, .rank_x = 1, .rank_y = 2, .rank_z = 1};
+
+// A fine cell beside a coarse one, every parameter random.
+std::unique_ptr<Field> two_cells(const std::string& kind, float beta) {
+  const RootGrid roots{.x0 = -16, .y0 = 8, .cell_size = 64, .columns = 2, .rows = 1};
+  auto field = make_field(kind, Quadtree(roots, {Region::kInterest, Region::kMargin}), kThickness,
+                          {kFine, kCoarse});
+  field->initialise(base::Random(3), 1.0);
+  field->bias = 0.25f;
+  field->activation = {beta};
+  return field;
+}
+
+// Parameters as the headers lay them out, in double: eq. 4 at the vertices.
+double vertex_value(const Field& field, int leaf, int x, int y, int z) {
+  const LeafShape& s = field.shape(leaf);
+  const float* at = field.parameters().data() + field.offset(leaf);
+  const auto take = [&at](int n0, int n1, int n2) {
+    const float* factor = at;
+    at += n0 * n1 * n2;
+    return [=](int i0, int i1, int i2) {
+      return static_cast<double>(factor[(i0 * n1 + i1) * n2 + i2]);
+    };
+  };
+  if (field.kind() == "grid") return take(s.nx, s.nz, s.ny)(x, z, y);
+  const auto vx = take(1, s.nx, s.rank_x), myz = take(s.nz, s.ny, s.rank_x);
+  const auto vy = take(1, s.ny, s.rank_y), mxz = take(s.nx, s.nz, s.rank_y);
+  const auto vz = take(1, s.nz, s.rank_z), mxy = take(s.nx, s.ny, s.rank_z);
+  double sum = 0.0;
+  for (int r = 0; r < s.rank_x; ++r) sum += vx(0, x, r) * myz(z, y, r);
+  for (int r = 0; r < s.rank_y; ++r) sum += vy(0, y, r) * mxz(x, z, r);
+  for (int r = 0; r < s.rank_z; ++r) sum += vz(0, z, r) * mxy(x, y, r);
+  return sum;
+}
+
+struct Position {
+  int lower;
+  double fraction;
+  // `position` runs from 0 to 1 over n vertices.
+  Position(double position, int n) {
+    const double vertex = position * (n - 1);
+    lower = std::min(static_cast<int>(vertex), n - 2);
+    fraction = vertex - lower;
+  }
+  double weight(int upper) const { return upper ? fraction : 1.0 - fraction; }
+};
+
+// Value at (x vertex, y, z vertex), bias included.
+double value_at_row(const Field& field, int leaf, int x, double y, int z) {
+  const Square& square = field.tree().leaf(leaf).square;
+  const Position at((y - static_cast<double>(square.y0)) / static_cast<double>(square.size),
+                    field.shape(leaf).ny);
+  double sum = static_cast<double>(field.bias);
+  for (const int j : {0, 1}) sum += at.weight(j) * vertex_value(field, leaf, x, at.lower + j, z);
+  return sum;
+}
+
+double expected_density(const Field& field, double x, double y, double z) {
+  const int leaf = field.tree().find_leaf(x, y);
+  const Square& square = field.tree().leaf(leaf).square;
+  const LeafShape& s = field.shape(leaf);
+  const Position px((x - static_cast<double>(square.x0)) / static_cast<double>(square.size), s.nx);
+  const Position pz(z / field.thickness(), s.nz);
+  double a = 0.0;
+  for (const int i : {0, 1}) {
+    for (const int k : {0, 1})
+      a += px.weight(i) * pz.weight(k) * value_at_row(field, leaf, px.lower + i, y, pz.lower + k);
+  }
+  const double beta = static_cast<double>(field.activation.beta);
+  return beta == 0.0 ? a : std::log1p(std::exp(beta * a)) / beta;
+}
+
+// Rows of a leaf from its first face to its last, and some outside of it.
+std::array<double, kLanes> rows_of(const Square& square) {
+  std::array<double, kLanes> y{};
+  for (std::size_t l = 0; l < kLanes; ++l)
+    y[l] = static_cast<double>(square.y0) +
+           static_cast<double>(square.size) * static_cast<double>(l) / 15.0;
+  return y;
+}
+
+class EachField : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, EachField, ::testing::Values("vm", "grid"),
+                         [](const auto& kind) { return std::string(kind.param); });
+
+TEST_P(EachField, SlabValuesAreEquation4) {
+  const auto field = two_cells(GetParam(), 0.0f);
+  for (int leaf = 0; leaf < 2; ++leaf) {
+    const LeafShape& s = field->shape(leaf);
+    const auto y = rows_of(field->tree().leaf(leaf).square);
+    std::vector<float> values(s.vertices_xz() * kLanes, 99.0f);
+    field->slab_values(leaf, field->lane_rows(leaf, y), values.data());
+    std::vector<double> expected;
+    for (int x = 0; x < s.nx; ++x) {
+      for (int z = 0; z < s.nz; ++z) {
+        for (const double row : y) expected.push_back(value_at_row(*field, leaf, x, row, z));
+      }
+    }
+    expect_near(values, expected, 2e-6);
+  }
+}
+
+TEST_P(EachField, RowValuesAreEquation4) {
+  const auto field = two_cells(GetParam(), 0.0f);
+  for (int leaf = 0; leaf < 2; ++leaf) {
+    const LeafShape& s = field->shape(leaf);
+    for (const double y : {8.0, 8.5, 40.0, 55.25, 72.0}) {
+      std::vector<float> values(s.vertices_xz(), 99.0f);
+      field->row_values(leaf, y, values.data());
+      std::vector<double> expected;
+      for (int x = 0; x < s.nx; ++x) {
+        for (int z = 0; z < s.nz; ++z) expected.push_back(value_at_row(*field, leaf, x, y, z));
+      }
+      expect_near(values, expected, 2e-6);
+    }
+  }
+}
+
+TEST_P(EachField, DensityIsTheActivatedInterpolation) {
+  for (const float beta : {0.0f, 4.0f}) {
+    const auto field = two_cells(GetParam(), beta);
+    base::Random random(5);
+    for (int n = 0; n < 500; ++n) {
+      const double x = random.uniform(-16, 112), y = random.uniform(8, 72);
+      const double z = random.uniform(0, kThickness);
+      EXPECT_NEAR(field->density(x, y, z), expected_density(*field, x, y, z), 1e-12);
+    }
+    EXPECT_NEAR(field->density(-16, 8, 0), expected_density(*field, -16, 8, 0), 1e-12);
+    EXPECT_NEAR(field->density(0, 9, kThickness), expected_density(*field, 0, 9, kThickness),
+                1e-12);
+  }
+}
+
+TEST_P(EachField, DensityOutsideTheDomainIsZero) {
+  const auto field = two_cells(GetParam(), 4.0f);
+  EXPECT_GT(field->density(0, 20, 10), 0.0);
+  EXPECT_EQ(field->density(-16.01, 20, 10), 0.0);
+  EXPECT_EQ(field->density(112, 20, 10), 0.0);
+  EXPECT_EQ(field->density(0, 7.9, 10), 0.0);
+  EXPECT_EQ(field->density(0, 72, 10), 0.0);
+  EXPECT_EQ(field->density(0, 20, -0.01), 0.0);
+  EXPECT_EQ(field->density(0, 20, kThickness + 0.01), 0.0);
+  EXPECT_EQ(field->density(0, 20, std::nan("")), 0.0);
+}
+
+// Values are linear in each single parameter, so that central differences of
+// any step are its derivative to rounding.
+TEST_P(EachField, SlabGradientIsTheDerivative) {
+  const auto field = two_cells(GetParam(), 0.0f);
+  for (int leaf = 0; leaf < 2; ++leaf) {
+    const std::size_t size = field->shape(leaf).vertices_xz() * kLanes;
+    const auto rows = field->lane_rows(leaf, rows_of(field->tree().leaf(leaf).square));
+    const auto weights = random_floats(size, 7);
+    const auto objective = [&] {
+      std::vector<float> values(size);
+      field->slab_values(leaf, rows, values.data());
+      return testing::dot(weights, values);
+    };
+    const std::size_t count = field->offset(leaf + 1) - field->offset(leaf);
+    const auto before = random_floats(count, 8);
+    std::vector<float> gradient = before;
+    field->slab_gradient(leaf, rows, weights.data(), gradient.data());
+    std::vector<double> expected;
+    for (std::size_t i = 0; i < count; ++i) {
+      float& p = field->parameters()[field->offset(leaf) + i];
+      const float kept = p;
+      p = kept + 1.0f;
+      const double high = objective();
+      p = kept - 1.0f;
+      const double low = objective();
+      p = kept;
+      expected.push_back(static_cast<double>(before[i]) + (high - low) / 2.0);
+    }
+    expect_near(gradient, expected, 2e-5);
+  }
+}
+
+// One factor, [n0, n1, channels], or a volume of vertices.
+struct VariedArray {
+  std::array<int, 3> n;
+  int channels;
+  double weight;
+  std::size_t size() const { return static_cast<std::size_t>(n[0] * n[1] * n[2] * channels); }
+};
+
+std::vector<VariedArray> varied_arrays(const std::string& kind, const LeafShape& s) {
+  if (kind == "grid") return {{{s.nx, s.nz, s.ny}, 1, 1.0}};
+  constexpr double kAlpha = 0.1;  // eq. 5
+  return {{{1, 1, s.nx}, s.rank_x, kAlpha}, {{1, s.nz, s.ny}, s.rank_x, 1.0},
+          {{1, 1, s.ny}, s.rank_y, kAlpha}, {{1, s.nx, s.nz}, s.rank_y, 1.0},
+          {{1, 1, s.nz}, s.rank_z, kAlpha}, {{1, s.nx, s.ny}, s.rank_z, 1.0}};
+}
+
+double expected_variation(const std::vector<VariedArray>& arrays,
+                          const kernels::VariationPenalty& penalty, const double* p) {
+  double total = 0.0;
+  for (const VariedArray& a : arrays) {
+    const auto at = [&](int i, int j, int k, int c) {
+      return p[((i * a.n[1] + j) * a.n[2] + k) * a.channels + c];
+    };
+    for (int i = 0; i < a.n[0]; ++i) {
+      for (int j = 0; j < a.n[1]; ++j) {
+        for (int k = 0; k < a.n[2]; ++k) {
+          for (int c = 0; c < a.channels; ++c) {
+            const double here = at(i, j, k, c);
+            const double d0 = i + 1 < a.n[0] ? at(i + 1, j, k, c) - here : 0.0;
+            const double d1 = j + 1 < a.n[1] ? at(i, j + 1, k, c) - here : 0.0;
+            const double d2 = k + 1 < a.n[2] ? at(i, j, k + 1, c) - here : 0.0;
+            const double epsilon = static_cast<double>(penalty.epsilon);
+            const double tau = static_cast<double>(penalty.concavity);
+            const double m = std::sqrt(d0 * d0 + d1 * d1 + d2 * d2 + epsilon * epsilon);
+            total += a.weight * (tau > 0 ? tau * std::log(1.0 + m / tau) : m);
+          }
+        }
+      }
+    }
+    p += a.size();
+  }
+  return total;
+}
+
+TEST_P(EachField, ParameterVariationAndItsDerivative) {
+  const auto field = two_cells(GetParam(), 0.0f);
+  constexpr double kWeight = 0.7;
+  for (const float concavity : {0.0f, 0.3f}) {
+    const kernels::VariationPenalty penalty{.epsilon = 0.02f, .concavity = concavity};
+    for (int leaf = 0; leaf < 2; ++leaf) {
+      const auto arrays = varied_arrays(GetParam(), field->shape(leaf));
+      const std::size_t count = field->offset(leaf + 1) - field->offset(leaf);
+      const auto before = random_floats(count, 8);
+      std::vector<float> gradient = before;
+      const double value = field->parameter_variation(leaf, penalty, kWeight, gradient.data());
+      const auto own = field->parameters().subspan(field->offset(leaf), count);
+      std::vector<double> p(own.begin(), own.end());
+      const double found = kWeight * expected_variation(arrays, penalty, p.data());
+      EXPECT_NEAR(value, found, 1e-6 * found);
+      std::vector<double> expected;
+      for (std::size_t i = 0; i < count; ++i) {
+        const double kept = p[i];
+        p[i] = kept + 1e-5;
+        const double high = expected_variation(arrays, penalty, p.data());
+        p[i] = kept - 1e-5;
+        const double low = expected_variation(arrays, penalty, p.data());
+        p[i] = kept;
+        expected.push_back(static_cast<double>(before[i]) + kWeight * (high - low) / 2e-5);
+      }
+      expect_near(gradient, expected, 2e-5);
+    }
+  }
+}
+
+TEST_P(EachField, SplittingLeavesTheFieldAsItIs) {
+  for (const float beta : {0.0f, 4.0f}) {
+    const auto field = two_cells(GetParam(), beta);
+    struct Sample {
+      double x, y, z, density;
+    };
+    std::vector<Sample> samples;
+    base::Random random(5);
+    for (int n = 0; n < 2000; ++n) {
+      const double x = random.uniform(-16, 112), y = random.uniform(8, 72);
+      const double z = random.uniform(0, kThickness);
+      samples.push_back({x, y, z, field->density(x, y, z)});
+    }
+    // Leaves of 64, 32 and 16 px beside each other; before and after the split ones.
+    for (const int leaf : {1, 0, 2, 7}) {
+      field->split_leaf(leaf);
+      for (const Sample& s : samples) ASSERT_NEAR(field->density(s.x, s.y, s.z), s.density, 3e-6);
+    }
+    EXPECT_EQ(field->tree().num_leaves(), 14);
+    EXPECT_EQ(field->shape(0), kFine);
+    EXPECT_EQ(field->shape(13), kCoarse);
+  }
+}
+
+TEST_P(EachField, InitialDensitiesAreThoseOfTheBias) {
+  const auto field = two_cells(GetParam(), 4.0f);
+  field->initialise(base::Random(9), 0.01);
+  const double expected = std::log1p(std::exp(4.0 * 0.25)) / 4.0;
+  EXPECT_NEAR(field->density(3, 33, 17), expected, 0.011);
+  EXPECT_NE(field->density(3, 33, 17), expected);
+}
+
+TEST(Field, IsMadeByItsName) {
+  const RootGrid roots{.x0 = 0, .y0 = 0, .cell_size = 16, .columns = 1, .rows = 1};
+  const Quadtree tree(roots, std::vector{Region::kInterest});
+  EXPECT_EQ(make_field("vm", tree, 8.0, {kFine})->kind(), "vm");
+  EXPECT_EQ(make_field("grid", tree, 8.0, {kFine})->kind(), "grid");
+  EXPECT_THROW(make_field("mesh", tree, 8.0, {kFine}), Error);
+}
+
+TEST(ArrayVariation, IsZeroButForEpsilonOnAConstant) {
+  const std::vector<float> values(2 * 3 * 4 * 5, 1.5f);
+  std::vector<float> gradient(values.size());
+  const double value = array_variation(values.data(), 2, 3, 4, 5,
+                                       {.epsilon = 0.01f, .concavity = 0.0f}, 2.0, gradient.data());
+  EXPECT_NEAR(value, 2.0 * 120 * 0.01, 1e-6);
+  EXPECT_EQ(gradient, std::vector<float>(values.size()));
+}
+
+}  // namespace
+}  // namespace tomofield::field
