@@ -1,0 +1,182 @@
+#include "io/alignment_files.h"
+
+#include <gtest/gtest.h>
+
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+using testing::message_of;
+using testing::ScratchDirectory;
+using Sections = std::vector<std::int64_t>;
+
+void expect_parts(const std::string& message, const std::vector<std::string>& parts) {
+  for (const auto& part : parts) {
+    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;
+  }
+}
+
+TEST(NumberColumn, ReadsAnglesWithTheirLines) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.tlt", "  -60.5\r\n+3 extra words\n\n1e1\n");
+  const auto numbers = read_number_column(path, "an angle");
+  ASSERT_EQ(numbers.size(), 3u);
+  EXPECT_EQ(numbers[0].value, -60.5);
+  EXPECT_EQ(numbers[1].value, 3.0);
+  EXPECT_EQ(numbers[2].value, 10.0);
+  EXPECT_EQ(numbers[2].line, 4);
+}
+
+TEST(NumberColumn, NamesFileLineAndText) {
+  const ScratchDirectory scratch;
+  for (const std::string bad : {"abc", "1.5x", "nan", "inf", "1,5", "--3", "1e999"}) {
+    const auto path = scratch.write("a.tlt", "1\n" + bad + "\n");
+    expect_parts(message_of<Error>([&] { read_number_column(path, "an angle"); }),
+                 {"a.tlt", "line 2", bad, "an angle"});
+  }
+  EXPECT_THROW(read_number_column(scratch / "absent.tlt", "an angle"), Error);
+  EXPECT_THROW(read_number_column(scratch.write("b.tlt", std::string(2000, '\0')), "an angle"),
+               Error);
+}
+
+TEST(ImodTransforms, ReadsSixNumbersALine) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.xf", "   0.9 0.1 -0.1 0.9   12.5  -3\n1 0 0 1 0 0\n");
+  const auto transforms = read_imod_transforms(path);
+  ASSERT_EQ(transforms.size(), 2u);
+  EXPECT_EQ(transforms[0].a12, 0.1);
+  EXPECT_EQ(transforms[0].a21, -0.1);
+  EXPECT_EQ(transforms[0].shift_x_px, 12.5);
+  EXPECT_EQ(transforms[0].shift_y_px, -3.0);
+}
+
+TEST(ImodTransforms, RefusesMalformedLines) {
+  const ScratchDirectory scratch;
+  for (const std::string bad : {"1 0 0 1 0", "1 0 0 1 0 0 0", "1 0 0 1 0 nan", "1 2 2 4 0 0"}) {
+    const auto path = scratch.write("a.xf", "1 0 0 1 0 0\n" + bad + "\n");
+    expect_parts(message_of<Error>([&] { read_imod_transforms(path); }), {"a.xf", "line 2", bad});
+  }
+}
+
+TEST(Mdoc, ReadsSectionsInAnyOrder) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.mdoc", R"(PixelSpacing = 2.17
+ImageFile = a.st
+
+[T = SerialEM: Tilt axis angle = 85.9, binning = 1]
+
+[ZValue = 1]
+ExposureDose = 3
+TiltAngle = 3.001
+SomeNewKey = what=ever
+
+[ZValue = 0]
+TiltAngle = -0.002
+RotationAngle = 175.9
+)");
+  const Mdoc mdoc = read_mdoc(path);
+  EXPECT_EQ(mdoc.pixel_spacing_A, 2.17);
+  ASSERT_EQ(mdoc.sections.size(), 2u);
+  EXPECT_EQ(mdoc.sections[0].section, 0);
+  EXPECT_EQ(mdoc.sections[0].tilt_deg, -0.002);
+  EXPECT_EQ(mdoc.sections[1].tilt_deg, 3.001);
+  EXPECT_EQ(mdoc.sections[1].line, 8);
+}
+
+TEST(Mdoc, RefusesWhatContradictsItself) {
+  const ScratchDirectory scratch;
+  expect_parts(message_of<Error>(
+                   [&] { read_mdoc(scratch.write("a.mdoc", "[ZValue = 0]\nTiltAngle = up\n")); }),
+               {"a.mdoc", "line 2", "TiltAngle = up"});
+  expect_parts(message_of<Error>(
+                   [&] { read_mdoc(scratch.write("a.mdoc", "[ZValue = 0]\n[ZValue = 0]\n")); }),
+               {"a.mdoc", "line 2", "twice"});
+  EXPECT_THROW(read_mdoc(scratch.write("a.mdoc", "[ZValue = first]\n")), Error);
+}
+
+std::string aln_row(int section) {
+  return std::to_string(section) + " 85.5 1.0 3.5 -2.25 nan 1.0 1.0 0.0 " +
+         std::to_string(10 * section - 20) + "\n";
+}
+
+TEST(AreTomoAlignment, ReadsHeaderGlobalAndLocalRows) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.aln", R"(# AreTomo Alignment / Priims bprmMn
+# RawSize = 64 48 3
+# NumPatches = 1
+# DarkFrame =     0    1   -10.00
+# AlphaOffset =     1.50
+# BetaOffset =     0.25
+# SEC     ROT         GMAG       TX          TY      SMEAN     SFIT    SCALE     BASE     TILT
+)" + aln_row(0) + aln_row(2) + "# Local Alignment\n0 0 1.0 2.0 0.1 0.2 1.0\n1 0 1 2 0 0 1\n");
+  const AreTomoAlignment alignment = read_aretomo_alignment(path);
+  EXPECT_EQ(*alignment.raw_size, (std::array<std::int64_t, 3>{64, 48, 3}));
+  EXPECT_EQ(alignment.dark_sections, Sections{1});
+  EXPECT_EQ(alignment.alpha_offset_deg, 1.5);
+  EXPECT_EQ(alignment.beta_offset_deg, 0.25);
+  ASSERT_EQ(alignment.rows.size(), 2u);
+  EXPECT_EQ(alignment.rows[1].section, 2);
+  EXPECT_EQ(alignment.rows[1].rotation_deg, 85.5);
+  EXPECT_EQ(alignment.rows[1].shift_x_px, 3.5);
+  EXPECT_EQ(alignment.rows[1].shift_y_px, -2.25);
+  EXPECT_EQ(alignment.rows[1].tilt_deg, 0.0);
+  EXPECT_EQ(alignment.num_local_rows, 2);
+}
+
+TEST(AreTomoAlignment, RefusesMalformedRows) {
+  const ScratchDirectory scratch;
+  for (const std::string bad : {"0 85 1 2 3 4 5 6 7", "x 85 1 0 0 0 0 0 0 10",
+                                "0 85 1 0 0 0 0 0 0 steep", "-1 85 1 0 0 0 0 0 0 10"}) {
+    const auto path = scratch.write("a.aln", aln_row(0) + bad + "\n");
+    expect_parts(message_of<Error>([&] { read_aretomo_alignment(path); }),
+                 {"a.aln", "line 2", bad});
+  }
+  EXPECT_THROW(read_aretomo_alignment(scratch.write("a.aln", "# RawSize = 1 2 3\n")), Error);
+  EXPECT_THROW(read_aretomo_alignment(scratch.write("a.aln", "# RawSize = 1 2\n" + aln_row(0))),
+               Error);
+}
+
+Sections assign(const Sections& rows, const Sections& dark, std::int64_t num_sections) {
+  AreTomoAlignment alignment;
+  alignment.dark_sections = dark;
+  for (const auto section : rows) {
+    alignment.rows.emplace_back();
+    alignment.rows.back().section = section;
+  }
+  return assign_aretomo_sections(alignment, "a.aln", num_sections, "a.st");
+}
+
+TEST(AreTomoSections, EveryWayOfCounting) {
+  EXPECT_EQ(assign({0, 1, 2}, {}, 3), (Sections{0, 1, 2}));
+  EXPECT_EQ(assign({1, 2, 3}, {}, 3), (Sections{0, 1, 2}));
+  EXPECT_EQ(assign({2, 0, 1}, {}, 3), (Sections{2, 0, 1}));   // sorted by tilt
+  EXPECT_EQ(assign({0, 2, 3}, {1}, 4), (Sections{0, 2, 3}));  // before removal
+  EXPECT_EQ(assign({2, 3, 4}, {1}, 4), (Sections{1, 2, 3}));  // before removal, from 1
+  EXPECT_EQ(assign({0, 1, 2}, {1}, 4), (Sections{0, 2, 3}));  // after removal
+  EXPECT_EQ(assign({1, 2, 3}, {2}, 4), (Sections{0, 2, 3}));  // after removal, from 1
+  EXPECT_EQ(assign({0, 2, 3}, {1}, 3), (Sections{0, 1, 2}));  // the stack has lost the dark ones
+  EXPECT_EQ(assign({0, 1, 2}, {1}, 3), (Sections{0, 1, 2}));
+}
+
+TEST(AreTomoSections, NeverAssumes) {
+  expect_parts(message_of<Error>([] {
+                 assign({0, 1, 2}, {3}, 7);
+               }),
+               {"3", "1 dark", "7", "a.aln", "a.st"});
+  EXPECT_THROW(assign({0, 2, 5}, {}, 3), Error);
+  EXPECT_THROW(assign({0, 1, 1}, {}, 3), Error);
+}
+
+TEST(SectionList, NumbersAndRanges) {
+  EXPECT_EQ(parse_section_list("1-3,40", 41), (Sections{0, 1, 2, 39}));
+  EXPECT_EQ(parse_section_list(" 4 , 2 - 3,3", 4), (Sections{1, 2, 3}));
+  EXPECT_TRUE(parse_section_list("", 4).empty());
+  for (const char* bad : {"0", "5", "3-2", "a", "1-", "-2", "1,,2", "2-9", "1.5"}) {
+    EXPECT_THROW(parse_section_list(bad, 4), Error) << bad;
+  }
+}
+
+}  // namespace
+}  // namespace tomofield::io

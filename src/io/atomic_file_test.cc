@@ -1,0 +1,90 @@
+#include "io/atomic_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "io/json.h"
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+using testing::message_of;
+using testing::read_whole_file;
+using testing::ScratchDirectory;
+
+TEST(AtomicFile, ReplacesOnCommitOnly) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("result.txt", "old");
+  AtomicFile file(path);
+  std::ofstream(file.temporary_path()) << "new";
+  EXPECT_EQ(read_whole_file(path), "old");
+  file.commit();
+  EXPECT_EQ(read_whole_file(path), "new");
+  EXPECT_EQ(scratch.num_files(), 1u);
+}
+
+TEST(AtomicFile, LeavesNothingBehindWithoutCommit) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("result.txt", "old");
+  {
+    AtomicFile file(path);
+    std::ofstream(file.temporary_path()) << "half of the n";
+    AtomicFile moved(std::move(file));
+    EXPECT_EQ(scratch.num_files(), 2u);
+  }
+  EXPECT_EQ(read_whole_file(path), "old");
+  EXPECT_EQ(scratch.num_files(), 1u);
+}
+
+TEST(AtomicFile, HonoursTheUmask) {
+  const ScratchDirectory scratch;
+  const mode_t before = ::umask(027);
+  write_text_file(scratch / "result.txt", "text");
+  ::umask(before);
+  struct stat status {};
+  ASSERT_EQ(::stat((scratch / "result.txt").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777u, 0640u);
+}
+
+TEST(AtomicFile, WritesThroughSymbolicLinks) {
+  const ScratchDirectory scratch;
+  const auto target = scratch.write("target.txt", "old");
+  std::filesystem::create_symlink("target.txt", scratch / "link.txt");
+  write_text_file(scratch / "link.txt", "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(scratch / "link.txt"));
+  EXPECT_EQ(read_whole_file(target), "new");
+}
+
+TEST(AtomicFile, RefusesWhatCannotBeWrittenAtOnce) {
+  const ScratchDirectory scratch;
+  EXPECT_THROW(AtomicFile(scratch / "absent/result.txt"), Error);
+  EXPECT_THROW(AtomicFile(scratch.path()), Error);
+  EXPECT_THROW(AtomicFile("/dev/null"), Error);
+  const std::string message = message_of<Error>([&] { AtomicFile(scratch / "absent/result.txt"); });
+  EXPECT_NE(message.find("absent"), std::string::npos) << message;
+  EXPECT_EQ(scratch.num_files(), 0u);
+}
+
+TEST(AtomicFile, RefusesAReadOnlyDirectory) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
+  const ScratchDirectory scratch;
+  const auto closed = scratch / "closed";
+  std::filesystem::create_directory(closed);
+  std::filesystem::permissions(
+      closed, std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+  EXPECT_THROW(AtomicFile(closed / "result.txt"), Error);
+}
+
+TEST(Json, IsWrittenForPeople) {
+  const ScratchDirectory scratch;
+  write_json(scratch / "figures.json",
+             {{"name", "a\xff"}, {"loss", 0.5}});  // invalid UTF-8 survives
+  const auto read = nlohmann::json::parse(read_whole_file(scratch / "figures.json"));
+  EXPECT_EQ(read["loss"], 0.5);
+}
+
+}  // namespace
+}  // namespace tomofield::io

@@ -1,0 +1,504 @@
+#include "tilt_series/tilt_series.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+
+#include "base/log.h"
+#include "base/random.h"
+#include "io/mrc.h"
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+using testing::message_of;
+using testing::ScratchDirectory;
+
+/// value(x, y, section) for every pixel of a stack.
+using PixelFunction = std::function<float(std::int64_t, std::int64_t, std::int64_t)>;
+
+std::filesystem::path write_stack(const std::filesystem::path& path, std::int64_t nx,
+                                  std::int64_t ny, std::int64_t nz, const PixelFunction& value,
+                                  double pixel_size_A = 2.5) {
+  io::MrcSpec spec;
+  spec.nx = nx;
+  spec.ny = ny;
+  spec.nz = nz;
+  spec.is_volume = false;
+  spec.voxel_size_A = {pixel_size_A, pixel_size_A, pixel_size_A};
+  io::MrcWriter writer(path, spec);
+  std::vector<float> section(static_cast<std::size_t>(nx * ny));
+  for (std::int64_t z = 0; z < nz; ++z) {
+    for (std::int64_t i = 0; i < nx * ny; ++i) {
+      section[static_cast<std::size_t>(i)] = value(i % nx, i / nx, z);
+    }
+    writer.write_section(z, section);
+  }
+  writer.close();
+  return path;
+}
+
+float some_value(std::int64_t x, std::int64_t y, std::int64_t z) {
+  return static_cast<float>(100 + (x * 7 + y * 13 + z * 5) % 31);
+}
+
+struct LoadedView {
+  std::int64_t width;
+  std::vector<float> image;
+  std::vector<std::uint8_t> valid;
+};
+
+LoadedView load(const TiltSeries& series, std::size_t view) {
+  const auto pixels = static_cast<std::size_t>(series.width() * series.height());
+  LoadedView loaded{series.width(), std::vector<float>(pixels), std::vector<std::uint8_t>(pixels)};
+  series.read_view(view, loaded.image, loaded.valid);
+  return loaded;
+}
+
+/// Options of a small bright stack with its angles in `scratch`.
+TiltSeriesOptions small_series(const ScratchDirectory& scratch, std::int64_t num_sections = 3) {
+  TiltSeriesOptions options;
+  options.stack = write_stack(scratch / "a.st", 16, 12, num_sections, some_value);
+  std::string angles;
+  for (std::int64_t i = 0; i < num_sections; ++i) angles += fmt::format("{}\n", 10 * i - 20);
+  options.tlt = scratch.write("a.tlt", angles);
+  options.contrast = Contrast::kBright;
+  return options;
+}
+
+std::string refusal(const TiltSeriesOptions& options) {
+  return message_of<Error>([&] { TiltSeries series(options); });
+}
+
+void expect_parts(const std::string& message, const std::vector<std::string>& parts) {
+  for (const auto& part : parts) {
+    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;
+  }
+}
+
+/// Collects warnings while it lives.
+class WarningCatcher {
+ public:
+  WarningCatcher() {
+    base::set_log_sink([this](base::LogLevel level, std::string_view text) {
+      if (level == base::LogLevel::kWarning) text_ += std::string(text) + "\n";
+    });
+  }
+  ~WarningCatcher() { base::set_log_sink({}); }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+TEST(TiltSeries, AlignedStackIsReadAsItIs) {
+  const ScratchDirectory scratch;
+  const TiltSeries series(small_series(scratch));
+  ASSERT_EQ(series.views().size(), 3u);
+  EXPECT_EQ(series.width(), 16);
+  EXPECT_EQ(series.height(), 12);
+  EXPECT_NEAR(series.pixel_size_A(), 2.5, 1e-6);
+  EXPECT_EQ(series.views()[2].tilt_deg, 0.0);
+  EXPECT_EQ(series.noise_sigma().size(), 3u);
+  const LoadedView view = load(series, 1);
+  for (std::int64_t i = 0; i < 16 * 12; ++i) {
+    ASSERT_EQ(view.image[static_cast<std::size_t>(i)], some_value(i % 16, i / 16, 1));
+    ASSERT_EQ(view.valid[static_cast<std::size_t>(i)], 1);
+  }
+}
+
+TEST(TiltSeries, ExcludedViewsAreAbsent) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 5);
+  options.exclude = "1-2,4";
+  const TiltSeries series(options);
+  ASSERT_EQ(series.views().size(), 2u);
+  EXPECT_EQ(series.views()[0].section, 2);
+  EXPECT_EQ(series.views()[1].section, 4);
+  EXPECT_EQ(series.views()[1].tilt_deg, 20.0);
+  EXPECT_EQ(load(series, 1).image[0], some_value(0, 0, 4));
+  options.exclude = "1-5";
+  expect_parts(refusal(options), {"no section", "a.st"});
+  options.exclude = "6";
+  expect_parts(refusal(options), {"'6'", "1 to 5"});
+}
+
+TEST(TiltSeries, AnglesComeFromTheFirstSourceThereIs) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 2);
+  options.aln = scratch.write("a.aln", "0 0 1 0 0 0 0 0 0 11\n1 0 1 0 0 0 0 0 0 12\n");
+  options.mdoc = scratch.write(
+      "a.mdoc", "PixelSpacing = 9\n[ZValue = 0]\nTiltAngle = 21\n[ZValue = 1]\nTiltAngle = 22\n");
+  EXPECT_EQ(TiltSeries(options).views()[1].tilt_deg, -10.0);
+  EXPECT_NEAR(TiltSeries(options).pixel_size_A(), 2.5, 1e-6);  // the header's
+  options.tlt.reset();
+  EXPECT_EQ(TiltSeries(options).views()[1].tilt_deg, 12.0);
+  options.aln.reset();
+  EXPECT_EQ(TiltSeries(options).views()[1].tilt_deg, 22.0);
+  options.mdoc.reset();
+  expect_parts(refusal(options), {"--tlt", "--aln", "--mdoc"});
+}
+
+TEST(TiltSeries, AnglesOfTheExtendedHeader) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 2);
+  std::string bytes = testing::read_whole_file(options.stack);
+  const std::int16_t tilts[] = {-3000, 125};
+  const std::int32_t extended_bytes = 4;
+  const std::int16_t layout[] = {2, 1};
+  bytes.replace(92, 4, reinterpret_cast<const char*>(&extended_bytes), 4);
+  bytes.replace(104, 4, "SERI");
+  bytes.replace(128, 4, reinterpret_cast<const char*>(layout), 4);
+  bytes.insert(1024, reinterpret_cast<const char*>(tilts), 4);
+  scratch.write("a.st", bytes);
+  EXPECT_EQ(TiltSeries(options).views()[1].tilt_deg, -10.0);  // the explicit file wins
+  options.tlt.reset();
+  EXPECT_EQ(TiltSeries(options).views()[0].tilt_deg, -30.0);
+  EXPECT_EQ(TiltSeries(options).views()[1].tilt_deg, 1.25);
+}
+
+TEST(TiltSeries, CountsThatDifferNameBothFiles) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  options.tlt = scratch.write("b.tlt", "1\n2\n");
+  expect_parts(refusal(options), {"b.tlt", "2 angles", "a.st", "3 sections"});
+  options = small_series(scratch);
+  options.xf = scratch.write("b.xf", "1 0 0 1 0 0\n");
+  expect_parts(refusal(options), {"b.xf", "1 transforms", "3 sections"});
+  options = small_series(scratch);
+  options.xtilt = scratch.write("b.xtilt", "0\n0\n0\n0\n");
+  expect_parts(refusal(options), {"b.xtilt", "4 x-axis tilts", "3 sections"});
+  options = small_series(scratch);
+  options.tlt.reset();
+  options.mdoc = scratch.write("b.mdoc", "[ZValue = 0]\nTiltAngle = 1\n");
+  expect_parts(refusal(options), {"b.mdoc", "1 sections", "3 sections"});
+  options.aln = scratch.write("b.aln", "0 0 1 0 0 0 0 0 0 11\n");
+  expect_parts(refusal(options), {"b.aln", "1 aligned", "a.st", "3"});
+}
+
+TEST(TiltSeries, ImpossibleAnglesAreRefused) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  options.tlt = scratch.write("b.tlt", "1\n2\n80.5\n");
+  expect_parts(refusal(options), {"b.tlt", "line 3", "80.5"});
+  options.exclude = "3";
+  EXPECT_EQ(refusal(options), "");
+  options.tlt = scratch.write("b.tlt", "1\ntwo\n3\n");
+  expect_parts(refusal(options), {"b.tlt", "line 2", "two"});
+}
+
+TEST(TiltSeries, OptionsThatExcludeEachOther) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  options.take_log = true;
+  expect_parts(refusal(options), {"--log", "dark"});
+  options = small_series(scratch);
+  options.bin = 2;
+  options.angpix = 5.0;
+  expect_parts(refusal(options), {"--bin", "--angpix"});
+  options.bin = 0.5;
+  options.angpix.reset();
+  expect_parts(refusal(options), {"--bin 0.5"});
+  options.bin = 13;
+  expect_parts(refusal(options), {"13", "16 × 12"});
+  options.bin = 1;
+  options.angpix = 2.0;
+  expect_parts(refusal(options), {"--angpix 2", "2.5"});
+}
+
+TEST(TiltSeries, BinningKeepsExactPixelSizes) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  options.pixel_size_A = 1.7;
+  options.angpix = 4.0;
+  const TiltSeries series(options);
+  EXPECT_DOUBLE_EQ(series.bin_factor(), 4.0 / 1.7);
+  EXPECT_DOUBLE_EQ(series.pixel_size_A(), 4.0);
+  EXPECT_EQ(series.width(), 6);   // floor(16 / 2.353)
+  EXPECT_EQ(series.height(), 5);  // floor(12 / 2.353)
+  options.angpix.reset();
+  options.bin = 2;
+  const TiltSeries halved(options);
+  const float mean =
+      (some_value(2, 0, 0) + some_value(3, 0, 0) + some_value(2, 1, 0) + some_value(3, 1, 0)) /
+      4.0f;
+  EXPECT_FLOAT_EQ(load(halved, 0).image[1], mean);
+}
+
+TEST(TiltSeries, PixelSizeOfTheMdocWhereTheHeaderHasNone) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 1);
+  write_stack(options.stack, 16, 12, 1, some_value, 1.0);
+  options.mdoc = scratch.write("a.mdoc", "[ZValue = 0]\nTiltAngle = 1\nPixelSpacing = 3.42\n");
+  EXPECT_DOUBLE_EQ(TiltSeries(options).pixel_size_A(), 3.42);
+  options.mdoc.reset();
+  write_stack(options.stack, 16, 12, 1, some_value, 0.0);
+  const WarningCatcher warnings;
+  EXPECT_DOUBLE_EQ(TiltSeries(options).pixel_size_A(), 1.0);
+  expect_parts(warnings.text(), {"no pixel size", "--pixel-size"});
+}
+
+TEST(TiltSeries, FewPixelsThatAreNoNumbersAreMasked) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  int num_bad = 1;
+  const auto write = [&] {
+    write_stack(options.stack, 16, 12, 3, [&](auto x, auto y, auto z) {
+      const bool is_bad = z == 1 && y == 5 && x < num_bad;
+      return is_bad ? (x == 0 ? std::numeric_limits<float>::quiet_NaN()
+                              : std::numeric_limits<float>::infinity())
+                    : some_value(x, y, z);
+    });
+  };
+  write();
+  {
+    const WarningCatcher warnings;
+    const TiltSeries series(options);
+    expect_parts(warnings.text(), {"section 2", "1 NaN"});
+    const LoadedView view = load(series, 1);
+    EXPECT_EQ(view.valid[5 * 16], 0);
+    EXPECT_EQ(view.image[5 * 16], 0.0f);
+    EXPECT_EQ(view.valid[5 * 16 + 1], 1);
+  }
+  num_bad = 2;  // of 192: above one in a hundred
+  write();
+  expect_parts(refusal(options), {"section 2", "2 NaN or infinite", "--exclude 2"});
+  options.exclude = "2";
+  EXPECT_EQ(refusal(options), "");
+}
+
+TEST(TiltSeries, ConstantViewIsNamed) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  write_stack(options.stack, 16, 12, 3,
+              [](auto x, auto y, auto z) { return z == 2 ? 7.0f : some_value(x, y, z); });
+  expect_parts(refusal(options), {"section 3", "constant", "a.st"});
+}
+
+// Transmission images I0 exp(−integral): a bright field with a dark disc.
+constexpr float kEmptyBeam = 800.0f;
+float integral_at(std::int64_t x, std::int64_t y) {
+  const double r = std::hypot(static_cast<double>(x) - 31.5, static_cast<double>(y) - 31.5);
+  return r < 15 ? 0.7f : 0.0f;
+}
+
+TEST(TiltSeries, DarkContrastBecomesLineIntegrals) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 2);
+  base::Random random(3);
+  write_stack(options.stack, 64, 64, 2, [&](auto x, auto y, auto) {
+    return kEmptyBeam * std::exp(-integral_at(x, y)) + static_cast<float>(5.0 * random.normal());
+  });
+  options.contrast = Contrast::kDark;
+  const TiltSeries linear(options);
+  EXPECT_NEAR(linear.empty_beam(), kEmptyBeam, 10.0);
+  EXPECT_NEAR(linear.noise_sigma()[0], 5.0, 0.5);
+  const double depth = kEmptyBeam * (1.0 - std::exp(-0.7));
+  const std::size_t centre = 32 * 64 + 32;
+  EXPECT_NEAR(load(linear, 0).image[centre], depth, 30.0);
+
+  options.take_log = true;
+  const TiltSeries logarithm(options);
+  EXPECT_NEAR(load(logarithm, 0).image[centre], 0.7, 0.06);
+  EXPECT_NEAR(load(logarithm, 0).image[0], 0.0, 0.05);
+  EXPECT_NEAR(logarithm.noise_sigma()[0], 5.0 / kEmptyBeam, 0.3 * 5.0 / kEmptyBeam);
+}
+
+TEST(TiltSeries, LogarithmNeverSeesZero) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 1);
+  write_stack(options.stack, 64, 64, 1, [](auto x, auto y, auto) {
+    if (x == 10 && y < 3) return y == 0 ? 0.0f : -5.0f;
+    return kEmptyBeam + static_cast<float>((x + y) % 3);
+  });
+  options.contrast = Contrast::kDark;
+  options.take_log = true;
+  const WarningCatcher warnings;
+  const TiltSeries series(options);
+  expect_parts(warnings.text(), {"3 pixels", "logarithm"});
+  const LoadedView view = load(series, 0);
+  for (std::size_t i = 0; i < view.image.size(); ++i) ASSERT_TRUE(std::isfinite(view.image[i]));
+  EXPECT_NEAR(view.image[10], -std::log(1e-3), 1e-3);
+
+  write_stack(options.stack, 64, 64, 1,
+              [](auto x, auto y, auto z) { return -some_value(x, y, z); });
+  expect_parts(refusal(options), {"--log", "positive"});
+}
+
+// --- alignment ---------------------------------------------------------------
+
+struct AlignmentCase {
+  std::int64_t nx, ny;
+  double rotation_deg;
+  double shift_x_px, shift_y_px;  ///< raw − centre = R(rotation) q + shift
+};
+
+class TiltSeriesAlignment : public ::testing::TestWithParam<AlignmentCase> {
+ protected:
+  static constexpr double kBlobX = 7.3, kBlobY = -4.6;  // of the aligned image's centre
+  static constexpr double kBlobRadius = 2.5;
+
+  /// A stack with a Gaussian where the aligned position (kBlobX, kBlobY) lands in the raw image.
+  TiltSeriesOptions write_blob(const ScratchDirectory& scratch) const {
+    const auto [nx, ny, rotation_deg, shift_x, shift_y] = GetParam();
+    const double c = std::cos(rotation_deg * std::numbers::pi / 180);
+    const double s = std::sin(rotation_deg * std::numbers::pi / 180);
+    const double raw_x = c * kBlobX - s * kBlobY + shift_x + 0.5 * static_cast<double>(nx);
+    const double raw_y = s * kBlobX + c * kBlobY + shift_y + 0.5 * static_cast<double>(ny);
+    TiltSeriesOptions options;
+    options.stack = write_stack(scratch / "raw.st", nx, ny, 1, [&](auto x, auto y, auto) {
+      const double dx = static_cast<double>(x) + 0.5 - raw_x;
+      const double dy = static_cast<double>(y) + 0.5 - raw_y;
+      return static_cast<float>(100 *
+                                std::exp(-(dx * dx + dy * dy) / (2 * kBlobRadius * kBlobRadius)));
+    });
+    options.contrast = Contrast::kBright;
+    options.tlt = scratch.write("a.tlt", "0\n");
+    // The file's own definition: A = R(−ROT), and A (raw − centre) + D = q.
+    const double dx = -(c * shift_x + s * shift_y), dy = -(-s * shift_x + c * shift_y);
+    options.xf = scratch.write(
+        "raw.xf", fmt::format("{:.9f} {:.9f} {:.9f} {:.9f} {:.6f} {:.6f}\n", c, s, -s, c, dx, dy));
+    scratch.write("raw.aln",
+                  fmt::format("# RawSize = {} {} 1\n0 {:.9f} 1.0 {:.6f} {:.6f} 1 1 1 0 0\n", nx, ny,
+                              rotation_deg, shift_x, shift_y));
+    return options;
+  }
+};
+
+TEST_P(TiltSeriesAlignment, BlobLandsWhereTheTransformSays) {
+  const ScratchDirectory scratch;
+  const TiltSeries series(write_blob(scratch));
+  const bool is_swapped = std::fabs(std::sin(GetParam().rotation_deg * std::numbers::pi / 180)) >
+                          std::numbers::sqrt2 / 2;
+  EXPECT_EQ(series.width(), is_swapped ? GetParam().ny : GetParam().nx);
+  EXPECT_EQ(series.height(), is_swapped ? GetParam().nx : GetParam().ny);
+  const LoadedView view = load(series, 0);
+  double sum = 0, sum_x = 0, sum_y = 0;
+  for (std::size_t i = 0; i < view.image.size(); ++i) {
+    const auto x = static_cast<double>(static_cast<std::int64_t>(i) % view.width);
+    const auto y = static_cast<double>(static_cast<std::int64_t>(i) / view.width);
+    sum += view.image[i];
+    sum_x += view.image[i] * (x + 0.5 - 0.5 * static_cast<double>(series.width()));
+    sum_y += view.image[i] * (y + 0.5 - 0.5 * static_cast<double>(series.height()));
+  }
+  EXPECT_NEAR(sum_x / sum, kBlobX, 0.02);
+  EXPECT_NEAR(sum_y / sum, kBlobY, 0.02);
+  EXPECT_NEAR(sum, 100 * 2 * std::numbers::pi * kBlobRadius * kBlobRadius, 20.0);
+}
+
+TEST_P(TiltSeriesAlignment, AreTomoAndImodAgree) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = write_blob(scratch);
+  const LoadedView by_imod = load(TiltSeries(options), 0);
+  options.xf.reset();
+  options.aln = scratch / "raw.aln";
+  const LoadedView by_aretomo = load(TiltSeries(options), 0);
+  ASSERT_EQ(by_aretomo.image.size(), by_imod.image.size());
+  for (std::size_t i = 0; i < by_imod.image.size(); ++i) {
+    if (by_imod.valid[i] != by_aretomo.valid[i]) continue;  // the outermost pixels may round apart
+    ASSERT_NEAR(by_aretomo.image[i], by_imod.image[i], 1e-3);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Cases, TiltSeriesAlignment,
+    ::testing::Values(AlignmentCase{64, 48, 0, 0, 0}, AlignmentCase{64, 48, 0, 3.25, -2.5},
+                      AlignmentCase{61, 48, 12.5, 1.5, 2.25}, AlignmentCase{61, 49, -8, -2, 0.5},
+                      AlignmentCase{64, 47, 85.3, 2.75, -1.5}, AlignmentCase{63, 50, -95, 0.25, 1},
+                      AlignmentCase{64, 48, 178, 1, 1}));
+
+TEST(TiltSeries, PixelsWithoutDataAreInvalid) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 1);
+  options.xf = scratch.write("a.xf", "1 0 0 1 3 -2\n");
+  const LoadedView view = load(TiltSeries(options), 0);
+  for (std::int64_t y = 0; y < 12; ++y) {
+    for (std::int64_t x = 0; x < 16; ++x) {
+      const auto at = static_cast<std::size_t>(16 * y + x);
+      const bool is_inside = x >= 3 && y < 10;
+      ASSERT_EQ(view.valid[at], is_inside);
+      ASSERT_EQ(view.image[at], is_inside ? some_value(x - 3, y + 2, 0) : 0.0f);
+    }
+  }
+  options.xf = scratch.write("a.xf", "1 0 0 1 100 0\n");
+  expect_parts(refusal(options), {"section 1", "no pixel left"});
+}
+
+TEST(TiltSeries, MagnificationIsUndone) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 1);
+  write_stack(options.stack, 33, 33, 1,
+              [](auto x, auto y, auto) { return static_cast<float>(x + 2 * y); });
+  options.xf = scratch.write("a.xf", "1.25 0 0 1.25 0 0\n");
+  const LoadedView view = load(TiltSeries(options), 0);
+  // Eight pixels beside the centre came from 6.4 pixels beside it.
+  EXPECT_NEAR(view.image[16 * 33 + 24], (16 + 6.4) + 2 * 16, 1e-3);
+}
+
+TEST(TiltSeries, DarkFramesOfAreTomoAreLeftOut) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 4);
+  options.tlt.reset();
+  options.aln = scratch.write("a.aln",
+                              "# RawSize = 16 12 4\n# DarkFrame = 1 1 -10.0\n"
+                              "0 0 1 0 0 0 0 0 0 -20\n1 0 1 0 0 0 0 0 0 0\n2 0 1 0 0 0 0 0 0 10\n");
+  const TiltSeries series(options);
+  ASSERT_EQ(series.views().size(), 3u);
+  EXPECT_EQ(series.views()[1].section, 2);
+  EXPECT_EQ(series.views()[1].tilt_deg, 0.0);
+  options.aln = scratch.write("a.aln", "# RawSize = 32 24 4\n0 0 1 0 0 0 0 0 0 -20\n");
+  expect_parts(refusal(options), {"32 × 24", "16 × 12"});
+}
+
+// --- real files --------------------------------------------------------------
+
+const std::filesystem::path kSharedData = std::filesystem::path(TOMOFIELD_SHARED_DATA) / "data";
+
+struct RealSeries {
+  const char* name;
+  const char* stack;
+  const char* tlt;
+  Contrast contrast;
+  std::size_t num_views;
+  std::int64_t width, height;
+  double first_deg, last_deg, pixel_size_A;
+};
+
+class TiltSeriesReal : public ::testing::TestWithParam<RealSeries> {};
+
+TEST_P(TiltSeriesReal, Opens) {
+  const RealSeries& real = GetParam();
+  TiltSeriesOptions options;
+  options.stack = kSharedData / real.stack;
+  options.tlt = kSharedData / real.tlt;
+  options.contrast = real.contrast;
+  if (!std::filesystem::exists(options.stack)) GTEST_SKIP() << "no " << options.stack;
+  const TiltSeries series(options);
+  EXPECT_EQ(series.views().size(), real.num_views);
+  EXPECT_EQ(series.width(), real.width);
+  EXPECT_EQ(series.height(), real.height);
+  EXPECT_NEAR(series.views().front().tilt_deg, real.first_deg, 1e-6);
+  EXPECT_NEAR(series.views().back().tilt_deg, real.last_deg, 1e-6);
+  EXPECT_NEAR(series.pixel_size_A(), real.pixel_size_A, 1e-4 * real.pixel_size_A);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Files, TiltSeriesReal,
+    ::testing::Values(RealSeries{"exosome", "exosome_cryo/exosome_341x480.ali",
+                                 "exosome_cryo/exosome.tlt", Contrast::kDark, 31, 341, 480, -59.7,
+                                 60.7, 16.56},
+                      RealSeries{"idp_raw", "idp_haadf/haadf_tilt_raw.st",
+                                 "idp_haadf/haadf_tilt_raw.rawtlt", Contrast::kBright, 16, 256, 256,
+                                 -40, 35, 130.81445},
+                      RealSeries{"ta_film", "ta_film/area24.ali", "ta_film/ta_film.tlt",
+                                 Contrast::kBright, 46, 151, 77, -63.000469, 55.898777, 1.0}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+}  // namespace
+}  // namespace tomofield::tilt_series
