@@ -98,7 +98,6 @@ void Fit::take_step(const std::vector<int>& views) {
     for (std::size_t v = 0; v < views.size(); ++v) {
       progress_.epoch_sums[static_cast<std::size_t>(views[v])] += band.views[v];
     }
-    progress_.epoch_variation += band.variation / options_.subsets;
     grad_bias += band.grad_bias;
   }
   const double rate = learning_rate(progress_.step);
@@ -117,7 +116,6 @@ void Fit::end_epoch() {
   if (options_.fit_view_scale)
     loss::fit_nuisances(loss::NuisancePrior{}, progress_.epoch_sums, progress_.views);
   progress_.epoch_sums.assign(progress_.views.size(), {});
-  progress_.epoch_variation = 0.0;
 }
 
 }  // namespace tomofield::reconstruct

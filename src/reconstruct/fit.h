@@ -33,7 +33,6 @@ struct Progress {
   std::int64_t step = 0;  ///< steps done
   std::vector<loss::ViewModel> views;
   std::vector<loss::ViewSums> epoch_sums;  ///< of the running epoch
-  double epoch_variation = 0.0;
   std::vector<double> data_loss;  ///< mean squared residual in units of the noise, one an epoch
 };
 

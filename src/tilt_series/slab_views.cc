@@ -112,4 +112,12 @@ std::int64_t SlabViews::num_valid(int view) const {
   return count;
 }
 
+std::uint64_t SlabViews::checksum() const {
+  const auto* words = static_cast<const std::uint32_t*>(memory_);
+  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  for (std::size_t i = 0; i < bytes_ / sizeof(std::uint32_t); ++i)
+    hash = (hash ^ words[i]) * 0x100000001b3ULL;
+  return hash;
+}
+
 }  // namespace tomofield::tilt_series

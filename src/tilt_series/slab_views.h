@@ -36,6 +36,8 @@ class SlabViews {
   const std::uint16_t* mask(int slab, int view) const;  ///< [x], bit = lane
   /// Rays that count in a view.
   std::int64_t num_valid(int view) const;
+  /// 64-bit FNV-1a over rays and masks: tells one series from another.
+  std::uint64_t checksum() const;
 
  private:
   void fill(double unit, const ReadView& read_view);

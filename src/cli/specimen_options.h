@@ -1,0 +1,13 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "reconstruct/prepare.h"
+
+namespace tomofield::cli {
+
+/// Registers --thickness, --roi, --hand, --center and --no-margin: what every
+/// command that reconstructs has to know of the specimen.
+void add_specimen_options(CLI::App& command, reconstruct::SpecimenOptions& options);
+
+}  // namespace tomofield::cli

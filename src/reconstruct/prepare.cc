@@ -1,0 +1,168 @@
+#include "reconstruct/prepare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruct {
+namespace {
+
+// Largest shift in y, in pixels at the slab's faces, that a varying x-axis tilt
+// may cause before single-axis slabs are no longer the geometry.
+constexpr double kMaxRowShift = 0.5;
+
+// The contrast of an untilted view (standard deviation over its pixels) that
+// one density unit stands for, per pixel of thickness: the yardstick phantoms,
+// with densities between 0 and 1, have 0.07 to 0.08.
+constexpr double kContrastPerThickness = 0.075;
+
+// The views nearest to zero tilt that contrast is measured in: tilted ones of a
+// specimen that ends in the field of view mostly show its faces.
+constexpr std::size_t kContrastViews = 5;
+
+double common_x_tilt(const std::vector<tilt_series::View>& views, double thickness) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const tilt_series::View& view : views) {
+    low = std::min(low, view.x_tilt_deg);
+    high = std::max(high, view.x_tilt_deg);
+  }
+  const double radians_each_way = (high - low) / 2 * 0.017453292519943295;
+  if (thickness / 2 * std::sin(radians_each_way) > kMaxRowShift) {
+    throw Error(fmt::format(
+        "the x-axis tilt varies from {}° to {}° over the series, which moves rows by more than "
+        "half "
+        "a pixel at this thickness; single-axis slabs cannot model it: align with one x-axis tilt "
+        "for all views, or leave --xtilt out",
+        low, high));
+  }
+  return (low + high) / 2;
+}
+
+geometry::Roi scaled_roi(const geometry::Roi& roi, double factor) {
+  const auto scale = [factor](std::int64_t v) {
+    return std::llround(static_cast<double>(v) / factor);
+  };
+  return {scale(roi.x0), scale(roi.y0), scale(roi.x1), scale(roi.y1)};
+}
+
+void check_roi(const geometry::Roi& roi, const geometry::TiltGeometry& g, double factor) {
+  if (roi.x0 < 0 || roi.y0 < 0 || roi.x1 > g.width || roi.y1 > g.height || roi.width() < 1 ||
+      roi.height() < 1) {
+    throw Error(fmt::format(
+        "--roi lies outside the aligned view or is empty: the view is {:.0f} × {:.0f} pixels "
+        "(unbinned), so x0,y0,x1,y1 must satisfy 0 <= x0 < x1 <= {:.0f} and 0 <= y0 < y1 <= {:.0f}",
+        static_cast<double>(g.width) * factor, static_cast<double>(g.height) * factor,
+        static_cast<double>(g.width) * factor, static_cast<double>(g.height) * factor));
+  }
+}
+
+// Mean and noise-free standard deviation of the valid pixels of a view's rows in the region of
+// interest.
+struct ViewBrightness {
+  double mean = 0;
+  double contrast = 0;
+};
+
+ViewBrightness view_brightness(std::span<const float> image, std::span<const std::uint8_t> valid,
+                               double noise) {
+  double n = 0, s = 0, ss = 0;
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    if (!valid[i]) continue;
+    const double b = static_cast<double>(image[i]);
+    n += 1;
+    s += b;
+    ss += b * b;
+  }
+  if (n == 0) return {};
+  const double mean = s / n;
+  const double variance = ss / n - mean * mean;
+  return {mean, std::sqrt(std::max(variance - noise * noise, 1e-4 * variance))};
+}
+
+// Sets the density unit and the mean density from the series' brightness.
+void measure_brightness(const tilt_series::TiltSeries& series, PreparedSeries& prepared) {
+  const geometry::TiltGeometry& g = prepared.geometry;
+  const std::size_t first = static_cast<std::size_t>(prepared.roi.y0 * g.width);
+  const std::size_t count = static_cast<std::size_t>(prepared.roi.height() * g.width);
+  std::vector<float> image(static_cast<std::size_t>(g.width * g.height));
+  std::vector<std::uint8_t> valid(image.size());
+  std::vector<std::pair<double, double>> contrast_by_tilt;
+  double mean_density = 0;
+  for (int v = 0; v < g.num_views(); ++v) {
+    const std::size_t view = static_cast<std::size_t>(v);
+    series.read_view(view, image, valid);
+    const ViewBrightness b =
+        view_brightness(std::span(image).subspan(first, count),
+                        std::span(valid).subspan(first, count), series.noise_sigma()[view]);
+    mean_density += b.mean * g.cos_tilt(v) / g.thickness / g.num_views();
+    contrast_by_tilt.emplace_back(std::abs(g.tilt_deg[view]), b.contrast);
+  }
+  std::sort(contrast_by_tilt.begin(), contrast_by_tilt.end());
+  const std::size_t used = std::min(kContrastViews, contrast_by_tilt.size());
+  double contrast = 0;
+  for (std::size_t i = 0; i < used; ++i)
+    contrast += contrast_by_tilt[i].second / static_cast<double>(used);
+  prepared.unit = contrast / (kContrastPerThickness * g.thickness);
+  prepared.mean_density = mean_density / prepared.unit;
+}
+
+}  // namespace
+
+std::vector<std::string> SpecimenOptions::faults() const {
+  std::vector<std::string> found;
+  if (!(thickness >= 1) || !std::isfinite(thickness)) {
+    found.push_back(fmt::format("--thickness must be at least one pixel, not {}", thickness));
+  }
+  if (hand != 1 && hand != -1) found.push_back(fmt::format("--hand must be 1 or -1, not {}", hand));
+  return found;
+}
+
+PreparedSeries plan_series(const tilt_series::TiltSeries& series, const SpecimenOptions& specimen) {
+  const std::vector<std::string> faults = specimen.faults();
+  if (!faults.empty()) throw Error(fmt::format("{}", fmt::join(faults, "; ")));
+  PreparedSeries plan;
+  plan.bin_factor = series.bin_factor();
+  plan.pixel_size_A = series.pixel_size_A();
+  plan.empty_beam = series.empty_beam();
+  std::vector<double> tilts;
+  for (const tilt_series::View& view : series.views()) tilts.push_back(view.tilt_deg);
+  const double thickness = std::max(1.0, std::round(specimen.thickness / plan.bin_factor));
+  plan.geometry =
+      geometry::centred_geometry(series.width(), series.height(), thickness, std::move(tilts));
+  plan.geometry.hand = specimen.hand;
+  if (specimen.axis_x) plan.geometry.axis_x = *specimen.axis_x / plan.bin_factor;
+  if (specimen.axis_z) plan.geometry.axis_z = *specimen.axis_z / plan.bin_factor;
+  plan.roi = specimen.roi ? scaled_roi(*specimen.roi, plan.bin_factor)
+                          : geometry::Roi{0, 0, plan.geometry.width, plan.geometry.height};
+  check_roi(plan.roi, plan.geometry, plan.bin_factor);
+  plan.x_tilt_deg = common_x_tilt(series.views(), thickness);
+  return plan;
+}
+
+PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
+                              const SpecimenOptions& specimen,
+                              const std::filesystem::path& scratch_dir) {
+  PreparedSeries prepared = plan_series(series, specimen);
+  measure_brightness(series, prepared);
+  for (const double sigma : series.noise_sigma())
+    prepared.noise_sigma.push_back(sigma / prepared.unit);
+  const tilt_series::SlabViews::Shape shape{series.views().size(), prepared.geometry.width,
+                                            prepared.geometry.height, prepared.roi.y0,
+                                            prepared.roi.height()};
+  prepared.rays = std::make_unique<tilt_series::SlabViews>(
+      shape, prepared.unit,
+      [&series](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
+        series.read_view(view, image, valid);
+      },
+      scratch_dir);
+  return prepared;
+}
+
+}  // namespace tomofield::reconstruct

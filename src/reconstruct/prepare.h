@@ -1,0 +1,50 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/tilt_geometry.h"
+#include "tilt_series/slab_views.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::reconstruct {
+
+/// What the user says of the specimen. Lengths and positions are in unbinned
+/// pixels of the aligned view, whatever --bin makes of them.
+struct SpecimenOptions {
+  double thickness = 0;              ///< of the volume along Z
+  std::optional<geometry::Roi> roi;  ///< default: the whole field of view
+  int hand = 1;                      ///< 1 or −1 (TiltGeometry)
+  std::optional<double> axis_x;      ///< tilt axis on the view; default: its centre
+  std::optional<double> axis_z;      ///< and in the volume; default: its centre
+  bool with_margin = true;           ///< false: the specimen ends inside the field of view
+  /// Every fault of these options for a view of this size, a sentence each.
+  std::vector<std::string> faults() const;
+};
+
+/// A tilt series made ready for fitting: geometry in binned pixels, rays in
+/// slab order and in density units, the noise of each view.
+struct PreparedSeries {
+  geometry::TiltGeometry geometry;
+  geometry::Roi roi;          ///< in binned pixels
+  double pixel_size_A = 1.0;  ///< binned
+  double bin_factor = 1.0;
+  double x_tilt_deg = 0.0;          ///< the same for every view: a rotation of the volume about X
+  double unit = 1.0;                ///< data units a density unit
+  std::vector<double> noise_sigma;  ///< of each view, in density units
+  double mean_density = 0.0;        ///< in density units
+  double empty_beam = 0.0;          ///< I0 in data units (dark contrast)
+  std::unique_ptr<tilt_series::SlabViews> rays;
+};
+
+/// Geometry alone: no pixel is read. Throws Error for options that do not fit the series.
+PreparedSeries plan_series(const tilt_series::TiltSeries& series, const SpecimenOptions& specimen);
+
+/// Everything. `scratch_dir` takes the rays of series that do not fit in memory.
+PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
+                              const SpecimenOptions& specimen,
+                              const std::filesystem::path& scratch_dir);
+
+}  // namespace tomofield::reconstruct
