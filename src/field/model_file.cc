@@ -1,0 +1,310 @@
+#include "field/model_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <new>
+#include <utility>
+
+#include "io/atomic_file.h"
+#include "io/hdf5_file.h"
+#include "tomofield/error.h"
+#include "tomofield/version.h"
+
+namespace tomofield::field {
+namespace {
+
+using io::Hdf5Group;
+using Integers = std::vector<std::int64_t>;
+
+// Persisted: do not change either without a new version.
+constexpr const char* kFormat = "tomofield model";
+constexpr std::int64_t kFormatVersion = 1;
+
+// A list of structs as one array a member.
+template <typename Items, typename Get>
+void write_column(Hdf5Group& group, const char* name, const Items& items, Get get) {
+  Integers column;
+  for (const auto& item : items) column.push_back(static_cast<std::int64_t>(get(item)));
+  group.write_array<std::int64_t>(name, column);
+}
+
+void require_finite_parameters(std::span<const float> parameters, const std::string& complaint) {
+  const auto bad =
+      std::find_if(parameters.begin(), parameters.end(), [](float p) { return !std::isfinite(p); });
+  if (bad != parameters.end())
+    throw Error(fmt::format("{}: parameter {} is {}", complaint, bad - parameters.begin(), *bad));
+}
+
+void write_geometry(Hdf5Group group, const ModelInfo& info) {
+  const geometry::TiltGeometry& g = info.geometry;
+  group.write_integer("width", g.width);
+  group.write_integer("height", g.height);
+  group.write_number("thickness", g.thickness);
+  group.write_integer("hand", g.hand);
+  group.write_number("axis_x", g.axis_x);
+  group.write_number("axis_z", g.axis_z);
+  group.write_array<double>("tilt_deg", g.tilt_deg);
+  const Integers roi{info.roi.x0, info.roi.y0, info.roi.x1, info.roi.y1};
+  group.write_array<std::int64_t>("roi", roi);
+}
+
+void write_tree(Hdf5Group group, const Quadtree& tree) {
+  const RootGrid& roots = tree.roots();
+  group.write_integer("x0", roots.x0);
+  group.write_integer("y0", roots.y0);
+  group.write_integer("cell_size", roots.cell_size);
+  group.write_integer("columns", roots.columns);
+  group.write_integer("rows", roots.rows);
+  const auto& nodes = tree.nodes();
+  using Node = const QuadtreeNode&;
+  write_column(group, "node_x0", nodes, [](Node n) { return n.square.x0; });
+  write_column(group, "node_y0", nodes, [](Node n) { return n.square.y0; });
+  write_column(group, "node_size", nodes, [](Node n) { return n.square.size; });
+  write_column(group, "node_level", nodes, [](Node n) { return n.level; });
+  write_column(group, "node_is_margin", nodes, [](Node n) { return n.region == Region::kMargin; });
+  write_column(group, "node_parent", nodes, [](Node n) { return n.parent; });
+  write_column(group, "node_first_child", nodes, [](Node n) { return n.first_child; });
+}
+
+void write_leaves(Hdf5Group group, const Field& field) {
+  write_column(group, "node", field.tree().leaves(), [](int node) { return node; });
+  const auto& shapes = field.shapes();
+  using Shape = const LeafShape&;
+  write_column(group, "nx", shapes, [](Shape s) { return s.nx; });
+  write_column(group, "ny", shapes, [](Shape s) { return s.ny; });
+  write_column(group, "nz", shapes, [](Shape s) { return s.nz; });
+  write_column(group, "rank_x", shapes, [](Shape s) { return s.rank_x; });
+  write_column(group, "rank_y", shapes, [](Shape s) { return s.rank_y; });
+  write_column(group, "rank_z", shapes, [](Shape s) { return s.rank_z; });
+  Integers offsets;
+  for (int i = 0; i <= field.tree().num_leaves(); ++i)
+    offsets.push_back(static_cast<std::int64_t>(field.offset(i)));
+  group.write_array<std::int64_t>("offset", offsets);
+}
+
+void write_field(Hdf5Group group, const Field& field) {
+  group.write_text("kind", field.kind());
+  group.write_number("thickness", field.thickness());
+  group.write_number("bias", static_cast<double>(field.bias));
+  group.write_number("softplus_beta", static_cast<double>(field.activation.beta));
+  write_tree(group.create_group("tree"), field.tree());
+  write_leaves(group.create_group("leaves"), field);
+  group.write_array<float>("parameters", field.parameters());
+}
+
+template <typename T>
+void write_arrays(Hdf5Group group, const std::map<std::string, std::vector<T>>& arrays) {
+  for (const auto& [name, values] : arrays) group.write_array<T>(name, values);
+}
+
+void write_training(Hdf5Group group, const TrainingState& state) {
+  write_arrays(group.create_group("floats"), state.floats);
+  write_arrays(group.create_group("doubles"), state.doubles);
+  write_arrays(group.create_group("integers"), state.integers);
+}
+
+// Reading: every fault is an Error that names the file.
+class ModelReader {
+ public:
+  explicit ModelReader(const std::filesystem::path& path)
+      : path_(path.string()), file_(io::Hdf5File::open(path)) {}
+
+  Model read(TrainingState* training) const {
+    const Hdf5Group root = file_.root();
+    require_known_format(root);
+    Model model;
+    model.pixel_size_A = root.number("pixel_size_A");
+    model.density_unit = root.number("density_unit");
+    model.is_dark = root.text("contrast") == "dark";
+    model.options_json = root.text("options_json");
+    model.written_by = root.text("written_by");
+    require(std::isfinite(model.pixel_size_A) && model.pixel_size_A > 0 &&
+                std::isfinite(model.density_unit),
+            "its pixel size or density unit is no usable number");
+    read_geometry(root.group("geometry"), model);
+    model.field = read_field(root.group("field"));
+    if (training != nullptr) *training = read_training(root);
+    return model;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(fmt::format("'{}' is a damaged model: {}; use another copy", path_, what));
+  }
+  void require(bool condition, const char* what) const {
+    if (!condition) fail(what);
+  }
+
+  void require_known_format(const Hdf5Group& root) const {
+    if (!root.has_attribute("format") || root.text("format") != kFormat)
+      throw Error(fmt::format("'{}' is an HDF5 file, but no model of tomofield", path_));
+    const std::int64_t version = root.integer("format_version");
+    if (version < 1 || version > kFormatVersion)
+      throw Error(fmt::format(
+          "'{}' is a model of format {}, written by {}; this is tomofield {}, which reads formats "
+          "up to {}: use a newer tomofield",
+          path_, version, root.text("written_by"), library_version(), kFormatVersion));
+  }
+
+  int small_integer(std::int64_t value) const {
+    require(value >= std::numeric_limits<int>::min() && value <= std::numeric_limits<int>::max(),
+            "a number is out of range");
+    return static_cast<int>(value);
+  }
+
+  void read_geometry(const Hdf5Group& group, ModelInfo& info) const {
+    geometry::TiltGeometry& g = info.geometry;
+    g.width = group.integer("width");
+    g.height = group.integer("height");
+    g.thickness = group.number("thickness");
+    g.hand = small_integer(group.integer("hand"));
+    g.axis_x = group.number("axis_x");
+    g.axis_z = group.number("axis_z");
+    g.tilt_deg = group.read_array<double>("tilt_deg");
+    const auto roi = group.read_array<std::int64_t>("roi");
+    require(roi.size() == 4, "its region of interest has no four corners");
+    info.roi = {roi[0], roi[1], roi[2], roi[3]};
+    constexpr std::int64_t kFar = std::int64_t{1} << 30;
+    require(g.width > 0 && g.height > 0 && g.width <= kFar && g.height <= kFar &&
+                std::isfinite(g.thickness) && g.thickness > 0 && (g.hand == 1 || g.hand == -1) &&
+                std::isfinite(g.axis_x) && std::isfinite(g.axis_z) &&
+                std::all_of(g.tilt_deg.begin(), g.tilt_deg.end(),
+                            [](double angle) { return std::abs(angle) < 90; }),
+            "its geometry makes no sense");
+    require(0 <= info.roi.x0 && info.roi.x0 < info.roi.x1 && info.roi.x1 <= g.width &&
+                0 <= info.roi.y0 && info.roi.y0 < info.roi.y1 && info.roi.y1 <= g.height,
+            "its region of interest is not inside the view");
+  }
+
+  Quadtree read_tree(const Hdf5Group& group) const {
+    RootGrid roots;
+    roots.x0 = group.integer("x0");
+    roots.y0 = group.integer("y0");
+    roots.cell_size = group.integer("cell_size");
+    roots.columns = small_integer(group.integer("columns"));
+    roots.rows = small_integer(group.integer("rows"));
+    std::vector<QuadtreeNode> nodes(group.array_size("node_x0"));
+    const auto read = [&](const char* name, auto&& set) {
+      Integers column(nodes.size());
+      group.read_array<std::int64_t>(name, column);
+      for (std::size_t i = 0; i < nodes.size(); ++i) set(nodes[i], column[i]);
+    };
+    using Node = QuadtreeNode&;
+    read("node_x0", [](Node n, std::int64_t v) { n.square.x0 = v; });
+    read("node_y0", [](Node n, std::int64_t v) { n.square.y0 = v; });
+    read("node_size", [](Node n, std::int64_t v) { n.square.size = v; });
+    read("node_level", [&](Node n, std::int64_t v) { n.level = small_integer(v); });
+    read("node_is_margin",
+         [](Node n, std::int64_t v) { n.region = v != 0 ? Region::kMargin : Region::kInterest; });
+    read("node_parent", [&](Node n, std::int64_t v) { n.parent = small_integer(v); });
+    read("node_first_child", [&](Node n, std::int64_t v) { n.first_child = small_integer(v); });
+    return Quadtree(roots, std::move(nodes));
+  }
+
+  std::vector<LeafShape> read_shapes(const Hdf5Group& group, int num_leaves) const {
+    std::vector<LeafShape> shapes(static_cast<std::size_t>(num_leaves));
+    const auto read = [&](const char* name, int LeafShape::*member, std::int64_t least) {
+      Integers column(shapes.size());
+      group.read_array<std::int64_t>(name, column);
+      for (std::size_t i = 0; i < shapes.size(); ++i) {
+        constexpr std::int64_t kMost = 1 << 16;
+        require(column[i] >= least && column[i] <= kMost, "a leaf has an impossible shape");
+        shapes[i].*member = static_cast<int>(column[i]);
+      }
+    };
+    read("nx", &LeafShape::nx, 2);
+    read("ny", &LeafShape::ny, 2);
+    read("nz", &LeafShape::nz, 2);
+    read("rank_x", &LeafShape::rank_x, 0);
+    read("rank_y", &LeafShape::rank_y, 0);
+    read("rank_z", &LeafShape::rank_z, 0);
+    return shapes;
+  }
+
+  std::unique_ptr<Field> read_field(const Hdf5Group& group) const {
+    std::unique_ptr<Field> field;
+    const double thickness = group.number("thickness");
+    require(std::isfinite(thickness) && thickness > 0, "its thickness is no usable number");
+    try {
+      Quadtree tree = read_tree(group.group("tree"));
+      auto shapes = read_shapes(group.group("leaves"), tree.num_leaves());
+      field = make_field(group.text("kind"), std::move(tree), thickness, std::move(shapes));
+    } catch (const std::bad_alloc&) {
+      throw Error(fmt::format("'{}' holds {} parameters, more than there is memory for", path_,
+                              group.array_size("parameters")));
+    } catch (const Error& error) {
+      const std::string what = error.what();
+      if (what.find(path_) != std::string::npos) throw;
+      fail(what);
+    }
+    field->bias = static_cast<float>(group.number("bias"));
+    field->activation.beta = static_cast<float>(group.number("softplus_beta"));
+    require(std::isfinite(field->bias) && std::isfinite(field->activation.beta) &&
+                field->activation.beta >= 0,
+            "its decoder is no usable number");
+    group.read_array<float>("parameters", field->parameters());
+    require_finite_parameters(field->parameters(), fmt::format("'{}' is a damaged model", path_));
+    return field;
+  }
+
+  template <typename T>
+  static std::map<std::string, std::vector<T>> read_arrays(const Hdf5Group& group) {
+    std::map<std::string, std::vector<T>> arrays;
+    for (const std::string& name : group.names()) arrays[name] = group.read_array<T>(name);
+    return arrays;
+  }
+
+  static TrainingState read_training(const Hdf5Group& root) {
+    if (!root.has("training")) return {};
+    const Hdf5Group group = root.group("training");
+    return {.floats = read_arrays<float>(group.group("floats")),
+            .doubles = read_arrays<double>(group.group("doubles")),
+            .integers = read_arrays<std::int64_t>(group.group("integers"))};
+  }
+
+  std::string path_;
+  io::Hdf5File file_;
+};
+
+}  // namespace
+
+void save_model(const std::filesystem::path& path, const Field& field, const ModelInfo& info,
+                const TrainingState* training) {
+  require_finite_parameters(field.parameters(),
+                            fmt::format("the fit diverged, so '{}' is left as it was; a lower "
+                                        "learning rate may help",
+                                        path.string()));
+  io::AtomicFile target(path);
+  {
+    io::Hdf5File file = io::Hdf5File::create(target.temporary_path());
+    {
+      Hdf5Group root = file.root();
+      root.write_text("format", kFormat);
+      root.write_integer("format_version", kFormatVersion);
+      root.write_text("written_by", fmt::format("tomofield {}", library_version()));
+      root.write_number("pixel_size_A", info.pixel_size_A);
+      root.write_number("density_unit", info.density_unit);
+      root.write_text("contrast", info.is_dark ? "dark" : "bright");
+      root.write_text("options_json", info.options_json);
+      write_geometry(root.create_group("geometry"), info);
+      write_field(root.create_group("field"), field);
+      if (training != nullptr) write_training(root.create_group("training"), *training);
+    }
+    file.close();
+  }
+  target.commit();
+}
+
+void save_model(const std::filesystem::path& path, const Model& model,
+                const TrainingState* training) {
+  save_model(path, *model.field, model, training);
+}
+
+Model load_model(const std::filesystem::path& path, TrainingState* training) {
+  return ModelReader(path).read(training);
+}
+
+}  // namespace tomofield::field

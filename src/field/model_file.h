@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "field/field.h"
+#include "geometry/tilt_geometry.h"
+
+namespace tomofield::field {
+
+/// What a field means: where it lies, its scale, and where it came from.
+struct ModelInfo {
+  geometry::TiltGeometry geometry;
+  geometry::Roi roi;          ///< the region that was asked for; the field goes further
+  double pixel_size_A = 1.0;  ///< of the pixels that every length counts
+  double density_unit = 1.0;  ///< data units a density unit
+  bool is_dark = false;       ///< the series was dark where dense, so volumes leave negated
+  std::string options_json;   ///< the resolved options of the reconstruction
+  std::string written_by;     ///< program and version; filled in by load_model
+};
+
+/// A fitted field with all that is needed to use it.
+struct Model : ModelInfo {
+  std::unique_ptr<Field> field;
+  /// What turns densities into values of the input's kind and contrast.
+  double output_scale() const { return is_dark ? -density_unit : density_unit; }
+};
+
+/// Arrays that a fit needs to go on, bit for bit. Names are free but for '/'.
+struct TrainingState {
+  std::map<std::string, std::vector<float>> floats;
+  std::map<std::string, std::vector<double>> doubles;
+  std::map<std::string, std::vector<std::int64_t>> integers;
+  bool operator==(const TrainingState&) const = default;
+};
+
+/// Writes a model (docs/model-format.md): atomically, so that `path` holds the
+/// old file or the whole new one, whatever happens. Parameters are written
+/// from where they are. Throws Error if `path` cannot be written, or if a
+/// parameter is not finite, which would replace a good model by a useless one.
+void save_model(const std::filesystem::path& path, const Field& field, const ModelInfo& info,
+                const TrainingState* training = nullptr);
+void save_model(const std::filesystem::path& path, const Model& model,
+                const TrainingState* training = nullptr);
+
+/// Reads a model, and its training state into `training` if that is asked for:
+/// empty where the model was saved without. Throws Error, naming the file and
+/// the reason, for anything but a whole model of a known version.
+Model load_model(const std::filesystem::path& path, TrainingState* training = nullptr);
+
+}  // namespace tomofield::field

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace tomofield::io {
+
+/// A group of an HDF5 file: named numbers and texts (attributes), one-dimensional
+/// arrays (datasets) and groups. Every byte is covered by a checksum: metadata by
+/// HDF5's own, arrays by its Fletcher-32 filter, so that a file which was cut
+/// off or overwritten in parts is found out when it is read. Arrays are stored as
+/// they are, without compression, and streamed in pieces of 1 MiB. The same
+/// contents make the same bytes.
+///
+/// Reading throws Error, naming the file and the item, for what is missing, of
+/// another kind, or damaged. T is float, double or std::int64_t. One thread at
+/// a time may use HDF5 files; groups must not outlive their file.
+class Hdf5Group {
+ public:
+  Hdf5Group(std::string file, std::string name, std::int64_t id);
+  ~Hdf5Group();
+  Hdf5Group(Hdf5Group&& other) noexcept;
+  Hdf5Group& operator=(Hdf5Group&&) = delete;
+
+  Hdf5Group create_group(const std::string& name);
+  Hdf5Group group(const std::string& name) const;
+  bool has(const std::string& name) const;  ///< a group or an array
+  bool has_attribute(const std::string& name) const;
+  std::vector<std::string> names() const;  ///< of groups and arrays, sorted
+
+  void write_number(const std::string& name, double value);
+  void write_integer(const std::string& name, std::int64_t value);
+  void write_text(const std::string& name, const std::string& value);
+  double number(const std::string& name) const;
+  std::int64_t integer(const std::string& name) const;
+  std::string text(const std::string& name) const;
+
+  template <typename T>
+  void write_array(const std::string& name, std::span<const T> values);
+  std::size_t array_size(const std::string& name) const;
+  /// Fills `values`, which has as many elements as the array.
+  template <typename T>
+  void read_array(const std::string& name, std::span<T> values) const;
+  template <typename T>
+  std::vector<T> read_array(const std::string& name) const {
+    std::vector<T> values(array_size(name));
+    read_array<T>(name, values);
+    return values;
+  }
+
+ private:
+  std::string path_of(const std::string& name) const;
+  template <typename T>
+  void write_scalar(const std::string& name, T value);
+  template <typename T>
+  T read_scalar(const std::string& name) const;
+
+  std::string file_, name_;
+  std::int64_t id_;
+};
+
+/// An HDF5 file as a whole.
+class Hdf5File {
+ public:
+  /// Makes an empty file, replacing what is there.
+  static Hdf5File create(const std::filesystem::path& path);
+  /// Opens for reading. Throws Error for what does not exist, is no HDF5 file, or is cut off.
+  static Hdf5File open(const std::filesystem::path& path);
+  ~Hdf5File();
+  Hdf5File(Hdf5File&& other) noexcept;
+  Hdf5File& operator=(Hdf5File&&) = delete;
+
+  Hdf5Group root() const;
+  /// Writes everything out; throws Error where the disk does not take it.
+  void close();
+
+ private:
+  Hdf5File(std::string path, std::int64_t id) : path_(std::move(path)), id_(id) {}
+  std::string path_;
+  std::int64_t id_;
+};
+
+/// Whether a file begins as HDF5 files do; false for what cannot be read.
+bool has_hdf5_signature(const std::filesystem::path& path);
+
+}  // namespace tomofield::io
