@@ -11,9 +11,9 @@ namespace tomofield::projection {
 /// of interest at one pixel, the margins coarser. Sample (i, k) sits at
 /// X = x0 + (i + ½) hx, Z = (k + ½) hz.
 ///
-/// A side either `cuts` sharply at its face, where another segment goes on, so
-/// that each point of a ray belongs to one segment; or fades over one sample
-/// to nothing, where the field ends.
+/// A side either `cuts` at its face, where another segment goes on, so that each
+/// point of a ray belongs to one segment; or fades over one sample to nothing,
+/// where the field ends.
 struct SampleSegment {
   double x0 = 0, hx = 1, hz = 1;
   int nx = 0, nz = 0;

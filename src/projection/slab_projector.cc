@@ -30,15 +30,32 @@ void set_pixel_range(double offset, double step, std::int64_t width, LineCrossin
   line.step = static_cast<float>(step);
 }
 
-// Row k of a segment as a flat view sees it.
+// Narrowest fade at a cut, in pixels: only so wide that rounding of a position
+// cannot drop or double a ray that runs along the face.
+constexpr double kNarrowestFade = 1.0 / 64;
+
+// Row k of a segment as a flat view sees it. The row stands for a piece of ray
+// that is hz high and hz tan θ wide; at a cut face the row counts for as much of
+// it as lies on its side, so that a ray's pieces on both sides, which differ in
+// height, add up to its length.
 LineCrossing row_crossing(const geometry::TiltGeometry& g, const SampleSegment& s, int view,
                           int k) {
   const double z = (k + 0.5) * s.hz;
   const double cosine = g.cos_tilt(view);
   LineCrossing line;
-  line.low = s.cut_low ? -0.5f : -1.0f;
-  line.high = static_cast<float>(s.nx) - (s.cut_high ? 0.5f : 0.0f);
+  line.low = -1.0f;
+  line.high = static_cast<float>(s.nx);
   line.weight = static_cast<float>(s.hz / cosine);
+  const double tangent = std::abs(g.signed_sin_tilt(view)) / cosine;
+  const double fade = std::min(1.0, std::max(s.hz * tangent, kNarrowestFade) / s.hx);
+  if (s.cut_low) {
+    line.low = static_cast<float>(-0.5 - fade / 2);
+    line.fade_low = static_cast<float>(s.hz / cosine / fade);
+  }
+  if (s.cut_high) {
+    line.high = static_cast<float>(s.nx - 0.5 + fade / 2);
+    line.fade_high = static_cast<float>(s.hz / cosine / fade);
+  }
   set_pixel_range((g.ray_x(view, 0.5, z) - s.x0) / s.hx - 0.5, 1.0 / (s.hx * cosine), g.width,
                   line);
   return line;
