@@ -11,13 +11,13 @@
 #include <string>
 #include <vector>
 
-#include "kernels/lanes.h"
+#include "base/lanes.h"
 #include "tomofield/error.h"
 
 namespace tomofield::tilt_series {
 namespace {
 
-using kernels::kLanes;
+using base::kLanes;
 
 // Up to here a series is kept in memory: a 1K series of 60 views is 250 MB.
 constexpr std::size_t kInMemoryBytes = std::size_t{1} << 30;
