@@ -1,0 +1,50 @@
+#include "bench/measure.h"
+
+#include <hwy/targets.h>
+
+#include <algorithm>
+#include <chrono>
+
+namespace tomofield::bench {
+namespace {
+
+double seconds_of(const std::function<void()>& run, int calls) {
+  const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; i < calls; ++i) run();
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  return elapsed.count() / calls;
+}
+
+// Short turns are rarely interrupted on a busy machine.
+constexpr double kTurnSeconds = 4e-3;
+
+}  // namespace
+
+double Timing::median() const {
+  auto sorted = seconds;
+  std::sort(sorted.begin(), sorted.end());
+  return sorted[sorted.size() / 2];
+}
+
+double Timing::minimum() const { return *std::min_element(seconds.begin(), seconds.end()); }
+
+std::vector<Timing> measure(const std::vector<Case>& cases,
+                            const std::vector<std::int64_t>& targets, int rounds) {
+  std::vector<Timing> timings;
+  for (const std::int64_t target : targets) {
+    for (std::size_t c = 0; c < cases.size(); ++c) timings.push_back({target, c, {}});
+  }
+  for (int round = 0; round < rounds; ++round) {
+    for (Timing& timing : timings) {
+      hwy::SetSupportedTargetsForTest(timing.target);
+      const auto& run = cases[timing.which].run;
+      const double once = seconds_of(run, 1);  // also warms up
+      const int calls = std::clamp(static_cast<int>(kTurnSeconds / once), 1, 1000);
+      timing.seconds.push_back(seconds_of(run, calls));
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  return timings;
+}
+
+}  // namespace tomofield::bench

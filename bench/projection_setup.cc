@@ -1,0 +1,88 @@
+#include "bench/projection_setup.h"
+
+#include <cmath>
+
+#include "base/random.h"
+#include "kernels/lanes.h"
+
+namespace tomofield::bench {
+namespace {
+
+constexpr int kWidth = 256;
+
+// Samples that a detector pixel of the views takes: what is left of the
+// nominal voxels × views when rays that miss the specimen are not counted and
+// columns are crossed less often than once a voxel.
+double updates_done(const geometry::TiltGeometry& g, const std::vector<int>& views) {
+  double count = 0.0;
+  for (const int view : views) {
+    const bool flat = g.is_flat(view);
+    const int num_lines = flat ? static_cast<int>(g.thickness) : kWidth;
+    const double limit = flat ? kWidth : g.thickness;
+    for (int line = 0; line < num_lines; ++line) {
+      for (int u = 0; u < kWidth; ++u) {
+        const double at =
+            flat ? g.ray_x(view, u + 0.5, line + 0.5) : g.ray_z(view, u + 0.5, line + 0.5);
+        if (at >= -0.5 && at < limit + 0.5) count += kernels::kLanes;
+      }
+    }
+  }
+  return count;
+}
+
+void fill_randomly(base::AlignedBuffer<float>& values, std::uint64_t seed) {
+  base::Random random(seed);
+  for (float& v : values) v = static_cast<float>(random.uniform(-1.0, 1.0));
+}
+
+}  // namespace
+
+geometry::TiltGeometry yardstick_geometry(int thickness) {
+  std::vector<double> tilts;
+  for (int view = 0; view < 94; ++view) tilts.push_back(-70.0 + 1.5 * view);
+  return geometry::centred_geometry(kWidth, kWidth, thickness, tilts);
+}
+
+ProjectionSetup::ProjectionSetup(int thickness, int stride)
+    : geometry_(yardstick_geometry(thickness)),
+      grid_(projection::make_sample_grid(geometry_, 0, kWidth, 0)),
+      projector_(geometry_, grid_) {
+  for (int v = 0; v < geometry_.num_views(); v += stride) views_.push_back(v);
+  samples_.reset(grid_.size());
+  gradient_.reset(grid_.size());
+  detector_.reset(projector_.detector_size(views_.size()));
+  fill_randomly(samples_, 1);
+  fill_randomly(detector_, 2);
+}
+
+Case ProjectionSetup::work(const std::string& name) const {
+  Case c;
+  c.name = name;
+  c.updates = kWidth * kernels::kLanes * geometry_.thickness * static_cast<double>(views_.size());
+  c.done = updates_done(geometry_, views_);
+  c.flops = 4 * c.done;
+  c.bytes = 8 * c.done;
+  return c;
+}
+
+Case ProjectionSetup::forward_case(const std::string& name,
+                                   std::shared_ptr<ProjectionSetup> self) const {
+  Case c = work(name);
+  c.run = [self] {
+    self->detector_.fill(0.0f);
+    self->projector_.forward(self->samples_.data(), self->views_, self->detector_.data());
+  };
+  return c;
+}
+
+Case ProjectionSetup::adjoint_case(const std::string& name,
+                                   std::shared_ptr<ProjectionSetup> self) const {
+  Case c = work(name);
+  c.run = [self] {
+    self->gradient_.fill(0.0f);
+    self->projector_.backward(self->detector_.data(), self->views_, self->gradient_.data());
+  };
+  return c;
+}
+
+}  // namespace tomofield::bench

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/aligned_buffer.h"
+#include "bench/measure.h"
+#include "geometry/tilt_geometry.h"
+#include "projection/slab_projector.h"
+
+namespace tomofield::bench {
+
+/// A slab of 256 × 16 × thickness voxels under every `stride`-th of the 94
+/// views of the yardstick, −70 … 69.5°, and the buffers to project it.
+class ProjectionSetup {
+ public:
+  ProjectionSetup(int thickness, int stride);
+
+  Case forward_case(const std::string& name, std::shared_ptr<ProjectionSetup> self) const;
+  Case adjoint_case(const std::string& name, std::shared_ptr<ProjectionSetup> self) const;
+
+  const geometry::TiltGeometry& geometry() const { return geometry_; }
+  const std::vector<int>& views() const { return views_; }
+  const projection::SampleGrid& grid() const { return grid_; }
+
+ private:
+  Case work(const std::string& name) const;
+
+  geometry::TiltGeometry geometry_;
+  projection::SampleGrid grid_;
+  projection::SlabProjector projector_;
+  std::vector<int> views_;
+  base::AlignedBuffer<float> samples_, gradient_, detector_;
+};
+
+geometry::TiltGeometry yardstick_geometry(int thickness);
+
+}  // namespace tomofield::bench
