@@ -1,0 +1,149 @@
+#include "reconstruct/write_volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <vector>
+
+#include "tomofield/error.h"
+#include "tomofield/version.h"
+
+namespace tomofield::reconstruct {
+namespace {
+
+using field::Box;
+using field::BoxPart;
+using field::Point;
+
+// Refuses a box that cannot meet the field: all of it would be zero.
+void require_inside(const field::Field& field, const Box& box) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Point low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
+  for (int corner = 0; corner < 8; ++corner) {
+    Point voxel{};
+    for (std::size_t a = 0; a < 3; ++a)
+      voxel[a] = (corner >> a & 1) ? static_cast<double>(box.size[a]) : 0.0;
+    const Point at = box.position(voxel);
+    for (std::size_t a = 0; a < 3; ++a) {
+      low[a] = std::min(low[a], at[a]);
+      high[a] = std::max(high[a], at[a]);
+    }
+  }
+  const field::RootGrid& roots = field.tree().roots();
+  const Point first{static_cast<double>(roots.x0), static_cast<double>(roots.y0), 0.0};
+  const Point last{first[0] + static_cast<double>(roots.columns * roots.cell_size),
+                   first[1] + static_cast<double>(roots.rows * roots.cell_size), field.thickness()};
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (low[a] < last[a] && high[a] > first[a]) continue;
+    throw Error(
+        fmt::format("the box lies outside of the model: its {} runs from {:.6g} to {:.6g} px, the "
+                    "model's from {:.6g} to {:.6g}",
+                    "xyz"[a], low[a], high[a], first[a], last[a]));
+  }
+}
+
+// Corner of the box in Å from the view's corner, IMOD's sign.
+std::array<double, 3> origin_A(const field::Model& model, const Box& box, VolumeAxes axes) {
+  if (!box.is_aligned()) return {0.0, 0.0, 0.0};
+  const auto [nx, ny, nz] = box.size;
+  Point corner = box.position({0.0, 0.0, 0.0});
+  if (axes == VolumeAxes::kXzy) {
+    // Rows run down from the upper face.
+    const double top = box.position({0.0, 0.0, static_cast<double>(nz)})[2];
+    corner = {corner[0], model.field->thickness() - top, corner[1]};
+  }
+  for (double& value : corner) value = value == 0.0 ? 0.0 : -value * model.pixel_size_A;
+  return corner;
+}
+
+float largest_density(const field::Field& field, const Box& box) {
+  std::mutex mutex;
+  float largest = 0.0f;
+  sample_box(field, box, [&](const BoxPart& part) {
+    float here = 0.0f;
+    for (const float value : part.values) here = std::max(here, std::abs(value));
+    const std::lock_guard lock(mutex);
+    largest = std::max(largest, here);
+  });
+  return largest;
+}
+
+// Densities times `scale`, in the file's axes.
+class PartWriter {
+ public:
+  PartWriter(io::MrcWriter& file, const Box& box, VolumeAxes axes, double scale)
+      : file_(file), box_(box), axes_(axes), scale_(static_cast<float>(scale)) {}
+
+  void operator()(const BoxPart& part) const {
+    const std::int64_t nx = box_.size[0];
+    std::vector<float> values;
+    const auto append_row = [&](std::int64_t section, std::int64_t row) {
+      const float* from = part.values.data() + (section * part.num_rows + row) * nx;
+      for (std::int64_t x = 0; x < nx; ++x) values.push_back(scale_ * from[x] + 0.0f);  // no −0
+    };
+    if (axes_ == VolumeAxes::kXyz) {
+      for (std::int64_t s = 0; s < part.num_sections; ++s) {
+        values.clear();
+        for (std::int64_t r = 0; r < part.num_rows; ++r) append_row(s, r);
+        file_.write_rows(part.first_section + s, part.first_row, part.num_rows, values);
+      }
+      return;
+    }
+    const std::int64_t first = box_.size[2] - part.first_section - part.num_sections;
+    for (std::int64_t r = 0; r < part.num_rows; ++r) {
+      values.clear();
+      for (std::int64_t s = part.num_sections - 1; s >= 0; --s) append_row(s, r);
+      file_.write_rows(part.first_row + r, first, part.num_sections, values);
+    }
+  }
+
+ private:
+  io::MrcWriter& file_;
+  const Box& box_;
+  VolumeAxes axes_;
+  float scale_;
+};
+
+}  // namespace
+
+Box region_box(const field::ModelInfo& model, double voxel_px) {
+  const auto& roi = model.roi;
+  return field::box_between(
+      {static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0},
+      {static_cast<double>(roi.x1), static_cast<double>(roi.y1), model.geometry.thickness},
+      voxel_px);
+}
+
+void write_volume(const field::Model& model, const VolumeOptions& options,
+                  const std::filesystem::path& path) {
+  const Box box = options.box.value_or(region_box(model, 1.0));
+  require_inside(*model.field, box);
+  io::MrcSpec spec;
+  spec.nx = box.size[0];
+  spec.ny = box.size[1];
+  spec.nz = box.size[2];
+  if (options.axes == VolumeAxes::kXzy) std::swap(spec.ny, spec.nz);
+  spec.mode = options.mode;
+  spec.voxel_size_A.fill(box.voxel_px * model.pixel_size_A);
+  spec.origin_A = origin_A(model, box, options.axes);
+  spec.label = fmt::format("tomofield {}: density field", library_version());
+
+  double scale = options.invert ? -model.output_scale() : model.output_scale();
+  if (options.mode == io::MrcMode::kInt16) {
+    { const io::MrcWriter probe(path, spec); }  // refuses before the pass, not after it
+    constexpr double kLargestStored = 32000.0;
+    const double largest =
+        std::abs(scale) * static_cast<double>(largest_density(*model.field, box));
+    const double factor = largest > 0 ? kLargestStored / largest : 1.0;
+    spec.label += fmt::format(", stored = {:.6g} x value", factor);
+    scale *= factor;
+  }
+  io::MrcWriter file(path, spec);
+  sample_box(*model.field, box, PartWriter(file, box, options.axes, scale));
+  file.close();
+}
+
+}  // namespace tomofield::reconstruct

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "field/model_file.h"
+#include "field/sample_box.h"
+#include "io/mrc.h"
+
+namespace tomofield::reconstruct {
+
+/// Order of the axes in the file: kXyz has sections along Z; kXzy has sections
+/// along Y and rows along −Z, as IMOD's tilt writes, so that its rotation about X
+/// (trimvol -rx: z = rows − 1 − row) gives kXyz without mirroring.
+enum class VolumeAxes { kXyz, kXzy };
+
+struct VolumeOptions {
+  std::optional<field::Box> box;             ///< default: the region of interest, one voxel a pixel
+  io::MrcMode mode = io::MrcMode::kFloat32;  ///< or kFloat16, or kInt16, which is scaled
+  VolumeAxes axes = VolumeAxes::kXyz;
+  bool invert = false;  ///< the other contrast than the input's
+};
+
+/// The region of interest and the whole thickness, in whole voxels of `voxel_px` pixels.
+field::Box region_box(const field::ModelInfo& model, double voxel_px);
+
+/// Writes a box of a model as an MRC volume: in the input's units and contrast
+/// (dark input: dense is low, an empty region 0), with exact voxel size, and with
+/// IMOD's origin: minus the box's corner in the view, in Å (0 for a rotated box).
+/// kInt16 takes a second pass over the box for the largest value, which becomes
+/// 32000; the label in the header names the factor.
+/// Atomic; replaces what is there. Throws Error before any work if `path` cannot be
+/// written or the box lies outside of what the model holds.
+void write_volume(const field::Model& model, const VolumeOptions& options,
+                  const std::filesystem::path& path);
+
+}  // namespace tomofield::reconstruct
