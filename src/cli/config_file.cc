@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <toml++/toml.h>
 #include <algorithm>
 #include <sstream>
-#include <toml++/toml.h>
 
 #include "tomofield/error.h"
 
@@ -34,7 +34,8 @@ toml::table read_toml(const std::string& path) {
   try {
     return toml::parse_file(path);
   } catch (const toml::parse_error& error) {
-    throw Error(fmt::format("{}, line {}: {}", path, error.source().begin.line, std::string(error.description())));
+    throw Error(fmt::format("{}, line {}: {}", path, error.source().begin.line,
+                            std::string(error.description())));
   }
 }
 
@@ -42,8 +43,9 @@ std::string value_text(const std::string& path, const std::string& key, const to
   if (const auto text = node.value_exact<std::string>()) return *text;
   if (const auto integer = node.value_exact<std::int64_t>()) return fmt::format("{}", *integer);
   if (const auto number = node.value_exact<double>()) return fmt::format("{}", *number);
-  throw Error(fmt::format("{}, line {}: '{}' must be a number, a text, true or false, or an array of these", path,
-                          node.source().begin.line, key));
+  throw Error(
+      fmt::format("{}, line {}: '{}' must be a number, a text, true or false, or an array of these",
+                  path, node.source().begin.line, key));
 }
 
 bool is_given(const CLI::Option& option, const std::vector<std::string>& arguments) {
@@ -57,7 +59,8 @@ bool is_given(const CLI::Option& option, const std::vector<std::string>& argumen
 const CLI::App* find_command(const CLI::App& program, const std::vector<std::string>& arguments) {
   const CLI::App* command = &program;
   for (const std::string& word : arguments) {
-    const auto named = command->get_subcommands([&](const CLI::App* sub) { return sub->get_name() == word; });
+    const auto named =
+        command->get_subcommands([&](const CLI::App* sub) { return sub->get_name() == word; });
     if (named.empty()) break;
     command = named.front();
   }
@@ -74,8 +77,9 @@ void expand_config_file(const CLI::App& program, std::vector<std::string>& argum
     const std::string name(key.str());
     const CLI::Option* option = command->get_option_no_throw("--" + name);
     if (option == nullptr) {
-      throw Error(fmt::format("{}, line {}: '{}' is no option of '{}'; `tomofield {} --help` lists them", path,
-                              node.source().begin.line, name, command->get_name(), command->get_name()));
+      throw Error(fmt::format(
+          "{}, line {}: '{}' is no option of '{}'; `tomofield {} --help` lists them", path,
+          node.source().begin.line, name, command->get_name(), command->get_name()));
     }
     if (is_given(*option, arguments)) continue;
     if (const auto flag = node.value_exact<bool>()) {

@@ -9,7 +9,8 @@ namespace tomofield::cli {
 /// signal stopped is neither a success nor a fault.
 class ExitStatus : public std::runtime_error {
  public:
-  ExitStatus(int status, const std::string& message) : std::runtime_error(message), status_(status) {}
+  ExitStatus(int status, const std::string& message)
+      : std::runtime_error(message), status_(status) {}
   int status() const { return status_; }
 
  private:

@@ -3,27 +3,54 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <string>
+#include <string_view>
+#include <vector>
 
+#include "base/log.h"
 #include "cli/commands.h"
+#include "cli/config_file.h"
+#include "cli/exit_status.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
+namespace {
+
+void print_log(base::LogLevel level, std::string_view message) {
+  fmt::print(stderr, "{}{}\n", level == base::LogLevel::kWarning ? "warning: " : "", message);
+}
+
+void add_commands(CLI::App& program) {
+  add_reconstruct_command(program);
+  add_evaluate_command(program);
+  add_simulate_command(program);
+  add_info_command(program);
+}
+
+}  // namespace
 
 int run_program(int argc, char** argv) {
-  CLI::App program{"tomofield: clean tomograms from aligned tilt series by continuous density fields"};
+  CLI::App program{
+      "tomofield: clean tomograms from aligned tilt series by continuous density fields"};
   program.set_version_flag("--version", "tomofield " TOMOFIELD_VERSION);
   program.require_subcommand(1);
-  add_evaluate_command(program);
-  add_info_command(program);
-  add_simulate_command(program);
+  base::set_log_sink(print_log);
+  add_commands(program);
   try {
-    program.parse(argc, argv);
+    std::vector<std::string> arguments(argv + 1, argv + argc);
+    expand_config_file(program, arguments);
+    std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them last first
+    program.parse(arguments);
     return 0;
   } catch (const CLI::ParseError& error) {
     return program.exit(error) == 0 ? 0 : 2;
   } catch (const Error& error) {
     fmt::print(stderr, "tomofield: {}\n", error.what());
     return 2;
+  } catch (const ExitStatus& exit) {
+    fmt::print(stderr, "tomofield: {}\n", exit.what());
+    return exit.status();
   } catch (const std::exception& error) {
     fmt::print(stderr, "tomofield: internal error, please report it: {}\n", error.what());
     return 1;

@@ -114,6 +114,14 @@ void Field::split_leaf(int leaf) {
   }
 }
 
+std::size_t count_parameters(const std::string& kind, const std::vector<LeafShape>& shapes) {
+  std::size_t count = 0;
+  for (const LeafShape& shape : shapes) {
+    count += kind == "vm" ? VmField::count(shape) : GridField::count(shape);
+  }
+  return count;
+}
+
 std::unique_ptr<Field> make_field(const std::string& kind, Quadtree tree, double thickness,
                                   std::vector<LeafShape> shapes) {
   if (kind == "vm") return std::make_unique<VmField>(std::move(tree), thickness, std::move(shapes));

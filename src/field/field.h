@@ -110,6 +110,9 @@ class Field {
   base::AlignedBuffer<float> parameters_;
 };
 
+/// Parameters that make_field would allocate.
+std::size_t count_parameters(const std::string& kind, const std::vector<LeafShape>& shapes);
+
 /// kind "vm": vector–matrix factors; "grid": plain trilinear vertices.
 std::unique_ptr<Field> make_field(const std::string& kind, Quadtree tree, double thickness,
                                   std::vector<LeafShape> shapes);

@@ -41,7 +41,7 @@ struct RowMatrix {
 
 }  // namespace
 
-std::size_t GridField::parameter_count(const LeafShape& s) const { return s.vertices_xz() * s.ny; }
+std::size_t GridField::count(const LeafShape& s) { return s.vertices_xz() * s.ny; }
 
 void GridField::add_slab_values(int leaf, const LaneRows& rows, float* values) const {
   const LeafShape& s = shape(leaf);

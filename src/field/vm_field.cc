@@ -71,7 +71,7 @@ float* scratch(std::size_t size, int which) {
 
 }  // namespace
 
-std::size_t VmField::parameter_count(const LeafShape& shape) const { return Layout(shape).count; }
+std::size_t VmField::count(const LeafShape& shape) { return Layout(shape).count; }
 
 void VmField::add_slab_values(int leaf, const LaneRows& rows, float* values) const {
   const LeafShape& s = shape(leaf);

@@ -25,6 +25,9 @@ class VmField final : public Field {
     allocate();
   }
 
+  /// Parameters of a leaf.
+  static std::size_t count(const LeafShape& shape);
+
   std::string kind() const override { return "vm"; }
   void slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
                      float* gradient) const override;
@@ -33,7 +36,7 @@ class VmField final : public Field {
   void initialise(base::Random random, double scale) override;
 
  protected:
-  std::size_t parameter_count(const LeafShape& shape) const override;
+  std::size_t parameter_count(const LeafShape& shape) const override { return count(shape); }
   void add_slab_values(int leaf, const LaneRows& rows, float* values) const override;
   void add_row_values(int leaf, int lower, float fraction, float* values) const override;
   double point_value(int leaf, double x, double y, double z) const override;

@@ -1,5 +1,6 @@
 #include "reconstruct/fit.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -17,10 +18,22 @@ constexpr double kBiasRate = 0.02;
 // Streams of the seed: one for the starting values, one for each epoch's order.
 constexpr std::uint64_t kOrderStream = 1000;
 
-ObjectiveWeights objective_weights(const FitOptions& options) {
+// Root mean square noise of the views, in density units times pixels.
+double typical_noise(const std::vector<double>& sigmas) {
+  double precision = 0.0;
+  for (const double sigma : sigmas) precision += 1.0 / (sigma * sigma);
+  return std::sqrt(static_cast<double>(sigmas.size()) / precision);
+}
+
+// The residuals are in units of the noise, so a prior that were the same for
+// every series would have one weight there. Total variation is not such a
+// prior: what it must suppress is noise, and its best weight grows with the
+// noise's deviation rather than its variance (as in denoising, Rudin, Osher and
+// Fatemi 1992). Dividing by the noise makes one setting serve every size.
+ObjectiveWeights objective_weights(const FitOptions& options, double noise) {
   ObjectiveWeights weights;
-  weights.density_variation = options.density_variation;
-  weights.factor_variation = options.factor_variation;
+  weights.density_variation = options.density_variation / noise;
+  weights.factor_variation = options.factor_variation / noise;
   weights.density_penalty.epsilon = static_cast<float>(options.gradient_floor);
   weights.density_penalty.concavity =
       options.penalty == "concave" ? static_cast<float>(options.concavity) : 0.0f;
@@ -28,12 +41,17 @@ ObjectiveWeights objective_weights(const FitOptions& options) {
   return weights;
 }
 
+FitOptions with_at_most_one_subset_a_view(FitOptions options, int num_views) {
+  options.subsets = std::min(options.subsets, num_views);
+  return options;
+}
+
 }  // namespace
 
 Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
          const FitOptions& options)
     : measurement_(measurement),
-      options_(options),
+      options_(with_at_most_one_subset_a_view(options, measurement.geometry.num_views())),
       domain_(make_domain(measurement.geometry, measurement.roi, field_options)),
       field_(make_initial_field(domain_, measurement.geometry.thickness, measurement.mean_density,
                                 field_options, options.seed)),
@@ -84,8 +102,9 @@ double Fit::learning_rate(std::int64_t step) const {
 }
 
 void Fit::take_step(const std::vector<int>& views) {
-  const SlabObjective objective(sampler_, projector_, *measurement_.rays, *field_,
-                                objective_weights(options_));
+  const SlabObjective objective(
+      sampler_, projector_, *measurement_.rays, *field_,
+      objective_weights(options_, typical_noise(measurement_.noise_sigma)));
   const double multiplicity =
       static_cast<double>(measurement_.geometry.num_views()) / static_cast<double>(views.size());
   std::vector<BandResult> bands(static_cast<std::size_t>(sampler_.num_bands()));

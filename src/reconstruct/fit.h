@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "field/field.h"
@@ -49,6 +50,8 @@ class Fit {
   std::int64_t num_steps() const;
   const field::Field& field() const { return *field_; }
   field::Field& field() { return *field_; }
+  /// The fitted field, for good: the fit cannot go on afterwards.
+  std::unique_ptr<field::Field> take_field() { return std::move(field_); }
   const optimize::Adam& optimizer() const { return optimizer_; }
   optimize::Adam& optimizer() { return optimizer_; }
   const Progress& progress() const { return progress_; }

@@ -16,17 +16,19 @@ struct FieldOptions {
   double margin_spacing = 2.0;  ///< of samples and vertices there
   int margin_rank = 8;
   std::string activation = "softplus";  ///< or identity, for densities of either sign
-  double sharpness = 10.0;              ///< β of softplus, per density unit
+  double sharpness = 5.0;               ///< β of softplus, per density unit
   double initial_scale = 0.1;           ///< factors start uniform in ± this
 };
 
-/// The optimisation. Weights are in noise units (SlabObjective).
+/// The optimisation. The data term is ½ Σ (residual / σ)²; weights of
+/// variations are relative to it and to the noise: weight / σ is used, with σ
+/// the typical noise of a ray in density units times pixels.
 struct FitOptions {
-  int epochs = 40;
-  int subsets = 8;              ///< interleaved tilt subsets: steps an epoch
+  int epochs = 30;
+  int subsets = 16;             ///< interleaved tilt subsets: steps an epoch; at most one a view
   double learning_rate = 0.05;  ///< falls exponentially to learning_rate · final_rate
   double final_rate = 0.1;
-  double density_variation = 1.0;
+  double density_variation = 9.0;
   double factor_variation = 0.0;
   std::string penalty = "concave";  ///< or smooth, for both variations
   double concavity = 0.1;           ///< τ of the concave penalty, in density units

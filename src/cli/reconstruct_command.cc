@@ -1,0 +1,178 @@
+#include <fmt/core.h>
+
+#include <csignal>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "base/parallel.h"
+#include "cli/commands.h"
+#include "cli/exit_status.h"
+#include "cli/input_options.h"
+#include "cli/progress_bar.h"
+#include "cli/specimen_options.h"
+#include "cli/volume_options.h"
+#include "reconstruct/reconstruct.h"
+
+namespace tomofield::cli {
+namespace {
+
+volatile std::sig_atomic_t g_signal = 0;
+void remember_signal(int signal) { g_signal = signal; }
+
+struct Arguments {
+  reconstruct::ReconstructOptions options;
+  std::string view_scale = "auto";
+  bool dry_run = false;
+};
+
+void add_field_options(CLI::App& command, reconstruct::FieldOptions& field) {
+  const char* group = "Field";
+  command.add_option("--field", field.kind, "vm: vector-matrix factors; grid: plain vertices")
+      ->check(CLI::IsMember({"vm", "grid"}))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--leaf-size", field.leaf_size,
+                  "side of a leaf in binned pixels, a multiple of 16")
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--vertex-spacing", field.vertex_spacing, "pixels between vertices")
+      ->check(CLI::Range(0.25, 64.0))
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--rank", field.rank, "components of each mode (vm)")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--margin-spacing", field.margin_spacing,
+                  "pixels between samples and vertices of the margin")
+      ->check(CLI::Range(1.0, 64.0))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--activation", field.activation,
+                  "softplus, or identity for densities of either sign")
+      ->check(CLI::IsMember({"softplus", "identity"}))
+      ->capture_default_str()
+      ->group(group);
+}
+
+void add_fit_options(CLI::App& command, Arguments& arguments) {
+  const char* group = "Fit";
+  reconstruct::FitOptions& fit = arguments.options.fit;
+  command.add_option("--epochs", fit.epochs, "passes over all views")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--subsets", fit.subsets,
+                  "steps a pass, each with an interleaved subset of the views")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--tv", fit.density_variation,
+                  "weight of the density's total variation, in noise units")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--tv-factors", fit.factor_variation, "weight of the factors' total variation")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--tv-penalty", fit.penalty, "concave (keeps edges sharper) or smooth")
+      ->check(CLI::IsMember({"concave", "smooth"}))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--view-scale", arguments.view_scale,
+                  "fit a scale and an offset a view; auto: for dark contrast")
+      ->check(CLI::IsMember({"auto", "on", "off"}))
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--seed", fit.seed, "of everything random")
+      ->capture_default_str()
+      ->group(group);
+}
+
+void add_run_options(CLI::App& command, Arguments& arguments) {
+  const char* group = "Running";
+  reconstruct::ReconstructOptions& o = arguments.options;
+  command
+      .add_option("-o,--output", o.output,
+                  "the tomogram; model (.h5), figures (.json) and pictures go beside it")
+      ->required()
+      ->group(group);
+  command.add_flag("--overwrite", o.overwrite, "replace existing results")->group(group);
+  command.add_flag("--resume", o.resume, "continue from the model file of an interrupted run")
+      ->excludes("--overwrite")
+      ->group(group);
+  command.add_option("--checkpoint-minutes", o.checkpoint_minutes, "between checkpoints")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_flag("--dry-run", arguments.dry_run,
+                "check everything, print what would be done and the memory it needs")
+      ->group(group);
+}
+
+void print_plan(const reconstruct::ReconstructOptions& options, const reconstruct::RunPlan& plan) {
+  fmt::print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {:.0f} voxels\n",
+             plan.num_views, plan.view_width, plan.view_height, plan.pixel_size_A, plan.roi.width(),
+             plan.roi.height(), plan.thickness);
+  fmt::print(
+      "{} field, {} leaves, {} parameters; {} steps on {} threads; about {:.2f} GiB of memory\n",
+      options.field.kind, plan.num_leaves, plan.num_parameters, plan.num_steps,
+      base::thread_count(), static_cast<double>(plan.memory_bytes) / (1 << 30));
+}
+
+void print_files(const reconstruct::OutputPaths& paths) {
+  fmt::print("tomogram  {}\nmodel     {}\nfigures   {}\npictures  {}_xy.png {}_xz.png {}_yz.png\n",
+             paths.volume.string(), paths.model.string(), paths.json.string(),
+             paths.picture_prefix.string(), paths.picture_prefix.string(),
+             paths.picture_prefix.string());
+}
+
+void run(Arguments& arguments) {
+  reconstruct::ReconstructOptions& options = arguments.options;
+  options.fit.fit_view_scale =
+      arguments.view_scale == "on" ||
+      (arguments.view_scale == "auto" && options.input.contrast == tilt_series::Contrast::kDark);
+  reconstruct::check_outputs(options);
+  const tilt_series::TiltSeries series(options.input);
+  print_plan(options, reconstruct::plan_run(series, options));
+  if (arguments.dry_run) return;
+  std::signal(SIGINT, remember_signal);
+  std::signal(SIGTERM, remember_signal);
+  const reconstruct::ReconstructHooks hooks{.progress = make_progress_bar("reconstruct"),
+                                            .stop_requested = [] { return g_signal != 0; }};
+  const reconstruct::OutputPaths paths = reconstruct::output_paths(options.output);
+  if (reconstruct::reconstruct(series, options, hooks) == reconstruct::Outcome::kStopped) {
+    throw ExitStatus(
+        128 + g_signal,
+        fmt::format("stopped; the checkpoint is {}: continue with the same command and --resume",
+                    paths.model.string()));
+  }
+  print_files(paths);
+}
+
+}  // namespace
+
+void add_reconstruct_command(CLI::App& program) {
+  CLI::App& command = *program.add_subcommand(
+      "reconstruct", "tilt series in, clean tomogram and compact model out");
+  auto arguments = std::make_shared<Arguments>();
+  add_input_options(command, arguments->options.input);
+  add_specimen_options(command, arguments->options.specimen);
+  add_field_options(command, arguments->options.field);
+  add_fit_options(command, *arguments);
+  add_volume_options(command, arguments->options.volume);
+  add_run_options(command, *arguments);
+  command.callback([arguments] { run(*arguments); });
+}
+
+}  // namespace tomofield::cli

@@ -1,0 +1,104 @@
+#include "reconstruct/checkpoint.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <span>
+
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruct {
+namespace {
+
+// Six numbers a view, in the order of the members.
+std::vector<double> flatten(const std::vector<loss::ViewSums>& sums) {
+  std::vector<double> flat;
+  for (const loss::ViewSums& s : sums) flat.insert(flat.end(), {s.n, s.p, s.b, s.pp, s.pb, s.bb});
+  return flat;
+}
+
+std::vector<loss::ViewSums> unflatten_sums(const std::vector<double>& flat) {
+  std::vector<loss::ViewSums> sums;
+  for (std::size_t i = 0; i + 6 <= flat.size(); i += 6) {
+    sums.push_back({flat[i], flat[i + 1], flat[i + 2], flat[i + 3], flat[i + 4], flat[i + 5]});
+  }
+  return sums;
+}
+
+std::vector<double> flatten(const std::vector<loss::ViewModel>& views) {
+  std::vector<double> flat;
+  for (const loss::ViewModel& v : views) flat.insert(flat.end(), {v.scale, v.offset, v.weight});
+  return flat;
+}
+
+std::vector<loss::ViewModel> unflatten_views(const std::vector<double>& flat) {
+  std::vector<loss::ViewModel> views;
+  for (std::size_t i = 0; i + 3 <= flat.size(); i += 3)
+    views.push_back({flat[i], flat[i + 1], flat[i + 2]});
+  return views;
+}
+
+std::vector<std::int64_t> as_numbers(const std::string& text) { return {text.begin(), text.end()}; }
+
+std::vector<float> copy(std::span<const float> values) { return {values.begin(), values.end()}; }
+
+template <typename Map>
+const typename Map::mapped_type& entry(const Map& map, const char* name, const std::string& path) {
+  const auto found = map.find(name);
+  if (found == map.end()) {
+    throw Error(fmt::format(
+        "{} holds no optimiser state ('{}' is missing): it is a finished model, not a checkpoint; "
+        "start over with --overwrite",
+        path, name));
+  }
+  return found->second;
+}
+
+}  // namespace
+
+field::TrainingState save_state(const Fit& fit, const std::string& fingerprint, bool with_moments) {
+  field::TrainingState state;
+  const Progress& progress = fit.progress();
+  state.integers["fingerprint"] = as_numbers(fingerprint);
+  state.integers["step"] = {progress.step};
+  state.doubles["views"] = flatten(progress.views);
+  state.doubles["epoch_sums"] = flatten(progress.epoch_sums);
+  state.doubles["data_loss"] = progress.data_loss;
+  if (!with_moments) return state;
+  const optimize::Adam::State& adam = fit.optimizer().state();
+  state.floats["adam_m"] = copy(adam.m);
+  state.floats["adam_v"] = copy(adam.v);
+  state.integers["leaf_steps"] = adam.leaf_steps;
+  state.doubles["bias_moments"] = {adam.bias_m, adam.bias_v};
+  state.integers["bias_steps"] = {adam.bias_steps};
+  return state;
+}
+
+void restore_state(const std::string& path, const std::string& fingerprint,
+                   const field::Field& stored, const field::TrainingState& state, Fit& fit) {
+  if (entry(state.integers, "fingerprint", path) != as_numbers(fingerprint) ||
+      stored.num_parameters() != fit.field().num_parameters()) {
+    throw Error(fmt::format(
+        "{} was made from another series or with other options, so it cannot be resumed: give the "
+        "options that it was started with (tomofield info {}), or start over with --overwrite",
+        path, path));
+  }
+  std::copy(stored.parameters().begin(), stored.parameters().end(),
+            fit.field().parameters().begin());
+  fit.field().bias = stored.bias;
+  Progress& progress = fit.progress();
+  progress.step = entry(state.integers, "step", path).at(0);
+  progress.views = unflatten_views(entry(state.doubles, "views", path));
+  progress.epoch_sums = unflatten_sums(entry(state.doubles, "epoch_sums", path));
+  progress.data_loss = entry(state.doubles, "data_loss", path);
+  if (progress.step == fit.num_steps()) return;
+  optimize::Adam::State& adam = fit.optimizer().state();
+  std::ranges::copy(entry(state.floats, "adam_m", path), adam.m.begin());
+  std::ranges::copy(entry(state.floats, "adam_v", path), adam.v.begin());
+  adam.leaf_steps = entry(state.integers, "leaf_steps", path);
+  adam.bias_m = entry(state.doubles, "bias_moments", path).at(0);
+  adam.bias_v = entry(state.doubles, "bias_moments", path).at(1);
+  adam.bias_steps = entry(state.integers, "bias_steps", path).at(0);
+}
+
+}  // namespace tomofield::reconstruct

@@ -1,0 +1,81 @@
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "reconstruct/reconstruct.h"
+
+namespace tomofield::reconstruct {
+namespace {
+
+using nlohmann::json;
+
+template <typename T>
+json or_null(const std::optional<T>& value) {
+  return value ? json(*value) : json(nullptr);
+}
+
+json or_null(const std::optional<std::filesystem::path>& path) {
+  return path ? json(path->string()) : json(nullptr);
+}
+
+json input_json(const tilt_series::TiltSeriesOptions& o) {
+  return {{"stack", o.stack.string()},
+          {"tlt", or_null(o.tlt)},
+          {"xf", or_null(o.xf)},
+          {"xtilt", or_null(o.xtilt)},
+          {"aln", or_null(o.aln)},
+          {"mdoc", or_null(o.mdoc)},
+          {"exclude", o.exclude},
+          {"bin", o.bin},
+          {"angpix", or_null(o.angpix)},
+          {"pixel_size_A", or_null(o.pixel_size_A)},
+          {"contrast", o.contrast == tilt_series::Contrast::kDark ? "dark" : "bright"},
+          {"log", o.take_log}};
+}
+
+json specimen_json(const SpecimenOptions& o) {
+  json roi = nullptr;
+  if (o.roi) roi = {o.roi->x0, o.roi->y0, o.roi->x1, o.roi->y1};
+  return {{"thickness", o.thickness},
+          {"roi", roi},
+          {"hand", o.hand},
+          {"axis_x", or_null(o.axis_x)},
+          {"axis_z", or_null(o.axis_z)}};
+}
+
+json field_json(const FieldOptions& o) {
+  return {{"kind", o.kind},
+          {"leaf_size", o.leaf_size},
+          {"vertex_spacing", o.vertex_spacing},
+          {"rank", o.rank},
+          {"with_margin", o.with_margin},
+          {"margin_spacing", o.margin_spacing},
+          {"margin_rank", o.margin_rank},
+          {"activation", o.activation},
+          {"sharpness", o.sharpness},
+          {"initial_scale", o.initial_scale}};
+}
+
+json fit_json(const FitOptions& o) {
+  return {{"epochs", o.epochs},
+          {"subsets", o.subsets},
+          {"learning_rate", o.learning_rate},
+          {"final_rate", o.final_rate},
+          {"density_variation", o.density_variation},
+          {"factor_variation", o.factor_variation},
+          {"penalty", o.penalty},
+          {"concavity", o.concavity},
+          {"gradient_floor", o.gradient_floor},
+          {"fit_view_scale", o.fit_view_scale},
+          {"seed", o.seed}};
+}
+
+}  // namespace
+
+json options_json(const ReconstructOptions& options) {
+  return {{"input", input_json(options.input)},
+          {"specimen", specimen_json(options.specimen)},
+          {"field", field_json(options.field)},
+          {"fit", fit_json(options.fit)}};
+}
+
+}  // namespace tomofield::reconstruct

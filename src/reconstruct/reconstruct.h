@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "base/progress.h"
+#include "reconstruct/options.h"
+#include "reconstruct/prepare.h"
+#include "reconstruct/write_volume.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::reconstruct {
+
+/// Everything that a reconstruction is made from.
+struct ReconstructOptions {
+  tilt_series::TiltSeriesOptions input;
+  SpecimenOptions specimen;
+  FieldOptions field;
+  FitOptions fit;
+  VolumeOptions volume;
+  std::filesystem::path output;  ///< the volume; model, JSON and pictures lie beside it
+  bool overwrite = false;
+  bool resume = false;  ///< continue from the model file, if there is one
+  double checkpoint_minutes = 5;
+};
+
+/// The files of a reconstruction, named after its volume.
+struct OutputPaths {
+  std::filesystem::path volume, model, json, picture_prefix;
+};
+OutputPaths output_paths(const std::filesystem::path& volume);
+
+/// What the caller sees while it runs.
+struct ReconstructHooks {
+  base::ProgressSink progress;
+  std::function<bool()>
+      stop_requested;  ///< asked after every step; true saves a checkpoint and stops
+};
+
+enum class Outcome { kFinished, kStopped };
+
+/// The main job: fits a field to the series and writes the volume (MRC), the
+/// model (HDF5, also the checkpoint while it runs), the figures and resolved
+/// options (JSON), and pictures of the central slices. Call check_outputs() and
+/// plan_run() first: this starts at once.
+Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& options,
+                    const ReconstructHooks& hooks);
+
+/// What a run will do; nothing is allocated or written for it.
+struct RunPlan {
+  int num_views = 0;
+  std::int64_t view_width = 0, view_height = 0;
+  double pixel_size_A = 0;
+  geometry::Roi roi;
+  double thickness = 0;
+  int num_leaves = 0;
+  std::size_t num_parameters = 0;
+  std::int64_t num_steps = 0;
+  std::size_t memory_bytes = 0;     ///< estimated peak
+  std::size_t available_bytes = 0;  ///< of this machine, now
+};
+
+/// Throws Error for options that do not fit the series, and when the memory
+/// needed is beyond what the machine has.
+RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options);
+
+/// Throws Error if results would replace existing ones without --overwrite or
+/// --resume, or cannot be written where they shall go.
+void check_outputs(const ReconstructOptions& options);
+
+/// Every option as it was resolved, for the JSON and the model file.
+nlohmann::json options_json(const ReconstructOptions& options);
+
+}  // namespace tomofield::reconstruct
