@@ -44,7 +44,7 @@ def project(gaussians, hand=1, center=(WIDTH / 2, THICKNESS / 2)):
     return views.astype(np.float32)
 
 
-def reconstruct(name, views, *options):
+def reconstruct(name, views, *options, epochs=8):
     """The volume [section, row, column] as the file has it."""
     directory = os.path.join(SCRATCH, name)
     shutil.rmtree(directory, ignore_errors=True)
@@ -56,7 +56,8 @@ def reconstruct(name, views, *options):
     np.savetxt(tlt, TILTS, fmt="%.2f")
     output = os.path.join(directory, "out.mrc")
     command = [PROGRAM, "reconstruct", stack, "--tlt", tlt, "-o", output, "--contrast", "bright",
-               "--thickness", str(THICKNESS), "--epochs", "6", "--rank", "6", *map(str, options)]
+               "--thickness", str(THICKNESS), "--epochs", str(epochs), "--rank", "6",
+               *map(str, options)]
     result = subprocess.run(command, capture_output=True, text=True)
     assert result.returncode == 0, f"{name}: {result.stderr}"
     with mrcfile.open(output) as file:
@@ -85,7 +86,8 @@ def main():
     plain = project(BEAD)
 
     check("default", reconstruct("default", plain, "--no-margin"), whole, (X, Y, Z))
-    check("grid", reconstruct("grid", plain, "--no-margin", "--field", "grid"), whole, (X, Y, Z))
+    check("grid", reconstruct("grid", plain, "--no-margin", "--field", "grid", epochs=16), whole,
+          (X, Y, Z))
     check("margin", reconstruct("margin", plain), whole, (X, Y, Z))
 
     mirrored = project(BEAD, hand=-1)
