@@ -142,6 +142,7 @@ void run(Arguments& arguments) {
   options.fit.fit_view_scale =
       arguments.view_scale == "on" ||
       (arguments.view_scale == "auto" && options.input.contrast == tilt_series::Contrast::kDark);
+  options.field.with_margin = options.specimen.with_margin;
   reconstruct::check_outputs(options);
   const tilt_series::TiltSeries series(options.input);
   print_plan(options, reconstruct::plan_run(series, options));

@@ -19,7 +19,7 @@ void add_specimen_options(CLI::App& command, reconstruct::SpecimenOptions& optio
           "x0,y0,x1,y1: region of interest at zero tilt; default: the whole field of view")
       ->delimiter(',')
       ->expected(4)
-      ->type_name("INT x 4")
+      ->type_name("INT,INT,INT,INT")
       ->group(group);
   command.add_option("--hand", options.hand, "1: x = X cos + Z sin; -1: mirrored in Z")
       ->check(CLI::IsMember({1, -1}))
