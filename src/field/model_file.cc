@@ -231,7 +231,10 @@ class ModelReader {
     try {
       Quadtree tree = read_tree(group.group("tree"));
       auto shapes = read_shapes(group.group("leaves"), tree.num_leaves());
-      field = make_field(group.text("kind"), std::move(tree), thickness, std::move(shapes));
+      const std::string kind = group.text("kind");
+      require(count_parameters(kind, shapes) <= group.array_size("parameters"),
+              "its leaves need more parameters than it holds");
+      field = make_field(kind, std::move(tree), thickness, std::move(shapes));
     } catch (const std::bad_alloc&) {
       throw Error(fmt::format("'{}' holds {} parameters, more than there is memory for", path_,
                               group.array_size("parameters")));

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/xxhash64.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -17,7 +18,11 @@ namespace {
 
 static_assert(std::is_same_v<hid_t, std::int64_t>, "handles are passed as 64-bit integers");
 
-constexpr hsize_t kChunkBytes = hsize_t{1} << 20;
+constexpr const char* kChecksum = "xxh64";
+
+// Set once metadata turned out to be damaged: HDF5 1.10 then cannot close the
+// file, and says so when the program ends, unless errors are still quiet.
+bool must_stay_quiet = false;
 
 // HDF5 prints its errors unless it is told not to; libraries never print.
 class QuietErrors {
@@ -26,7 +31,9 @@ class QuietErrors {
     H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   }
-  ~QuietErrors() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
+  ~QuietErrors() {
+    if (!must_stay_quiet) H5Eset_auto2(H5E_DEFAULT, function_, data_);
+  }
   QuietErrors(const QuietErrors&) = delete;
   QuietErrors& operator=(const QuietErrors&) = delete;
 
@@ -87,6 +94,7 @@ struct Stored<std::int64_t> {
 
 [[noreturn]] void fail_reading(const std::string& file, const std::string& item,
                                const std::string& reason) {
+  must_stay_quiet = true;
   throw Error(fmt::format(
       "'{}': '{}' cannot be read ({}); the file is damaged or incomplete, so use another copy",
       file, item, reason));
@@ -107,6 +115,38 @@ Handle creation(hid_t kind) {
   const hid_t properties = H5Pcreate(kind);
   H5Pset_obj_track_times(properties, 0);
   return {properties, H5Pclose};
+}
+
+// Of fixed length: texts of variable length lie in a heap without checksum.
+void write_text_attribute(hid_t owner, const std::string& name, const std::string& value,
+                          const std::string& file, const std::string& item) {
+  const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type.id(), value.size() + 1);
+  H5Tset_cset(type.id(), H5T_CSET_UTF8);
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Handle attribute(
+      H5Acreate2(owner, name.c_str(), type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  if (!attribute || H5Awrite(attribute.id(), type.id(), value.c_str()) < 0)
+    fail_writing(file, item);
+}
+
+std::string read_text_attribute(hid_t owner, const std::string& name, const std::string& file,
+                                const std::string& item) {
+  const Handle attribute(H5Aopen(owner, name.c_str(), H5P_DEFAULT), H5Aclose);
+  if (!attribute) fail_reading(file, item, last_reason());
+  const Handle type(H5Aget_type(attribute.id()), H5Tclose);
+  const Handle space(H5Aget_space(attribute.id()), H5Sclose);
+  if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) != 0 ||
+      H5Sget_simple_extent_npoints(space.id()) != 1)
+    fail_reading(file, item, "it is not a text of fixed length");
+  std::string value(H5Tget_size(type.id()), '\0');
+  if (H5Aread(attribute.id(), type.id(), value.data()) < 0) fail_reading(file, item, last_reason());
+  value.resize(std::min(value.find('\0'), value.size()));
+  return value;
+}
+
+std::string checksum_of(std::span<const std::byte> bytes) {
+  return fmt::format("{:016x}", base::xxhash64(bytes));
 }
 
 }  // namespace
@@ -205,33 +245,14 @@ std::int64_t Hdf5Group::integer(const std::string& name) const {
   return read_scalar<std::int64_t>(name);
 }
 
-// Of fixed length: texts of variable length lie in a heap without checksum.
 void Hdf5Group::write_text(const std::string& name, const std::string& value) {
   const QuietErrors quiet;
-  const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
-  H5Tset_size(type.id(), value.size() + 1);
-  H5Tset_cset(type.id(), H5T_CSET_UTF8);
-  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
-  const Handle attribute(
-      H5Acreate2(id_, name.c_str(), type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-  if (!attribute || H5Awrite(attribute.id(), type.id(), value.c_str()) < 0)
-    fail_writing(file_, path_of(name));
+  write_text_attribute(id_, name, value, file_, path_of(name));
 }
 
 std::string Hdf5Group::text(const std::string& name) const {
   const QuietErrors quiet;
-  const Handle attribute(H5Aopen(id_, name.c_str(), H5P_DEFAULT), H5Aclose);
-  if (!attribute) fail_reading(file_, path_of(name), last_reason());
-  const Handle type(H5Aget_type(attribute.id()), H5Tclose);
-  const Handle space(H5Aget_space(attribute.id()), H5Sclose);
-  if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) != 0 ||
-      H5Sget_simple_extent_npoints(space.id()) != 1)
-    fail_reading(file_, path_of(name), "it is not a text of fixed length");
-  std::string value(H5Tget_size(type.id()), '\0');
-  if (H5Aread(attribute.id(), type.id(), value.data()) < 0)
-    fail_reading(file_, path_of(name), last_reason());
-  value.resize(std::min(value.find('\0'), value.size()));
-  return value;
+  return read_text_attribute(id_, name, file_, path_of(name));
 }
 
 template <typename T>
@@ -240,17 +261,14 @@ void Hdf5Group::write_array(const std::string& name, std::span<const T> values) 
   const hsize_t size = values.size();
   const Handle space(H5Screate_simple(1, &size, nullptr), H5Sclose);
   const Handle layout = creation(H5P_DATASET_CREATE);
-  if (size > 0) {
-    const hsize_t chunk = std::min<hsize_t>(size, kChunkBytes / sizeof(T));
-    H5Pset_chunk(layout.id(), 1, &chunk);
-    H5Pset_fletcher32(layout.id());
-  }
-  const Handle dataset(H5Dcreate2(id_, name.c_str(), Stored<T>::in_file(), space.id(), H5P_DEFAULT,
-                                  layout.id(), H5P_DEFAULT),
-                       H5Dclose);
-  if (!dataset || H5Dwrite(dataset.id(), Stored<T>::in_memory(), H5S_ALL, H5S_ALL, H5P_DEFAULT,
-                           values.data()) < 0)
+  const hid_t dataset = H5Dcreate2(id_, name.c_str(), Stored<T>::in_file(), space.id(), H5P_DEFAULT,
+                                   layout.id(), H5P_DEFAULT);
+  const Handle closing(dataset, H5Dclose);
+  if (dataset < 0 ||
+      H5Dwrite(dataset, Stored<T>::in_memory(), H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
     fail_writing(file_, path_of(name));
+  write_text_attribute(dataset, kChecksum, checksum_of(std::as_bytes(values)), file_,
+                       path_of(name));
 }
 
 std::size_t Hdf5Group::array_size(const std::string& name) const {
@@ -282,6 +300,12 @@ void Hdf5Group::read_array(const std::string& name, std::span<T> values) const {
   if (size > 0 && H5Dread(dataset.id(), Stored<T>::in_memory(), H5S_ALL, H5S_ALL, H5P_DEFAULT,
                           values.data()) < 0)
     fail_reading(file_, path_of(name), last_reason());
+  const std::string stored =
+      read_text_attribute(dataset.id(), kChecksum, file_, path_of(name) + "." + kChecksum);
+  const std::string found = checksum_of(std::as_bytes(values));
+  if (found != stored)
+    fail_reading(file_, path_of(name),
+                 fmt::format("its checksum is {} instead of {}", found, stored));
 }
 
 template void Hdf5Group::write_array(const std::string&, std::span<const float>);

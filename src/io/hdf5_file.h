@@ -10,11 +10,12 @@
 namespace tomofield::io {
 
 /// A group of an HDF5 file: named numbers and texts (attributes), one-dimensional
-/// arrays (datasets) and groups. Every byte is covered by a checksum: metadata by
-/// HDF5's own, arrays by its Fletcher-32 filter, so that a file which was cut
-/// off or overwritten in parts is found out when it is read. Arrays are stored as
-/// they are, without compression, and streamed in pieces of 1 MiB. The same
-/// contents make the same bytes.
+/// arrays (datasets) and groups. Every byte that means something is covered by a
+/// checksum: metadata by HDF5's own, an array by its attribute "xxh64" (XXH64 of
+/// its bytes, hexadecimal), so that a file which lost its end, a page or a bit is
+/// found out when it is read. (HDF5's Fletcher-32 filter takes a page of zeros, checksum
+/// included, for sound.) Arrays are written as they are, in one piece. The
+/// same contents make the same bytes.
 ///
 /// Reading throws Error, naming the file and the item, for what is missing, of
 /// another kind, or damaged. T is float, double or std::int64_t. One thread at

@@ -1,0 +1,76 @@
+#include "base/xxhash64.h"
+
+#include <array>
+#include <bit>
+#include <cstring>
+
+namespace tomofield::base {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+
+// Names and values of the specification.
+constexpr std::uint64_t kPrime1 = 0x9e3779b185ebca87ULL;
+constexpr std::uint64_t kPrime2 = 0xc2b2ae3d27d4eb4fULL;
+constexpr std::uint64_t kPrime3 = 0x165667b19e3779f9ULL;
+constexpr std::uint64_t kPrime4 = 0x85ebca77c2b2ae63ULL;
+constexpr std::uint64_t kPrime5 = 0x27d4eb2f165667c5ULL;
+constexpr std::size_t kStripe = 32;
+
+template <typename Word>
+std::uint64_t read_word(const std::byte* at) {
+  Word word;
+  std::memcpy(&word, at, sizeof word);
+  return word;
+}
+
+std::uint64_t round(std::uint64_t accumulator, std::uint64_t word) {
+  return std::rotl(accumulator + word * kPrime2, 31) * kPrime1;
+}
+
+std::uint64_t merge(std::uint64_t accumulator, std::uint64_t lane) {
+  return (accumulator ^ round(0, lane)) * kPrime1 + kPrime4;
+}
+
+std::uint64_t avalanche(std::uint64_t hash) {
+  hash = (hash ^ (hash >> 33)) * kPrime2;
+  hash = (hash ^ (hash >> 29)) * kPrime3;
+  return hash ^ (hash >> 32);
+}
+
+// Takes whole stripes off the front.
+std::uint64_t hash_stripes(std::span<const std::byte>& bytes) {
+  if (bytes.size() < kStripe) return kPrime5;
+  std::array<std::uint64_t, 4> lanes{kPrime1 + kPrime2, kPrime2, 0, 0 - kPrime1};
+  for (; bytes.size() >= kStripe; bytes = bytes.subspan(kStripe)) {
+    for (std::size_t i = 0; i < lanes.size(); ++i)
+      lanes[i] = round(lanes[i], read_word<std::uint64_t>(bytes.data() + 8 * i));
+  }
+  std::uint64_t hash = std::rotl(lanes[0], 1) + std::rotl(lanes[1], 7) + std::rotl(lanes[2], 12) +
+                       std::rotl(lanes[3], 18);
+  for (const std::uint64_t lane : lanes) hash = merge(hash, lane);
+  return hash;
+}
+
+}  // namespace
+
+std::uint64_t xxhash64(std::span<const std::byte> bytes) {
+  const std::size_t length = bytes.size();
+  std::uint64_t hash = hash_stripes(bytes) + length;
+  for (; bytes.size() >= 8; bytes = bytes.subspan(8)) {
+    hash ^= round(0, read_word<std::uint64_t>(bytes.data()));
+    hash = std::rotl(hash, 27) * kPrime1 + kPrime4;
+  }
+  if (bytes.size() >= 4) {
+    hash ^= read_word<std::uint32_t>(bytes.data()) * kPrime1;
+    hash = std::rotl(hash, 23) * kPrime2 + kPrime3;
+    bytes = bytes.subspan(4);
+  }
+  for (const std::byte byte : bytes) {
+    hash ^= std::to_integer<std::uint64_t>(byte) * kPrime5;
+    hash = std::rotl(hash, 11) * kPrime1;
+  }
+  return avalanche(hash);
+}
+
+}  // namespace tomofield::base
