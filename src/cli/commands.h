@@ -7,6 +7,7 @@ namespace tomofield::cli {
 // Each adds one subcommand to the program; the subcommand's callback does the
 // work and throws tomofield::Error for the user's mistakes. One file each:
 // src/cli/NAME_command.cc.
+void add_baseline_command(CLI::App& program);
 void add_evaluate_command(CLI::App& program);
 void add_info_command(CLI::App& program);
 void add_reconstruct_command(CLI::App& program);

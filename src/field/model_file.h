@@ -21,13 +21,13 @@ struct ModelInfo {
   bool is_dark = false;       ///< the series was dark where dense, so volumes leave negated
   std::string options_json;   ///< the resolved options of the reconstruction
   std::string written_by;     ///< program and version; filled in by load_model
+  /// What turns densities into values of the input's kind and contrast.
+  double output_scale() const { return is_dark ? -density_unit : density_unit; }
 };
 
 /// A fitted field with all that is needed to use it.
 struct Model : ModelInfo {
   std::unique_ptr<Field> field;
-  /// What turns densities into values of the input's kind and contrast.
-  double output_scale() const { return is_dark ? -density_unit : density_unit; }
 };
 
 /// Arrays that a fit needs to go on, bit for bit. Names are free but for '/'.

@@ -1,3 +1,5 @@
+#include "reconstruct/options_json.h"
+
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -16,6 +18,8 @@ json or_null(const std::optional<T>& value) {
 json or_null(const std::optional<std::filesystem::path>& path) {
   return path ? json(path->string()) : json(nullptr);
 }
+
+}  // namespace
 
 json input_json(const tilt_series::TiltSeriesOptions& o) {
   return {{"stack", o.stack.string()},
@@ -41,6 +45,8 @@ json specimen_json(const SpecimenOptions& o) {
           {"axis_x", or_null(o.axis_x)},
           {"axis_z", or_null(o.axis_z)}};
 }
+
+namespace {
 
 json field_json(const FieldOptions& o) {
   return {{"kind", o.kind},

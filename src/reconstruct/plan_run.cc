@@ -1,30 +1,16 @@
-#include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
-#include <string>
 #include <utility>
 
 #include "base/lanes.h"
+#include "base/memory.h"
 #include "base/parallel.h"
 #include "reconstruct/domain.h"
 #include "reconstruct/fit.h"
 #include "reconstruct/reconstruct.h"
-#include "tomofield/error.h"
 
 namespace tomofield::reconstruct {
 namespace {
-
-// MemAvailable of Linux: what can be had without swapping.
-std::size_t available_memory() {
-  std::ifstream file("/proc/meminfo");
-  std::string key, unit;
-  std::size_t kibibytes = 0;
-  while (file >> key >> kibibytes >> unit) {
-    if (key == "MemAvailable:") return kibibytes << 10;
-  }
-  return 0;
-}
 
 // Parameters, gradient and two moments; the rays in their slab order (large
 // series lie in a file that the kernel pages and count only as far as it is
@@ -64,14 +50,9 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.num_steps =
       static_cast<std::int64_t>(options.fit.epochs) * std::min(options.fit.subsets, run.num_views);
   run.memory_bytes = estimate_memory(plan, domain, run.num_parameters, run.num_views);
-  run.available_bytes = available_memory();
-  if (run.memory_bytes > run.available_bytes) {
-    throw Error(fmt::format(
-        "this reconstruction needs about {:.1f} GiB of memory and {:.1f} GiB are available: use a "
-        "larger --bin or --vertex-spacing, a smaller --roi or --thickness, or fewer --threads",
-        static_cast<double>(run.memory_bytes) / (1 << 30),
-        static_cast<double>(run.available_bytes) / (1 << 30)));
-  }
+  base::require_memory(run.memory_bytes, "this reconstruction",
+                       "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, or "
+                       "fewer --threads");
   return run;
 }
 

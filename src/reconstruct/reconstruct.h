@@ -58,8 +58,7 @@ struct RunPlan {
   int num_leaves = 0;
   std::size_t num_parameters = 0;
   std::int64_t num_steps = 0;
-  std::size_t memory_bytes = 0;     ///< estimated peak
-  std::size_t available_bytes = 0;  ///< of this machine, now
+  std::size_t memory_bytes = 0;  ///< estimated peak
 };
 
 /// Throws Error for options that do not fit the series, and when the memory

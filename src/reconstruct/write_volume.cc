@@ -46,23 +46,23 @@ void require_inside(const field::Field& field, const Box& box) {
 }
 
 // Corner of the box in Å from the view's corner, IMOD's sign.
-std::array<double, 3> origin_A(const field::Model& model, const Box& box, VolumeAxes axes) {
+std::array<double, 3> origin_A(const field::ModelInfo& info, const Box& box, VolumeAxes axes) {
   if (!box.is_aligned()) return {0.0, 0.0, 0.0};
   const auto [nx, ny, nz] = box.size;
   Point corner = box.position({0.0, 0.0, 0.0});
   if (axes == VolumeAxes::kXzy) {
     // Rows run down from the upper face.
     const double top = box.position({0.0, 0.0, static_cast<double>(nz)})[2];
-    corner = {corner[0], model.field->thickness() - top, corner[1]};
+    corner = {corner[0], info.geometry.thickness - top, corner[1]};
   }
-  for (double& value : corner) value = value == 0.0 ? 0.0 : -value * model.pixel_size_A;
+  for (double& value : corner) value = value == 0.0 ? 0.0 : -value * info.pixel_size_A;
   return corner;
 }
 
-float largest_density(const field::Field& field, const Box& box) {
+float largest_density(const VoxelSource& source) {
   std::mutex mutex;
   float largest = 0.0f;
-  sample_box(field, box, [&](const BoxPart& part) {
+  source([&](const BoxPart& part) {
     float here = 0.0f;
     for (const float value : part.values) here = std::max(here, std::abs(value));
     const std::lock_guard lock(mutex);
@@ -121,28 +121,34 @@ void write_volume(const field::Model& model, const VolumeOptions& options,
                   const std::filesystem::path& path) {
   const Box box = options.box.value_or(region_box(model, 1.0));
   require_inside(*model.field, box);
+  write_voxels([&](const field::BoxSink& sink) { sample_box(*model.field, box, sink); }, box, model,
+               "density field", options, path);
+}
+
+void write_voxels(const VoxelSource& source, const Box& box, const field::ModelInfo& info,
+                  const std::string& made_by, const VolumeOptions& options,
+                  const std::filesystem::path& path) {
   io::MrcSpec spec;
   spec.nx = box.size[0];
   spec.ny = box.size[1];
   spec.nz = box.size[2];
   if (options.axes == VolumeAxes::kXzy) std::swap(spec.ny, spec.nz);
   spec.mode = options.mode;
-  spec.voxel_size_A.fill(box.voxel_px * model.pixel_size_A);
-  spec.origin_A = origin_A(model, box, options.axes);
-  spec.label = fmt::format("tomofield {}: density field", library_version());
+  spec.voxel_size_A.fill(box.voxel_px * info.pixel_size_A);
+  spec.origin_A = origin_A(info, box, options.axes);
+  spec.label = fmt::format("tomofield {}: {}", library_version(), made_by);
 
-  double scale = options.invert ? -model.output_scale() : model.output_scale();
+  double scale = options.invert ? -info.output_scale() : info.output_scale();
   if (options.mode == io::MrcMode::kInt16) {
     { const io::MrcWriter probe(path, spec); }  // refuses before the pass, not after it
     constexpr double kLargestStored = 32000.0;
-    const double largest =
-        std::abs(scale) * static_cast<double>(largest_density(*model.field, box));
+    const double largest = std::abs(scale) * static_cast<double>(largest_density(source));
     const double factor = largest > 0 ? kLargestStored / largest : 1.0;
     spec.label += fmt::format(", stored = {:.6g} x value", factor);
     scale *= factor;
   }
   io::MrcWriter file(path, spec);
-  sample_box(*model.field, box, PartWriter(file, box, options.axes, scale));
+  source(PartWriter(file, box, options.axes, scale));
   file.close();
 }
 

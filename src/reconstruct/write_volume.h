@@ -1,7 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <string>
 
 #include "field/model_file.h"
 #include "field/sample_box.h"
@@ -32,6 +34,15 @@ field::Box region_box(const field::ModelInfo& model, double voxel_px);
 /// Atomic; replaces what is there. Throws Error before any work if `path` cannot be
 /// written or the box lies outside of what the model holds.
 void write_volume(const field::Model& model, const VolumeOptions& options,
+                  const std::filesystem::path& path);
+
+/// Passes every voxel of a box to a sink once, part by part, on any threads; called
+/// twice for kInt16.
+using VoxelSource = std::function<void(const field::BoxSink&)>;
+
+/// The same for densities from anywhere; `made_by` goes into the header's label.
+void write_voxels(const VoxelSource& source, const field::Box& box, const field::ModelInfo& info,
+                  const std::string& made_by, const VolumeOptions& options,
                   const std::filesystem::path& path);
 
 }  // namespace tomofield::reconstruct

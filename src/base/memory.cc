@@ -1,0 +1,34 @@
+#include "base/memory.h"
+
+#include <fmt/core.h>
+
+#include <fstream>
+#include <string>
+
+#include "tomofield/error.h"
+
+namespace tomofield::base {
+
+// MemAvailable of Linux.
+std::size_t available_memory() {
+  std::ifstream file("/proc/meminfo");
+  std::string line;
+  constexpr const char* kKey = "MemAvailable:";
+  while (std::getline(file, line)) {
+    if (line.rfind(kKey, 0) == 0) {
+      return std::size_t{std::stoull(line.substr(std::string(kKey).size()))} << 10;
+    }
+  }
+  return 0;
+}
+
+void require_memory(std::size_t needed, const char* noun, const char* advice) {
+  const std::size_t available = available_memory();
+  if (available == 0 || needed <= available) return;
+  constexpr double kGibibyte = 1 << 30;
+  throw Error(fmt::format("{} needs about {:.1f} GiB of memory and {:.1f} GiB are available: {}",
+                          noun, static_cast<double>(needed) / kGibibyte,
+                          static_cast<double>(available) / kGibibyte, advice));
+}
+
+}  // namespace tomofield::base

@@ -1,0 +1,227 @@
+#include "baseline/run_baseline.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "baseline/voxel_problem.h"
+#include "io/atomic_file.h"
+#include "io/json.h"
+#include "kernels/lanes.h"
+#include "projection/sample_grid.h"
+#include "reconstruct/options_json.h"
+#include "report/slices.h"
+#include "tomofield/error.h"
+
+namespace tomofield::baseline {
+namespace {
+
+using kernels::kLanes;
+using Clock = std::chrono::steady_clock;
+
+bool is_tv(const BaselineOptions& options) {
+  return std::holds_alternative<TvOptions>(options.method);
+}
+
+int num_iterations(const BaselineOptions& options) {
+  return std::visit([](const auto& method) { return method.iterations; }, options.method);
+}
+
+projection::SampleGrid grid_of(const reconstruct::PreparedSeries& series,
+                               const BaselineOptions& options) {
+  return projection::make_sample_grid(series.geometry, static_cast<double>(series.roi.x0),
+                                      static_cast<double>(series.roi.x1),
+                                      options.specimen.with_margin ? options.margin_spacing : 0.0);
+}
+
+// Volumes: densities and inverse column sums, or densities, Kᵀ y and three
+// gradient duals. The rays, and with TV a dual of each.
+std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
+                            const projection::SampleGrid& grid, bool with_tv) {
+  constexpr std::size_t kFixed = std::size_t{48} << 20;  // program and libraries
+  const std::size_t slabs = static_cast<std::size_t>((plan.roi.height() + kLanes - 1) / kLanes);
+  const std::size_t rays = static_cast<std::size_t>(plan.geometry.num_views()) *
+                           static_cast<std::size_t>(plan.geometry.width) * kLanes;
+  const std::size_t volumes = with_tv ? 5 : 2;
+  const std::size_t values_of_slab = volumes * grid.size() + (with_tv ? 2 : 1) * rays;
+  const std::size_t values_of_thread = grid.size() + rays;
+  return kFixed +
+         sizeof(float) * (slabs * values_of_slab +
+                          static_cast<std::size_t>(base::thread_count()) * values_of_thread);
+}
+
+base::ProgressReport progress_report(const IterationReport& report, int num_iterations,
+                                     std::int64_t num_rays, double seconds) {
+  base::ProgressReport progress;
+  progress.fraction_done = static_cast<double>(report.iteration) / num_iterations;
+  progress.seconds_elapsed = seconds;
+  progress.seconds_left = seconds / report.iteration * (num_iterations - report.iteration);
+  progress.detail = fmt::format("iteration {}  loss {:.4f}", report.iteration,
+                                2 * report.data_loss / static_cast<double>(num_rays));
+  return progress;
+}
+
+// Voxels of the region of interest, slab by slab.
+reconstruct::VoxelSource voxels_of(const VoxelVolume& densities) {
+  return [&densities](const field::BoxSink& sink) {
+    const projection::SampleSegment& segment = densities.grid().segments().front();
+    base::parallel_for(densities.num_slabs(), [&](std::int64_t index) {
+      const int slab = static_cast<int>(index);
+      const int num_rows = densities.rows_in_slab(slab);
+      std::vector<float> values;
+      values.reserve(static_cast<std::size_t>(segment.nz) * static_cast<std::size_t>(num_rows) *
+                     static_cast<std::size_t>(segment.nx));
+      for (int k = 0; k < segment.nz; ++k) {
+        const float* row = densities.slab(slab) + segment.origin + k * segment.stride_z();
+        for (int lane = 0; lane < num_rows; ++lane) {
+          for (int i = 0; i < segment.nx; ++i)
+            values.push_back(row[static_cast<std::ptrdiff_t>(i) * kLanes + lane]);
+        }
+      }
+      sink({0, segment.nz, std::int64_t{slab} * kLanes, num_rows, values});
+    });
+  };
+}
+
+field::ModelInfo volume_info(const reconstruct::PreparedSeries& series,
+                             const BaselineOptions& options) {
+  field::ModelInfo info;
+  info.geometry = series.geometry;
+  info.roi = series.roi;
+  info.pixel_size_A = series.pixel_size_A;
+  info.density_unit = series.unit;
+  info.is_dark = options.input.contrast == tilt_series::Contrast::kDark;
+  return info;
+}
+
+nlohmann::json method_json(const SirtOptions& o) {
+  return {{"name", "sirt"},
+          {"iterations", o.iterations},
+          {"relaxation", o.relaxation},
+          {"non_negative", o.non_negative},
+          {"fit_view_scale", o.fit_view_scale}};
+}
+
+nlohmann::json method_json(const TvOptions& o) {
+  return {{"name", "tv"},
+          {"iterations", o.iterations},
+          {"weight", o.weight},
+          {"balance", o.balance},
+          {"non_negative", o.non_negative},
+          {"fit_view_scale", o.fit_view_scale}};
+}
+
+nlohmann::json options_json(const BaselineOptions& options) {
+  return {{"input", reconstruct::input_json(options.input)},
+          {"specimen", reconstruct::specimen_json(options.specimen)},
+          {"with_margin", options.specimen.with_margin},
+          {"margin_spacing", options.margin_spacing},
+          {"method",
+           std::visit([](const auto& method) { return method_json(method); }, options.method)}};
+}
+
+nlohmann::json figures_json(const Solution& solution, const VoxelProblem& problem,
+                            const reconstruct::PreparedSeries& series, double seconds) {
+  nlohmann::json views = nlohmann::json::array();
+  for (const int view : problem.views()) {
+    const std::size_t v = static_cast<std::size_t>(view);
+    views.push_back({{"tilt_deg", series.geometry.tilt_deg[v]},
+                     {"scale", problem.view_model(view).scale},
+                     {"offset", problem.view_model(view).offset * series.unit},
+                     {"noise_sigma", series.noise_sigma[v] * series.unit}});
+  }
+  std::vector<double> residuals;
+  for (const double loss : solution.data_loss)
+    residuals.push_back(2 * loss / static_cast<double>(problem.num_rays()));
+  return {{"mean_squared_residual_per_noise_variance", residuals},
+          {"objective", solution.objective},
+          {"density_unit", series.unit},
+          {"pixel_size_A", series.pixel_size_A},
+          {"size_px", {series.roi.width(), series.roi.height(), series.geometry.thickness}},
+          {"seconds", seconds},
+          {"threads", base::thread_count()},
+          {"views", views}};
+}
+
+BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays) {
+  const std::vector<double>& objective = solution.objective;
+  const double before = objective[(objective.size() - 1) * 9 / 10];
+  return {2 * solution.data_loss.back() / static_cast<double>(num_rays),
+          (before - objective.back()) / objective.back()};
+}
+
+}  // namespace
+
+BaselinePaths baseline_paths(const std::filesystem::path& volume) {
+  std::filesystem::path stem = volume;
+  stem.replace_extension();
+  return {volume, stem.string() + ".json", stem};
+}
+
+void check_outputs(const BaselineOptions& options) {
+  const BaselinePaths paths = baseline_paths(options.output);
+  for (const auto& path : {paths.volume, paths.json}) {
+    if (!options.overwrite && std::filesystem::exists(path)) {
+      throw Error(
+          fmt::format("{} exists already: give --overwrite to replace it, or another name with -o",
+                      path.string()));
+    }
+  }
+  const io::AtomicFile probe(paths.volume);  // the directory can be written
+}
+
+BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {
+  const reconstruct::PreparedSeries planned = plan_series(series, options.specimen);
+  const projection::SampleGrid grid = grid_of(planned, options);
+  BaselinePlan plan;
+  plan.num_views = planned.geometry.num_views();
+  plan.geometry = planned.geometry;
+  plan.roi = planned.roi;
+  plan.pixel_size_A = planned.pixel_size_A;
+  for (const projection::SampleSegment& segment : grid.segments()) {
+    plan.num_voxels += static_cast<std::size_t>(segment.nx) * static_cast<std::size_t>(segment.nz) *
+                       static_cast<std::size_t>(planned.roi.height());
+  }
+  plan.memory_bytes = estimate_memory(planned, grid, is_tv(options));
+  base::require_memory(plan.memory_bytes, "this baseline",
+                       "use a larger --bin or --margin-spacing, or a smaller --roi or --thickness");
+  return plan;
+}
+
+BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
+                             const BaselineOptions& options, const base::ProgressSink& progress) {
+  const BaselinePaths paths = baseline_paths(options.output);
+  const reconstruct::PreparedSeries series =
+      prepare_series(tilt_series, options.specimen,
+                     paths.volume.has_parent_path() ? paths.volume.parent_path() : ".");
+  VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays, series.noise_sigma);
+  const std::int64_t num_rays = problem.num_rays();
+  const auto start = Clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
+  const AfterIteration report = [&](const IterationReport& iteration, const VoxelVolume&) {
+    if (progress)
+      progress(progress_report(iteration, num_iterations(options), num_rays, seconds()));
+  };
+  const Solution solution =
+      is_tv(options) ? reconstruct_tv(problem, std::get<TvOptions>(options.method),
+                                      series.mean_density, report)
+                     : reconstruct_sirt(problem, std::get<SirtOptions>(options.method), report);
+  const double fit_seconds = seconds();
+
+  const field::ModelInfo info = volume_info(series, options);
+  write_voxels(voxels_of(solution.densities), reconstruct::region_box(info, 1.0), info,
+               is_tv(options) ? "baseline tv" : "baseline sirt", options.volume, paths.volume);
+  report::write_slice_pictures(paths.volume, paths.picture_prefix);
+  io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
+                              {"options", options_json(options)},
+                              {"figures", figures_json(solution, problem, series, fit_seconds)}});
+  return summary_of(solution, num_rays);
+}
+
+}  // namespace tomofield::baseline

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <filesystem>
+#include <variant>
+
+#include "base/progress.h"
+#include "baseline/sirt.h"
+#include "baseline/tv_reconstruction.h"
+#include "reconstruct/prepare.h"
+#include "reconstruct/write_volume.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::baseline {
+
+/// Everything that a baseline reconstruction is made from.
+struct BaselineOptions {
+  tilt_series::TiltSeriesOptions input;
+  reconstruct::SpecimenOptions specimen;
+  double margin_spacing = 2.0;  ///< binned pixels between samples of the margins
+  std::variant<SirtOptions, TvOptions> method;
+  reconstruct::VolumeOptions volume;  ///< `box` stays empty: voxels are where they were fitted
+  std::filesystem::path output;       ///< the volume; JSON and pictures lie beside it
+  bool overwrite = false;
+};
+
+/// The files of a run, named after its volume.
+struct BaselinePaths {
+  std::filesystem::path volume, json, picture_prefix;
+};
+BaselinePaths baseline_paths(const std::filesystem::path& volume);
+
+/// Throws Error if results would replace existing ones without `overwrite`, or
+/// cannot be written where they shall go.
+void check_outputs(const BaselineOptions& options);
+
+/// What a run will do; nothing is allocated or written for it.
+struct BaselinePlan {
+  int num_views = 0;
+  geometry::TiltGeometry geometry;
+  geometry::Roi roi;
+  double pixel_size_A = 0;
+  std::size_t num_voxels = 0;    ///< with the margins
+  std::size_t memory_bytes = 0;  ///< estimated peak
+};
+
+/// Throws Error for options that do not fit the series, and when the memory
+/// needed is beyond what the machine has.
+BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options);
+
+/// What is left to say when it is done.
+struct BaselineSummary {
+  double mean_squared_residual = 0;  ///< in units of the noise's variance
+  /// By how much the objective fell in the last tenth of the iterations, as a fraction of it.
+  double last_decrease = 0;
+};
+
+/// Reads the series, reconstructs, writes the volume (MRC, the input's units and contrast),
+/// the figures and resolved options (JSON) and pictures of the central slices. Call
+/// check_outputs() and plan_baseline() first: this starts at once.
+BaselineSummary run_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options,
+                             const base::ProgressSink& progress);
+
+}  // namespace tomofield::baseline

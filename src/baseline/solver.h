@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "base/aligned_buffer.h"
+#include "base/parallel.h"
+#include "baseline/voxel_volume.h"
+
+namespace tomofield::baseline {
+
+/// What an iterative reconstruction ends with. The histories have one entry for
+/// the starting densities and one for the densities after each iteration.
+struct Solution {
+  VoxelVolume densities;
+  std::vector<double> data_loss;  ///< ½ Σ (residual / σ)²
+  std::vector<double> objective;  ///< what is minimised
+};
+
+/// An iteration that is done; the figures are those of the densities that it began with.
+struct IterationReport {
+  int iteration = 0;  ///< 1 is the first
+  double data_loss = 0.0;
+  double objective = 0.0;
+};
+
+/// Called after every iteration, with the densities that it ended with.
+using AfterIteration = std::function<void(const IterationReport&, const VoxelVolume&)>;
+
+/// A slab's rays and a slab's samples for each thread of base::parallel_for.
+class ThreadScratch {
+ public:
+  ThreadScratch(std::size_t detector_size, std::size_t slab_size) {
+    for (int t = 0; t < base::thread_count(); ++t) {
+      detectors_.emplace_back(detector_size);
+      samples_.emplace_back(slab_size);
+    }
+  }
+  float* detector() { return detectors_[thread()].data(); }
+  /// Zeros.
+  float* cleared_samples() {
+    samples_[thread()].fill(0.0f);
+    return samples_[thread()].data();
+  }
+
+ private:
+  static std::size_t thread() { return static_cast<std::size_t>(base::thread_index()); }
+  std::vector<base::AlignedBuffer<float>> detectors_, samples_;
+};
+
+}  // namespace tomofield::baseline

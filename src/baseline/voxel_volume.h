@@ -1,0 +1,68 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "base/aligned_buffer.h"
+#include "base/parallel.h"
+#include "kernels/lanes.h"
+#include "projection/sample_grid.h"
+
+namespace tomofield::baseline {
+
+/// A volume whose voxels are the samples of the projector, slab by slab: each
+/// slab a buffer [segment][z][x][lane] of a SampleGrid, zero at first. Padding
+/// and the lanes past the last row are no voxels and stay zero.
+class VoxelVolume {
+ public:
+  VoxelVolume(projection::SampleGrid grid, std::int64_t num_rows)
+      : grid_(std::move(grid)), num_rows_(num_rows) {
+    slabs_.reserve(static_cast<std::size_t>(num_slabs()));
+    for (int s = 0; s < num_slabs(); ++s) slabs_.emplace_back(grid_.size());
+  }
+
+  const projection::SampleGrid& grid() const { return grid_; }
+  std::int64_t num_rows() const { return num_rows_; }
+  int num_slabs() const {
+    return static_cast<int>((num_rows_ + kernels::kLanes - 1) / kernels::kLanes);
+  }
+  /// Lanes of a slab that are rows of the volume: 16, or fewer in the last one.
+  int rows_in_slab(int slab) const {
+    return static_cast<int>(
+        std::min<std::int64_t>(kernels::kLanes, num_rows_ - std::int64_t{slab} * kernels::kLanes));
+  }
+
+  float* slab(int index) { return slabs_[static_cast<std::size_t>(index)].data(); }
+  const float* slab(int index) const { return slabs_[static_cast<std::size_t>(index)].data(); }
+
+ private:
+  projection::SampleGrid grid_;
+  std::int64_t num_rows_;
+  std::vector<base::AlignedBuffer<float>> slabs_;
+};
+
+/// Calls body(segment, row) for each z row of a slab's samples: `row` is where
+/// sample (0, k, lane 0) lies in a slab buffer, and the nx · kLanes floats from
+/// there on are the row's samples.
+template <typename Body>
+void for_each_sample_row(const projection::SampleGrid& grid, Body&& body) {
+  for (const projection::SampleSegment& segment : grid.segments()) {
+    for (int k = 0; k < segment.nz; ++k) body(segment, segment.origin + k * segment.stride_z());
+  }
+}
+
+/// Sum of body(slab) over all slabs, in their order whatever the thread count.
+template <typename Body>
+double sum_over_slabs(int num_slabs, Body&& body) {
+  std::vector<double> parts(static_cast<std::size_t>(num_slabs));
+  base::parallel_for(num_slabs, [&](std::int64_t slab) {
+    parts[static_cast<std::size_t>(slab)] = body(static_cast<int>(slab));
+  });
+  double sum = 0.0;
+  for (const double part : parts) sum += part;
+  return sum;
+}
+
+}  // namespace tomofield::baseline

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "reconstruct/prepare.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::reconstruct {
+
+/// What every command that reconstructs records of its options.
+nlohmann::json input_json(const tilt_series::TiltSeriesOptions& options);
+nlohmann::json specimen_json(const SpecimenOptions& options);
+
+}  // namespace tomofield::reconstruct
