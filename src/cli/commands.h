@@ -9,6 +9,7 @@ namespace tomofield::cli {
 // src/cli/NAME_command.cc.
 void add_baseline_command(CLI::App& program);
 void add_evaluate_command(CLI::App& program);
+void add_export_command(CLI::App& program);
 void add_info_command(CLI::App& program);
 void add_reconstruct_command(CLI::App& program);
 void add_simulate_command(CLI::App& program);

@@ -9,11 +9,11 @@
 
 #include "cli/commands.h"
 #include "cli/input_options.h"
+#include "cli/model_info.h"
 #include "io/mrc.h"
 #include "io/mrc_header.h"
 #include "io/positioned_file.h"
 #include "tilt_series/tilt_series.h"
-#include "tomofield/error.h"
 
 namespace tomofield::cli {
 namespace {
@@ -89,8 +89,8 @@ void print_series(const tilt_series::TiltSeriesOptions& options) {
 
 void print_info(const tilt_series::TiltSeriesOptions& options) {
   switch (kind_of(options.stack)) {
-    case FileKind::kHdf5:  // where a model file is shown
-      throw Error(fmt::format("'{}' is an HDF5 file, not an MRC file", options.stack.string()));
+    case FileKind::kHdf5:
+      return print_model(options.stack);
     case FileKind::kMrc:
       print_mrc(options.stack);
       if (options.tlt || options.aln || options.mdoc) print_series(options);

@@ -24,6 +24,7 @@ void print_log(base::LogLevel level, std::string_view message) {
 void add_commands(CLI::App& program) {
   add_reconstruct_command(program);
   add_baseline_command(program);
+  add_export_command(program);
   add_evaluate_command(program);
   add_simulate_command(program);
   add_info_command(program);

@@ -1,0 +1,146 @@
+#include <fmt/core.h>
+
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "cli/commands.h"
+#include "cli/volume_options.h"
+#include "field/model_file.h"
+#include "io/atomic_file.h"
+#include "reconstruct/write_volume.h"
+#include "tomofield/error.h"
+
+namespace tomofield::cli {
+namespace {
+
+using field::Box;
+using field::Model;
+
+struct ExportArguments {
+  std::filesystem::path model;
+  std::filesystem::path output;
+  std::vector<double> box, centre, rotation;
+  std::vector<std::int64_t> size;
+  std::optional<double> voxel_size_A;
+  double bin = 1.0;
+  reconstruct::VolumeOptions volume;
+  bool overwrite = false;
+};
+
+void check_output(const ExportArguments& arguments) {
+  std::error_code ignored;
+  if (std::filesystem::equivalent(arguments.model, arguments.output, ignored))
+    throw Error(fmt::format("'{}' is the model itself: give the volume another name with -o",
+                            arguments.output.string()));
+  if (!arguments.overwrite && std::filesystem::exists(arguments.output))
+    throw Error(fmt::format("'{}' exists: give another name, or --overwrite to replace it",
+                            arguments.output.string()));
+  const io::AtomicFile probe(arguments.output);  // throws where nothing can be written
+}
+
+field::Point point(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
+
+Box unrotated_box(const ExportArguments& arguments, const Model& model) {
+  const double voxel_px =
+      arguments.voxel_size_A ? *arguments.voxel_size_A / model.pixel_size_A : arguments.bin;
+  if (!arguments.size.empty())
+    return {.centre_px = point(arguments.centre.data()),
+            .size = {arguments.size[0], arguments.size[1], arguments.size[2]},
+            .voxel_px = voxel_px};
+  if (arguments.box.empty()) return reconstruct::region_box(model, voxel_px);
+  const field::Point low = point(arguments.box.data()), high = point(arguments.box.data() + 3);
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double voxels = (high[a] - low[a]) / voxel_px;
+    if (voxels > 0 && voxels <= std::numeric_limits<std::int32_t>::max()) continue;
+    throw Error(fmt::format(
+        "--box has {} from {} to {}, {:.6g} voxels: give x0,y0,z0,x1,y1,z1 with the low corner "
+        "first",
+        "xyz"[a], low[a], high[a], voxels));
+  }
+  return field::box_between(low, high, voxel_px);
+}
+
+void run_export(ExportArguments& arguments) {
+  check_output(arguments);
+  const Model model = field::load_model(arguments.model);
+  Box box = unrotated_box(arguments, model);
+  const auto& angles = arguments.rotation;
+  if (!angles.empty())
+    box.field_from_box = field::rotation_from_euler(angles[0], angles[1], angles[2]);
+  arguments.volume.box = box;
+  reconstruct::write_volume(model, arguments.volume, arguments.output);
+  fmt::print("{}: {} × {} × {} voxels (x, y, z) of {:.6g} Å about {:.6g}, {:.6g}, {:.6g} px\n",
+             arguments.output.string(), box.size[0], box.size[1], box.size[2],
+             box.voxel_px * model.pixel_size_A, box.centre_px[0], box.centre_px[1],
+             box.centre_px[2]);
+}
+
+void add_box_options(CLI::App& command, ExportArguments& arguments) {
+  const char* group = "Box (pixels of the model: the binned view at zero tilt, z from 0 up)";
+  const CLI::Validator finite(
+      [](std::string& text) {
+        return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not finite";
+      },
+      "", "finite");
+  CLI::Option* box =
+      command
+          .add_option("--box", arguments.box,
+                      "x0,y0,z0,x1,y1,z1: corners; default: the region of interest and the whole "
+                      "thickness")
+          ->delimiter(',')
+          ->expected(6)
+          ->check(finite)
+          ->group(group);
+  CLI::Option* centre =
+      command.add_option("--center", arguments.centre, "x,y,z: centre of the box, with --size")
+          ->delimiter(',')
+          ->expected(3)
+          ->check(finite)
+          ->excludes(box)
+          ->group(group);
+  CLI::Option* size = command.add_option("--size", arguments.size, "nx,ny,nz: voxels")
+                          ->delimiter(',')
+                          ->expected(3)
+                          ->check(CLI::Range(1, std::numeric_limits<std::int32_t>::max()))
+                          ->needs(centre)
+                          ->group(group);
+  centre->needs(size);
+  command
+      .add_option("--rotate", arguments.rotation,
+                  "rot,tilt,psi: Euler angles in degrees as RELION's rlnAngleRot, Tilt, Psi; the "
+                  "box, turned about its centre, shows a particle as its reference lies")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(finite)
+      ->group(group);
+  const CLI::Range positive(1e-3, 1e6);
+  CLI::Option* voxel_size =
+      command.add_option("--voxel-size", arguments.voxel_size_A, "Å; default: the pixel size")
+          ->check(positive)
+          ->group(group);
+  command.add_option("--bin", arguments.bin, "or voxels of so many pixels")
+      ->check(positive)
+      ->excludes(voxel_size)
+      ->group(group);
+}
+
+}  // namespace
+
+void add_export_command(CLI::App& program) {
+  auto arguments = std::make_shared<ExportArguments>();
+  CLI::App* command = program.add_subcommand(
+      "export", "Write any box of a model, at any voxel size and orientation, as an MRC volume");
+  command->add_option("model", arguments->model, "Model file (.h5) of reconstruct")->required();
+  command->add_option("-o,--output", arguments->output, "MRC volume")->required();
+  command->add_flag("--overwrite", arguments->overwrite, "Replace an existing volume");
+  add_box_options(*command, *arguments);
+  add_volume_options(*command, arguments->volume);
+  command->callback([arguments] { run_export(*arguments); });
+}
+
+}  // namespace tomofield::cli
