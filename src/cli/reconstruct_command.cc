@@ -73,6 +73,11 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->capture_default_str()
       ->group(group);
   command
+      .add_option("--learning-rate", fit.learning_rate, "of the first step; it falls exponentially")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->group(group);
+  command
       .add_option("--tv", fit.density_variation,
                   "weight of the density's total variation, in noise units")
       ->check(CLI::NonNegativeNumber)
