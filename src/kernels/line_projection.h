@@ -10,25 +10,19 @@ namespace tomofield::kernels {
 //
 //   position(u) = offset + step u        in samples of the line, |step| > 0
 //
-// and takes w · hat(position(u) − j) of sample j, hat(t) = max(0, 1 − |t|), with
-//
-//   w = min(weight, fade_low (position − low), fade_high (high − position)).
-//
+// and takes weight · hat(position(u) − j) of sample j, hat(t) = max(0, 1 − |t|).
 // Pixels with position outside [low, high) or index outside
 // [first_pixel, end_pixel) do not see the line. Forward and adjoint evaluate
 // the same expression, so they are each other's exact transpose.
 
 /// One line as one view sees it.
 struct LineCrossing {
-  static constexpr float kSharp = 1e30f;
   const float* samples = nullptr;  ///< source of project_lines: sample 0; −1 and num_samples must
                                    ///< be readable (padding)
   const float* detector =
       nullptr;  ///< source of backproject_lines: pixel 0 of the view, [pixel, lane]
   float offset = 0, step = 1;
   float low = 0, high = 0;  ///< within [−1, num_samples]
-  /// How steeply the weight rises from the ends; the default is at once.
-  float fade_low = kSharp, fade_high = kSharp;
   int first_pixel = 0, end_pixel = 0;
   float weight = 0;
 };

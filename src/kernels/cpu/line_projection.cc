@@ -39,19 +39,11 @@ HWY_INLINE void store_sample(const Vec (&acc)[kVecs], float* p) {
 
 HWY_INLINE Vec iota_from(int first) { return hn::ConvertTo(Tag(), hn::Iota(IntTag(), first)); }
 
-// What a position takes of the line, before the hat.
-HWY_INLINE Vec weight_at(const LineCrossing& line, Vec position) {
-  const Tag d;
-  const Vec from_low = hn::Mul(hn::Set(d, line.fade_low), hn::Sub(position, hn::Set(d, line.low)));
-  const Vec from_high =
-      hn::Mul(hn::Set(d, line.fade_high), hn::Sub(hn::Set(d, line.high), position));
-  return hn::Min(hn::Set(d, line.weight), hn::Min(from_low, from_high));
-}
-
 // Lower sample and the two weights of pixels first … first + kTile − 1.
 HWY_INLINE void forward_taps(const LineCrossing& line, int first, TapTable& lower,
                              float* upper_weight) {
   const Tag d;
+  const Vec weight = hn::Set(d, line.weight);
   for (int t = 0; t < kTile; t += kVecLanes) {
     const Vec pixel = iota_from(first + t);
     const Vec position = hn::MulAdd(pixel, hn::Set(d, line.step), hn::Set(d, line.offset));
@@ -59,7 +51,6 @@ HWY_INLINE void forward_taps(const LineCrossing& line, int first, TapTable& lowe
         hn::And(hn::Ge(position, hn::Set(d, line.low)), hn::Lt(position, hn::Set(d, line.high))),
         hn::And(hn::Ge(pixel, hn::Set(d, static_cast<float>(line.first_pixel))),
                 hn::Lt(pixel, hn::Set(d, static_cast<float>(line.end_pixel)))));
-    const Vec weight = weight_at(line, position);
     const Vec base = hn::Floor(position);
     const Vec fraction = hn::Sub(position, base);
     const Vec upper = hn::IfThenElseZero(inside, hn::Mul(weight, fraction));
@@ -117,7 +108,7 @@ HWY_INLINE void adjoint_taps(const LineCrossing& view, int first, int tap, TapTa
     const auto inside = hn::And(
         hn::And(hn::Ge(position, hn::Set(d, view.low)), hn::Lt(position, hn::Set(d, view.high))),
         hn::And(hn::Ge(pixel, first_pixel), hn::Le(pixel, last_pixel)));
-    hn::Store(hn::IfThenElseZero(inside, hn::Mul(weight_at(view, position), hat)), d,
+    hn::Store(hn::IfThenElseZero(inside, hn::Mul(hn::Set(d, view.weight), hat)), d,
               table.weight + t);
     const Vec clamped = hn::Min(hn::Max(pixel, first_pixel), last_pixel);
     hn::Store(hn::ConvertTo(IntTag(), clamped), IntTag(), table.index + t);

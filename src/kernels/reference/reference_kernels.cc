@@ -24,11 +24,7 @@ double line_weight(const LineCrossing& line, int pixel, int sample) {
                     position >= static_cast<double>(line.low) &&
                     position < static_cast<double>(line.high);
   const double hat = std::max(0.0, 1.0 - std::abs(position - sample));
-  const double weight =
-      std::min({static_cast<double>(line.weight),
-                static_cast<double>(line.fade_low) * (position - static_cast<double>(line.low)),
-                static_cast<double>(line.fade_high) * (static_cast<double>(line.high) - position)});
-  return sees ? weight * hat : 0.0;
+  return sees ? static_cast<double>(line.weight) * hat : 0.0;
 }
 
 void project_line(const LineCrossing& line, int num_samples, std::ptrdiff_t stride, int first,
