@@ -1,0 +1,160 @@
+"""`tomofield export` and `tomofield info` on a model of a small reconstruction.
+
+Volumes are read with mrcfile and compared with the reconstruction's own.
+
+usage: export_test.py TOMOFIELD SCRATCH_DIRECTORY"""
+import io
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+try:
+    import h5py
+    import mrcfile
+    import numpy as np
+except ImportError as missing:
+    print(f"SKIPPED: {missing}")
+    sys.exit(77)
+
+tomofield, scratch = sys.argv[1:3]
+shutil.rmtree(scratch, ignore_errors=True)
+os.makedirs(scratch)
+os.chdir(scratch)
+
+PIXEL_A = 7.3
+X0, Y0, WIDTH, HEIGHT, THICKNESS = 6, 4, 41, 37, 30
+
+
+def run(*arguments):
+    return subprocess.run([tomofield, *map(str, arguments)], capture_output=True, text=True)
+
+
+def succeed(*arguments):
+    result = run(*arguments)
+    assert result.returncode == 0, (arguments, result.stderr)
+    return result.stdout
+
+
+def read(path):
+    complaints = io.StringIO()
+    assert mrcfile.validate(path, complaints), complaints.getvalue()
+    with mrcfile.open(path) as volume:
+        return np.array(volume.data), volume.voxel_size, volume.header.origin.tolist()
+
+
+def export(*arguments):
+    """Exports to box.mrc and returns its values, voxel size and origin."""
+    succeed("export", "model.h5", "-o", "box.mrc", "--overwrite", *arguments)
+    return read("box.mrc")
+
+
+def close(found, expected):
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-6 * np.abs(whole).max())
+
+
+succeed("simulate", "series", "--size", 56, "--thickness", THICKNESS, "--voxel-size", PIXEL_A,
+        "--tilts", "-60:60:10")
+succeed("reconstruct", "series/tilt_series.mrc", "--tlt", "series/tilt_series.tlt", "--contrast",
+        "bright", "--thickness", THICKNESS, "--roi", f"{X0},{Y0},{X0 + WIDTH},{Y0 + HEIGHT}",
+        "--epochs", 1, "-o", "volume.mrc")
+os.rename("volume.h5", "model.h5")
+whole, voxel_size, origin = read("volume.mrc")
+assert whole.shape == (THICKNESS, HEIGHT, WIDTH)
+assert np.ptp(whole) > 0
+
+# By default the reconstruction's own volume, header and all.
+export()
+assert pathlib.Path("box.mrc").read_bytes() == pathlib.Path("volume.mrc").read_bytes()
+
+# A part of it, by corners and by centre, knows where it lies.
+part = whole[5:16, 8:28, 3:33]
+for box in (["--box", f"{X0 + 3},{Y0 + 8},5,{X0 + 33},{Y0 + 28},16"],
+            ["--center", f"{X0 + 18},{Y0 + 18},10.5", "--size", "30,20,11"]):
+    values, voxel_size, origin = export(*box)
+    close(values, part)
+    np.testing.assert_allclose(origin, np.array([X0 + 3, Y0 + 8, 5]) * -PIXEL_A, atol=1e-4)
+    np.testing.assert_allclose(voxel_size.tolist(), PIXEL_A, rtol=1e-7)
+
+# Two pixels a voxel: means, with the exact size; the odd last column and row stay out,
+# half a pixel on either side.
+values, voxel_size, origin = export("--bin", 2, "--box", f"{X0 + 3},{Y0 + 8},5,{X0 + 33},{Y0 + 28},15")
+close(values, part[:10].reshape(5, 2, 10, 2, 15, 2).mean(axis=(1, 3, 5)))
+np.testing.assert_allclose(voxel_size.tolist(), 2 * PIXEL_A, rtol=1e-7)
+values, voxel_size, origin = export("--voxel-size", 2 * PIXEL_A)
+assert values.shape == (15, 18, 20)
+np.testing.assert_allclose(origin, np.array([X0 + 0.5, Y0 + 0.5, 0]) * -PIXEL_A, atol=1e-4)
+
+# IMOD's axes; trimvol -rx turns the sections back: z = rows - 1 - row.
+values = export("--axes", "xzy")[0]
+close(values[:, ::-1].transpose(1, 0, 2), whole)
+
+# A quarter turn about z (RELION's rot): the box's x lies along -y of the tomogram.
+values = export("--center", f"{X0 + 18},{Y0 + 18},10.5", "--size", "20,30,11", "--rotate", "90,0,0")[0]
+close(values, part[:, ::-1, :].transpose(0, 2, 1))
+
+close(export("--invert")[0], -whole)
+halves = export("--mode", 12)[0]
+assert halves.dtype == np.float16
+np.testing.assert_allclose(halves, whole, rtol=1e-3, atol=1e-6)
+integers = export("--mode", 1)[0]
+assert integers.dtype == np.int16 and np.abs(integers).max() == 32000
+step = np.abs(whole).max() / 32000
+np.testing.assert_allclose(integers * step, whole, rtol=0, atol=0.51 * step)
+
+# What info says of the model.
+text = succeed("info", "model.h5")
+with h5py.File("model.h5") as model:
+    num_parameters = model["field/parameters"].size
+for fact in ("7.3 Å", f"{WIDTH} × {HEIGHT} px from {X0},{Y0}", "13 views from -60° to 60°", "bright",
+             f"{num_parameters} parameters", "root cells", "margin", '"epochs":1'):
+    assert fact in text, (fact, text)
+
+
+def expect_refusal(facts, *arguments, command="export"):
+    before = {path: path.stat().st_mtime_ns for path in pathlib.Path(".").rglob("*")}
+    result = run(command, *arguments)
+    assert result.returncode == 2, (arguments, result.returncode, result.stdout, result.stderr)
+    for fact in facts:
+        assert fact in result.stderr, (arguments, fact, result.stderr)
+    assert "HDF5:" not in result.stderr, result.stderr
+    after = {path: path.stat().st_mtime_ns for path in pathlib.Path(".").rglob("*")}
+    assert before.keys() == after.keys(), (arguments, before.keys() ^ after.keys())
+    assert all(path.is_dir() or before[path] == after[path] for path in before), arguments
+
+
+expect_refusal(["box.mrc", "--overwrite"], "model.h5", "-o", "box.mrc")
+expect_refusal(["nowhere"], "model.h5", "-o", "nowhere/new.mrc")
+expect_refusal(["model.h5"], "model.h5", "-o", "./model.h5", "--overwrite")
+expect_refusal(["absent.h5"], "absent.h5", "-o", "new.mrc")
+expect_refusal(["volume.mrc", "HDF5"], "volume.mrc", "-o", "new.mrc")
+expect_refusal(["outside", "z runs"], "model.h5", "-o", "new.mrc", "--box", "0,0,100,9,9,110")
+expect_refusal(["--box", "y from 9 to 0"], "model.h5", "-o", "new.mrc", "--box", "0,9,0,9,0,9")
+expect_refusal(["--box"], "model.h5", "-o", "new.mrc", "--box", "0,0,0,9,9")
+expect_refusal(["nan"], "model.h5", "-o", "new.mrc", "--center", "1,nan,1", "--size", "3,3,3")
+expect_refusal(["--size"], "model.h5", "-o", "new.mrc", "--center", "1,1,1")
+expect_refusal(["--size"], "model.h5", "-o", "new.mrc", "--center", "1,1,1", "--size", "0,3,3")
+expect_refusal(["--voxel-size"], "model.h5", "-o", "new.mrc", "--voxel-size", "0")
+expect_refusal(["--bin"], "model.h5", "-o", "new.mrc", "--voxel-size", "9", "--bin", "2")
+expect_refusal(["--mode"], "model.h5", "-o", "new.mrc", "--mode", "4")
+
+whole_model = pathlib.Path("model.h5").read_bytes()
+for length in (9, 400, len(whole_model) // 2, len(whole_model) - 1):
+    pathlib.Path("torn.h5").write_bytes(whole_model[:length])
+    expect_refusal(["torn.h5"], "torn.h5", "-o", "new.mrc")
+    expect_refusal(["torn.h5"], "torn.h5", command="info")
+zeroed = bytearray(whole_model)
+zeroed[len(zeroed) // 2:len(zeroed) // 2 + 4096] = bytes(4096)
+pathlib.Path("zeroed.h5").write_bytes(zeroed)
+expect_refusal(["zeroed.h5", "checksum"], "zeroed.h5", "-o", "new.mrc")
+with h5py.File("foreign.h5", "w") as foreign:
+    foreign["voltage"] = 300.0
+expect_refusal(["foreign.h5", "no model"], "foreign.h5", "-o", "new.mrc")
+expect_refusal(["foreign.h5", "no model"], "foreign.h5", command="info")
+
+# Metadata damaged in place: HDF5 itself must stay silent, too.
+damaged = bytearray(whole_model)
+damaged[whole_model.index(b"softplus_beta")] ^= 1
+pathlib.Path("damaged.h5").write_bytes(damaged)
+expect_refusal(["damaged.h5"], "damaged.h5", "-o", "new.mrc")
