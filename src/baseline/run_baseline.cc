@@ -11,13 +11,12 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "baseline/voxel_problem.h"
-#include "io/atomic_file.h"
 #include "io/json.h"
 #include "kernels/lanes.h"
 #include "projection/sample_grid.h"
 #include "reconstruct/options_json.h"
+#include "reconstruct/result_files.h"
 #include "report/slices.h"
-#include "tomofield/error.h"
 
 namespace tomofield::baseline {
 namespace {
@@ -112,7 +111,6 @@ nlohmann::json method_json(const TvOptions& o) {
   return {{"name", "tv"},
           {"iterations", o.iterations},
           {"weight", o.weight},
-          {"balance", o.balance},
           {"non_negative", o.non_negative},
           {"fit_view_scale", o.fit_view_scale}};
 }
@@ -166,14 +164,9 @@ BaselinePaths baseline_paths(const std::filesystem::path& volume) {
 
 void check_outputs(const BaselineOptions& options) {
   const BaselinePaths paths = baseline_paths(options.output);
-  for (const auto& path : {paths.volume, paths.json}) {
-    if (!options.overwrite && std::filesystem::exists(path)) {
-      throw Error(
-          fmt::format("{} exists already: give --overwrite to replace it, or another name with -o",
-                      path.string()));
-    }
-  }
-  const io::AtomicFile probe(paths.volume);  // the directory can be written
+  reconstruct::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.input,
+                                  options.overwrite,
+                                  "give --overwrite to replace it, or another name with -o");
 }
 
 BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {

@@ -10,9 +10,6 @@ struct TvOptions {
   double weight = 1.0;  ///< λ, see reconstruct_tv
   bool non_negative = true;
   bool fit_view_scale = false;  ///< per-view scale and offset as nuisances
-  /// κ, balances the steps of densities and of their duals: the result does not
-  /// depend on it, the number of iterations does.
-  double balance = 1.0;
 };
 
 /// Least squares with isotropic total variation:
@@ -23,7 +20,8 @@ struct TvOptions {
 ///
 /// Solved by the primal–dual hybrid gradient method of Chambolle and Pock (2011),
 /// with the diagonal preconditioning of Pock and Chambolle (2011), eq. 10 with
-/// α = 1. `start` is the density of every voxel at first.
+/// α = 1, over-relaxed after Condat (2013). `start` is the density of every voxel
+/// at first. Memory: five volumes, the rays and a dual of each ray.
 Solution reconstruct_tv(VoxelProblem& problem, const TvOptions& options, double start,
                         const AfterIteration& after_iteration);
 
