@@ -1,9 +1,10 @@
 #include <iostream>
 #include <tomofield/error.h>
+#include <tomofield/model.h>
 #include <tomofield/version.h>
 int main() try {
   std::cout << "tomofield " << tomofield::library_version() << '\n';
-  throw tomofield::Error("an error as the library throws it");
+  return static_cast<int>(tomofield::Model("absent.h5").sample({}).size());
 } catch (const tomofield::Error& error) {
   std::cout << "caught " << error.what() << '\n';
 }

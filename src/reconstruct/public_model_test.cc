@@ -1,0 +1,60 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "field/model_file.h"
+#include "io/mrc.h"
+#include "reconstruct/write_volume.h"
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+#include "tomofield/model.h"
+#include "uneven_model.h"
+
+namespace tomofield {
+namespace {
+
+TEST(PublicModel, SamplesWhatExportWrites) {
+  const testing::ScratchDirectory scratch;
+  auto inner = testing::uneven_model("vm");
+  inner.is_dark = true;
+  field::save_model(scratch / "model.h5", inner);
+  reconstruct::write_volume(inner, {}, scratch / "volume.mrc");
+
+  const Model model(scratch / "model.h5");
+  EXPECT_EQ(model.pixel_size_A(), inner.pixel_size_A);
+  const SampleBox region = model.region();
+  EXPECT_EQ(region.size, (std::array<std::int64_t, 3>{100, 116, 21}));
+  const auto values = model.sample(region);
+  const io::MrcReader volume(scratch / "volume.mrc");
+  std::vector<float> section(100 * 116);
+  for (std::int64_t z = 0; z < 21; ++z) {
+    volume.read_section(z, section);
+    EXPECT_TRUE(std::equal(section.begin(), section.end(), values.begin() + z * 100 * 116));
+  }
+}
+
+TEST(PublicModel, TurnsBoxesByEulerAngles) {
+  const testing::ScratchDirectory scratch;
+  const auto inner = testing::uneven_model("grid");
+  field::save_model(scratch / "model.h5", inner);
+  const Model model(scratch / "model.h5");
+  // rot 90: the box's x lies along the field's −y.
+  const auto values = model.sample(
+      {.centre_px = {30, 40, 10}, .size = {5, 1, 1}, .voxel_px = 1.0, .euler_deg = {90, 0, 0}});
+  for (std::size_t x = 0; x < 5; ++x)
+    EXPECT_NEAR(values[x], 40.0 * inner.field->density(30, 42 - static_cast<double>(x), 10), 1e-4);
+}
+
+TEST(PublicModel, RefusesBoxesThatCannotBeSampled) {
+  const testing::ScratchDirectory scratch;
+  field::save_model(scratch / "model.h5", testing::uneven_model("grid"));
+  const Model model(scratch / "model.h5");
+  EXPECT_THROW(model.sample({}), Error);
+  EXPECT_THROW(model.sample({.centre_px = {0, std::nan(""), 0}, .size = {1, 1, 1}}), Error);
+  EXPECT_THROW(model.sample({.centre_px = {}, .size = {1, 1, 1}, .voxel_px = 0}), Error);
+  EXPECT_THROW(Model(scratch / "absent.h5"), Error);
+}
+
+}  // namespace
+}  // namespace tomofield
