@@ -2,11 +2,14 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <signal.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -37,20 +40,44 @@ fs::path directory_of(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
 
+std::string temporary_prefix(const fs::path& target) {
+  return fmt::format(".{}.tmp-", target.filename().string());
+}
+
+/// Removes the temporary files of this target whose process was killed: nobody
+/// else would, and a volume may have gigabytes.
+void remove_abandoned(const fs::path& target) {
+  const std::string prefix = temporary_prefix(target);
+  std::error_code error;
+  for (fs::directory_iterator it(directory_of(target), error), end; !error && it != end;
+       it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    if (name.rfind(prefix, 0) != 0) continue;
+    const char* const after_prefix = name.data() + prefix.size();
+    ::pid_t process = 0;
+    const auto [rest, fault] = std::from_chars(after_prefix, name.data() + name.size(), process);
+    const bool is_ours = fault == std::errc() && process > 0 && *rest == '-';
+    if (is_ours && ::kill(process, 0) != 0 && errno == ESRCH) ::unlink(it->path().c_str());
+  }
+}
+
 /// Creates an empty file that nobody else uses. Permissions come from the
 /// umask, which mkstemp would not honour.
 fs::path create_temporary(const fs::path& target) {
   static std::atomic<unsigned> counter{0};
+  remove_abandoned(target);
   while (true) {
     const fs::path candidate =
         directory_of(target) /
-        fmt::format(".{}.tmp-{}-{}", target.filename().string(), ::getpid(), counter.fetch_add(1));
+        fmt::format("{}{}-{}", temporary_prefix(target), ::getpid(), counter.fetch_add(1));
     const int descriptor = ::open(candidate.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0666);
     if (descriptor >= 0) {
       ::close(descriptor);
       return candidate;
     }
-    if (errno != EEXIST) {
+    if (errno == EEXIST) {
+      ::unlink(candidate.c_str());  // left by a killed process that had our number
+    } else {
       throw Error(fmt::format("cannot write '{}': no file can be created in the directory '{}': {}",
                               target.string(), directory_of(target).string(),
                               std::strerror(errno)));

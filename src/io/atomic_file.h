@@ -18,6 +18,7 @@ class AtomicFile {
   /// Creates an empty temporary file in the directory of `path` (of the file
   /// that it points to, if it is a symbolic link). Throws Error at once if that
   /// directory does not exist or cannot be written, or if `path` is no regular file.
+  /// Removes what killed processes of this machine left of the same file.
   explicit AtomicFile(const std::filesystem::path& path);
   ~AtomicFile();
   AtomicFile(AtomicFile&& other) noexcept;

@@ -1,7 +1,9 @@
 #include "io/atomic_file.h"
 
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "io/json.h"
@@ -56,6 +58,28 @@ TEST(AtomicFile, WritesThroughSymbolicLinks) {
   write_text_file(scratch / "link.txt", "new");
   EXPECT_TRUE(std::filesystem::is_symlink(scratch / "link.txt"));
   EXPECT_EQ(read_whole_file(target), "new");
+}
+
+TEST(AtomicFile, RemovesWhatKilledProcessesLeft) {
+  const ScratchDirectory scratch;
+  const ::pid_t killed = ::fork();
+  if (killed == 0) ::_exit(0);
+  ::waitpid(killed, nullptr, 0);
+  const auto left_by = [&](const char* target, ::pid_t process, unsigned number) {
+    const auto path = scratch / fmt::format(".{}.tmp-{}-{}", target, process, number);
+    std::ofstream(path) << "half a result";
+    return path;
+  };
+  const auto abandoned = left_by("result.txt", killed, 3);
+  const auto in_use = left_by("result.txt", ::getppid(), 0);
+  const auto of_another_target = left_by("other.txt", killed, 0);
+  const auto not_ours = scratch / ".result.txt.tmp-backup";
+  std::ofstream(not_ours) << "the user's";
+  write_text_file(scratch / "result.txt", "whole");
+  EXPECT_FALSE(std::filesystem::exists(abandoned));
+  EXPECT_TRUE(std::filesystem::exists(in_use));
+  EXPECT_TRUE(std::filesystem::exists(of_another_target));
+  EXPECT_TRUE(std::filesystem::exists(not_ours));
 }
 
 TEST(AtomicFile, RefusesWhatCannotBeWrittenAtOnce) {
