@@ -6,10 +6,13 @@
 #include "base/parallel.h"
 #include "baseline/run_baseline.h"
 #include "cli/commands.h"
+#include "cli/common_options.h"
 #include "cli/input_options.h"
+#include "cli/number_checks.h"
 #include "cli/progress_bar.h"
 #include "cli/specimen_options.h"
 #include "cli/volume_options.h"
+#include "reconstruct/options.h"
 
 namespace tomofield::cli {
 namespace {
@@ -32,6 +35,7 @@ void run(Arguments<Method>& arguments) {
       (arguments.view_scale == "auto" && options.input.contrast == tilt_series::Contrast::kDark);
   method.non_negative = arguments.non_negative == "on";
   options.method = method;
+  reconstruct::require_no_faults(options.specimen.faults());
   baseline::check_outputs(options);
   const tilt_series::TiltSeries series(options.input);
   const baseline::BaselinePlan plan = baseline::plan_baseline(series, options);
@@ -58,7 +62,7 @@ template <typename Method>
 void add_method_options(CLI::App& command, Arguments<Method>& arguments) {
   const char* group = "Method";
   command.add_option("--iterations", arguments.method.iterations, "passes over all views")
-      ->check(CLI::PositiveNumber)
+      ->check(number_above(0))
       ->capture_default_str()
       ->group(group);
   command
@@ -77,7 +81,7 @@ void add_method_options(CLI::App& command, Arguments<Method>& arguments) {
   command
       .add_option("--margin-spacing", arguments.options.margin_spacing,
                   "pixels between samples of the margin")
-      ->check(CLI::Range(1.0, 64.0))
+      ->check(number_between(1.0, 64.0))
       ->capture_default_str()
       ->group(group);
 }
@@ -106,6 +110,7 @@ std::shared_ptr<Arguments<Method>> add_method(CLI::App& command) {
   add_method_options(command, *arguments);
   add_volume_options(command, arguments->options.volume);
   add_run_options(command, *arguments);
+  add_common_options(command);
   command.callback([arguments] { run(*arguments); });
   return arguments;
 }
@@ -116,7 +121,7 @@ void add_sirt(CLI::App& baseline) {
   const auto arguments = add_method<baseline::SirtOptions>(command);
   command
       .add_option("--relaxation", arguments->method.relaxation, "length of a step, between 0 and 2")
-      ->check(CLI::Range(0.01, 1.99))
+      ->check(number_between(0.01, 1.99))
       ->capture_default_str()
       ->group("Method");
 }
@@ -129,7 +134,7 @@ void add_tv(CLI::App& baseline) {
       .add_option("--weight", arguments->method.weight,
                   "of the total variation, in noise units: half the sum of squared residuals over "
                   "the noise's variance, plus this times the sum of the density's gradients")
-      ->check(CLI::PositiveNumber)
+      ->check(number_above(0))
       ->capture_default_str()
       ->group("Method");
 }

@@ -4,55 +4,103 @@
 
 #include <toml++/toml.h>
 #include <algorithm>
-#include <sstream>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <utility>
 
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
 namespace {
 
+constexpr const char* kConfigFlag = "--config";
+
 // Removes `--config FILE` or `--config=FILE`; returns FILE or nothing.
-std::string take_config_path(std::vector<std::string>& arguments) {
-  const std::string flag = "--config";
-  for (auto it = arguments.begin(); it != arguments.end(); ++it) {
-    if (*it == flag) {
-      if (it + 1 == arguments.end()) throw Error("--config needs a file name");
-      const std::string path = *(it + 1);
-      arguments.erase(it, it + 2);
-      return path;
+std::optional<std::string> take_config_path(std::vector<std::string>& arguments) {
+  std::optional<std::string> path;
+  const std::string assignment = std::string(kConfigFlag) + "=";
+  for (auto it = arguments.begin(); it != arguments.end();) {
+    const bool is_assignment = it->rfind(assignment, 0) == 0;
+    if (*it != kConfigFlag && !is_assignment) {
+      ++it;
+      continue;
     }
-    if (it->rfind(flag + "=", 0) == 0) {
-      const std::string path = it->substr(flag.size() + 1);
-      arguments.erase(it);
-      return path;
-    }
+    if (path) throw Error("--config is given twice: put the options into one file");
+    const auto end = it + (is_assignment ? 1 : 2);
+    if (!is_assignment && it + 1 == arguments.end()) throw Error("--config needs a file name");
+    path = is_assignment ? it->substr(assignment.size()) : *(it + 1);
+    it = arguments.erase(it, end);
   }
-  return {};
+  return path;
 }
 
 toml::table read_toml(const std::string& path) {
+  std::ifstream file(path);
+  if (!file || !std::filesystem::is_regular_file(path))
+    throw Error(fmt::format("--config '{}' cannot be read: check its path", path));
   try {
-    return toml::parse_file(path);
+    return toml::parse(file, path);
   } catch (const toml::parse_error& error) {
-    throw Error(fmt::format("{}, line {}: {}", path, error.source().begin.line,
+    throw Error(fmt::format("'{}', line {}: {}", path, error.source().begin.line,
                             std::string(error.description())));
   }
 }
 
-std::string value_text(const std::string& path, const std::string& key, const toml::node& node) {
-  if (const auto text = node.value_exact<std::string>()) return *text;
-  if (const auto integer = node.value_exact<std::int64_t>()) return fmt::format("{}", *integer);
-  if (const auto number = node.value_exact<double>()) return fmt::format("{}", *number);
-  throw Error(
-      fmt::format("{}, line {}: '{}' must be a number, a text, true or false, or an array of these",
-                  path, node.source().begin.line, key));
-}
+// One entry of the file; faults name the line.
+class Entry {
+ public:
+  Entry(const std::string& path, std::string name, const toml::node& node)
+      : path_(path), name_(std::move(name)), node_(node) {}
+
+  const std::string& name() const { return name_; }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(
+        fmt::format("'{}', line {}: '{}' {}", path_, node_.source().begin.line, name_, what));
+  }
+
+  // The words of the command line that it stands for.
+  std::vector<std::string> arguments(int most_values) const {
+    const bool is_flag = most_values == 0;
+    const auto flag = node_.value_exact<bool>();
+    if (flag.has_value() != is_flag)
+      fail(is_flag ? "must be true or false" : "needs a value, not true or false");
+    if (flag) return *flag ? std::vector{"--" + name_} : std::vector<std::string>{};
+    const toml::array* array = node_.as_array();
+    if (array == nullptr) return {"--" + name_ + "=" + text_of(node_)};  // also of "-60:60:2"
+    if (array->size() > static_cast<std::size_t>(most_values))
+      fail(fmt::format("takes at most {} values, not {}", most_values, array->size()));
+    std::vector<std::string> words{"--" + name_};
+    for (const toml::node& element : *array) words.push_back(text_of(element));
+    return words;
+  }
+
+ private:
+  std::string text_of(const toml::node& node) const {
+    if (const auto text = node.value_exact<std::string>()) return *text;
+    if (const auto integer = node.value_exact<std::int64_t>()) return fmt::format("{}", *integer);
+    if (const auto number = node.value_exact<double>()) return fmt::format("{}", *number);
+    fail("must be a number, a text, true or false, or an array of numbers or texts");
+  }
+
+  const std::string& path_;
+  std::string name_;
+  const toml::node& node_;
+};
 
 bool is_given(const CLI::Option& option, const std::vector<std::string>& arguments) {
   return std::any_of(arguments.begin(), arguments.end(), [&](const std::string& argument) {
     const std::string name = argument.substr(0, argument.find('='));
     return name.rfind('-', 0) == 0 && option.check_name(name);
   });
+}
+
+// How the user calls it: "tomofield baseline tv".
+std::string full_name(const CLI::App& command) {
+  const CLI::App* parent = command.get_parent();
+  return parent == nullptr ? "tomofield" : full_name(*parent) + " " + command.get_name();
 }
 
 // The subcommand that the leading words of the arguments name.
@@ -70,28 +118,20 @@ const CLI::App* find_command(const CLI::App& program, const std::vector<std::str
 }  // namespace
 
 void expand_config_file(const CLI::App& program, std::vector<std::string>& arguments) {
-  const std::string path = take_config_path(arguments);
-  if (path.empty()) return;
+  const std::optional<std::string> path = take_config_path(arguments);
+  if (!path) return;
   const CLI::App* command = find_command(program, arguments);
-  for (const auto& [key, node] : read_toml(path)) {
-    const std::string name(key.str());
-    const CLI::Option* option = command->get_option_no_throw("--" + name);
-    if (option == nullptr) {
-      throw Error(fmt::format(
-          "{}, line {}: '{}' is no option of '{}'; `tomofield {} --help` lists them", path,
-          node.source().begin.line, name, command->get_name(), command->get_name()));
+  const std::vector<std::string> given = arguments;
+  for (const auto& [key, node] : read_toml(*path)) {
+    const Entry entry(*path, std::string(key.str()), node);
+    const CLI::Option* option = command->get_option_no_throw("--" + entry.name());
+    if (option == nullptr || option->check_name(kConfigFlag) || option->check_name("--help")) {
+      entry.fail(
+          fmt::format("is no option of `{0}`; `{0} --help` lists them", full_name(*command)));
     }
-    if (is_given(*option, arguments)) continue;
-    if (const auto flag = node.value_exact<bool>()) {
-      if (*flag) arguments.push_back("--" + name);
-      continue;
-    }
-    arguments.push_back("--" + name);
-    if (const toml::array* array = node.as_array()) {
-      for (const toml::node& element : *array) arguments.push_back(value_text(path, name, element));
-    } else {
-      arguments.push_back(value_text(path, name, node));
-    }
+    if (is_given(*option, given)) continue;
+    for (std::string& word : entry.arguments(option->get_items_expected_max()))
+      arguments.push_back(std::move(word));
   }
 }
 

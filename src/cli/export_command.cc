@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "cli/commands.h"
+#include "cli/common_options.h"
+#include "cli/number_checks.h"
 #include "cli/volume_options.h"
 #include "field/model_file.h"
 #include "io/atomic_file.h"
@@ -106,7 +108,7 @@ void add_box_options(CLI::App& command, ExportArguments& arguments) {
   CLI::Option* size = command.add_option("--size", arguments.size, "nx,ny,nz: voxels")
                           ->delimiter(',')
                           ->expected(3)
-                          ->check(CLI::Range(1, std::numeric_limits<std::int32_t>::max()))
+                          ->check(number_between(1, std::numeric_limits<std::int32_t>::max()))
                           ->needs(centre)
                           ->group(group);
   centre->needs(size);
@@ -118,7 +120,7 @@ void add_box_options(CLI::App& command, ExportArguments& arguments) {
       ->expected(3)
       ->check(finite)
       ->group(group);
-  const CLI::Range positive(1e-3, 1e6);
+  const CLI::Validator positive = number_between(1e-3, 1e6);
   CLI::Option* voxel_size =
       command.add_option("--voxel-size", arguments.voxel_size_A, "Å; default: the pixel size")
           ->check(positive)
@@ -140,6 +142,7 @@ void add_export_command(CLI::App& program) {
   command->add_flag("--overwrite", arguments->overwrite, "Replace an existing volume");
   add_box_options(*command, *arguments);
   add_volume_options(*command, arguments->volume);
+  add_common_options(*command);
   command->callback([arguments] { run_export(*arguments); });
 }
 

@@ -4,6 +4,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
+#include <new>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,6 +32,16 @@ void add_commands(CLI::App& program) {
   add_info_command(program);
 }
 
+// The subcommand that was called, as the user writes it.
+std::string command_name(const CLI::App& program) {
+  std::string name = "tomofield";
+  for (const CLI::App* app = &program; !app->get_subcommands().empty();) {
+    app = app->get_subcommands().front();
+    name += " " + app->get_name();
+  }
+  return name;
+}
+
 }  // namespace
 
 int run_program(int argc, char** argv) {
@@ -46,13 +58,25 @@ int run_program(int argc, char** argv) {
     program.parse(arguments);
     return 0;
   } catch (const CLI::ParseError& error) {
-    return program.exit(error) == 0 ? 0 : 2;
+    if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
+    fmt::print(stderr, "tomofield: {}; `{} --help` lists the options\n", error.what(),
+               command_name(program));
+    return 2;
   } catch (const Error& error) {
     fmt::print(stderr, "tomofield: {}\n", error.what());
     return 2;
   } catch (const ExitStatus& exit) {
     fmt::print(stderr, "tomofield: {}\n", exit.what());
     return exit.status();
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr,
+               "tomofield: the system has no more memory to give: end other programs, or reduce "
+               "the problem (a larger --bin, a smaller --roi or --thickness, fewer --threads)\n");
+    return 2;
+  } catch (const std::filesystem::filesystem_error& error) {
+    fmt::print(stderr, "tomofield: '{}' cannot be used: {}\n", error.path1().string(),
+               error.code().message());
+    return 2;
   } catch (const std::exception& error) {
     fmt::print(stderr, "tomofield: internal error, please report it: {}\n", error.what());
     return 1;

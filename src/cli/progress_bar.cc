@@ -1,25 +1,60 @@
 #include "cli/progress_bar.h"
 
 #include <fmt/core.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <string_view>
 
 namespace tomofield::cli {
 namespace {
 
 constexpr double kSecondsBetweenLines = 5.0;
 constexpr double kSecondsBetweenDraws = 0.2;
-constexpr int kBarWidth = 24;
+constexpr std::size_t kBarWidth = 24;
+constexpr std::size_t kLeastBarWidth = 8;
 
-std::string bar(double fraction) {
-  const int full = static_cast<int>(std::lround(std::clamp(fraction, 0.0, 1.0) * kBarWidth));
-  return std::string(static_cast<std::size_t>(full), '#') +
-         std::string(static_cast<std::size_t>(kBarWidth - full), '.');
+// Columns of the terminal; a line that is longer would wrap and could not be redrawn.
+std::size_t terminal_width() {
+  winsize size{};
+  const bool is_known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return is_known ? size.ws_col : 80;
 }
+
+std::string bar(double fraction, std::size_t width) {
+  const double full = std::clamp(fraction, 0.0, 1.0) * static_cast<double>(width);
+  const auto marks = static_cast<std::size_t>(std::lround(full));
+  return std::string(marks, '#') + std::string(width - marks, '.');
+}
+
+std::string terminal_line(const std::string& title, double fraction, const std::string& state) {
+  const std::size_t columns = terminal_width() - 1;
+  const std::size_t others = title.size() + state.size() + std::string_view(" [] ").size();
+  const std::size_t room = columns > others ? columns - others : 0;
+  std::string line =
+      room < kLeastBarWidth
+          ? title + " " + state
+          : fmt::format("{} [{}] {}", title, bar(fraction, std::min(room, kBarWidth)), state);
+  line.resize(std::min(line.size(), columns));
+  return line;
+}
+
+// When the last report was shown, and whether the cursor is behind it on a terminal:
+// what is printed after a run that stopped or failed begins on a line of its own.
+struct Display {
+  double last_shown = -1e9;
+  bool line_is_open = false;
+  Display() = default;
+  Display(const Display&) = delete;
+  Display& operator=(const Display&) = delete;
+  ~Display() {
+    if (line_is_open) std::fputs("\n", stderr);
+  }
+};
 
 }  // namespace
 
@@ -32,18 +67,18 @@ std::string format_duration(double seconds) {
 
 base::ProgressSink make_progress_bar(const std::string& title) {
   const bool terminal = isatty(STDERR_FILENO) == 1;
-  auto last = std::make_shared<double>(-1e9);
+  auto display = std::make_shared<Display>();
   return [=](const base::ProgressReport& report) {
     const bool finished = report.fraction_done >= 1.0;
-    if (!finished &&
-        report.seconds_elapsed - *last < (terminal ? kSecondsBetweenDraws : kSecondsBetweenLines))
-      return;
-    *last = report.seconds_elapsed;
+    const double pause = terminal ? kSecondsBetweenDraws : kSecondsBetweenLines;
+    if (!finished && report.seconds_elapsed - display->last_shown < pause) return;
+    display->last_shown = report.seconds_elapsed;
     const std::string state = fmt::format("{:3.0f} %  {}  {} left", 100 * report.fraction_done,
                                           report.detail, format_duration(report.seconds_left));
     if (terminal) {
-      fmt::print(stderr, "\r\033[K{} [{}] {}{}", title, bar(report.fraction_done), state,
+      fmt::print(stderr, "\r\033[K{}{}", terminal_line(title, report.fraction_done, state),
                  finished ? "\n" : "");
+      display->line_is_open = !finished;
     } else {
       fmt::print(stderr, "{} {}\n", title, state);
     }

@@ -7,8 +7,10 @@
 
 #include "base/parallel.h"
 #include "cli/commands.h"
+#include "cli/common_options.h"
 #include "cli/exit_status.h"
 #include "cli/input_options.h"
+#include "cli/number_checks.h"
 #include "cli/progress_bar.h"
 #include "cli/specimen_options.h"
 #include "cli/volume_options.h"
@@ -38,17 +40,14 @@ void add_field_options(CLI::App& command, reconstruct::FieldOptions& field) {
       ->capture_default_str()
       ->group(group);
   command.add_option("--vertex-spacing", field.vertex_spacing, "pixels between vertices")
-      ->check(CLI::Range(0.25, 64.0))
       ->capture_default_str()
       ->group(group);
   command.add_option("--rank", field.rank, "components of each mode (vm)")
-      ->check(CLI::Range(1, 256))
       ->capture_default_str()
       ->group(group);
   command
       .add_option("--margin-spacing", field.margin_spacing,
                   "pixels between samples and vertices of the margin")
-      ->check(CLI::Range(1.0, 64.0))
       ->capture_default_str()
       ->group(group);
   command
@@ -63,29 +62,24 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
   const char* group = "Fit";
   reconstruct::FitOptions& fit = arguments.options.fit;
   command.add_option("--epochs", fit.epochs, "passes over all views")
-      ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->group(group);
   command
       .add_option("--subsets", fit.subsets,
                   "steps a pass, each with an interleaved subset of the views")
-      ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->group(group);
   command
       .add_option("--learning-rate", fit.learning_rate, "of the first step; it falls exponentially")
-      ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->group(group);
   command
       .add_option("--tv", fit.density_variation,
                   "weight of the density's total variation, in noise units")
-      ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->group(group);
   command
       .add_option("--tv-factors", fit.factor_variation, "weight of the factors' total variation")
-      ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->group(group);
   command.add_option("--tv-penalty", fit.penalty, "concave (keeps edges sharper) or smooth")
@@ -99,6 +93,7 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->capture_default_str()
       ->group(group);
   command.add_option("--seed", fit.seed, "of everything random")
+      ->check(seed_check())
       ->capture_default_str()
       ->group(group);
 }
@@ -116,7 +111,6 @@ void add_run_options(CLI::App& command, Arguments& arguments) {
       ->excludes("--overwrite")
       ->group(group);
   command.add_option("--checkpoint-minutes", o.checkpoint_minutes, "between checkpoints")
-      ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->group(group);
   command
@@ -148,7 +142,7 @@ void run(Arguments& arguments) {
       arguments.view_scale == "on" ||
       (arguments.view_scale == "auto" && options.input.contrast == tilt_series::Contrast::kDark);
   options.field.with_margin = options.specimen.with_margin;
-  reconstruct::check_outputs(options);
+  reconstruct::check_options(options);
   const tilt_series::TiltSeries series(options.input);
   print_plan(options, reconstruct::plan_run(series, options));
   if (arguments.dry_run) return;
@@ -160,8 +154,9 @@ void run(Arguments& arguments) {
   if (reconstruct::reconstruct(series, options, hooks) == reconstruct::Outcome::kStopped) {
     throw ExitStatus(
         128 + g_signal,
-        fmt::format("stopped; the checkpoint is {}: continue with the same command and --resume",
-                    paths.model.string()));
+        fmt::format(
+            "stopped; the checkpoint is '{}': continue with the same command and --resume{}",
+            paths.model.string(), options.overwrite ? " instead of --overwrite" : ""));
   }
   print_files(paths);
 }
@@ -178,6 +173,7 @@ void add_reconstruct_command(CLI::App& program) {
   add_fit_options(command, *arguments);
   add_volume_options(command, arguments->options.volume);
   add_run_options(command, *arguments);
+  add_common_options(command);
   command.callback([arguments] { run(*arguments); });
 }
 

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "cli/commands.h"
+#include "cli/common_options.h"
+#include "cli/number_checks.h"
 #include "simulate/simulate_series.h"
 #include "tomofield/error.h"
 
@@ -88,6 +90,7 @@ void add_simulate_command(CLI::App& program) {
   command->add_option("--thickness", options.cell.thickness_px, "Thickness in voxels")
       ->capture_default_str();
   command->add_option("--seed", options.cell.seed, "Seed of everything random")
+      ->check(seed_check())
       ->capture_default_str();
   command->add_flag("--extended", options.cell.is_extended,
                     "The specimen leaves the field of view, as in a microscope");
@@ -123,6 +126,7 @@ void add_simulate_command(CLI::App& program) {
       ->capture_default_str();
   command->add_flag("--no-truth", arguments->without_truth, "Do not write truth.mrc");
   command->add_flag("--overwrite", arguments->overwrite, "Replace files that exist");
+  add_common_options(*command);
   command->callback([arguments] { run_simulate(*arguments); });
 }
 

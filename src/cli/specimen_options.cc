@@ -8,7 +8,6 @@ void add_specimen_options(CLI::App& command, reconstruct::SpecimenOptions& optio
   const char* group = "Specimen (unbinned pixels of the aligned view)";
   command.add_option("--thickness", options.thickness, "thickness of the tomogram along Z")
       ->required()
-      ->check(CLI::PositiveNumber)
       ->group(group);
   command
       .add_option_function<std::vector<long>>(

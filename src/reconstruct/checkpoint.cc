@@ -1,8 +1,10 @@
 #include "reconstruct/checkpoint.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
 #include <span>
 
 #include "tomofield/error.h"
@@ -39,6 +41,29 @@ std::vector<loss::ViewModel> unflatten_views(const std::vector<double>& flat) {
 }
 
 std::vector<std::int64_t> as_numbers(const std::string& text) { return {text.begin(), text.end()}; }
+std::string as_text(const std::vector<std::int64_t>& numbers) {
+  std::string text;
+  for (const std::int64_t number : numbers) text.push_back(static_cast<char>(number));
+  return text;
+}
+
+// Names of what differs between two fingerprints, as "fit seed, tilt_deg".
+std::string differences(const std::string& found, const std::string& wanted) {
+  const auto parse = [](const std::string& text) {
+    return nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+  };
+  std::set<std::string> names;
+  for (const nlohmann::json& change : nlohmann::json::diff(parse(found), parse(wanted))) {
+    std::string name = change["path"].get<std::string>();
+    const std::size_t index = name.find_first_of("0123456789");
+    if (index != std::string::npos) name.resize(index);  // of an array: its name will do
+    std::ranges::replace(name, '/', ' ');
+    const std::size_t first = name.find_first_not_of(' ');
+    if (first == std::string::npos) return "everything";
+    names.insert(name.substr(first, name.find_last_not_of(' ') + 1 - first));
+  }
+  return fmt::format("{}", fmt::join(names, ", "));
+}
 
 std::vector<float> copy(std::span<const float> values) { return {values.begin(), values.end()}; }
 
@@ -47,11 +72,18 @@ const typename Map::mapped_type& entry(const Map& map, const char* name, const s
   const auto found = map.find(name);
   if (found == map.end()) {
     throw Error(fmt::format(
-        "{} holds no optimiser state ('{}' is missing): it is a finished model, not a checkpoint; "
-        "start over with --overwrite",
-        path, name));
+        "'{}' holds no optimiser state ('{}' is missing), so it is no checkpoint", path, name));
   }
   return found->second;
+}
+
+void copy_moments(const std::vector<float>& stored, const std::string& path,
+                  base::AlignedBuffer<float>& moments) {
+  if (stored.size() != moments.size()) {
+    throw Error(fmt::format("'{}' holds {} of the {} moments of its parameters, so it is damaged",
+                            path, stored.size(), moments.size()));
+  }
+  std::ranges::copy(stored, moments.begin());
 }
 
 }  // namespace
@@ -76,12 +108,11 @@ field::TrainingState save_state(const Fit& fit, const std::string& fingerprint, 
 
 void restore_state(const std::string& path, const std::string& fingerprint,
                    const field::Field& stored, const field::TrainingState& state, Fit& fit) {
-  if (entry(state.integers, "fingerprint", path) != as_numbers(fingerprint) ||
-      stored.num_parameters() != fit.field().num_parameters()) {
-    throw Error(fmt::format(
-        "{} was made from another series or with other options, so it cannot be resumed: give the "
-        "options that it was started with (tomofield info {}), or start over with --overwrite",
-        path, path));
+  const std::string found = as_text(entry(state.integers, "fingerprint", path));
+  if (found != fingerprint || stored.num_parameters() != fit.field().num_parameters()) {
+    throw Error(
+        fmt::format("'{}' was made from another series or with other options (these differ: {})",
+                    path, differences(found, fingerprint)));
   }
   std::copy(stored.parameters().begin(), stored.parameters().end(),
             fit.field().parameters().begin());
@@ -93,8 +124,8 @@ void restore_state(const std::string& path, const std::string& fingerprint,
   progress.data_loss = entry(state.doubles, "data_loss", path);
   if (progress.step == fit.num_steps()) return;
   optimize::Adam::State& adam = fit.optimizer().state();
-  std::ranges::copy(entry(state.floats, "adam_m", path), adam.m.begin());
-  std::ranges::copy(entry(state.floats, "adam_v", path), adam.v.begin());
+  copy_moments(entry(state.floats, "adam_m", path), path, adam.m);
+  copy_moments(entry(state.floats, "adam_v", path), path, adam.v);
   adam.leaf_steps = entry(state.integers, "leaf_steps", path);
   adam.bias_m = entry(state.doubles, "bias_moments", path).at(0);
   adam.bias_v = entry(state.doubles, "bias_moments", path).at(1);

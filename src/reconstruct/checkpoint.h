@@ -13,7 +13,8 @@ namespace tomofield::reconstruct {
 field::TrainingState save_state(const Fit& fit, const std::string& fingerprint, bool with_moments);
 
 /// Puts a stored field and state into a fresh fit of the same options. Throws
-/// Error naming `path` if they belong to another series or other options.
+/// Error naming `path` if they belong to another series or other options, and
+/// what differs. A fingerprint is a JSON text.
 void restore_state(const std::string& path, const std::string& fingerprint,
                    const field::Field& stored, const field::TrainingState& state, Fit& fit);
 

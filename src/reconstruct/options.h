@@ -18,6 +18,8 @@ struct FieldOptions {
   std::string activation = "softplus";  ///< or identity, for densities of either sign
   double sharpness = 5.0;               ///< β of softplus, per density unit
   double initial_scale = 0.1;           ///< factors start uniform in ± this
+  /// Every fault of these options, a sentence each.
+  std::vector<std::string> faults() const;
 };
 
 /// The optimisation. The data term is ½ Σ (residual / σ)²; weights of
@@ -35,6 +37,10 @@ struct FitOptions {
   double gradient_floor = 1e-3;     ///< ε of both penalties, in density units a pixel
   bool fit_view_scale = false;      ///< per-view scale and offset as nuisances
   std::uint64_t seed = 1;
+  std::vector<std::string> faults() const;
 };
+
+/// Throws Error with all the faults, if there are any.
+void require_no_faults(const std::vector<std::string>& faults);
 
 }  // namespace tomofield::reconstruct

@@ -75,13 +75,20 @@ json fit_json(const FitOptions& o) {
           {"seed", o.seed}};
 }
 
+json volume_json(const VolumeOptions& o) {
+  return {{"mode", static_cast<int>(o.mode)},
+          {"axes", o.axes == VolumeAxes::kXyz ? "xyz" : "xzy"},
+          {"invert", o.invert}};
+}
+
 }  // namespace
 
 json options_json(const ReconstructOptions& options) {
   return {{"input", input_json(options.input)},
           {"specimen", specimen_json(options.specimen)},
           {"field", field_json(options.field)},
-          {"fit", fit_json(options.fit)}};
+          {"fit", fit_json(options.fit)},
+          {"volume", volume_json(options.volume)}};
 }
 
 }  // namespace tomofield::reconstruct

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "reconstruct/options.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruct {
@@ -17,6 +18,9 @@ namespace {
 // Largest shift in y, in pixels at the slab's faces, that a varying x-axis tilt
 // may cause before single-axis slabs are no longer the geometry.
 constexpr double kMaxRowShift = 0.5;
+
+// Far beyond any specimen, and small enough to be counted in ints.
+constexpr double kLargestThickness = 1e6;
 
 // The contrast of an untilted view (standard deviation over its pixels) that
 // one density unit stands for, per pixel of thickness: the yardstick phantoms,
@@ -60,6 +64,19 @@ void check_roi(const geometry::Roi& roi, const geometry::TiltGeometry& g, double
         "(unbinned), so x0,y0,x1,y1 must satisfy 0 <= x0 < x1 <= {:.0f} and 0 <= y0 < y1 <= {:.0f}",
         static_cast<double>(g.width) * factor, static_cast<double>(g.height) * factor,
         static_cast<double>(g.width) * factor, static_cast<double>(g.height) * factor));
+  }
+}
+
+// An axis further away is a slip, and needs a domain of any size.
+void check_axis(const geometry::TiltGeometry& g, double factor) {
+  const double reach = 4 * std::max(static_cast<double>(g.width), g.thickness);
+  for (const double offset :
+       {g.axis_x - static_cast<double>(g.width) / 2, g.axis_z - g.thickness / 2}) {
+    if (std::abs(offset) <= reach) continue;
+    throw Error(fmt::format(
+        "--center puts the tilt axis {:g} pixels from the middle of a view {:g} pixels wide: give "
+        "x[,z] in unbinned pixels of the aligned view and the volume",
+        offset * factor, static_cast<double>(g.width) * factor));
   }
 }
 
@@ -117,16 +134,16 @@ void measure_brightness(const tilt_series::TiltSeries& series, PreparedSeries& p
 
 std::vector<std::string> SpecimenOptions::faults() const {
   std::vector<std::string> found;
-  if (!(thickness >= 1) || !std::isfinite(thickness)) {
-    found.push_back(fmt::format("--thickness must be at least one pixel, not {}", thickness));
+  if (!(thickness >= 1 && thickness <= kLargestThickness)) {
+    found.push_back(fmt::format("--thickness must be from 1 to {:g} pixels, not {:g}",
+                                kLargestThickness, thickness));
   }
   if (hand != 1 && hand != -1) found.push_back(fmt::format("--hand must be 1 or -1, not {}", hand));
   return found;
 }
 
 PreparedSeries plan_series(const tilt_series::TiltSeries& series, const SpecimenOptions& specimen) {
-  const std::vector<std::string> faults = specimen.faults();
-  if (!faults.empty()) throw Error(fmt::format("{}", fmt::join(faults, "; ")));
+  require_no_faults(specimen.faults());
   PreparedSeries plan;
   plan.bin_factor = series.bin_factor();
   plan.pixel_size_A = series.pixel_size_A();
@@ -142,6 +159,7 @@ PreparedSeries plan_series(const tilt_series::TiltSeries& series, const Specimen
   plan.roi = specimen.roi ? scaled_roi(*specimen.roi, plan.bin_factor)
                           : geometry::Roi{0, 0, plan.geometry.width, plan.geometry.height};
   check_roi(plan.roi, plan.geometry, plan.bin_factor);
+  check_axis(plan.geometry, plan.bin_factor);
   plan.x_tilt_deg = common_x_tilt(series.views(), thickness);
   return plan;
 }

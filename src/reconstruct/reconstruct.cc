@@ -14,6 +14,7 @@
 #include "io/json.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/fit.h"
+#include "reconstruct/result_files.h"
 #include "report/slices.h"
 #include "tomofield/error.h"
 
@@ -26,11 +27,17 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// What decides the bits of a fit: the options and the rays themselves.
+// What decides the bits of a fit: the options, the geometry and the rays themselves (JSON).
 std::string fingerprint_of(const ReconstructOptions& options, const PreparedSeries& series) {
   nlohmann::json json = options_json(options);
   json.erase("input");
-  return fmt::format("{} rays {:016x}", json.dump(), series.rays->checksum());
+  json.erase("volume");
+  json["tilt_deg"] = series.geometry.tilt_deg;
+  json["bin_factor"] = series.bin_factor;
+  json["unit"] = series.unit;
+  json["noise_sigma"] = series.noise_sigma;
+  json["rays"] = fmt::format("{:016x}", series.rays->checksum());
+  return json.dump();
 }
 
 field::ModelInfo model_info(const PreparedSeries& series, const ReconstructOptions& options) {
@@ -55,31 +62,24 @@ bool resume(const OutputPaths& paths, const std::string& fingerprint, Fit& fit) 
         fmt::format("no checkpoint {} yet: starting from the beginning", paths.model.string()));
     return false;
   }
-  field::TrainingState state;
-  const field::Model model = field::load_model(paths.model, &state);
-  restore_state(paths.model.string(), fingerprint, *model.field, state, fit);
+  try {
+    field::TrainingState state;
+    const field::Model model = field::load_model(paths.model, &state);
+    restore_state(paths.model.string(), fingerprint, *model.field, state, fit);
+  } catch (const Error& error) {
+    throw Error(fmt::format(
+        "cannot resume: {}; to start over, give --overwrite instead of --resume", error.what()));
+  }
   base::log_info(fmt::format("resuming {} at step {} of {}", paths.model.string(),
                              fit.progress().step, fit.num_steps()));
   return true;
-}
-
-void refuse_existing(const OutputPaths& paths) {
-  for (const auto& path : {paths.volume, paths.model, paths.json}) {
-    if (std::filesystem::exists(path)) {
-      throw Error(
-          fmt::format("{} exists already: give --overwrite to replace it, --resume to continue the "
-                      "run that made "
-                      "it, or another name with -o",
-                      path.string()));
-    }
-  }
 }
 
 std::filesystem::path directory_of(const std::filesystem::path& file) {
   return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
-base::ProgressReport progress_report(const Fit& fit, std::int64_t first_step,
+base::ProgressReport progress_report(const Fit& fit, int num_epochs, std::int64_t first_step,
                                      Clock::time_point start) {
   base::ProgressReport report;
   const double done = static_cast<double>(fit.progress().step),
@@ -89,7 +89,8 @@ base::ProgressReport progress_report(const Fit& fit, std::int64_t first_step,
   const double rate = (done - static_cast<double>(first_step)) / report.seconds_elapsed;
   report.seconds_left = (all - done) / rate;
   const auto& loss = fit.progress().data_loss;
-  report.detail = fmt::format("epoch {}  loss {}  {:.1f} steps/s", loss.size() + 1,
+  const std::int64_t epoch = (fit.progress().step - 1) * num_epochs / fit.num_steps() + 1;
+  report.detail = fmt::format("epoch {}/{}  loss {}  {:.1f} steps/s", epoch, num_epochs,
                               loss.empty() ? "-" : fmt::format("{:.4f}", loss.back()), rate);
   return report;
 }
@@ -138,10 +139,28 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
   return {volume, with(".h5"), with(".json"), stem};
 }
 
-void check_outputs(const ReconstructOptions& options) {
+std::vector<std::string> ReconstructOptions::faults() const {
+  std::vector<std::string> all = specimen.faults();
+  for (const auto& faults : {field.faults(), fit.faults()})
+    all.insert(all.end(), faults.begin(), faults.end());
+  if (!(checkpoint_minutes >= 0))
+    all.push_back(
+        fmt::format("--checkpoint-minutes must be 0 or more, not {:g}", checkpoint_minutes));
+  return all;
+}
+
+void check_options(const ReconstructOptions& options) {
+  require_no_faults(options.faults());
   const OutputPaths paths = output_paths(options.output);
-  if (!options.overwrite && !options.resume) refuse_existing(paths);
-  const io::AtomicFile probe(paths.volume);  // the directory can be written
+  // Without a checkpoint there is nothing to resume, and what else is there is not this run's.
+  const bool resumes = options.resume && std::filesystem::exists(paths.model);
+  check_result_files(
+      {paths.volume, paths.model, paths.json}, paths.picture_prefix, options.input,
+      options.overwrite || resumes,
+      options.resume ? "there is no checkpoint to resume, so give --overwrite to start over and "
+                       "replace it, or another name with -o"
+                     : "give --overwrite to replace it, --resume to continue the run that made "
+                       "it, or another name with -o");
 }
 
 Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& options,
@@ -163,7 +182,7 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
   const std::int64_t first_step = fit.progress().step;
   bool stopped = false;
   fit.run([&](const Fit&) {
-    if (hooks.progress) hooks.progress(progress_report(fit, first_step, start));
+    if (hooks.progress) hooks.progress(progress_report(fit, options.fit.epochs, first_step, start));
     stopped =
         hooks.stop_requested && hooks.stop_requested() && fit.progress().step < fit.num_steps();
     if (stopped || seconds_since(last_checkpoint) > 60 * options.checkpoint_minutes) {

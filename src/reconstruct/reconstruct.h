@@ -24,6 +24,8 @@ struct ReconstructOptions {
   bool overwrite = false;
   bool resume = false;  ///< continue from the model file, if there is one
   double checkpoint_minutes = 5;
+  /// Every fault that these options have by themselves, a sentence each.
+  std::vector<std::string> faults() const;
 };
 
 /// The files of a reconstruction, named after its volume.
@@ -43,7 +45,7 @@ enum class Outcome { kFinished, kStopped };
 
 /// The main job: fits a field to the series and writes the volume (MRC), the
 /// model (HDF5, also the checkpoint while it runs), the figures and resolved
-/// options (JSON), and pictures of the central slices. Call check_outputs() and
+/// options (JSON), and pictures of the central slices. Call check_options() and
 /// plan_run() first: this starts at once.
 Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& options,
                     const ReconstructHooks& hooks);
@@ -65,9 +67,10 @@ struct RunPlan {
 /// needed is beyond what the machine has.
 RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options);
 
-/// Throws Error if results would replace existing ones without --overwrite or
-/// --resume, or cannot be written where they shall go.
-void check_outputs(const ReconstructOptions& options);
+/// Throws Error for faulty options, and if results would replace an input, would
+/// replace existing files without --overwrite or --resume, or cannot be written
+/// where they shall go. Nothing is read.
+void check_options(const ReconstructOptions& options);
 
 /// Every option as it was resolved, for the JSON and the model file.
 nlohmann::json options_json(const ReconstructOptions& options);

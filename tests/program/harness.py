@@ -1,0 +1,151 @@
+"""What the program tests of reconstruct share: running it, and a small series to run it on."""
+
+import copy
+import glob
+import os
+import shutil
+import subprocess
+import sys
+import warnings
+
+import mrcfile
+import numpy as np
+
+warnings.filterwarnings("ignore", module="mrcfile")  # NaN pixels are wanted here
+
+PROGRAM, SCRATCH = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
+
+WIDTH, HEIGHT, THICKNESS = 48, 36, 24
+PIXEL_SIZE = 13.37
+TILTS = np.arange(-60, 61, 6.0)
+# A fit of a tenth of a second that still finds the specimen.
+QUICK = ["--thickness", THICKNESS, "--contrast", "bright", "--no-margin", "--leaf-size", 16,
+         "--rank", 6, "--epochs", 8, "--subsets", 7]
+
+
+def tomofield(*arguments, **keywords):
+    """Runs the program to its end; text comes back as stdout and stderr."""
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True,
+                          **keywords)
+
+
+def start(*arguments, **keywords):
+    """Starts the program and returns at once."""
+    return subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE,
+                            stderr=subprocess.PIPE, text=True, **keywords)
+
+
+def succeed(*arguments, **keywords):
+    result = tomofield(*arguments, **keywords)
+    assert result.returncode == 0, (arguments, result.returncode, result.stderr)
+    return result
+
+
+def fresh_directory(name):
+    directory = os.path.join(SCRATCH, name)
+    shutil.rmtree(directory, ignore_errors=True)
+    os.makedirs(directory)
+    return directory
+
+
+def write_stack(path, views, pixel_size=PIXEL_SIZE):
+    with mrcfile.new(path, overwrite=True) as file:
+        file.set_data(np.asarray(views))
+        file.set_image_stack()
+        file.voxel_size = pixel_size
+
+
+def read_volume(path):
+    with mrcfile.open(path) as file:
+        return file.data.astype(np.float64)
+
+
+def read_bytes(path):
+    with open(path, "rb") as file:
+        return file.read()
+
+
+class Series:
+    """Views [tilt, y, x] of a simulated cell that are wider than high, its truth [z, y, x],
+    and the options that hand it to reconstruct."""
+
+    def __init__(self, name, seed=3):
+        self.directory = fresh_directory(name)
+        cell = os.path.join(self.directory, "cell")
+        succeed("simulate", cell, "--size", WIDTH, "--thickness", THICKNESS, "--seed", seed,
+                "--tilts=-60:60:6", "--noise", 0.03)
+        rows = slice((WIDTH - HEIGHT) // 2, (WIDTH + HEIGHT) // 2)
+        self.views = read_volume(os.path.join(cell, "tilt_series.mrc"))[:, rows]
+        self.truth = read_volume(os.path.join(cell, "truth.mrc"))[:, rows]
+        self.write("series", TILTS)
+
+    def write(self, name, tilts):
+        self.stack = os.path.join(self.directory, name + ".mrc")
+        self.tlt = os.path.join(self.directory, name + ".tlt")
+        write_stack(self.stack, self.views.astype(np.float32))
+        np.savetxt(self.tlt, tilts, fmt="%.1f")
+        self.input = [self.stack, "--tlt", self.tlt]
+
+    def with_views(self, name, views, tilts=TILTS):
+        """The series with other images and tilts, in files of its own."""
+        other = copy.copy(self)
+        other.views = views
+        other.write(name, tilts)
+        return other
+
+    def reconstruct(self, name, *options, run=succeed, **keywords):
+        """Runs it with QUICK options, which later ones replace; returns where its results are."""
+        output = os.path.join(fresh_directory(name), "out.mrc")
+        run("reconstruct", *self.input, "-o", output, *merge(QUICK, options), **keywords)
+        return Results(output)
+
+
+def merge(defaults, options):
+    """The defaults without those that options give again, then the options."""
+    given = {str(option) for option in options if str(option).startswith("--")}
+    kept = []
+    for i, word in enumerate(defaults):
+        owner = word if str(word).startswith("--") else defaults[i - 1]
+        if owner not in given:
+            kept.append(word)
+    return [*kept, *options]
+
+
+class Results:
+    """The files of a reconstruction."""
+
+    def __init__(self, output):
+        self.volume_path = output
+        stem = output[: -len(".mrc")]
+        self.model_path, self.json_path = stem + ".h5", stem + ".json"
+        self.pictures = {plane: f"{stem}_{plane}.png" for plane in ("xy", "xz", "yz")}
+        self.all_paths = [output, self.model_path, self.json_path, *self.pictures.values()]
+
+    @property
+    def volume(self):
+        return read_volume(self.volume_path)
+
+    def same_as(self, other):
+        """Whether volume and model have the same bytes as another run's."""
+        return (read_bytes(self.volume_path) == read_bytes(other.volume_path)
+                and read_bytes(self.model_path) == read_bytes(other.model_path))
+
+    def leftovers(self):
+        """Files of the directory that are no results."""
+        return set(glob.glob(os.path.join(glob.escape(os.path.dirname(self.volume_path)), "*"))
+                   + glob.glob(os.path.join(glob.escape(os.path.dirname(self.volume_path)), ".*"))
+                   ) - set(self.all_paths)
+
+
+def psnr(volume, truth):
+    return -10 * np.log10(np.mean((volume - truth) ** 2))
+
+
+def run_tests(tests):
+    """Runs every test_ function of a script and removes what they wrote."""
+    for name, test in list(tests.items()):
+        if not name.startswith("test_"):
+            continue
+        test()
+        print("passed ", name, flush=True)
+    shutil.rmtree(SCRATCH)
