@@ -1,0 +1,234 @@
+"""Runs of reconstruct that are killed, stopped or damaged, and --resume after them.
+
+usage: resume_test.py TOMOFIELD SCRATCH_DIR"""
+
+import glob
+import os
+import random
+import signal
+import time
+
+import h5py
+import numpy as np
+
+import harness
+from harness import read_bytes
+
+series = harness.Series("series")
+FIT = harness.merge(harness.QUICK, ["--rank", 3, "--epochs", 5])
+NUM_STEPS = 5 * 7
+EVERY_STEP = ["--checkpoint-minutes", 0]
+
+
+def command(results, *options):
+    return ["reconstruct", *series.input, "-o", results.volume_path, *harness.merge(FIT, options)]
+
+
+def fresh_results(name):
+    return harness.Results(os.path.join(harness.fresh_directory(name), "out.mrc"))
+
+
+undisturbed = fresh_results("undisturbed")
+began = time.monotonic()
+harness.succeed(*command(undisturbed, *EVERY_STEP))
+duration = time.monotonic() - began
+assert not undisturbed.leftovers(), undisturbed.leftovers()
+
+
+def wait_for(condition, run):
+    """Waits until a condition holds or the run ends; true if it still runs."""
+    while run.poll() is None:
+        if condition():
+            return True
+        time.sleep(0.0002)
+    return False
+
+
+def kill(run):
+    run.kill()
+    run.communicate()
+    return run.returncode == -signal.SIGKILL
+
+
+def interrupted(results, kill_when, most=40):
+    """Starts the run, resumes it and kills it again until it ends; how often it was killed."""
+    kills = 0
+    while kills < most:
+        run = harness.start(*command(results, *EVERY_STEP, "--resume"))
+        if wait_for(kill_when(kills), run) and kill(run):
+            kills += 1
+            continue
+        _, errors = run.communicate()
+        assert run.returncode == 0, errors
+        return kills
+    harness.succeed(*command(results, *EVERY_STEP, "--resume"))
+    return kills
+
+
+def test_killed_at_random_moments():
+    chance = random.Random(5)
+    results = fresh_results("random")
+
+    def kill_when(kills):
+        moment = time.monotonic() + chance.uniform(0.05, 0.5) * duration
+        return lambda: time.monotonic() > moment
+
+    kills = interrupted(results, kill_when, most=6)
+    assert kills > 0
+    assert results.same_as(undisturbed)
+    assert not results.leftovers(), results.leftovers()
+
+
+def test_killed_in_the_middle_of_writing():
+    for written in ("out.h5", "out.mrc", "out.json", "out_xz.png"):
+        results = fresh_results("writing")
+        pattern = os.path.join(os.path.dirname(results.volume_path), f".{written}.tmp-*")
+        seen = set()
+
+        def kill_when(kills):
+            # The file that proves the directory writable comes first, and is empty.
+            def being_written():
+                for path in glob.glob(pattern):
+                    try:
+                        if os.path.getsize(path) > 0 and path not in seen:
+                            seen.add(path)
+                            return True
+                    except FileNotFoundError:
+                        pass
+                return False
+            return being_written
+
+        kills = interrupted(results, kill_when, most=3)
+        print(f"{written}: killed {kills} times")
+        assert results.same_as(undisturbed), written
+        assert not results.leftovers(), results.leftovers()
+        if written == "out.h5":
+            assert kills > 0, "no moment was caught"
+
+
+def stopped_run(name, number=signal.SIGTERM, *options):
+    """Results that are only a checkpoint, the run that was stopped by a signal, and what it said.
+    No checkpoint falls due before the signal."""
+    for _ in range(10):
+        results = fresh_results(name)
+        run = harness.start(*command(results, *options))
+        for line in run.stderr:
+            if line.startswith("reconstruct "):  # the first step is done
+                break
+        run.send_signal(number)
+        _, errors = run.communicate()
+        if run.returncode != 0:  # else it was too quick for us
+            return results, run, errors
+    raise AssertionError("every run ended before its signal")
+
+
+def test_signals_leave_a_checkpoint():
+    for number, status in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+        results, run, errors = stopped_run("signal", number)
+        assert run.returncode == status, (run.returncode, errors)
+        assert "--resume" in errors and results.model_path in errors, errors
+        assert os.listdir(os.path.dirname(results.model_path)) == ["out.h5"]
+        with h5py.File(results.model_path) as model:
+            step = model["training/integers/step"][0]
+            assert 0 < step < NUM_STEPS and "adam_m" in model["training/floats"], step
+        resumed = harness.succeed(*command(results, "--resume"))
+        assert f"step {step} of {NUM_STEPS}" in resumed.stderr, resumed.stderr
+        assert results.same_as(undisturbed)
+
+
+def refuse(results, words, *options, input=None):
+    """Resuming is refused for the words' reason, and the files stay as they are."""
+    before = {path: read_bytes(path) for path in glob.glob(os.path.dirname(results.model_path) + "/*")}
+    arguments = command(results, "--resume", *options)
+    if input:
+        arguments[1 : 1 + len(series.input)] = input
+    result = harness.tomofield(*arguments)
+    assert result.returncode == 2, (words, result)
+    complaint = result.stderr.splitlines()[-1]
+    for word in [results.model_path, "--overwrite", *words]:
+        assert word in complaint, (word, complaint)
+    after = {path: read_bytes(path) for path in glob.glob(os.path.dirname(results.model_path) + "/*")}
+    assert after == before and not results.leftovers(), words
+
+
+def test_torn_checkpoints_are_refused():
+    results, _, _ = stopped_run("torn")
+    whole = read_bytes(results.model_path)
+    for length in (0, 5, 100, 2048, len(whole) // 3, len(whole) - 4096, len(whole) - 1):
+        with open(results.model_path, "wb") as file:
+            file.write(whole[:length])
+        refuse(results, [])
+    # As long as it was, but a page never reached the disk.
+    middle = len(whole) // 2
+    with open(results.model_path, "wb") as file:
+        file.write(whole[:middle] + bytes(4096) + whole[middle + 4096 :])
+    refuse(results, ["damaged"])
+    with open(results.model_path, "wb") as file:
+        file.write(whole)
+    harness.succeed(*command(results, "--resume"))
+    assert results.same_as(undisturbed)
+
+
+def test_foreign_checkpoints_are_refused():
+    results, _, _ = stopped_run("foreign")
+    refuse(results, ["fit seed"], "--seed", 2)
+    refuse(results, ["specimen thickness"], "--thickness", 22)
+    refuse(results, ["field rank"], "--rank", 4)
+    refuse(results, ["field kind"], "--field", "grid")
+    refuse(results, ["fit epochs"], "--epochs", 6)
+    refuse(results, ["rays"], "--exclude", 3)
+    refuse(results, ["tilt_deg"], input=series.with_views("tilted", series.views,
+                                                          harness.TILTS + 1).input)
+    views = series.views.copy()
+    views[5, 7, 9] += 0.01
+    refuse(results, ["rays"], input=series.with_views("changed", views).input)
+    # How the volume is written changes nothing of the fit; nor does another place for the series.
+    moved = series.with_views("moved", series.views)
+    arguments = command(results, "--resume", "--mode", 12)
+    arguments[1 : 1 + len(series.input)] = moved.input
+    harness.succeed(*arguments)
+    np.testing.assert_allclose(results.volume, undisturbed.volume, rtol=6e-4, atol=1e-6)
+
+    with h5py.File(results.model_path, "w") as file:
+        file["density"] = np.arange(10.0)
+    refuse(results, ["no model"])
+    with open(results.model_path, "w") as file:
+        file.write("a list of things to do\n" * 100)
+    refuse(results, ["HDF5"])
+    os.remove(results.model_path)
+    os.mkdir(results.model_path)
+    result = harness.tomofield(*command(results, "--resume"))
+    assert result.returncode == 2 and results.model_path in result.stderr, result
+
+
+def test_resume_without_a_checkpoint_starts_from_the_beginning():
+    results = fresh_results("beginning")
+    result = harness.succeed(*command(results, "--resume"))
+    assert "from the beginning" in result.stderr, result.stderr
+    assert results.same_as(undisturbed)
+    # What somebody else put there is no result of a run to resume.
+    results = fresh_results("others")
+    with open(results.volume_path, "w") as file:
+        file.write("another volume")
+    result = harness.tomofield(*command(results, "--resume"))
+    assert result.returncode == 2 and results.volume_path in result.stderr, result
+    assert read_bytes(results.volume_path) == b"another volume"
+
+
+def test_resume_of_a_finished_run_writes_the_same_results():
+    results = fresh_results("finished")
+    harness.succeed(*command(results))
+    os.remove(results.volume_path)
+    os.remove(results.pictures["yz"])
+    result = harness.succeed(*command(results, "--resume"))
+    assert f"step {NUM_STEPS} of {NUM_STEPS}" in result.stderr, result.stderr
+    assert results.same_as(undisturbed)
+    assert all(os.path.exists(path) for path in results.all_paths) and not results.leftovers()
+
+
+def test_stopping_is_told_to_go_on_without_overwrite():
+    results, run, errors = stopped_run("replaced", signal.SIGINT, "--overwrite")
+    assert run.returncode == 130 and "--resume instead of --overwrite" in errors, errors
+
+
+harness.run_tests(globals())
