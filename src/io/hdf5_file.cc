@@ -105,7 +105,7 @@ struct Stored<std::int64_t> {
 Handle file_access() {
   const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
   H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);
-  H5Pset_file_locking(access, 1, 1);
+  H5Pset_file_locking(access, true, true);
   return {access, H5Pclose};
 }
 
@@ -113,7 +113,7 @@ Handle file_access() {
 // contents are the same bytes.
 Handle creation(hid_t kind) {
   const hid_t properties = H5Pcreate(kind);
-  H5Pset_obj_track_times(properties, 0);
+  H5Pset_obj_track_times(properties, false);
   return {properties, H5Pclose};
 }
 
