@@ -17,10 +17,11 @@ namespace tomofield::kernels {
 
 /// One line as one view sees it.
 struct LineCrossing {
-  const float* samples = nullptr;  ///< source of project_lines: sample 0; −1 and num_samples must
-                                   ///< be readable (padding)
-  const float* detector =
-      nullptr;  ///< source of backproject_lines: pixel 0 of the view, [pixel, lane]
+  /// Source of project_lines: sample 0. Samples −1 and num_samples must be readable (padding).
+  const float* samples = nullptr;
+  /// Source of backproject_lines: pixel 0 of the view, [pixel, lane]. Pixel end_pixel must be
+  /// readable: it is multiplied by 0.
+  const float* detector = nullptr;
   float offset = 0, step = 1;
   float low = 0, high = 0;  ///< within [−1, num_samples]
   int first_pixel = 0, end_pixel = 0;
@@ -29,14 +30,15 @@ struct LineCrossing {
 
 /// detector[u, lane] += Σ_lines weight Σ_j hat(position(u) − j) samples_j[lane],
 /// for pixels [first, end). All lines belong to one view: same detector, same step.
-/// `stride` is the distance between samples in floats.
+/// `stride` is the distance between samples in floats; the samples of all lines lie within 2³¹.
 /// Traffic a pixel and line: two cache lines of samples; the detector once for all lines.
 void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stride, int first,
                    int end, float* detector);
 
 /// The adjoint: samples[j, lane] += Σ_views weight Σ_u hat(position_view(u) − j) detector_view[u,
-/// lane] for samples j in [first, end), padding included. All crossings belong to one line. Traffic
-/// a sample and view: 2/|step| cache lines of the detector; the sample once for all views.
+/// lane] for samples j in [first, end), padding included. All crossings belong to one line; all
+/// detectors lie within 2³¹ floats. Traffic a sample and view: two cache lines of the detector
+/// (more for |step| < 1); the sample once for all views.
 void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t stride, int first,
                        int end, float* samples);
 

@@ -8,8 +8,11 @@
 
 namespace tomofield::projection {
 
+// An odd number of eight cache lines, so that neighbouring rows and the samples of a column
+// spread over all sets of a cache.
 std::ptrdiff_t SampleSegment::stride_z() const {
-  return static_cast<std::ptrdiff_t>(nx + 2) * kernels::kLanes;
+  const int padded = (nx + 2 + 7) / 16 * 16 + 8;
+  return static_cast<std::ptrdiff_t>(padded) * kernels::kLanes;
 }
 
 SampleGrid::SampleGrid(std::vector<SampleSegment> segments) : segments_(std::move(segments)) {

@@ -20,7 +20,7 @@ struct SampleSegment {
   bool cut_low = false, cut_high = false;
   std::ptrdiff_t origin = 0;  ///< of sample (0, 0, lane 0) in a slab buffer
 
-  /// Floats between z rows: one sample of padding on either side.
+  /// Floats between z rows: one sample of padding on either side, or more.
   std::ptrdiff_t stride_z() const;
   double x1() const { return x0 + nx * hx; }
 };

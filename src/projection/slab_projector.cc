@@ -1,6 +1,7 @@
 #include "projection/slab_projector.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -14,97 +15,98 @@ namespace {
 using kernels::kLanes;
 using kernels::LineCrossing;
 
-// Lines that are projected together, so that a detector pixel is read and
-// written once for all of them; eight rows also stay in L2 for every view.
-constexpr int kLinesAtOnce = 8;
+using Beam = SlabProjector::Beam;
 
-// A line as a view sees it. Its row stands for a piece of ray hz high and
-// hz tan θ wide; where that piece straddles a cut face, the row counts for the
+// Lines and views are treated in blocks, over tiles of samples, that fit in L1:
+// each sample or pixel then comes from further away once for several uses.
+constexpr int kLinesAtOnce = 8;
+constexpr int kViewsAtOnce = 8;
+constexpr int kSamplesAtOnce = 32;
+
+Beam row_beam(const geometry::TiltGeometry& g, const SampleSegment& s, int view) {
+  const double cosine = g.cos_tilt(view), tangent = g.signed_sin_tilt(view) / cosine;
+  return {.flat = true,
+          .offset = (g.ray_x(view, 0.5, 0.5 * s.hz) - s.x0) / s.hx - 0.5,
+          .offset_per_line = -tangent * s.hz / s.hx,
+          .step = 1.0 / (s.hx * cosine),
+          .weight = static_cast<float>(s.hz / cosine),
+          .spread = s.hz * std::abs(tangent) / s.hx};
+}
+
+Beam column_beam(const geometry::TiltGeometry& g, const SampleSegment& s, int view) {
+  const double sine = g.signed_sin_tilt(view), cotangent = g.cos_tilt(view) / sine;
+  return {.flat = false,
+          .offset = g.ray_z(view, 0.5, s.x0 + 0.5 * s.hx) / s.hz - 0.5,
+          .offset_per_line = -cotangent * s.hx / s.hz,
+          .step = 1.0 / (s.hz * sine),
+          .weight = static_cast<float>(s.hx / std::abs(sine)),
+          .spread = s.hx * std::abs(cotangent) / s.hz};
+}
+
+// The lines of a segment that one kind of view crosses.
+struct Family {
+  bool flat;
+  int num_lines, num_samples;
+  std::ptrdiff_t origin, line_stride, sample_stride;
+  bool cut_low, cut_high;  // whether the lines end at faces where another segment goes on
+};
+
+Family rows_of(const SampleSegment& s) {
+  return {true, s.nz, s.nx, s.origin, s.stride_z(), kLanes, s.cut_low, s.cut_high};
+}
+Family columns_of(const SampleSegment& s) {
+  return {false, s.nx, s.nz, s.origin, kLanes, s.stride_z(), false, false};
+}
+
+// A line as a view sees it. It stands for a piece of ray that spans some width
+// along the line; where that piece straddles a cut face, the line counts for the
 // part on its side, so that a ray's pieces on both sides, which differ in
-// height, add up to its length. Such pixels [part_first, part_end) around those
-// of `line` are few and dealt with here.
+// length, add up. Such pixels [part_first, part_end) around those of `line` are
+// few and dealt with here.
 struct Crossing {
   LineCrossing line;
   double offset = 0, step = 1;  // position(pixel), as in LineCrossing
   int part_first = 0, part_end = 0;
-  double low_face = 0, high_face = 0, width = 0;  // of the piece, in samples
+  double low_face = 0, high_face = 0, spread = 0;  // in samples
 
   double position(int pixel) const { return offset + step * pixel; }
   // Share of a pixel's piece within the faces.
   double share(int pixel) const {
     const double p = position(pixel);
-    return std::clamp(std::min(p - low_face, high_face - p) / width + 0.5, 0.0, 1.0);
+    return std::clamp(std::min(p - low_face, high_face - p) / spread + 0.5, 0.0, 1.0);
   }
 };
 
 // First pixel whose position is at least `position`; steps are positive.
-int first_pixel_from(const Crossing& c, double position, std::int64_t width) {
+int first_pixel_from(const Crossing& c, double position, int width) {
   const double pixel = std::ceil((position - c.offset) / c.step);
   return static_cast<int>(std::clamp(pixel, 0.0, static_cast<double>(width)));
 }
 
-void set_positions(Crossing& c, double offset, double step) {
-  c.offset = offset;
-  c.step = step;
-  c.line.offset = static_cast<float>(offset);
-  c.line.step = static_cast<float>(step);
-}
-
-// Row k of a segment as a flat view sees it.
-Crossing row_crossing(const geometry::TiltGeometry& g, const SampleSegment& s, int view, int k) {
-  const double z = (k + 0.5) * s.hz;
-  const double cosine = g.cos_tilt(view);
+Crossing crossing(const Beam& beam, const Family& family, int line, int width) {
   Crossing c;
-  set_positions(c, (g.ray_x(view, 0.5, z) - s.x0) / s.hx - 0.5, 1.0 / (s.hx * cosine));
+  c.offset = beam.offset + line * beam.offset_per_line;
+  c.step = beam.step;
+  c.line.offset = static_cast<float>(c.offset);
+  c.line.step = static_cast<float>(c.step);
   c.line.low = -1.0f;
-  c.line.high = static_cast<float>(s.nx);
-  c.line.weight = static_cast<float>(s.hz / cosine);
-  // Where the field ends instead, the hat of the last sample does: beyond it.
+  c.line.high = static_cast<float>(family.num_samples);
+  c.line.weight = beam.weight;
+  c.line.end_pixel = c.part_end = width;
+  if (!family.cut_low && !family.cut_high) return c;
+
+  // Where the field ends instead, the hat of the last sample does.
   constexpr double kNowhere = 1e9, kThinnest = 1e-6;
-  c.low_face = s.cut_low ? -0.5 : -kNowhere;
-  c.high_face = s.cut_high ? s.nx - 0.5 : kNowhere;
-  c.width = std::max(s.hz * std::abs(g.signed_sin_tilt(view)) / cosine, kThinnest) / s.hx;
-  const double half = c.width / 2;
-  c.part_first = first_pixel_from(c, std::max(c.low_face - half, -1.0), g.width);
-  c.line.first_pixel = first_pixel_from(c, std::max(c.low_face + half, -1.0), g.width);
-  const double end = static_cast<double>(s.nx);
-  c.line.end_pixel = first_pixel_from(c, std::min(c.high_face - half, end), g.width);
-  c.part_end = first_pixel_from(c, std::min(c.high_face + half, end), g.width);
+  c.low_face = family.cut_low ? -0.5 : -kNowhere;
+  c.high_face = family.cut_high ? family.num_samples - 0.5 : kNowhere;
+  c.spread = std::max(beam.spread, kThinnest);
+  const double half = c.spread / 2, end = family.num_samples;
+  c.part_first = first_pixel_from(c, std::max(c.low_face - half, -1.0), width);
+  c.line.first_pixel = first_pixel_from(c, std::max(c.low_face + half, -1.0), width);
+  c.line.end_pixel = first_pixel_from(c, std::min(c.high_face - half, end), width);
+  c.part_end = first_pixel_from(c, std::min(c.high_face + half, end), width);
   return c;
 }
-
-// Column i of a segment as a steep view sees it: faces do not cut it.
-Crossing column_crossing(const geometry::TiltGeometry& g, const SampleSegment& s, int view, int i) {
-  const double x = s.x0 + (i + 0.5) * s.hx;
-  const double sine = g.signed_sin_tilt(view);
-  Crossing c;
-  set_positions(c, g.ray_z(view, 0.5, x) / s.hz - 0.5, 1.0 / (s.hz * sine));
-  c.line.low = -1.0f;
-  c.line.high = static_cast<float>(s.nz);
-  c.line.weight = static_cast<float>(s.hx / std::abs(sine));
-  // The pixels that can lie in [low, high); the kernel tests which do.
-  const double a = (-1.0 - c.offset) / c.step, b = (s.nz - c.offset) / c.step;
-  const double limit = static_cast<double>(g.width);
-  c.line.first_pixel = static_cast<int>(std::clamp(std::floor(std::min(a, b)), 0.0, limit));
-  c.line.end_pixel = static_cast<int>(std::clamp(std::ceil(std::max(a, b)) + 1.0, 0.0, limit));
-  c.part_first = c.line.first_pixel;
-  c.part_end = c.line.end_pixel;
-  return c;
-}
-
-// The two families of lines of a segment: rows for flat views, columns for steep ones.
-struct Family {
-  bool flat;
-  int num_lines;
-  std::ptrdiff_t line_stride, sample_stride;
-  Crossing crossing(const geometry::TiltGeometry& g, const SampleSegment& s, int view,
-                    int line) const {
-    return flat ? row_crossing(g, s, view, line) : column_crossing(g, s, view, line);
-  }
-};
-
-Family rows_of(const SampleSegment& s) { return {true, s.nz, s.stride_z(), kLanes}; }
-Family columns_of(const SampleSegment& s) { return {false, s.nx, kLanes, s.stride_z()}; }
 
 // A cut side repeats its last sample, so that the field is constant up to the face.
 void fill_padding(const SampleSegment& s, float* samples) {
@@ -167,69 +169,127 @@ void backproject_parts(const Crossing& c, std::ptrdiff_t stride, float* samples)
   });
 }
 
-void project_family(const geometry::TiltGeometry& g, const SampleSegment& s, const Family& family,
+// The pixels that cross the middle of a block of lines within a tile of
+// samples; the first and last tile take all that lie beyond them.
+struct PixelRange {
+  int first, end;
+};
+
+PixelRange pixels_of_tile(const Beam& beam, const Family& family, double middle_line,
+                          int first_sample, int width) {
+  const auto pixel_at = [&](double sample) {
+    const double pixel = (sample - beam.offset - middle_line * beam.offset_per_line) / beam.step;
+    return static_cast<int>(std::clamp(pixel + 1.0, 0.0, static_cast<double>(width)));
+  };
+  const double beyond = 2.0 + 0.5 * kLinesAtOnce * std::abs(beam.offset_per_line);
+  const int end_sample = first_sample + kSamplesAtOnce;
+  const int a = pixel_at(first_sample == 0 ? -beyond : first_sample);
+  const int b =
+      pixel_at(end_sample < family.num_samples ? end_sample : family.num_samples + beyond);
+  return {std::min(a, b), std::max(a, b)};
+}
+
+void project_family(const Family& family, const std::vector<Beam>& beams, int width,
                     const float* samples, std::span<const int> views, float* detector) {
-  LineCrossing lines[kLinesAtOnce];
+  std::vector<std::array<LineCrossing, kLinesAtOnce>> lines(views.size());
+  const auto beam_of = [&](std::size_t v) -> const Beam& {
+    return beams[static_cast<std::size_t>(views[v])];
+  };
+  const auto rays_of = [&](std::size_t v) {
+    return detector + static_cast<std::ptrdiff_t>(v) * width * kLanes;
+  };
   for (int first = 0; first < family.num_lines; first += kLinesAtOnce) {
     const int count = std::min(kLinesAtOnce, family.num_lines - first);
     for (std::size_t v = 0; v < views.size(); ++v) {
-      if (g.is_flat(views[v]) != family.flat) continue;
-      float* const rays = detector + static_cast<std::ptrdiff_t>(v) * g.width * kLanes;
-      int first_pixel = static_cast<int>(g.width), end_pixel = 0;
+      if (beam_of(v).flat != family.flat) continue;
       for (int l = 0; l < count; ++l) {
-        Crossing c = family.crossing(g, s, views[v], first + l);
-        c.line.samples = samples + s.origin + (first + l) * family.line_stride;
-        project_parts(c, family.sample_stride, rays);
-        lines[l] = c.line;
-        first_pixel = std::min(first_pixel, lines[l].first_pixel);
-        end_pixel = std::max(end_pixel, lines[l].end_pixel);
+        Crossing c = crossing(beam_of(v), family, first + l, width);
+        c.line.samples = samples + family.origin + (first + l) * family.line_stride;
+        project_parts(c, family.sample_stride, rays_of(v));
+        lines[v][static_cast<std::size_t>(l)] = c.line;
       }
-      kernels::project_lines(lines, count, family.sample_stride, first_pixel, end_pixel, rays);
+    }
+    for (int tile = 0; tile < family.num_samples; tile += kSamplesAtOnce) {
+      for (std::size_t v = 0; v < views.size(); ++v) {
+        if (beam_of(v).flat != family.flat) continue;
+        const PixelRange pixels =
+            pixels_of_tile(beam_of(v), family, first + 0.5 * (count - 1), tile, width);
+        kernels::project_lines(lines[v].data(), count, family.sample_stride, pixels.first,
+                               pixels.end, rays_of(v));
+      }
     }
   }
 }
 
-void backproject_family(const geometry::TiltGeometry& g, const SampleSegment& s,
-                        const Family& family, const float* detector, std::span<const int> views,
-                        float* samples) {
-  std::vector<LineCrossing> crossings;
-  const int first = family.flat && s.cut_low ? -1 : 0;
-  const int end = family.flat ? s.nx + (s.cut_high ? 1 : 0) : s.nz;
-  for (int l = 0; l < family.num_lines; ++l) {
-    crossings.clear();
-    for (std::size_t v = 0; v < views.size(); ++v) {
-      if (g.is_flat(views[v]) != family.flat) continue;
-      Crossing c = family.crossing(g, s, views[v], l);
-      c.line.detector = detector + static_cast<std::ptrdiff_t>(v) * g.width * kLanes;
-      backproject_parts(c, family.sample_stride, samples + s.origin + l * family.line_stride);
-      if (c.line.first_pixel < c.line.end_pixel) crossings.push_back(c.line);
+void backproject_family(const Family& family, const std::vector<Beam>& beams, int width,
+                        const float* detector, std::span<const int> views, float* samples) {
+  std::array<std::vector<LineCrossing>, kLinesAtOnce> crossings;
+  const int first_sample = family.cut_low ? -1 : 0;
+  const int end_sample = family.num_samples + (family.cut_high ? 1 : 0);
+  for (int first = 0; first < family.num_lines; first += kLinesAtOnce) {
+    const int count = std::min(kLinesAtOnce, family.num_lines - first);
+    for (int l = 0; l < count; ++l) {
+      std::vector<LineCrossing>& of_line = crossings[static_cast<std::size_t>(l)];
+      of_line.clear();
+      for (std::size_t v = 0; v < views.size(); ++v) {
+        const Beam& beam = beams[static_cast<std::size_t>(views[v])];
+        if (beam.flat != family.flat) continue;
+        Crossing c = crossing(beam, family, first + l, width);
+        c.line.detector = detector + static_cast<std::ptrdiff_t>(v) * width * kLanes;
+        backproject_parts(c, family.sample_stride,
+                          samples + family.origin + (first + l) * family.line_stride);
+        of_line.push_back(c.line);
+      }
     }
-    if (crossings.empty()) continue;
-    kernels::backproject_lines(crossings.data(), static_cast<int>(crossings.size()),
-                               family.sample_stride, first, end,
-                               samples + s.origin + l * family.line_stride);
+    const int num_views = static_cast<int>(crossings[0].size());
+    for (int tile = first_sample; tile < end_sample; tile += kSamplesAtOnce) {
+      const int tile_end = std::min(end_sample, tile + kSamplesAtOnce);
+      for (int v = 0; v < num_views; v += kViewsAtOnce) {
+        for (int l = 0; l < count; ++l) {
+          kernels::backproject_lines(crossings[static_cast<std::size_t>(l)].data() + v,
+                                     std::min(kViewsAtOnce, num_views - v), family.sample_stride,
+                                     tile, tile_end,
+                                     samples + family.origin + (first + l) * family.line_stride);
+        }
+      }
+    }
   }
 }
 
 }  // namespace
 
+SlabProjector::SlabProjector(const geometry::TiltGeometry& geometry, const SampleGrid& grid)
+    : geometry_(geometry), grid_(grid) {
+  for (const SampleSegment& s : grid_.segments()) {
+    std::vector<Beam>& beams = beams_.emplace_back();
+    for (int v = 0; v < geometry_.num_views(); ++v) {
+      beams.push_back(geometry_.is_flat(v) ? row_beam(geometry_, s, v)
+                                           : column_beam(geometry_, s, v));
+    }
+  }
+}
+
 std::size_t SlabProjector::detector_size(std::size_t num_views) const {
-  return num_views * static_cast<std::size_t>(geometry_.width) * kLanes;
+  return (num_views * static_cast<std::size_t>(geometry_.width) + 1) * kLanes;
 }
 
 void SlabProjector::forward(float* samples, std::span<const int> views, float* detector) const {
-  for (const SampleSegment& s : grid_.segments()) {
+  const int width = static_cast<int>(geometry_.width);
+  for (std::size_t i = 0; i < beams_.size(); ++i) {
+    const SampleSegment& s = grid_.segments()[i];
     fill_padding(s, samples);
-    project_family(geometry_, s, rows_of(s), samples, views, detector);
-    project_family(geometry_, s, columns_of(s), samples, views, detector);
+    project_family(rows_of(s), beams_[i], width, samples, views, detector);
+    project_family(columns_of(s), beams_[i], width, samples, views, detector);
   }
 }
 
 void SlabProjector::backward(const float* detector, std::span<const int> views,
                              float* samples) const {
-  for (const SampleSegment& s : grid_.segments()) {
-    backproject_family(geometry_, s, rows_of(s), detector, views, samples);
-    backproject_family(geometry_, s, columns_of(s), detector, views, samples);
+  const int width = static_cast<int>(geometry_.width);
+  for (std::size_t i = 0; i < beams_.size(); ++i) {
+    const SampleSegment& s = grid_.segments()[i];
+    backproject_family(rows_of(s), beams_[i], width, detector, views, samples);
+    backproject_family(columns_of(s), beams_[i], width, detector, views, samples);
     fold_padding(s, samples);
   }
 }

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "geometry/tilt_geometry.h"
 #include "projection/sample_grid.h"
@@ -15,12 +16,22 @@ namespace tomofield::projection {
 /// transposes. Thread-safe.
 class SlabProjector {
  public:
-  SlabProjector(const geometry::TiltGeometry& geometry, const SampleGrid& grid)
-      : geometry_(geometry), grid_(grid) {}
+  /// How the rays of a view cross the lines of a segment, which are rows of z
+  /// for flat views and columns of x for steep ones: pixel u crosses line l at
+  /// sample offset + l offset_per_line + u step.
+  struct Beam {
+    bool flat = true;
+    double offset = 0, offset_per_line = 0, step = 1;
+    float weight = 0;   ///< length of ray that a line stands for
+    double spread = 0;  ///< how many samples that piece of ray spans
+  };
+
+  SlabProjector(const geometry::TiltGeometry& geometry, const SampleGrid& grid);
 
   const geometry::TiltGeometry& geometry() const { return geometry_; }
   const SampleGrid& grid() const { return grid_; }
-  /// Floats of the predicted rays of `num_views` views: [view, x, lane].
+  /// Floats of the predicted rays of `num_views` views: [view, x, lane], and one pixel more,
+  /// which is read.
   std::size_t detector_size(std::size_t num_views) const;
 
   /// detector += A samples for the named views. Writes the padding of `samples`.
@@ -31,6 +42,7 @@ class SlabProjector {
  private:
   geometry::TiltGeometry geometry_;
   SampleGrid grid_;
+  std::vector<std::vector<Beam>> beams_;  // [segment][view]
 };
 
 }  // namespace tomofield::projection

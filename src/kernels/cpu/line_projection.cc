@@ -13,155 +13,292 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
-// Destinations are treated in tiles; the weights of a tile are worked out
-// first, a vector of destinations at a time, then used as broadcasts.
-constexpr int kTile = 16;
+// Destinations are treated in tiles. What they take from four items (lines, or
+// pairs of pixels of a view) is worked out first, a vector of destinations at a
+// time, and then used. Loads limit the speed of that: so the two taps of an item
+// share an index, and the weights of four items are loaded together and
+// broadcast in registers.
+constexpr int kTile = 32;
+constexpr int kItems = 4;
+constexpr int kMaxTables = 4;
+using IntVec = hn::Vec<IntTag>;
 
-struct TapTable {
-  HWY_ALIGN int index[kTile];
-  HWY_ALIGN float weight[kTile];
+// Two taps of one item for a vector of destinations: the source at `index`
+// floats and the one after it.
+struct Taps {
+  IntVec index;
+  Vec weight0, weight1;
 };
 
-HWY_INLINE void add_tap(const float* source, float weight, Vec (&acc)[kVecs]) {
+struct TapTable {
+  HWY_ALIGN int index[kTile][kItems];
+  HWY_ALIGN float weight0[kTile][kItems], weight1[kTile][kItems];
+
+  // `taps_of(item, t)` gives the taps of destinations t, t + 1, …
+  template <typename TapsOf>
+  HWY_INLINE void fill(const TapsOf& taps_of) {
+    for (int t = 0; t < kTile; t += kVecLanes) {
+      const Taps a = taps_of(0, t), b = taps_of(1, t), c = taps_of(2, t), d = taps_of(3, t);
+      hn::StoreInterleaved4(a.index, b.index, c.index, d.index, IntTag(), index[t]);
+      hn::StoreInterleaved4(a.weight0, b.weight0, c.weight0, d.weight0, Tag(), weight0[t]);
+      hn::StoreInterleaved4(a.weight1, b.weight1, c.weight1, d.weight1, Tag(), weight1[t]);
+    }
+  }
+};
+
+// Sums of a destination; the taps of an item go to different ones, so that an
+// addition waits for half as many others.
+struct Sums {
+  Vec of_tap0[kVecs], of_tap1[kVecs];
+};
+
+template <int kItem>
+HWY_INLINE void add_item(const float* source, std::ptrdiff_t next, const TapTable& table, int t,
+                         Vec weights0, Vec weights1, Sums& sums) {
   const Tag d;
-  const Vec w = hn::Set(d, weight);
-  for (int v = 0; v < kVecs; ++v)
-    acc[v] = hn::MulAdd(w, hn::LoadU(d, source + v * kVecLanes), acc[v]);
+  const float* const tap0 = source + table.index[t][kItem];
+  const float* const tap1 = tap0 + next;
+#if HWY_TARGET == HWY_SCALAR
+  weights0 = hn::Set(d, table.weight0[t][kItem]);
+  weights1 = hn::Set(d, table.weight1[t][kItem]);
+#else
+  weights0 = hn::Broadcast<kItem>(weights0);
+  weights1 = hn::Broadcast<kItem>(weights1);
+#endif
+  for (int v = 0; v < kVecs; ++v) {
+    sums.of_tap0[v] = hn::MulAdd(weights0, hn::LoadU(d, tap0 + v * kVecLanes), sums.of_tap0[v]);
+    sums.of_tap1[v] = hn::MulAdd(weights1, hn::LoadU(d, tap1 + v * kVecLanes), sums.of_tap1[v]);
+  }
 }
 
-HWY_INLINE void load_sample(const float* p, Vec (&acc)[kVecs]) {
-  for (int v = 0; v < kVecs; ++v) acc[v] = hn::LoadU(Tag(), p + v * kVecLanes);
-}
-
-HWY_INLINE void store_sample(const Vec (&acc)[kVecs], float* p) {
-  for (int v = 0; v < kVecs; ++v) hn::StoreU(acc[v], Tag(), p + v * kVecLanes);
-}
-
-HWY_INLINE Vec iota_from(int first) { return hn::ConvertTo(Tag(), hn::Iota(IntTag(), first)); }
-
-// Lower sample and the two weights of pixels first … first + kTile − 1.
-HWY_INLINE void forward_taps(const LineCrossing& line, int first, TapTable& lower,
-                             float* upper_weight) {
+// Adds what `num_tables` tables take to destinations [0, count), `stride`
+// floats apart. Sources that follow each other are `next` floats apart.
+HWY_INLINE void gather(const TapTable* tables, int num_tables, const float* source,
+                       std::ptrdiff_t next, int count, std::ptrdiff_t stride, float* out) {
   const Tag d;
-  const Vec weight = hn::Set(d, line.weight);
-  for (int t = 0; t < kTile; t += kVecLanes) {
-    const Vec pixel = iota_from(first + t);
-    const Vec position = hn::MulAdd(pixel, hn::Set(d, line.step), hn::Set(d, line.offset));
-    const auto inside = hn::And(
-        hn::And(hn::Ge(position, hn::Set(d, line.low)), hn::Lt(position, hn::Set(d, line.high))),
-        hn::And(hn::Ge(pixel, hn::Set(d, static_cast<float>(line.first_pixel))),
-                hn::Lt(pixel, hn::Set(d, static_cast<float>(line.end_pixel)))));
-    const Vec base = hn::Floor(position);
-    const Vec fraction = hn::Sub(position, base);
-    const Vec upper = hn::IfThenElseZero(inside, hn::Mul(weight, fraction));
-    const Vec low = hn::IfThenElseZero(inside, hn::NegMulAdd(weight, fraction, weight));
-    hn::Store(hn::ConvertTo(IntTag(), hn::IfThenElseZero(inside, base)), IntTag(), lower.index + t);
-    hn::Store(low, d, lower.weight + t);
-    hn::Store(upper, d, upper_weight + t);
+  for (int t = 0; t < count; ++t, out += stride) {
+    Sums sums;
+    for (int v = 0; v < kVecs; ++v) {
+      sums.of_tap0[v] = hn::LoadU(d, out + v * kVecLanes);
+      sums.of_tap1[v] = hn::Zero(d);
+    }
+    for (int i = 0; i < num_tables; ++i) {
+      const Vec weights0 = hn::LoadDup128(d, tables[i].weight0[t]);
+      const Vec weights1 = hn::LoadDup128(d, tables[i].weight1[t]);
+      add_item<0>(source, next, tables[i], t, weights0, weights1, sums);
+      add_item<1>(source, next, tables[i], t, weights0, weights1, sums);
+      add_item<2>(source, next, tables[i], t, weights0, weights1, sums);
+      add_item<3>(source, next, tables[i], t, weights0, weights1, sums);
+    }
+    for (int v = 0; v < kVecs; ++v)
+      hn::StoreU(hn::Add(sums.of_tap0[v], sums.of_tap1[v]), d, out + v * kVecLanes);
+  }
+}
+
+// first, first + 1, …; Highway's own Iota goes through memory.
+HWY_INLINE Vec iota_from(int first) {
+  return hn::Add(hn::Iota(Tag(), 0.0f), hn::Set(Tag(), static_cast<float>(first)));
+}
+
+// Integers below 2^22 in magnitude: adding 1.5 · 2^23 leaves them in the low bits.
+HWY_INLINE IntVec to_int(Vec integral) {
+  const auto bits = hn::BitCast(IntTag(), hn::Add(integral, hn::Set(Tag(), 12582912.0f)));
+  return hn::Sub(bits, hn::Set(IntTag(), 0x4b400000));
+}
+
+HWY_INLINE Taps no_taps() {
+  const Vec none = hn::Zero(Tag());
+  return {hn::Zero(IntTag()), none, none};
+}
+
+// Whether this line's pixels weigh anything: those of the window, and within [low, high).
+HWY_INLINE auto sees(const LineCrossing& line, Vec pixel, Vec position) {
+  const Tag d;
+  return hn::And(
+      hn::And(hn::Ge(pixel, hn::Set(d, static_cast<float>(line.first_pixel))),
+              hn::Lt(pixel, hn::Set(d, static_cast<float>(line.end_pixel)))),
+      hn::And(hn::Ge(position, hn::Set(d, line.low)), hn::Lt(position, hn::Set(d, line.high))));
+}
+
+// Whether all of pixels [first, end) see the line.
+HWY_INLINE bool all_see(const LineCrossing& line, int first, int end) {
+  const float at_first = line.offset + line.step * static_cast<float>(first);
+  const float at_last = line.offset + line.step * static_cast<float>(end - 1);
+  // Wider than positions can differ by rounding.
+  constexpr float kRounding = 0.01f;
+  return first >= line.first_pixel && end <= line.end_pixel &&
+         std::min(at_first, at_last) - kRounding >= line.low &&
+         std::max(at_first, at_last) + kRounding < line.high;
+}
+
+// What these pixels take of a line: a sample and the one after it.
+template <bool kAllSee>
+HWY_INLINE Taps forward_taps(const LineCrossing& line, Vec pixel, IntVec origin, IntVec stride) {
+  const Tag d;
+  const Vec position = hn::MulAdd(pixel, hn::Set(d, line.step), hn::Set(d, line.offset));
+  Vec base = hn::Floor(position);
+  const Vec fraction = hn::Sub(position, base);
+  Vec weight = hn::Set(d, line.weight);
+  if (!kAllSee) {
+    const auto seen = sees(line, pixel, position);
+    weight = hn::IfThenElseZero(seen, weight);
+    base = hn::IfThenElseZero(seen, base);  // others may lie anywhere, but sample 0 exists
+  }
+  return {hn::Add(hn::Mul(stride, to_int(base)), origin), hn::NegMulAdd(weight, fraction, weight),
+          hn::Mul(weight, fraction)};
+}
+
+HWY_INLINE void fill_forward(const LineCrossing* lines, int count, const float* source,
+                             std::ptrdiff_t stride, int tile, int end, TapTable& table) {
+  const IntTag di;
+  const IntVec floats = hn::Set(di, static_cast<int>(stride));
+  int origin[kItems] = {};
+  bool seen = count == kItems;
+  for (int k = 0; k < count; ++k) {
+    origin[k] = static_cast<int>(lines[k].samples - source);
+    seen = seen && all_see(lines[k], tile, end);
+  }
+  if (seen) {
+    table.fill([&](int k, int t) HWY_ATTR {
+      return forward_taps<true>(lines[k], iota_from(tile + t), hn::Set(di, origin[k]), floats);
+    });
+  } else {
+    table.fill([&](int k, int t) HWY_ATTR {
+      return k < count ? forward_taps<false>(lines[k], iota_from(tile + t), hn::Set(di, origin[k]),
+                                             floats)
+                       : no_taps();
+    });
   }
 }
 
 void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stride, int first,
                    int end, float* detector) {
-  constexpr int kMaxLines = 8;
-  TapTable lower[kMaxLines];
-  HWY_ALIGN float upper[kMaxLines][kTile];
-  for (int group = 0; group < num_lines; group += kMaxLines) {
-    const int count = std::min(kMaxLines, num_lines - group);
-    const LineCrossing* const g = lines + group;
+  TapTable tables[kMaxTables];
+  for (int group = 0; group < num_lines; group += kMaxTables * kItems) {
+    const float* const source = lines[group].samples;
     for (int tile = first; tile < end; tile += kTile) {
-      for (int l = 0; l < count; ++l) forward_taps(g[l], tile, lower[l], upper[l]);
-      const int in_tile = std::min(kTile, end - tile);
-      for (int t = 0; t < in_tile; ++t) {
-        float* const out = detector + static_cast<std::ptrdiff_t>(tile + t) * kLanes;
-        Vec acc[kVecs];
-        load_sample(out, acc);
-        for (int l = 0; l < count; ++l) {
-          const float* const sample = g[l].samples + lower[l].index[t] * stride;
-          add_tap(sample, lower[l].weight[t], acc);
-          add_tap(sample + stride, upper[l][t], acc);
-        }
-        store_sample(acc, out);
+      const int tile_end = std::min(end, tile + kTile);
+      int num_tables = 0;
+      for (int l = group; l < num_lines && num_tables < kMaxTables; l += kItems) {
+        fill_forward(lines + l, std::min(kItems, num_lines - l), source, stride, tile, tile_end,
+                     tables[num_tables++]);
       }
+      gather(tables, num_tables, source, stride, tile_end - tile, kLanes,
+             detector + static_cast<std::ptrdiff_t>(tile) * kLanes);
     }
   }
 }
 
-// Tap `tap` of samples first …: pixel index and weight; taps outside weigh 0
-// and point at a pixel that exists.
-HWY_INLINE void adjoint_taps(const LineCrossing& view, int first, int tap, TapTable& table) {
+// A pair of pixels of a view that samples take from.
+struct PixelPair {
+  const LineCrossing* view;
+  int pair;      // of those that reach a sample
+  bool is_only;  // there are no other pairs, and pixels that do not see the line do not reach
+};
+
+// How many pairs of pixels reach samples [first, end): one for |step| >= 1, more
+// when samples are coarser than pixels, none for most tiles of a margin.
+HWY_INLINE int num_pairs(const LineCrossing& view, int first, int end) {
+  const float at_first = view.offset + view.step * static_cast<float>(view.first_pixel);
+  const float at_last = view.offset + view.step * static_cast<float>(view.end_pixel - 1);
+  if (view.first_pixel >= view.end_pixel ||
+      std::max(at_first, at_last) < static_cast<float>(first) - 1.5f ||
+      std::min(at_first, at_last) > static_cast<float>(end) + 0.5f) {
+    return 0;
+  }
+  // Rounding of the first pixel can only lose a weight that is itself of the size of the rounding.
+  return static_cast<int>(std::ceil((1.0f - 1e-6f) / std::abs(view.step)));
+}
+
+// Whether no pixel that does not see the line could reach samples [first, end).
+HWY_INLINE bool none_is_cut_off(const LineCrossing& view, int first, int end) {
+  const float low = static_cast<float>(first - 1), high = static_cast<float>(end);
+  const auto is_clear = [&](int pixel) HWY_ATTR {
+    const float position = view.offset + view.step * static_cast<float>(pixel);
+    return position < low - 0.01f || position > high + 0.01f;
+  };
+  return view.low <= low && view.high >= high && is_clear(view.first_pixel - 1) &&
+         is_clear(view.end_pixel);
+}
+
+// What these samples take of a pair of pixels, which is shifted into the window
+// if need be; the pixel past the window's end may be read, with weight 0.
+template <bool kIsOnly>
+HWY_INLINE Taps adjoint_taps(const PixelPair& item, Vec sample, IntVec origin) {
   const Tag d;
+  const LineCrossing& view = *item.view;
+  const Vec one = hn::Set(d, 1.0f);
   const Vec step = hn::Set(d, view.step);
   const Vec offset = hn::Set(d, view.offset);
   const Vec inverse = hn::Set(d, 1.0f / view.step);
   const Vec reach = hn::Set(d, std::abs(1.0f / view.step));
-  const Vec one = hn::Set(d, 1.0f);
-  const Vec first_pixel = hn::Set(d, static_cast<float>(view.first_pixel));
-  const Vec last_pixel = hn::Set(d, static_cast<float>(view.end_pixel - 1));
-  for (int t = 0; t < kTile; t += kVecLanes) {
-    const Vec sample = iota_from(first + t);
-    const Vec centre = hn::Mul(hn::Sub(sample, offset), inverse);
-    const Vec pixel =
-        hn::Add(hn::Floor(hn::Sub(centre, reach)), hn::Set(d, 1.0f + static_cast<float>(tap)));
-    const Vec position = hn::MulAdd(pixel, step, offset);
+  const Vec centre = hn::Mul(hn::Sub(sample, offset), inverse);
+  const Vec pair =
+      hn::Add(hn::Floor(hn::Sub(centre, reach)), hn::Set(d, static_cast<float>(2 * item.pair + 1)));
+  const Vec pixel = hn::Min(hn::Max(pair, hn::Set(d, static_cast<float>(view.first_pixel))),
+                            hn::Set(d, static_cast<float>(view.end_pixel - 1)));
+  const auto weight_of = [&](Vec at) HWY_ATTR {
+    const Vec position = hn::MulAdd(at, step, offset);
     const Vec hat = hn::Max(hn::Zero(d), hn::Sub(one, hn::Abs(hn::Sub(position, sample))));
-    const auto inside = hn::And(
-        hn::And(hn::Ge(position, hn::Set(d, view.low)), hn::Lt(position, hn::Set(d, view.high))),
-        hn::And(hn::Ge(pixel, first_pixel), hn::Le(pixel, last_pixel)));
-    hn::Store(hn::IfThenElseZero(inside, hn::Mul(hn::Set(d, view.weight), hat)), d,
-              table.weight + t);
-    const Vec clamped = hn::Min(hn::Max(pixel, first_pixel), last_pixel);
-    hn::Store(hn::ConvertTo(IntTag(), clamped), IntTag(), table.index + t);
+    const Vec weight = hn::Mul(hn::Set(d, view.weight), hat);
+    if (kIsOnly) return weight;
+    const Vec from_pair = hn::Sub(at, pair);
+    const auto is_ours = hn::And(hn::Ge(from_pair, hn::Zero(d)), hn::Le(from_pair, one));
+    return hn::IfThenElseZero(hn::And(is_ours, sees(view, at, position)), weight);
+  };
+  static_assert(kLanes == 16);
+  return {hn::Add(hn::ShiftLeft<4>(to_int(pixel)), origin), weight_of(pixel),
+          weight_of(hn::Add(pixel, one))};
+}
+
+HWY_INLINE void fill_adjoint(const PixelPair* items, int count, const float* source, int tile,
+                             TapTable& table) {
+  const IntTag di;
+  int origin[kItems] = {};
+  bool all_only = count == kItems;
+  for (int k = 0; k < count; ++k) {
+    origin[k] = static_cast<int>(items[k].view->detector - source);
+    all_only = all_only && items[k].is_only;
   }
-}
-
-// Whether any pixel of the view can reach samples [first, end): most tiles of
-// a margin are seen by few views.
-HWY_INLINE bool reaches(const LineCrossing& view, int first, int end) {
-  const float p0 = view.offset + view.step * static_cast<float>(view.first_pixel);
-  const float p1 = view.offset + view.step * static_cast<float>(view.end_pixel - 1);
-  return view.first_pixel < view.end_pixel && std::max(p0, p1) > static_cast<float>(first) - 1.5f &&
-         std::min(p0, p1) < static_cast<float>(end) + 0.5f;
-}
-
-// Pixels that can reach a sample: two for |step| >= 1, more when samples are
-// coarser than pixels. Rounding of the first one can only lose a weight that
-// is itself of the size of the rounding.
-HWY_INLINE int num_taps(float step) {
-  return static_cast<int>(std::ceil((2.0f - 1e-6f) / std::abs(step)));
+  if (all_only) {
+    table.fill([&](int k, int t) HWY_ATTR {
+      return adjoint_taps<true>(items[k], iota_from(tile + t), hn::Set(di, origin[k]));
+    });
+  } else {
+    table.fill([&](int k, int t) HWY_ATTR {
+      return k < count ? adjoint_taps<false>(items[k], iota_from(tile + t), hn::Set(di, origin[k]))
+                       : no_taps();
+    });
+  }
 }
 
 void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t stride, int first,
                        int end, float* samples) {
-  constexpr int kMaxTables = 24;
   TapTable tables[kMaxTables];
-  const float* sources[kMaxTables];
+  PixelPair items[kItems];
   for (int tile = first; tile < end; tile += kTile) {
-    const int in_tile = std::min(kTile, end - tile);
-    int view = 0, tap = 0;
-    while (view < num_views) {
-      int count = 0;
-      while (view < num_views && count < kMaxTables) {
-        if (tap >= num_taps(views[view].step) || !reaches(views[view], tile, tile + in_tile)) {
-          ++view;
-          tap = 0;
-          continue;
-        }
-        adjoint_taps(views[view], tile, tap++, tables[count]);
-        sources[count++] = views[view].detector;
-      }
-      if (count == 0) continue;
-      for (int t = 0; t < in_tile; ++t) {
-        float* const out = samples + (tile + t) * stride;
-        Vec acc[kVecs];
-        load_sample(out, acc);
-        for (int k = 0; k < count; ++k) {
-          add_tap(sources[k] + static_cast<std::ptrdiff_t>(tables[k].index[t]) * kLanes,
-                  tables[k].weight[t], acc);
-        }
-        store_sample(acc, out);
+    const int tile_end = std::min(end, tile + kTile);
+    int num_tables = 0, count = 0;
+    const auto use_tables = [&]() HWY_ATTR {
+      gather(tables, num_tables, views->detector, kLanes, tile_end - tile, stride,
+             samples + tile * stride);
+      num_tables = 0;
+    };
+    const auto fill_table = [&]() HWY_ATTR {
+      fill_adjoint(items, count, views->detector, tile, tables[num_tables++]);
+      count = 0;
+      if (num_tables == kMaxTables) use_tables();
+    };
+    for (int v = 0; v < num_views; ++v) {
+      const int pairs = num_pairs(views[v], tile, tile_end);
+      const bool is_only = pairs == 1 && none_is_cut_off(views[v], tile, tile_end);
+      for (int pair = 0; pair < pairs; ++pair) {
+        items[count++] = {&views[v], pair, is_only};
+        if (count == kItems) fill_table();
       }
     }
+    if (count > 0) fill_table();
+    if (num_tables > 0) use_tables();
   }
 }
 
