@@ -1,85 +1,62 @@
 #include "tilt_series/flat_fill.h"
 
 #include <algorithm>
-#include <limits>
+#include <cmath>
 #include <vector>
+
+#include "tilt_series/constant_fill.h"
+#include "tilt_series/straight_fill.h"
 
 namespace tomofield::tilt_series {
 namespace {
 
-constexpr std::size_t kFewestFillPixels = 64;
+// The sides are where 5 × 5 means stop being flat, 2 px before the fill ends,
+// and found to about 1 px; then 2 px of blur.
+constexpr double kEdge_px = 2.0 + 1.0 + 2.0;
+constexpr std::int64_t kRim_px = 2;
 
-/// Regions of equal value, each pixel visited once.
-class RegionFinder {
- public:
-  explicit RegionFinder(const MaskedImage& image) : image_(image), seen_(image.valid.size()) {}
-
-  /// The pixels 4-connected to `seed` that have its value; empty if it was visited before.
-  const std::vector<std::size_t>& region_of(std::size_t seed) {
-    region_.clear();
-    visit(seed, image_.values[seed]);
-    for (std::size_t next = 0; next < region_.size(); ++next) {
-      const auto at = static_cast<std::int64_t>(region_[next]);
-      const std::int64_t x = at % image_.width, y = at / image_.width;
-      const float value = image_.values[region_[next]];
-      if (x > 0) visit(region_[next] - 1, value);
-      if (x + 1 < image_.width) visit(region_[next] + 1, value);
-      if (y > 0) visit(image_.index(x, y - 1), value);
-      if (y + 1 < image_.height) visit(image_.index(x, y + 1), value);
-    }
-    return region_;
-  }
-
- private:
-  void visit(std::size_t at, float value) {
-    if (seen_[at] || !image_.valid[at] || image_.values[at] != value) return;
-    seen_[at] = 1;
-    region_.push_back(at);
-  }
-
-  const MaskedImage& image_;
-  std::vector<std::uint8_t> seen_;
-  std::vector<std::size_t> region_;
+/// Pixels of the image, counted from its lower left one, with
+/// x·along_x + y·along_y < offset.
+struct HalfPlane {
+  double along_x = 0.0;
+  double along_y = 0.0;
+  double offset = 0.0;
 };
 
-std::vector<std::size_t> edge_pixels(const MaskedImage& image) {
-  std::vector<std::size_t> edge;
-  for (std::int64_t x = 0; x < image.width; ++x) {
-    edge.push_back(image.index(x, 0));
-    edge.push_back(image.index(x, image.height - 1));
-  }
-  for (std::int64_t y = 0; y < image.height; ++y) {
-    edge.push_back(image.index(0, y));
-    edge.push_back(image.index(image.width - 1, y));
-  }
-  return edge;
+HalfPlane beyond(const FillSide& side, const MaskedImage& image) {
+  const double along_x = std::cos(side.angle_rad), along_y = std::sin(side.angle_rad);
+  const double centre = 0.5 * (static_cast<double>(image.width - 1) * along_x +
+                               static_cast<double>(image.height - 1) * along_y);
+  return {along_x, along_y, centre + side.offset_px + kEdge_px};
 }
 
-float smallest_valid(const MaskedImage& image) {
-  float smallest = std::numeric_limits<float>::infinity();
-  for (std::size_t i = 0; i < image.values.size(); ++i) {
-    if (image.valid[i]) smallest = std::min(smallest, image.values[i]);
+std::int64_t mask_beyond_sides(const std::vector<FillSide>& sides, MaskedImage* image) {
+  std::vector<HalfPlane> planes;
+  for (const FillSide& side : sides) planes.push_back(beyond(side, *image));
+  std::int64_t num_marked = 0;
+  for (std::int64_t y = 0; y < image->height; ++y) {
+    for (std::int64_t x = 0; x < image->width; ++x) {
+      const bool is_rim = std::min({x, y, image->width - 1 - x, image->height - 1 - y}) < kRim_px;
+      const bool is_fill = std::any_of(planes.begin(), planes.end(), [&](const HalfPlane& plane) {
+        return static_cast<double>(x) * plane.along_x + static_cast<double>(y) * plane.along_y <
+               plane.offset;
+      });
+      if (!is_rim && !is_fill) continue;
+      const std::size_t at = image->index(x, y);
+      num_marked += image->valid[at];
+      image->valid[at] = 0;
+      image->values[at] = 0.0f;
+    }
   }
-  return smallest;
+  return num_marked;
 }
 
 }  // namespace
 
 std::int64_t mask_flat_fill(Contrast contrast, MaskedImage* image) {
-  const float empty = contrast == Contrast::kBright ? smallest_valid(*image)
-                                                    : std::numeric_limits<float>::quiet_NaN();
-  RegionFinder finder(*image);
-  std::vector<std::size_t> fill;
-  for (const std::size_t seed : edge_pixels(*image)) {
-    if (image->values[seed] == empty) continue;
-    const auto& region = finder.region_of(seed);
-    if (region.size() >= kFewestFillPixels) fill.insert(fill.end(), region.begin(), region.end());
-  }
-  for (const std::size_t at : fill) {
-    image->valid[at] = 0;
-    image->values[at] = 0.0f;
-  }
-  return static_cast<std::int64_t>(fill.size());
+  const std::vector<FillSide> sides = find_straight_fill(contrast, *image);
+  const std::int64_t num_constant = mask_constant_fill(contrast, image);
+  return sides.empty() ? num_constant : num_constant + mask_beyond_sides(sides, image);
 }
 
 }  // namespace tomofield::tilt_series

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+
+#include "tilt_series/image.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::tilt_series {
+
+/// Marks fill of exactly one value as no measurement: connected regions of
+/// equal pixels that hold a corner of the image (what lies outside a rotated or
+/// shifted image always does) and have at least 64 pixels.
+///
+/// Space without specimen looks the same where there is no noise. A region at
+/// its value (the smallest of a bright image, the largest of a dark one) is
+/// therefore kept, except for whole rows or columns at the edge that end at a
+/// line of differing pixels, as a shift leaves them. Returns the number of
+/// pixels marked.
+std::int64_t mask_constant_fill(Contrast contrast, MaskedImage* image);
+
+}  // namespace tomofield::tilt_series
