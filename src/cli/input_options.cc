@@ -1,6 +1,5 @@
 #include "cli/input_options.h"
 
-#include <map>
 #include <string>
 
 namespace tomofield::cli {
@@ -61,14 +60,15 @@ void add_image_options(CLI::App& command, TiltSeriesOptions& options) {
                   "Size of the stack's own pixels, where its header has none or a wrong one")
       ->type_name("Å")
       ->group(group);
-  const std::map<std::string, Contrast> contrasts{{"dark", Contrast::kDark},
-                                                  {"bright", Contrast::kBright}};
   command
-      .add_option("--contrast", options.contrast,
-                  "How the specimen looks: dark on bright, as a cryo microscope records it, or "
-                  "bright on dark, as dark-field images and line integrals are")
-      ->transform(CLI::CheckedTransformer(contrasts).description(""))
-      ->type_name("dark|bright")
+      .add_option_function<std::string>(
+          "--contrast",
+          [&options](const std::string& contrast) {
+            options.contrast = contrast == "dark" ? Contrast::kDark : Contrast::kBright;
+          },
+          "How the specimen looks: dark on bright, as a cryo microscope records it, or "
+          "bright on dark, as dark-field images and line integrals are")
+      ->check(CLI::IsMember({"dark", "bright"}))
       ->default_str("dark")
       ->group(group);
   command

@@ -42,6 +42,19 @@ std::string command_name(const CLI::App& program) {
   return name;
 }
 
+// CLI11 would say that a command is missing where it is misspelt.
+void require_known_command(const CLI::App& program, const std::vector<std::string>& arguments) {
+  const CLI::App* app = &program;
+  for (const std::string& word : arguments) {
+    if (app->get_require_subcommand_min() == 0 || word.rfind('-', 0) == 0) return;
+    const auto named =
+        app->get_subcommands([&](const CLI::App* sub) { return sub->get_name() == word; });
+    if (named.empty())
+      throw Error(fmt::format("there is no command '{}': `tomofield --help` lists them", word));
+    app = named.front();
+  }
+}
+
 }  // namespace
 
 int run_program(int argc, char** argv) {
@@ -53,6 +66,7 @@ int run_program(int argc, char** argv) {
   add_commands(program);
   try {
     std::vector<std::string> arguments(argv + 1, argv + argc);
+    require_known_command(program, arguments);
     expand_config_file(program, arguments);
     std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them last first
     program.parse(arguments);

@@ -15,8 +15,7 @@ class Faults {
  public:
   void require_between(const char* option, double value, double low, double high) {
     if (value >= low && value <= high) return;
-    found_.push_back(
-        fmt::format("{} must be from {:g} to {:g}, not {:g}", option, low, high, value));
+    found_.push_back(fmt::format("{} must be from {} to {}, not {}", option, low, high, value));
   }
   void require_not_negative(const char* option, double value) {
     if (value >= 0 && std::isfinite(value)) return;

@@ -135,7 +135,7 @@ void measure_brightness(const tilt_series::TiltSeries& series, PreparedSeries& p
 std::vector<std::string> SpecimenOptions::faults() const {
   std::vector<std::string> found;
   if (!(thickness >= 1 && thickness <= kLargestThickness)) {
-    found.push_back(fmt::format("--thickness must be from 1 to {:g} pixels, not {:g}",
+    found.push_back(fmt::format("--thickness must be from 1 to {} pixels, not {}",
                                 kLargestThickness, thickness));
   }
   if (hand != 1 && hand != -1) found.push_back(fmt::format("--hand must be 1 or -1, not {}", hand));

@@ -11,7 +11,7 @@ import warnings
 import mrcfile
 import numpy as np
 
-warnings.filterwarnings("ignore", module="mrcfile")  # NaN pixels are wanted here
+warnings.filterwarnings("ignore", category=RuntimeWarning)  # of NaN pixels, which are meant
 
 PROGRAM, SCRATCH = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
 
@@ -102,7 +102,7 @@ class Series:
 
 def merge(defaults, options):
     """The defaults without those that options give again, then the options."""
-    given = {str(option) for option in options if str(option).startswith("--")}
+    given = {str(option).split("=")[0] for option in options if str(option).startswith("--")}
     kept = []
     for i, word in enumerate(defaults):
         owner = word if str(word).startswith("--") else defaults[i - 1]

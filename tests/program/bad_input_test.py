@@ -1,0 +1,322 @@
+"""What reconstruct refuses: status 2, one sentence with the facts, nothing written or changed.
+
+usage: bad_input_test.py TOMOFIELD SCRATCH_DIR"""
+
+import os
+import re
+import resource
+import shutil
+import signal
+import struct
+import subprocess
+
+import mrcfile
+import numpy as np
+
+import harness
+from harness import fresh_directory, read_bytes, write_stack
+
+NX, NY, NUM_VIEWS = 40, 33, 7
+TILTS = np.linspace(-60, 60, NUM_VIEWS)
+
+inputs = fresh_directory("inputs")
+views = np.random.default_rng(1).normal(10, 1, (NUM_VIEWS, NY, NX)).astype(np.float32)
+
+
+def path(name):
+    return os.path.join(inputs, name)
+
+
+def text_file(name, text):
+    with open(path(name), "w") as file:
+        file.write(text)
+    return path(name)
+
+
+def stack_file(name, values=views):
+    write_stack(path(name), values, 10)
+    return path(name)
+
+
+def patched_stack(name, *patches):
+    """The good stack with other bytes at places of its header."""
+    contents = bytearray(read_bytes(stack))
+    for at, value in patches:
+        contents[at : at + len(value)] = value
+    with open(path(name), "wb") as file:
+        file.write(contents)
+    return path(name)
+
+
+stack = stack_file("good.mrc")
+tlt = text_file("good.tlt", "".join(f"{tilt:.1f}\n" for tilt in TILTS))
+GOOD = ["--tlt", tlt, "--thickness", 20, "--contrast", "bright"]
+
+
+def snapshot(directory):
+    found = {}
+    for folder, _, names in os.walk(directory):
+        for name in names:
+            found[os.path.join(folder, name)] = read_bytes(os.path.join(folder, name))
+    return found
+
+
+def refuse(words, *arguments, status=2, **keywords):
+    """Checks that the program refuses these arguments for a reason that has these words."""
+    before = snapshot(harness.SCRATCH)
+    result = harness.tomofield(*arguments, **keywords)
+    assert result.returncode == status, (arguments, result)
+    complaints = [line for line in result.stderr.splitlines() if line.startswith("tomofield: ")]
+    assert len(complaints) == 1 and complaints[0] == result.stderr.splitlines()[-1], result.stderr
+    # A sentence that a person can read, no number of three hundred digits.
+    assert len(complaints[0]) < 700 and not re.search(r"\d{25}", complaints[0]), complaints[0]
+    for sign in ("terminate called", "internal error", "what()", "Traceback", "Aborted"):
+        assert sign not in result.stderr, result.stderr
+    for word in words:
+        assert str(word) in complaints[0], (word, complaints[0])
+    assert snapshot(harness.SCRATCH) == before, arguments
+    return complaints[0]
+
+
+out = os.path.join(fresh_directory("results"), "out.mrc")
+
+
+def refuse_series(words, file=stack, *options):
+    """The same of a series, its options beside the good ones."""
+    refuse(words, "reconstruct", file, "-o", out, *harness.merge(GOOD, options))
+
+
+def test_counts_that_differ():
+    short = text_file("short.tlt", "0\n1\n2\n")
+    refuse_series([short, stack, 3, NUM_VIEWS], stack, "--tlt", short)
+    long = text_file("long.tlt", "1\n" * (NUM_VIEWS + 1))
+    refuse_series([long, stack, NUM_VIEWS + 1, NUM_VIEWS], stack, "--tlt", long)
+    few = text_file("few.xf", "1 0 0 1 0 0\n" * 5)
+    refuse_series([few, stack, 5, NUM_VIEWS], stack, "--xf", few)
+    few = text_file("few.xtilt", "0\n" * 2)
+    refuse_series([few, stack, 2, NUM_VIEWS], stack, "--xtilt", few)
+    empty = text_file("empty.tlt", "")
+    refuse_series([empty, 0, NUM_VIEWS], stack, "--tlt", empty)
+
+
+def test_angles_that_are_none():
+    for line, word in (("twelve", "twelve"), ("nan", "nan"), ("inf", "inf"), ("80.5", "80.5"),
+                       ("-81", "-81"), ("1e400", "1e400"), ("3,5", "3,5")):
+        name = text_file("angles.tlt", "0\n1\n" + line + "\n3\n4\n5\n6\n")
+        refuse_series([name, "line 3", word], stack, "--tlt", name)
+    refuse_series([stack], stack, "--tlt", stack)  # swapped
+    refuse(["--tlt"], "reconstruct", stack, "-o", out, "--thickness", 20)  # none at all
+    bad = text_file("bad.xf", "1 0 0 1 0 0\n" * 6 + "0 0 0 0 0 0\n")
+    refuse_series([bad, "line 7"], stack, "--xf", bad)
+    bad = text_file("bad.aln", "what is this\n")
+    refuse_series([bad], stack, "--aln", bad)
+
+
+def test_files_that_are_missing_or_something_else():
+    absent = path("absent")
+    refuse_series([absent], absent)
+    for option in ("--tlt", "--xf", "--xtilt", "--aln", "--mdoc"):
+        refuse_series([absent], stack, option, absent)
+    refuse_series([inputs], inputs)
+    refuse_series([inputs], stack, "--tlt", inputs)
+    refuse_series([tlt], tlt)
+    refuse_series(["/dev/null"], "/dev/null")
+    refuse_series(["x" * 20], "x" * 300)  # longer than a file's name may be
+
+
+def test_damaged_stacks():
+    whole = read_bytes(stack)
+    for length in (0, 500, 1024, len(whole) - 1):
+        with open(path("torn.mrc"), "wb") as file:
+            file.write(whole[:length])
+        refuse_series([path("torn.mrc"), length] + [len(whole)] * (length >= 1024), path("torn.mrc"))
+    integer = lambda value: struct.pack("<i", value)
+    for name, at, value in (
+        ("negative.mrc", 0, integer(-5)),
+        ("zero.mrc", 4, integer(0)),
+        ("huge.mrc", 0, integer(2**31 - 1) * 3),
+        ("mode.mrc", 12, integer(99)),
+        ("complex.mrc", 12, integer(4)),
+        ("skip.mrc", 92, integer(-1024)),
+        ("far.mrc", 92, integer(2**31 - 1)),
+        ("noise.mrc", 0, bytes(range(7, 231))),
+    ):
+        name = patched_stack(name, (at, value))
+        refuse_series([name], name)
+
+
+def test_pixels_that_are_no_measurements():
+    for value in (np.nan, np.inf, -np.inf):
+        values = views.copy()
+        values[4, :2] = value  # 80 of 1320: 6 %
+        name = stack_file("holes.mrc", values)
+        refuse_series([name, "80", "section 5", "--exclude 5"], name)
+    values = views.copy()
+    values[4, 3, :4] = [np.nan, np.inf, -np.inf, np.nan]
+    name = stack_file("four.mrc", values)
+    result = harness.succeed("reconstruct", name, "-o", out, *GOOD, "--dry-run")
+    assert re.search("warning: .*section 5.* 4 NaN or infinite", result.stderr), result.stderr
+    values = views.copy()
+    values[2] = 7
+    name = stack_file("constant.mrc", values)
+    refuse_series([name, "section 3", "constant", "--exclude 3"], name)
+    harness.succeed("reconstruct", name, "-o", out, *GOOD, "--dry-run", "--exclude", 3)
+    refuse_series(["8", "1 to 7"], stack, "--exclude", 8)
+    refuse_series(["two"], stack, "--exclude", "two")
+    refuse_series([stack], stack, "--exclude", f"1-{NUM_VIEWS}")  # none is left
+    refuse_series(["--log"], stack, "--contrast", "bright", "--log")
+    negative = stack_file("negative.mrc", -views)
+    refuse_series([negative, "--log"], negative, "--contrast", "dark", "--log")
+    away = text_file("away.xf", "1 0 0 1 1000 0\n" * NUM_VIEWS)
+    refuse_series([stack, "section 1"], stack, "--xf", away)
+
+
+def test_options_that_make_no_sense():
+    for option, values in {
+        "--thickness": [0, -5, "nan", "inf", 1e12, "thick", ""],
+        "--leaf-size": [0, -16, 17, 8, 1 << 20, 32.5],
+        "--bin": [0.5, 0, -2, "nan", "inf", 1000],
+        "--angpix": [5, -1, "nan"],
+        "--pixel-size": [0, -1, "nan", "inf"],
+        "--subsets": [0, -1, 1.5, 1e30],
+        "--epochs": [0, -3, 99999999999],
+        "--rank": [0, 1000],
+        "--vertex-spacing": [0, -1, "nan", 1000],
+        "--margin-spacing": [0, "nan", 1e9],
+        "--learning-rate": [0, -1, "nan", "inf"],
+        "--tv": [-1, "nan", "inf"],
+        "--tv-factors": [-1, "nan"],
+        "--checkpoint-minutes": [-1, "nan"],
+        "--seed": [-1, 1.5, 1e40],
+        "--hand": [0, 2],
+        "--center": ["nan", "20,nan", 1e9, "20,-1e9", "1,2,3"],
+        "--roi": ["0,0,41,33", "-1,0,9,9", "5,5,5,9", "9,9,3,3", "0,0,9", "0,0,9,9,9", "a,b,c,d",
+                  "0,0,9,99999999999999999999"],
+        "--field": ["mesh"],
+        "--contrast": ["grey"],
+        "--mode": [0, 3],
+        "--axes": ["zyx"],
+        "--view-scale": ["maybe"],
+        "--threads": [0, 5000],
+    }.items():
+        for value in values:
+            refuse_series([option.split("-")[2]], stack,
+                          f"{option}={value}")
+    refuse_series(["--nonsense"], stack, "--nonsense")
+    refuse_series(["more.mrc"], stack, "more.mrc")
+    refuse_series(["--bin", "--angpix"], stack, "--bin", 2, "--angpix", 20)
+    refuse_series(["--overwrite", "--resume"], stack, "--overwrite", "--resume")
+    refuse(["--thickness"], "reconstruct", stack, "-o", out, "--tlt", tlt)
+    refuse(["-o", "--output"][1:], "reconstruct", stack, *GOOD)
+    refuse(["stack"], "reconstruct", "-o", out, *GOOD)
+    refuse(["--help"])
+    refuse(["reconstrct"], "reconstrct")
+    # Every mistake at once.
+    refuse_series(["--tv", "--rank", "--leaf-size"], stack, "--tv", -1, "--rank", 0,
+                  "--leaf-size", 1)
+
+
+def refuse_output(words, output, *options):
+    refuse(words, "reconstruct", stack, "-o", output, *GOOD, *options)
+
+
+def test_outputs_that_cannot_be_written():
+    for output in (os.path.join(inputs, "no", "out.mrc"), os.path.join(stack, "out.mrc"),
+                   "/proc/nowhere/out.mrc", "/dev/full", inputs, inputs + "/", "",
+                   os.path.join(inputs, "x" * 300)):
+        refuse_output([output[:40]], output, "--overwrite")
+    refuse_output(["out.h5", ".mrc"], path("out.h5"))
+    refuse_output(["out.json", ".mrc"], path("out.json"))
+
+
+def test_outputs_that_exist_are_kept():
+    directory = fresh_directory("existing")
+    for name in ("out.mrc", "out.h5", "out.json", "out_xy.png", "out_yz.png"):
+        existing = os.path.join(directory, name)
+        with open(existing, "w") as file:
+            file.write("years of work")
+        refuse_output([existing, "--overwrite"], os.path.join(directory, "out.mrc"))
+        refuse_output([existing, "--overwrite"], os.path.join(directory, "out.mrc"), "--dry-run")
+        os.remove(existing)
+    for method in ("sirt", "tv"):
+        refuse(["good.mrc"], "baseline", method, stack, "-o", stack, *GOOD, "--overwrite")
+
+
+def test_the_input_is_never_the_output():
+    os.symlink(stack, path("link.mrc"))
+    os.link(stack, path("same.mrc"))
+    for output in (stack, os.path.join(inputs, ".", "good.mrc"), path("link.mrc"),
+                   path("same.mrc"), os.path.relpath(stack)):
+        for options in ([], ["--overwrite"], ["--resume"]):
+            refuse_output(["input", stack], output, *options)
+    # Nor is it what lies beside the output: figures in place of the angles.
+    angles = text_file("angles.json", open(tlt).read())
+    refuse(["input", angles], "reconstruct", stack, "-o", path("angles.mrc"),
+           *harness.merge(GOOD, ["--tlt", angles]), "--overwrite")
+
+
+def test_a_full_disk():
+    def with_little_room():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+
+    for name, options in (("model", []), ("checkpoint", ["--checkpoint-minutes", 0])):
+        directory = fresh_directory("full")
+        refuse([directory], "reconstruct", stack, "-o", os.path.join(directory, "out.mrc"),
+               *GOOD, "--no-margin", "--epochs", 1, *options,
+               preexec_fn=with_little_room, restore_signals=False)
+        assert os.listdir(directory) == []
+
+
+def run_measured(*arguments):
+    """Exit status, output and the largest resident size in MiB of a run."""
+    with open(path("stdout"), "w") as output, open(path("stderr"), "w") as errors:
+        run = subprocess.Popen([harness.PROGRAM, *map(str, arguments)], stdout=output,
+                               stderr=errors)
+        _, status, usage = os.wait4(run.pid, 0)
+    run.returncode = os.waitstatus_to_exitcode(status)
+    return (run.returncode, open(path("stdout")).read() + open(path("stderr")).read(),
+            usage.ru_maxrss / 1024)
+
+
+def test_memory_is_estimated_first():
+    # Views of 4096 × 4096 with something to see: the same tile all over.
+    tile = np.random.default_rng(2).integers(0, 100, (256, 256), dtype=np.int8)
+    large = path("large.mrc")
+    with mrcfile.new_mmap(large, (2, 4096, 4096), mrc_mode=0) as file:
+        for section in range(2):
+            file.data[section] = np.tile(tile, (16, 16))
+        file.set_image_stack()
+        file.voxel_size = 1
+    options = ["-o", out, "--tlt", text_file("two.tlt", "0\n10\n"), "--contrast", "bright"]
+    before = os.listdir(os.path.dirname(out))
+    status, text, mebibytes = run_measured("reconstruct", large, *options, "--thickness", 50,
+                                           "--bin", 8, "--dry-run")
+    assert status == 0 and re.search(r"about \d+\.\d\d GiB of memory", text), text
+    assert mebibytes < 1024, mebibytes
+    status, text, mebibytes = run_measured("reconstruct", large, *options, "--thickness", 100000,
+                                           "--roi", "0,0,4096,16")
+    assert status == 2 and mebibytes < 1024, (status, text, mebibytes)
+    assert re.search(r"tomofield: .*needs about \d{4,}\.\d GiB .* \d+\.\d GiB .*--bin", text), text
+    assert os.listdir(os.path.dirname(out)) == before == []
+    os.remove(large)
+
+
+def test_a_stack_of_nothing_is_answered_in_little_memory():
+    # 61 views of 4096 × 4096 floats that exist in the header alone.
+    header = bytearray(read_bytes(stack)[:1024])
+    header[0:12] = struct.pack("<3i", 4096, 4096, 61)
+    header[28:40] = struct.pack("<3i", 4096, 4096, 61)
+    empty = path("empty.mrc")
+    with open(empty, "wb") as file:
+        file.write(header)
+        file.truncate(1024 + 61 * 4096 * 4096 * 4)
+    angles = text_file("all.tlt", "".join(f"{tilt}\n" for tilt in range(-60, 61, 2)))
+    status, text, mebibytes = run_measured("reconstruct", empty, "-o", out, "--tlt", angles,
+                                           "--thickness", 300, "--bin", 4, "--dry-run")
+    assert status == 2 and "section 1" in text and "constant" in text, text
+    assert mebibytes < 1024, mebibytes
+    os.remove(empty)
+
+
+harness.run_tests(globals())
