@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
@@ -28,6 +29,9 @@ bool must_stay_quiet = false;
 class QuietErrors {
  public:
   QuietErrors() {
+    // HDF5 1.10 crashes when it ends a program in which a file could not be
+    // closed for want of disk space. Files are closed here, so it has nothing to end.
+    [[maybe_unused]] static const herr_t never_at_exit = H5dont_atexit();
     H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   }
@@ -50,6 +54,13 @@ std::string last_reason() {
     return 0;
   };
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, visit, &reason);
+  // Failed system calls come with all their arguments; what the system said is enough.
+  constexpr std::string_view kSystemMessage = "error message = '";
+  const std::size_t message = reason.find(kSystemMessage);
+  if (message != std::string::npos) {
+    const std::string said = reason.substr(message + kSystemMessage.size());
+    reason = said.substr(0, said.find('\''));
+  }
   return reason.empty() ? "unknown reason" : reason;
 }
 
@@ -89,7 +100,8 @@ struct Stored<std::int64_t> {
 };
 
 [[noreturn]] void fail_writing(const std::string& file, const std::string& item) {
-  throw Error(fmt::format("cannot write '{}' of '{}': {}", item, file, last_reason()));
+  throw Error(
+      fmt::format("cannot write '{}' of '{}' ({}): is the disk full?", item, file, last_reason()));
 }
 
 [[noreturn]] void fail_reading(const std::string& file, const std::string& item,
