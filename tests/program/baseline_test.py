@@ -1,0 +1,182 @@
+"""baseline sirt and tv from end to end: the inputs, outputs and errors of reconstruct.
+
+usage: baseline_test.py TOMOFIELD SCRATCH_DIR"""
+
+import io
+import json
+import os
+
+import mrcfile
+import numpy as np
+import skimage.io
+
+import harness
+from harness import HEIGHT, PIXEL_SIZE, THICKNESS, TILTS, WIDTH, psnr, read_bytes
+
+EMPTY_BEAM = 500.0
+DEFAULTS = ["--thickness", THICKNESS, "--contrast", "bright", "--no-margin"]
+METHODS = {"sirt": ["--iterations", 12], "tv": ["--iterations", 40, "--weight", 2]}
+
+series = harness.Series("series")
+
+
+class Baseline(harness.Results):
+    """The files of a run: no model."""
+
+    def __init__(self, output):
+        super().__init__(output)
+        self.all_paths.remove(self.model_path)
+
+    @property
+    def record(self):
+        return json.load(open(self.json_path))
+
+
+def baseline(method, name, *options, source=series, run=harness.succeed, **keywords):
+    output = os.path.join(harness.fresh_directory(f"{method}-{name}"), "out.mrc")
+    options = harness.merge([*DEFAULTS, *METHODS[method]], options)
+    result = run("baseline", method, *source.input, "-o", output, *options, **keywords)
+    return Baseline(output), result
+
+
+plain = {method: baseline(method, "plain")[0] for method in METHODS}
+
+
+def test_volume_is_an_mrc_file_that_others_read():
+    for results in plain.values():
+        report = io.StringIO()
+        assert mrcfile.validate(results.volume_path, print_file=report), report.getvalue()
+        with mrcfile.open(results.volume_path) as file:
+            assert file.data.shape == (THICKNESS, HEIGHT, WIDTH) and file.is_volume()
+            for axis, size in zip("xyz", (WIDTH, HEIGHT, THICKNESS)):
+                assert file.header.cella[axis] == np.float32(size * PIXEL_SIZE)
+            assert b"baseline" in file.header.label[0]
+        for plane, path in results.pictures.items():
+            assert skimage.io.imread(path).shape[1] >= 512, plane
+        assert not results.leftovers()
+
+
+def test_specimen_is_found_and_tv_is_the_better_one():
+    flat = psnr(np.full_like(series.truth, series.truth.mean()), series.truth)
+    gain = {method: psnr(plain[method].volume, series.truth) - flat for method in METHODS}
+    print({method: f"{value:.2f} dB" for method, value in gain.items()}, "above a flat volume")
+    assert gain["sirt"] > 2 and gain["tv"] > gain["sirt"] + 0.5, gain
+
+
+def test_densities_are_not_negative_unless_allowed():
+    for method, results in plain.items():
+        assert results.volume.min() >= 0
+        weak = ["--weight", 0.1] if method == "tv" else []
+        free, _ = baseline(method, "free", "--non-negative", "off", *weak)
+        assert free.volume.min() < 0, method
+        assert free.record["options"]["method"]["non_negative"] is False
+
+
+def test_json_has_figures_and_every_option():
+    for method, results in plain.items():
+        options, figures = results.record["options"], results.record["figures"]
+        assert options["input"]["stack"] == series.stack
+        assert options["specimen"]["thickness"] == THICKNESS
+        assert options["with_margin"] is False
+        assert options["method"]["name"] == method
+        iterations = METHODS[method][1]
+        assert options["method"]["iterations"] == iterations
+        for history in ("mean_squared_residual_per_noise_variance", "objective"):
+            values = figures[history]
+            assert len(values) == iterations + 1 and values[-1] < 0.5 * values[0], history
+        assert figures["size_px"] == [WIDTH, HEIGHT, THICKNESS]
+        np.testing.assert_allclose([view["tilt_deg"] for view in figures["views"]], TILTS)
+    assert plain["tv"].record["options"]["method"]["weight"] == 2
+    assert plain["sirt"].record["options"]["method"]["relaxation"] == 1
+
+
+def test_region_of_interest_is_a_part_of_the_whole():
+    x0, y0, x1, y1 = 10, 5, 41, 30
+    for method in METHODS:
+        whole = baseline(method, "whole", "--margin-spacing", 1)[0].volume
+        part, _ = baseline(method, "part", "--roi", f"{x0},{y0},{x1},{y1}", "--margin-spacing", 1,
+                           run=with_margin)
+        assert part.volume.shape == (THICKNESS, y1 - y0, x1 - x0)
+        inside = whole[:, y0:y1, x0:x1]
+        correlation = np.corrcoef(part.volume.ravel(), inside.ravel())[0, 1]
+        print(f"{method}: correlation of part and whole {correlation:.3f}")
+        assert correlation > 0.95
+
+
+def with_margin(*arguments, **keywords):
+    return harness.succeed(*[word for word in arguments if word != "--no-margin"], **keywords)
+
+
+def test_hand_mirrors_the_volume():
+    other, _ = baseline("sirt", "hand", "--hand", -1)
+    np.testing.assert_allclose(other.volume[::-1], plain["sirt"].volume, atol=2e-3)
+
+
+def test_dark_contrast_comes_out_dark():
+    dark = series.with_views("dark", EMPTY_BEAM - series.views)
+    results, _ = baseline("tv", "dark", "--contrast", "dark", "--view-scale", "off", source=dark)
+    assert np.corrcoef(results.volume.ravel(), -series.truth.ravel())[0, 1] > 0.7
+    inverted, _ = baseline("tv", "inverted", "--contrast", "dark", "--view-scale", "off", "--invert",
+                           source=dark)
+    np.testing.assert_array_equal(inverted.volume, -results.volume)
+
+
+def test_axes_of_the_file():
+    swapped, _ = baseline("sirt", "xzy", "--axes", "xzy")
+    # Sections along y, rows down from the upper face.
+    np.testing.assert_array_equal(swapped.volume[:, ::-1].transpose(1, 0, 2),
+                                  plain["sirt"].volume)
+
+
+def test_threads_do_not_change_a_byte():
+    for method in METHODS:
+        for threads in (1, 2):
+            results, _ = baseline(method, f"threads{threads}", "--threads", threads)
+            assert read_bytes(results.volume_path) == read_bytes(plain[method].volume_path)
+
+
+def test_dry_run_writes_nothing():
+    results, run = baseline("tv", "dry", "--dry-run")
+    assert "GiB" in run.stdout and f"{WIDTH} × {HEIGHT} × {THICKNESS}" in run.stdout
+    assert not results.leftovers() and not os.path.exists(results.volume_path)
+
+
+def test_existing_results_are_kept_unless_overwritten():
+    for method, results in plain.items():
+        before = read_bytes(results.volume_path)
+        arguments = ["baseline", method, *series.input, *DEFAULTS, "-o", results.volume_path,
+                     "--iterations", 1]
+        refused = harness.tomofield(*arguments)
+        assert refused.returncode == 2, refused.stderr
+        assert results.volume_path in refused.stderr and "--overwrite" in refused.stderr
+        assert read_bytes(results.volume_path) == before
+        copy, _ = baseline(method, "overwritten")
+        arguments[arguments.index(results.volume_path)] = copy.volume_path
+        harness.succeed(*arguments, "--overwrite")
+        assert read_bytes(copy.volume_path) != before
+
+
+def test_bad_input_gets_a_sentence_and_nothing_is_written():
+    short = series.with_views("short", series.views[:-1])
+    cases = [
+        (["--thickness", 0], series, "thickness"),
+        (["--iterations", 0], series, "iterations"),
+        (["--weight", "-1"], series, "weight"),
+        (["--roi", "0,0,4000,10"], series, "--roi"),
+        (["--margin-spacing", 0.1], series, "margin-spacing"),
+        ([], short, str(len(TILTS))),
+    ]
+    for options, source, expected in cases:
+        results, run = baseline("tv", "bad", *options, source=source, run=harness.tomofield)
+        assert run.returncode == 2, (options, run.returncode, run.stderr)
+        assert expected in run.stderr and "internal" not in run.stderr, run.stderr
+        assert not results.leftovers() and not os.path.exists(results.volume_path)
+
+
+def test_a_method_has_to_be_named():
+    for arguments in (["baseline"], ["baseline", "wbp", *series.input]):
+        run = harness.tomofield(*arguments)
+        assert run.returncode == 2 and run.stderr, (arguments, run.stderr)
+
+
+harness.run_tests(globals())
