@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import warnings
 
 import mrcfile
@@ -39,6 +40,21 @@ def succeed(*arguments, **keywords):
     result = tomofield(*arguments, **keywords)
     assert result.returncode == 0, (arguments, result.returncode, result.stderr)
     return result
+
+
+def run_measured(*arguments):
+    """Exit status, all output, and the largest resident size in MiB of a run."""
+    with tempfile.TemporaryFile("w+") as output:
+        run = subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=output, stderr=output)
+        _, status, usage = os.wait4(run.pid, 0)
+        run.returncode = os.waitstatus_to_exitcode(status)
+        output.seek(0)
+        return run.returncode, output.read(), usage.ru_maxrss / 1024
+
+
+def is_sanitized():
+    """Whether sanitizers watch the program, whose memory is then not the program's own."""
+    return b"__asan_init" in read_bytes(PROGRAM) or b"__tsan_init" in read_bytes(PROGRAM)
 
 
 def fresh_directory(name):

@@ -235,6 +235,24 @@ def test_config_file():
     assert sorted(os.listdir(directory)) == sorted(before)
 
 
+def test_dry_run_writes_nothing_and_knows_the_memory():
+    directory = harness.fresh_directory("dry")
+    options = harness.merge(harness.QUICK, ["--epochs", 1, "--subsets", 1, "--rank", 256,
+                                            "--checkpoint-minutes", 0])
+    arguments = ["reconstruct", *series.input, "-o", os.path.join(directory, "out.mrc"), *options]
+    plan = harness.succeed(*arguments, "--dry-run").stdout
+    assert os.listdir(directory) == []
+    assert f"{len(TILTS)} views of {WIDTH} × {HEIGHT} pixels" in plan, plan
+    assert f"tomogram {WIDTH} × {HEIGHT} × {THICKNESS} voxels" in plan, plan
+    estimate = 1024 * float(re.search(r"about ([\d.]+) GiB of memory", plan)[1])
+    if harness.is_sanitized():
+        return
+    status, text, measured = harness.run_measured(*arguments)
+    assert status == 0, text
+    print(f"memory: {estimate:.0f} MiB estimated, {measured:.0f} MiB measured")
+    assert 0.8 < estimate / measured < 1.25, (estimate, measured)
+
+
 LONG = ["--epochs", 100000, "--overwrite"]
 
 
