@@ -6,13 +6,12 @@ set(HDF5_PREFER_PARALLEL OFF)
 find_package(HDF5 REQUIRED COMPONENTS C)
 find_package(PNG REQUIRED)
 find_package(fmt REQUIRED)
-find_package(spdlog REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(tomlplusplus REQUIRED)
 
 set(TOMOFIELD_LIBRARIES
-  OpenMP::OpenMP_CXX Threads::Threads hwy::hwy HDF5::HDF5 PNG::PNG fmt::fmt spdlog::spdlog
+  OpenMP::OpenMP_CXX Threads::Threads hwy::hwy HDF5::HDF5 PNG::PNG fmt::fmt
   nlohmann_json::nlohmann_json)
 set(TOMOFIELD_CLI_LIBRARIES CLI11::CLI11 tomlplusplus::tomlplusplus)
 

@@ -16,7 +16,6 @@
 #include "projection/sample_grid.h"
 #include "reconstruct/options_json.h"
 #include "reconstruct/result_files.h"
-#include "report/slices.h"
 
 namespace tomofield::baseline {
 namespace {
@@ -210,7 +209,6 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   const field::ModelInfo info = volume_info(series, options);
   write_voxels(voxels_of(solution.densities), reconstruct::region_box(info, 1.0), info,
                is_tv(options) ? "baseline tv" : "baseline sirt", options.volume, paths.volume);
-  report::write_slice_pictures(paths.volume, paths.picture_prefix);
   io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
                               {"options", options_json(options)},
                               {"figures", figures_json(solution, problem, series, fit_seconds)}});

@@ -55,7 +55,7 @@ struct BaselineSummary {
 };
 
 /// Reads the series, reconstructs, writes the volume (MRC, the input's units and contrast),
-/// the figures and resolved options (JSON) and pictures of the central slices. Call
+/// and the figures and resolved options (JSON). Call
 /// check_outputs() and plan_baseline() first: this starts at once.
 BaselineSummary run_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options,
                              const base::ProgressSink& progress);

@@ -9,6 +9,7 @@
 #include "cli/common_options.h"
 #include "cli/input_options.h"
 #include "cli/number_checks.h"
+#include "cli/pictures.h"
 #include "cli/progress_bar.h"
 #include "cli/specimen_options.h"
 #include "cli/volume_options.h"
@@ -53,9 +54,8 @@ void run(Arguments<Method>& arguments) {
       "last tenth of the iterations\n",
       summary.mean_squared_residual, 100 * summary.last_decrease);
   const baseline::BaselinePaths paths = baseline::baseline_paths(options.output);
-  const std::string prefix = paths.picture_prefix.string();
-  fmt::print("tomogram  {}\nfigures   {}\npictures  {}_xy.png {}_xz.png {}_yz.png\n",
-             paths.volume.string(), paths.json.string(), prefix, prefix, prefix);
+  fmt::print("tomogram  {}\nfigures   {}\n", paths.volume.string(), paths.json.string());
+  write_pictures(paths.volume, paths.picture_prefix);
 }
 
 template <typename Method>

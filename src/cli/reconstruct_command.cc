@@ -11,6 +11,7 @@
 #include "cli/exit_status.h"
 #include "cli/input_options.h"
 #include "cli/number_checks.h"
+#include "cli/pictures.h"
 #include "cli/progress_bar.h"
 #include "cli/specimen_options.h"
 #include "cli/volume_options.h"
@@ -130,10 +131,8 @@ void print_plan(const reconstruct::ReconstructOptions& options, const reconstruc
 }
 
 void print_files(const reconstruct::OutputPaths& paths) {
-  fmt::print("tomogram  {}\nmodel     {}\nfigures   {}\npictures  {}_xy.png {}_xz.png {}_yz.png\n",
-             paths.volume.string(), paths.model.string(), paths.json.string(),
-             paths.picture_prefix.string(), paths.picture_prefix.string(),
-             paths.picture_prefix.string());
+  fmt::print("tomogram  {}\nmodel     {}\nfigures   {}\n", paths.volume.string(),
+             paths.model.string(), paths.json.string());
 }
 
 void run(Arguments& arguments) {
@@ -159,6 +158,7 @@ void run(Arguments& arguments) {
             paths.model.string(), options.overwrite ? " instead of --overwrite" : ""));
   }
   print_files(paths);
+  write_pictures(paths.volume, paths.picture_prefix);
 }
 
 }  // namespace

@@ -100,8 +100,10 @@ void write_arrays(Hdf5Group group, const std::map<std::string, std::vector<T>>& 
   for (const auto& [name, values] : arrays) group.write_array<T>(name, values);
 }
 
-void write_training(Hdf5Group group, const TrainingState& state) {
-  write_arrays(group.create_group("floats"), state.floats);
+void write_training(Hdf5Group group, const TrainingState& state, const FloatArrays& more_floats) {
+  Hdf5Group floats = group.create_group("floats");
+  for (const auto& [name, values] : state.floats) floats.write_array<float>(name, values);
+  for (const auto& [name, values] : more_floats) floats.write_array<float>(name, values);
   write_arrays(group.create_group("doubles"), state.doubles);
   write_arrays(group.create_group("integers"), state.integers);
 }
@@ -210,8 +212,8 @@ class ModelReader {
       Integers column(shapes.size());
       group.read_array<std::int64_t>(name, column);
       for (std::size_t i = 0; i < shapes.size(); ++i) {
-        constexpr std::int64_t kMost = 1 << 16;
-        require(column[i] >= least && column[i] <= kMost, "a leaf has an impossible shape");
+        require(column[i] >= least && column[i] <= LeafShape::kMostVertices,
+                "a leaf has an impossible shape");
         shapes[i].*member = static_cast<int>(column[i]);
       }
     };
@@ -275,7 +277,7 @@ class ModelReader {
 }  // namespace
 
 void save_model(const std::filesystem::path& path, const Field& field, const ModelInfo& info,
-                const TrainingState* training) {
+                const TrainingState* training, const FloatArrays& more_floats) {
   require_finite_parameters(field.parameters(),
                             fmt::format("the fit diverged, so '{}' is left as it was; a lower "
                                         "learning rate may help",
@@ -294,7 +296,8 @@ void save_model(const std::filesystem::path& path, const Field& field, const Mod
       root.write_text("options_json", info.options_json);
       write_geometry(root.create_group("geometry"), info);
       write_field(root.create_group("field"), field);
-      if (training != nullptr) write_training(root.create_group("training"), *training);
+      if (training != nullptr)
+        write_training(root.create_group("training"), *training, more_floats);
     }
     file.close();
   }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -38,12 +39,16 @@ struct TrainingState {
   bool operator==(const TrainingState&) const = default;
 };
 
+/// Large arrays of a training state that are written from where they are.
+using FloatArrays = std::map<std::string, std::span<const float>>;
+
 /// Writes a model (docs/model-format.md): atomically, so that `path` holds the
 /// old file or the whole new one, whatever happens. Parameters are written
 /// from where they are. Throws Error if `path` cannot be written, or if a
 /// parameter is not finite, which would replace a good model by a useless one.
+/// `more_floats` join those of `training`, without which they are not written.
 void save_model(const std::filesystem::path& path, const Field& field, const ModelInfo& info,
-                const TrainingState* training = nullptr);
+                const TrainingState* training = nullptr, const FloatArrays& more_floats = {});
 void save_model(const std::filesystem::path& path, const Model& model,
                 const TrainingState* training = nullptr);
 

@@ -53,15 +53,17 @@ ViewSums data_term(const ViewModel& model, double multiplicity, const float* mea
   return sums;
 }
 
+// Keeps the equations of a view without rays solvable: it gets scale 1, offset 0.
+constexpr double kNoRays = 1e-9;
+
 void fit_nuisances(const NuisancePrior& prior, const std::vector<ViewSums>& sums,
                    std::vector<ViewModel>& views) {
   double log_scales = 0.0;
   for (std::size_t v = 0; v < views.size(); ++v) {
     const ViewSums& s = sums[v];
     const double w = views[v].weight;
-    // Normal equations of w Σ (a p + o − b)² + ((a − 1) / σa)² + (o / σo)².
-    const double prior_a = 1.0 / (prior.scale_spread * prior.scale_spread);
-    const double prior_o = 1.0 / (prior.offset_spread * prior.offset_spread);
+    const double prior_a = prior.shrinkage * w * s.pp + kNoRays;
+    const double prior_o = prior.shrinkage * w * s.n + kNoRays;
     const double aa = w * s.pp + prior_a, ao = w * s.p, oo = w * s.n + prior_o;
     const double rhs_a = w * s.pb + prior_a, rhs_o = w * s.b;
     const double determinant = aa * oo - ao * ao;

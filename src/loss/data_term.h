@@ -29,13 +29,16 @@ struct ViewSums {
 ViewSums data_term(const ViewModel& model, double multiplicity, const float* measured,
                    const std::uint16_t* mask, std::int64_t width, float* rays);
 
-/// Per-view scale and offset in closed form, least squares with a shrinkage
-/// prior: scale ~ 1 ± scale_spread, offset ~ 0 ± offset_spread (in the data's
-/// units). Without the prior an extended slab's laterally constant part could
-/// move into free offsets. Afterwards Σ log scale = 0.
+/// Per-view scale and offset in closed form: least squares with a shrinkage
+/// prior worth `shrinkage` times the view's own rays,
+///
+///   min  w Σ (a p + o − b)² + shrinkage · w (Σ p² (a − 1)² + n o²).
+///
+/// Without it an extended slab's laterally constant part could stay in free
+/// offsets; with it each fit leaves a share of the residual to the density,
+/// which takes it over in the course of the epochs. Afterwards Σ log scale = 0.
 struct NuisancePrior {
-  double scale_spread = 0.1;
-  double offset_spread = 0.1;
+  double shrinkage = 0.1;
 };
 void fit_nuisances(const NuisancePrior& prior, const std::vector<ViewSums>& sums,
                    std::vector<ViewModel>& views);

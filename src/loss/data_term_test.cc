@@ -133,7 +133,7 @@ Truth balanced_truth() { return {{0.8, 1.25, 1.6, 0.625, 1.0}, {0.3, -0.2, 0.0, 
 TEST(Nuisances, AreFoundExactlyUnderWeakPriors) {
   const Truth truth = balanced_truth();
   std::vector<ViewModel> views(5, ViewModel{.scale = 3, .offset = 9, .weight = 4});
-  fit_nuisances({.scale_spread = 1e6, .offset_spread = 1e6}, sums_of_views(truth), views);
+  fit_nuisances({.shrinkage = 1e-12}, sums_of_views(truth), views);
   for (std::size_t v = 0; v < views.size(); ++v) {
     EXPECT_NEAR(views[v].scale, truth.scales[v], 1e-9) << v;
     EXPECT_NEAR(views[v].offset, truth.offsets[v], 1e-8) << v;
@@ -144,36 +144,36 @@ TEST(Nuisances, AreFoundExactlyUnderWeakPriors) {
 TEST(Nuisances, ScalesKeepTheirGeometricMeanAtOne) {
   Truth truth = balanced_truth();
   for (double& scale : truth.scales) scale *= 1.7;  // the density's business
-  for (const double spread : {0.05, 1e6}) {
+  for (const double shrinkage : {0.5, 1e-12}) {
     std::vector<ViewModel> views(5);
-    fit_nuisances({.scale_spread = spread, .offset_spread = spread}, sums_of_views(truth), views);
+    fit_nuisances({.shrinkage = shrinkage}, sums_of_views(truth), views);
     double log_scales = 0;
     for (const ViewModel& view : views) log_scales += std::log(view.scale);
-    EXPECT_NEAR(log_scales, 0.0, 1e-12) << spread;
+    EXPECT_NEAR(log_scales, 0.0, 1e-12) << shrinkage;
   }
   std::vector<ViewModel> views(5);
-  fit_nuisances({.scale_spread = 1e6, .offset_spread = 1e6}, sums_of_views(truth), views);
+  fit_nuisances({.shrinkage = 1e-12}, sums_of_views(truth), views);
   for (std::size_t v = 0; v < views.size(); ++v) {
     EXPECT_NEAR(views[v].scale, truth.scales[v] / 1.7, 1e-9);
     EXPECT_NEAR(views[v].offset, truth.offsets[v], 1e-8);
   }
 }
 
-TEST(Nuisances, ShrinkTowardsNoneAsPriorsNarrow) {
+TEST(Nuisances, ShrinkTowardsNone) {
   const Truth truth = balanced_truth();
   const auto sums = sums_of_views(truth);
   double last_scale = 1e9, last_offset = 1e9;
-  for (const double spread : {1.0, 0.1, 0.01, 1e-3, 1e-5}) {
+  for (const double shrinkage : {0.1, 1.0, 10.0, 1e3, 1e7}) {
     std::vector<ViewModel> views(5, ViewModel{.scale = 1, .offset = 0, .weight = 0.5});
-    fit_nuisances({.scale_spread = spread, .offset_spread = spread}, sums, views);
+    fit_nuisances({.shrinkage = shrinkage}, sums, views);
     double scale = 0, offset = 0;
     for (const ViewModel& view : views) {
       scale = std::max(scale, std::abs(std::log(view.scale)));
       offset = std::max(offset, std::abs(view.offset));
     }
-    EXPECT_LT(offset, last_offset) << spread;
-    if (spread < 0.1) {
-      EXPECT_LT(scale, last_scale) << spread;
+    EXPECT_LT(offset, last_offset) << shrinkage;
+    if (shrinkage > 1) {
+      EXPECT_LT(scale, last_scale) << shrinkage;
     }
     last_scale = scale;
     last_offset = offset;
@@ -182,11 +182,11 @@ TEST(Nuisances, ShrinkTowardsNoneAsPriorsNarrow) {
   EXPECT_LT(last_offset, 1e-5);
 }
 
-// The answer minimises w Σ (a p + o − b)² + ((a − 1) / σa)² + (o / σo)².
+// The answer minimises w Σ (a p + o − b)² + shrinkage · w (Σ p² (a − 1)² + n o²).
 TEST(Nuisances, SolveTheNormalEquationsOfThePrior) {
   const Truth truth{{1.1, 1 / 1.1}, {0.4, -0.6}};
   const auto sums = sums_of_views(truth);
-  const NuisancePrior prior{.scale_spread = 0.02, .offset_spread = 0.05};
+  const NuisancePrior prior{.shrinkage = 0.4};
   // Two equal views: the common scale is that of either, so undo it.
   for (std::size_t v = 0; v < 2; ++v) {
     std::vector<ViewModel> views(1, ViewModel{.scale = 1, .offset = 0, .weight = 0.3});
@@ -194,8 +194,8 @@ TEST(Nuisances, SolveTheNormalEquationsOfThePrior) {
     EXPECT_EQ(views[0].scale, 1.0);  // one view alone has no scale of its own
     const auto objective = [&](double scale, double offset) {
       return 0.3 * sums[v].squared_residual({scale, offset, 1}) +
-             std::pow((scale - 1) / prior.scale_spread, 2) +
-             std::pow(offset / prior.offset_spread, 2);
+             0.3 * prior.shrinkage *
+                 (sums[v].pp * std::pow(scale - 1, 2) + sums[v].n * std::pow(offset, 2));
     };
     // The best scale for this offset, from the parabola through three points.
     const double o = views[0].offset, h = 0.1;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <span>
 
 #include "tomofield/error.h"
 
@@ -65,8 +64,6 @@ std::string differences(const std::string& found, const std::string& wanted) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-std::vector<float> copy(std::span<const float> values) { return {values.begin(), values.end()}; }
-
 template <typename Map>
 const typename Map::mapped_type& entry(const Map& map, const char* name, const std::string& path) {
   const auto found = map.find(name);
@@ -88,7 +85,7 @@ void copy_moments(const std::vector<float>& stored, const std::string& path,
 
 }  // namespace
 
-field::TrainingState save_state(const Fit& fit, const std::string& fingerprint, bool with_moments) {
+field::TrainingState progress_state(const Fit& fit, const std::string& fingerprint) {
   field::TrainingState state;
   const Progress& progress = fit.progress();
   state.integers["fingerprint"] = as_numbers(fingerprint);
@@ -96,14 +93,17 @@ field::TrainingState save_state(const Fit& fit, const std::string& fingerprint, 
   state.doubles["views"] = flatten(progress.views);
   state.doubles["epoch_sums"] = flatten(progress.epoch_sums);
   state.doubles["data_loss"] = progress.data_loss;
-  if (!with_moments) return state;
+  return state;
+}
+
+void save_checkpoint(const std::filesystem::path& path, const Fit& fit,
+                     const field::ModelInfo& info, const std::string& fingerprint) {
+  field::TrainingState state = progress_state(fit, fingerprint);
   const optimize::Adam::State& adam = fit.optimizer().state();
-  state.floats["adam_m"] = copy(adam.m);
-  state.floats["adam_v"] = copy(adam.v);
   state.integers["leaf_steps"] = adam.leaf_steps;
   state.doubles["bias_moments"] = {adam.bias_m, adam.bias_v};
   state.integers["bias_steps"] = {adam.bias_steps};
-  return state;
+  field::save_model(path, fit.field(), info, &state, {{"adam_m", adam.m}, {"adam_v", adam.v}});
 }
 
 void restore_state(const std::string& path, const std::string& fingerprint,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "field/model_file.h"
@@ -7,10 +8,13 @@
 
 namespace tomofield::reconstruct {
 
-/// The state of a fit between two steps as the model file stores it. With
-/// `with_moments` it can be continued bit for bit; a finished fit leaves the
-/// optimiser's moments out, which triples the file.
-field::TrainingState save_state(const Fit& fit, const std::string& fingerprint, bool with_moments);
+/// How far a fit is, as the model file stores it: all that a finished fit leaves.
+field::TrainingState progress_state(const Fit& fit, const std::string& fingerprint);
+
+/// Writes the model of a fit between two steps with its optimiser's state, which
+/// triples the file, so that it can be continued bit for bit.
+void save_checkpoint(const std::filesystem::path& path, const Fit& fit,
+                     const field::ModelInfo& info, const std::string& fingerprint);
 
 /// Puts a stored field and state into a fresh fit of the same options. Throws
 /// Error naming `path` if they belong to another series or other options, and

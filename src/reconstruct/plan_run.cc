@@ -1,6 +1,7 @@
+#include <fmt/format.h>
 
 #include <algorithm>
-#include <utility>
+#include <filesystem>
 
 #include "base/lanes.h"
 #include "base/memory.h"
@@ -8,29 +9,56 @@
 #include "reconstruct/domain.h"
 #include "reconstruct/fit.h"
 #include "reconstruct/reconstruct.h"
+#include "tilt_series/slab_views.h"
+#include "tomofield/error.h"
 
 namespace tomofield::reconstruct {
 namespace {
 
-// Parameters, gradient and two moments; the rays in their slab order (large
-// series lie in a file that the kernel pages and count only as far as it is
-// kept); and what each thread works on.
-std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain,
-                            std::size_t num_parameters, int num_views) {
-  constexpr std::size_t kFixed = std::size_t{48} << 20;  // program and libraries
-  const std::size_t width = static_cast<std::size_t>(plan.geometry.width);
-  const std::size_t rows = static_cast<std::size_t>(plan.roi.height());
-  const std::size_t parameters = 4 * sizeof(float) * num_parameters;
-  const std::size_t rays = static_cast<std::size_t>(num_views) * width * rows * (sizeof(float) + 1);
-  const std::size_t slab = 3 * domain.grid.size() * sizeof(float);
-  const std::size_t detector =
-      static_cast<std::size_t>(num_views) * width * base::kLanes * sizeof(float);
+constexpr std::size_t kProgram = std::size_t{20} << 20;  // with its libraries
+
+// Reading a view: its raw pixels, aligned and as they are, with their masks, and what
+// becomes of them.
+std::size_t reading_memory(const PreparedSeries& plan) {
+  constexpr double kBytesPerPixel = 5;
+  constexpr double kCopies = 3;
+  const double binned = static_cast<double>(plan.geometry.width * plan.geometry.height);
+  const double raw = binned * plan.bin_factor * plan.bin_factor;
+  return static_cast<std::size_t>(kCopies * kBytesPerPixel * (raw + binned));
+}
+
+// What each thread works on: samples of two slabs and a gradient, rows for the total
+// variation, the views of a step, a leaf's vertices; and then a part of the volume.
+std::size_t thread_memory(const PreparedSeries& plan, const Domain& domain, int views_a_step) {
+  constexpr std::size_t kRow = base::kLanes * sizeof(float);
+  const std::size_t slab = domain.grid.size() * sizeof(float);
+  const std::size_t views =
+      static_cast<std::size_t>(views_a_step) * static_cast<std::size_t>(plan.geometry.width) * kRow;
   std::size_t leaf = 0;
-  for (const field::LeafShape& shape : domain.shapes) {
-    leaf = std::max(leaf, 2 * shape.vertices_xz() * base::kLanes * sizeof(float));
-  }
-  return kFixed + parameters + rays +
-         static_cast<std::size_t>(base::thread_count()) * (slab + detector + leaf);
+  for (const field::LeafShape& shape : domain.shapes)
+    leaf = std::max(leaf, 2 * shape.vertices_xz() * kRow);
+  const std::size_t written = std::min(
+      std::size_t{16} << 20,
+      static_cast<std::size_t>(static_cast<double>(plan.roi.width()) * plan.geometry.thickness) *
+          kRow);
+  return 3 * slab + 3 * slab / base::kLanes + views + leaf + written;
+}
+
+// Peak of a run. Parameters, their gradient and two moments; a checkpoint that is
+// resumed has all but the gradient once more.
+std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, const RunPlan& run,
+                            const ReconstructOptions& options) {
+  const std::size_t copies =
+      options.resume && std::filesystem::exists(output_paths(options.output).model) ? 7 : 4;
+  const std::size_t parameters = copies * sizeof(float) * run.num_parameters;
+  const std::size_t rays = tilt_series::SlabViews::least_memory(
+      {static_cast<std::size_t>(run.num_views), plan.geometry.width, plan.geometry.height,
+       plan.roi.y0, plan.roi.height()});
+  const int steps_an_epoch = std::min(options.fit.subsets, run.num_views);
+  const int views_a_step = (run.num_views + steps_an_epoch - 1) / steps_an_epoch;
+  const std::size_t fitting = parameters + static_cast<std::size_t>(base::thread_count()) *
+                                               thread_memory(plan, domain, views_a_step);
+  return kProgram + rays + std::max(fitting, reading_memory(plan));
 }
 
 }  // namespace
@@ -49,10 +77,17 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.num_parameters = field::count_parameters(options.field.kind, domain.shapes);
   run.num_steps =
       static_cast<std::int64_t>(options.fit.epochs) * std::min(options.fit.subsets, run.num_views);
-  run.memory_bytes = estimate_memory(plan, domain, run.num_parameters, run.num_views);
+  run.memory_bytes = estimate_memory(plan, domain, run, options);
   base::require_memory(run.memory_bytes, "this reconstruction",
                        "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, or "
                        "fewer --threads");
+  for (const field::LeafShape& shape : domain.shapes) {
+    if (std::max(shape.nx, shape.nz) <= field::LeafShape::kMostVertices) continue;
+    throw Error(fmt::format(
+        "{} vertices along an axis of a leaf are more than {}: use a larger --vertex-spacing or "
+        "--bin, or a smaller --thickness",
+        std::max(shape.nx, shape.nz), field::LeafShape::kMostVertices));
+  }
   return run;
 }
 

@@ -15,7 +15,6 @@
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/fit.h"
 #include "reconstruct/result_files.h"
-#include "report/slices.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruct {
@@ -118,11 +117,10 @@ nlohmann::json figures_json(const field::Model& model, const Progress& progress,
 
 void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOptions& options,
                    const OutputPaths& paths, const std::string& fingerprint, double seconds) {
-  const field::TrainingState state = save_state(fit, fingerprint, /*with_moments=*/false);
+  const field::TrainingState state = progress_state(fit, fingerprint);
   field::Model model{model_info(series, options), fit.take_field()};
   field::save_model(paths.model, model, &state);
   write_volume(model, options.volume, paths.volume);
-  report::write_slice_pictures(paths.volume, paths.picture_prefix);
   io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
                               {"options", options_json(options)},
                               {"figures", figures_json(model, fit.progress(), series, seconds)}});
@@ -173,10 +171,6 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
   Fit fit(measurement, options.field, options.fit);
   if (options.resume) resume(paths, fingerprint, fit);
 
-  const auto save_checkpoint = [&] {
-    const field::TrainingState state = save_state(fit, fingerprint, /*with_moments=*/true);
-    field::save_model(paths.model, fit.field(), model_info(series, options), &state);
-  };
   const auto start = Clock::now();
   auto last_checkpoint = start;
   const std::int64_t first_step = fit.progress().step;
@@ -186,7 +180,7 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
     stopped =
         hooks.stop_requested && hooks.stop_requested() && fit.progress().step < fit.num_steps();
     if (stopped || seconds_since(last_checkpoint) > 60 * options.checkpoint_minutes) {
-      save_checkpoint();
+      save_checkpoint(paths.model, fit, model_info(series, options), fingerprint);
       last_checkpoint = Clock::now();
     }
     return !stopped;

@@ -44,8 +44,8 @@ struct ReconstructHooks {
 enum class Outcome { kFinished, kStopped };
 
 /// The main job: fits a field to the series and writes the volume (MRC), the
-/// model (HDF5, also the checkpoint while it runs), the figures and resolved
-/// options (JSON), and pictures of the central slices. Call check_options() and
+/// model (HDF5, also the checkpoint while it runs), and the figures and resolved
+/// options (JSON). Call check_options() and
 /// plan_run() first: this starts at once.
 Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& options,
                     const ReconstructHooks& hooks);

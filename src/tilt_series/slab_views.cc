@@ -5,6 +5,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cstring>
@@ -47,6 +48,12 @@ void* map_scratch_file(const std::filesystem::path& dir, std::size_t bytes) {
 }
 
 }  // namespace
+
+std::size_t SlabViews::least_memory(const Shape& shape) {
+  const std::size_t slabs = static_cast<std::size_t>((shape.num_rows + kLanes - 1) / kLanes);
+  const std::size_t lines = slabs * shape.num_views * static_cast<std::size_t>(shape.width);
+  return std::min(lines * (kLanes * sizeof(float) + sizeof(std::uint16_t)), kInMemoryBytes);
+}
 
 SlabViews::SlabViews(const Shape& shape, double unit, const ReadView& read_view,
                      const std::filesystem::path& scratch_dir)

@@ -23,6 +23,9 @@ class SlabViews {
     std::int64_t width = 0, height = 0;        ///< of a view
     std::int64_t first_row = 0, num_rows = 0;  ///< rows of the view that slabs cover
   };
+  /// Memory that they take at least: large series may be paged out to their file.
+  static std::size_t least_memory(const Shape& shape);
+
   /// Intensities are divided by `unit`. Throws Error if the scratch file cannot be made.
   SlabViews(const Shape& shape, double unit, const ReadView& read_view,
             const std::filesystem::path& scratch_dir);
