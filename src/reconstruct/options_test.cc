@@ -1,0 +1,56 @@
+#include "reconstruct/options.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+
+#include "reconstruct/reconstruct.h"
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruct {
+namespace {
+
+ReconstructOptions good_options() {
+  ReconstructOptions options;
+  options.specimen.thickness = 100;
+  return options;
+}
+
+TEST(ReconstructOptions, DefaultsAreSound) { EXPECT_TRUE(good_options().faults().empty()); }
+
+TEST(ReconstructOptions, NoNumberMayBeNaN) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (double FieldOptions::*number : {&FieldOptions::vertex_spacing, &FieldOptions::margin_spacing,
+                                       &FieldOptions::sharpness, &FieldOptions::initial_scale}) {
+    FieldOptions options;
+    options.*number = nan;
+    EXPECT_EQ(options.faults().size(), 1u);
+  }
+  for (double FitOptions::*number :
+       {&FitOptions::learning_rate, &FitOptions::final_rate, &FitOptions::density_variation,
+        &FitOptions::factor_variation, &FitOptions::concavity, &FitOptions::gradient_floor}) {
+    FitOptions options;
+    options.*number = nan;
+    EXPECT_EQ(options.faults().size(), 1u);
+  }
+}
+
+TEST(ReconstructOptions, EveryFaultIsNamedAtOnce) {
+  ReconstructOptions options = good_options();
+  options.specimen.thickness = 0;
+  options.field.leaf_size = 24;
+  options.field.kind = "mesh";
+  options.fit.subsets = 0;
+  options.checkpoint_minutes = -1;
+  EXPECT_EQ(options.faults().size(), 5u);
+  const std::string message =
+      testing::message_of<Error>([&] { require_no_faults(options.faults()); });
+  for (const char* word :
+       {"--thickness", "--leaf-size", "24", "mesh", "--subsets", "--checkpoint-minutes"})
+    EXPECT_NE(message.find(word), std::string::npos) << word << " in " << message;
+}
+
+}  // namespace
+}  // namespace tomofield::reconstruct
