@@ -16,6 +16,7 @@
 #include "projection/sample_grid.h"
 #include "reconstruct/options_json.h"
 #include "reconstruct/result_files.h"
+#include "tomofield/error.h"
 
 namespace tomofield::baseline {
 namespace {
@@ -170,6 +171,12 @@ void check_outputs(const BaselineOptions& options) {
 
 BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {
   const reconstruct::PreparedSeries planned = plan_series(series, options.specimen);
+  if (planned.x_tilt_deg != 0.0) {
+    throw Error(fmt::format(
+        "the series has an x-axis tilt of {}°, which the voxel baselines do not turn back: leave "
+        "--xtilt out (the volume is then turned by it), or use reconstruct",
+        planned.x_tilt_deg));
+  }
   const projection::SampleGrid grid = grid_of(planned, options);
   BaselinePlan plan;
   plan.num_views = planned.geometry.num_views();

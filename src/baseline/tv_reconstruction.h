@@ -6,8 +6,8 @@
 namespace tomofield::baseline {
 
 struct TvOptions {
-  int iterations = 150;
-  double weight = 1.0;  ///< λ, see reconstruct_tv
+  int iterations = 200;  ///< docs/results/baselines.md
+  double weight = 3.0;   ///< λ, see reconstruct_tv
   bool non_negative = true;
   bool fit_view_scale = false;  ///< per-view scale and offset as nuisances
 };
