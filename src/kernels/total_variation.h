@@ -8,7 +8,7 @@ namespace tomofield::kernels {
 ///   smooth    φ(m) = m                        (concavity τ = 0)
 ///   concave   φ(m) = τ log(1 + m / τ)         (τ > 0; slope 1 at 0, so τ → ∞ is smooth)
 struct VariationPenalty {
-  float epsilon = 1e-3f;
+  float epsilon = 1e-3f;  ///< ε > 0
   float concavity = 0.0f;
 };
 

@@ -1,9 +1,7 @@
 #include "kernels/leaf_decoding.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <vector>
+#include <utility>
 
 #include "base/aligned_buffer.h"
 #include "kernels/lanes.h"
@@ -18,14 +16,15 @@ HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
 
 struct Softplus {
-  Vec beta, inverse_beta;
-  explicit Softplus(float b) : beta(hn::Set(Tag(), b)), inverse_beta(hn::Set(Tag(), 1.0f / b)) {}
+  Vec per_log2, inverse_beta;  // e^(−βa) = 2^(per_log2 a)
+  explicit Softplus(float beta)
+      : per_log2(hn::Set(Tag(), -1.44269504f * beta)), inverse_beta(hn::Set(Tag(), 1.0f / beta)) {}
   Vec operator()(Vec a) const {
-    const Vec t = exp_of_negative(hn::Neg(hn::Mul(beta, hn::Abs(a))));
+    const Vec t = exp2_of_negative(hn::Mul(per_log2, hn::Abs(a)));
     return hn::MulAdd(log1p_of_unit(t), inverse_beta, hn::Max(a, hn::Zero(Tag())));
   }
   Vec derivative(Vec f) const {
-    return hn::Sub(hn::Set(Tag(), 1.0f), exp_of_negative(hn::Neg(hn::Mul(beta, f))));
+    return hn::Sub(hn::Set(Tag(), 1.0f), exp2_of_negative(hn::Mul(per_log2, f)));
   }
 };
 
@@ -38,81 +37,141 @@ HWY_INLINE Vec interpolate(Vec lower, Vec upper, Vec fraction) {
   return hn::MulAdd(fraction, hn::Sub(upper, lower), lower);
 }
 
-// `column` holds one x position's vertex values interpolated in x, [z, lane].
+// Rows of samples along x are decoded one after the other, between two rows of
+// vertex values that are already interpolated in x and rise through the leaf.
+struct RowPair {
+  float* lower;  // of vertex row `index`, [x, lane]
+  float* upper;  // of the next
+  int index = -2;
+  RowPair(const LeafPiece& piece, float* scratch)
+      : lower(scratch), upper(scratch + static_cast<std::ptrdiff_t>(piece.x.count) * kLanes) {}
+};
+
+HWY_INLINE void interpolate_row(const LeafPiece& p, const float* values, int z, float* row) {
+  const Tag d;
+  const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(p.num_vertices_z) * kLanes;
+  values += static_cast<std::ptrdiff_t>(z) * kLanes;
+  for (int x = 0; x < p.x.count; ++x, row += kLanes) {
+    const float* lower = values + p.x.lower[x] * column;
+    const Vec fx = hn::Set(d, p.x.fraction[x]);
+    for (int v = 0; v < kLanes; v += kVecLanes) {
+      hn::Store(interpolate(hn::LoadU(d, lower + v), hn::LoadU(d, lower + column + v), fx), d,
+                row + v);
+    }
+  }
+}
+
+HWY_INLINE void move_to(const LeafPiece& p, const float* values, int z, RowPair& rows) {
+  if (z == rows.index) return;
+  if (z == rows.index + 1) {
+    std::swap(rows.lower, rows.upper);
+  } else {
+    interpolate_row(p, values, z, rows.lower);
+  }
+  interpolate_row(p, values, z + 1, rows.upper);
+  rows.index = z;
+}
+
 template <class Act>
-HWY_INLINE void decode(const LeafPiece& p, const Act& act, const float* values, float* column,
+HWY_INLINE void decode(const LeafPiece& p, const Act& act, const float* values, float* scratch,
                        float* samples) {
   const Tag d;
-  const std::ptrdiff_t column_size = static_cast<std::ptrdiff_t>(p.num_vertices_z) * kLanes;
-  for (int x = 0; x < p.x.count; ++x) {
-    const float* lower = values + p.x.lower[x] * column_size;
-    const Vec fx = hn::Set(d, p.x.fraction[x]);
-    for (std::ptrdiff_t i = 0; i < column_size; i += kVecLanes) {
-      hn::Store(interpolate(hn::LoadU(d, lower + i), hn::LoadU(d, lower + column_size + i), fx), d,
-                column + i);
+  const std::ptrdiff_t row_size = static_cast<std::ptrdiff_t>(p.x.count) * kLanes;
+  RowPair rows(p, scratch);
+  for (int z = 0; z < p.z.count; ++z, samples += p.stride_z) {
+    move_to(p, values, p.z.lower[z], rows);
+    const Vec fz = hn::Set(d, p.z.fraction[z]);
+    for (std::ptrdiff_t i = 0; i < row_size; i += kVecLanes) {
+      const Vec a = interpolate(hn::Load(d, rows.lower + i), hn::Load(d, rows.upper + i), fz);
+      hn::StoreU(act(a), d, samples + i);
     }
-    for (int z = 0; z < p.z.count; ++z) {
-      const float* c = column + static_cast<std::ptrdiff_t>(p.z.lower[z]) * kLanes;
-      const Vec fz = hn::Set(d, p.z.fraction[z]);
-      float* out = samples + z * p.stride_z + static_cast<std::ptrdiff_t>(x) * kLanes;
-      for (int v = 0; v < kLanes; v += kVecLanes) {
-        hn::StoreU(act(interpolate(hn::Load(d, c + v), hn::Load(d, c + kLanes + v), fz)), d,
-                   out + v);
+  }
+}
+
+HWY_INLINE void add_to(Vec sum, float* to) {
+  hn::StoreU(hn::Add(hn::LoadU(Tag(), to), sum), Tag(), to);
+}
+
+// Adjoint of interpolate_row: empties the row into the gradient of its
+// vertices. What neighbouring samples give a vertex is summed in registers.
+HWY_INLINE void spread_row(const LeafPiece& p, float* row, int z, float* grad_values) {
+  const Tag d;
+  const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(p.num_vertices_z) * kLanes;
+  grad_values += static_cast<std::ptrdiff_t>(z) * kLanes;
+  for (int v = 0; v < kLanes; v += kVecLanes) {
+    Vec low = hn::Zero(d), high = hn::Zero(d);  // of vertices `at` and at + 1
+    int at = p.x.lower[0];
+    for (int x = 0; x < p.x.count; ++x) {
+      if (p.x.lower[x] != at) {
+        add_to(low, grad_values + at * column + v);
+        low = high;
+        high = hn::Zero(d);
+        if (p.x.lower[x] != at + 1) {
+          add_to(low, grad_values + (at + 1) * column + v);
+          low = high;
+        }
+        at = p.x.lower[x];
       }
+      float* const g = row + static_cast<std::ptrdiff_t>(x) * kLanes + v;
+      const Vec upper = hn::Mul(hn::Load(d, g), hn::Set(d, p.x.fraction[x]));
+      low = hn::Add(low, hn::Sub(hn::Load(d, g), upper));
+      high = hn::Add(high, upper);
+      hn::Store(hn::Zero(d), d, g);
     }
+    add_to(low, grad_values + at * column + v);
+    add_to(high, grad_values + (at + 1) * column + v);
   }
 }
 
 template <class Act>
 HWY_INLINE double decode_adjoint(const LeafPiece& p, const Act& act, const float* samples,
-                                 const float* grad_samples, float* column, float* grad_values) {
+                                 const float* grad_samples, float* scratch, float* grad_values) {
   const Tag d;
-  const std::ptrdiff_t column_size = static_cast<std::ptrdiff_t>(p.num_vertices_z) * kLanes;
+  const std::ptrdiff_t row_size = static_cast<std::ptrdiff_t>(p.x.count) * kLanes;
+  RowPair rows(p, scratch);
+  std::fill_n(scratch, 2 * row_size, 0.0f);
   double bias = 0.0;
-  for (int x = 0; x < p.x.count; ++x) {
-    std::fill_n(column, column_size, 0.0f);
-    Vec sum = hn::Zero(d);
-    for (int z = 0; z < p.z.count; ++z) {
-      float* c = column + static_cast<std::ptrdiff_t>(p.z.lower[z]) * kLanes;
-      const Vec fz = hn::Set(d, p.z.fraction[z]);
-      const std::ptrdiff_t at = z * p.stride_z + static_cast<std::ptrdiff_t>(x) * kLanes;
-      for (int v = 0; v < kLanes; v += kVecLanes) {
-        const Vec g = hn::Mul(hn::LoadU(d, grad_samples + at + v),
-                              act.derivative(hn::LoadU(d, samples + at + v)));
-        const Vec upper = hn::Mul(g, fz);
-        sum = hn::Add(sum, g);
-        hn::Store(hn::Add(hn::Load(d, c + v), hn::Sub(g, upper)), d, c + v);
-        hn::Store(hn::Add(hn::Load(d, c + kLanes + v), upper), d, c + kLanes + v);
+  for (int z = 0; z < p.z.count; ++z, samples += p.stride_z, grad_samples += p.stride_z) {
+    if (p.z.lower[z] != rows.index) {
+      if (z > 0) spread_row(p, rows.lower, rows.index, grad_values);
+      if (z > 0 && p.z.lower[z] != rows.index + 1) {
+        spread_row(p, rows.upper, rows.index + 1, grad_values);
       }
+      std::swap(rows.lower, rows.upper);
+      rows.index = p.z.lower[z];
+    }
+    const Vec fz = hn::Set(d, p.z.fraction[z]);
+    Vec sum = hn::Zero(d);
+    for (std::ptrdiff_t i = 0; i < row_size; i += kVecLanes) {
+      const Vec g =
+          hn::Mul(hn::LoadU(d, grad_samples + i), act.derivative(hn::LoadU(d, samples + i)));
+      const Vec upper = hn::Mul(g, fz);
+      sum = hn::Add(sum, g);
+      hn::Store(hn::Add(hn::Load(d, rows.lower + i), hn::Sub(g, upper)), d, rows.lower + i);
+      hn::Store(hn::Add(hn::Load(d, rows.upper + i), upper), d, rows.upper + i);
     }
     bias += static_cast<double>(hn::GetLane(hn::SumOfLanes(d, sum)));
-    float* lower = grad_values + p.x.lower[x] * column_size;
-    const Vec fx = hn::Set(d, p.x.fraction[x]);
-    for (std::ptrdiff_t i = 0; i < column_size; i += kVecLanes) {
-      const Vec g = hn::Load(d, column + i);
-      const Vec upper = hn::Mul(g, fx);
-      hn::StoreU(hn::Add(hn::LoadU(d, lower + i), hn::Sub(g, upper)), d, lower + i);
-      hn::StoreU(hn::Add(hn::LoadU(d, lower + column_size + i), upper), d, lower + column_size + i);
-    }
   }
+  spread_row(p, rows.lower, rows.index, grad_values);
+  spread_row(p, rows.upper, rows.index + 1, grad_values);
   return bias;
 }
 
-void decode_leaf(const LeafPiece& piece, const float* values, float* column, float* samples) {
+void decode_leaf(const LeafPiece& piece, const float* values, float* scratch, float* samples) {
   if (piece.activation.beta > 0) {
-    decode(piece, Softplus(piece.activation.beta), values, column, samples);
+    decode(piece, Softplus(piece.activation.beta), values, scratch, samples);
   } else {
-    decode(piece, Identity(), values, column, samples);
+    decode(piece, Identity(), values, scratch, samples);
   }
 }
 
 double decode_leaf_adjoint(const LeafPiece& piece, const float* samples, const float* grad_samples,
-                           float* column, float* grad_values) {
+                           float* scratch, float* grad_values) {
   if (piece.activation.beta > 0) {
-    return decode_adjoint(piece, Softplus(piece.activation.beta), samples, grad_samples, column,
+    return decode_adjoint(piece, Softplus(piece.activation.beta), samples, grad_samples, scratch,
                           grad_values);
   }
-  return decode_adjoint(piece, Identity(), samples, grad_samples, column, grad_values);
+  return decode_adjoint(piece, Identity(), samples, grad_samples, scratch, grad_values);
 }
 
 void activate_softplus(float beta, float* values, std::ptrdiff_t count) {
@@ -137,21 +196,21 @@ HWY_EXPORT(decode_leaf_adjoint);
 HWY_EXPORT(activate_softplus);
 
 namespace {
-float* scratch_column(const LeafPiece& piece) {
-  thread_local base::AlignedBuffer<float> column;
-  column.reserve(static_cast<std::size_t>(piece.num_vertices_z) * kLanes);
-  return column.data();
+float* scratch_rows(const LeafPiece& piece) {
+  thread_local base::AlignedBuffer<float> rows;
+  rows.reserve(2 * static_cast<std::size_t>(piece.x.count) * kLanes);
+  return rows.data();
 }
 }  // namespace
 
 void decode_leaf(const LeafPiece& piece, const float* values, float* samples) {
-  HWY_DYNAMIC_DISPATCH(decode_leaf)(piece, values, scratch_column(piece), samples);
+  HWY_DYNAMIC_DISPATCH(decode_leaf)(piece, values, scratch_rows(piece), samples);
 }
 
 double decode_leaf_adjoint(const LeafPiece& piece, const float* samples, const float* grad_samples,
                            float* grad_values) {
   return HWY_DYNAMIC_DISPATCH(decode_leaf_adjoint)(piece, samples, grad_samples,
-                                                   scratch_column(piece), grad_values);
+                                                   scratch_rows(piece), grad_values);
 }
 
 void activate(Activation activation, float* values, std::ptrdiff_t count) {

@@ -21,40 +21,34 @@ using IntTag = hn::RebindToSigned<Tag>;
 constexpr int kVecLanes = static_cast<int>(hn::MaxLanes(Tag()));
 constexpr int kVecs = kLanes / kVecLanes;
 
-// e^x for x <= 0 (−87 and below give about 1e-38). Range reduction by ln 2 in
-// two parts, then Taylor to x^6 on |r| <= ln2/2: relative error below 3e-7.
-HWY_INLINE Vec exp_of_negative(Vec x) {
-  const Tag d;
-  x = hn::Max(x, hn::Set(d, -87.0f));
-  const Vec n = hn::Round(hn::Mul(x, hn::Set(d, 1.44269504f)));
-  Vec r = hn::NegMulAdd(n, hn::Set(d, 0.693145751953125f), x);
-  r = hn::NegMulAdd(n, hn::Set(d, 1.42860677e-6f), r);
-  Vec p = hn::Set(d, 1.0f / 720);
-  p = hn::MulAdd(p, r, hn::Set(d, 1.0f / 120));
-  p = hn::MulAdd(p, r, hn::Set(d, 1.0f / 24));
-  p = hn::MulAdd(p, r, hn::Set(d, 1.0f / 6));
-  p = hn::MulAdd(p, r, hn::Set(d, 0.5f));
-  p = hn::MulAdd(p, r, hn::Set(d, 1.0f));
-  p = hn::MulAdd(p, r, hn::Set(d, 1.0f));
-  const auto exponent =
-      hn::ShiftLeft<23>(hn::Add(hn::ConvertTo(IntTag(), n), hn::Set(IntTag(), 127)));
-  return hn::Mul(p, hn::BitCast(d, exponent));
+// c[0] + c[1] x + c[2] x² + …
+template <int kCount>
+HWY_INLINE Vec polynomial(Vec x, const float (&c)[kCount]) {
+  Vec sum = hn::Set(Tag(), c[kCount - 1]);
+  for (int i = kCount - 2; i >= 0; --i) sum = hn::MulAdd(sum, x, hn::Set(Tag(), c[i]));
+  return sum;
 }
 
-// log(1 + t) for 0 <= t <= 1 as 2 atanh(t / (2 + t)); the argument of the odd
-// series is at most 1/3, so six terms leave 2e-7.
-HWY_INLINE Vec log1p_of_unit(Vec t) {
+// 2^x for x <= 0; −126 and below give 2^−126. x = n + r with an integer n, taken
+// from the low bits of x + 1.5 · 2^23, and |r| <= 1/2; minimax polynomial of 2^r
+// that is exact at 0. Relative error below 3e-7.
+HWY_INLINE Vec exp2_of_negative(Vec x) {
   const Tag d;
-  const Vec s = hn::Div(t, hn::Add(t, hn::Set(d, 2.0f)));
-  const Vec s2 = hn::Mul(s, s);
-  Vec p = hn::Set(d, 2.0f / 13);
-  p = hn::MulAdd(p, s2, hn::Set(d, 2.0f / 11));
-  p = hn::MulAdd(p, s2, hn::Set(d, 2.0f / 9));
-  p = hn::MulAdd(p, s2, hn::Set(d, 2.0f / 7));
-  p = hn::MulAdd(p, s2, hn::Set(d, 2.0f / 5));
-  p = hn::MulAdd(p, s2, hn::Set(d, 2.0f / 3));
-  p = hn::MulAdd(p, s2, hn::Set(d, 2.0f));
-  return hn::Mul(p, s);
+  const IntTag di;
+  const Vec shift = hn::Set(d, 12582912.0f);
+  x = hn::Max(x, hn::Set(d, -126.0f));
+  const Vec shifted = hn::Add(x, shift);
+  const Vec r = hn::Sub(x, hn::Sub(shifted, shift));
+  const Vec p = polynomial(
+      r, {1.0f, 0.693146978f, 0.240222421f, 0.0555073374f, 0.00967151275f, 0.00132647273f});
+  return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(hn::BitCast(di, shifted))));
+}
+
+// log(1 + t) for 0 <= t <= 1: t times a minimax polynomial of the rest that is
+// exact at 0. Relative error below 3e-7.
+HWY_INLINE Vec log1p_of_unit(Vec t) {
+  return hn::Mul(t, polynomial(t, {1.0f, -0.49999648f, 0.333213226f, -0.248571636f, 0.191536547f,
+                                   -0.137538017f, 0.0792045266f, -0.0300657857f, 0.00536482241f}));
 }
 
 // log(x) for finite x >= 1: exponent · ln 2 + log of the mantissa. Relative

@@ -17,11 +17,12 @@ template <int kRows, int kVecs, class D>
 HWY_INLINE void block(D d, const SmallGemm& g, std::ptrdiff_t row, std::ptrdiff_t col) {
   using Vec = hn::Vec<D>;
   const std::ptrdiff_t lanes = static_cast<std::ptrdiff_t>(hn::Lanes(d));
-  Vec acc[kRows][kVecs];
-  for (int m = 0; m < kRows; ++m)
-    for (int v = 0; v < kVecs; ++v) acc[m][v] = hn::Zero(d);
   const float* a = g.a + row * g.a_row;
   const float* b = g.b + col;
+  float* const c = g.c + row * g.c_row + col;
+  Vec acc[kRows][kVecs];
+  for (int m = 0; m < kRows; ++m)
+    for (int v = 0; v < kVecs; ++v) acc[m][v] = hn::LoadU(d, c + m * g.c_row + v * lanes);
   for (std::ptrdiff_t n = 0; n < g.depth; ++n) {
     Vec bv[kVecs];
     for (int v = 0; v < kVecs; ++v) bv[v] = hn::LoadU(d, b + v * lanes);
@@ -32,10 +33,18 @@ HWY_INLINE void block(D d, const SmallGemm& g, std::ptrdiff_t row, std::ptrdiff_
     a += g.a_col;
     b += g.b_row;
   }
-  for (int m = 0; m < kRows; ++m) {
-    float* c = g.c + (row + m) * g.c_row + col;
-    for (int v = 0; v < kVecs; ++v) {
-      hn::StoreU(hn::Add(hn::LoadU(d, c + v * lanes), acc[m][v]), d, c + v * lanes);
+  for (int m = 0; m < kRows; ++m)
+    for (int v = 0; v < kVecs; ++v) hn::StoreU(acc[m][v], d, c + m * g.c_row + v * lanes);
+}
+
+// The last rows of a panel, fewer than kRows.
+template <int kRows, int kVecs, class D>
+HWY_INLINE void rest(D d, const SmallGemm& g, std::ptrdiff_t row, std::ptrdiff_t col) {
+  if constexpr (kRows > 1) {
+    if (g.rows - row == kRows - 1) {
+      block<kRows - 1, kVecs>(d, g, row, col);
+    } else {
+      rest<kRows - 1, kVecs>(d, g, row, col);
     }
   }
 }
@@ -49,8 +58,7 @@ HWY_INLINE std::ptrdiff_t panels(D d, const SmallGemm& g, std::ptrdiff_t col) {
   for (; col + width <= g.width; col += width) {
     std::ptrdiff_t row = 0;
     for (; row + kRows <= g.rows; row += kRows) block<kRows, kVecs>(d, g, row, col);
-    for (; row + 2 <= g.rows; row += 2) block<2, kVecs>(d, g, row, col);
-    if (row < g.rows) block<1, kVecs>(d, g, row, col);
+    rest<kRows, kVecs>(d, g, row, col);
   }
   return col;
 }

@@ -15,7 +15,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
 
-// Lane masks as 0/1 factors: rows of the volume, and rows that have a next one.
+// Lanes that are rows of the volume, and those that have a next one, as 0 or 1.
 struct RowMasks {
   HWY_ALIGN float is_row[kLanes];
   HWY_ALIGN float has_next[kLanes];
@@ -27,137 +27,191 @@ struct RowMasks {
   }
 };
 
-// The value of kTermsPerLog concave terms is one logarithm of their product,
-// which holds factors 1 + m/τ up to 4e9.
-constexpr int kTermsPerLog = 4;
+// Σ log of numbers of at least 1, as the mantissa and the exponent of their
+// product. Numbers up to 2^31 can be multiplied kAtOnce times before the
+// exponent has to be taken out.
+class SumOfLogs {
+ public:
+  // Explicit, or the compiler would not build it for the target.
+  HWY_INLINE SumOfLogs() : product_(hn::Set(Tag(), 1.0f)), exponent_(hn::Zero(IntTag())) {}
+  HWY_INLINE void multiply(Vec factor) {
+    product_ = hn::Mul(product_, factor);
+    if (++count_ == kAtOnce) take_exponent();
+  }
+  // Returns the sum and starts again.
+  HWY_INLINE Vec take() {
+    take_exponent();
+    const Vec sum = hn::MulAdd(hn::ConvertTo(Tag(), exponent_), hn::Set(Tag(), 0.693147181f),
+                               log_above_one(product_));
+    exponent_ = hn::Zero(IntTag());
+    product_ = hn::Set(Tag(), 1.0f);
+    return sum;
+  }
 
+ private:
+  static constexpr int kAtOnce = 4;
+  HWY_INLINE void take_exponent() {
+    const IntTag di;
+    const auto bits = hn::BitCast(di, product_);
+    exponent_ = hn::Add(exponent_, hn::Sub(hn::ShiftRight<23>(bits), hn::Set(di, 127)));
+    product_ =
+        hn::BitCast(Tag(), hn::Or(hn::And(bits, hn::Set(di, 0x7fffff)), hn::Set(di, 0x3f800000)));
+    count_ = 0;
+  }
+  Vec product_;
+  hn::Vec<IntTag> exponent_;
+  int count_ = 0;
+};
+
+template <bool kConcave>
 class Penalty {
  public:
   explicit Penalty(const SlabVariation& s)
-      : concave_(s.penalty.concavity > 0),
-        tau_(s.penalty.concavity),
+      : tau_(s.penalty.concavity),
         epsilon2_(hn::Set(Tag(), s.penalty.epsilon * s.penalty.epsilon)),
-        per_tau_(hn::Set(Tag(), concave_ ? 1.0f / s.penalty.concavity : 0.0f)),
+        per_tau_(hn::Set(Tag(), kConcave ? 1.0f / s.penalty.concavity : 0.0f)),
         weight_(hn::Set(Tag(), s.weight)) {}
 
-  // weight φ′(m)/m for |∇f|² = square; adds φ(m) where `rows` is 1.
+  Vec epsilon2() const { return epsilon2_; }
+
+  // weight φ′(m)/m = weight / (m + m²/τ) where `rows` is 1, for square = |∇f|² + ε² = m²;
+  // counts φ(m) there.
   HWY_INLINE Vec slope(Vec square, Vec rows) {
-    const Tag d;
-    const Vec m = hn::Sqrt(hn::Add(square, epsilon2_));
-    const Vec factor = hn::MulAdd(m, per_tau_, hn::Set(d, 1.0f));
-    if (concave_) {
-      product_ = hn::Mul(product_, hn::MulAdd(hn::Mul(m, per_tau_), rows, hn::Set(d, 1.0f)));
-      if (++terms_ == kTermsPerLog) take_logarithm();
+    const Vec m = hn::Sqrt(square);
+    if (kConcave) {
+      logs_.multiply(hn::MulAdd(hn::Mul(m, per_tau_), rows, hn::Set(Tag(), 1.0f)));
     } else {
       sum_ = hn::MulAdd(m, rows, sum_);
     }
-    return hn::Mul(rows, hn::Div(weight_, hn::Mul(m, factor)));
+    return hn::Div(hn::Mul(weight_, rows), hn::MulAdd(square, per_tau_, m));
   }
 
   HWY_INLINE void end_row() {
-    take_logarithm();
-    value_ += static_cast<double>(hn::GetLane(hn::SumOfLanes(Tag(), sum_)));
+    const Vec sum = kConcave ? hn::Mul(hn::Set(Tag(), tau_), logs_.take()) : sum_;
+    value_ += static_cast<double>(hn::GetLane(hn::SumOfLanes(Tag(), sum)));
     sum_ = hn::Zero(Tag());
   }
   // Σ φ over all rows that have ended.
-  double value() const { return concave_ ? static_cast<double>(tau_) * value_ : value_; }
+  double value() const { return value_; }
 
  private:
-  HWY_INLINE void take_logarithm() {
-    sum_ = hn::Add(sum_, log_above_one(product_));
-    product_ = hn::Set(Tag(), 1.0f);
-    terms_ = 0;
-  }
-  bool concave_;
   float tau_;
   Vec epsilon2_, per_tau_, weight_;
   Vec sum_ = hn::Zero(Tag());
-  Vec product_ = hn::Set(Tag(), 1.0f);
-  int terms_ = 0;
+  SumOfLogs logs_;
   double value_ = 0.0;
 };
 
-// Fluxes of one z row, [x, lane]; one more sample in front so that x − 1 and
-// lane − 1 can be read without a test.
-struct FluxRow {
-  float* x;
-  float* y;
-  float* z;
+// Moves lanes up by one across the vectors of a sample; lane 0 becomes `below`.
+struct LaneShift {
+  using Indices = decltype(hn::SetTableIndices(Tag(), static_cast<const int*>(nullptr)));
+  Indices rotation;
+  LaneShift() : rotation(rotate_by_one()) {}
+
+  // Returns what was the last lane.
+  HWY_INLINE float apply(const Vec (&from)[kVecs], float below, Vec (&to)[kVecs]) const {
+    const Tag d;
+    const auto first = hn::FirstN(d, 1);
+    Vec carry = hn::Set(d, below);
+    for (int v = 0; v < kVecs; ++v) {
+      const Vec rotated = hn::TableLookupLanes(from[v], rotation);
+      to[v] = hn::IfThenElse(first, carry, rotated);
+      carry = rotated;
+    }
+    return hn::GetLane(carry);
+  }
+
+ private:
+  static Indices rotate_by_one() {
+    HWY_ALIGN int lanes[kVecLanes];
+    for (int l = 0; l < kVecLanes; ++l) lanes[l] = (l + kVecLanes - 1) % kVecLanes;
+    return hn::SetTableIndices(Tag(), lanes);
+  }
 };
 
 // Density one row up (y + 1): the next lane, and past the last lane `above`.
-HWY_INLINE Vec next_row(const float* sample, int v, const float* above, std::ptrdiff_t at) {
+HWY_INLINE Vec next_row(const float* sample, int v, float above) {
   const Tag d;
-  const Vec next = hn::LoadU(d, sample + v + 1);
-  if (v + kVecLanes < kLanes) return next;
-  return hn::IfThenElse(hn::FirstN(d, kVecLanes - 1), next,
-                        hn::Set(d, above != nullptr ? above[at] : 0.0f));
+  const Vec next = hn::LoadU(d, sample + v * kVecLanes + 1);
+  if (v + 1 < kVecs) return next;
+  return hn::IfThenElse(hn::FirstN(d, kVecLanes - 1), next, hn::Set(d, above));
 }
 
-HWY_INLINE void compute_fluxes(const SlabVariation& s, const RowMasks& masks, int z,
-                               Penalty& penalty, FluxRow out) {
+// Samples [first, end) of row z: gradient += −div(flux). flux_x is the flux into
+// the first sample from the one before, and out of the last when done; flux_z,
+// [x, lane], the fluxes into the row from the one below, and out of it when done.
+template <bool kConcave>
+HWY_INLINE void add_row(const SlabVariation& s, const RowMasks& masks, const LaneShift& shift,
+                        Penalty<kConcave>& penalty, int z, int first, int end, float* flux_x,
+                        float* flux_z) {
   const Tag d;
-  const float* row = s.samples + z * s.stride_z;
   const std::ptrdiff_t up = z + 1 < s.nz ? s.stride_z : 0;
-  const Vec per_hx = hn::Set(d, s.per_hx), per_hz = hn::Set(d, s.per_hz);
-  for (int x = 0; x < s.nx; ++x) {
-    const float* p = row + static_cast<std::ptrdiff_t>(x) * kLanes;
-    const std::ptrdiff_t right = x + 1 < s.nx ? kLanes : 0;
+  const Vec per_hx2 = hn::Set(d, s.per_hx * s.per_hx), per_hz2 = hn::Set(d, s.per_hz * s.per_hz);
+  Vec from_left[kVecs];
+  for (int v = 0; v < kVecs; ++v) from_left[v] = hn::Load(d, flux_x + v * kVecLanes);
+  for (int x = first; x < end; ++x, flux_z += kLanes) {
+    const std::ptrdiff_t offset = z * s.stride_z + static_cast<std::ptrdiff_t>(x) * kLanes;
+    const float* const sample = s.samples + offset;
+    const float* const right = sample + (x + 1 < s.nx ? kLanes : 0);
     const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(x) * s.nz + z;
-    const std::ptrdiff_t to = static_cast<std::ptrdiff_t>(x) * kLanes;
-    for (int v = 0; v < kLanes; v += kVecLanes) {
-      const Vec f = hn::LoadU(d, p + v);
-      const Vec rows = hn::Load(d, masks.is_row + v);
-      const Vec dx = hn::Mul(per_hx, hn::Sub(hn::LoadU(d, p + right + v), f));
-      const Vec dz = hn::Mul(per_hz, hn::Sub(hn::LoadU(d, p + up + v), f));
+    const float above = s.above != nullptr ? s.above[at] : 0.0f;
+    Vec flux_y[kVecs], sum[kVecs];
+    for (int v = 0; v < kVecs; ++v) {
+      const std::ptrdiff_t lane = static_cast<std::ptrdiff_t>(v) * kVecLanes;
+      const Vec f = hn::LoadU(d, sample + lane);
+      const Vec dx = hn::Sub(hn::LoadU(d, right + lane), f);
+      const Vec dz = hn::Sub(hn::LoadU(d, sample + up + lane), f);
       const Vec dy =
-          hn::Mul(hn::Load(d, masks.has_next + v), hn::Sub(next_row(p, v, s.above, at), f));
-      const Vec slope =
-          penalty.slope(hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz))), rows);
-      hn::StoreU(hn::Mul(slope, hn::Mul(per_hx, dx)), d, out.x + to + v);
-      hn::StoreU(hn::Mul(slope, dy), d, out.y + to + v);
-      hn::StoreU(hn::Mul(slope, hn::Mul(per_hz, dz)), d, out.z + to + v);
+          hn::Mul(hn::Load(d, masks.has_next + lane), hn::Sub(next_row(sample, v, above), f));
+      const Vec dx_h = hn::Mul(dx, per_hx2), dz_h = hn::Mul(dz, per_hz2);
+      const Vec square =
+          hn::MulAdd(dx, dx_h, hn::MulAdd(dy, dy, hn::MulAdd(dz, dz_h, penalty.epsilon2())));
+      const Vec slope = penalty.slope(square, hn::Load(d, masks.is_row + lane));
+      const Vec to_right = hn::Mul(slope, dx_h), to_top = hn::Mul(slope, dz_h);
+      flux_y[v] = hn::Mul(slope, dy);
+      const Vec in = hn::Add(from_left[v], hn::Load(d, flux_z + lane));
+      sum[v] = hn::Sub(hn::Sub(in, to_right), hn::Add(to_top, flux_y[v]));
+      from_left[v] = to_right;
+      hn::Store(to_top, d, flux_z + lane);
+    }
+    Vec from_below[kVecs];
+    s.flux[at] = shift.apply(flux_y, s.flux[at], from_below);
+    for (int v = 0; v < kVecs; ++v) {
+      float* const g = s.gradient + offset + static_cast<std::ptrdiff_t>(v) * kVecLanes;
+      hn::StoreU(hn::Add(hn::LoadU(d, g), hn::Add(sum[v], from_below[v])), d, g);
     }
   }
+  for (int v = 0; v < kVecs; ++v) hn::Store(from_left[v], d, flux_x + v * kVecLanes);
   penalty.end_row();
 }
 
-// gradient += −div(flux), with the flux into the first lane from the row below.
-HWY_INLINE void add_divergence(const SlabVariation& s, int z, FluxRow now, const float* z_before) {
-  const Tag d;
-  float* row = s.gradient + z * s.stride_z;
-  for (int x = 0; x < s.nx; ++x) {
-    float* g = row + static_cast<std::ptrdiff_t>(x) * kLanes;
-    const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(x) * kLanes;
-    float& below = s.flux[static_cast<std::ptrdiff_t>(x) * s.nz + z];
-    const float last = now.y[at + s.num_rows - 1];
-    // Lane −1 of this sample is lane 15 of the one before it, already read.
-    now.y[at - 1] = below;
-    below = last;
-    for (int v = 0; v < kLanes; v += kVecLanes) {
-      const Vec in =
-          hn::Add(hn::LoadU(d, now.x + at - kLanes + v),
-                  hn::Add(hn::LoadU(d, now.y + at - 1 + v), hn::LoadU(d, z_before + at + v)));
-      const Vec out = hn::Add(hn::LoadU(d, now.x + at + v),
-                              hn::Add(hn::LoadU(d, now.y + at + v), hn::LoadU(d, now.z + at + v)));
-      hn::StoreU(hn::Add(hn::LoadU(d, g + v), hn::Sub(in, out)), d, g + v);
+// x is treated in tiles whose flux along z, [x, lane], is carried from row to
+// row; the flux along x out of a tile is kept for all rows, [z, lane].
+struct Scratch {
+  int tile;
+  float *flux_z, *flux_x;
+};
+
+template <bool kConcave>
+HWY_INLINE double variation(const SlabVariation& s, const Scratch& scratch) {
+  const RowMasks masks(s);
+  const LaneShift shift;
+  Penalty<kConcave> penalty(s);
+  std::fill_n(scratch.flux_x, static_cast<std::ptrdiff_t>(s.nz) * kLanes, 0.0f);
+  for (int first = 0; first < s.nx; first += scratch.tile) {
+    const int end = std::min(first + scratch.tile, s.nx);
+    std::fill_n(scratch.flux_z, static_cast<std::ptrdiff_t>(end - first) * kLanes, 0.0f);
+    for (int z = 0; z < s.nz; ++z) {
+      add_row(s, masks, shift, penalty, z, first, end,
+              scratch.flux_x + static_cast<std::ptrdiff_t>(z) * kLanes, scratch.flux_z);
     }
   }
+  return static_cast<double>(s.weight) * penalty.value();
 }
 
-double slab_variation(const SlabVariation& s, float* scratch) {
-  const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(s.nx + 1) * kLanes;
-  std::fill_n(scratch, 4 * row, 0.0f);
-  FluxRow now{scratch + kLanes, scratch + row + kLanes, scratch + 2 * row + kLanes};
-  float* z_before = scratch + 3 * row + kLanes;
-  const RowMasks masks(s);
-  Penalty penalty(s);
-  for (int z = 0; z < s.nz; ++z) {
-    compute_fluxes(s, masks, z, penalty, now);
-    add_divergence(s, z, now, z_before);
-    std::swap(now.z, z_before);
-  }
-  return static_cast<double>(s.weight) * penalty.value();
+double slab_variation(const SlabVariation& s, int tile, float* flux_z, float* flux_x) {
+  const Scratch scratch{tile, flux_z, flux_x};
+  return s.penalty.concavity > 0 ? variation<true>(s, scratch) : variation<false>(s, scratch);
 }
 
 }  // namespace tomofield::kernels::HWY_NAMESPACE
@@ -168,9 +222,11 @@ namespace tomofield::kernels {
 HWY_EXPORT(slab_variation);
 
 double slab_variation(const SlabVariation& slab) {
+  constexpr std::size_t kTile = 128;  // two rows of samples, a flux and a gradient fit in L1
   thread_local base::AlignedBuffer<float> scratch;
-  scratch.reserve(4 * static_cast<std::size_t>(slab.nx + 1) * kLanes);
-  return HWY_DYNAMIC_DISPATCH(slab_variation)(slab, scratch.data());
+  scratch.reserve((kTile + static_cast<std::size_t>(slab.nz)) * kLanes);
+  return HWY_DYNAMIC_DISPATCH(slab_variation)(slab, static_cast<int>(kTile), scratch.data(),
+                                              scratch.data() + kTile * kLanes);
 }
 
 void row_flux(const SlabVariation& s, const float* row, const float* next, float* flux) {
