@@ -118,13 +118,14 @@ class ModelReader {
     const Hdf5Group root = file_.root();
     require_known_format(root);
     Model model;
+    model.x_tilt_deg = root.number("x_tilt_deg");
     model.pixel_size_A = root.number("pixel_size_A");
     model.density_unit = root.number("density_unit");
     model.is_dark = root.text("contrast") == "dark";
     model.options_json = root.text("options_json");
     model.written_by = root.text("written_by");
-    require(std::isfinite(model.pixel_size_A) && model.pixel_size_A > 0 &&
-                std::isfinite(model.density_unit),
+    require(std::isfinite(model.x_tilt_deg) && std::isfinite(model.pixel_size_A) &&
+                model.pixel_size_A > 0 && std::isfinite(model.density_unit),
             "its pixel size or density unit is no usable number");
     read_geometry(root.group("geometry"), model);
     model.field = read_field(root.group("field"));
@@ -290,6 +291,7 @@ void save_model(const std::filesystem::path& path, const Field& field, const Mod
       root.write_text("format", kFormat);
       root.write_integer("format_version", kFormatVersion);
       root.write_text("written_by", fmt::format("tomofield {}", library_version()));
+      root.write_number("x_tilt_deg", info.x_tilt_deg);
       root.write_number("pixel_size_A", info.pixel_size_A);
       root.write_number("density_unit", info.density_unit);
       root.write_text("contrast", info.is_dark ? "dark" : "bright");

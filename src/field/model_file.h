@@ -16,7 +16,9 @@ namespace tomofield::field {
 /// What a field means: where it lies, its scale, and where it came from.
 struct ModelInfo {
   geometry::TiltGeometry geometry;
-  geometry::Roi roi;          ///< the region that was asked for; the field goes further
+  geometry::Roi roi;  ///< the region that was asked for; the field goes further
+  double x_tilt_deg =
+      0.0;  ///< the specimen's rotation about X before the tilt, the same for all views
   double pixel_size_A = 1.0;  ///< of the pixels that every length counts
   double density_unit = 1.0;  ///< data units a density unit
   bool is_dark = false;       ///< the series was dark where dense, so volumes leave negated

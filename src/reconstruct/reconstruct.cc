@@ -43,6 +43,7 @@ field::ModelInfo model_info(const PreparedSeries& series, const ReconstructOptio
   field::ModelInfo info;
   info.geometry = series.geometry;
   info.roi = series.roi;
+  info.x_tilt_deg = series.x_tilt_deg;
   info.pixel_size_A = series.pixel_size_A;
   info.density_unit = series.unit;
   info.is_dark = options.input.contrast == tilt_series::Contrast::kDark;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <numbers>
 #include <vector>
 
 #include "tomofield/error.h"
@@ -107,14 +108,30 @@ class PartWriter {
   float scale_;
 };
 
+// The fit sees the specimen after its x-axis tilt: p = Ry(tilt) Rx(alpha) (P − C)
+// (CONVENTIONS), so a box of the specimen is turned by Rx(alpha) about C in the
+// field. A mirrored Z turns the other way.
+void rotate_about_x(const field::ModelInfo& model, Box& box) {
+  const geometry::TiltGeometry& g = model.geometry;
+  const double alpha = g.hand * model.x_tilt_deg * std::numbers::pi / 180.0;
+  const double c = std::cos(alpha), s = std::sin(alpha);
+  box.field_from_box = {{{1, 0, 0}, {0, c, -s}, {0, s, c}}};
+  const double axis_y = static_cast<double>(g.height) / 2;
+  const double y = box.centre_px[1] - axis_y, z = box.centre_px[2] - g.axis_z;
+  box.centre_px[1] = axis_y + c * y - s * z;
+  box.centre_px[2] = g.axis_z + s * y + c * z;
+}
+
 }  // namespace
 
 Box region_box(const field::ModelInfo& model, double voxel_px) {
   const auto& roi = model.roi;
-  return field::box_between(
+  Box box = field::box_between(
       {static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0},
       {static_cast<double>(roi.x1), static_cast<double>(roi.y1), model.geometry.thickness},
       voxel_px);
+  if (model.x_tilt_deg != 0.0) rotate_about_x(model, box);
+  return box;
 }
 
 void write_volume(const field::Model& model, const VolumeOptions& options,

@@ -129,5 +129,26 @@ TEST(WriteVolume, RefusesWhatCannotBeWritten) {
   EXPECT_EQ(scratch.num_files(), 0u);
 }
 
+// CONVENTIONS: p = Ry(tilt) Rx(alpha) (P − C): a point P of the specimen lies at
+// C + Rx(alpha) (P − C) in the field, wherever the region of interest is.
+TEST(WriteVolume, TurnsTheSpecimenBackByItsXTilt) {
+  auto model = uneven_model("vm");
+  const field::Box straight = region_box(model, 1.0);
+  model.x_tilt_deg = 30.0;
+  const double c = std::cos(M_PI / 6), s = std::sin(M_PI / 6);
+  for (const int hand : {1, -1}) {
+    model.geometry.hand = hand;
+    const field::Box turned = region_box(model, 1.0);
+    EXPECT_EQ(turned.size, straight.size);
+    const field::Point p = straight.position({3.5, 20.5, 15.5});
+    const field::Point q = turned.position({3.5, 20.5, 15.5});
+    const double y = p[1] - static_cast<double>(model.geometry.height) / 2;
+    const double z = p[2] - model.geometry.axis_z;
+    EXPECT_NEAR(q[0], p[0], 1e-9);
+    EXPECT_NEAR(q[1] - static_cast<double>(model.geometry.height) / 2, c * y - hand * s * z, 1e-9);
+    EXPECT_NEAR(q[2] - model.geometry.axis_z, hand * s * y + c * z, 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace tomofield::reconstruct
