@@ -6,13 +6,17 @@
 #include "base/aligned_buffer.h"
 #include "field/resample.h"
 #include "field/variation_planes.h"
+#include "kernels/row_interpolation.h"
 #include "kernels/small_gemm.h"
 
 namespace tomofield::field {
 namespace {
 
+using kernels::interpolate_rows;
+using kernels::interpolate_rows_transposed;
 using kernels::kLanes;
 using kernels::small_gemm;
+using kernels::spread_rows;
 
 // Positions of the six factors inside a leaf's parameters.
 struct Layout {
@@ -29,39 +33,6 @@ struct Layout {
   }
 };
 
-// out[lane, r]: a factor [y, r] interpolated at the slab's rows.
-void interpolate_rows(const float* factor, const LaneRows& rows, int rank, float* out) {
-  for (int l = 0; l < kLanes; ++l) {
-    const float* lower = factor + static_cast<std::ptrdiff_t>(rows.lower[l]) * rank;
-    const float fraction = rows.fraction[l];
-    for (int r = 0; r < rank; ++r)
-      out[l * rank + r] = lower[r] + fraction * (lower[rank + r] - lower[r]);
-  }
-}
-
-// The same with the lane innermost: out[r, lane].
-void interpolate_rows_by_rank(const float* factor, const LaneRows& rows, int rank, float* out) {
-  for (int l = 0; l < kLanes; ++l) {
-    const float* lower = factor + static_cast<std::ptrdiff_t>(rows.lower[l]) * rank;
-    const float fraction = rows.fraction[l];
-    for (int r = 0; r < rank; ++r)
-      out[r * kLanes + l] = lower[r] + fraction * (lower[rank + r] - lower[r]);
-  }
-}
-
-// Adjoint of interpolate_rows: adds to a factor's gradient [y, r].
-void spread_rows(const float* grad_lanes, const LaneRows& rows, int rank, float* gradient) {
-  for (int l = 0; l < kLanes; ++l) {
-    float* lower = gradient + static_cast<std::ptrdiff_t>(rows.lower[l]) * rank;
-    const float fraction = rows.fraction[l];
-    for (int r = 0; r < rank; ++r) {
-      const float g = grad_lanes[l * rank + r];
-      lower[r] += g - fraction * g;
-      lower[rank + r] += fraction * g;
-    }
-  }
-}
-
 // Scratch that a thread keeps between calls.
 float* scratch(std::size_t size, int which) {
   thread_local base::AlignedBuffer<float> buffers[3];
@@ -76,12 +47,13 @@ std::size_t VmField::count(const LeafShape& shape) { return Layout(shape).count;
 void VmField::add_slab_values(int leaf, const LaneRows& rows, float* values) const {
   const LeafShape& s = shape(leaf);
   const Layout at(s);
+  const kernels::LaneTaps taps{rows.lower.data(), rows.fraction.data()};
   const float* p = leaf_parameters(leaf);
   const int max_rank = std::max({s.rank_x, s.rank_y, s.rank_z});
   float* lanes = scratch(static_cast<std::size_t>(max_rank) * kLanes, 0);
   const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(s.nz) * kLanes;
 
-  interpolate_rows_by_rank(p + at.vy, rows, s.rank_y, lanes);
+  interpolate_rows_transposed(taps, s.rank_y, p + at.vy, lanes);
   small_gemm({.rows = static_cast<std::ptrdiff_t>(s.vertices_xz()),
               .depth = s.rank_y,
               .width = kLanes,
@@ -93,8 +65,8 @@ void VmField::add_slab_values(int leaf, const LaneRows& rows, float* values) con
               .c = values,
               .c_row = kLanes});
   for (int k = 0; k < s.nz; ++k) {
-    interpolate_rows_by_rank(p + at.myz + static_cast<std::size_t>(k) * s.ny * s.rank_x, rows,
-                             s.rank_x, lanes);
+    interpolate_rows_transposed(taps, s.rank_x,
+                                p + at.myz + static_cast<std::size_t>(k) * s.ny * s.rank_x, lanes);
     small_gemm({.rows = s.nx,
                 .depth = s.rank_x,
                 .width = kLanes,
@@ -107,8 +79,8 @@ void VmField::add_slab_values(int leaf, const LaneRows& rows, float* values) con
                 .c_row = column});
   }
   for (int i = 0; i < s.nx; ++i) {
-    interpolate_rows_by_rank(p + at.mxy + static_cast<std::size_t>(i) * s.ny * s.rank_z, rows,
-                             s.rank_z, lanes);
+    interpolate_rows_transposed(taps, s.rank_z,
+                                p + at.mxy + static_cast<std::size_t>(i) * s.ny * s.rank_z, lanes);
     small_gemm({.rows = s.nz,
                 .depth = s.rank_z,
                 .width = kLanes,
@@ -128,6 +100,7 @@ void VmField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_va
                             float* gradient) const {
   const LeafShape& s = shape(leaf);
   const Layout at(s);
+  const kernels::LaneTaps taps{rows.lower.data(), rows.fraction.data()};
   const float* p = leaf_parameters(leaf);
   const int max_rank = std::max({s.rank_x, s.rank_y, s.rank_z});
   const std::size_t lane_size = static_cast<std::size_t>(max_rank) * kLanes;
@@ -137,7 +110,7 @@ void VmField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_va
   const std::ptrdiff_t num_xz = static_cast<std::ptrdiff_t>(s.vertices_xz());
 
   // VY ⊗ MXZ
-  interpolate_rows(p + at.vy, rows, s.rank_y, lanes);
+  interpolate_rows(taps, s.rank_y, p + at.vy, lanes);
   std::fill_n(grad_lanes, lane_size, 0.0f);
   small_gemm({.rows = num_xz,
               .depth = kLanes,
@@ -159,13 +132,13 @@ void VmField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_va
               .b_row = s.rank_y,
               .c = grad_lanes,
               .c_row = s.rank_y});
-  spread_rows(grad_lanes, rows, s.rank_y, gradient + at.vy);
+  spread_rows(taps, s.rank_y, grad_lanes, gradient + at.vy);
 
   // VX ⊗ MYZ
   for (int k = 0; k < s.nz; ++k) {
     const std::size_t plane = at.myz + static_cast<std::size_t>(k) * s.ny * s.rank_x;
     const float* g = grad_values + k * kLanes;
-    interpolate_rows(p + plane, rows, s.rank_x, lanes);
+    interpolate_rows(taps, s.rank_x, p + plane, lanes);
     std::fill_n(grad_lanes, lane_size, 0.0f);
     small_gemm({.rows = s.nx,
                 .depth = kLanes,
@@ -187,14 +160,14 @@ void VmField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_va
                 .b_row = s.rank_x,
                 .c = grad_lanes,
                 .c_row = s.rank_x});
-    spread_rows(grad_lanes, rows, s.rank_x, gradient + plane);
+    spread_rows(taps, s.rank_x, grad_lanes, gradient + plane);
   }
 
   // VZ ⊗ MXY
   for (int i = 0; i < s.nx; ++i) {
     const std::size_t plane = at.mxy + static_cast<std::size_t>(i) * s.ny * s.rank_z;
     const float* g = grad_values + i * column;
-    interpolate_rows(p + plane, rows, s.rank_z, lanes);
+    interpolate_rows(taps, s.rank_z, p + plane, lanes);
     std::fill_n(grad_lanes, lane_size, 0.0f);
     small_gemm({.rows = s.nz,
                 .depth = kLanes,
@@ -216,7 +189,7 @@ void VmField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_va
                 .b_row = s.rank_z,
                 .c = grad_lanes,
                 .c_row = s.rank_z});
-    spread_rows(grad_lanes, rows, s.rank_z, gradient + plane);
+    spread_rows(taps, s.rank_z, grad_lanes, gradient + plane);
   }
 }
 

@@ -112,6 +112,26 @@ double decode_leaf_adjoint(const LeafPiece& piece, const double* values, const d
   return bias;
 }
 
+void interpolate_rows(const LaneTaps& taps, int width, const double* matrix, double* out) {
+  for (int l = 0; l < kLanes; ++l) {
+    const double f = static_cast<double>(taps.fraction[l]);
+    for (int c = 0; c < width; ++c) {
+      out[l * width + c] =
+          (1 - f) * matrix[taps.lower[l] * width + c] + f * matrix[(taps.lower[l] + 1) * width + c];
+    }
+  }
+}
+
+void spread_rows(const LaneTaps& taps, int width, const double* grad, double* grad_matrix) {
+  for (int l = 0; l < kLanes; ++l) {
+    const double f = static_cast<double>(taps.fraction[l]);
+    for (int c = 0; c < width; ++c) {
+      grad_matrix[taps.lower[l] * width + c] += (1 - f) * grad[l * width + c];
+      grad_matrix[(taps.lower[l] + 1) * width + c] += f * grad[l * width + c];
+    }
+  }
+}
+
 double volume_variation(const VolumeVariation& s, const double* volume, double* gradient) {
   const double epsilon = static_cast<double>(s.penalty.epsilon);
   const double tau = static_cast<double>(s.penalty.concavity);

@@ -5,6 +5,7 @@
 #include "kernels/adam.h"
 #include "kernels/leaf_decoding.h"
 #include "kernels/line_projection.h"
+#include "kernels/row_interpolation.h"
 #include "kernels/small_gemm.h"
 #include "kernels/total_variation.h"
 
@@ -39,6 +40,10 @@ void decode_leaf(const LeafPiece& piece, const double* values, double* samples);
 /// Σ grad_samples · act′. The derivative is taken from the values, not from the samples.
 double decode_leaf_adjoint(const LeafPiece& piece, const double* values, const double* grad_samples,
                            double* grad_values);
+
+/// out[lane, c] = Σ_row hat-weights of the taps · matrix[row, c], and its adjoint.
+void interpolate_rows(const LaneTaps& taps, int width, const double* matrix, double* out);
+void spread_rows(const LaneTaps& taps, int width, const double* grad, double* grad_matrix);
 
 /// A whole volume [z, x, y], without slabs.
 struct VolumeVariation {
