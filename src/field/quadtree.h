@@ -55,6 +55,8 @@ class Quadtree {
   }
   int num_leaves() const { return static_cast<int>(leaves_.size()); }
   int band_of_leaf(int index) const;
+  /// Leaf number of a node, −1 for inner nodes.
+  int leaf_of_node(int node) const { return leaf_of_node_[static_cast<std::size_t>(node)]; }
 
   /// Replaces a leaf by its four quarters. Leaf numbers change: call leaves() again.
   void split(int leaf_index);

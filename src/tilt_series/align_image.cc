@@ -55,11 +55,6 @@ bool interpolate(const MaskedImage& raw, const Taps& x, const Taps& y, float* va
 
 }  // namespace
 
-bool RawFromAligned::is_identity() const {
-  return m11 == 1.0 && m12 == 0.0 && m21 == 0.0 && m22 == 1.0 && shift_x_px == 0.0 &&
-         shift_y_px == 0.0;
-}
-
 MaskedImage align_image(const MaskedImage& raw, const RawFromAligned& transform, std::int64_t width,
                         std::int64_t height) {
   MaskedImage out(width, height);

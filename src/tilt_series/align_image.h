@@ -1,18 +1,11 @@
 #pragma once
 
+#include "geometry/raw_from_aligned.h"
 #include "tilt_series/image.h"
 
 namespace tomofield::tilt_series {
 
-/// Where an aligned pixel comes from in the raw image: with q relative to the
-/// centre of the aligned image and p relative to the centre of the raw one, in
-/// unbinned pixels, p = M q + shift.
-struct RawFromAligned {
-  double m11 = 1.0, m12 = 0.0, m21 = 0.0, m22 = 1.0;
-  double shift_x_px = 0.0, shift_y_px = 0.0;
-
-  bool is_identity() const;
-};
+using geometry::RawFromAligned;
 
 /// The raw image resampled onto width × height aligned pixels by cubic
 /// convolution (Keys 1981, a = −1/2: Catmull–Rom), linear in the outermost

@@ -162,6 +162,57 @@ double volume_variation(const VolumeVariation& s, const double* volume, double* 
   return s.weight * value;
 }
 
+namespace {
+
+// Calls visit(vertex, hat weight) for every vertex around sample `index` of a piece.
+template <typename Visit>
+void for_each_vertex(const LeafVertices& leaf, const RayPiece& p, int index, Visit&& visit) {
+  const double t = (index + static_cast<double>(random_unit(p.key, index))) / p.num_samples;
+  const auto at = [t](float start, float span) {
+    return static_cast<double>(start) + t * static_cast<double>(span);
+  };
+  const double x = at(p.start_x, p.span_x), y = at(p.start_y, p.span_y),
+               z = at(p.start_z, p.span_z);
+  for (int i = 0; i < leaf.nx; ++i) {
+    for (int k = 0; k < leaf.nz; ++k) {
+      for (int j = 0; j < leaf.ny; ++j) {
+        const double weight = std::max(0.0, 1.0 - std::abs(x - i)) *
+                              std::max(0.0, 1.0 - std::abs(y - j)) *
+                              std::max(0.0, 1.0 - std::abs(z - k));
+        if (weight > 0) visit((i * leaf.nz + k) * leaf.ny + j, weight);
+      }
+    }
+  }
+}
+
+double value_at(const LeafVertices& leaf, const double* values, const RayPiece& piece, int index) {
+  double value = 0.0;
+  for_each_vertex(leaf, piece, index, [&](int v, double weight) { value += weight * values[v]; });
+  return value;
+}
+
+}  // namespace
+
+double integrate_piece(const LeafVertices& leaf, Activation activation, const double* values,
+                       const RayPiece& piece) {
+  double sum = 0.0;
+  for (int i = 0; i < piece.num_samples; ++i)
+    sum += activation_value(activation, value_at(leaf, values, piece, i));
+  return sum * static_cast<double>(piece.segment_length);
+}
+
+double spread_piece(const LeafVertices& leaf, Activation activation, const double* values,
+                    const RayPiece& piece, double g, double* grad_values) {
+  double grad_bias = 0.0;
+  for (int i = 0; i < piece.num_samples; ++i) {
+    const double grad = g * static_cast<double>(piece.segment_length) *
+                        activation_derivative(activation, value_at(leaf, values, piece, i));
+    for_each_vertex(leaf, piece, i, [&](int v, double weight) { grad_values[v] += weight * grad; });
+    grad_bias += grad;
+  }
+  return grad_bias;
+}
+
 void adam_step(const AdamStep& s, std::ptrdiff_t count, double* p, double* g, double* m,
                double* v) {
   const double beta1 = static_cast<double>(s.beta1), beta2 = static_cast<double>(s.beta2);

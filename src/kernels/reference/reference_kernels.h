@@ -5,6 +5,7 @@
 #include "kernels/adam.h"
 #include "kernels/leaf_decoding.h"
 #include "kernels/line_projection.h"
+#include "kernels/ray_samples.h"
 #include "kernels/row_interpolation.h"
 #include "kernels/small_gemm.h"
 #include "kernels/total_variation.h"
@@ -55,6 +56,13 @@ struct VolumeVariation {
 /// weight · Σ φ(√(|∇f|² + ε²)) over all voxels, forward differences that are
 /// zero past the last of each axis; adds its derivative to `gradient`.
 double volume_variation(const VolumeVariation& shape, const double* volume, double* gradient);
+
+/// Σ segment_length · act(trilinear interpolation of values [x, z, y]) over the
+/// samples of a piece, and g times its derivative: grad_values += …; returns the bias's.
+double integrate_piece(const LeafVertices& leaf, Activation activation, const double* values,
+                       const RayPiece& piece);
+double spread_piece(const LeafVertices& leaf, Activation activation, const double* values,
+                    const RayPiece& piece, double g, double* grad_values);
 
 void adam_step(const AdamStep& step, std::ptrdiff_t count, double* parameters, double* gradient,
                double* m, double* v);

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "field/field.h"
+#include "kernels/ray_samples.h"
+
+namespace tomofield::projection {
+
+kernels::LeafVertices vertices_of(const field::LeafShape& shape);
+
+/// values[x, z, y], overwritten: the pre-activation at every vertex of a leaf,
+/// bias included, whose trilinear interpolation is the leaf's pre-activation everywhere.
+void contract_leaf(const field::Field& field, int leaf, float* values);
+
+/// Its adjoint: adds dL/d parameters of the leaf to gradient[0 … count).
+void contract_leaf_adjoint(const field::Field& field, int leaf, const float* grad_values,
+                           float* gradient);
+
+}  // namespace tomofield::projection
