@@ -15,10 +15,20 @@
 namespace tomofield::field {
 namespace {
 
-double activate(const kernels::Activation& activation, double a) {
-  const double beta = static_cast<double>(activation.beta);
-  if (beta <= 0) return a;
-  return std::max(a, 0.0) + std::log1p(std::exp(-beta * std::abs(a))) / beta;
+// One axis of points between n vertices from `low` on over `length`; kept between calls.
+kernels::AxisTaps axis_taps(std::span<const double> positions, double low, double length, int n,
+                            int axis) {
+  thread_local std::vector<int> lower[3];
+  thread_local std::vector<float> fraction[3];
+  lower[axis].resize(positions.size());
+  fraction[axis].resize(positions.size());
+  const double vertices_a_pixel = (n - 1) / length;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const AxisPoint at((positions[i] - low) * vertices_a_pixel, n);
+    lower[axis][i] = static_cast<int>(at.lower);
+    fraction[axis][i] = static_cast<float>(at.fraction);
+  }
+  return {static_cast<int>(positions.size()), lower[axis].data(), fraction[axis].data()};
 }
 
 }  // namespace
@@ -68,16 +78,40 @@ void Field::row_values(int leaf, double y, float* values) const {
   add_row_values(leaf, static_cast<int>(at.lower), static_cast<float>(at.fraction), values);
 }
 
+PointTaps Field::point_taps(int leaf, const Points& points) const {
+  const Square& square = tree_.leaf(leaf).square;
+  const LeafShape& s = shape(leaf);
+  const double size = static_cast<double>(square.size);
+  return {axis_taps(points.x, static_cast<double>(square.x0), size, s.nx, 0),
+          axis_taps(points.y, static_cast<double>(square.y0), size, s.ny, 1),
+          axis_taps(points.z, 0.0, thickness_, s.nz, 2)};
+}
+
+void Field::point_densities(int leaf, const Points& points, std::span<float> densities) const {
+  std::fill(densities.begin(), densities.end(), bias);
+  add_point_values(leaf, point_taps(leaf, points), densities.data());
+  kernels::activate(activation, densities.data(), std::ssize(densities));
+}
+
+double Field::point_gradient(int leaf, const Points& points, std::span<const float> densities,
+                             std::span<const float> grad_densities, float* gradient) const {
+  thread_local std::vector<float> grad_values;
+  grad_values.assign(grad_densities.begin(), grad_densities.end());
+  double grad_bias = 0.0;
+  for (std::size_t i = 0; i < grad_values.size(); ++i) {
+    if (activation.beta > 0) grad_values[i] *= -std::expm1(-activation.beta * densities[i]);
+    grad_bias += static_cast<double>(grad_values[i]);
+  }
+  add_point_gradient(leaf, point_taps(leaf, points), grad_values.data(), gradient);
+  return grad_bias;
+}
+
 double Field::density(double x, double y, double z) const {
   const int leaf = tree_.find_leaf(x, y);
   if (leaf < 0 || !(z >= 0 && z <= thickness_)) return 0.0;
-  const Square& square = tree_.leaf(leaf).square;
-  const LeafShape& s = shape(leaf);
-  const double vx =
-      (x - static_cast<double>(square.x0)) / static_cast<double>(square.size) * (s.nx - 1);
-  const double vz = z / thickness_ * (s.nz - 1);
-  return activate(activation,
-                  point_value(leaf, vx, vertex_y(leaf, y), vz) + static_cast<double>(bias));
+  float density = 0.0f;
+  point_densities(leaf, {{&x, 1}, {&y, 1}, {&z, 1}}, {&density, 1});
+  return static_cast<double>(density);
 }
 
 void Field::split_leaf(int leaf) {

@@ -34,6 +34,18 @@ struct LaneRows {
   std::array<float, kernels::kLanes> fraction{};
 };
 
+/// Points in the field's coordinates (pixels): spans of one length.
+struct Points {
+  std::span<const double> x, y, z;
+  std::size_t size() const { return x.size(); }
+};
+
+/// The same points between the vertices of one leaf.
+struct PointTaps {
+  kernels::AxisTaps x, y, z;
+  int count() const { return x.count; }
+};
+
 /// A density field over a quadtree: vertex values a leaf at a time, and the
 /// gradient back to the parameters. Everything above this folder sees a field
 /// through this interface alone. Coordinates are pixels of the aligned view at
@@ -73,6 +85,14 @@ class Field {
                              float* gradient) const = 0;
   /// Vertex values at a single row: values[x, z], overwritten.
   void row_values(int leaf, double y, float* values) const;
+  /// Densities of one leaf at points in it, overwritten. The leaf is given, so that
+  /// both sides of a shared face can be asked for; points beyond it take the
+  /// nearest face's value. Interpolated in float, ranks in vectors.
+  void point_densities(int leaf, const Points& points, std::span<float> densities) const;
+  /// Adjoint of point_densities at the densities that it gave: adds dL/d parameters
+  /// of this leaf to gradient[0 … count) and returns dL/d bias.
+  double point_gradient(int leaf, const Points& points, std::span<const float> densities,
+                        std::span<const float> grad_densities, float* gradient) const;
   /// Density at a point; 0 outside the domain.
   double density(double x, double y, double z) const;
 
@@ -91,8 +111,10 @@ class Field {
   virtual std::size_t parameter_count(const LeafShape& shape) const = 0;
   virtual void add_slab_values(int leaf, const LaneRows& rows, float* values) const = 0;
   virtual void add_row_values(int leaf, int lower, float fraction, float* values) const = 0;
-  virtual double point_value(int leaf, double x, double y,
-                             double z) const = 0;  ///< vertex coordinates, no bias
+  /// values[point] += vertex values interpolated there, without the bias; and its adjoint.
+  virtual void add_point_values(int leaf, const PointTaps& taps, float* values) const = 0;
+  virtual void add_point_gradient(int leaf, const PointTaps& taps, const float* grad_values,
+                                  float* gradient) const = 0;
   /// Parameters of the quarter [x0, x0 + ½] × [y0, y0 + ½] (fractions of the leaf) of a leaf.
   virtual void sample_quarter(const LeafShape& shape, const float* leaf, double x0, double y0,
                               float* quarter) const = 0;
@@ -103,6 +125,7 @@ class Field {
 
  private:
   double vertex_y(int leaf, double y) const;
+  PointTaps point_taps(int leaf, const Points& points) const;
 
   Quadtree tree_;
   double thickness_;

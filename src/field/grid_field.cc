@@ -39,6 +39,25 @@ struct RowMatrix {
   }
 };
 
+// Calls body(vertex, weight) for the eight vertices around a point.
+template <typename Body>
+void for_each_corner(const LeafShape& s, const PointTaps& taps, int point, const Body& body) {
+  const auto weight = [point](const kernels::AxisTaps& axis, int upper) {
+    return upper ? axis.fraction[point] : 1.0f - axis.fraction[point];
+  };
+  for (int i = 0; i < 2; ++i) {
+    for (int k = 0; k < 2; ++k) {
+      const float w = weight(taps.x, i) * weight(taps.z, k);
+      const std::ptrdiff_t column =
+          (static_cast<std::ptrdiff_t>(taps.x.lower[point] + i) * s.nz + taps.z.lower[point] + k) *
+              s.ny +
+          taps.y.lower[point];
+      body(column, w * weight(taps.y, 0));
+      body(column + 1, w * weight(taps.y, 1));
+    }
+  }
+}
+
 }  // namespace
 
 std::size_t GridField::count(const LeafShape& s) { return s.vertices_xz() * s.ny; }
@@ -81,19 +100,21 @@ void GridField::add_row_values(int leaf, int lower, float fraction, float* value
     values[i] += p[0] + fraction * (p[1] - p[0]);
 }
 
-double GridField::point_value(int leaf, double x, double y, double z) const {
-  const LeafShape& s = shape(leaf);
-  const AxisPoint px(x, s.nx), py(y, s.ny), pz(z, s.nz);
+void GridField::add_point_values(int leaf, const PointTaps& taps, float* values) const {
   const float* p = leaf_parameters(leaf);
-  double sum = 0.0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const int i = corner & 1, j = corner >> 1 & 1, k = corner >> 2;
-    const double weight = (i ? px.fraction : 1 - px.fraction) *
-                          (j ? py.fraction : 1 - py.fraction) * (k ? pz.fraction : 1 - pz.fraction);
-    sum += weight *
-           static_cast<double>(p[((px.lower + i) * s.nz + pz.lower + k) * s.ny + py.lower + j]);
+  for (int n = 0; n < taps.count(); ++n) {
+    for_each_corner(shape(leaf), taps, n,
+                    [&](std::ptrdiff_t vertex, float weight) { values[n] += weight * p[vertex]; });
   }
-  return sum;
+}
+
+void GridField::add_point_gradient(int leaf, const PointTaps& taps, const float* grad_values,
+                                   float* gradient) const {
+  for (int n = 0; n < taps.count(); ++n) {
+    for_each_corner(shape(leaf), taps, n, [&](std::ptrdiff_t vertex, float weight) {
+      gradient[vertex] += weight * grad_values[n];
+    });
+  }
 }
 
 double GridField::parameter_variation(int leaf, const kernels::VariationPenalty& penalty,

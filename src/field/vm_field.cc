@@ -1,11 +1,13 @@
 #include "field/vm_field.h"
 
 #include <algorithm>
+#include <array>
 #include <vector>
 
 #include "base/aligned_buffer.h"
 #include "field/resample.h"
 #include "field/variation_planes.h"
+#include "kernels/point_products.h"
 #include "kernels/row_interpolation.h"
 #include "kernels/small_gemm.h"
 
@@ -32,6 +34,18 @@ struct Layout {
     count = mxy + size(s.nx, s.ny, s.rank_z);
   }
 };
+
+// The three products of eq. 4 at points, and where their factors lie.
+struct Product {
+  kernels::PointProducts points;
+  std::size_t vector, matrix;
+};
+std::array<Product, 3> products(const LeafShape& s, const PointTaps& t) {
+  const Layout at(s);
+  return {Product{{t.x, t.z, t.y, s.ny, s.rank_x}, at.vx, at.myz},
+          Product{{t.y, t.x, t.z, s.nz, s.rank_y}, at.vy, at.mxz},
+          Product{{t.z, t.x, t.y, s.ny, s.rank_z}, at.vz, at.mxy}};
+}
 
 // Scratch that a thread keeps between calls.
 float* scratch(std::size_t size, int which) {
@@ -251,14 +265,20 @@ void VmField::add_row_values(int leaf, int lower, float fraction, float* values)
               .c_row = 1});
 }
 
-double VmField::point_value(int leaf, double x, double y, double z) const {
-  const LeafShape& s = shape(leaf);
-  const Layout at(s);
-  const float* p = leaf_parameters(leaf);
-  const AxisPoint px(x, s.nx), py(y, s.ny), pz(z, s.nz);
-  return sum_of_products(p + at.vx, p + at.myz, px, pz, py, s.ny, s.rank_x) +
-         sum_of_products(p + at.vy, p + at.mxz, py, px, pz, s.nz, s.rank_y) +
-         sum_of_products(p + at.vz, p + at.mxy, pz, px, py, s.ny, s.rank_z);
+void VmField::add_point_values(int leaf, const PointTaps& taps, float* values) const {
+  for (const Product& f : products(shape(leaf), taps)) {
+    const float* p = leaf_parameters(leaf);
+    kernels::add_point_products(f.points, p + f.vector, p + f.matrix, values);
+  }
+}
+
+void VmField::add_point_gradient(int leaf, const PointTaps& taps, const float* grad_values,
+                                 float* gradient) const {
+  for (const Product& f : products(shape(leaf), taps)) {
+    const float* p = leaf_parameters(leaf);
+    kernels::add_point_products_gradient(f.points, p + f.vector, p + f.matrix, grad_values,
+                                         gradient + f.vector, gradient + f.matrix);
+  }
 }
 
 double VmField::parameter_variation(int leaf, const kernels::VariationPenalty& penalty,

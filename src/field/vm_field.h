@@ -39,7 +39,9 @@ class VmField final : public Field {
   std::size_t parameter_count(const LeafShape& shape) const override { return count(shape); }
   void add_slab_values(int leaf, const LaneRows& rows, float* values) const override;
   void add_row_values(int leaf, int lower, float fraction, float* values) const override;
-  double point_value(int leaf, double x, double y, double z) const override;
+  void add_point_values(int leaf, const PointTaps& taps, float* values) const override;
+  void add_point_gradient(int leaf, const PointTaps& taps, const float* grad_values,
+                          float* gradient) const override;
   void sample_quarter(const LeafShape& shape, const float* leaf, double x0, double y0,
                       float* quarter) const override;
 };

@@ -4,7 +4,7 @@
 
 namespace tomofield::kernels {
 
-/// Where regularly spaced samples lie between vertices on one axis: sample s
+/// Where samples lie between vertices on one axis: sample s
 /// interpolates vertices lower[s] and lower[s] + 1, which both exist, with weight
 /// fraction[s] on the upper one.
 struct AxisTaps {
