@@ -14,6 +14,7 @@
 #include "io/json.h"
 #include "kernels/lanes.h"
 #include "projection/sample_grid.h"
+#include "reconstruct/mask_json.h"
 #include "reconstruct/options_json.h"
 #include "reconstruct/result_files.h"
 #include "tomofield/error.h"
@@ -144,6 +145,7 @@ nlohmann::json figures_json(const Solution& solution, const VoxelProblem& proble
           {"size_px", {series.roi.width(), series.roi.height(), series.geometry.thickness}},
           {"seconds", seconds},
           {"threads", base::thread_count()},
+          {"mask", reconstruct::mask_json(series)},
           {"views", views}};
 }
 

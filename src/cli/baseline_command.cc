@@ -55,7 +55,7 @@ void run(Arguments<Method>& arguments) {
       summary.mean_squared_residual, 100 * summary.last_decrease);
   const baseline::BaselinePaths paths = baseline::baseline_paths(options.output);
   fmt::print("tomogram  {}\nfigures   {}\n", paths.volume.string(), paths.json.string());
-  write_pictures(paths.volume, paths.picture_prefix);
+  write_pictures(paths.volume, series, paths.picture_prefix);
 }
 
 template <typename Method>

@@ -1,5 +1,6 @@
 #include "cli/input_options.h"
 
+#include <cmath>
 #include <string>
 
 namespace tomofield::cli {
@@ -78,6 +79,44 @@ void add_image_options(CLI::App& command, TiltSeriesOptions& options) {
       ->group(group);
 }
 
+/// "auto", or a diameter in nm, 0 or more.
+std::string bead_diameter_fault(const std::string& word) {
+  if (word == "auto") return {};
+  double diameter_nm = 0.0;
+  if (CLI::detail::lexical_cast(word, diameter_nm) && diameter_nm >= 0.0 &&
+      std::isfinite(diameter_nm)) {
+    return {};
+  }
+  return "must be auto or a diameter in nm, 0 or more, not " + word;
+}
+
+void add_mask_options(CLI::App& command, TiltSeriesOptions& options) {
+  const char* group = "Masks";
+  command
+      .add_option_function<std::string>(
+          "--bead-diameter",
+          [&options](const std::string& word) {
+            if (word != "auto") options.bead_diameter_nm = std::stod(word);
+          },
+          "Diameter of the gold beads, which are found and masked in every view; auto: "
+          "estimated, and only with --contrast dark and where there clearly are some; 0: none")
+      ->check(CLI::Validator(bead_diameter_fault, "auto|NM"))
+      ->default_str("auto")
+      ->group(group);
+  command
+      .add_option("--fiducials", options.fiducials,
+                  "Places of beads to mask as well: IMOD's fiducial model of this stack as text "
+                  "(model2point, with or without -object or -contour)")
+      ->type_name("FILE")
+      ->group(group);
+  command
+      .add_option("--mask", options.mask,
+                  "MRC stack of the same size as the tilt series: pixels that are 0 there are "
+                  "left out, all others count")
+      ->type_name("FILE")
+      ->group(group);
+}
+
 }  // namespace
 
 void add_input_options(CLI::App& command, TiltSeriesOptions& options) {
@@ -86,6 +125,7 @@ void add_input_options(CLI::App& command, TiltSeriesOptions& options) {
       ->required();
   add_alignment_options(command, options);
   add_image_options(command, options);
+  add_mask_options(command, options);
 }
 
 }  // namespace tomofield::cli

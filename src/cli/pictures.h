@@ -2,9 +2,13 @@
 
 #include <filesystem>
 
+#include "tilt_series/tilt_series.h"
+
 namespace tomofield::cli {
 
-/// Writes pictures of the central slices of a volume (report/slices.h) and prints where they are.
-void write_pictures(const std::filesystem::path& volume, const std::filesystem::path& prefix);
+/// Writes pictures of the central slices of a volume (report/slices.h) and of the masks of the
+/// series that it comes from (report/mask_picture.h), and prints where they are.
+void write_pictures(const std::filesystem::path& volume, const tilt_series::TiltSeries& series,
+                    const std::filesystem::path& prefix);
 
 }  // namespace tomofield::cli

@@ -158,7 +158,7 @@ void run(Arguments& arguments) {
             paths.model.string(), options.overwrite ? " instead of --overwrite" : ""));
   }
   print_files(paths);
-  write_pictures(paths.volume, paths.picture_prefix);
+  write_pictures(paths.volume, series, paths.picture_prefix);
 }
 
 }  // namespace

@@ -33,7 +33,10 @@ json input_json(const tilt_series::TiltSeriesOptions& o) {
           {"angpix", or_null(o.angpix)},
           {"pixel_size_A", or_null(o.pixel_size_A)},
           {"contrast", o.contrast == tilt_series::Contrast::kDark ? "dark" : "bright"},
-          {"log", o.take_log}};
+          {"log", o.take_log},
+          {"bead_diameter_nm", or_null(o.bead_diameter_nm)},
+          {"fiducials", or_null(o.fiducials)},
+          {"mask", or_null(o.mask)}};
 }
 
 json specimen_json(const SpecimenOptions& o) {

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "base/log.h"
 #include "reconstruct/options.h"
 #include "tomofield/error.h"
 
@@ -130,6 +131,19 @@ void measure_brightness(const tilt_series::TiltSeries& series, PreparedSeries& p
   prepared.mean_density = mean_density / prepared.unit;
 }
 
+void log_masks(const PreparedSeries& prepared) {
+  const tilt_series::MaskFigures& masks = prepared.masks;
+  double masked = 0;
+  const int num_views = prepared.geometry.num_views();
+  for (int v = 0; v < num_views; ++v) masked += prepared.masked_part(v) / num_views;
+  const std::string beads =
+      masks.num_beads == 0
+          ? "no beads"
+          : fmt::format("{} beads of {:.3g} nm", masks.num_beads, masks.bead_diameter_A / 10);
+  base::log_info(fmt::format("masked: {:.1f} % of all rays ({}, {} hot or dead pixels, fill)",
+                             100 * masked, beads, masks.num_bad_pixels));
+}
+
 }  // namespace
 
 std::vector<std::string> SpecimenOptions::faults() const {
@@ -180,7 +194,14 @@ PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
         series.read_view(view, image, valid);
       },
       scratch_dir);
+  prepared.masks = series.mask_figures();
+  log_masks(prepared);
   return prepared;
+}
+
+double PreparedSeries::masked_part(int view) const {
+  const auto num_rays = static_cast<double>(rays->shape().width * rays->shape().num_rows);
+  return 1.0 - static_cast<double>(rays->num_valid(view)) / num_rays;
 }
 
 }  // namespace tomofield::reconstruct

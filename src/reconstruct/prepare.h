@@ -36,7 +36,10 @@ struct PreparedSeries {
   std::vector<double> noise_sigma;  ///< of each view, in density units
   double mean_density = 0.0;        ///< in density units
   double empty_beam = 0.0;          ///< I0 in data units (dark contrast)
+  tilt_series::MaskFigures masks;   ///< what was masked, in all of the views
   std::unique_ptr<tilt_series::SlabViews> rays;
+  /// Part of a view's rays in the region of interest that carry no loss; needs `rays`.
+  double masked_part(int view) const;
 };
 
 /// Geometry alone: no pixel is read. Throws Error for options that do not fit the series.

@@ -14,6 +14,7 @@
 #include "io/json.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/fit.h"
+#include "reconstruct/mask_json.h"
 #include "reconstruct/result_files.h"
 #include "tomofield/error.h"
 
@@ -113,6 +114,7 @@ nlohmann::json figures_json(const field::Model& model, const Progress& progress,
           {"size_px", {series.roi.width(), series.roi.height(), series.geometry.thickness}},
           {"seconds", seconds},
           {"threads", base::thread_count()},
+          {"mask", mask_json(series)},
           {"views", views}};
 }
 

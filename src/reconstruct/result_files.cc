@@ -15,7 +15,8 @@ namespace fs = std::filesystem;
 
 std::vector<fs::path> input_files(const tilt_series::TiltSeriesOptions& input) {
   std::vector<fs::path> files{input.stack};
-  for (const auto& file : {input.tlt, input.xf, input.xtilt, input.aln, input.mdoc}) {
+  for (const auto& file :
+       {input.tlt, input.xf, input.xtilt, input.aln, input.mdoc, input.fiducials, input.mask}) {
     if (file) files.push_back(*file);
   }
   return files;
@@ -26,8 +27,8 @@ std::vector<fs::path> input_files(const tilt_series::TiltSeriesOptions& input) {
 void check_result_files(std::vector<fs::path> results, const fs::path& picture_prefix,
                         const tilt_series::TiltSeriesOptions& input, bool may_replace,
                         const std::string& advice) {
-  for (const char* plane : {"_xy.png", "_xz.png", "_yz.png"})
-    results.emplace_back(picture_prefix.string() + plane);
+  for (const char* picture : {"_xy.png", "_xz.png", "_yz.png", "_mask.png"})
+    results.emplace_back(picture_prefix.string() + picture);
   for (auto it = results.begin(); it != results.end(); ++it) {
     if (std::find(it + 1, results.end(), *it) != results.end()) {
       throw Error(fmt::format(

@@ -9,9 +9,11 @@
 #include "base/log.h"
 #include "io/mrc.h"
 #include "tilt_series/align_image.h"
+#include "tilt_series/bad_pixels.h"
 #include "tilt_series/binning.h"
 #include "tilt_series/flat_fill.h"
 #include "tilt_series/noise.h"
+#include "tilt_series/series_masks.h"
 #include "tilt_series/series_plan.h"
 #include "tomofield/error.h"
 
@@ -21,6 +23,7 @@ namespace {
 /// What is wrong with the raw pixels of a section.
 struct PixelCensus {
   std::int64_t num_not_finite = 0;
+  std::int64_t num_bad = 0;  // hot or dead
   bool is_constant = true;
 };
 
@@ -76,19 +79,24 @@ constexpr double kMostNotFinite = 0.01;
 struct TiltSeries::Impl {
   TiltSeriesOptions options;
   io::MrcReader stack;
+  std::optional<io::MrcReader> mask;
   SeriesPlan plan;
   std::vector<View> views;
   std::int64_t width = 0;
   std::int64_t height = 0;
   double empty_beam = 0.0;
   std::vector<double> noise_sigma;
+  BeadMasks beads;  // none while they are looked for
 
   explicit Impl(const TiltSeriesOptions& given)
       : options(given), stack(given.stack), plan(plan_series(given, stack)) {
+    if (options.mask) mask.emplace(open_mask(*options.mask, stack));
     for (const PlannedView& planned : plan.views) views.push_back(planned.view);
+    beads.discs.resize(views.size());
     width = reduced_size(plan.aligned_width, plan.bin_factor);
     height = reduced_size(plan.aligned_height, plan.bin_factor);
     survey();
+    find_beads();
     base::log_info(fmt::format(
         "'{}': {} of {} sections, tilts {:.1f}° to {:.1f}° from {}, views of {} × {} pixels of {} "
         "Å",
@@ -112,12 +120,16 @@ struct TiltSeries::Impl {
     stack.read_section(views[view].section, image.values);
     *census = mask_not_finite(&image);
     if (!plan.is_raw) mask_flat_fill(options.contrast, &image);
+    if (mask) apply_mask(*mask, views[view].section, &image);
+    census->num_bad = mask_bad_pixels(&image);
     const RawFromAligned& transform = plan.views[view].raw_from_aligned;
     const bool keeps_sizes = plan.aligned_width == header.nx && plan.aligned_height == header.ny;
     if (!(transform.is_identity() && keeps_sizes)) {
       image = align_image(image, transform, plan.aligned_width, plan.aligned_height);
     }
-    return plan.bin_factor == 1.0 ? image : reduce_image(image, plan.bin_factor);
+    if (plan.bin_factor != 1.0) image = reduce_image(image, plan.bin_factor);
+    mask_discs(beads.discs[view], &image);
+    return image;
   }
 
   /// Intensities to line integrals; returns how many pixels the floor raised.
@@ -156,8 +168,8 @@ struct TiltSeries::Impl {
     }
     if (std::find(image.valid.begin(), image.valid.end(), 1) == image.valid.end()) {
       throw Error(
-          fmt::format("{} has no pixel left: its alignment moves it out of the view, or it "
-                      "is all flat fill; leave it out with --exclude {}",
+          fmt::format("{} has no pixel left: its alignment moves it out of the view, it is all "
+                      "flat fill, or --mask is zero all over it; leave it out with --exclude {}",
                       describe(view), views[view].section + 1));
     }
     if (census.num_not_finite > 0) {
@@ -170,16 +182,34 @@ struct TiltSeries::Impl {
   /// noise. The noise of I0 − I is that of I; only a logarithm needs I0 first.
   void survey() {
     std::vector<float> block_means;
+    std::int64_t num_bad_pixels = 0;
     for (std::size_t view = 0; view < views.size(); ++view) {
       PixelCensus census;
       const MaskedImage image = load(view, &census);
       require_measurements(view, census, image);
+      num_bad_pixels += census.num_bad;
       if (options.contrast == Contrast::kDark) append_block_means(image, &block_means);
       if (!options.take_log) noise_sigma.push_back(estimate_noise_sigma(image));
     }
+    beads.figures.num_bad_pixels = num_bad_pixels;
     if (options.contrast == Contrast::kBright) return;
     if (!block_means.empty()) empty_beam = percentile_in_place(block_means, kEmptyBeamFraction);
     if (options.take_log) survey_logarithms();
+  }
+
+  /// Finds what hides beads and fiducials, in images that have no such masks yet.
+  void find_beads() {
+    BeadViews bead_views;
+    for (const View& view : views) bead_views.tilt_deg.push_back(view.tilt_deg);
+    bead_views.read = [this](std::size_t view) {
+      PixelCensus census;
+      MaskedImage image = load(view, &census);
+      convert(&image);
+      return image;
+    };
+    const std::int64_t num_bad_pixels = beads.figures.num_bad_pixels;
+    beads = find_bead_masks(options, plan, stack, bead_views);
+    beads.figures.num_bad_pixels = num_bad_pixels;
   }
 
   void survey_logarithms() {
@@ -219,6 +249,7 @@ double TiltSeries::pixel_size_A() const { return impl_->plan.pixel_size_A * bin_
 double TiltSeries::bin_factor() const { return impl_->plan.bin_factor; }
 const std::vector<double>& TiltSeries::noise_sigma() const { return impl_->noise_sigma; }
 double TiltSeries::empty_beam() const { return impl_->empty_beam; }
+const MaskFigures& TiltSeries::mask_figures() const { return impl_->beads.figures; }
 
 void TiltSeries::read_view(std::size_t view, std::span<float> image,
                            std::span<std::uint8_t> valid) const {

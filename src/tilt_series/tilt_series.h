@@ -26,6 +26,21 @@ struct TiltSeriesOptions {
   std::optional<double> pixel_size_A;          ///< overrides the header's pixel size
   Contrast contrast = Contrast::kDark;
   bool take_log = false;  ///< −ln(I / I0) instead of I0 − I; dark only
+
+  std::optional<std::filesystem::path> mask;       ///< MRC as the stack: 0 is no measurement
+  std::optional<std::filesystem::path> fiducials;  ///< text of model2point, stack coordinates
+  /// Gold beads are looked for and masked; 0: they are not. None: of dark
+  /// series the diameter is estimated, of bright ones nothing is looked for.
+  std::optional<double> bead_diameter_nm;
+};
+
+/// What was masked beside the fill of rotated images.
+struct MaskFigures {
+  std::size_t num_beads = 0;              ///< with one position in the specimen
+  double bead_diameter_A = 0.0;           ///< given or estimated; 0: no beads
+  std::vector<std::size_t> beads_found;   ///< of each view: with a spot of their own
+  std::vector<std::size_t> beads_masked;  ///< of each view: discs, by tracks and --fiducials too
+  std::int64_t num_bad_pixels = 0;        ///< of all sections: hot, dead
 };
 
 /// One view of the series.
@@ -54,7 +69,8 @@ class TiltSeries {
 
   /// View `view` (an index into views()) as height × width line integrals in
   /// the data's units (I0 − I, −ln(I/I0), or as stored), and which pixels are
-  /// measurements: false for NaN, infinity and fill outside a rotated image.
+  /// measurements: false for NaN, infinity, hot and dead pixels, fill outside a
+  /// rotated image, beads, fiducials and what the user's mask leaves out.
   /// Pixels that are not measurements are 0. Thread-safe.
   void read_view(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) const;
 
@@ -64,6 +80,8 @@ class TiltSeries {
   /// Intensity that stands for an empty beam (I0), in the stack's units; for
   /// kBright 0, where none is needed.
   double empty_beam() const;
+
+  const MaskFigures& mask_figures() const;
 
  private:
   struct Impl;

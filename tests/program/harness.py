@@ -135,7 +135,9 @@ class Results:
         stem = output[: -len(".mrc")]
         self.model_path, self.json_path = stem + ".h5", stem + ".json"
         self.pictures = {plane: f"{stem}_{plane}.png" for plane in ("xy", "xz", "yz")}
-        self.all_paths = [output, self.model_path, self.json_path, *self.pictures.values()]
+        self.mask_picture = stem + "_mask.png"
+        self.all_paths = [output, self.model_path, self.json_path, self.mask_picture,
+                          *self.pictures.values()]
 
     @property
     def volume(self):

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "tilt_series/image.h"
+
+namespace tomofield::tilt_series {
+
+/// A round part of a view that is not to be fitted.
+struct MaskDisc {
+  double x_px = 0.0;  ///< pixel i covers [i, i + 1)
+  double y_px = 0.0;
+  double radius_px = 0.0;
+};
+
+/// A series to be searched: tilts and images, dense parts high.
+struct BeadViews {
+  std::vector<double> tilt_deg;
+  std::function<MaskedImage(std::size_t view)> read;  ///< thread-safe
+};
+
+struct BeadSearchOptions {
+  std::optional<double> diameter_px;  ///< none: estimated, and only clear evidence counts
+  double smallest_px = 3.0;           ///< diameters that are tried without one
+  double largest_px = 64.0;
+};
+
+/// What a search found; without beads there are no discs.
+struct BeadSearch {
+  double diameter_px = 0.0;                  ///< given or estimated; 0: none
+  std::size_t num_beads = 0;                 ///< with one position in the specimen
+  std::vector<std::size_t> num_found;        ///< of each view: beads with a spot of their own
+  std::vector<std::vector<MaskDisc>> discs;  ///< of each view: every bead that reaches into it
+};
+
+/// Looks for fiducial beads: strong round spots (spots.h) that keep one place
+/// in the specimen (bead_tracks.h). Every bead gets a disc in every view, where
+/// its spot is or, where that is too weak to be seen, where its track passes;
+/// spots as strong as those of beads get one as well although no track has
+/// them (beads that few views see).
+///
+/// Without a diameter it is estimated from the views of lowest tilt, and beads
+/// are believed in only if at least three have a spot far beyond noise and
+/// specimen in most views.
+BeadSearch find_beads(const BeadViews& views, const BeadSearchOptions& options);
+
+/// The disc that hides a bead and the fringe around it.
+double mask_radius_px(double diameter_px);
+
+/// Marks the pixels whose centres lie in a disc as no measurements.
+void mask_discs(const std::vector<MaskDisc>& discs, MaskedImage* image);
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <vector>
+
+#include "tilt_series/image.h"
+
+namespace tomofield::tilt_series {
+
+/// A round spot that is denser than everything around it.
+struct Spot {
+  double x_px = 0.0;  ///< its centre; pixel i covers [i, i + 1)
+  double y_px = 0.0;
+  double contrast = 0.0;  ///< by how much it is denser than its surroundings
+  double strength = 0.0;  ///< the same over the spread of all places of the image
+};
+
+/// Round spots of about this diameter (pixels, >= 2) in an image whose dense
+/// parts are high, those with strength >= `least_strength`, in rows from the
+/// lowest, left to right.
+///
+/// The contrast of a place is the mean of a disc there less the mean of an
+/// equal disc one and a quarter diameters away; of 16 directions the third
+/// lowest difference counts, so that edges, ridges and lines have none but a
+/// spot with a close neighbour has. Spread is the median absolute deviation of
+/// the contrast, which structure and noise make and few spots do not change.
+/// Large spots are looked for in a reduced image. Discs need most of their
+/// pixels to be measurements.
+std::vector<Spot> find_spots(const MaskedImage& image, double diameter_px, double least_strength);
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,153 @@
+"""What is masked: beads that are found, a user's mask, fiducials, hot pixels; and what it changes.
+
+usage: masks_test.py TOMOFIELD SCRATCH_DIR"""
+
+import json
+import os
+
+import numpy as np
+import skimage.io
+
+import harness
+from harness import tomofield
+
+WIDTH, HEIGHT = 96, 80
+TILTS = np.arange(-60, 61, 6.0)
+DIAMETER = 4.0  # pixels of 10 Å
+BEADS = np.array([[-30, 12, 4], [-12, 60, -8], [5, 30, 6], [18, 66, 0], [33, 20, -5], [-25, 40, 9]])
+DIRECTORY = harness.fresh_directory("masks")
+QUICK = ["--thickness", 24, "--no-margin", "--leaf-size", 16, "--field", "grid", "--epochs", 2]
+
+
+def bead_places(tilt):
+    """x, y of every bead in a view (the second axis of the array and its first)."""
+    angle = np.radians(tilt)
+    return np.stack([WIDTH / 2 + BEADS[:, 0] * np.cos(angle) + BEADS[:, 2] * np.sin(angle),
+                     BEADS[:, 1]], axis=1)
+
+
+def views_of(contrast, seed=1):
+    """Ice with a soft body, noise, and beads of this contrast; dense is dark."""
+    random = np.random.default_rng(seed)
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH] + 0.5
+    views = []
+    for tilt in TILTS:
+        dense = 3 * np.exp(-((x - 50) ** 2 + (y - 45) ** 2) / 300) + random.normal(size=x.shape)
+        for bead_x, bead_y in bead_places(tilt):
+            depth = 1 - ((x - bead_x) ** 2 + (y - bead_y) ** 2) / (DIAMETER / 2) ** 2
+            dense += contrast * np.sqrt(np.maximum(depth, 0))
+        views.append(200 - dense)
+    return np.array(views, dtype=np.float32)
+
+
+def write_series(name, views):
+    stack, tlt = (os.path.join(DIRECTORY, name + end) for end in (".st", ".tlt"))
+    harness.write_stack(stack, views, pixel_size=10.0)
+    np.savetxt(tlt, TILTS, fmt="%.1f")
+    return [stack, "--tlt", tlt]
+
+
+def reconstruct(name, series, *options, command=("reconstruct",), quick=QUICK):
+    output = os.path.join(harness.fresh_directory(name), "out.mrc")
+    run = harness.succeed(*command, *series, "-o", output, *quick, *options)
+    results = harness.Results(output)
+    record = json.load(open(results.json_path))
+    return results, record["figures"]["mask"], run
+
+
+beads = write_series("beads", views_of(14))
+plain = write_series("plain", views_of(0))
+
+
+def masked_pixels(results):
+    """Where the picture of the masks is red, [y, x] in the file's order."""
+    picture = skimage.io.imread(results.mask_picture)
+    zoom = picture.shape[1] // WIDTH
+    assert picture.shape == (HEIGHT * zoom, WIDTH * zoom, 3)
+    red = (picture[..., 0] > picture[..., 1])[::-1]
+    return red[zoom // 2 :: zoom, zoom // 2 :: zoom]
+
+
+def test_beads_are_found_reported_and_shown():
+    results, mask, run = reconstruct("found", beads)
+    assert mask["beads"] == len(BEADS), mask
+    assert 0.8 * DIAMETER < mask["bead_diameter_nm"] < 1.1 * DIAMETER, mask["bead_diameter_nm"]
+    assert [view["beads_masked"] for view in mask["views"]] == [len(BEADS)] * len(TILTS)
+    assert all(view["beads_found"] >= len(BEADS) - 1 for view in mask["views"])
+    assert f"{len(BEADS)} beads" in run.stdout + run.stderr
+    masked = masked_pixels(results)
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH] + 0.5
+    distance = np.min([np.hypot(x - bx, y - by) for bx, by in bead_places(0)], axis=0)
+    assert masked[distance < DIAMETER / 2].all() and not masked[distance > 2 * DIAMETER].any()
+    lowest = mask["views"][list(TILTS).index(0)]
+    np.testing.assert_allclose(lowest["masked_part"], masked.mean(), atol=1e-9)
+
+
+def test_voxel_baselines_mask_beads_too():
+    _, mask, _ = reconstruct("sirt", beads, command=("baseline", "sirt"),
+                             quick=["--thickness", 24, "--iterations", 2])
+    assert mask["beads"] == len(BEADS)
+
+
+def test_beads_are_not_looked_for_when_told_so():
+    results, mask, _ = reconstruct("off", beads, "--bead-diameter", 0)
+    assert mask["beads"] == 0 and mask["masked_part"] == 0 and not masked_pixels(results).any()
+
+
+def test_nothing_is_found_where_there_are_none():
+    _, mask, _ = reconstruct("none", plain)
+    assert mask["beads"] == 0 and mask["masked_part"] == 0
+    cell = harness.Series("cell")
+    dark = cell.with_views("dark", 1000 - 10 * cell.views)
+    figures = json.load(open(dark.reconstruct("dark_cell", "--contrast", "dark").json_path))
+    assert figures["figures"]["mask"]["beads"] == 0
+
+
+def test_masked_pixels_carry_no_loss():
+    views = views_of(0)
+    counts = np.ones_like(views, dtype=np.int16)
+    counts[:, 30:44, 10:31] = 0
+    mask = os.path.join(DIRECTORY, "mask.mrc")
+    harness.write_stack(mask, counts)
+    spoilt = views.copy()
+    spoilt[:, 30:44, 10:31] = np.random.default_rng(5).normal(100, 40, (len(TILTS), 14, 21))
+    first, figures, _ = reconstruct("plain_masked", plain, "--mask", mask)
+    second, _, _ = reconstruct("spoilt", write_series("spoilt", spoilt), "--mask", mask)
+    np.testing.assert_allclose(figures["masked_part"], 14 * 21 / (WIDTH * HEIGHT))
+    np.testing.assert_array_equal(first.volume, second.volume)
+
+
+def test_fiducials_and_hot_pixels_are_masked():
+    views = views_of(0)
+    views[3, 50, 60] = 1e6
+    places = [(section, *place) for section, tilt in enumerate(TILTS)
+              for place in bead_places(tilt)]
+    model = os.path.join(DIRECTORY, "model.txt")
+    with open(model, "w") as file:
+        file.writelines(f"  1 {i} {x:10.2f} {y:10.2f} {section:8.2f}\n"
+                        for i, (section, x, y) in enumerate(places))
+    _, mask, _ = reconstruct("fiducials", write_series("hot", views), "--fiducials", model,
+                             "--bead-diameter", DIAMETER)
+    assert mask["beads"] == 0 and mask["bad_pixels"] == 1
+    assert [view["beads_masked"] for view in mask["views"]] == [len(BEADS)] * len(TILTS)
+
+
+def test_what_cannot_be_is_refused():
+    small = os.path.join(DIRECTORY, "small.mrc")
+    harness.write_stack(small, np.ones((2, HEIGHT, WIDTH), dtype=np.int16))
+    text = os.path.join(DIRECTORY, "bad.txt")
+    with open(text, "w") as file:
+        file.write("10 20 0\n10 twenty 0\n")
+    output = os.path.join(harness.fresh_directory("refused"), "out.mrc")
+    for options, parts in [(["--mask", small], ["small.mrc", "2 sections"]),
+                           (["--fiducials", text], ["bad.txt", "line 2", "twenty"]),
+                           (["--bead-diameter", "big"], ["--bead-diameter", "big"]),
+                           (["--bead-diameter", "-3"], ["--bead-diameter", "-3"]),
+                           (["--bead-diameter", "500"], ["500 nm", "500 pixels"])]:
+        run = tomofield("reconstruct", *plain, "-o", output, *QUICK, *options)
+        assert run.returncode == 2, (options, run.returncode, run.stderr)
+        assert all(part in run.stderr for part in parts), (options, run.stderr)
+        assert not os.path.exists(output)
+
+
+harness.run_tests(globals())
