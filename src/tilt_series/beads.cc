@@ -25,6 +25,9 @@ constexpr double kDiameterStep = 1.4142135623730951;  // between the diameters t
 constexpr std::size_t kFewestBeads = 3;
 constexpr double kPartOfViews = 0.5;
 
+// How far from a track its spots may be, at least: alignment is no better.
+constexpr double kLeastTolerance_px = 2.0;
+
 // A spot without a track is a bead's if it has this part of their median contrast in its view.
 constexpr double kPartOfContrast = 0.5;
 
@@ -106,40 +109,99 @@ bool is_evident(const std::vector<BeadTrack>& tracks, std::size_t num_views) {
   return num_clear >= static_cast<std::ptrdiff_t>(kFewestBeads);
 }
 
-/// Discs of one view: of the tracks, and of strong spots beside them.
-std::vector<MaskDisc> discs_of_view(const std::vector<BeadTrack>& tracks,
-                                    const std::vector<Spot>& spots, double middle_x,
-                                    double tilt_deg, double tolerance, double radius,
-                                    std::size_t* num_found) {
-  std::vector<MaskDisc> discs;
-  std::vector<bool> is_of_track(spots.size(), false);
-  std::vector<double> contrasts;
-  for (const BeadTrack& track : tracks) {
-    MaskDisc disc{track_x(track, middle_x, tilt_deg), track.y_px, radius};
-    const auto distance = [&](const Spot& spot) {
-      return std::hypot(spot.x_px - disc.x_px, spot.y_px - disc.y_px);
-    };
-    const auto nearest =
-        std::min_element(spots.begin(), spots.end(),
-                         [&](const Spot& a, const Spot& b) { return distance(a) < distance(b); });
-    if (nearest != spots.end() && distance(*nearest) <= tolerance) {
-      disc.x_px = nearest->x_px;
-      disc.y_px = nearest->y_px;
-      is_of_track[static_cast<std::size_t>(nearest - spots.begin())] = true;
-      contrasts.push_back(nearest->contrast);
-      ++*num_found;
-    }
-    discs.push_back(disc);
+/// Tracks of beads; none if evidence is wanted and there is not enough.
+std::vector<BeadTrack> find_bead_tracks(const SearchedViews& searched,
+                                        const std::vector<double>& tilt_deg, double tolerance_px,
+                                        bool wants_evidence) {
+  TrackRules rules;
+  rules.tolerance_px = tolerance_px;
+  rules.largest_z_px = static_cast<double>(searched.width) / 2;
+  rules.seed_strength = kStrong;
+  const TrackedViews tracked{
+      tilt_deg, static_cast<double>(searched.width) / 2,
+      [&](std::size_t view, double x, double y) { return searched.is_measured(view, x, y); }};
+  if (wants_evidence && !is_evident(find_tracks(searched.spots, tracked, rules), tilt_deg.size())) {
+    return {};
   }
-  if (contrasts.empty()) return discs;
-  const auto middle = contrasts.begin() + static_cast<std::ptrdiff_t>(contrasts.size() / 2);
-  std::nth_element(contrasts.begin(), middle, contrasts.end());
+  rules.seed_strength = kLikely;
+  return find_tracks(searched.spots, tracked, rules);
+}
+
+double distance_between(const Spot& spot, const MaskDisc& disc) {
+  return std::hypot(spot.x_px - disc.x_px, spot.y_px - disc.y_px);
+}
+
+/// The spot of each disc: the nearest within `tolerance`, unless another disc
+/// shares it (two beads that overlap); spots.size() where there is none.
+std::vector<std::size_t> match_spots(const std::vector<MaskDisc>& discs,
+                                     const std::vector<Spot>& spots, double tolerance) {
+  std::vector<std::size_t> match, num_discs(spots.size(), 0);
+  for (const MaskDisc& disc : discs) {
+    const auto nearest =
+        std::min_element(spots.begin(), spots.end(), [&](const Spot& a, const Spot& b) {
+          return distance_between(a, disc) < distance_between(b, disc);
+        });
+    const bool is_near = nearest != spots.end() && distance_between(*nearest, disc) <= tolerance;
+    match.push_back(is_near ? static_cast<std::size_t>(nearest - spots.begin()) : spots.size());
+    if (is_near) ++num_discs[match.back()];
+  }
+  for (std::size_t& spot : match) {
+    if (spot < spots.size() && num_discs[spot] > 1) spot = spots.size();
+  }
+  return match;
+}
+
+/// Places of strong spots that no track has: beads that few views see.
+std::vector<MaskDisc> loose_discs(const std::vector<Spot>& spots, const std::vector<bool>& is_taken,
+                                  std::vector<double> bead_contrasts, double radius) {
+  std::vector<MaskDisc> discs;
+  if (bead_contrasts.empty()) return discs;
+  const auto middle =
+      bead_contrasts.begin() + static_cast<std::ptrdiff_t>(bead_contrasts.size() / 2);
+  std::nth_element(bead_contrasts.begin(), middle, bead_contrasts.end());
   for (std::size_t i = 0; i < spots.size(); ++i) {
-    if (is_of_track[i] || spots[i].strength < kLikely ||
+    if (is_taken[i] || spots[i].strength < kLikely ||
         spots[i].contrast < kPartOfContrast * *middle) {
       continue;
     }
     discs.push_back({spots[i].x_px, spots[i].y_px, radius});
+  }
+  return discs;
+}
+
+/// Moves the discs of a view, which are where the tracks are, to their spots
+/// and adds those of spots without a track. Returns how many have a spot.
+std::size_t settle_discs(const std::vector<Spot>& spots, double tolerance, double radius,
+                         std::vector<MaskDisc>* discs) {
+  const std::vector<MaskDisc> predicted = *discs;
+  const std::vector<std::size_t> match = match_spots(predicted, spots, tolerance);
+  std::vector<double> contrasts;
+  for (std::size_t i = 0; i < discs->size(); ++i) {
+    if (match[i] == spots.size()) continue;
+    const Spot& spot = spots[match[i]];
+    (*discs)[i].x_px = spot.x_px;
+    (*discs)[i].y_px = spot.y_px;
+    contrasts.push_back(spot.contrast);
+  }
+  std::vector<bool> is_taken(spots.size(), false);
+  for (std::size_t i = 0; i < spots.size(); ++i) {
+    is_taken[i] = std::any_of(predicted.begin(), predicted.end(), [&](const MaskDisc& disc) {
+      return distance_between(spots[i], disc) <= tolerance;
+    });
+  }
+  const auto loose = loose_discs(spots, is_taken, contrasts, radius);
+  discs->insert(discs->end(), loose.begin(), loose.end());
+  return contrasts.size();
+}
+
+/// Where the tracks pass a view, if that is within it.
+std::vector<MaskDisc> predict_discs(const std::vector<BeadTrack>& tracks,
+                                    const SearchedViews& searched, double tilt_deg, double radius) {
+  std::vector<MaskDisc> discs;
+  for (const BeadTrack& track : tracks) {
+    const double x = track_x(track, static_cast<double>(searched.width) / 2, tilt_deg);
+    if (x < -radius || x > static_cast<double>(searched.width) + radius) continue;
+    discs.push_back({x, track.y_px, radius});
   }
   return discs;
 }
@@ -155,24 +217,17 @@ BeadSearch find_beads(const BeadViews& views, const BeadSearchOptions& options) 
       options.diameter_px ? options.diameter_px : estimate_diameter(views, options);
   if (!diameter) return result;
   const SearchedViews searched = search_views(views, *diameter);
-  const double middle_x = static_cast<double>(searched.width) / 2;
-  TrackRules rules;
-  rules.tolerance_px = std::max(2.0, 0.5 * *diameter);
-  rules.largest_z_px = middle_x;
-  rules.seed_strength = kStrong;
-  const TrackedViews tracked{views.tilt_deg, middle_x, [&](std::size_t view, double x, double y) {
-                               return searched.is_measured(view, x, y);
-                             }};
-  std::vector<BeadTrack> tracks = find_tracks(searched.spots, tracked, rules);
-  if (!options.diameter_px && !is_evident(tracks, num_views)) return result;
-  rules.seed_strength = kLikely;
-  tracks = find_tracks(searched.spots, tracked, rules);
+  const double tolerance_px = std::max(kLeastTolerance_px, *diameter / 2);
+  const std::vector<BeadTrack> tracks =
+      find_bead_tracks(searched, views.tilt_deg, tolerance_px, !options.diameter_px);
+  if (tracks.empty() && !options.diameter_px) return result;
   result.diameter_px = *diameter;
   result.num_beads = tracks.size();
+  const double radius = mask_radius_px(*diameter);
   for (std::size_t view = 0; view < num_views; ++view) {
-    result.discs[view] =
-        discs_of_view(tracks, searched.spots[view], middle_x, views.tilt_deg[view],
-                      rules.tolerance_px, mask_radius_px(*diameter), &result.num_found[view]);
+    result.discs[view] = predict_discs(tracks, searched, views.tilt_deg[view], radius);
+    result.num_found[view] =
+        settle_discs(searched.spots[view], tolerance_px, radius, &result.discs[view]);
   }
   return result;
 }

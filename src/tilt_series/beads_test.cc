@@ -53,7 +53,8 @@ TEST(Beads, AreAllFoundAndMeasuredWithoutHelp) {
   EXPECT_EQ(search.num_beads, 18u);
   // A sphere's profile has half its height at sqrt(3)/2 of its diameter.
   EXPECT_NEAR(search.diameter_px, 0.866 * scene.diameter_px, 0.15 * scene.diameter_px);
-  expect_discs_on_beads(scene, search, 2.0);  // two that overlap share a spot between them
+  // Of two that overlap in a view only one spot is seen, between them.
+  expect_discs_on_beads(scene, search, 2.0);
 }
 
 TEST(Beads, OfManyPixelsAreFoundToo) {
