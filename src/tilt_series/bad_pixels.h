@@ -7,7 +7,7 @@
 namespace tomofield::tilt_series {
 
 /// Marks hot and dead pixels as no measurements and returns how many there
-/// are: single pixels, at most two beside each other, that lie more than six
+/// are: single pixels, at most three beside each other, that lie more than six
 /// standard deviations of the image from its mean and, beyond all but two of
 /// the 24 pixels around, by three times what those spread. Nothing that a
 /// camera's optics image is that sharp, so neither specimen nor bead is marked;

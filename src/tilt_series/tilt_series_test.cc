@@ -314,14 +314,14 @@ TEST(TiltSeries, LogarithmNeverSeesZero) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = small_series(scratch, 1);
   write_stack(options.stack, 64, 64, 1, [](auto x, auto y, auto) {
-    if (x == 10 && y < 3) return y == 0 ? 0.0f : -5.0f;
+    if (x >= 10 && x < 13 && y < 3) return y == 0 ? 0.0f : -5.0f;  // too large for dead pixels
     return kEmptyBeam + static_cast<float>((x + y) % 3);
   });
   options.contrast = Contrast::kDark;
   options.take_log = true;
   const WarningCatcher warnings;
   const TiltSeries series(options);
-  expect_parts(warnings.text(), {"3 pixels", "logarithm"});
+  expect_parts(warnings.text(), {"9 pixels", "logarithm"});
   const LoadedView view = load(series, 0);
   for (std::size_t i = 0; i < view.image.size(); ++i) ASSERT_TRUE(std::isfinite(view.image[i]));
   EXPECT_NEAR(view.image[10], -std::log(1e-3), 1e-3);
