@@ -25,6 +25,10 @@ constexpr double kDiameterStep = 1.4142135623730951;  // between the diameters t
 constexpr std::size_t kFewestBeads = 3;
 constexpr double kPartOfViews = 0.5;
 
+// Spots of a view that are followed: more beads than anybody adds, and the
+// tracks of a view full of ice crystals are still found in seconds.
+constexpr std::size_t kMostSpots = 1000;
+
 // How far from a track its spots may be, at least: alignment is no better.
 constexpr double kLeastTolerance_px = 2.0;
 
@@ -45,6 +49,15 @@ struct SearchedViews {
   }
 };
 
+/// The strongest spots of a view.
+std::vector<Spot> strongest_spots(const MaskedImage& image, double diameter) {
+  std::vector<Spot> spots = find_spots(image, diameter, kWeak);
+  std::stable_sort(spots.begin(), spots.end(),
+                   [](const Spot& a, const Spot& b) { return a.strength > b.strength; });
+  spots.resize(std::min(spots.size(), kMostSpots));
+  return spots;
+}
+
 SearchedViews search_views(const BeadViews& views, double diameter) {
   SearchedViews searched;
   const std::size_t num_views = views.tilt_deg.size();
@@ -53,7 +66,7 @@ SearchedViews search_views(const BeadViews& views, double diameter) {
   base::parallel_for(static_cast<std::int64_t>(num_views), [&](std::int64_t v) {
     const auto view = static_cast<std::size_t>(v);
     const MaskedImage image = views.read(view);
-    searched.spots[view] = find_spots(image, diameter, kWeak);
+    searched.spots[view] = strongest_spots(image, diameter);
     searched.is_valid[view].assign(image.valid.begin(), image.valid.end());
     if (view > 0) return;
     searched.width = image.width;
