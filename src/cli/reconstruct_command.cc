@@ -71,6 +71,22 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->capture_default_str()
       ->group(group);
   command
+      .add_option("--engine", fit.engine,
+                  "slab: fast, one tilt axis; ray: any view geometry, without resampling the views")
+      ->check(CLI::IsMember({"slab", "ray"}))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--ray-samples", fit.ray_samples,
+                  "ray engine: samples along a leaf's diagonal; 0: one a pixel")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--rays-per-step", fit.rays_per_step,
+                  "ray engine: about as many rays a step; 0: those of all views over --subsets")
+      ->capture_default_str()
+      ->group(group);
+  command
       .add_option("--learning-rate", fit.learning_rate, "of the first step; it falls exponentially")
       ->capture_default_str()
       ->group(group);
@@ -141,6 +157,7 @@ void run(Arguments& arguments) {
       arguments.view_scale == "on" ||
       (arguments.view_scale == "auto" && options.input.contrast == tilt_series::Contrast::kDark);
   options.field.with_margin = options.specimen.with_margin;
+  options.input.resample = options.fit.engine == "slab";
   reconstruct::check_options(options);
   const tilt_series::TiltSeries series(options.input);
   print_plan(options, reconstruct::plan_run(series, options));

@@ -53,6 +53,14 @@ ViewSums data_term(const ViewModel& model, double multiplicity, const float* mea
   return sums;
 }
 
+double ray_data_term(const ViewModel& model, double multiplicity, double measured, double predicted,
+                     ViewSums& sums) {
+  sums +=
+      {1.0, predicted, measured, predicted * predicted, predicted * measured, measured * measured};
+  return multiplicity * model.weight * model.scale *
+         (model.scale * predicted + model.offset - measured);
+}
+
 // Keeps the equations of a view without rays solvable: it gets scale 1, offset 0.
 constexpr double kNoRays = 1e-9;
 

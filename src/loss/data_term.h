@@ -29,6 +29,11 @@ struct ViewSums {
 ViewSums data_term(const ViewModel& model, double multiplicity, const float* measured,
                    const std::uint16_t* mask, std::int64_t width, float* rays);
 
+/// The same for a single ray that counts: adds it to the sums of its view and
+/// returns multiplicity · dL/dp.
+double ray_data_term(const ViewModel& model, double multiplicity, double measured, double predicted,
+                     ViewSums& sums);
+
 /// Per-view scale and offset in closed form: least squares with a shrinkage
 /// prior worth `shrinkage` times the view's own rays,
 ///

@@ -96,6 +96,25 @@ TEST(DataTerm, MaskedRaysDoNotCountWhateverTheyHold) {
   EXPECT_EQ(run(0.0f), run(1e6f));
 }
 
+TEST(DataTerm, RayByRayIsTheSame) {
+  const ViewModel model{.scale = 1.3, .offset = -0.4, .weight = 2.5};
+  const auto predicted = random_floats(kWidth * kLanes, 1, -2, 3);
+  const auto measured = random_floats(kWidth * kLanes, 2, -2, 3);
+  const auto mask = random_mask();
+  auto rays = predicted;
+  const ViewSums whole = data_term(model, 8, measured.data(), mask.data(), kWidth, rays.data());
+  ViewSums sums;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (!counts(mask, i)) continue;
+    const double grad = ray_data_term(model, 8, static_cast<double>(measured[i]),
+                                      static_cast<double>(predicted[i]), sums);
+    ASSERT_NEAR(grad, rays[i], 1e-6 * (10 + std::abs(grad)));
+  }
+  EXPECT_EQ(sums.n, whole.n);
+  EXPECT_NEAR(sums.squared_residual(model), whole.squared_residual(model),
+              1e-5 * whole.squared_residual(model));
+}
+
 TEST(DataTerm, SumsOfPartsAdd) {
   ViewSums total{1, 2, 3, 4, 5, 6};
   total += {10, 20, 30, 40, 50, 60};

@@ -27,19 +27,23 @@ SampleGrid::SampleGrid(std::vector<SampleSegment> segments) : segments_(std::mov
 
 SampleGrid make_sample_grid(const geometry::TiltGeometry& geometry, double x0, double x1,
                             double margin_spacing) {
+  return make_sample_grid(geometry.reach(), geometry.thickness, x0, x1, margin_spacing);
+}
+
+SampleGrid make_sample_grid(const geometry::TiltGeometry::Extent& reach, double thickness,
+                            double x0, double x1, double margin_spacing) {
   const auto segment = [&](double from, double width, double spacing) {
     SampleSegment s;
     s.x0 = from;
     s.nx = static_cast<int>(std::lround(width / spacing));
     s.hx = spacing;
-    s.nz = std::max(1, static_cast<int>(std::ceil(geometry.thickness / spacing)));
-    s.hz = geometry.thickness / s.nz;
+    s.nz = std::max(1, static_cast<int>(std::ceil(thickness / spacing)));
+    s.hz = thickness / s.nz;
     return s;
   };
   std::vector<SampleSegment> segments{segment(x0, x1 - x0, 1.0)};
   if (margin_spacing <= 0) return SampleGrid(std::move(segments));
 
-  const auto reach = geometry.reach();
   const double low = std::ceil(std::max(0.0, x0 - reach.low) / margin_spacing) * margin_spacing;
   const double high = std::ceil(std::max(0.0, reach.high - x1) / margin_spacing) * margin_spacing;
   if (low > 0) {

@@ -44,5 +44,8 @@ class SampleGrid {
 /// sampled every `margin_spacing` pixels.
 SampleGrid make_sample_grid(const geometry::TiltGeometry& geometry, double x0, double x1,
                             double margin_spacing);
+/// The same for rays that reach from reach.low to reach.high.
+SampleGrid make_sample_grid(const geometry::TiltGeometry::Extent& reach, double thickness,
+                            double x0, double x1, double margin_spacing);
 
 }  // namespace tomofield::projection

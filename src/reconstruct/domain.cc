@@ -19,41 +19,50 @@ field::LeafShape leaf_shape(double size, double thickness, double spacing, int r
       .nx = n, .ny = n, .nz = vertices(thickness), .rank_x = rank, .rank_y = rank, .rank_z = rank};
 }
 
-// Root cells from x_low on, so that the region of interest starts on a cell's face.
-field::RootGrid root_grid(const geometry::Roi& roi, double x_low, double x_high,
+// Root cells over a rectangle around the region of interest, which starts on a cell's corner.
+field::RootGrid root_grid(const geometry::Roi& roi, const geometry::Extent2& reach,
                           std::int64_t cell) {
   const auto cells = [cell](double length) {
     return static_cast<std::int64_t>(std::ceil(length / static_cast<double>(cell)));
   };
-  const std::int64_t left = cells(static_cast<double>(roi.x0) - x_low);
+  const std::int64_t left = cells(static_cast<double>(roi.x0) - reach.x0);
+  const std::int64_t below = cells(static_cast<double>(roi.y0) - reach.y0);
   field::RootGrid grid;
   grid.cell_size = cell;
   grid.x0 = roi.x0 - left * cell;
-  grid.y0 = roi.y0;
-  grid.columns = static_cast<int>(left + cells(x_high - static_cast<double>(roi.x0)));
-  grid.rows = static_cast<int>(cells(static_cast<double>(roi.height())));
+  grid.y0 = roi.y0 - below * cell;
+  grid.columns = static_cast<int>(left + cells(reach.x1 - static_cast<double>(roi.x0)));
+  grid.rows = static_cast<int>(below + cells(reach.y1 - static_cast<double>(roi.y0)));
   return grid;
 }
 
-}  // namespace
-
-Domain make_domain(const geometry::TiltGeometry& geometry, const geometry::Roi& roi,
-                   const FieldOptions& options) {
+// A domain for rays that meet the region of interest and reach no further than `reach`.
+Domain cover(double thickness, const geometry::Roi& roi, geometry::Extent2 reach,
+             const FieldOptions& options) {
   projection::SampleGrid grid = projection::make_sample_grid(
-      geometry, static_cast<double>(roi.x0), static_cast<double>(roi.x1),
+      {reach.x0, reach.x1}, thickness, static_cast<double>(roi.x0), static_cast<double>(roi.x1),
       options.with_margin ? options.margin_spacing : 0.0);
-  double low = static_cast<double>(roi.x0), high = static_cast<double>(roi.x1);
+  if (!options.with_margin) {
+    reach = {static_cast<double>(roi.x0), static_cast<double>(roi.y0), static_cast<double>(roi.x1),
+             static_cast<double>(roi.y1)};
+  }
   for (const projection::SampleSegment& s : grid.segments()) {
-    low = std::min(low, s.x0);
-    high = std::max(high, s.x1());
+    reach.x0 = std::min(reach.x0, s.x0);
+    reach.x1 = std::max(reach.x1, s.x1());
   }
   const field::RootGrid roots =
-      root_grid(roi, low, high, static_cast<std::int64_t>(options.leaf_size) << kDepth);
+      root_grid(roi, reach, static_cast<std::int64_t>(options.leaf_size) << kDepth);
+  // Slabs start with the cells; below the region there are whole ones or none.
+  const auto end_row = static_cast<std::int64_t>(std::ceil(reach.y1));
+  reach.y0 = static_cast<double>(roots.y0);
+  reach.y1 = static_cast<double>(end_row);
   std::vector<field::Region> regions;
   for (int row = 0; row < roots.rows; ++row) {
     for (int column = 0; column < roots.columns; ++column) {
       const std::int64_t x0 = roots.x0 + column * roots.cell_size;
-      const bool inside = x0 < roi.x1 && x0 + roots.cell_size > roi.x0;
+      const std::int64_t y0 = roots.y0 + row * roots.cell_size;
+      const bool inside = x0 < roi.x1 && x0 + roots.cell_size > roi.x0 && y0 < roi.y1 &&
+                          y0 + roots.cell_size > roi.y0;
       regions.push_back(inside ? field::Region::kInterest : field::Region::kMargin);
     }
   }
@@ -62,12 +71,32 @@ Domain make_domain(const geometry::TiltGeometry& geometry, const geometry::Roi& 
   std::vector<field::LeafShape> shapes;
   for (int leaf = 0; leaf < tree.num_leaves(); ++leaf) {
     const bool inside = tree.leaf(leaf).region == field::Region::kInterest;
-    shapes.push_back(leaf_shape(static_cast<double>(tree.leaf(leaf).square.size),
-                                geometry.thickness,
+    shapes.push_back(leaf_shape(static_cast<double>(tree.leaf(leaf).square.size), thickness,
                                 inside ? options.vertex_spacing : options.margin_spacing,
                                 inside ? options.rank : options.margin_rank));
   }
-  return {roi, std::move(grid), std::move(tree), std::move(shapes)};
+  return {.roi = roi,
+          .support = reach,
+          .first_row = roots.y0,
+          .num_rows = end_row - roots.y0,
+          .grid = std::move(grid),
+          .tree = std::move(tree),
+          .shapes = std::move(shapes)};
+}
+
+}  // namespace
+
+Domain make_domain(const geometry::TiltGeometry& geometry, const geometry::Roi& roi,
+                   const FieldOptions& options) {
+  const auto reach = geometry.reach();
+  return cover(geometry.thickness, roi,
+               {reach.low, static_cast<double>(roi.y0), reach.high, static_cast<double>(roi.y1)},
+               options);
+}
+
+Domain make_domain(const geometry::RayGeometry& geometry, const geometry::Roi& roi,
+                   const FieldOptions& options) {
+  return cover(geometry.aligned.thickness, roi, reach_of_rays(geometry, roi), options);
 }
 
 std::unique_ptr<field::Field> make_initial_field(const Domain& domain, double thickness,

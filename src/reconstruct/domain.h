@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "field/field.h"
+#include "geometry/ray_geometry.h"
 #include "geometry/tilt_geometry.h"
 #include "projection/sample_grid.h"
 #include "reconstruct/options.h"
@@ -10,15 +11,21 @@
 namespace tomofield::reconstruct {
 
 /// Where the field lives and how it is sampled: root cells over the region of
-/// interest and, with a margin, as far in x as any ray reaches.
+/// interest and, with a margin, as far as any ray reaches.
 struct Domain {
   geometry::Roi roi;
+  geometry::Extent2 support;  ///< where densities count: what `grid` and the rows cover
+  std::int64_t first_row = 0, num_rows = 0;  ///< of the slabs
   projection::SampleGrid grid;
   field::Quadtree tree;
   std::vector<field::LeafShape> shapes;
 };
 
 Domain make_domain(const geometry::TiltGeometry& geometry, const geometry::Roi& roi,
+                   const FieldOptions& options);
+
+/// For views as they were recorded, whose rays also leave the region across its rows.
+Domain make_domain(const geometry::RayGeometry& geometry, const geometry::Roi& roi,
                    const FieldOptions& options);
 
 /// A new field on the domain whose density is about `mean_density` everywhere.

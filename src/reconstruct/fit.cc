@@ -42,8 +42,13 @@ ObjectiveWeights objective_weights(const FitOptions& options, double noise) {
 }
 
 FitOptions with_at_most_one_subset_a_view(FitOptions options, int num_views) {
-  options.subsets = std::min(options.subsets, num_views);
+  if (options.engine == "slab") options.subsets = std::min(options.subsets, num_views);
   return options;
+}
+
+Domain domain_of(const Measurement& measurement, const FieldOptions& options) {
+  return measurement.ray_geometry ? make_domain(*measurement.ray_geometry, measurement.roi, options)
+                                  : make_domain(measurement.geometry, measurement.roi, options);
 }
 
 }  // namespace
@@ -52,13 +57,17 @@ Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
          const FitOptions& options)
     : measurement_(measurement),
       options_(with_at_most_one_subset_a_view(options, measurement.geometry.num_views())),
-      domain_(make_domain(measurement.geometry, measurement.roi, field_options)),
+      domain_(domain_of(measurement, field_options)),
       field_(make_initial_field(domain_, measurement.geometry.thickness, measurement.mean_density,
                                 field_options, options.seed)),
       optimizer_(*field_, optimize::AdamOptions{}),
       gradient_(field_->num_parameters()),
       projector_(measurement.geometry, domain_.grid),
-      sampler_(*field_, domain_.grid, measurement.roi.y0, measurement.roi.height()) {
+      sampler_(*field_, domain_.grid, domain_.first_row, domain_.num_rows) {
+  if (measurement.ray_geometry) {
+    ray_term_ = std::make_unique<RayTerm>(*measurement.ray_geometry, *measurement.rays, *field_,
+                                          domain_, options_);
+  }
   for (const double sigma : measurement.noise_sigma)
     progress_.views.push_back({1.0, 0.0, 1.0 / (sigma * sigma)});
   progress_.epoch_sums.resize(progress_.views.size());
@@ -68,15 +77,19 @@ Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
   }
 }
 
+int Fit::steps_per_epoch() const {
+  return ray_term_ ? ray_term_->steps_per_epoch() : options_.subsets;
+}
+
 std::int64_t Fit::num_steps() const {
-  return static_cast<std::int64_t>(options_.epochs) * options_.subsets;
+  return static_cast<std::int64_t>(options_.epochs) * steps_per_epoch();
 }
 
 void Fit::run(const AfterStep& after_step) {
   while (progress_.step < num_steps()) {
-    take_step(subset_of_step(progress_.step));
+    take_step(ray_term_ ? std::vector<int>{} : subset_of_step(progress_.step));
     ++progress_.step;
-    if (progress_.step % options_.subsets == 0) end_epoch();
+    if (progress_.step % steps_per_epoch() == 0) end_epoch();
     if (!after_step(*this)) return;
   }
 }
@@ -102,11 +115,20 @@ double Fit::learning_rate(std::int64_t step) const {
 }
 
 void Fit::take_step(const std::vector<int>& views) {
+  double grad_bias = add_slab_gradient(views);
+  if (ray_term_) grad_bias += add_ray_gradient();
+  const double rate = learning_rate(progress_.step);
+  optimizer_.step(*field_, touched_leaves_, gradient_, rate);
+  optimizer_.step_bias(*field_, grad_bias, kBiasRate * rate);
+}
+
+// The data term of these views and every regulariser; returns dL/d bias.
+double Fit::add_slab_gradient(const std::vector<int>& views) {
   const SlabObjective objective(
       sampler_, projector_, *measurement_.rays, *field_,
       objective_weights(options_, typical_noise(measurement_.noise_sigma)));
-  const double multiplicity =
-      static_cast<double>(measurement_.geometry.num_views()) / static_cast<double>(views.size());
+  const double multiplicity = static_cast<double>(measurement_.geometry.num_views()) /
+                              std::max(static_cast<double>(views.size()), 1.0);
   std::vector<BandResult> bands(static_cast<std::size_t>(sampler_.num_bands()));
   base::parallel_for(sampler_.num_bands(), [&](std::int64_t band) {
     bands[static_cast<std::size_t>(band)] = objective.accumulate_gradient(
@@ -119,9 +141,15 @@ void Fit::take_step(const std::vector<int>& views) {
     }
     grad_bias += band.grad_bias;
   }
-  const double rate = learning_rate(progress_.step);
-  optimizer_.step(*field_, touched_leaves_, gradient_, rate);
-  optimizer_.step_bias(*field_, grad_bias, kBiasRate * rate);
+  return grad_bias;
+}
+
+// The data term of this step's rays; returns dL/d bias.
+double Fit::add_ray_gradient() {
+  const RayTerm::Result result =
+      ray_term_->accumulate_gradient(progress_.step, progress_.views, gradient_.data());
+  for (std::size_t v = 0; v < result.views.size(); ++v) progress_.epoch_sums[v] += result.views[v];
+  return result.grad_bias;
 }
 
 void Fit::end_epoch() {

@@ -3,10 +3,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "field/field.h"
+#include "geometry/ray_geometry.h"
 #include "geometry/tilt_geometry.h"
 #include "loss/data_term.h"
 #include "optimize/adam.h"
@@ -14,6 +16,7 @@
 #include "projection/slab_sampler.h"
 #include "reconstruct/domain.h"
 #include "reconstruct/options.h"
+#include "reconstruct/ray_term.h"
 #include "tilt_series/slab_views.h"
 
 namespace tomofield::reconstruct {
@@ -26,6 +29,8 @@ struct Measurement {
   const tilt_series::SlabViews* rays = nullptr;
   std::vector<double> noise_sigma;
   double mean_density = 0.0;
+  /// For the ray engine: how `rays`, which are then the views as recorded, look at the specimen.
+  std::optional<geometry::RayGeometry> ray_geometry;
 };
 
 /// Where a fit stands between two steps: everything that a resumed run needs
@@ -37,8 +42,9 @@ struct Progress {
   std::vector<double> data_loss;  ///< mean squared residual in units of the noise, one an epoch
 };
 
-/// The loop of DESIGN §5 over (slabs × tilt subsets): one step uses every slab
-/// and one subset of the views.
+/// The loop of DESIGN §5. With the slab engine, a step uses every slab and one
+/// subset of the views; with the ray engine, a random share of the rays of all
+/// views, while slabs without views carry the regularisers.
 class Fit {
  public:
   Fit(const Measurement& measurement, const FieldOptions& field_options, const FitOptions& options);
@@ -48,6 +54,7 @@ class Fit {
   void run(const AfterStep& after_step);
 
   std::int64_t num_steps() const;
+  int steps_per_epoch() const;
   const field::Field& field() const { return *field_; }
   field::Field& field() { return *field_; }
   /// The fitted field, for good: the fit cannot go on afterwards.
@@ -61,6 +68,8 @@ class Fit {
   std::vector<int> subset_of_step(std::int64_t step) const;
   double learning_rate(std::int64_t step) const;
   void take_step(const std::vector<int>& views);
+  double add_slab_gradient(const std::vector<int>& views);
+  double add_ray_gradient();
   void end_epoch();
 
   const Measurement& measurement_;
@@ -72,6 +81,7 @@ class Fit {
   base::AlignedBuffer<float> gradient_;
   projection::SlabProjector projector_;
   projection::SlabSampler sampler_;
+  std::unique_ptr<RayTerm> ray_term_;  ///< of the ray engine
   std::vector<int> touched_leaves_;
 };
 

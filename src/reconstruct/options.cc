@@ -63,6 +63,9 @@ std::vector<std::string> FitOptions::faults() const {
   Faults faults;
   faults.require_between("--epochs", epochs, 1, kMost);
   faults.require_between("--subsets", subsets, 1, kMost);
+  faults.require_one_of("--engine", engine, "slab", "ray");
+  faults.require_between("--ray-samples", ray_samples, 0, 1 << 20);
+  faults.require_between("--rays-per-step", static_cast<double>(rays_per_step), 0, kMost);
   faults.require_positive("--learning-rate", learning_rate);
   faults.require_between("the final learning rate's part of the first", final_rate, 1e-6, 1);
   faults.require_not_negative("--tv", density_variation);

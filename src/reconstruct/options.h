@@ -27,8 +27,11 @@ struct FieldOptions {
 /// the typical noise of a ray in density units times pixels.
 struct FitOptions {
   int epochs = 30;
-  int subsets = 16;             ///< interleaved tilt subsets: steps an epoch; at most one a view
-  double learning_rate = 0.05;  ///< falls exponentially to learning_rate · final_rate
+  int subsets = 16;                ///< interleaved tilt subsets: steps an epoch; at most one a view
+  std::string engine = "slab";     ///< or ray: any view geometry, views as they were recorded
+  int ray_samples = 0;             ///< N_max of eq. 10; 0: one a pixel of a leaf's diagonal
+  std::int64_t rays_per_step = 0;  ///< about; 0: all rays of an epoch over `subsets`
+  double learning_rate = 0.05;     ///< falls exponentially to learning_rate · final_rate
   double final_rate = 0.1;
   double density_variation = 9.0;
   double factor_variation = 0.0;

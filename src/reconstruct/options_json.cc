@@ -67,6 +67,9 @@ json field_json(const FieldOptions& o) {
 json fit_json(const FitOptions& o) {
   return {{"epochs", o.epochs},
           {"subsets", o.subsets},
+          {"engine", o.engine},
+          {"ray_samples", o.ray_samples},
+          {"rays_per_step", o.rays_per_step},
           {"learning_rate", o.learning_rate},
           {"final_rate", o.final_rate},
           {"density_variation", o.density_variation},

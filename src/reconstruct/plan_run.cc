@@ -44,6 +44,11 @@ std::size_t thread_memory(const PreparedSeries& plan, const Domain& domain, int 
   return 3 * slab + 3 * slab / base::kLanes + views + leaf + written;
 }
 
+int steps_an_epoch(const PreparedSeries& plan, const FitOptions& options) {
+  return plan.ray_geometry ? ray_steps_per_epoch(options, plan.rays_shape())
+                           : std::min(options.subsets, plan.geometry.num_views());
+}
+
 // Peak of a run. Parameters, their gradient and two moments; a checkpoint that is
 // resumed has all but the gradient once more.
 std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, const RunPlan& run,
@@ -51,21 +56,24 @@ std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, co
   const std::size_t copies =
       options.resume && std::filesystem::exists(output_paths(options.output).model) ? 7 : 4;
   const std::size_t parameters = copies * sizeof(float) * run.num_parameters;
-  const std::size_t rays = tilt_series::SlabViews::least_memory(
-      {static_cast<std::size_t>(run.num_views), plan.geometry.width, plan.geometry.height,
-       plan.roi.y0, plan.roi.height()});
-  const int steps_an_epoch = std::min(options.fit.subsets, run.num_views);
-  const int views_a_step = (run.num_views + steps_an_epoch - 1) / steps_an_epoch;
+  const std::size_t rays = tilt_series::SlabViews::least_memory(plan.rays_shape());
+  const int steps = steps_an_epoch(plan, options.fit);
+  const int views_a_step = plan.ray_geometry ? 0 : (run.num_views + steps - 1) / steps;
   const std::size_t fitting = parameters + static_cast<std::size_t>(base::thread_count()) *
                                                thread_memory(plan, domain, views_a_step);
-  return kProgram + rays + std::max(fitting, reading_memory(plan));
+  const std::size_t tracing =
+      plan.ray_geometry
+          ? RayTerm::working_memory(*plan.ray_geometry, domain, options.fit, plan.rays_shape())
+          : 0;
+  return kProgram + rays + std::max(fitting + tracing, reading_memory(plan));
 }
 
 }  // namespace
 
 RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options) {
   const PreparedSeries plan = plan_series(series, options.specimen);
-  const Domain domain = make_domain(plan.geometry, plan.roi, options.field);
+  const Domain domain = plan.ray_geometry ? make_domain(*plan.ray_geometry, plan.roi, options.field)
+                                          : make_domain(plan.geometry, plan.roi, options.field);
   RunPlan run;
   run.num_views = plan.geometry.num_views();
   run.view_width = plan.geometry.width;
@@ -75,8 +83,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.thickness = plan.geometry.thickness;
   run.num_leaves = domain.tree.num_leaves();
   run.num_parameters = field::count_parameters(options.field.kind, domain.shapes);
-  run.num_steps =
-      static_cast<std::int64_t>(options.fit.epochs) * std::min(options.fit.subsets, run.num_views);
+  run.num_steps = static_cast<std::int64_t>(options.fit.epochs) * steps_an_epoch(plan, options.fit);
   run.memory_bytes = estimate_memory(plan, domain, run, options);
   base::require_memory(run.memory_bytes, "this reconstruction",
                        "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, or "

@@ -42,9 +42,8 @@ double common_x_tilt(const std::vector<tilt_series::View>& views, double thickne
   if (thickness / 2 * std::sin(radians_each_way) > kMaxRowShift) {
     throw Error(fmt::format(
         "the x-axis tilt varies from {}° to {}° over the series, which moves rows by more than "
-        "half "
-        "a pixel at this thickness; single-axis slabs cannot model it: align with one x-axis tilt "
-        "for all views, or leave --xtilt out",
+        "half a pixel at this thickness; single-axis slabs cannot model it: use --engine ray (of "
+        "reconstruct), align with one x-axis tilt for all views, or leave --xtilt out",
         low, high));
   }
   return (low + high) / 2;
@@ -81,6 +80,20 @@ void check_axis(const geometry::TiltGeometry& g, double factor) {
   }
 }
 
+// How the views as recorded look at the specimen.
+geometry::RayGeometry ray_geometry(const tilt_series::TiltSeries& series,
+                                   const geometry::TiltGeometry& aligned) {
+  geometry::RayGeometry g;
+  g.aligned = aligned;
+  g.raw_width = series.width();
+  g.raw_height = series.height();
+  for (std::size_t v = 0; v < series.views().size(); ++v) {
+    g.x_tilt_deg.push_back(series.views()[v].x_tilt_deg);
+    g.raw_from_aligned.push_back(series.raw_from_aligned(v));
+  }
+  return g;
+}
+
 // Mean and noise-free standard deviation of the valid pixels of a view's rows in the region of
 // interest.
 struct ViewBrightness {
@@ -107,9 +120,10 @@ ViewBrightness view_brightness(std::span<const float> image, std::span<const std
 // Sets the density unit and the mean density from the series' brightness.
 void measure_brightness(const tilt_series::TiltSeries& series, PreparedSeries& prepared) {
   const geometry::TiltGeometry& g = prepared.geometry;
-  const std::size_t first = static_cast<std::size_t>(prepared.roi.y0 * g.width);
-  const std::size_t count = static_cast<std::size_t>(prepared.roi.height() * g.width);
-  std::vector<float> image(static_cast<std::size_t>(g.width * g.height));
+  const tilt_series::SlabViews::Shape shape = prepared.rays_shape();
+  const std::size_t first = static_cast<std::size_t>(shape.first_row * shape.width);
+  const std::size_t count = static_cast<std::size_t>(shape.num_rows * shape.width);
+  std::vector<float> image(static_cast<std::size_t>(shape.width * shape.height));
   std::vector<std::uint8_t> valid(image.size());
   std::vector<std::pair<double, double>> contrast_by_tilt;
   double mean_density = 0;
@@ -156,6 +170,15 @@ std::vector<std::string> SpecimenOptions::faults() const {
   return found;
 }
 
+tilt_series::SlabViews::Shape PreparedSeries::rays_shape() const {
+  const auto num_views = static_cast<std::size_t>(geometry.num_views());
+  if (ray_geometry) {
+    return {num_views, ray_geometry->raw_width, ray_geometry->raw_height, 0,
+            ray_geometry->raw_height};
+  }
+  return {num_views, geometry.width, geometry.height, roi.y0, roi.height()};
+}
+
 PreparedSeries plan_series(const tilt_series::TiltSeries& series, const SpecimenOptions& specimen) {
   require_no_faults(specimen.faults());
   PreparedSeries plan;
@@ -165,8 +188,8 @@ PreparedSeries plan_series(const tilt_series::TiltSeries& series, const Specimen
   std::vector<double> tilts;
   for (const tilt_series::View& view : series.views()) tilts.push_back(view.tilt_deg);
   const double thickness = std::max(1.0, std::round(specimen.thickness / plan.bin_factor));
-  plan.geometry =
-      geometry::centred_geometry(series.width(), series.height(), thickness, std::move(tilts));
+  plan.geometry = geometry::centred_geometry(series.aligned_width(), series.aligned_height(),
+                                             thickness, std::move(tilts));
   plan.geometry.hand = specimen.hand;
   if (specimen.axis_x) plan.geometry.axis_x = *specimen.axis_x / plan.bin_factor;
   if (specimen.axis_z) plan.geometry.axis_z = *specimen.axis_z / plan.bin_factor;
@@ -174,7 +197,11 @@ PreparedSeries plan_series(const tilt_series::TiltSeries& series, const Specimen
                           : geometry::Roi{0, 0, plan.geometry.width, plan.geometry.height};
   check_roi(plan.roi, plan.geometry, plan.bin_factor);
   check_axis(plan.geometry, plan.bin_factor);
-  plan.x_tilt_deg = common_x_tilt(series.views(), thickness);
+  if (series.is_resampled()) {
+    plan.x_tilt_deg = common_x_tilt(series.views(), thickness);
+  } else {
+    plan.ray_geometry = ray_geometry(series, plan.geometry);
+  }
   return plan;
 }
 
@@ -185,11 +212,8 @@ PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
   measure_brightness(series, prepared);
   for (const double sigma : series.noise_sigma())
     prepared.noise_sigma.push_back(sigma / prepared.unit);
-  const tilt_series::SlabViews::Shape shape{series.views().size(), prepared.geometry.width,
-                                            prepared.geometry.height, prepared.roi.y0,
-                                            prepared.roi.height()};
   prepared.rays = std::make_unique<tilt_series::SlabViews>(
-      shape, prepared.unit,
+      prepared.rays_shape(), prepared.unit,
       [&series](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
         series.read_view(view, image, valid);
       },

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "geometry/ray_geometry.h"
 #include "geometry/tilt_geometry.h"
 #include "tilt_series/slab_views.h"
 #include "tilt_series/tilt_series.h"
@@ -25,9 +26,12 @@ struct SpecimenOptions {
 };
 
 /// A tilt series made ready for fitting: geometry in binned pixels, rays in
-/// slab order and in density units, the noise of each view.
+/// slab order and in density units, the noise of each view. `geometry` is of the
+/// aligned views; of a series that is not resampled, `rays` are the views as
+/// recorded, and `ray_geometry` says how they look at the specimen.
 struct PreparedSeries {
   geometry::TiltGeometry geometry;
+  std::optional<geometry::RayGeometry> ray_geometry;
   geometry::Roi roi;          ///< in binned pixels
   double pixel_size_A = 1.0;  ///< binned
   double bin_factor = 1.0;
@@ -40,6 +44,8 @@ struct PreparedSeries {
   std::unique_ptr<tilt_series::SlabViews> rays;
   /// Part of a view's rays in the region of interest that carry no loss; needs `rays`.
   double masked_part(int view) const;
+  /// Views, and which of their rows are fitted: those of the region of interest, or all.
+  tilt_series::SlabViews::Shape rays_shape() const;
 };
 
 /// Geometry alone: no pixel is read. Throws Error for options that do not fit the series.

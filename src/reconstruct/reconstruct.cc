@@ -27,12 +27,23 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+// Each view's x-axis tilt, 2 × 2 matrix and shift.
+nlohmann::json alignment_json(const geometry::RayGeometry& g) {
+  nlohmann::json views = nlohmann::json::array();
+  for (std::size_t v = 0; v < g.x_tilt_deg.size(); ++v) {
+    const geometry::RawFromAligned& m = g.raw_from_aligned[v];
+    views.push_back({g.x_tilt_deg[v], m.m11, m.m12, m.m21, m.m22, m.shift_x_px, m.shift_y_px});
+  }
+  return views;
+}
+
 // What decides the bits of a fit: the options, the geometry and the rays themselves (JSON).
 std::string fingerprint_of(const ReconstructOptions& options, const PreparedSeries& series) {
   nlohmann::json json = options_json(options);
   json.erase("input");
   json.erase("volume");
   json["tilt_deg"] = series.geometry.tilt_deg;
+  if (series.ray_geometry) json["alignment"] = alignment_json(*series.ray_geometry);
   json["bin_factor"] = series.bin_factor;
   json["unit"] = series.unit;
   json["noise_sigma"] = series.noise_sigma;
@@ -53,7 +64,12 @@ field::ModelInfo model_info(const PreparedSeries& series, const ReconstructOptio
 }
 
 Measurement measurement_of(const PreparedSeries& series) {
-  return {series.geometry, series.roi, series.rays.get(), series.noise_sigma, series.mean_density};
+  return {.geometry = series.geometry,
+          .roi = series.roi,
+          .rays = series.rays.get(),
+          .noise_sigma = series.noise_sigma,
+          .mean_density = series.mean_density,
+          .ray_geometry = series.ray_geometry};
 }
 
 // Loads the checkpoint into `fit`; false if there is none yet.

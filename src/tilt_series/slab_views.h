@@ -6,6 +6,8 @@
 #include <functional>
 #include <span>
 
+#include "base/lanes.h"
+
 namespace tomofield::tilt_series {
 
 /// Reads a view as height × width floats and which pixels are measurements.
@@ -37,12 +39,20 @@ class SlabViews {
   int num_slabs() const { return num_slabs_; }
   const float* rays(int slab, int view) const;          ///< [x, lane]
   const std::uint16_t* mask(int slab, int view) const;  ///< [x], bit = lane
+  /// Whether the ray of a pixel counts, and its value; y is counted from the first row.
+  bool counts(int view, std::int64_t x, std::int64_t y) const {
+    return mask(static_cast<int>(y / kRows), view)[x] >> (y % kRows) & 1;
+  }
+  float ray(int view, std::int64_t x, std::int64_t y) const {
+    return rays(static_cast<int>(y / kRows), view)[x * kRows + y % kRows];
+  }
   /// Rays that count in a view.
   std::int64_t num_valid(int view) const;
   /// 64-bit FNV-1a over rays and masks: tells one series from another.
   std::uint64_t checksum() const;
 
  private:
+  static constexpr std::int64_t kRows = base::kLanes;  // of a slab
   void fill(double unit, const ReadView& read_view);
   std::size_t line(int slab, int view) const;
 

@@ -93,8 +93,9 @@ struct TiltSeries::Impl {
     if (options.mask) mask.emplace(open_mask(*options.mask, stack));
     for (const PlannedView& planned : plan.views) views.push_back(planned.view);
     beads.discs.resize(views.size());
-    width = reduced_size(plan.aligned_width, plan.bin_factor);
-    height = reduced_size(plan.aligned_height, plan.bin_factor);
+    const io::MrcHeader& header = stack.header();
+    width = reduced_size(options.resample ? plan.aligned_width : header.nx, plan.bin_factor);
+    height = reduced_size(options.resample ? plan.aligned_height : header.ny, plan.bin_factor);
     survey();
     find_beads();
     base::log_info(fmt::format(
@@ -113,8 +114,12 @@ struct TiltSeries::Impl {
                        views[view].tilt_deg, options.stack.string());
   }
 
-  /// The aligned, binned intensities of a view, as stored.
+  /// The binned intensities of a view, as stored, in the frame that the options ask for.
   MaskedImage load(std::size_t view, PixelCensus* census) const {
+    return load(view, options.resample, census);
+  }
+
+  MaskedImage load(std::size_t view, bool aligned, PixelCensus* census) const {
     const io::MrcHeader& header = stack.header();
     MaskedImage image(header.nx, header.ny);
     stack.read_section(views[view].section, image.values);
@@ -124,7 +129,7 @@ struct TiltSeries::Impl {
     census->num_bad = mask_bad_pixels(&image);
     const RawFromAligned& transform = plan.views[view].raw_from_aligned;
     const bool keeps_sizes = plan.aligned_width == header.nx && plan.aligned_height == header.ny;
-    if (!(transform.is_identity() && keeps_sizes)) {
+    if (aligned && !(transform.is_identity() && keeps_sizes)) {
       image = align_image(image, transform, plan.aligned_width, plan.aligned_height);
     }
     if (plan.bin_factor != 1.0) image = reduce_image(image, plan.bin_factor);
@@ -197,19 +202,36 @@ struct TiltSeries::Impl {
     if (options.take_log) survey_logarithms();
   }
 
-  /// Finds what hides beads and fiducials, in images that have no such masks yet.
+  /// Finds what hides beads and fiducials, in aligned images that have no such masks yet.
   void find_beads() {
     BeadViews bead_views;
     for (const View& view : views) bead_views.tilt_deg.push_back(view.tilt_deg);
     bead_views.read = [this](std::size_t view) {
       PixelCensus census;
-      MaskedImage image = load(view, &census);
+      MaskedImage image = load(view, /*aligned=*/true, &census);
       convert(&image);
       return image;
     };
     const std::int64_t num_bad_pixels = beads.figures.num_bad_pixels;
     beads = find_bead_masks(options, plan, stack, bead_views);
     beads.figures.num_bad_pixels = num_bad_pixels;
+    if (options.resample) return;
+    for (std::size_t view = 0; view < views.size(); ++view) {
+      for (MaskDisc& disc : beads.discs[view]) disc = as_recorded(disc, view);
+    }
+  }
+
+  /// A disc of an aligned, binned view in the view as it was recorded.
+  MaskDisc as_recorded(const MaskDisc& disc, std::size_t view) const {
+    const RawFromAligned m = plan.views[view].raw_from_aligned.binned(plan.bin_factor);
+    const auto middle = [&](std::int64_t size) {
+      return static_cast<double>(reduced_size(size, plan.bin_factor)) / 2;
+    };
+    const double x = disc.x_px - middle(plan.aligned_width);
+    const double y = disc.y_px - middle(plan.aligned_height);
+    return {m.m11 * x + m.m12 * y + m.shift_x_px + static_cast<double>(width) / 2,
+            m.m21 * x + m.m22 * y + m.shift_y_px + static_cast<double>(height) / 2,
+            disc.radius_px * std::sqrt(std::abs(m.m11 * m.m22 - m.m12 * m.m21))};
   }
 
   void survey_logarithms() {
@@ -245,6 +267,16 @@ TiltSeries::TiltSeries(TiltSeries&&) noexcept = default;
 const std::vector<View>& TiltSeries::views() const { return impl_->views; }
 std::int64_t TiltSeries::width() const { return impl_->width; }
 std::int64_t TiltSeries::height() const { return impl_->height; }
+std::int64_t TiltSeries::aligned_width() const {
+  return reduced_size(impl_->plan.aligned_width, bin_factor());
+}
+std::int64_t TiltSeries::aligned_height() const {
+  return reduced_size(impl_->plan.aligned_height, bin_factor());
+}
+bool TiltSeries::is_resampled() const { return impl_->options.resample; }
+geometry::RawFromAligned TiltSeries::raw_from_aligned(std::size_t view) const {
+  return impl_->plan.views[view].raw_from_aligned.binned(bin_factor());
+}
 double TiltSeries::pixel_size_A() const { return impl_->plan.pixel_size_A * bin_factor(); }
 double TiltSeries::bin_factor() const { return impl_->plan.bin_factor; }
 const std::vector<double>& TiltSeries::noise_sigma() const { return impl_->noise_sigma; }

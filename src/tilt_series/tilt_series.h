@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "geometry/raw_from_aligned.h"
+
 namespace tomofield::tilt_series {
 
 enum class Contrast { kDark, kBright };
@@ -26,6 +28,7 @@ struct TiltSeriesOptions {
   std::optional<double> pixel_size_A;          ///< overrides the header's pixel size
   Contrast contrast = Contrast::kDark;
   bool take_log = false;  ///< −ln(I / I0) instead of I0 − I; dark only
+  bool resample = true;   ///< false: views stay as they were recorded, with their alignment beside
 
   std::optional<std::filesystem::path> mask;       ///< MRC as the stack: 0 is no measurement
   std::optional<std::filesystem::path> fiducials;  ///< text of model2point, stack coordinates
@@ -52,7 +55,8 @@ struct View {
 
 /// An aligned tilt series: views whose tilt axis is the +Y direction through
 /// the image centre, dense specimen high, ready to be fitted. Images stay in
-/// the file and are read a view at a time: aligned, binned, converted.
+/// the file and are read a view at a time: aligned (unless `resample` is off),
+/// binned, converted.
 class TiltSeries {
  public:
   /// Opens and checks everything: counts, angles, sizes, every pixel of every
@@ -62,8 +66,14 @@ class TiltSeries {
   TiltSeries(TiltSeries&&) noexcept;
 
   const std::vector<View>& views() const;  ///< in the stack's order, excluded ones absent
-  std::int64_t width() const;              ///< pixels of an aligned, binned view
+  std::int64_t width() const;              ///< pixels of a view as read_view gives it, binned
   std::int64_t height() const;
+  std::int64_t aligned_width() const;  ///< pixels of an aligned, binned view
+  std::int64_t aligned_height() const;
+  /// Whether read_view gives aligned views, and where their pixels else come from
+  /// in the views as recorded, in binned pixels.
+  bool is_resampled() const;
+  geometry::RawFromAligned raw_from_aligned(std::size_t view) const;
   double pixel_size_A() const;  ///< of an aligned, binned view
   double bin_factor() const;    ///< unbinned pixels a pixel, exact
 
