@@ -177,6 +177,29 @@ def test_binned_views_and_a_region_of_interest():
     assert correlation > 0.93, correlation
 
 
+def test_masks_lie_where_beads_are_in_the_recorded_views():
+    # Gold that is in one view each, so that only the list of fiducials tells of it.
+    painted = general.views.copy()
+    v, u = np.mgrid[:WIDTH, :HEIGHT] + 0.5
+    spots = np.random.default_rng(8).uniform(6, 34, (len(TILTS), 2))
+    for view, (x, y) in zip(painted, spots):
+        view[(u - x)**2 + (v - y)**2 < 2**2] += 60
+    stack, fiducials = general.path("gold.mrc"), general.path("gold.txt")
+    harness.write_stack(stack, painted.astype(np.float32))
+    np.savetxt(fiducials, np.column_stack([spots, np.arange(len(TILTS))]), fmt="%.2f")
+    alignment = [stack, *general.with_xf()[1:]]
+
+    def correlation(name, *options):
+        volume = general.reconstruct(name, alignment, "--no-margin", *options).volume
+        return np.corrcoef(volume.ravel(), truth().ravel())[0, 1]
+
+    seen = correlation("gold")
+    hidden = correlation("gold_masked", "--fiducials", fiducials, "--bead-diameter",
+                         4 * harness.PIXEL_SIZE / 10)
+    print(f"gold: correlation {seen:.4f}, masked {hidden:.4f}")
+    assert seen < 0.8 and hidden > 0.96, (seen, hidden)
+
+
 def test_both_engines_agree_on_an_aligned_series():
     zeros = np.zeros(len(TILTS))
     plain = RawSeries("plain", rots=zeros, x_tilts=zeros, shifts=np.zeros((len(TILTS), 2)),
