@@ -16,6 +16,7 @@ namespace tomofield::projection {
 struct Ray {
   std::int32_t view = 0;
   std::int32_t x = 0, y = 0;
+  bool operator==(const Ray&) const = default;
 };
 
 /// What a forward projection leaves for its adjoint: where each ray was sampled,
