@@ -5,13 +5,14 @@ find_package(hwy REQUIRED)
 set(HDF5_PREFER_PARALLEL OFF)
 find_package(HDF5 REQUIRED COMPONENTS C)
 find_package(PNG REQUIRED)
+find_package(kissfft REQUIRED COMPONENTS float SHARED)
 find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(tomlplusplus REQUIRED)
 
 set(TOMOFIELD_LIBRARIES
-  OpenMP::OpenMP_CXX Threads::Threads hwy::hwy HDF5::HDF5 PNG::PNG fmt::fmt
+  OpenMP::OpenMP_CXX Threads::Threads hwy::hwy HDF5::HDF5 PNG::PNG kissfft::kissfft-float fmt::fmt
   nlohmann_json::nlohmann_json)
 set(TOMOFIELD_CLI_LIBRARIES CLI11::CLI11 tomlplusplus::tomlplusplus)
 

@@ -104,6 +104,22 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->capture_default_str()
       ->group(group);
   command
+      .add_option("--bcc", fit.boundary,
+                  "weight of what neighbouring leaves disagree by on their faces")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--ifp", fit.fourier,
+                  "weight of the isotropic Fourier prior, against streaks along X and Y")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--ifp-ring", fit.fourier_ring,
+                  "what the Fourier axes are compared with: a ring's mean or its max")
+      ->check(CLI::IsMember({"mean", "max"}))
+      ->capture_default_str()
+      ->group(group);
+  command
       .add_option("--view-scale", arguments.view_scale,
                   "fit a scale and an offset a view; auto: for dark contrast")
       ->check(CLI::IsMember({"auto", "on", "off"}))

@@ -41,6 +41,31 @@ ObjectiveWeights objective_weights(const FitOptions& options, double noise) {
   return weights;
 }
 
+// A jump at a face counts in total variation's units, and so does what stands
+// out on a Fourier axis: both are densities times a volume.
+loss::BoundaryOptions boundary_options(const FitOptions& options, double noise) {
+  loss::BoundaryOptions boundary;
+  boundary.weight = options.boundary / noise;
+  boundary.seed = options.seed;
+  return boundary;
+}
+
+loss::FourierPriorOptions fourier_options(const FitOptions& options, double noise) {
+  loss::FourierPriorOptions fourier;
+  fourier.weight = options.fourier / noise;
+  fourier.seed = options.seed;
+  fourier.axes.reference =
+      options.fourier_ring == "max" ? loss::RingReference::kMax : loss::RingReference::kMean;
+  return fourier;
+}
+
+std::vector<std::vector<int>> leaves_of_bands(const projection::SlabSampler& sampler) {
+  std::vector<std::vector<int>> bands;
+  for (int band = 0; band < sampler.num_bands(); ++band)
+    bands.push_back(sampler.leaves_of_band(band));
+  return bands;
+}
+
 FitOptions with_at_most_one_subset_a_view(FitOptions options, int num_views) {
   if (options.engine == "slab") options.subsets = std::min(options.subsets, num_views);
   return options;
@@ -63,7 +88,11 @@ Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
       optimizer_(*field_, optimize::AdamOptions{}),
       gradient_(field_->num_parameters()),
       projector_(measurement.geometry, domain_.grid),
-      sampler_(*field_, domain_.grid, domain_.first_row, domain_.num_rows) {
+      sampler_(*field_, domain_.grid, domain_.first_row, domain_.num_rows),
+      boundary_(*field_, leaves_of_bands(sampler_),
+                boundary_options(options_, typical_noise(measurement.noise_sigma))),
+      fourier_(*field_, measurement.roi,
+               fourier_options(options_, typical_noise(measurement.noise_sigma))) {
   if (measurement.ray_geometry) {
     ray_term_ = std::make_unique<RayTerm>(*measurement.ray_geometry, *measurement.rays, *field_,
                                           domain_, options_);
@@ -116,13 +145,15 @@ double Fit::learning_rate(std::int64_t step) const {
 
 void Fit::take_step(const std::vector<int>& views) {
   double grad_bias = add_slab_gradient(views);
+  grad_bias += add_boundary_gradient();
+  grad_bias += fourier_.accumulate_gradient(progress_.step, gradient_.data()).grad_bias;
   if (ray_term_) grad_bias += add_ray_gradient();
   const double rate = learning_rate(progress_.step);
   optimizer_.step(*field_, touched_leaves_, gradient_, rate);
   optimizer_.step_bias(*field_, grad_bias, kBiasRate * rate);
 }
 
-// The data term of these views and every regulariser; returns dL/d bias.
+// The data term of these views and total variation; returns dL/d bias.
 double Fit::add_slab_gradient(const std::vector<int>& views) {
   const SlabObjective objective(
       sampler_, projector_, *measurement_.rays, *field_,
@@ -142,6 +173,17 @@ double Fit::add_slab_gradient(const std::vector<int>& views) {
     grad_bias += band.grad_bias;
   }
   return grad_bias;
+}
+
+// Boundary consistency, band by band as they own leaves; returns dL/d bias.
+double Fit::add_boundary_gradient() {
+  std::vector<double> bands(static_cast<std::size_t>(sampler_.num_bands()));
+  base::parallel_for(sampler_.num_bands(), [&](std::int64_t band) {
+    bands[static_cast<std::size_t>(band)] =
+        boundary_.accumulate_gradient(static_cast<int>(band), progress_.step, gradient_.data())
+            .grad_bias;
+  });
+  return std::accumulate(bands.begin(), bands.end(), 0.0);
 }
 
 // The data term of this step's rays; returns dL/d bias.

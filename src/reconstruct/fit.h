@@ -10,7 +10,9 @@
 #include "field/field.h"
 #include "geometry/ray_geometry.h"
 #include "geometry/tilt_geometry.h"
+#include "loss/boundary_consistency.h"
 #include "loss/data_term.h"
+#include "loss/fourier_prior.h"
 #include "optimize/adam.h"
 #include "projection/slab_projector.h"
 #include "projection/slab_sampler.h"
@@ -69,6 +71,7 @@ class Fit {
   double learning_rate(std::int64_t step) const;
   void take_step(const std::vector<int>& views);
   double add_slab_gradient(const std::vector<int>& views);
+  double add_boundary_gradient();
   double add_ray_gradient();
   void end_epoch();
 
@@ -81,6 +84,8 @@ class Fit {
   base::AlignedBuffer<float> gradient_;
   projection::SlabProjector projector_;
   projection::SlabSampler sampler_;
+  loss::BoundaryConsistency boundary_;
+  loss::FourierPrior fourier_;
   std::unique_ptr<RayTerm> ray_term_;  ///< of the ray engine
   std::vector<int> touched_leaves_;
 };

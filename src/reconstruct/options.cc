@@ -70,6 +70,9 @@ std::vector<std::string> FitOptions::faults() const {
   faults.require_between("the final learning rate's part of the first", final_rate, 1e-6, 1);
   faults.require_not_negative("--tv", density_variation);
   faults.require_not_negative("--tv-factors", factor_variation);
+  faults.require_not_negative("--bcc", boundary);
+  faults.require_not_negative("--ifp", fourier);
+  faults.require_one_of("--ifp-ring", fourier_ring, "mean", "max");
   faults.require_one_of("--tv-penalty", penalty, "concave", "smooth");
   faults.require_positive("the concavity", concavity);
   faults.require_positive("the gradient floor", gradient_floor);

@@ -35,10 +35,13 @@ struct FitOptions {
   double final_rate = 0.1;
   double density_variation = 9.0;
   double factor_variation = 0.0;
-  std::string penalty = "concave";  ///< or smooth, for both variations
-  double concavity = 0.1;           ///< τ of the concave penalty, in density units
-  double gradient_floor = 1e-3;     ///< ε of both penalties, in density units a pixel
-  bool fit_view_scale = false;      ///< per-view scale and offset as nuisances
+  double boundary = 0.0;              ///< boundary consistency of leaves (eq. 6)
+  double fourier = 0.0;               ///< isotropic Fourier prior (eq. 7)
+  std::string fourier_ring = "mean";  ///< or max: what an axis may not exceed
+  std::string penalty = "concave";    ///< or smooth, for both variations
+  double concavity = 0.1;             ///< τ of the concave penalty, in density units
+  double gradient_floor = 1e-3;       ///< ε of both penalties, in density units a pixel
+  bool fit_view_scale = false;        ///< per-view scale and offset as nuisances
   std::uint64_t seed = 1;
   std::vector<std::string> faults() const;
 };

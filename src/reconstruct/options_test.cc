@@ -30,7 +30,8 @@ TEST(ReconstructOptions, NoNumberMayBeNaN) {
   }
   for (double FitOptions::*number :
        {&FitOptions::learning_rate, &FitOptions::final_rate, &FitOptions::density_variation,
-        &FitOptions::factor_variation, &FitOptions::concavity, &FitOptions::gradient_floor}) {
+        &FitOptions::factor_variation, &FitOptions::boundary, &FitOptions::fourier,
+        &FitOptions::concavity, &FitOptions::gradient_floor}) {
     FitOptions options;
     options.*number = nan;
     EXPECT_EQ(options.faults().size(), 1u);

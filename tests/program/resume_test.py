@@ -15,7 +15,8 @@ import harness
 from harness import read_bytes
 
 series = harness.Series("series")
-FIT = harness.merge(harness.QUICK, ["--rank", 3, "--epochs", 5])
+PRIORS = ["--tv-factors", 0.5, "--bcc", 5, "--ifp", 0.2]  # beside the default
+FIT = harness.merge(harness.QUICK, ["--rank", 3, "--epochs", 5, *PRIORS])
 NUM_STEPS = 5 * 7
 EVERY_STEP = ["--checkpoint-minutes", 0]
 

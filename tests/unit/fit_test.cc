@@ -197,6 +197,8 @@ Outcome small_fit(const std::string& kind, int threads, std::uint64_t seed, int 
   fit_options.epochs = epochs;
   fit_options.subsets = 4;
   fit_options.factor_variation = 0.01;
+  fit_options.boundary = 1.0;
+  fit_options.fourier = 0.1;
   fit_options.fit_view_scale = true;
   fit_options.seed = seed;
   Fit fit(series.measurement(), options, fit_options);
