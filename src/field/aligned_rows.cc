@@ -31,7 +31,9 @@ AlignedRows::AlignedRows(const Field& field, const Box& box)
   for (const LeafShape& shape : field.shapes()) {
     const auto [found, is_new] = taps_z_.try_emplace(shape.nz);
     for (std::int64_t z = first_z_; is_new && z < end_z_; ++z) {
-      const AxisPoint at(coordinate(2, z) / field.thickness() * (shape.nz - 1), shape.nz);
+      const AxisPoint at(
+          (coordinate(2, z) - kPixelCentre) / vertex_height(field.thickness()) * (shape.nz - 1),
+          shape.nz);
       found->second.lower.push_back(static_cast<int>(at.lower));
       found->second.fraction.push_back(static_cast<float>(at.fraction));
     }
@@ -65,28 +67,25 @@ void AlignedRows::contract_lanes(std::int64_t block_first, std::int64_t lanes_fi
   std::array<double, kLanes> y{};
   for (int l = 0; l < kLanes; ++l)
     y[static_cast<std::size_t>(l)] = coordinate(1, lanes_first + std::min(l, num_lanes - 1));
-  const auto low = static_cast<std::int64_t>(std::floor(y.front()));
-  const auto high = static_cast<std::int64_t>(std::floor(y.back())) + 1;
+  const auto low = static_cast<std::int64_t>(std::floor(y.front() - kPixelCentre));
+  const auto high = static_cast<std::int64_t>(std::floor(y.back() + kPixelCentre)) + 1;
   for (const int leaf : field_.tree().leaves_across(low, high)) {
-    const Square& square = field_.tree().leaf(leaf).square;
+    const Quadtree::Bounds bounds = field_.tree().bounds(field_.tree().leaf(leaf).square);
     const LeafShape& shape = field_.shape(leaf);
     LeafRows rows;
     rows.leaf = leaf;
     rows.first_point_row = lanes_first - block_first;
-    const auto lane_at = [&](std::int64_t edge) {
-      return static_cast<int>(
-          std::lower_bound(y.begin(), y.begin() + num_lanes, static_cast<double>(edge)) -
-          y.begin());
+    const auto lane_at = [&](double edge) {
+      return static_cast<int>(std::lower_bound(y.begin(), y.begin() + num_lanes, edge) - y.begin());
     };
-    rows.first_lane = lane_at(square.y0);
-    rows.end_lane = lane_at(square.y1());
+    rows.first_lane = lane_at(bounds.y0);
+    rows.end_lane = lane_at(bounds.y1);
     if (rows.first_lane >= rows.end_lane) continue;
-    const double size = static_cast<double>(square.size);
     for (std::int64_t i = 0; i < box_.size[0] * factor_; ++i) {
-      const double x = coordinate(0, i) - static_cast<double>(square.x0);
-      if (x < 0 || x >= size) continue;
+      const double x = coordinate(0, i);
+      if (x < bounds.x0 || x >= bounds.x1) continue;
       if (rows.lower_x.empty()) rows.first_point_x = i;
-      const AxisPoint at(x / size * (shape.nx - 1), shape.nx);
+      const AxisPoint at(field_.vertex_x(leaf, x), shape.nx);
       rows.lower_x.push_back(static_cast<int>(at.lower));
       rows.fraction_x.push_back(static_cast<float>(at.fraction));
     }

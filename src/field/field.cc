@@ -51,10 +51,20 @@ void Field::allocate() {
   parameters_.reset(offsets_.back());
 }
 
+double Field::vertex_x(int leaf, double x) const {
+  const Square& square = tree_.leaf(leaf).square;
+  return (x - kPixelCentre - static_cast<double>(square.x0)) / static_cast<double>(square.size) *
+         (shape(leaf).nx - 1);
+}
+
 double Field::vertex_y(int leaf, double y) const {
   const Square& square = tree_.leaf(leaf).square;
-  return (y - static_cast<double>(square.y0)) / static_cast<double>(square.size) *
+  return (y - kPixelCentre - static_cast<double>(square.y0)) / static_cast<double>(square.size) *
          (shape(leaf).ny - 1);
+}
+
+double Field::vertex_z(int leaf, double z) const {
+  return (z - kPixelCentre) / vertex_height(thickness_) * (shape(leaf).nz - 1);
 }
 
 LaneRows Field::lane_rows(int leaf, std::span<const double, kernels::kLanes> y) const {
@@ -82,9 +92,9 @@ PointTaps Field::point_taps(int leaf, const Points& points) const {
   const Square& square = tree_.leaf(leaf).square;
   const LeafShape& s = shape(leaf);
   const double size = static_cast<double>(square.size);
-  return {axis_taps(points.x, static_cast<double>(square.x0), size, s.nx, 0),
-          axis_taps(points.y, static_cast<double>(square.y0), size, s.ny, 1),
-          axis_taps(points.z, 0.0, thickness_, s.nz, 2)};
+  return {axis_taps(points.x, static_cast<double>(square.x0) + kPixelCentre, size, s.nx, 0),
+          axis_taps(points.y, static_cast<double>(square.y0) + kPixelCentre, size, s.ny, 1),
+          axis_taps(points.z, kPixelCentre, vertex_height(thickness_), s.nz, 2)};
 }
 
 void Field::point_densities(int leaf, const Points& points, std::span<float> densities) const {
@@ -147,6 +157,8 @@ void Field::split_leaf(int leaf) {
     }
   }
 }
+
+double vertex_height(double thickness) { return std::max(1.0, thickness - 1.0); }
 
 std::size_t count_parameters(const std::string& kind, const std::vector<LeafShape>& shapes) {
   std::size_t count = 0;

@@ -76,6 +76,11 @@ class Field {
   float bias = 0.0f;
   kernels::Activation activation;
 
+  /// Position among the vertices of an axis of `leaf`; those in z lie between the
+  /// centres of the first and the last pixel of the thickness.
+  double vertex_x(int leaf, double x) const;
+  double vertex_y(int leaf, double y) const;
+  double vertex_z(int leaf, double z) const;
   LaneRows lane_rows(int leaf, std::span<const double, kernels::kLanes> y) const;
 
   /// Vertex values of a leaf at 16 rows: values[x, z, lane], overwritten.
@@ -124,7 +129,6 @@ class Field {
   void allocate();
 
  private:
-  double vertex_y(int leaf, double y) const;
   PointTaps point_taps(int leaf, const Points& points) const;
 
   Quadtree tree_;
@@ -133,6 +137,10 @@ class Field {
   std::vector<std::size_t> offsets_;
   base::AlignedBuffer<float> parameters_;
 };
+
+/// Length in z that vertices span: from the centre of the first pixel to that of the
+/// last, or a pixel for specimens thinner than two.
+double vertex_height(double thickness);
 
 /// Parameters that make_field would allocate.
 std::size_t count_parameters(const std::string& kind, const std::vector<LeafShape>& shapes);

@@ -65,7 +65,9 @@ struct Position {
   double fraction;
   // `position` runs from 0 to 1 over n vertices.
   Position(double position, int n) {
-    const double vertex = position * (n - 1);
+    double vertex = position * (n - 1);
+    // Beyond the outer vertices their values go on.
+    vertex = std::clamp(vertex, 0.0, n - 1.0);
     lower = std::min(static_cast<int>(vertex), n - 2);
     fraction = vertex - lower;
   }
@@ -75,7 +77,7 @@ struct Position {
 // Value at (x vertex, y, z vertex), bias included.
 double value_at_row(const Field& field, int leaf, int x, double y, int z) {
   const Square& square = field.tree().leaf(leaf).square;
-  const Position at((y - static_cast<double>(square.y0)) / static_cast<double>(square.size),
+  const Position at((y - 0.5 - static_cast<double>(square.y0)) / static_cast<double>(square.size),
                     field.shape(leaf).ny);
   double sum = static_cast<double>(field.bias);
   for (const int j : {0, 1}) sum += at.weight(j) * vertex_value(field, leaf, x, at.lower + j, z);
@@ -86,8 +88,9 @@ double value_at_row(const Field& field, int leaf, int x, double y, int z) {
 double expected_density(const Field& field, int leaf, double x, double y, double z) {
   const Square& square = field.tree().leaf(leaf).square;
   const LeafShape& s = field.shape(leaf);
-  const Position px((x - static_cast<double>(square.x0)) / static_cast<double>(square.size), s.nx);
-  const Position pz(z / field.thickness(), s.nz);
+  const Position px((x - 0.5 - static_cast<double>(square.x0)) / static_cast<double>(square.size),
+                    s.nx);
+  const Position pz((z - 0.5) / (field.thickness() - 1), s.nz);
   double a = 0.0;
   for (const int i : {0, 1}) {
     for (const int k : {0, 1})
@@ -105,7 +108,7 @@ double expected_density(const Field& field, double x, double y, double z) {
 std::array<double, kLanes> rows_of(const Square& square) {
   std::array<double, kLanes> y{};
   for (std::size_t l = 0; l < kLanes; ++l)
-    y[l] = static_cast<double>(square.y0) +
+    y[l] = static_cast<double>(square.y0) + 0.5 +
            static_cast<double>(square.size) * static_cast<double>(l) / 15.0;
   return y;
 }
@@ -165,9 +168,9 @@ TEST_P(EachField, DensityOutsideTheDomainIsZero) {
   const auto field = two_cells(GetParam(), 4.0f);
   EXPECT_GT(field->density(0, 20, 10), 0.0);
   EXPECT_EQ(field->density(-16.01, 20, 10), 0.0);
-  EXPECT_EQ(field->density(112, 20, 10), 0.0);
+  EXPECT_EQ(field->density(112.5, 20, 10), 0.0);
   EXPECT_EQ(field->density(0, 7.9, 10), 0.0);
-  EXPECT_EQ(field->density(0, 72, 10), 0.0);
+  EXPECT_EQ(field->density(0, 72.5, 10), 0.0);
   EXPECT_EQ(field->density(0, 20, -0.01), 0.0);
   EXPECT_EQ(field->density(0, 20, kThickness + 0.01), 0.0);
   EXPECT_EQ(field->density(0, 20, std::nan("")), 0.0);

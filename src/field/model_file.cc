@@ -21,7 +21,7 @@ using Integers = std::vector<std::int64_t>;
 
 // Persisted: do not change either without a new version.
 constexpr const char* kFormat = "tomofield model";
-constexpr std::int64_t kFormatVersion = 1;
+constexpr std::int64_t kFormatVersion = 2;
 
 // A list of structs as one array a member.
 template <typename Items, typename Get>
@@ -145,11 +145,12 @@ class ModelReader {
     if (!root.has_attribute("format") || root.text("format") != kFormat)
       throw Error(fmt::format("'{}' is an HDF5 file, but no model of tomofield", path_));
     const std::int64_t version = root.integer("format_version");
-    if (version < 1 || version > kFormatVersion)
-      throw Error(fmt::format(
-          "'{}' is a model of format {}, written by {}; this is tomofield {}, which reads formats "
-          "up to {}: use a newer tomofield",
-          path_, version, root.text("written_by"), library_version(), kFormatVersion));
+    if (version != kFormatVersion)
+      throw Error(
+          fmt::format("'{}' is a model of format {}, written by {}; this is tomofield {}, which "
+                      "reads format {}: "
+                      "use the tomofield that wrote it",
+                      path_, version, root.text("written_by"), library_version(), kFormatVersion));
   }
 
   int small_integer(std::int64_t value) const {

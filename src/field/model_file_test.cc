@@ -194,7 +194,7 @@ TEST(ModelFile, RefusesANewerFormatAndNamesItsWriter) {
   const ScratchDirectory scratch;
   auto file = io::Hdf5File::create(scratch / "newer.h5");
   file.root().write_text("format", "tomofield model");
-  file.root().write_integer("format_version", 2);
+  file.root().write_integer("format_version", 3);
   file.root().write_text("written_by", "tomofield 9.8.7");
   file.close();
   expect_refusal(scratch / "newer.h5", "tomofield 9.8.7");
@@ -310,7 +310,7 @@ TEST(ModelFile, IsReadByH5py) {
 import h5py, numpy as np
 f = h5py.File('model.h5', 'r')
 assert f.attrs['format'].decode() == 'tomofield model'
-assert f.attrs['format_version'] == 1
+assert f.attrs['format_version'] == 2
 assert f.attrs['pixel_size_A'] == 3.3725 and f.attrs['density_unit'] == 40.0
 assert f.attrs['contrast'].decode() == 'bright'
 assert 'Ångström' in f.attrs['options_json'].decode('utf8')
@@ -326,8 +326,9 @@ inside = None
 for leaf, node in enumerate(leaves['node']):
     corner = np.array([tree['node_x0'][node], tree['node_y0'][node]])
     size = tree['node_size'][node]
-    if np.all(point[:2] >= corner) and np.all(point[:2] < corner + size):
-        inside = leaf, np.append((point[:2] - corner) / size, point[2] / field.attrs['thickness'])
+    offset = point[:2] - 0.5 - corner  # faces lie on the centres of pixels
+    if np.all(offset >= 0) and np.all(offset < size):
+        inside = leaf, np.append(offset / size, (point[2] - 0.5) / max(1, field.attrs['thickness'] - 1))
 leaf, unit = inside
 assert tree['node_size'][leaves['node'][leaf]] == 16 and not tree['node_is_margin'][leaves['node'][leaf]]
 nx, ny, nz = (int(leaves[n][leaf]) for n in ('nx', 'ny', 'nz'))

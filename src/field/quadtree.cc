@@ -142,17 +142,30 @@ std::vector<int> Quadtree::leaves_across(std::int64_t y0, std::int64_t y1) const
   return found;
 }
 
+Quadtree::Bounds Quadtree::bounds(const Square& square) const {
+  const auto first = [](std::int64_t position, std::int64_t domain) {
+    return static_cast<double>(position) + (position == domain ? 0.0 : kPixelCentre);
+  };
+  return {first(square.x0, roots_.x0), first(square.y0, roots_.y0),
+          static_cast<double>(square.x1()) + kPixelCentre,
+          static_cast<double>(square.y1()) + kPixelCentre};
+}
+
 int Quadtree::find_leaf(double x, double y) const {
   const double size = static_cast<double>(roots_.cell_size);
-  const double column = std::floor((x - static_cast<double>(roots_.x0)) / size);
-  const double row = std::floor((y - static_cast<double>(roots_.y0)) / size);
+  const auto past_first_centre = [](double position, std::int64_t first) {
+    const double distance = position - kPixelCentre - static_cast<double>(first);
+    return distance < 0 && distance >= -kPixelCentre ? 0.0 : distance;
+  };
+  const double along_x = past_first_centre(x, roots_.x0), along_y = past_first_centre(y, roots_.y0);
+  const double column = std::floor(along_x / size), row = std::floor(along_y / size);
   if (!(column >= 0 && column < roots_.columns && row >= 0 && row < roots_.rows)) return -1;
   int n = static_cast<int>(row) * roots_.columns + static_cast<int>(column);
   while (!nodes_[static_cast<std::size_t>(n)].is_leaf()) {
     const QuadtreeNode& node = nodes_[static_cast<std::size_t>(n)];
     const double half = static_cast<double>(node.square.size) / 2;
-    const int right = x >= static_cast<double>(node.square.x0) + half ? 1 : 0;
-    const int up = y >= static_cast<double>(node.square.y0) + half ? 2 : 0;
+    const int right = along_x >= static_cast<double>(node.square.x0 - roots_.x0) + half ? 1 : 0;
+    const int up = along_y >= static_cast<double>(node.square.y0 - roots_.y0) + half ? 2 : 0;
     n = node.first_child + right + up;
   }
   return leaf_of_node_[static_cast<std::size_t>(n)];

@@ -9,8 +9,15 @@ namespace tomofield::field {
 /// the margin around it that rays cross on their way.
 enum class Region : std::uint8_t { kInterest, kMargin };
 
-/// A square of the specimen's plane, in pixels of the aligned view at zero
-/// tilt: [x0, x0 + size) × [y0, y0 + size).
+/// Pixel i of the aligned view at zero tilt covers [i, i + 1) and has its centre
+/// half a pixel on. Faces of squares, and with them vertices at a spacing of one
+/// pixel, lie on centres of pixels: there the samples of a fit read single
+/// vertices, where between them they would see means of eight, whose sharp
+/// detail the fit recovers slowly (docs/results/ablation.md).
+inline constexpr double kPixelCentre = 0.5;
+
+/// A square of the specimen's plane that owns the pixels (centres) x0 … x1 − 1
+/// and y0 … y1 − 1: in coordinates [x0 + ½, x1 + ½) × [y0 + ½, y1 + ½).
 struct Square {
   std::int64_t x0 = 0, y0 = 0, size = 0;
   std::int64_t x1() const { return x0 + size; }
@@ -65,6 +72,12 @@ class Quadtree {
 
   /// Leaves whose square meets rows [y0, y1), ordered by x.
   std::vector<int> leaves_across(std::int64_t y0, std::int64_t y1) const;
+  /// Coordinates that a square owns; those of the domain's first ones begin half a
+  /// pixel early, with the first pixel.
+  struct Bounds {
+    double x0, y0, x1, y1;
+  };
+  Bounds bounds(const Square& square) const;
   /// The leaf that holds a point, or −1 outside the domain.
   int find_leaf(double x, double y) const;
 

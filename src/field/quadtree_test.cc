@@ -83,17 +83,25 @@ TEST(Quadtree, FindsTheLeafOfEveryPoint) {
   const Quadtree tree = uneven_tree();
   base::Random random(1);
   for (int n = 0; n < 2000; ++n) {
-    const double x = random.uniform(-64, 128), y = random.uniform(32, 160);
+    const double x = random.uniform(-64, 128.5), y = random.uniform(32, 160.5);
     const int found = tree.find_leaf(x, y);
     ASSERT_GE(found, 0);
     const Square& s = tree.leaf(found).square;
-    EXPECT_TRUE(x >= static_cast<double>(s.x0) && x < static_cast<double>(s.x1()));
-    EXPECT_TRUE(y >= static_cast<double>(s.y0) && y < static_cast<double>(s.y1()));
+    const double low_x = s.x0 == -64 ? -64.0 : static_cast<double>(s.x0) + 0.5;
+    const double low_y = s.y0 == 32 ? 32.0 : static_cast<double>(s.y0) + 0.5;
+    EXPECT_TRUE(x >= low_x && x < static_cast<double>(s.x1()) + 0.5);
+    EXPECT_TRUE(y >= low_y && y < static_cast<double>(s.y1()) + 0.5);
+    const Quadtree::Bounds bounds = tree.bounds(s);
+    EXPECT_EQ(bounds.x0, low_x);
+    EXPECT_EQ(bounds.y0, low_y);
+    EXPECT_EQ(bounds.x1, static_cast<double>(s.x1()) + 0.5);
+    EXPECT_EQ(bounds.y1, static_cast<double>(s.y1()) + 0.5);
   }
-  // A face belongs to the leaf above it; the domain's last faces to none.
-  EXPECT_EQ(tree.leaf(tree.find_leaf(32, 40)).square.x0, 32);
-  EXPECT_EQ(tree.find_leaf(128, 40), -1);
-  EXPECT_EQ(tree.find_leaf(0, 160), -1);
+  // Faces lie on centres of pixels. A face belongs to the leaf above it; the domain's last faces to
+  // none.
+  EXPECT_EQ(tree.leaf(tree.find_leaf(32.5, 40)).square.x0, 32);
+  EXPECT_EQ(tree.find_leaf(128.5, 40), -1);
+  EXPECT_EQ(tree.find_leaf(0, 160.5), -1);
   EXPECT_EQ(tree.find_leaf(-64.001, 40), -1);
   EXPECT_EQ(tree.find_leaf(std::nan(""), 40), -1);
 }

@@ -66,7 +66,7 @@ TEST_P(EachBoxedField, OutsideTheDomainThereIsNothing) {
 TEST_P(EachBoxedField, CoarseVoxelsAreMeansOfFineOnes) {
   const auto model = uneven_model(GetParam());
   for (const double voxel_px : {2.0, 2.5, 20.0}) {
-    Box coarse{.centre_px = {31.0, 35.0, 12.0}, .size = {9, 7, 4}, .voxel_px = voxel_px};
+    Box coarse{.centre_px = {31.2, 35.2, 12.0}, .size = {9, 7, 4}, .voxel_px = voxel_px};
     if (voxel_px == 20.0) coarse.size = {2, 3, 1};
     const std::int64_t factor = points_per_voxel(coarse);
     ASSERT_EQ(factor, static_cast<std::int64_t>(std::ceil(voxel_px)));

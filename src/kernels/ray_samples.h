@@ -16,7 +16,7 @@ struct LeafVertices {
 /// The piece of a ray inside one leaf, cut into num_samples segments of equal
 /// length with one random sample in each (eq. 10): segment i has its sample at
 /// the share (i + random_unit(key, i)) / num_samples of the way from `start`
-/// along `span`, both in vertex spacings.
+/// along `span`, both in vertex spacings; samples past the outer vertices read those.
 struct RayPiece {
   float start_x = 0, start_y = 0, start_z = 0;
   float span_x = 0, span_y = 0, span_z = 0;

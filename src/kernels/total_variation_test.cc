@@ -88,6 +88,8 @@ class Slabs {
     v.per_hz = static_cast<float>(shape_.per_hz);
     v.weight = static_cast<float>(shape_.weight);
     v.penalty = shape_.penalty;
+    v.backward_x = shape_.backward_x;
+    v.backward_z = shape_.backward_z;
     return v;
   }
 
@@ -124,15 +126,26 @@ std::vector<float> random_volume(const VolumeVariation& s) {
 
 const std::vector<VariationPenalty> kPenalties = {{1e-3f, 0.0f}, {0.1f, 0.0f}, {1e-2f, 0.05f}};
 
-void compare(const VolumeVariation& shape) {
-  SCOPED_TRACE(::testing::Message() << shape.nx << " x " << shape.ny << " x " << shape.nz
-                                    << ", concavity " << shape.penalty.concavity);
+void compare_one(const VolumeVariation& shape) {
+  SCOPED_TRACE(::testing::Message()
+               << shape.nx << " x " << shape.ny << " x " << shape.nz << ", concavity "
+               << shape.penalty.concavity << ", backward " << shape.backward_x << shape.backward_z);
   const auto volume = random_volume(shape);
   const Result expected = from_reference(shape, volume);
   const Result found = Slabs(shape, volume).run();
   EXPECT_NEAR(found.value, expected.value, 2e-6 * expected.value);
   expect_near({found.gradient.begin(), found.gradient.end()}, expected.gradient,
               4e-6 * shape.weight * (shape.per_hx + shape.per_hz + 1));
+}
+
+void compare(VolumeVariation shape) {
+  for (const bool backward_x : {false, true}) {
+    for (const bool backward_z : {false, true}) {
+      shape.backward_x = backward_x;
+      shape.backward_z = backward_z;
+      compare_one(shape);
+    }
+  }
 }
 
 TEST(SlabVariation, SlabsWithHalosAreOneVolume) {
@@ -156,7 +169,9 @@ TEST(SlabVariation, ABandStartsWithTheFluxOfTheRowBefore) {
                                   .per_hx = 0.5,
                                   .per_hz = 2.0,
                                   .weight = 0.7,
-                                  .penalty = penalty};
+                                  .penalty = penalty,
+                                  .backward_x = true,
+                                  .backward_z = penalty.concavity > 0};
       const auto volume = random_volume(shape);
       const Result expected = from_reference(shape, volume);
       Slabs slabs(shape, volume);

@@ -20,8 +20,8 @@ void add_side(const Quadtree& tree, int leaf, bool faces_x, std::vector<Face>& f
   const std::int64_t at = faces_x ? s.x1() : s.y1();
   const std::int64_t end = faces_x ? s.y1() : s.x1();
   for (std::int64_t along = faces_x ? s.y0 : s.x0; along < end;) {
-    const double x = static_cast<double>(faces_x ? at : along);
-    const double y = static_cast<double>(faces_x ? along : at);
+    const double x = static_cast<double>(faces_x ? at : along) + field::kPixelCentre;
+    const double y = static_cast<double>(faces_x ? along : at) + field::kPixelCentre;
     const int next = tree.find_leaf(x, y);
     if (next < 0) return;  // the domain is a rectangle: it ends along the whole side
     const Square& n = tree.leaf(next).square;
@@ -88,14 +88,14 @@ void BoundaryConsistency::draw_points(std::size_t index, std::int64_t step,
                       kPointStream + static_cast<std::uint64_t>(step) * faces_.size() + index);
   std::vector<double>& along = face.faces_x ? samples.y : samples.x;
   std::vector<double>& across = face.faces_x ? samples.x : samples.y;
-  std::fill(across.begin(), across.end(), static_cast<double>(face.at));
+  std::fill(across.begin(), across.end(), static_cast<double>(face.at) + field::kPixelCentre);
   std::size_t n = 0;
   for (std::int64_t i = 0; i < num_along; ++i) {
     for (std::int64_t k = 0; k < num_z; ++k, ++n) {
       const double cell_along = static_cast<double>(i) + random.uniform();
       const double cell_z = static_cast<double>(k) + random.uniform();
-      along[n] =
-          static_cast<double>(face.begin) + cell_along * length / static_cast<double>(num_along);
+      along[n] = static_cast<double>(face.begin) + field::kPixelCentre +
+                 cell_along * length / static_cast<double>(num_along);
       samples.z[n] = cell_z * field_.thickness() / static_cast<double>(num_z);
     }
   }

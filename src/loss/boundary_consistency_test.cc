@@ -59,7 +59,8 @@ TEST(SharedFaces, AreTheSidesBetweenNeighbours) {
   const auto faces = shared_faces(tree);
   for (const bool faces_x : {true, false}) {
     const auto leaf_at = [&](std::int64_t across, std::int64_t along, double shift) {
-      const double a = static_cast<double>(across) + shift, b = static_cast<double>(along) + 0.5;
+      const double a = static_cast<double>(across) + 0.5 + shift;
+      const double b = static_cast<double>(along) + 0.75;
       return faces_x ? tree.find_leaf(a, b) : tree.find_leaf(b, a);
     };
     for (std::int64_t across = -48; across <= 160; ++across) {
@@ -116,8 +117,8 @@ TEST_P(EachBoundaryField, ValueIsEquation6) {
          along += 0.5) {
       for (double z = 0.25; z < kThickness; z += 0.5, ++count) {
         const auto density = [&](int leaf) {
-          const double at = static_cast<double>(f.at);
-          const double x = f.faces_x ? at : along, y = f.faces_x ? along : at;
+          const double at = static_cast<double>(f.at) + 0.5;
+          const double x = f.faces_x ? at : along + 0.5, y = f.faces_x ? along + 0.5 : at;
           float value = 0.0f;
           field->point_densities(leaf, {{&x, 1}, {&y, 1}, {&z, 1}}, {&value, 1});
           return static_cast<double>(value);

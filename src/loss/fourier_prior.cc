@@ -16,11 +16,10 @@ constexpr std::uint64_t kSampleStream = std::uint64_t{2} << 48;
 // Positions first + i · spacing, 0 <= i < count, that lie in [low, high).
 struct Range {
   std::size_t begin, end;
-  Range(const std::vector<double>& positions, std::int64_t low, std::int64_t high) {
-    const auto index = [&](std::int64_t limit) {
-      return static_cast<std::size_t>(
-          std::lower_bound(positions.begin(), positions.end(), static_cast<double>(limit)) -
-          positions.begin());
+  Range(const std::vector<double>& positions, double low, double high) {
+    const auto index = [&](double limit) {
+      return static_cast<std::size_t>(std::lower_bound(positions.begin(), positions.end(), limit) -
+                                      positions.begin());
     };
     begin = index(low);
     end = index(high);
@@ -44,7 +43,7 @@ FourierPrior::FourierPrior(const field::Field& field, const geometry::Roi& roi,
             static_cast<int>(width / spacing_)};
   for (int leaf = 0; leaf < field.tree().num_leaves(); ++leaf) {
     const field::Square& s = field.tree().leaf(leaf).square;
-    if (s.x0 < roi.x1 && s.x1() > roi.x0 && s.y0 < roi.y1 && s.y1() > roi.y0)
+    if (s.x0 <= roi.x1 && s.x1() >= roi.x0 && s.y0 <= roi.y1 && s.y1() >= roi.y0)
       leaves_.push_back(leaf);
   }
 }
@@ -80,8 +79,9 @@ std::vector<FourierPrior::LeafSamples> FourierPrior::leaf_samples(std::int64_t s
 
   std::vector<LeafSamples> all(leaves_.size());
   for (std::size_t l = 0; l < leaves_.size(); ++l) {
-    const field::Square& square = field_.tree().leaf(leaves_[l]).square;
-    const Range x(xs, square.x0, square.x1()), y(ys, square.y0, square.y1());
+    const field::Quadtree::Bounds bounds =
+        field_.tree().bounds(field_.tree().leaf(leaves_[l]).square);
+    const Range x(xs, bounds.x0, bounds.x1), y(ys, bounds.y0, bounds.y1);
     for (std::size_t s = 0; s < zs.size(); ++s) {
       for (std::size_t j = y.begin; j < y.end; ++j) {
         for (std::size_t i = x.begin; i < x.end; ++i)

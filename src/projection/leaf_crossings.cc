@@ -9,15 +9,11 @@ namespace {
 using geometry::HeightRange;
 using Line = geometry::RayBundle::Line;
 
-geometry::Extent2 extent_of(const field::Square& s) {
-  return {static_cast<double>(s.x0), static_cast<double>(s.y0), static_cast<double>(s.x1()),
-          static_cast<double>(s.y1())};
-}
-
 void descend(const field::Quadtree& tree, int index, const Line& line, const HeightRange& heights,
              std::vector<LeafCrossing>& crossings) {
   const field::QuadtreeNode& node = tree.nodes()[static_cast<std::size_t>(index)];
-  const HeightRange inside = clip(line, extent_of(node.square), heights);
+  const field::Quadtree::Bounds b = tree.bounds(node.square);
+  const HeightRange inside = clip(line, {b.x0, b.y0, b.x1, b.y1}, heights);
   if (inside.empty()) return;
   if (node.is_leaf()) {
     crossings.push_back({tree.leaf_of_node(index), inside});

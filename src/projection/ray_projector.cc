@@ -48,18 +48,16 @@ RayPiece RayProjector::sample_positions(const RayBundle& bundle, const RayBundle
   const double length = height * bundle.length_per_z;
   const double diagonal = std::hypot(size, size, field_.thickness());
   const double per_x = (shape.nx - 1) / size, per_y = (shape.ny - 1) / size;
-  const double per_z = (shape.nz - 1) / field_.thickness();
+  const double per_z = (shape.nz - 1) / field::vertex_height(field_.thickness());
   const double low = crossing.heights.low;
 
   RayPiece piece;
   piece.num_samples =
       std::max(1, static_cast<int>(std::ceil(samples_per_diagonal_ * length / diagonal)));
   piece.segment_length = static_cast<float>(length / piece.num_samples);
-  piece.start_x =
-      static_cast<float>((line.x0 + line.x_per_z * low - static_cast<double>(square.x0)) * per_x);
-  piece.start_y =
-      static_cast<float>((line.y0 + line.y_per_z * low - static_cast<double>(square.y0)) * per_y);
-  piece.start_z = static_cast<float>(low * per_z);
+  piece.start_x = static_cast<float>(field_.vertex_x(crossing.leaf, line.x0 + line.x_per_z * low));
+  piece.start_y = static_cast<float>(field_.vertex_y(crossing.leaf, line.y0 + line.y_per_z * low));
+  piece.start_z = static_cast<float>(field_.vertex_z(crossing.leaf, low));
   piece.span_x = static_cast<float>(line.x_per_z * height * per_x);
   piece.span_y = static_cast<float>(line.y_per_z * height * per_y);
   piece.span_z = static_cast<float>(height * per_z);

@@ -39,7 +39,9 @@ SlabSampler::SlabSampler(const field::Field& field, const SampleGrid& grid, std:
       if (std::any_of(taps_z_.begin(), taps_z_.end(), known)) continue;
       TapsZ taps{.segment = s, .num_vertices = shape.nz, .lower = {}, .fraction = {}};
       for (int k = 0; k < segments[s].nz; ++k) {
-        const field::AxisPoint at((k + 0.5) / segments[s].nz * (shape.nz - 1), shape.nz);
+        const double height = (k + 0.5) * segments[s].hz - field::kPixelCentre;
+        const field::AxisPoint at(height / field::vertex_height(field.thickness()) * (shape.nz - 1),
+                                  shape.nz);
         taps.lower.push_back(static_cast<int>(at.lower));
         taps.fraction.push_back(static_cast<float>(at.fraction));
       }
@@ -77,10 +79,10 @@ std::vector<SlabSampler::Piece> SlabSampler::pieces_across(std::int64_t y0, std:
       piece.leaf = leaf;
       piece.segment = s;
       for (int i = 0; i < segment.nx; ++i) {
-        const double x = segment.x0 + (i + 0.5) * segment.hx - static_cast<double>(square.x0);
-        if (x < 0 || x >= static_cast<double>(square.size)) continue;
+        const double x = segment.x0 + (i + 0.5) * segment.hx;
+        if (field_.tree().find_leaf(x, y.front()) != leaf) continue;
         if (piece.lower_x.empty()) piece.first_sample = i;
-        const field::AxisPoint at(x / static_cast<double>(square.size) * (shape.nx - 1), shape.nx);
+        const field::AxisPoint at(field_.vertex_x(leaf, x), shape.nx);
         piece.lower_x.push_back(static_cast<int>(at.lower));
         piece.fraction_x.push_back(static_cast<float>(at.fraction));
       }

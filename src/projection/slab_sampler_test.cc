@@ -132,7 +132,7 @@ TEST_P(EachSampledField, AdjointIsTheDerivative) {
     p = kept;
     return (high - low) / (static_cast<double>(up) - static_cast<double>(down));
   };
-  EXPECT_NEAR(grad_bias, derivative(field->bias), 1e-3);
+  EXPECT_NEAR(grad_bias, derivative(field->bias), 3e-3);
   base::Random random(12);
   for (int n = 0; n < 40; ++n) {
     const int leaf =
@@ -140,7 +140,7 @@ TEST_P(EachSampledField, AdjointIsTheDerivative) {
     const std::size_t at =
         field->offset(leaf) + random.below(field->offset(leaf + 1) - field->offset(leaf));
     EXPECT_NEAR(static_cast<double>(gradient[at]) - static_cast<double>(before[at]),
-                derivative(field->parameters()[at]), 2e-4)
+                derivative(field->parameters()[at]), 6e-4)
         << "leaf " << leaf << " parameter " << at;
   }
   // Leaves that the slab does not meet are left alone.

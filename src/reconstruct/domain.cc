@@ -15,8 +15,12 @@ field::LeafShape leaf_shape(double size, double thickness, double spacing, int r
     return std::max(2, static_cast<int>(std::lround(length / spacing)) + 1);
   };
   const int n = vertices(size);
-  return {
-      .nx = n, .ny = n, .nz = vertices(thickness), .rank_x = rank, .rank_y = rank, .rank_z = rank};
+  return {.nx = n,
+          .ny = n,
+          .nz = vertices(field::vertex_height(thickness)),
+          .rank_x = rank,
+          .rank_y = rank,
+          .rank_z = rank};
 }
 
 // Root cells over a rectangle around the region of interest, which starts on a cell's corner.

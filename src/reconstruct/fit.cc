@@ -15,8 +15,10 @@ namespace {
 // The bias moves every density at once, so it takes smaller steps than a factor.
 constexpr double kBiasRate = 0.02;
 
-// Streams of the seed: one for the starting values, one for each epoch's order.
+// Streams of the seed: one for the starting values, one for each epoch's order, one for
+// each step's differences.
 constexpr std::uint64_t kOrderStream = 1000;
+constexpr std::uint64_t kDirectionStream = std::uint64_t{1} << 40;
 
 // Root mean square noise of the views, in density units times pixels.
 double typical_noise(const std::vector<double>& sigmas) {
@@ -155,9 +157,14 @@ void Fit::take_step(const std::vector<int>& views) {
 
 // The data term of these views and total variation; returns dL/d bias.
 double Fit::add_slab_gradient(const std::vector<int>& views) {
-  const SlabObjective objective(
-      sampler_, projector_, *measurement_.rays, *field_,
-      objective_weights(options_, typical_noise(measurement_.noise_sigma)));
+  ObjectiveWeights weights = objective_weights(options_, typical_noise(measurement_.noise_sigma));
+  // Each step looks at edges from another corner: forward differences alone treat
+  // their two sides differently.
+  base::Random directions(options_.seed,
+                          kDirectionStream + static_cast<std::uint64_t>(progress_.step));
+  weights.backward_x = directions.below(2) == 1;
+  weights.backward_z = directions.below(2) == 1;
+  const SlabObjective objective(sampler_, projector_, *measurement_.rays, *field_, weights);
   const double multiplicity = static_cast<double>(measurement_.geometry.num_views()) /
                               std::max(static_cast<double>(views.size()), 1.0);
   std::vector<BandResult> bands(static_cast<std::size_t>(sampler_.num_bands()));

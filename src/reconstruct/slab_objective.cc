@@ -92,6 +92,8 @@ kernels::SlabVariation SlabObjective::variation_of(std::size_t index) const {
   variation.per_hz = static_cast<float>(1.0 / segment.hz);
   variation.weight = static_cast<float>(weights_.density_variation * segment.hx * segment.hz);
   variation.penalty = weights_.density_penalty;
+  variation.backward_x = weights_.backward_x;
+  variation.backward_z = weights_.backward_z;
   return variation;
 }
 

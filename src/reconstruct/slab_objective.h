@@ -19,6 +19,7 @@ struct ObjectiveWeights {
   double factor_variation = 0.0;
   kernels::VariationPenalty density_penalty;
   kernels::VariationPenalty factor_penalty;
+  bool backward_x = false, backward_z = false;  ///< direction of the density's differences
 };
 
 /// What a pass over a band of slabs found.

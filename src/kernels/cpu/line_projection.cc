@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "kernels/lanes.h"
 
@@ -34,11 +35,13 @@ struct TapTable {
   HWY_ALIGN int index[kTile][kItems];
   HWY_ALIGN float weight0[kTile][kItems], weight1[kTile][kItems];
 
-  // `taps_of(item, t)` gives the taps of destinations t, t + 1, …
+  // `taps_of(item, t)` gives the taps of destinations t, t + 1, … for items [0, count).
   template <typename TapsOf>
-  HWY_INLINE void fill(const TapsOf& taps_of) {
+  HWY_INLINE void fill(int count, const TapsOf& taps_of) {
+    const Taps none{hn::Zero(IntTag()), hn::Zero(Tag()), hn::Zero(Tag())};
     for (int t = 0; t < kTile; t += kVecLanes) {
-      const Taps a = taps_of(0, t), b = taps_of(1, t), c = taps_of(2, t), d = taps_of(3, t);
+      const Taps a = taps_of(0, t), b = count > 1 ? taps_of(1, t) : none;
+      const Taps c = count > 2 ? taps_of(2, t) : none, d = count > 3 ? taps_of(3, t) : none;
       hn::StoreInterleaved4(a.index, b.index, c.index, d.index, IntTag(), index[t]);
       hn::StoreInterleaved4(a.weight0, b.weight0, c.weight0, d.weight0, Tag(), weight0[t]);
       hn::StoreInterleaved4(a.weight1, b.weight1, c.weight1, d.weight1, Tag(), weight1[t]);
@@ -100,25 +103,37 @@ HWY_INLINE Vec iota_from(int first) {
   return hn::Add(hn::Iota(Tag(), 0.0f), hn::Set(Tag(), static_cast<float>(first)));
 }
 
-// Integers below 2^22 in magnitude: adding 1.5 · 2^23 leaves them in the low bits.
-HWY_INLINE IntVec to_int(Vec integral) {
-  const auto bits = hn::BitCast(IntTag(), hn::Add(integral, hn::Set(Tag(), 12582912.0f)));
-  return hn::Sub(bits, hn::Set(IntTag(), 0x4b400000));
+// origin + stride · integer for integers below 2^22 in magnitude, held as floats:
+// adding 1.5 · 2^23 leaves them in the low bits. The constant above them is
+// taken off together with `origin`, modulo 2^32.
+constexpr float kIntegerShift = 12582912.0f;
+HWY_INLINE IntVec index_origin(std::ptrdiff_t origin, std::ptrdiff_t stride) {
+  const auto wrapped = static_cast<std::uint32_t>(origin - stride * 0x4b400000);
+  return hn::Set(IntTag(), static_cast<int>(wrapped));
+}
+HWY_INLINE IntVec integer_bits(Vec integral) {
+  return hn::BitCast(IntTag(), hn::Add(integral, hn::Set(Tag(), kIntegerShift)));
 }
 
-HWY_INLINE Taps no_taps() {
-  const Vec none = hn::Zero(Tag());
-  return {hn::Zero(IntTag()), none, none};
-}
+// A line's numbers in vectors, so that they are made once a tile.
+struct LineVectors {
+  Vec step, offset, weight, first_pixel, last_pixel, low, high;
+  HWY_INLINE explicit LineVectors(const LineCrossing& line)
+      : step(hn::Set(Tag(), line.step)),
+        offset(hn::Set(Tag(), line.offset)),
+        weight(hn::Set(Tag(), line.weight)),
+        first_pixel(hn::Set(Tag(), static_cast<float>(line.first_pixel))),
+        last_pixel(hn::Set(Tag(), static_cast<float>(line.end_pixel - 1))),
+        low(hn::Set(Tag(), line.low)),
+        high(hn::Set(Tag(), line.high)) {}
 
-// Whether this line's pixels weigh anything: those of the window, and within [low, high).
-HWY_INLINE auto sees(const LineCrossing& line, Vec pixel, Vec position) {
-  const Tag d;
-  return hn::And(
-      hn::And(hn::Ge(pixel, hn::Set(d, static_cast<float>(line.first_pixel))),
-              hn::Lt(pixel, hn::Set(d, static_cast<float>(line.end_pixel)))),
-      hn::And(hn::Ge(position, hn::Set(d, line.low)), hn::Lt(position, hn::Set(d, line.high))));
-}
+  HWY_INLINE Vec position(Vec pixel) const { return hn::MulAdd(pixel, step, offset); }
+  // Whether pixels weigh anything: those of the window, and within [low, high).
+  HWY_INLINE auto sees(Vec pixel, Vec at) const {
+    return hn::And(hn::And(hn::Ge(pixel, first_pixel), hn::Le(pixel, last_pixel)),
+                   hn::And(hn::Ge(at, low), hn::Lt(at, high)));
+  }
+};
 
 // Whether all of pixels [first, end) see the line.
 HWY_INLINE bool all_see(const LineCrossing& line, int first, int end) {
@@ -131,43 +146,46 @@ HWY_INLINE bool all_see(const LineCrossing& line, int first, int end) {
          std::max(at_first, at_last) + kRounding < line.high;
 }
 
-// What these pixels take of a line: a sample and the one after it.
-template <bool kAllSee>
-HWY_INLINE Taps forward_taps(const LineCrossing& line, Vec pixel, IntVec origin, IntVec stride) {
-  const Tag d;
-  const Vec position = hn::MulAdd(pixel, hn::Set(d, line.step), hn::Set(d, line.offset));
-  Vec base = hn::Floor(position);
-  const Vec fraction = hn::Sub(position, base);
-  Vec weight = hn::Set(d, line.weight);
-  if (!kAllSee) {
-    const auto seen = sees(line, pixel, position);
-    weight = hn::IfThenElseZero(seen, weight);
-    base = hn::IfThenElseZero(seen, base);  // others may lie anywhere, but sample 0 exists
+// What pixels take of a line: a sample and the one after it.
+struct ForwardItem {
+  LineVectors line;
+  IntVec origin, stride;
+  HWY_INLINE ForwardItem(const LineCrossing& crossing, const float* source, std::ptrdiff_t step)
+      : line(crossing),
+        origin(index_origin(crossing.samples - source, step)),
+        stride(hn::Set(IntTag(), static_cast<int>(step))) {}
+
+  template <bool kAllSee>
+  HWY_INLINE Taps taps(Vec pixel) const {
+    const Vec position = line.position(pixel);
+    Vec base = hn::Floor(position);
+    const Vec fraction = hn::Sub(position, base);
+    Vec weight = line.weight;
+    if (!kAllSee) {
+      const auto seen = line.sees(pixel, position);
+      weight = hn::IfThenElseZero(seen, weight);
+      base = hn::IfThenElseZero(seen, base);  // others may lie anywhere, but sample 0 exists
+    }
+    return {hn::Add(hn::Mul(stride, integer_bits(base)), origin),
+            hn::NegMulAdd(weight, fraction, weight), hn::Mul(weight, fraction)};
   }
-  return {hn::Add(hn::Mul(stride, to_int(base)), origin), hn::NegMulAdd(weight, fraction, weight),
-          hn::Mul(weight, fraction)};
-}
+};
 
 HWY_INLINE void fill_forward(const LineCrossing* lines, int count, const float* source,
                              std::ptrdiff_t stride, int tile, int end, TapTable& table) {
-  const IntTag di;
-  const IntVec floats = hn::Set(di, static_cast<int>(stride));
-  int origin[kItems] = {};
-  bool seen = count == kItems;
-  for (int k = 0; k < count; ++k) {
-    origin[k] = static_cast<int>(lines[k].samples - source);
-    seen = seen && all_see(lines[k], tile, end);
-  }
+  bool seen = true;
+  for (int k = 0; k < count; ++k) seen = seen && all_see(lines[k], tile, end);
+  const int last = count - 1;
+  const ForwardItem items[kItems] = {{lines[0], source, stride},
+                                     {lines[std::min(1, last)], source, stride},
+                                     {lines[std::min(2, last)], source, stride},
+                                     {lines[last], source, stride}};
   if (seen) {
-    table.fill([&](int k, int t) HWY_ATTR {
-      return forward_taps<true>(lines[k], iota_from(tile + t), hn::Set(di, origin[k]), floats);
-    });
+    table.fill(count, [&](int k, int t)
+                          HWY_ATTR { return items[k].template taps<true>(iota_from(tile + t)); });
   } else {
-    table.fill([&](int k, int t) HWY_ATTR {
-      return k < count ? forward_taps<false>(lines[k], iota_from(tile + t), hn::Set(di, origin[k]),
-                                             floats)
-                       : no_taps();
-    });
+    table.fill(count, [&](int k, int t)
+                          HWY_ATTR { return items[k].template taps<false>(iota_from(tile + t)); });
   }
 }
 
@@ -221,54 +239,62 @@ HWY_INLINE bool none_is_cut_off(const LineCrossing& view, int first, int end) {
          is_clear(view.end_pixel);
 }
 
-// What these samples take of a pair of pixels, which is shifted into the window
-// if need be; the pixel past the window's end may be read, with weight 0.
-template <bool kIsOnly>
-HWY_INLINE Taps adjoint_taps(const PixelPair& item, Vec sample, IntVec origin) {
-  const Tag d;
-  const LineCrossing& view = *item.view;
-  const Vec one = hn::Set(d, 1.0f);
-  const Vec step = hn::Set(d, view.step);
-  const Vec offset = hn::Set(d, view.offset);
-  const Vec inverse = hn::Set(d, 1.0f / view.step);
-  const Vec reach = hn::Set(d, std::abs(1.0f / view.step));
-  const Vec centre = hn::Mul(hn::Sub(sample, offset), inverse);
-  const Vec pair =
-      hn::Add(hn::Floor(hn::Sub(centre, reach)), hn::Set(d, static_cast<float>(2 * item.pair + 1)));
-  const Vec pixel = hn::Min(hn::Max(pair, hn::Set(d, static_cast<float>(view.first_pixel))),
-                            hn::Set(d, static_cast<float>(view.end_pixel - 1)));
-  const auto weight_of = [&](Vec at) HWY_ATTR {
-    const Vec position = hn::MulAdd(at, step, offset);
-    const Vec hat = hn::Max(hn::Zero(d), hn::Sub(one, hn::Abs(hn::Sub(position, sample))));
-    const Vec weight = hn::Mul(hn::Set(d, view.weight), hat);
-    if (kIsOnly) return weight;
-    const Vec from_pair = hn::Sub(at, pair);
-    const auto is_ours = hn::And(hn::Ge(from_pair, hn::Zero(d)), hn::Le(from_pair, one));
-    return hn::IfThenElseZero(hn::And(is_ours, sees(view, at, position)), weight);
-  };
-  static_assert(kLanes == 16);
-  return {hn::Add(hn::ShiftLeft<4>(to_int(pixel)), origin), weight_of(pixel),
-          weight_of(hn::Add(pixel, one))};
-}
-
-HWY_INLINE void fill_adjoint(const PixelPair* items, int count, const float* source, int tile,
-                             TapTable& table) {
-  const IntTag di;
-  int origin[kItems] = {};
-  bool all_only = count == kItems;
-  for (int k = 0; k < count; ++k) {
-    origin[k] = static_cast<int>(items[k].view->detector - source);
-    all_only = all_only && items[k].is_only;
+// What samples take of a pair of pixels, which is shifted into the window if
+// need be; the pixel past the window's end may be read, with weight 0.
+struct AdjointItem {
+  LineVectors line;
+  // The pair starts at floor(inverse · sample + bias) + skipped: the same floor for all pairs.
+  Vec inverse, bias, skipped;
+  IntVec origin;
+  HWY_INLINE AdjointItem(const PixelPair& item, const float* source)
+      : line(*item.view), origin(index_origin(item.view->detector - source, kLanes)) {
+    const float per_step = 1.0f / item.view->step;
+    inverse = hn::Set(Tag(), per_step);
+    bias = hn::Set(Tag(), -item.view->offset * per_step - std::abs(per_step));
+    skipped = hn::Set(Tag(), static_cast<float>(2 * item.pair + 1));
   }
-  if (all_only) {
-    table.fill([&](int k, int t) HWY_ATTR {
-      return adjoint_taps<true>(items[k], iota_from(tile + t), hn::Set(di, origin[k]));
-    });
+
+  HWY_INLINE Vec hat(Vec pixel, Vec sample) const {
+    const Vec distance = hn::Abs(hn::Sub(line.position(pixel), sample));
+    return hn::Max(hn::Zero(Tag()), hn::NegMulAdd(line.weight, distance, line.weight));
+  }
+
+  template <bool kIsOnly>
+  HWY_INLINE Taps taps(Vec sample) const {
+    static_assert(kLanes == 16);
+    const Vec one = hn::Set(Tag(), 1.0f);
+    const Vec pair = hn::Add(hn::Floor(hn::MulAdd(sample, inverse, bias)), skipped);
+    const Vec pixel = hn::Min(hn::Max(pair, line.first_pixel), line.last_pixel);
+    const Vec next = hn::Add(pixel, one);
+    Taps taps{hn::Add(hn::ShiftLeft<4>(integer_bits(pixel)), origin), hat(pixel, sample),
+              hat(next, sample)};
+    if (kIsOnly) return taps;
+    const auto counts = [&](Vec at) HWY_ATTR {
+      const Vec from_pair = hn::Sub(at, pair);
+      const auto is_ours = hn::And(hn::Ge(from_pair, hn::Zero(Tag())), hn::Le(from_pair, one));
+      return hn::And(is_ours, line.sees(at, line.position(at)));
+    };
+    taps.weight0 = hn::IfThenElseZero(counts(pixel), taps.weight0);
+    taps.weight1 = hn::IfThenElseZero(counts(next), taps.weight1);
+    return taps;
+  }
+};
+
+HWY_INLINE void fill_adjoint(const PixelPair* pairs, int count, const float* source, int tile,
+                             TapTable& table) {
+  bool only = true;
+  for (int k = 0; k < count; ++k) only = only && pairs[k].is_only;
+  const int last = count - 1;
+  const AdjointItem items[kItems] = {{pairs[0], source},
+                                     {pairs[std::min(1, last)], source},
+                                     {pairs[std::min(2, last)], source},
+                                     {pairs[last], source}};
+  if (only) {
+    table.fill(count, [&](int k, int t)
+                          HWY_ATTR { return items[k].template taps<true>(iota_from(tile + t)); });
   } else {
-    table.fill([&](int k, int t) HWY_ATTR {
-      return k < count ? adjoint_taps<false>(items[k], iota_from(tile + t), hn::Set(di, origin[k]))
-                       : no_taps();
-    });
+    table.fill(count, [&](int k, int t)
+                          HWY_ATTR { return items[k].template taps<false>(iota_from(tile + t)); });
   }
 }
 

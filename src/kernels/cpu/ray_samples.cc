@@ -20,6 +20,8 @@ struct Taps {
 // The lower vertex of positions along an axis, and the rest.
 HWY_INLINE Ints split(Vec& position, int num_vertices) {
   const IntTag di;
+  const Vec last = hn::Set(Tag(), static_cast<float>(num_vertices - 1));
+  position = hn::Min(hn::Max(position, hn::Zero(Tag())), last);
   const Ints lower =
       hn::Min(hn::Max(hn::ConvertTo(di, position), hn::Zero(di)), hn::Set(di, num_vertices - 2));
   position = hn::Sub(position, hn::ConvertTo(Tag(), lower));

@@ -145,15 +145,15 @@ HWY_INLINE void add_row(const SlabVariation& s, const RowMasks& masks, const Lan
                         Penalty<kConcave>& penalty, int z, int first, int end, float* flux_x,
                         float* flux_z) {
   const Tag d;
-  const std::ptrdiff_t up = z + 1 < s.nz ? s.stride_z : 0;
+  const SampleOrder order(s);
+  const std::ptrdiff_t up = z + 1 < s.nz ? order.step_z : 0;
   const Vec per_hx2 = hn::Set(d, s.per_hx * s.per_hx), per_hz2 = hn::Set(d, s.per_hz * s.per_hz);
   Vec from_left[kVecs];
   for (int v = 0; v < kVecs; ++v) from_left[v] = hn::Load(d, flux_x + v * kVecLanes);
   for (int x = first; x < end; ++x, flux_z += kLanes) {
-    const std::ptrdiff_t offset = z * s.stride_z + static_cast<std::ptrdiff_t>(x) * kLanes;
+    const std::ptrdiff_t offset = order.sample(x, z), at = order.row_sample(x, z);
     const float* const sample = s.samples + offset;
-    const float* const right = sample + (x + 1 < s.nx ? kLanes : 0);
-    const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(x) * s.nz + z;
+    const float* const right = sample + (x + 1 < s.nx ? order.step_x : 0);
     const float above = s.above != nullptr ? s.above[at] : 0.0f;
     Vec flux_y[kVecs], sum[kVecs];
     for (int v = 0; v < kVecs; ++v) {
@@ -231,13 +231,14 @@ double slab_variation(const SlabVariation& slab) {
 
 void row_flux(const SlabVariation& s, const float* row, const float* next, float* flux) {
   const float tau = s.penalty.concavity;
+  const SampleOrder order(s);
   for (int x = 0; x < s.nx; ++x) {
-    const std::ptrdiff_t right = x + 1 < s.nx ? s.nz : 0;
+    const std::ptrdiff_t right = x + 1 < s.nx ? order.row_step_x : 0;
     for (int z = 0; z < s.nz; ++z) {
-      const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(x) * s.nz + z;
+      const std::ptrdiff_t at = order.row_sample(x, z);
       const float f = row[at];
       const float dx = s.per_hx * (row[at + right] - f);
-      const float dz = s.per_hz * (row[at + (z + 1 < s.nz ? 1 : 0)] - f);
+      const float dz = s.per_hz * (row[at + (z + 1 < s.nz ? order.row_step_z : 0)] - f);
       const float dy = next[at] - f;
       const float m =
           std::sqrt(dx * dx + dy * dy + dz * dz + s.penalty.epsilon * s.penalty.epsilon);

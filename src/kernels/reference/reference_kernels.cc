@@ -138,14 +138,15 @@ double volume_variation(const VolumeVariation& s, const double* volume, double* 
   const auto at = [&](int x, int y, int z) {
     return (static_cast<std::ptrdiff_t>(z) * s.nx + x) * s.ny + y;
   };
+  const int step_x = s.backward_x ? -1 : 1, step_z = s.backward_z ? -1 : 1;
   double value = 0.0;
   for (int z = 0; z < s.nz; ++z) {
     for (int x = 0; x < s.nx; ++x) {
       for (int y = 0; y < s.ny; ++y) {
         const auto here = at(x, y, z);
-        const auto right = at(std::min(x + 1, s.nx - 1), y, z);
+        const auto right = at(std::clamp(x + step_x, 0, s.nx - 1), y, z);
         const auto behind = at(x, std::min(y + 1, s.ny - 1), z);
-        const auto up = at(x, y, std::min(z + 1, s.nz - 1));
+        const auto up = at(x, y, std::clamp(z + step_z, 0, s.nz - 1));
         const double dx = s.per_hx * (volume[right] - volume[here]);
         const double dy = volume[behind] - volume[here];
         const double dz = s.per_hz * (volume[up] - volume[here]);
@@ -168,11 +169,11 @@ namespace {
 template <typename Visit>
 void for_each_vertex(const LeafVertices& leaf, const RayPiece& p, int index, Visit&& visit) {
   const double t = (index + static_cast<double>(random_unit(p.key, index))) / p.num_samples;
-  const auto at = [t](float start, float span) {
-    return static_cast<double>(start) + t * static_cast<double>(span);
+  const auto at = [t](float start, float span, int n) {
+    return std::clamp(static_cast<double>(start) + t * static_cast<double>(span), 0.0, n - 1.0);
   };
-  const double x = at(p.start_x, p.span_x), y = at(p.start_y, p.span_y),
-               z = at(p.start_z, p.span_z);
+  const double x = at(p.start_x, p.span_x, leaf.nx), y = at(p.start_y, p.span_y, leaf.ny),
+               z = at(p.start_z, p.span_z, leaf.nz);
   for (int i = 0; i < leaf.nx; ++i) {
     for (int k = 0; k < leaf.nz; ++k) {
       for (int j = 0; j < leaf.ny; ++j) {

@@ -51,6 +51,7 @@ struct VolumeVariation {
   int nx = 0, ny = 0, nz = 0;
   double per_hx = 1.0, per_hz = 1.0, weight = 0.0;
   VariationPenalty penalty;
+  bool backward_x = false, backward_z = false;
 };
 
 /// weight · Σ φ(√(|∇f|² + ε²)) over all voxels, forward differences that are
