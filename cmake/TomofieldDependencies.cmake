@@ -10,10 +10,13 @@ find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(tomlplusplus REQUIRED)
+find_package(Eigen3 3.3 REQUIRED NO_MODULE)
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(CBC REQUIRED IMPORTED_TARGET cbc)
 
 set(TOMOFIELD_LIBRARIES
   OpenMP::OpenMP_CXX Threads::Threads hwy::hwy HDF5::HDF5 PNG::PNG kissfft::kissfft-float fmt::fmt
-  nlohmann_json::nlohmann_json)
+  nlohmann_json::nlohmann_json $<BUILD_INTERFACE:Eigen3::Eigen> PkgConfig::CBC)
 set(TOMOFIELD_CLI_LIBRARIES CLI11::CLI11 tomlplusplus::tomlplusplus)
 
 add_library(tomofield_warnings INTERFACE)

@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/parallel.h"
 #include "field/grid_field.h"
+#include "field/merge_target.h"
 #include "field/resample.h"
 #include "field/vm_field.h"
 #include "tomofield/error.h"
@@ -124,38 +126,54 @@ double Field::density(double x, double y, double z) const {
   return static_cast<double>(density);
 }
 
-void Field::split_leaf(int leaf) {
-  const int node = tree_.leaves()[static_cast<std::size_t>(leaf)];
-  const LeafShape parent_shape = shape(leaf);
-  const std::vector<int> old_leaves = tree_.leaves();
-  const std::vector<LeafShape> old_shapes = shapes_;
-  const std::vector<std::size_t> old_offsets = offsets_;
-  const base::AlignedBuffer<float> old_parameters = std::move(parameters_);
+// From an array of this field to one leaf of the edited one.
+void Field::carry_leaf(const LeafOrigin& origin, const float* from, float* to) const {
+  const LeafShape& s = shape(origin.leaf);
+  const float* leaf = from + offset(origin.leaf);
+  switch (origin.kind) {
+    case LeafOrigin::Kind::kSame:
+      std::copy_n(leaf, parameter_count(s), to);
+      break;
+    case LeafOrigin::Kind::kQuarter:
+      sample_quarter(s, leaf, 0.5 * (origin.quarter & 1), 0.5 * (origin.quarter >> 1), to);
+      break;
+    case LeafOrigin::Kind::kUnion:
+      join_leaves(s,
+                  {leaf, from + offset(origin.leaf + 1), from + offset(origin.leaf + 2),
+                   from + offset(origin.leaf + 3)},
+                  to);
+      break;
+  }
+}
 
-  tree_.split(leaf);
-  const auto old_leaf = [&](int n) {
-    return static_cast<std::size_t>(std::find(old_leaves.begin(), old_leaves.end(), n) -
-                                    old_leaves.begin());
-  };
-  shapes_.clear();
-  for (const int n : tree_.leaves()) {
-    const bool is_child = tree_.nodes()[static_cast<std::size_t>(n)].parent == node;
-    shapes_.push_back(is_child ? parent_shape : old_shapes[old_leaf(n)]);
+std::vector<LeafOrigin> Field::edit(const QuadtreeEdit& edit,
+                                    const std::vector<base::AlignedBuffer<float>*>& moments) {
+  EditedTree edited = edit_tree(tree_, edit);
+  std::vector<LeafShape> shapes;
+  for (const LeafOrigin& origin : edited.origins) {
+    shapes.push_back(shape(origin.leaf));
+    for (int c = 1; c < 4 && origin.kind == LeafOrigin::Kind::kUnion; ++c)
+      TOMOFIELD_CHECK(shape(origin.leaf + c) == shapes.back(), "merged leaves have one shape");
   }
-  allocate();
-  for (int i = 0; i < tree_.num_leaves(); ++i) {
-    const int n = tree_.leaves()[static_cast<std::size_t>(i)];
-    float* to = parameters_.data() + offset(i);
-    if (tree_.leaf(i).parent == node) {
-      const int quarter = n - tree_.nodes()[static_cast<std::size_t>(node)].first_child;
-      sample_quarter(parent_shape,
-                     old_parameters.data() + old_offsets[static_cast<std::size_t>(leaf)],
-                     0.5 * (quarter & 1), 0.5 * (quarter >> 1), to);
-    } else {
-      const std::size_t from = old_offsets[old_leaf(n)];
-      std::copy_n(old_parameters.data() + from, parameter_count(shape(i)), to);
-    }
-  }
+  const auto after = make_field(kind(), std::move(edited.tree), thickness_, std::move(shapes));
+  std::vector<base::AlignedBuffer<float>> carried;
+  for (std::size_t i = 0; i < moments.size(); ++i) carried.emplace_back(after->num_parameters());
+  base::parallel_for(after->tree().num_leaves(), [&](std::int64_t i) {
+    const LeafOrigin& origin = edited.origins[static_cast<std::size_t>(i)];
+    const std::size_t at = after->offset(static_cast<int>(i));
+    float* parameters = after->parameters_.data() + at;
+    carry_leaf(origin, parameters_.data(), parameters);
+    if (origin.kind == LeafOrigin::Kind::kUnion)
+      fit_merged(shape(origin.leaf), make_merge_target(*this, origin.leaf), parameters);
+    for (std::size_t k = 0; k < moments.size(); ++k)
+      carry_leaf(origin, moments[k]->data(), carried[k].data() + at);
+  });
+  for (std::size_t k = 0; k < moments.size(); ++k) *moments[k] = std::move(carried[k]);
+  tree_ = std::move(after->tree_);
+  shapes_ = std::move(after->shapes_);
+  offsets_ = std::move(after->offsets_);
+  parameters_ = std::move(after->parameters_);
+  return std::move(edited.origins);
 }
 
 double vertex_height(double thickness) { return std::max(1.0, thickness - 1.0); }

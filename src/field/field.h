@@ -10,7 +10,9 @@
 
 #include "base/aligned_buffer.h"
 #include "base/random.h"
+#include "field/join_quarters.h"
 #include "field/quadtree.h"
+#include "field/quadtree_edit.h"
 #include "kernels/lanes.h"
 #include "kernels/leaf_decoding.h"
 #include "kernels/total_variation.h"
@@ -45,6 +47,7 @@ struct PointTaps {
   kernels::AxisTaps x, y, z;
   int count() const { return x.count; }
 };
+struct MergeTarget;
 
 /// A density field over a quadtree: vertex values a leaf at a time, and the
 /// gradient back to the parameters. Everything above this folder sees a field
@@ -109,8 +112,13 @@ class Field {
   /// Starting values: every density close to act(bias).
   virtual void initialise(base::Random random, double scale) = 0;
 
-  /// Replaces a leaf by four that hold the same field to rounding.
-  void split_leaf(int leaf);
+  /// Changes the tree, and with it the leaves' numbers and parameters. Every leaf keeps
+  /// its vertex counts, so that a leaf half as wide is twice as fine (DESIGN §1). A
+  /// split leaves the field as it is to rounding; a merge is the least-squares fit
+  /// to the vertex values of the four. `moments` go with the parameters, one value
+  /// each, and are carried along by maps of positive weights. Returns what each leaf was.
+  std::vector<LeafOrigin> edit(const QuadtreeEdit& edit,
+                               const std::vector<base::AlignedBuffer<float>*>& moments = {});
 
  protected:
   virtual std::size_t parameter_count(const LeafShape& shape) const = 0;
@@ -123,6 +131,11 @@ class Field {
   /// Parameters of the quarter [x0, x0 + ½] × [y0, y0 + ½] (fractions of the leaf) of a leaf.
   virtual void sample_quarter(const LeafShape& shape, const float* leaf, double x0, double y0,
                               float* quarter) const = 0;
+  /// join_quarters() of every factor.
+  virtual void join_leaves(const LeafShape& shape, const Quarters& leaves, float* joined) const = 0;
+  /// Least-squares parameters of a merged leaf; `parameters` hold where to start.
+  virtual void fit_merged(const LeafShape& shape, const MergeTarget& target,
+                          float* parameters) const = 0;
 
   const float* leaf_parameters(int leaf) const { return parameters_.data() + offset(leaf); }
   /// Fixes the parameter layout; derived constructors call it.
@@ -130,6 +143,7 @@ class Field {
 
  private:
   PointTaps point_taps(int leaf, const Points& points) const;
+  void carry_leaf(const LeafOrigin& origin, const float* from, float* to) const;
 
   Quadtree tree_;
   double thickness_;

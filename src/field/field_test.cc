@@ -371,7 +371,7 @@ TEST_P(EachField, SplittingLeavesTheFieldAsItIs) {
     }
     // Leaves of 64, 32 and 16 px beside each other; before and after the split ones.
     for (const int leaf : {1, 0, 2, 7}) {
-      field->split_leaf(leaf);
+      field->edit({.split = {leaf}, .merge = {}});
       for (const Sample& s : samples) ASSERT_NEAR(field->density(s.x, s.y, s.z), s.density, 3e-6);
     }
     EXPECT_EQ(field->tree().num_leaves(), 14);

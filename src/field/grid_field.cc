@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "field/merge_target.h"
 #include "field/resample.h"
 #include "field/variation_planes.h"
 #include "kernels/small_gemm.h"
@@ -132,6 +133,22 @@ void GridField::sample_quarter(const LeafShape& s, const float* leaf, double x0,
   std::vector<float> along_x(parameter_count(s));
   halve_axis(leaf, 1, s.nx, s.nz * s.ny, x0 * (s.nx - 1), along_x.data());
   halve_axis(along_x.data(), s.nx * s.nz, s.ny, 1, y0 * (s.ny - 1), quarter);
+}
+
+void GridField::join_leaves(const LeafShape& s, const Quarters& leaves, float* joined) const {
+  join_quarters(leaves, {.x = s.nx, .middle = s.nz, .y = s.ny}, joined);
+}
+
+// a = Lx⁻ᵀ B Ly⁻¹
+void GridField::fit_merged(const LeafShape& s, const MergeTarget& target, float* parameters) const {
+  RowMajorMatrix a = target.b;
+  target.chol_x.transpose().triangularView<Eigen::Upper>().solveInPlace(a);
+  const Eigen::Map<const RowMajorMatrix> columns(a.data(), a.rows() * s.nz, s.ny);
+  const RowMajorMatrix solved = target.chol_y.transpose()
+                                    .triangularView<Eigen::Upper>()
+                                    .solve(columns.transpose())
+                                    .transpose();
+  std::copy_n(solved.data(), solved.size(), parameters);
 }
 
 }  // namespace tomofield::field

@@ -13,15 +13,11 @@
 #include "tomofield/error.h"
 
 namespace tomofield::field {
-namespace {
 
-// Quarter c of a square, x fastest.
-Square quarter(const Square& square, int c) {
+Square quarter_of(const Square& square, int quarter) {
   const std::int64_t half = square.size / 2;
-  return {square.x0 + (c & 1) * half, square.y0 + (c >> 1) * half, half};
+  return {square.x0 + (quarter & 1) * half, square.y0 + (quarter >> 1) * half, half};
 }
-
-}  // namespace
 
 Quadtree::Quadtree(const RootGrid& roots, const std::vector<Region>& region_of) : roots_(roots) {
   TOMOFIELD_CHECK(roots.cell_size > 0 && roots.cell_size % kernels::kLanes == 0,
@@ -73,7 +69,7 @@ Quadtree::Quadtree(const RootGrid& roots, std::vector<QuadtreeNode> nodes)
     for (int c = 0; c < 4; ++c) {
       const QuadtreeNode& child = nodes_[static_cast<std::size_t>(node.first_child + c)];
       require(child.parent == n && child.level == node.level + 1 && child.region == node.region &&
-                  child.square == quarter(node.square, c),
+                  child.square == quarter_of(node.square, c),
               "a child is not a quarter of its parent");
     }
   }
@@ -88,7 +84,7 @@ void Quadtree::add_children(int index) {
   nodes_[static_cast<std::size_t>(index)].first_child = static_cast<int>(nodes_.size());
   for (int c = 0; c < 4; ++c) {
     QuadtreeNode child = parent;
-    child.square = quarter(parent.square, c);
+    child.square = quarter_of(parent.square, c);
     child.level = parent.level + 1;
     child.parent = index;
     child.first_child = -1;

@@ -25,6 +25,9 @@ struct Square {
   bool operator==(const Square&) const = default;
 };
 
+/// Quarter 0 … 3 of a square, x fastest.
+Square quarter_of(const Square& square, int quarter);
+
 struct QuadtreeNode {
   Square square;
   Region region = Region::kInterest;
