@@ -2,8 +2,10 @@
 
 #include <fmt/core.h>
 
+#include "field/model_file.h"
 #include "report/mask_picture.h"
 #include "report/slices.h"
+#include "report/tree_picture.h"
 
 namespace tomofield::cli {
 
@@ -16,6 +18,11 @@ void write_pictures(const std::filesystem::path& volume, const tilt_series::Tilt
   const std::filesystem::path mask = prefix.string() + "_mask.png";
   report::write_mask_picture(series, mask);
   fmt::print(" {}\n", mask.string());
+}
+
+void write_tree_picture(const std::filesystem::path& model, const std::filesystem::path& picture) {
+  report::write_tree_picture(field::load_model(model), picture);
+  fmt::print("tree      {}\n", picture.string());
 }
 
 }  // namespace tomofield::cli

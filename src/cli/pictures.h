@@ -11,4 +11,7 @@ namespace tomofield::cli {
 void write_pictures(const std::filesystem::path& volume, const tilt_series::TiltSeries& series,
                     const std::filesystem::path& prefix);
 
+/// A picture of a model's leaves (report/tree_picture.h); prints where it is.
+void write_tree_picture(const std::filesystem::path& model, const std::filesystem::path& picture);
+
 }  // namespace tomofield::cli

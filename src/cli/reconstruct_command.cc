@@ -40,7 +40,20 @@ void add_field_options(CLI::App& command, reconstruct::FieldOptions& field) {
                   "side of a leaf in binned pixels, a multiple of 16")
       ->capture_default_str()
       ->group(group);
-  command.add_option("--vertex-spacing", field.vertex_spacing, "pixels between vertices")
+  command
+      .add_option("--tree", field.tree,
+                  "uniform: all leaves alike; adaptive: finer where the density varies more")
+      ->check(CLI::IsMember({"uniform", "adaptive"}))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--leaf-budget", field.leaf_budget,
+                  "most leaves of an adaptive tree; 0: as many as a uniform one has")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--vertex-spacing", field.vertex_spacing,
+                  "pixels between vertices, in leaves of --leaf-size")
       ->capture_default_str()
       ->group(group);
   command.add_option("--rank", field.rank, "components of each mode (vm)")
@@ -192,6 +205,7 @@ void run(Arguments& arguments) {
   }
   print_files(paths);
   write_pictures(paths.volume, series, paths.picture_prefix);
+  if (options.field.tree == "adaptive") write_tree_picture(paths.model, paths.tree_picture);
 }
 
 }  // namespace

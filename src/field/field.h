@@ -47,6 +47,7 @@ struct PointTaps {
   kernels::AxisTaps x, y, z;
   int count() const { return x.count; }
 };
+
 struct MergeTarget;
 
 /// A density field over a quadtree: vertex values a leaf at a time, and the

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
 
 #include "tomofield/error.h"
 
@@ -37,6 +38,39 @@ std::vector<loss::ViewModel> unflatten_views(const std::vector<double>& flat) {
   for (std::size_t i = 0; i + 3 <= flat.size(); i += 3)
     views.push_back({flat[i], flat[i + 1], flat[i + 2]});
   return views;
+}
+
+// Whether it is frozen; then four numbers an update, the last that of the levels, and its levels.
+void store(const TreeProgress& tree, field::TrainingState& state) {
+  auto& numbers = state.integers["tree_updates"];
+  auto& errors = state.doubles["tree_errors"];
+  numbers.push_back(tree.is_frozen ? 1 : 0);
+  for (const TreeUpdate& u : tree.updates) {
+    numbers.insert(numbers.end(), {u.epoch, u.splits, u.merges,
+                                   static_cast<std::int64_t>(u.leaves_by_level.size())});
+    numbers.insert(numbers.end(), u.leaves_by_level.begin(), u.leaves_by_level.end());
+    errors.insert(errors.end(), {u.error, u.predicted_error});
+  }
+}
+
+TreeProgress unflatten_tree(const std::vector<std::int64_t>& numbers,
+                            const std::vector<double>& errors) {
+  TreeProgress tree;
+  tree.is_frozen = numbers.at(0) != 0;
+  for (std::size_t i = 1, e = 0; i < numbers.size(); e += 2) {
+    const std::size_t num_levels = static_cast<std::size_t>(numbers.at(i + 3));
+    TreeUpdate update{.epoch = numbers.at(i),
+                      .splits = numbers.at(i + 1),
+                      .merges = numbers.at(i + 2),
+                      .error = errors.at(e),
+                      .predicted_error = errors.at(e + 1),
+                      .leaves_by_level = {}};
+    for (std::size_t level = 0; level < num_levels; ++level)
+      update.leaves_by_level.push_back(numbers.at(i + 4 + level));
+    i += 4 + num_levels;
+    tree.updates.push_back(std::move(update));
+  }
+  return tree;
 }
 
 std::vector<std::int64_t> as_numbers(const std::string& text) { return {text.begin(), text.end()}; }
@@ -93,6 +127,7 @@ field::TrainingState progress_state(const Fit& fit, const std::string& fingerpri
   state.doubles["views"] = flatten(progress.views);
   state.doubles["epoch_sums"] = flatten(progress.epoch_sums);
   state.doubles["data_loss"] = progress.data_loss;
+  store(progress.tree, state);
   return state;
 }
 
@@ -107,21 +142,22 @@ void save_checkpoint(const std::filesystem::path& path, const Fit& fit,
 }
 
 void restore_state(const std::string& path, const std::string& fingerprint,
-                   const field::Field& stored, const field::TrainingState& state, Fit& fit) {
+                   std::unique_ptr<field::Field> stored, const field::TrainingState& state,
+                   Fit& fit) {
   const std::string found = as_text(entry(state.integers, "fingerprint", path));
-  if (found != fingerprint || stored.num_parameters() != fit.field().num_parameters()) {
+  if (found != fingerprint) {
     throw Error(
         fmt::format("'{}' was made from another series or with other options (these differ: {})",
                     path, differences(found, fingerprint)));
   }
-  std::copy(stored.parameters().begin(), stored.parameters().end(),
-            fit.field().parameters().begin());
-  fit.field().bias = stored.bias;
+  fit.set_field(std::move(stored));
   Progress& progress = fit.progress();
   progress.step = entry(state.integers, "step", path).at(0);
   progress.views = unflatten_views(entry(state.doubles, "views", path));
   progress.epoch_sums = unflatten_sums(entry(state.doubles, "epoch_sums", path));
   progress.data_loss = entry(state.doubles, "data_loss", path);
+  progress.tree = unflatten_tree(entry(state.integers, "tree_updates", path),
+                                 entry(state.doubles, "tree_errors", path));
   if (progress.step == fit.num_steps()) return;
   optimize::Adam::State& adam = fit.optimizer().state();
   copy_moments(entry(state.floats, "adam_m", path), path, adam.m);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "field/model_file.h"
@@ -20,6 +21,7 @@ void save_checkpoint(const std::filesystem::path& path, const Fit& fit,
 /// Error naming `path` if they belong to another series or other options, and
 /// what differs. A fingerprint is a JSON text.
 void restore_state(const std::string& path, const std::string& fingerprint,
-                   const field::Field& stored, const field::TrainingState& state, Fit& fit);
+                   std::unique_ptr<field::Field> stored, const field::TrainingState& state,
+                   Fit& fit);
 
 }  // namespace tomofield::reconstruct

@@ -10,14 +10,15 @@ namespace {
 
 constexpr int kDepth = 1;  // of the uniform tree: margin leaves are root cells
 
-field::LeafShape leaf_shape(double size, double thickness, double spacing, int rank) {
-  const auto vertices = [spacing](double length) {
-    return std::max(2, static_cast<int>(std::lround(length / spacing)) + 1);
+field::LeafShape leaf_shape(double size, double thickness, double spacing, double spacing_z,
+                            int rank) {
+  const auto vertices = [](double length, double step) {
+    return std::max(2, static_cast<int>(std::lround(length / step)) + 1);
   };
-  const int n = vertices(size);
+  const int n = vertices(size, spacing);
   return {.nx = n,
           .ny = n,
-          .nz = vertices(field::vertex_height(thickness)),
+          .nz = vertices(field::vertex_height(thickness), spacing_z),
           .rank_x = rank,
           .rank_y = rank,
           .rank_z = rank};
@@ -73,10 +74,13 @@ Domain cover(double thickness, const geometry::Roi& roi, geometry::Extent2 reach
   field::Quadtree tree(roots, regions);
   tree.split_to_level(field::Region::kInterest, kDepth);
   std::vector<field::LeafShape> shapes;
+  // Along z all leaves are as fine as the finest ones are in the plane.
+  const double spacing_z = options.vertex_spacing / (options.tree == "adaptive" ? 2 : 1);
   for (int leaf = 0; leaf < tree.num_leaves(); ++leaf) {
     const bool inside = tree.leaf(leaf).region == field::Region::kInterest;
     shapes.push_back(leaf_shape(static_cast<double>(tree.leaf(leaf).square.size), thickness,
                                 inside ? options.vertex_spacing : options.margin_spacing,
+                                inside ? spacing_z : options.margin_spacing,
                                 inside ? options.rank : options.margin_rank));
   }
   return {.roi = roi,

@@ -7,6 +7,7 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
+#include "kernels/lanes.h"
 #include "reconstruct/slab_objective.h"
 
 namespace tomofield::reconstruct {
@@ -78,6 +79,19 @@ Domain domain_of(const Measurement& measurement, const FieldOptions& options) {
                                   : make_domain(measurement.geometry, measurement.roi, options);
 }
 
+// The structure is open for this part of the epochs.
+constexpr double kOpenPart = 0.4;
+
+TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
+                              const FitOptions& options) {
+  if (field.tree == "uniform") return {};
+  const auto levels = leaves_by_level(domain.tree);
+  const auto num_leaves = std::accumulate(levels.begin(), levels.end(), std::int64_t{0});
+  return {std::max(field.leaf_size / 2, static_cast<int>(kernels::kLanes)),
+          field.leaf_budget > 0 ? field.leaf_budget : static_cast<int>(num_leaves),
+          static_cast<std::int64_t>(kOpenPart * options.epochs), options.seed};
+}
+
 }  // namespace
 
 Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
@@ -88,24 +102,36 @@ Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
       field_(make_initial_field(domain_, measurement.geometry.thickness, measurement.mean_density,
                                 field_options, options.seed)),
       optimizer_(*field_, optimize::AdamOptions{}),
-      gradient_(field_->num_parameters()),
       projector_(measurement.geometry, domain_.grid),
-      sampler_(*field_, domain_.grid, domain_.first_row, domain_.num_rows),
-      boundary_(*field_, leaves_of_bands(sampler_),
-                boundary_options(options_, typical_noise(measurement.noise_sigma))),
-      fourier_(*field_, measurement.roi,
-               fourier_options(options_, typical_noise(measurement.noise_sigma))) {
-  if (measurement.ray_geometry) {
-    ray_term_ = std::make_unique<RayTerm>(*measurement.ray_geometry, *measurement.rays, *field_,
-                                          domain_, options_);
-  }
+      tree_updates_(make_tree_updates(field_options, domain_, options)) {
   for (const double sigma : measurement.noise_sigma)
     progress_.views.push_back({1.0, 0.0, 1.0 / (sigma * sigma)});
   progress_.epoch_sums.resize(progress_.views.size());
-  for (int band = 0; band < sampler_.num_bands(); ++band) {
-    const auto leaves = sampler_.leaves_of_band(band);
+  follow_tree();
+}
+
+// What is made for one tree.
+void Fit::follow_tree() {
+  gradient_.reset(field_->num_parameters());
+  sampler_.emplace(*field_, domain_.grid, domain_.first_row, domain_.num_rows);
+  const double noise = typical_noise(measurement_.noise_sigma);
+  boundary_.emplace(*field_, leaves_of_bands(*sampler_), boundary_options(options_, noise));
+  fourier_.emplace(*field_, measurement_.roi, fourier_options(options_, noise));
+  if (measurement_.ray_geometry) {
+    ray_term_ = std::make_unique<RayTerm>(*measurement_.ray_geometry, *measurement_.rays, *field_,
+                                          domain_, options_);
+  }
+  touched_leaves_.clear();
+  for (int band = 0; band < sampler_->num_bands(); ++band) {
+    const auto leaves = sampler_->leaves_of_band(band);
     touched_leaves_.insert(touched_leaves_.end(), leaves.begin(), leaves.end());
   }
+}
+
+void Fit::set_field(std::unique_ptr<field::Field> field) {
+  field_ = std::move(field);
+  optimizer_ = optimize::Adam(*field_, optimize::AdamOptions{});
+  follow_tree();
 }
 
 int Fit::steps_per_epoch() const {
@@ -148,7 +174,7 @@ double Fit::learning_rate(std::int64_t step) const {
 void Fit::take_step(const std::vector<int>& views) {
   double grad_bias = add_slab_gradient(views);
   grad_bias += add_boundary_gradient();
-  grad_bias += fourier_.accumulate_gradient(progress_.step, gradient_.data()).grad_bias;
+  grad_bias += fourier_->accumulate_gradient(progress_.step, gradient_.data()).grad_bias;
   if (ray_term_) grad_bias += add_ray_gradient();
   const double rate = learning_rate(progress_.step);
   optimizer_.step(*field_, touched_leaves_, gradient_, rate);
@@ -164,11 +190,11 @@ double Fit::add_slab_gradient(const std::vector<int>& views) {
                           kDirectionStream + static_cast<std::uint64_t>(progress_.step));
   weights.backward_x = directions.below(2) == 1;
   weights.backward_z = directions.below(2) == 1;
-  const SlabObjective objective(sampler_, projector_, *measurement_.rays, *field_, weights);
+  const SlabObjective objective(*sampler_, projector_, *measurement_.rays, *field_, weights);
   const double multiplicity = static_cast<double>(measurement_.geometry.num_views()) /
                               std::max(static_cast<double>(views.size()), 1.0);
-  std::vector<BandResult> bands(static_cast<std::size_t>(sampler_.num_bands()));
-  base::parallel_for(sampler_.num_bands(), [&](std::int64_t band) {
+  std::vector<BandResult> bands(static_cast<std::size_t>(sampler_->num_bands()));
+  base::parallel_for(sampler_->num_bands(), [&](std::int64_t band) {
     bands[static_cast<std::size_t>(band)] = objective.accumulate_gradient(
         static_cast<int>(band), views, progress_.views, multiplicity, gradient_.data());
   });
@@ -184,10 +210,10 @@ double Fit::add_slab_gradient(const std::vector<int>& views) {
 
 // Boundary consistency, band by band as they own leaves; returns dL/d bias.
 double Fit::add_boundary_gradient() {
-  std::vector<double> bands(static_cast<std::size_t>(sampler_.num_bands()));
-  base::parallel_for(sampler_.num_bands(), [&](std::int64_t band) {
+  std::vector<double> bands(static_cast<std::size_t>(sampler_->num_bands()));
+  base::parallel_for(sampler_->num_bands(), [&](std::int64_t band) {
     bands[static_cast<std::size_t>(band)] =
-        boundary_.accumulate_gradient(static_cast<int>(band), progress_.step, gradient_.data())
+        boundary_->accumulate_gradient(static_cast<int>(band), progress_.step, gradient_.data())
             .grad_bias;
   });
   return std::accumulate(bands.begin(), bands.end(), 0.0);
@@ -212,6 +238,8 @@ void Fit::end_epoch() {
   if (options_.fit_view_scale)
     loss::fit_nuisances(loss::NuisancePrior{}, progress_.epoch_sums, progress_.views);
   progress_.epoch_sums.assign(progress_.views.size(), {});
+  const std::int64_t epochs_done = progress_.step / steps_per_epoch();
+  if (tree_updates_.update(epochs_done, *field_, optimizer_.state(), progress_.tree)) follow_tree();
 }
 
 }  // namespace tomofield::reconstruct

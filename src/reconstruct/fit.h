@@ -19,6 +19,7 @@
 #include "reconstruct/domain.h"
 #include "reconstruct/options.h"
 #include "reconstruct/ray_term.h"
+#include "reconstruct/tree_updates.h"
 #include "tilt_series/slab_views.h"
 
 namespace tomofield::reconstruct {
@@ -42,6 +43,7 @@ struct Progress {
   std::vector<loss::ViewModel> views;
   std::vector<loss::ViewSums> epoch_sums;  ///< of the running epoch
   std::vector<double> data_loss;  ///< mean squared residual in units of the noise, one an epoch
+  TreeProgress tree;
 };
 
 /// The loop of DESIGN §5. With the slab engine, a step uses every slab and one
@@ -59,6 +61,8 @@ class Fit {
   int steps_per_epoch() const;
   const field::Field& field() const { return *field_; }
   field::Field& field() { return *field_; }
+  /// Goes on with another tree and parameters, of the same options; the optimiser starts anew.
+  void set_field(std::unique_ptr<field::Field> field);
   /// The fitted field, for good: the fit cannot go on afterwards.
   std::unique_ptr<field::Field> take_field() { return std::move(field_); }
   const optimize::Adam& optimizer() const { return optimizer_; }
@@ -74,6 +78,7 @@ class Fit {
   double add_boundary_gradient();
   double add_ray_gradient();
   void end_epoch();
+  void follow_tree();
 
   const Measurement& measurement_;
   FitOptions options_;
@@ -83,11 +88,12 @@ class Fit {
   Progress progress_;
   base::AlignedBuffer<float> gradient_;
   projection::SlabProjector projector_;
-  projection::SlabSampler sampler_;
-  loss::BoundaryConsistency boundary_;
-  loss::FourierPrior fourier_;
+  std::optional<projection::SlabSampler> sampler_;
+  std::optional<loss::BoundaryConsistency> boundary_;
+  std::optional<loss::FourierPrior> fourier_;
   std::unique_ptr<RayTerm> ray_term_;  ///< of the ray engine
   std::vector<int> touched_leaves_;
+  TreeUpdates tree_updates_;
 };
 
 }  // namespace tomofield::reconstruct

@@ -46,6 +46,10 @@ std::vector<std::string> FieldOptions::faults() const {
   Faults faults;
   faults.require_one_of("--field", kind, "vm", "grid");
   faults.require_one_of("--activation", activation, "softplus", "identity");
+  faults.require_one_of("--tree", tree, "uniform", "adaptive");
+  faults.require_between("--leaf-budget", leaf_budget, 0, kMost);
+  if (leaf_budget > 0 && tree == "uniform")
+    faults.add("--leaf-budget is for --tree adaptive alone");
   if (leaf_size < base::kLanes || leaf_size > kLargestLeaf || leaf_size % base::kLanes != 0) {
     faults.add(fmt::format("--leaf-size must be a multiple of {} up to {}, not {}", base::kLanes,
                            kLargestLeaf, leaf_size));

@@ -8,9 +8,11 @@ namespace tomofield::reconstruct {
 
 /// The field: how finely leaves resolve the specimen. Lengths in pixels of the binned view.
 struct FieldOptions {
-  std::string kind = "vm";      ///< vm or grid
-  int leaf_size = 32;           ///< side of a leaf, a multiple of 16
-  double vertex_spacing = 1.0;  ///< between vertices, all axes
+  std::string kind = "vm";       ///< vm or grid
+  int leaf_size = 32;            ///< side of a leaf, a multiple of 16
+  std::string tree = "uniform";  ///< or adaptive: leaves half and twice as wide where that pays
+  int leaf_budget = 0;  ///< most leaves of an adaptive tree; 0: as many as the uniform one has
+  double vertex_spacing = 1.0;  ///< between vertices, all axes; of leaves of that size
   int rank = 16;                ///< of each mode, vm only
   bool with_margin = true;      ///< model what rays cross outside the region of interest
   double margin_spacing = 2.0;  ///< of samples and vertices there

@@ -54,6 +54,8 @@ namespace {
 json field_json(const FieldOptions& o) {
   return {{"kind", o.kind},
           {"leaf_size", o.leaf_size},
+          {"tree", o.tree},
+          {"leaf_budget", o.leaf_budget},
           {"vertex_spacing", o.vertex_spacing},
           {"rank", o.rank},
           {"with_margin", o.with_margin},

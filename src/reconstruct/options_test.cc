@@ -53,5 +53,17 @@ TEST(ReconstructOptions, EveryFaultIsNamedAtOnce) {
     EXPECT_NE(message.find(word), std::string::npos) << word << " in " << message;
 }
 
+TEST(ReconstructOptions, ABudgetIsForAdaptiveTrees) {
+  FieldOptions options;
+  options.leaf_budget = 12;
+  EXPECT_EQ(options.faults().size(), 1u);
+  options.tree = "adaptive";
+  EXPECT_TRUE(options.faults().empty());
+  options.leaf_budget = -1;
+  EXPECT_EQ(options.faults().size(), 1u);
+  options.tree = "binary";
+  EXPECT_EQ(options.faults().size(), 2u);
+}
+
 }  // namespace
 }  // namespace tomofield::reconstruct

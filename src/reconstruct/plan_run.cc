@@ -49,12 +49,26 @@ int steps_an_epoch(const PreparedSeries& plan, const FitOptions& options) {
                            : std::min(options.subsets, plan.geometry.num_views());
 }
 
+// Of the first tree, or of an adaptive one whose budget is used up.
+std::size_t most_parameters(const Domain& domain, const FieldOptions& options) {
+  std::vector<field::LeafShape> shapes = domain.shapes, inside;
+  for (int i = 0; i < domain.tree.num_leaves(); ++i) {
+    if (domain.tree.leaf(i).region == field::Region::kInterest)
+      inside.push_back(domain.shapes[static_cast<std::size_t>(i)]);
+  }
+  const auto more = options.leaf_budget - static_cast<std::ptrdiff_t>(inside.size());
+  if (options.tree == "adaptive" && more > 0)
+    shapes.insert(shapes.end(), static_cast<std::size_t>(more), inside.front());
+  return field::count_parameters(options.kind, shapes);
+}
+
 // Peak of a run. Parameters, their gradient and two moments; a checkpoint that is
-// resumed has all but the gradient once more.
+// resumed has all but the gradient once more, and so has a tree that is edited.
 std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, const RunPlan& run,
                             const ReconstructOptions& options) {
-  const std::size_t copies =
-      options.resume && std::filesystem::exists(output_paths(options.output).model) ? 7 : 4;
+  const bool resumes =
+      options.resume && std::filesystem::exists(output_paths(options.output).model);
+  const std::size_t copies = resumes || options.field.tree == "adaptive" ? 7 : 4;
   const std::size_t parameters = copies * sizeof(float) * run.num_parameters;
   const std::size_t rays = tilt_series::SlabViews::least_memory(plan.rays_shape());
   const int steps = steps_an_epoch(plan, options.fit);
@@ -82,7 +96,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.roi = plan.roi;
   run.thickness = plan.geometry.thickness;
   run.num_leaves = domain.tree.num_leaves();
-  run.num_parameters = field::count_parameters(options.field.kind, domain.shapes);
+  run.num_parameters = most_parameters(domain, options.field);
   run.num_steps = static_cast<std::int64_t>(options.fit.epochs) * steps_an_epoch(plan, options.fit);
   run.memory_bytes = estimate_memory(plan, domain, run, options);
   base::require_memory(run.memory_bytes, "this reconstruction",

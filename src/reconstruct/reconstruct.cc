@@ -81,8 +81,8 @@ bool resume(const OutputPaths& paths, const std::string& fingerprint, Fit& fit) 
   }
   try {
     field::TrainingState state;
-    const field::Model model = field::load_model(paths.model, &state);
-    restore_state(paths.model.string(), fingerprint, *model.field, state, fit);
+    field::Model model = field::load_model(paths.model, &state);
+    restore_state(paths.model.string(), fingerprint, std::move(model.field), state, fit);
   } catch (const Error& error) {
     throw Error(fmt::format(
         "cannot resume: {}; to start over, give --overwrite instead of --resume", error.what()));
@@ -112,6 +112,20 @@ base::ProgressReport progress_report(const Fit& fit, int num_epochs, std::int64_
   return report;
 }
 
+// How an adaptive tree came about.
+nlohmann::json tree_json(const TreeProgress& tree) {
+  nlohmann::json updates = nlohmann::json::array();
+  for (const TreeUpdate& u : tree.updates) {
+    updates.push_back({{"epoch", u.epoch},
+                       {"splits", u.splits},
+                       {"merges", u.merges},
+                       {"error", u.error},
+                       {"predicted_error", u.predicted_error},
+                       {"leaves_by_level", u.leaves_by_level}});
+  }
+  return updates;
+}
+
 nlohmann::json figures_json(const field::Model& model, const Progress& progress,
                             const PreparedSeries& series, double seconds) {
   nlohmann::json views = nlohmann::json::array();
@@ -123,6 +137,7 @@ nlohmann::json figures_json(const field::Model& model, const Progress& progress,
   }
   return {{"parameters", model.field->num_parameters()},
           {"leaves", model.field->tree().num_leaves()},
+          {"tree_updates", tree_json(progress.tree)},
           {"steps", progress.step},
           {"mean_squared_residual_per_noise_variance", progress.data_loss},
           {"density_unit", series.unit},
@@ -153,7 +168,7 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
   const auto with = [&](const char* extension) {
     return std::filesystem::path(stem.string() + extension);
   };
-  return {volume, with(".h5"), with(".json"), stem};
+  return {volume, with(".h5"), with(".json"), with("_tree.png"), stem};
 }
 
 std::vector<std::string> ReconstructOptions::faults() const {
@@ -171,9 +186,10 @@ void check_options(const ReconstructOptions& options) {
   const OutputPaths paths = output_paths(options.output);
   // Without a checkpoint there is nothing to resume, and what else is there is not this run's.
   const bool resumes = options.resume && std::filesystem::exists(paths.model);
+  std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json};
+  if (options.field.tree == "adaptive") results.push_back(paths.tree_picture);
   check_result_files(
-      {paths.volume, paths.model, paths.json}, paths.picture_prefix, options.input,
-      options.overwrite || resumes,
+      std::move(results), paths.picture_prefix, options.input, options.overwrite || resumes,
       options.resume ? "there is no checkpoint to resume, so give --overwrite to start over and "
                        "replace it, or another name with -o"
                      : "give --overwrite to replace it, --resume to continue the run that made "

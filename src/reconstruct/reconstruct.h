@@ -30,7 +30,9 @@ struct ReconstructOptions {
 
 /// The files of a reconstruction, named after its volume.
 struct OutputPaths {
-  std::filesystem::path volume, model, json, picture_prefix;
+  std::filesystem::path volume, model, json;
+  std::filesystem::path tree_picture;  ///< of adaptive trees alone
+  std::filesystem::path picture_prefix;
 };
 OutputPaths output_paths(const std::filesystem::path& volume);
 

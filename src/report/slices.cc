@@ -1,21 +1,18 @@
 #include "report/slices.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <utility>
 
-#include "base/percentile.h"
 #include "io/mrc.h"
 #include "io/png.h"
+#include "report/grey_scale.h"
 
 namespace tomofield::report {
 namespace {
 
-constexpr std::int64_t kMinWidth_px = 512;
-constexpr std::int64_t kMaxWidth_px = 4096;  // of an enlarged picture
 constexpr std::int64_t kChunkValues = std::int64_t{1} << 22;
 constexpr std::size_t kMaxSample = std::size_t{1} << 20;
 
@@ -51,32 +48,26 @@ std::vector<Slice> read_central_slices(const io::MrcReader& file) {
   return slices;
 }
 
-/// Black and white for all the slices.
-std::pair<double, double> grey_range(const std::vector<Slice>& slices) {
+/// One for all the slices.
+GreyScale grey_scale_of(const std::vector<Slice>& slices) {
   std::size_t total = 0;
   for (const Slice& slice : slices) total += slice.values.size();
   const std::size_t stride = total / kMaxSample + 1;
   std::vector<float> sample;
   for (const Slice& slice : slices)
-    for (std::size_t i = 0; i < slice.values.size(); i += stride)
-      if (std::isfinite(slice.values[i])) sample.push_back(slice.values[i]);
-  if (sample.empty()) return {0.0, 1.0};
-  return {base::percentile(sample, 0.5), base::percentile(sample, 99.5)};
+    for (std::size_t i = 0; i < slice.values.size(); i += stride) sample.push_back(slice.values[i]);
+  return GreyScale(std::move(sample));
 }
 
-void write_picture(const std::filesystem::path& path, const Slice& slice,
-                   std::pair<double, double> range, std::int64_t zoom) {
-  const double to_grey = range.second > range.first ? 255.0 / (range.second - range.first) : 0.0;
+void write_picture(const std::filesystem::path& path, const Slice& slice, const GreyScale& scale,
+                   std::int64_t zoom) {
   const std::int64_t width = slice.width * zoom, height = slice.height * zoom;
   std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width * height));
   for (std::int64_t y = 0; y < height; ++y) {
     const float* row = slice.row(slice.height - 1 - y / zoom);  // the first row at the bottom
-    for (std::int64_t x = 0; x < width; ++x) {
-      const double grey = (static_cast<double>(row[x / zoom]) - range.first) * to_grey;
-      const double shown = std::isnan(grey) ? 0.0 : std::clamp(grey, 0.0, 255.0);  // NaN: black
+    for (std::int64_t x = 0; x < width; ++x)
       pixels[static_cast<std::size_t>(y * width + x)] =
-          static_cast<std::uint8_t>(std::lround(shown));
-    }
+          scale.grey(static_cast<double>(row[x / zoom]));
   }
   io::write_png_grey(path, width, height, pixels);
 }
@@ -86,15 +77,13 @@ void write_picture(const std::filesystem::path& path, const Slice& slice,
 std::vector<std::filesystem::path> write_slice_pictures(const std::filesystem::path& mrc,
                                                         const std::filesystem::path& prefix) {
   const auto slices = read_central_slices(io::MrcReader(mrc));
-  const auto range = grey_range(slices);
+  const GreyScale scale = grey_scale_of(slices);
   const auto [narrowest, widest] = std::minmax({slices[0].width, slices[2].width});
-  const std::int64_t zoom =
-      std::clamp<std::int64_t>((kMinWidth_px + narrowest - 1) / narrowest, 1,
-                               std::max<std::int64_t>(kMaxWidth_px / widest, 1));
+  const std::int64_t zoom = picture_zoom(narrowest, widest);
   std::vector<std::filesystem::path> paths;
   for (const Slice& slice : slices) {
     paths.emplace_back(prefix.string() + "_" + slice.name + ".png");
-    write_picture(paths.back(), slice, range, zoom);
+    write_picture(paths.back(), slice, scale, zoom);
   }
   return paths;
 }

@@ -227,6 +227,59 @@ TEST_P(EachFittedField, SameBitsForAnyNumberOfThreads) {
   }
 }
 
+// A tree that starts with sixteen leaves of 32 px.
+Fit adaptive_fit(const Measurement& measurement, const std::string& kind, int epochs, int budget) {
+  FieldOptions options = field_options(kind);
+  options.leaf_size = 32;
+  options.vertex_spacing = 4.0;
+  options.tree = "adaptive";
+  options.leaf_budget = budget;
+  options.with_margin = false;
+  FitOptions fit_options;
+  fit_options.epochs = epochs;
+  fit_options.subsets = 4;
+  return Fit(measurement, options, fit_options);
+}
+
+int leaves_of_interest(const field::Quadtree& tree) {
+  const auto levels = leaves_by_level(tree);
+  return static_cast<int>(std::accumulate(levels.begin(), levels.end(), std::int64_t{0}));
+}
+
+TEST_P(EachFittedField, AdaptiveTreeFollowsTheDensityWithinItsBudget) {
+  const geometry::TiltGeometry g = geometry::centred_geometry(128, 128, 12, tilts(-48, 48, 8));
+  const BeadSeries series(g, Bead({40, 90, 5}), 4);
+  const Measurement measurement = series.measurement();
+  const auto run = [&](int threads) {
+    base::set_thread_count(threads);
+    auto fit = std::make_unique<Fit>(adaptive_fit(measurement, GetParam(), 10, 13));
+    fit->run([](const Fit&) { return true; });
+    base::set_thread_count(0);
+    return fit;
+  };
+  const auto fit = run(1);
+  const field::Quadtree& tree = fit->field().tree();
+  EXPECT_LE(leaves_of_interest(tree), 13);
+  // Finest at the bead, and coarse in the empty corner across from it.
+  EXPECT_EQ(tree.leaf(tree.find_leaf(40, 90)).square.size, 16);
+  EXPECT_EQ(tree.leaf(tree.find_leaf(100, 20)).square.size, 64);
+  for (int i = 0; i < tree.num_leaves(); ++i) EXPECT_EQ(fit->field().shape(i).nx, 9);
+  // It started with sixteen, was never above its budget, and then came to rest.
+  const TreeProgress& progress = fit->progress().tree;
+  ASSERT_GE(progress.updates.size(), 1u);
+  EXPECT_EQ(progress.updates[0].epoch, 2);
+  EXPECT_TRUE(progress.is_frozen);
+  for (const TreeUpdate& u : progress.updates) {
+    EXPECT_LE(u.predicted_error, 1.1 * u.error);
+    EXPECT_LE(std::accumulate(u.leaves_by_level.begin(), u.leaves_by_level.end(), std::int64_t{0}),
+              13);
+  }
+  const auto& losses = fit->progress().data_loss;
+  EXPECT_LT(losses.back(), losses.front());
+  const auto same = run(3);
+  EXPECT_TRUE(std::ranges::equal(fit->field().parameters(), same->field().parameters()));
+}
+
 TEST_P(EachFittedField, SeedDecides) {
   const Outcome one = small_fit(GetParam(), 1, 5);
   EXPECT_EQ(one.parameters, small_fit(GetParam(), 1, 5).parameters);

@@ -1,0 +1,98 @@
+#include "report/tree_picture.h"
+
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "scratch_directory.h"
+
+namespace tomofield::report {
+namespace {
+
+using Colour = std::array<int, 3>;
+constexpr Colour kOrange{255, 140, 0};
+
+struct Picture {
+  std::int64_t width = 0, height = 0;
+  std::vector<std::uint8_t> pixels;
+  /// y upwards
+  Colour at(std::int64_t x, std::int64_t y) const {
+    const auto first = static_cast<std::size_t>(3 * ((height - 1 - y) * width + x));
+    return {pixels[first], pixels[first + 1], pixels[first + 2]};
+  }
+};
+
+Picture read_picture(const std::filesystem::path& path) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  EXPECT_TRUE(png_image_begin_read_from_file(&image, path.c_str())) << path;
+  image.format = PNG_FORMAT_RGB;
+  Picture picture{image.width, image.height, std::vector<std::uint8_t>(PNG_IMAGE_SIZE(image))};
+  EXPECT_TRUE(png_image_finish_read(&image, nullptr, picture.pixels.data(), 0, nullptr));
+  return picture;
+}
+
+// A cell of 64 px in quarters, the upper right one in quarters again; a ramp along x in the
+// density; a region of interest that starts inside the first leaf.
+field::Model stepped_model() {
+  field::Quadtree tree({.x0 = 0, .y0 = 0, .cell_size = 64, .columns = 1, .rows = 1},
+                       {field::Region::kInterest});
+  tree.split(0);
+  tree.split(3);
+  const field::LeafShape shape{.nx = 2, .ny = 2, .nz = 2};
+  field::Model model;
+  model.field = field::make_field("grid", tree, 10.0, std::vector<field::LeafShape>(7, shape));
+  for (int leaf = 0; leaf < 7; ++leaf) {
+    const field::Square& square = tree.leaf(leaf).square;
+    for (std::size_t i = 0; i < 8; ++i)
+      model.field->parameters()[model.field->offset(leaf) + i] =
+          static_cast<float>(i < 4 ? square.x0 : square.x1());
+  }
+  model.roi = {4, 8, 64, 60};
+  return model;
+}
+
+TEST(TreePicture, DrawsLeafBordersOverTheSlice) {
+  const testing::ScratchDirectory scratch;
+  const std::filesystem::path path = scratch.path() / "tree.png";
+  const field::Model model = stepped_model();
+  write_tree_picture(model, path);
+  const Picture picture = read_picture(path);
+  const std::int64_t zoom = 9;  // 60 × 9 is the first multiple past 512
+  ASSERT_EQ(picture.width, 60 * zoom);
+  ASSERT_EQ(picture.height, 52 * zoom);
+  const auto at = [&](double x, double y) {  // pixels of the view
+    return picture.at(static_cast<std::int64_t>((x - 4) * zoom),
+                      static_cast<std::int64_t>((y - 8) * zoom));
+  };
+  EXPECT_EQ(at(32, 20.5), kOrange);  // between the lower quarters
+  EXPECT_EQ(at(10.5, 32), kOrange);  // between the left ones
+  EXPECT_EQ(at(48, 40.5), kOrange);  // inside the upper right one
+  EXPECT_EQ(at(40.5, 48), kOrange);
+  std::set<std::vector<int>> plain;
+  for (const auto& [x, y] : {std::pair{48.0, 20.5},
+                             {10.5, 48.0},
+                             {31.9, 20.5},
+                             {32.2, 20.5},
+                             {10.5, 31.9},
+                             {10.5, 32.2},
+                             {4.0, 20.5},
+                             {20.5, 8.0}})
+    EXPECT_NE(at(x, y), kOrange) << x << ' ' << y;
+  // Grey follows the density, which rises along x and is the same along y.
+  const Colour left = at(10.5, 20.5), right = at(58.5, 20.5);
+  EXPECT_EQ(left[0], left[1]);
+  EXPECT_EQ(left[0], left[2]);
+  EXPECT_EQ(at(10.5, 50.5), left);
+  EXPECT_NEAR(right[0] - left[0], 255.0 * 48 / 60, 6);
+}
+
+}  // namespace
+}  // namespace tomofield::report
