@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "base/check.h"
+#include "base/lanes.h"
 #include "structure/integer_program.h"
 
 namespace tomofield::structure {
@@ -29,7 +30,7 @@ struct Candidates {
       const QuadtreeNode& leaf = tree.leaf(i);
       if (leaf.region != Region::kInterest) continue;
       ++num_active;
-      if (leaf.square.size % 2 == 0 && leaf.square.size / 2 >= options.least_size)
+      if (leaf.square.size % (2 * base::kLanes) == 0 && leaf.square.size / 2 >= options.least_size)
         splits.push_back(i);
       // The first of four consecutive leaves with one parent.
       if (leaf.level <= options.coarsest_level || !starts_siblings(tree, i)) continue;

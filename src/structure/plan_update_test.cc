@@ -152,6 +152,15 @@ TEST(PlanUpdate, ChangesNothingWithoutAGain) {
   EXPECT_EQ(plan_update(tree, std::vector<double>(5, 1.0), {.budget = 7}).edit.split.size(), 1u);
 }
 
+// Quarters of 24 px would straddle slabs.
+TEST(PlanUpdate, KeepsMultiplesOfASlab) {
+  Quadtree tree(RootGrid{.x0 = 0, .y0 = 0, .cell_size = 96, .columns = 1, .rows = 1},
+                {Region::kInterest});
+  EXPECT_EQ(plan_update(tree, {1.0}, {.budget = 100}).edit.split.size(), 1u);
+  tree.split(0);
+  EXPECT_TRUE(plan_update(tree, std::vector<double>(4, 1.0), {.budget = 100}).edit.is_empty());
+}
+
 TEST(PlanUpdate, ComesAsCloseToATightBudgetAsOneEditCan) {
   const Quadtree tree = even_tree(2);
   const std::vector<double> errors(17, 1.0);
