@@ -54,8 +54,8 @@ double misfit(const Field& leaf, const Field& quarters) {
   for (int c = 0; c < 4; ++c) {
     const Square& square = quarters.tree().leaf(c).square;
     for (int j = 0; j < kShape.ny; ++j) {
-      const double y =
-          static_cast<double>(square.y0) + static_cast<double>(square.size) * j / (kShape.ny - 1);
+      const double y = kPixelCentre + static_cast<double>(square.y0) +
+                       static_cast<double>(square.size) * j / (kShape.ny - 1);
       quarters.row_values(c, y, from.data());
       leaf.row_values(0, y, to.data());
       for (int i = 0; i < kShape.nx; ++i) {
@@ -228,10 +228,10 @@ double least_misfit(const Field& quarters) {
   for (int c = 0; c < 4; ++c) {
     const Square& square = quarters.tree().leaf(c).square;
     for (int j = 0; j < kShape.ny; ++j) {
-      quarters.row_values(
-          c,
-          static_cast<double>(square.y0) + static_cast<double>(square.size) * j / (kShape.ny - 1),
-          row.data());
+      quarters.row_values(c,
+                          kPixelCentre + static_cast<double>(square.y0) +
+                              static_cast<double>(square.size) * j / (kShape.ny - 1),
+                          row.data());
       for (std::size_t i = 0; i < row.size(); ++i)
         grid->parameters()[grid->offset(c) + i * kShape.ny + static_cast<std::size_t>(j)] =
             row[i] - quarters.bias;

@@ -23,7 +23,7 @@ RowMajorMatrix vertex_values(const Field& field, int leaf) {
   RowMajorMatrix values(s.nx, static_cast<Eigen::Index>(s.nz) * s.ny);
   std::vector<float> row(s.vertices_xz());
   for (int j = 0; j < s.ny; ++j) {
-    const double y = static_cast<double>(square.y0) +
+    const double y = kPixelCentre + static_cast<double>(square.y0) +
                      static_cast<double>(square.size) * j / static_cast<double>(s.ny - 1);
     field.row_values(leaf, y, row.data());
     for (int i = 0; i < s.nx; ++i) {

@@ -26,8 +26,10 @@ double deviation(const field::Field& field, const field::Square& square, base::R
   for (int k = 0; k < kBoxesZ; ++k) {
     for (int j = 0; j < kBoxesY; ++j) {
       for (int i = 0; i < kBoxesX; ++i) {
-        const double x = static_cast<double>(square.x0) + width * (i + random.uniform()) / kBoxesX;
-        const double y = static_cast<double>(square.y0) + width * (j + random.uniform()) / kBoxesY;
+        const double x = field::kPixelCentre + static_cast<double>(square.x0) +
+                         width * (i + random.uniform()) / kBoxesX;
+        const double y = field::kPixelCentre + static_cast<double>(square.y0) +
+                         width * (j + random.uniform()) / kBoxesY;
         const double z = field.thickness() * (k + random.uniform()) / kBoxesZ;
         const double density = field.density(x, y, z);
         sum += density;
