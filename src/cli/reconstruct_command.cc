@@ -138,6 +138,20 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->check(CLI::IsMember({"auto", "on", "off"}))
       ->capture_default_str()
       ->group(group);
+  command
+      .add_option("--hold-out", fit.hold_out,
+                  "keep every so-manieth view from the fit and report how well it is predicted")
+      ->group(group);
+  command
+      .add_flag("--tune", arguments.options.tune,
+                "choose --tv, --rank and --epochs by the error of held-out views, then fit all "
+                "views with them")
+      ->group(group);
+  command
+      .add_option("--early-stop", fit.patience,
+                  "epochs without a better held-out error after which the fit stops; 0: never")
+      ->capture_default_str()
+      ->group(group);
   command.add_option("--seed", fit.seed, "of everything random")
       ->check(seed_check())
       ->capture_default_str()
@@ -180,6 +194,14 @@ void print_files(const reconstruct::OutputPaths& paths) {
              paths.model.string(), paths.json.string());
 }
 
+ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
+                   const reconstruct::ReconstructOptions& options) {
+  return {
+      128 + g_signal,
+      fmt::format("stopped; {} '{}': continue with the same command and --resume{}", what_is_there,
+                  file.string(), options.overwrite ? " instead of --overwrite" : "")};
+}
+
 void run(Arguments& arguments) {
   reconstruct::ReconstructOptions& options = arguments.options;
   options.fit.fit_view_scale =
@@ -194,14 +216,16 @@ void run(Arguments& arguments) {
   std::signal(SIGINT, remember_signal);
   std::signal(SIGTERM, remember_signal);
   const reconstruct::ReconstructHooks hooks{.progress = make_progress_bar("reconstruct"),
+                                            .tune_progress = make_progress_bar("tune"),
                                             .stop_requested = [] { return g_signal != 0; }};
   const reconstruct::OutputPaths paths = reconstruct::output_paths(options.output);
-  if (reconstruct::reconstruct(series, options, hooks) == reconstruct::Outcome::kStopped) {
-    throw ExitStatus(
-        128 + g_signal,
-        fmt::format(
-            "stopped; the checkpoint is '{}': continue with the same command and --resume{}",
-            paths.model.string(), options.overwrite ? " instead of --overwrite" : ""));
+  switch (reconstruct::reconstruct(series, options, hooks)) {
+    case reconstruct::Outcome::kFinished:
+      break;
+    case reconstruct::Outcome::kStopped:
+      throw stopped("the checkpoint is", paths.model, options);
+    case reconstruct::Outcome::kStoppedTuning:
+      throw stopped("the finished trials are in", paths.trials, options);
   }
   print_files(paths);
   write_pictures(paths.volume, series, paths.picture_prefix);

@@ -128,6 +128,7 @@ field::TrainingState progress_state(const Fit& fit, const std::string& fingerpri
   state.doubles["epoch_sums"] = flatten(progress.epoch_sums);
   state.doubles["data_loss"] = progress.data_loss;
   store(progress.tree, state);
+  state.doubles["held_out_error"] = progress.held_out_error;
   return state;
 }
 
@@ -158,7 +159,8 @@ void restore_state(const std::string& path, const std::string& fingerprint,
   progress.data_loss = entry(state.doubles, "data_loss", path);
   progress.tree = unflatten_tree(entry(state.integers, "tree_updates", path),
                                  entry(state.doubles, "tree_errors", path));
-  if (progress.step == fit.num_steps()) return;
+  progress.held_out_error = entry(state.doubles, "held_out_error", path);
+  if (fit.is_done()) return;
   optimize::Adam::State& adam = fit.optimizer().state();
   copy_moments(entry(state.floats, "adam_m", path), path, adam.m);
   copy_moments(entry(state.floats, "adam_v", path), path, adam.v);

@@ -69,6 +69,13 @@ std::vector<std::vector<int>> leaves_of_bands(const projection::SlabSampler& sam
   return bands;
 }
 
+std::vector<int> views_but(int num_views, const std::vector<int>& held_out) {
+  std::vector<int> views;
+  for (int v = 0; v < num_views; ++v)
+    if (std::ranges::find(held_out, v) == held_out.end()) views.push_back(v);
+  return views;
+}
+
 FitOptions with_at_most_one_subset_a_view(FitOptions options, int num_views) {
   if (options.engine == "slab") options.subsets = std::min(options.subsets, num_views);
   return options;
@@ -97,11 +104,14 @@ TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
 Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
          const FitOptions& options)
     : measurement_(measurement),
-      options_(with_at_most_one_subset_a_view(options, measurement.geometry.num_views())),
+      options_(with_at_most_one_subset_a_view(
+          options,
+          measurement.geometry.num_views() - static_cast<int>(measurement.held_out.size()))),
       domain_(domain_of(measurement, field_options)),
       field_(make_initial_field(domain_, measurement.geometry.thickness, measurement.mean_density,
                                 field_options, options.seed)),
       optimizer_(*field_, optimize::AdamOptions{}),
+      fitted_views_(views_but(measurement.geometry.num_views(), measurement.held_out)),
       projector_(measurement.geometry, domain_.grid),
       tree_updates_(make_tree_updates(field_options, domain_, options)) {
   for (const double sigma : measurement.noise_sigma)
@@ -142,8 +152,26 @@ std::int64_t Fit::num_steps() const {
   return static_cast<std::int64_t>(options_.epochs) * steps_per_epoch();
 }
 
+bool Fit::is_done() const {
+  if (progress_.step == num_steps()) return true;
+  const std::vector<double>& errors = progress_.held_out_error;
+  if (options_.patience == 0 || errors.empty()) return false;
+  return errors.end() - std::ranges::min_element(errors) > options_.patience;
+}
+
+HeldOutError Fit::held_out_error() const {
+  std::vector<double> weights;
+  for (const loss::ViewModel& view : progress_.views) weights.push_back(view.weight);
+  return reconstruct::held_out_error(*sampler_, projector_, *measurement_.rays,
+                                     measurement_.held_out, weights, options_.fit_view_scale);
+}
+
+PredictedView Fit::predict_held_out(int view, const loss::ViewModel& model) const {
+  return predicted_view(*sampler_, projector_, *measurement_.rays, view, model);
+}
+
 void Fit::run(const AfterStep& after_step) {
-  while (progress_.step < num_steps()) {
+  while (!is_done()) {
     take_step(ray_term_ ? std::vector<int>{} : subset_of_step(progress_.step));
     ++progress_.step;
     if (progress_.step % steps_per_epoch() == 0) end_epoch();
@@ -160,9 +188,11 @@ std::vector<int> Fit::subset_of_step(std::int64_t step) const {
   std::iota(order.begin(), order.end(), 0);
   for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);
   std::vector<int> views;
-  const int first = order[static_cast<std::size_t>(step % options_.subsets)];
-  for (int v = first; v < measurement_.geometry.num_views(); v += options_.subsets)
-    views.push_back(v);
+  const auto first =
+      static_cast<std::size_t>(order[static_cast<std::size_t>(step % options_.subsets)]);
+  for (std::size_t i = first; i < fitted_views_.size();
+       i += static_cast<std::size_t>(options_.subsets))
+    views.push_back(fitted_views_[i]);
   return views;
 }
 
@@ -191,8 +221,8 @@ double Fit::add_slab_gradient(const std::vector<int>& views) {
   weights.backward_x = directions.below(2) == 1;
   weights.backward_z = directions.below(2) == 1;
   const SlabObjective objective(*sampler_, projector_, *measurement_.rays, *field_, weights);
-  const double multiplicity = static_cast<double>(measurement_.geometry.num_views()) /
-                              std::max(static_cast<double>(views.size()), 1.0);
+  const double multiplicity =
+      static_cast<double>(fitted_views_.size()) / std::max(static_cast<double>(views.size()), 1.0);
   std::vector<BandResult> bands(static_cast<std::size_t>(sampler_->num_bands()));
   base::parallel_for(sampler_->num_bands(), [&](std::int64_t band) {
     bands[static_cast<std::size_t>(band)] = objective.accumulate_gradient(
@@ -227,6 +257,13 @@ double Fit::add_ray_gradient() {
   return result.grad_bias;
 }
 
+void Fit::score_held_out() {
+  const HeldOutError error = held_out_error();
+  for (std::size_t i = 0; i < error.views.size(); ++i)
+    progress_.views[static_cast<std::size_t>(error.views[i])] = error.models[i];
+  progress_.held_out_error.push_back(error.total);
+}
+
 void Fit::end_epoch() {
   double squares = 0.0, rays = 0.0;
   for (std::size_t v = 0; v < progress_.views.size(); ++v) {
@@ -238,6 +275,7 @@ void Fit::end_epoch() {
   if (options_.fit_view_scale)
     loss::fit_nuisances(loss::NuisancePrior{}, progress_.epoch_sums, progress_.views);
   progress_.epoch_sums.assign(progress_.views.size(), {});
+  if (!measurement_.held_out.empty()) score_held_out();
   const std::int64_t epochs_done = progress_.step / steps_per_epoch();
   if (tree_updates_.update(epochs_done, *field_, optimizer_.state(), progress_.tree)) follow_tree();
 }

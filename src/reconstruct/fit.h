@@ -17,6 +17,7 @@
 #include "projection/slab_projector.h"
 #include "projection/slab_sampler.h"
 #include "reconstruct/domain.h"
+#include "reconstruct/held_out.h"
 #include "reconstruct/options.h"
 #include "reconstruct/ray_term.h"
 #include "reconstruct/tree_updates.h"
@@ -34,6 +35,8 @@ struct Measurement {
   double mean_density = 0.0;
   /// For the ray engine: how `rays`, which are then the views as recorded, look at the specimen.
   std::optional<geometry::RayGeometry> ray_geometry;
+  /// Views that carry no loss and only tell how well the others predict them (slab engine).
+  std::vector<int> held_out;
 };
 
 /// Where a fit stands between two steps: everything that a resumed run needs
@@ -44,6 +47,7 @@ struct Progress {
   std::vector<loss::ViewSums> epoch_sums;  ///< of the running epoch
   std::vector<double> data_loss;  ///< mean squared residual in units of the noise, one an epoch
   TreeProgress tree;
+  std::vector<double> held_out_error;  ///< the same of the views held out, if there are any
 };
 
 /// The loop of DESIGN §5. With the slab engine, a step uses every slab and one
@@ -58,6 +62,11 @@ class Fit {
   void run(const AfterStep& after_step);
 
   std::int64_t num_steps() const;
+  /// Whether every step is done, or the held-out error says to stop before (FitOptions::patience).
+  bool is_done() const;
+  /// Of the field as it is; there must be views held out.
+  HeldOutError held_out_error() const;
+  PredictedView predict_held_out(int view, const loss::ViewModel& model) const;
   int steps_per_epoch() const;
   const field::Field& field() const { return *field_; }
   field::Field& field() { return *field_; }
@@ -77,6 +86,7 @@ class Fit {
   double add_slab_gradient(const std::vector<int>& views);
   double add_boundary_gradient();
   double add_ray_gradient();
+  void score_held_out();
   void end_epoch();
   void follow_tree();
 
@@ -86,6 +96,7 @@ class Fit {
   std::unique_ptr<field::Field> field_;
   optimize::Adam optimizer_;
   Progress progress_;
+  std::vector<int> fitted_views_;
   base::AlignedBuffer<float> gradient_;
   projection::SlabProjector projector_;
   std::optional<projection::SlabSampler> sampler_;

@@ -73,6 +73,12 @@ std::vector<std::string> FitOptions::faults() const {
   faults.require_positive("--learning-rate", learning_rate);
   faults.require_between("the final learning rate's part of the first", final_rate, 1e-6, 1);
   faults.require_not_negative("--tv", density_variation);
+  if (hold_out != 0) faults.require_between("--hold-out", hold_out, 2, kMost);
+  faults.require_between("--early-stop", patience, 0, kMost);
+  if (patience > 0 && hold_out == 0)
+    faults.add("--early-stop watches views that --hold-out keeps from the fit: give that as well");
+  if (hold_out > 0 && engine == "ray")
+    faults.add("--hold-out predicts aligned views: it needs --engine slab");
   faults.require_not_negative("--tv-factors", factor_variation);
   faults.require_not_negative("--bcc", boundary);
   faults.require_not_negative("--ifp", fourier);

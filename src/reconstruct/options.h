@@ -45,6 +45,8 @@ struct FitOptions {
   double gradient_floor = 1e-3;       ///< ε of both penalties, in density units a pixel
   bool fit_view_scale = false;        ///< per-view scale and offset as nuisances
   std::uint64_t seed = 1;
+  int hold_out = 0;  ///< keep every so-manieth view from the fit; 0: none
+  int patience = 0;  ///< epochs without a better held-out error before it stops; 0: never
   std::vector<std::string> faults() const;
 };
 

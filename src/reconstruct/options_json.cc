@@ -82,6 +82,8 @@ json fit_json(const FitOptions& o) {
           {"penalty", o.penalty},
           {"concavity", o.concavity},
           {"gradient_floor", o.gradient_floor},
+          {"hold_out", o.hold_out},
+          {"patience", o.patience},
           {"fit_view_scale", o.fit_view_scale},
           {"seed", o.seed}};
 }
@@ -99,6 +101,7 @@ json options_json(const ReconstructOptions& options) {
           {"specimen", specimen_json(options.specimen)},
           {"field", field_json(options.field)},
           {"fit", fit_json(options.fit)},
+          {"tune", options.tune},
           {"volume", volume_json(options.volume)}};
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <optional>
@@ -14,8 +15,10 @@
 #include "io/json.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/fit.h"
+#include "reconstruct/held_out_picture.h"
 #include "reconstruct/mask_json.h"
 #include "reconstruct/result_files.h"
+#include "reconstruct/trials.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruct {
@@ -63,13 +66,16 @@ field::ModelInfo model_info(const PreparedSeries& series, const ReconstructOptio
   return info;
 }
 
-Measurement measurement_of(const PreparedSeries& series) {
+Measurement measurement_of(const PreparedSeries& series, const FitOptions& options) {
   return {.geometry = series.geometry,
           .roi = series.roi,
           .rays = series.rays.get(),
           .noise_sigma = series.noise_sigma,
           .mean_density = series.mean_density,
-          .ray_geometry = series.ray_geometry};
+          .ray_geometry = series.ray_geometry,
+          .held_out = options.hold_out > 0
+                          ? held_out_views(series.geometry.tilt_deg, options.hold_out)
+                          : std::vector<int>{}};
 }
 
 // Loads the checkpoint into `fit`; false if there is none yet.
@@ -107,8 +113,11 @@ base::ProgressReport progress_report(const Fit& fit, int num_epochs, std::int64_
   report.seconds_left = (all - done) / rate;
   const auto& loss = fit.progress().data_loss;
   const std::int64_t epoch = (fit.progress().step - 1) * num_epochs / fit.num_steps() + 1;
-  report.detail = fmt::format("epoch {}/{}  loss {}  {:.1f} steps/s", epoch, num_epochs,
-                              loss.empty() ? "-" : fmt::format("{:.4f}", loss.back()), rate);
+  const auto& held_out = fit.progress().held_out_error;
+  report.detail =
+      fmt::format("epoch {}/{}  loss {}{}  {:.1f} steps/s", epoch, num_epochs,
+                  loss.empty() ? "-" : fmt::format("{:.4f}", loss.back()),
+                  held_out.empty() ? "" : fmt::format("  held out {:.4f}", held_out.back()), rate);
   return report;
 }
 
@@ -149,15 +158,55 @@ nlohmann::json figures_json(const field::Model& model, const Progress& progress,
           {"views", views}};
 }
 
+// What a tuning chose, and everything that it tried.
+nlohmann::json tuning_json(const Tuned& tuned) {
+  return {{"chosen",
+           {{"tv", tuned.settings.variation},
+            {"rank", tuned.settings.rank},
+            {"epochs", tuned.settings.epochs}}},
+          {"trials", trials_json(tuned.trials)}};
+}
+
+nlohmann::json held_out_json(const HeldOutError& error, const PreparedSeries& series,
+                             const std::vector<double>& by_epoch) {
+  nlohmann::json views = nlohmann::json::array();
+  for (std::size_t i = 0; i < error.views.size(); ++i) {
+    const auto view = static_cast<std::size_t>(error.views[i]);
+    views.push_back({{"view", view},
+                     {"tilt_deg", series.geometry.tilt_deg[view]},
+                     {"error", error.view_error[i]}});
+  }
+  return {{"error", error.total}, {"error_by_epoch", by_epoch}, {"views", views}};
+}
+
+// The error of the views held out, and a picture of the one nearest to zero tilt.
+nlohmann::json report_held_out(const Fit& fit, const PreparedSeries& series,
+                               const std::filesystem::path& picture) {
+  const HeldOutError error = fit.held_out_error();
+  const auto nearest = std::ranges::min_element(error.views, {}, [&](int view) {
+    return std::abs(series.geometry.tilt_deg[static_cast<std::size_t>(view)]);
+  });
+  const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
+  write_held_out_picture(picture, fit.predict_held_out(*nearest, model));
+  base::log_info(fmt::format("held out: {} views, error {:.4f}", error.views.size(), error.total));
+  return held_out_json(error, series, fit.progress().held_out_error);
+}
+
 void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOptions& options,
-                   const OutputPaths& paths, const std::string& fingerprint, double seconds) {
+                   const std::optional<Tuned>& tuned, const OutputPaths& paths,
+                   const std::string& fingerprint, double seconds) {
+  nlohmann::json held_out = nullptr;
+  if (options.fit.hold_out > 0) held_out = report_held_out(fit, series, paths.held_out_picture);
   const field::TrainingState state = progress_state(fit, fingerprint);
   field::Model model{model_info(series, options), fit.take_field()};
   field::save_model(paths.model, model, &state);
   write_volume(model, options.volume, paths.volume);
-  io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
-                              {"options", options_json(options)},
-                              {"figures", figures_json(model, fit.progress(), series, seconds)}});
+  nlohmann::json figures = figures_json(model, fit.progress(), series, seconds);
+  figures["held_out"] = held_out;
+  figures["tuning"] = tuned ? tuning_json(*tuned) : nlohmann::json(nullptr);
+  io::write_json(
+      paths.json,
+      {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"figures", figures}});
 }
 
 }  // namespace
@@ -168,13 +217,18 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
   const auto with = [&](const char* extension) {
     return std::filesystem::path(stem.string() + extension);
   };
-  return {volume, with(".h5"), with(".json"), with("_tree.png"), stem};
+  return {volume, with(".h5"),           with(".json"),     with("_tree.png"),
+          stem,   with("_held_out.png"), with("_tune.json")};
 }
 
 std::vector<std::string> ReconstructOptions::faults() const {
   std::vector<std::string> all = specimen.faults();
   for (const auto& faults : {field.faults(), fit.faults()})
     all.insert(all.end(), faults.begin(), faults.end());
+  if (tune && fit.engine == "ray")
+    all.push_back("--tune predicts aligned views: it needs --engine slab");
+  if (tune && fit.patience > 0)
+    all.push_back("--tune chooses the number of epochs: leave --early-stop out");
   if (!(checkpoint_minutes >= 0))
     all.push_back(
         fmt::format("--checkpoint-minutes must be 0 or more, not {:g}", checkpoint_minutes));
@@ -185,9 +239,12 @@ void check_options(const ReconstructOptions& options) {
   require_no_faults(options.faults());
   const OutputPaths paths = output_paths(options.output);
   // Without a checkpoint there is nothing to resume, and what else is there is not this run's.
-  const bool resumes = options.resume && std::filesystem::exists(paths.model);
+  const bool resumes = options.resume && (std::filesystem::exists(paths.model) ||
+                                          (options.tune && std::filesystem::exists(paths.trials)));
   std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json};
   if (options.field.tree == "adaptive") results.push_back(paths.tree_picture);
+  if (options.tune) results.push_back(paths.trials);
+  if (options.fit.hold_out > 0 && !options.tune) results.push_back(paths.held_out_picture);
   check_result_files(
       std::move(results), paths.picture_prefix, options.input, options.overwrite || resumes,
       options.resume ? "there is no checkpoint to resume, so give --overwrite to start over and "
@@ -196,13 +253,40 @@ void check_options(const ReconstructOptions& options) {
                        "it, or another name with -o");
 }
 
-Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& options,
+namespace {
+
+// Chooses settings with some views held out, and puts them into the options of the
+// fit, which has them all. None if a stop was requested.
+std::optional<Tuned> tune_options(const PreparedSeries& series, const OutputPaths& paths,
+                                  const ReconstructHooks& hooks, ReconstructOptions& options) {
+  constexpr int kHoldOut = 8;
+  FitOptions trial_fit = options.fit;
+  if (trial_fit.hold_out == 0) trial_fit.hold_out = kHoldOut;
+  TrialFile file(paths.trials, fingerprint_of(options, series), options.resume);
+  const std::optional<Tuned> tuned =
+      tune(measurement_of(series, trial_fit), options.field, trial_fit, file,
+           {.progress = hooks.tune_progress, .stop_requested = hooks.stop_requested});
+  if (!tuned) return std::nullopt;
+  options.fit.hold_out = 0;
+  options.fit.density_variation = tuned->settings.variation;
+  options.fit.epochs = tuned->settings.epochs;
+  options.field.rank = tuned->settings.rank;
+  return tuned;
+}
+
+}  // namespace
+
+Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& requested,
                     const ReconstructHooks& hooks) {
+  ReconstructOptions options = requested;
   const OutputPaths paths = output_paths(options.output);
   const PreparedSeries series =
       prepare_series(tilt_series, options.specimen, directory_of(paths.volume));
+  std::optional<Tuned> tuned;
+  if (options.tune && !(tuned = tune_options(series, paths, hooks, options)))
+    return Outcome::kStoppedTuning;
   const std::string fingerprint = fingerprint_of(options, series);
-  const Measurement measurement = measurement_of(series);
+  const Measurement measurement = measurement_of(series, options.fit);
   Fit fit(measurement, options.field, options.fit);
   if (options.resume) resume(paths, fingerprint, fit);
 
@@ -212,8 +296,7 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
   bool stopped = false;
   fit.run([&](const Fit&) {
     if (hooks.progress) hooks.progress(progress_report(fit, options.fit.epochs, first_step, start));
-    stopped =
-        hooks.stop_requested && hooks.stop_requested() && fit.progress().step < fit.num_steps();
+    stopped = hooks.stop_requested && hooks.stop_requested() && !fit.is_done();
     if (stopped || seconds_since(last_checkpoint) > 60 * options.checkpoint_minutes) {
       save_checkpoint(paths.model, fit, model_info(series, options), fingerprint);
       last_checkpoint = Clock::now();
@@ -221,7 +304,7 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
     return !stopped;
   });
   if (stopped) return Outcome::kStopped;
-  write_results(fit, series, options, paths, fingerprint, seconds_since(start));
+  write_results(fit, series, options, tuned, paths, fingerprint, seconds_since(start));
   return Outcome::kFinished;
 }
 

@@ -19,6 +19,7 @@ struct ReconstructOptions {
   SpecimenOptions specimen;
   FieldOptions field;
   FitOptions fit;
+  bool tune = false;  ///< choose the weight, rank and epochs by held-out error (tune.h)
   VolumeOptions volume;
   std::filesystem::path output;  ///< the volume; model, JSON and pictures lie beside it
   bool overwrite = false;
@@ -33,17 +34,20 @@ struct OutputPaths {
   std::filesystem::path volume, model, json;
   std::filesystem::path tree_picture;  ///< of adaptive trees alone
   std::filesystem::path picture_prefix;
+  std::filesystem::path held_out_picture;  ///< with views held out
+  std::filesystem::path trials;            ///< of a tuning (JSON)
 };
 OutputPaths output_paths(const std::filesystem::path& volume);
 
 /// What the caller sees while it runs.
 struct ReconstructHooks {
   base::ProgressSink progress;
+  base::ProgressSink tune_progress;  ///< of the trials before the fit
   std::function<bool()>
       stop_requested;  ///< asked after every step; true saves a checkpoint and stops
 };
 
-enum class Outcome { kFinished, kStopped };
+enum class Outcome { kFinished, kStopped, kStoppedTuning };
 
 /// The main job: fits a field to the series and writes the volume (MRC), the
 /// model (HDF5, also the checkpoint while it runs), and the figures and resolved

@@ -1,0 +1,142 @@
+#include "reconstruct/held_out.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "base/aligned_buffer.h"
+#include "base/parallel.h"
+#include "kernels/lanes.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruct {
+namespace {
+
+using kernels::kLanes;
+
+// Line integrals of a slab: [view, x, lane].
+base::AlignedBuffer<float> predict(const projection::SlabSampler& sampler,
+                                   const projection::SlabProjector& projector,
+                                   std::span<const int> views, int slab) {
+  base::AlignedBuffer<float> samples(projector.grid().size());
+  base::AlignedBuffer<float> rays(projector.detector_size(views.size()));
+  sampler.decode(slab, samples.data());
+  projector.forward(samples.data(), views, rays.data());
+  return rays;
+}
+
+// Least squares of measured ≈ scale · predicted + offset.
+loss::ViewModel fitted_model(const loss::ViewSums& s, double weight) {
+  const double spread = s.n * s.pp - s.p * s.p;
+  const bool is_flat = !(spread > 1e-9 * s.n * s.pp);
+  const double scale = is_flat ? 1.0 : (s.n * s.pb - s.p * s.b) / spread;
+  return {scale, s.n > 0 ? (s.b - scale * s.p) / s.n : 0.0, weight};
+}
+
+// Sums of one view of a slab over its rays that count.
+loss::ViewSums sums_of(const std::uint16_t* mask, const float* measured, std::int64_t width,
+                       const float* predicted) {
+  loss::ViewSums sums;
+  for (std::int64_t x = 0; x < width; ++x) {
+    for (int lane = 0; lane < kLanes; ++lane, ++predicted, ++measured) {
+      if ((mask[x] >> lane & 1) == 0) continue;
+      const double p = static_cast<double>(*predicted), b = static_cast<double>(*measured);
+      sums += {1.0, p, b, p * p, p * b, b * b};
+    }
+  }
+  return sums;
+}
+
+// [slab][view]
+using SlabSums = std::vector<std::vector<loss::ViewSums>>;
+
+SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
+                       const projection::SlabProjector& projector,
+                       const tilt_series::SlabViews& measured, std::span<const int> views) {
+  const std::int64_t width = projector.geometry().width;
+  SlabSums sums(static_cast<std::size_t>(measured.num_slabs()));
+  base::parallel_for(measured.num_slabs(), [&](std::int64_t s) {
+    const int slab = static_cast<int>(s);
+    const auto rays = predict(sampler, projector, views, slab);
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      sums[static_cast<std::size_t>(s)].push_back(
+          sums_of(measured.mask(slab, views[v]), measured.rays(slab, views[v]), width,
+                  rays.data() + static_cast<std::ptrdiff_t>(v) * width * kLanes));
+    }
+  });
+  return sums;
+}
+
+}  // namespace
+
+std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every) {
+  std::vector<int> by_tilt(tilt_deg.size());
+  std::iota(by_tilt.begin(), by_tilt.end(), 0);
+  std::ranges::stable_sort(by_tilt, [&](int a, int b) {
+    return tilt_deg[static_cast<std::size_t>(a)] < tilt_deg[static_cast<std::size_t>(b)];
+  });
+  const std::size_t step = static_cast<std::size_t>(every);
+  std::vector<int> views;
+  for (std::size_t i = step / 2; i + 1 < by_tilt.size(); i += step) views.push_back(by_tilt[i]);
+  if (views.empty()) {
+    throw Error(
+        fmt::format("--hold-out {} holds out none of {} views: the first and the last in order of "
+                    "tilt are always fitted, so give a smaller number, at least 2",
+                    every, tilt_deg.size()));
+  }
+  std::ranges::sort(views);
+  return views;
+}
+
+HeldOutError held_out_error(const projection::SlabSampler& sampler,
+                            const projection::SlabProjector& projector,
+                            const tilt_series::SlabViews& measured, std::vector<int> views,
+                            std::span<const double> noise_weight, bool fit_view_scale) {
+  const SlabSums sums = sums_of_slabs(sampler, projector, measured, views);
+  HeldOutError error;
+  error.views = std::move(views);
+  double squares = 0, rays = 0;
+  for (std::size_t v = 0; v < error.views.size(); ++v) {
+    const double weight = noise_weight[static_cast<std::size_t>(error.views[v])];
+    loss::ViewSums view;
+    for (const auto& slab : sums) view += slab[v];
+    error.models.push_back(fit_view_scale ? fitted_model(view, weight)
+                                          : loss::ViewModel{1.0, 0.0, weight});
+    const double view_squares = weight * view.squared_residual(error.models.back());
+    error.view_error.push_back(view.n > 0 ? view_squares / view.n : 0.0);
+    squares += view_squares;
+    rays += view.n;
+  }
+  error.total = rays > 0 ? squares / rays : 0.0;
+  return error;
+}
+
+PredictedView predicted_view(const projection::SlabSampler& sampler,
+                             const projection::SlabProjector& projector,
+                             const tilt_series::SlabViews& measured, int view,
+                             const loss::ViewModel& model) {
+  const auto& shape = measured.shape();
+  PredictedView result{
+      .width = shape.width, .height = shape.num_rows, .measured = {}, .predicted = {}};
+  for (std::int64_t y = 0; y < shape.num_rows; ++y)
+    for (std::int64_t x = 0; x < shape.width; ++x)
+      result.measured.push_back(measured.counts(view, x, y)
+                                    ? measured.ray(view, x, y)
+                                    : std::numeric_limits<float>::quiet_NaN());
+  for (int slab = 0; slab < measured.num_slabs(); ++slab) {
+    const auto rays = predict(sampler, projector, std::span(&view, 1), slab);
+    const std::int64_t rows = std::min<std::int64_t>(kLanes, shape.num_rows - slab * kLanes);
+    for (std::int64_t lane = 0; lane < rows; ++lane)
+      for (std::int64_t x = 0; x < shape.width; ++x) {
+        const double p = static_cast<double>(rays.data()[x * kLanes + lane]);
+        result.predicted.push_back(static_cast<float>(model.scale * p + model.offset));
+      }
+  }
+  return result;
+}
+
+}  // namespace tomofield::reconstruct

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "loss/data_term.h"
+#include "projection/slab_projector.h"
+#include "projection/slab_sampler.h"
+#include "tilt_series/slab_views.h"
+
+namespace tomofield::reconstruct {
+
+/// Views kept from the fit: in order of tilt every `every`-th one (at least 2),
+/// first the one in the middle of the first `every`, and neither the first nor
+/// the last of all, whose tilts nothing else covers. Indices, ascending. Throws
+/// Error if the series is too short to hold any out.
+std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every);
+
+/// How well a field predicts views that it was not fitted to.
+struct HeldOutError {
+  std::vector<int> views;
+  std::vector<loss::ViewModel> models;  ///< of each of the views: what it was scored with
+  std::vector<double> view_error;       ///< mean squared residual over the noise variance
+  double total = 0;                     ///< over all of their rays
+};
+
+/// The error of `views`; `noise_weight` holds 1 / variance of the noise of each
+/// view of the series. With `fit_view_scale`, a view's scale and offset are least
+/// squares on that view alone: they are nuisances of its exposure, which no other
+/// view tells. The sums are the same for any number of threads.
+HeldOutError held_out_error(const projection::SlabSampler& sampler,
+                            const projection::SlabProjector& projector,
+                            const tilt_series::SlabViews& measured, std::vector<int> views,
+                            std::span<const double> noise_weight, bool fit_view_scale);
+
+/// A view as measured and as a field predicts it: [y, x], rows of the region of
+/// interest; NaN where there is no measurement.
+struct PredictedView {
+  std::int64_t width = 0, height = 0;
+  std::vector<float> measured, predicted;
+};
+PredictedView predicted_view(const projection::SlabSampler& sampler,
+                             const projection::SlabProjector& projector,
+                             const tilt_series::SlabViews& measured, int view,
+                             const loss::ViewModel& model);
+
+}  // namespace tomofield::reconstruct

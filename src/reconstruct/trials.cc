@@ -1,0 +1,204 @@
+#include "reconstruct/trials.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <memory>
+#include <utility>
+
+#include "base/log.h"
+#include "io/json.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruct {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using nlohmann::json;
+
+// Rows of a trial: enough for edges in every direction, few enough for a dozen fits.
+constexpr std::int64_t kStripRows = 64;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+Trial trial_from(const json& entry) {
+  return {.settings = {.variation = entry.at("tv"),
+                       .rank = entry.at("rank"),
+                       .epochs = entry.at("epochs")},
+          .error = entry.at("held_out_error"),
+          .view_error = entry.at("held_out_error_by_view"),
+          .seconds = entry.at("seconds")};
+}
+
+// The middle rows of a measurement, copied.
+struct Strip {
+  std::unique_ptr<tilt_series::SlabViews> rays;
+  Measurement measurement;
+};
+
+Strip middle_strip(const Measurement& whole) {
+  const auto& shape = whole.rays->shape();
+  const std::int64_t rows = std::min(kStripRows, shape.num_rows);
+  const std::int64_t first = (shape.num_rows - rows) / 2;
+  const auto read = [&](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
+    const int view = static_cast<int>(v);
+    for (std::int64_t y = 0; y < rows; ++y) {
+      for (std::int64_t x = 0; x < shape.width; ++x) {
+        const auto at = static_cast<std::size_t>(y * shape.width + x);
+        image[at] = whole.rays->ray(view, x, first + y);
+        valid[at] = whole.rays->counts(view, x, first + y);
+      }
+    }
+  };
+  Strip strip{.rays = std::make_unique<tilt_series::SlabViews>(
+                  tilt_series::SlabViews::Shape{shape.num_views, shape.width, rows, 0, rows}, 1.0,
+                  read, std::filesystem::temp_directory_path()),
+              .measurement = whole};
+  strip.measurement.rays = strip.rays.get();
+  strip.measurement.roi.y0 = whole.roi.y0 + first;
+  strip.measurement.roi.y1 = strip.measurement.roi.y0 + rows;
+  return strip;
+}
+
+struct StopRequested {};
+
+// Makes the trials of a search, with its progress.
+class TrialFits {
+ public:
+  TrialFits(const Measurement& measurement, const FieldOptions& field, const FitOptions& fit,
+            TrialFile& file, const TuneHooks& hooks)
+      : strip_(middle_strip(measurement)),
+        field_(field),
+        fit_(fit),
+        file_(file),
+        hooks_(hooks),
+        num_expected_(expected_trials(field.kind == "vm")) {}
+
+  Trial run(const TrialSettings& settings) {
+    std::optional<Trial> trial = file_.find(settings);
+    if (!trial) {
+      trial = fitted(settings);
+      file_.add(*trial);
+    }
+    ++num_done_;
+    return *trial;
+  }
+
+ private:
+  Trial fitted(const TrialSettings& settings) {
+    FieldOptions field = field_;
+    FitOptions options = fit_;
+    field.rank = settings.rank;
+    options.density_variation = settings.variation;
+    options.epochs = settings.epochs;
+    options.patience = 0;
+    const auto start = Clock::now();
+    Fit fit(strip_.measurement, field, options);
+    fit.run([&](const Fit&) {
+      if (hooks_.stop_requested && hooks_.stop_requested()) throw StopRequested();
+      if (hooks_.progress) hooks_.progress(report(fit, settings));
+      return true;
+    });
+    const HeldOutError error = fit.held_out_error();
+    return {settings, error.total, error.view_error, seconds_since(start)};
+  }
+
+  base::ProgressReport report(const Fit& fit, const TrialSettings& settings) const {
+    const int expected = std::max(num_expected_, num_done_ + 1);
+    const double of_trial =
+        static_cast<double>(fit.progress().step) / static_cast<double>(fit.num_steps());
+    const auto& errors = fit.progress().held_out_error;
+    base::ProgressReport report;
+    report.fraction_done = (num_done_ + of_trial) / expected;
+    report.seconds_elapsed = seconds_since(start_);
+    report.seconds_left =
+        report.seconds_elapsed * (1 - report.fraction_done) / report.fraction_done;
+    report.detail =
+        fmt::format("trial {}/{}  tv {:.3g}  rank {}  epochs {}  held out {}", num_done_ + 1,
+                    expected, settings.variation, settings.rank, settings.epochs,
+                    errors.empty() ? "-" : fmt::format("{:.4f}", errors.back()));
+    return report;
+  }
+
+  Strip strip_;
+  const FieldOptions& field_;
+  const FitOptions& fit_;
+  TrialFile& file_;
+  const TuneHooks& hooks_;
+  Clock::time_point start_ = Clock::now();
+  int num_expected_;
+  int num_done_ = 0;
+};
+
+}  // namespace
+
+TrialFile::TrialFile(std::filesystem::path path, std::string fingerprint, bool reuse)
+    : path_(std::move(path)), fingerprint_(std::move(fingerprint)) {
+  if (!reuse || !std::filesystem::exists(path_)) return;
+  const char* advice = "give --overwrite instead of --resume to start over";
+  std::ifstream file(path_);
+  const json document = json::parse(file, nullptr, /*allow_exceptions=*/false);
+  try {
+    if (document.at("fingerprint").get<std::string>() != fingerprint_) {
+      throw Error(fmt::format(
+          "cannot resume: the trials in '{}' are of another series or of other options; {}",
+          path_.string(), advice));
+    }
+    for (const json& entry : document.at("trials")) trials_.push_back(trial_from(entry));
+  } catch (const json::exception& error) {
+    throw Error(fmt::format("cannot resume: '{}' is damaged ({}); {}", path_.string(), error.what(),
+                            advice));
+  }
+}
+
+std::optional<Trial> TrialFile::find(const TrialSettings& settings) const {
+  const auto found = std::ranges::find(trials_, settings, &Trial::settings);
+  return found == trials_.end() ? std::nullopt : std::optional(*found);
+}
+
+void TrialFile::add(const Trial& trial) {
+  trials_.push_back(trial);
+  io::write_json(path_, {{"fingerprint", fingerprint_}, {"trials", trials_json(trials_)}});
+}
+
+json trials_json(const std::vector<Trial>& trials) {
+  json table = json::array();
+  for (const Trial& t : trials) {
+    table.push_back({{"tv", t.settings.variation},
+                     {"rank", t.settings.rank},
+                     {"epochs", t.settings.epochs},
+                     {"held_out_error", t.error},
+                     {"held_out_error_by_view", t.view_error},
+                     {"seconds", t.seconds}});
+  }
+  return table;
+}
+
+std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& field,
+                          const FitOptions& fit, TrialFile& file, const TuneHooks& hooks) {
+  TrialFits fits(measurement, field, fit, file, hooks);
+  // A run without total variation still needs a weight to search from.
+  const double first =
+      fit.density_variation > 0 ? fit.density_variation : FitOptions{}.density_variation;
+  Tuned tuned;
+  try {
+    tuned.settings = search_settings(
+        {first, field.rank, fit.epochs}, field.kind == "vm",
+        [&](const TrialSettings& settings) { return fits.run(settings); }, tuned.trials);
+  } catch (const StopRequested&) {
+    return std::nullopt;
+  }
+  for (const Trial& t : tuned.trials) {
+    base::log_info(fmt::format("tried tv {:8.3f}  rank {:3}  epochs {:4}: held-out error {:.5f}",
+                               t.settings.variation, t.settings.rank, t.settings.epochs, t.error));
+  }
+  base::log_info(fmt::format("tuned: --tv {:.3f} --rank {} --epochs {}", tuned.settings.variation,
+                             tuned.settings.rank, tuned.settings.epochs));
+  return tuned;
+}
+
+}  // namespace tomofield::reconstruct

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "reconstruct/fit.h"
+#include "reconstruct/tune.h"
+
+namespace tomofield::reconstruct {
+
+/// Trials of a tuning that are done, kept in a file (JSON) so that a run that was
+/// interrupted need not repeat them.
+class TrialFile {
+ public:
+  /// With `reuse`, reads the trials of an earlier run, if there are any. Throws
+  /// Error if they are of another `fingerprint` (series and options) or damaged.
+  TrialFile(std::filesystem::path path, std::string fingerprint, bool reuse);
+
+  std::optional<Trial> find(const TrialSettings& settings) const;
+  /// Adds a trial and writes the file anew.
+  void add(const Trial& trial);
+
+ private:
+  std::filesystem::path path_;
+  std::string fingerprint_;
+  std::vector<Trial> trials_;
+};
+
+/// The table of what was tried.
+nlohmann::json trials_json(const std::vector<Trial>& trials);
+
+struct TuneHooks {
+  base::ProgressSink progress;
+  std::function<bool()> stop_requested;  ///< asked after every step
+};
+
+struct Tuned {
+  TrialSettings settings;
+  std::vector<Trial> trials;
+};
+
+/// Chooses settings by search_settings(). A trial fits the views that
+/// `measurement` does not hold out, of a strip of rows in the middle: rays of a
+/// tilt about Y stay in their row, so a strip is the same problem, only shorter.
+/// Finished trials go to `file`, and those found there are not repeated. None if
+/// a stop was requested.
+std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& field,
+                          const FitOptions& fit, TrialFile& file, const TuneHooks& hooks);
+
+}  // namespace tomofield::reconstruct

@@ -1,0 +1,84 @@
+#include "reconstruct/tune.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+#include <tuple>
+#include <vector>
+
+namespace tomofield::reconstruct {
+namespace {
+
+// Errors of an imagined series: best at some weight, and better by `gain` a doubling of
+// the rank and of the epochs, up to what is needed. Views differ from each other, not
+// between trials, but for `scatter`.
+struct ImaginedSeries {
+  double best_variation = 10;
+  int needed_rank = 16, needed_epochs = 30;
+  double gain = 0.1, scatter = 0;
+  int num_trials = 0;
+
+  Trial run(const TrialSettings& s) {
+    ++num_trials;
+    const double doublings = std::log2(s.variation / best_variation);
+    double error = 1 + 0.02 * doublings * doublings;
+    error += gain * std::max(0.0, std::log2(static_cast<double>(needed_rank) / s.rank));
+    error += gain * std::max(0.0, std::log2(static_cast<double>(needed_epochs) / s.epochs));
+    Trial trial{s, error, {}, 0};
+    for (int view = 0; view < 12; ++view) {
+      const double sign = (view + num_trials) % 2 == 0 ? 1 : -1;
+      trial.view_error.push_back(error + 0.3 * view + sign * scatter);
+    }
+    return trial;
+  }
+};
+
+TrialSettings search(ImaginedSeries& series, std::vector<Trial>& trials, bool tunes_rank = true) {
+  return search_settings(
+      {9, 16, 30}, tunes_rank, [&](const TrialSettings& s) { return series.run(s); }, trials);
+}
+
+TEST(SearchSettings, FindsTheWeightWithinAFactorOfRootTwo) {
+  for (const double best : {0.2, 3.0, 9.0, 13.0, 100.0, 800.0}) {
+    ImaginedSeries series{.best_variation = best};
+    std::vector<Trial> trials;
+    const TrialSettings found = search(series, trials);
+    EXPECT_LE(std::abs(std::log2(found.variation / best)), 0.5) << best << " " << found.variation;
+    std::set<std::tuple<double, int, int>> distinct;
+    for (const Trial& t : trials)
+      distinct.insert({t.settings.variation, t.settings.rank, t.settings.epochs});
+    EXPECT_EQ(distinct.size(), trials.size()) << "tried twice";
+    EXPECT_EQ(static_cast<int>(trials.size()), series.num_trials);
+  }
+}
+
+TEST(SearchSettings, PaysForRankAndEpochsOnlyWhatHelps) {
+  ImaginedSeries modest{.needed_rank = 8, .needed_epochs = 15};
+  ImaginedSeries demanding{.needed_rank = 24, .needed_epochs = 60};
+  std::vector<Trial> trials;
+  TrialSettings found = search(modest, trials);
+  EXPECT_EQ(std::pair(found.rank, found.epochs), std::pair(8, 15));
+  trials.clear();
+  found = search(demanding, trials);
+  EXPECT_EQ(std::pair(found.rank, found.epochs), std::pair(24, 60));
+  trials.clear();
+  EXPECT_EQ(search(modest, trials, /*tunes_rank=*/false).rank, 16);
+}
+
+TEST(SearchSettings, TakesTheSmoothestOfWhatCannotBeToldApart) {
+  ImaginedSeries sure{.best_variation = 9}, unsure{.best_variation = 9, .scatter = 0.1};
+  std::vector<Trial> trials, unsure_trials;
+  EXPECT_NEAR(search(sure, trials).variation, 9, 1e-9);
+  EXPECT_GT(search(unsure, unsure_trials).variation, 9 * 1.4);
+}
+
+TEST(StandardErrorOfDifference, IgnoresWhatTrialsShare) {
+  const Trial a{{}, 0, {1.0, 5.0, 2.0}, 0}, b{{}, 0, {1.1, 5.1, 2.1}, 0},
+      c{{}, 0, {2.0, 5.0, 2.0}, 0};
+  EXPECT_NEAR(standard_error_of_difference(a, b), 0.0, 1e-7);
+  EXPECT_NEAR(standard_error_of_difference(a, c), 1.0 / 3, 1e-12);  // s = 1/√3, over √3
+}
+
+}  // namespace
+}  // namespace tomofield::reconstruct

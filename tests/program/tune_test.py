@@ -1,0 +1,117 @@
+"""reconstruct --hold-out, --early-stop and --tune: what they write and choose.
+
+usage: tune_test.py TOMOFIELD SCRATCH_DIR"""
+
+import json
+import os
+
+import numpy as np
+import skimage.io
+
+import harness
+from harness import HEIGHT, TILTS, WIDTH, read_bytes
+
+series = harness.Series("series")
+
+
+def record(results):
+    return json.load(open(results.json_path))
+
+
+def stem(results, suffix):
+    return results.volume_path[: -len(".mrc")] + suffix
+
+
+def test_hold_out_reports_the_error_of_every_fourth_view():
+    results = series.reconstruct("held", "--hold-out", 4)
+    held_out = record(results)["figures"]["held_out"]
+    curve = held_out["error_by_epoch"]
+    assert len(curve) == 8 and curve[-1] == held_out["error"] and curve[-1] < curve[0], curve
+    views = [view["view"] for view in held_out["views"]]
+    assert views == [2, 6, 10, 14, 18], views
+    np.testing.assert_allclose([view["tilt_deg"] for view in held_out["views"]], TILTS[views])
+    np.testing.assert_allclose(np.mean([view["error"] for view in held_out["views"]]), curve[-1],
+                               rtol=1e-3)
+    assert not results.same_as(series.reconstruct("all")), "held-out views were fitted"
+
+
+def test_picture_shows_measured_predicted_and_what_is_left():
+    results = series.reconstruct("picture", "--hold-out", 4, "--epochs", 16)
+    picture = skimage.io.imread(stem(results, "_held_out.png")).astype(float)
+    assert picture.shape == (HEIGHT, 3 * WIDTH + 8), picture.shape
+    measured, predicted, left = (picture[::-1, i * (WIDTH + 4):][:, :WIDTH] for i in range(3))
+    view = series.views[10]  # the one nearest to zero tilt
+    assert np.corrcoef(measured.ravel(), view.ravel())[0, 1] > 0.98
+    assert np.corrcoef(predicted.ravel(), view.ravel())[0, 1] > 0.8
+    inside = np.all([(0 < panel) & (panel < 255) for panel in (measured, predicted, left)], axis=0)
+    np.testing.assert_allclose((measured - predicted)[inside], (left - 127.5)[inside], atol=2)
+
+
+def test_early_stop_ends_the_fit_and_resumes_as_finished():
+    options = ["--hold-out", 4, "--tv", 0, "--epochs", 200, "--early-stop", 2]
+    results = series.reconstruct("early", *options)
+    curve = record(results)["figures"]["held_out"]["error_by_epoch"]
+    assert len(curve) < 200 and len(curve) == np.argmin(curve) + 3, curve
+    before = read_bytes(results.volume_path)
+    harness.succeed("reconstruct", *series.input, "-o", results.volume_path,
+                    *harness.merge(harness.QUICK, options), "--resume")
+    assert read_bytes(results.volume_path) == before
+
+
+TUNE = harness.merge(harness.QUICK, ["--epochs", 4, "--tune"])
+
+
+def test_tune_chooses_what_predicts_best_then_fits_all_views():
+    results = series.reconstruct("tuned", "--epochs", 4, "--tune", "--tv", 500)
+    written = record(results)
+    tuning = written["figures"]["tuning"]
+    trials, chosen = tuning["trials"], tuning["chosen"]
+    assert len(trials) >= 9 and len({(t["tv"], t["rank"], t["epochs"]) for t in trials}) == len(trials)
+    assert {t["rank"] for t in trials} >= {6, 8, 16, 24} and {t["epochs"] for t in trials} == {2, 4, 8}
+    assert chosen["tv"] < 250, chosen  # a weight of 500 leaves no specimen
+    options = written["options"]
+    assert options["fit"]["density_variation"] == chosen["tv"] and options["tune"] is True
+    assert options["field"]["rank"] == chosen["rank"] and options["fit"]["epochs"] == chosen["epochs"]
+    assert options["fit"]["hold_out"] == 0 and written["figures"]["held_out"] is None
+    by_hand = series.reconstruct("by_hand", "--tv", chosen["tv"], "--rank", chosen["rank"],
+                                 "--epochs", chosen["epochs"])
+    assert read_bytes(by_hand.volume_path) == read_bytes(results.volume_path)
+
+    # Interrupted after some trials: those are not repeated, and the result is the same.
+    path = stem(results, "_tune.json")
+    stored = json.load(open(path))
+    assert stored["trials"] == trials
+    stored["trials"] = stored["trials"][:5]
+    json.dump(stored, open(path, "w"))
+    before = read_bytes(results.volume_path)
+    for file in (results.volume_path, results.model_path, results.json_path):
+        os.remove(file)
+    again = ["reconstruct", *series.input, "-o", results.volume_path,
+             *harness.merge(TUNE, ["--tv", 500]), "--resume"]
+    harness.succeed(*again)
+    assert read_bytes(results.volume_path) == before
+    repeated = record(results)["figures"]["tuning"]["trials"]
+    assert repeated[:5] == trials[:5], "seconds show which trials were made anew"
+    assert [t["held_out_error"] for t in repeated] == [t["held_out_error"] for t in trials]
+
+    other = harness.tomofield(*again, "--seed", 2)
+    assert other.returncode == 2 and "_tune.json" in other.stderr, other.stderr
+    open(path, "w").write("{")
+    damaged = harness.tomofield(*again)
+    assert damaged.returncode == 2 and "damaged" in damaged.stderr, damaged.stderr
+
+
+def test_options_that_do_not_fit_are_refused():
+    for options, fact in ((["--hold-out", 1], "--hold-out"), (["--hold-out", 300], "21 views"),
+                          (["--early-stop", 3], "--hold-out"),
+                          (["--hold-out", 4, "--engine", "ray"], "--engine slab"),
+                          (["--tune", "--engine", "ray"], "--engine slab"),
+                          (["--tune", "--hold-out", 4, "--early-stop", 3], "--early-stop")):
+        output = os.path.join(harness.fresh_directory("refused"), "out.mrc")
+        result = harness.tomofield("reconstruct", *series.input, "-o", output,
+                                   *harness.merge(harness.QUICK, options))
+        assert result.returncode == 2 and fact in result.stderr, (options, result.stderr)
+        assert not os.listdir(os.path.dirname(output)), options
+
+
+harness.run_tests(globals())
