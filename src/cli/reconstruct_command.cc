@@ -26,11 +26,13 @@ void remember_signal(int signal) { g_signal = signal; }
 struct Arguments {
   reconstruct::ReconstructOptions options;
   std::string view_scale = "auto";
+  std::string activation = "auto";
   bool dry_run = false;
 };
 
-void add_field_options(CLI::App& command, reconstruct::FieldOptions& field) {
+void add_field_options(CLI::App& command, Arguments& arguments) {
   const char* group = "Field";
+  reconstruct::FieldOptions& field = arguments.options.field;
   command.add_option("--field", field.kind, "vm: vector-matrix factors; grid: plain vertices")
       ->check(CLI::IsMember({"vm", "grid"}))
       ->capture_default_str()
@@ -65,9 +67,10 @@ void add_field_options(CLI::App& command, reconstruct::FieldOptions& field) {
       ->capture_default_str()
       ->group(group);
   command
-      .add_option("--activation", field.activation,
-                  "softplus, or identity for densities of either sign")
-      ->check(CLI::IsMember({"softplus", "identity"}))
+      .add_option("--activation", arguments.activation,
+                  "softplus, or identity for densities of either sign; auto: identity for dark "
+                  "contrast, whose zero is uncertain")
+      ->check(CLI::IsMember({"auto", "softplus", "identity"}))
       ->capture_default_str()
       ->group(group);
 }
@@ -204,9 +207,13 @@ ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
 
 void run(Arguments& arguments) {
   reconstruct::ReconstructOptions& options = arguments.options;
+  const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
   options.fit.fit_view_scale =
-      arguments.view_scale == "on" ||
-      (arguments.view_scale == "auto" && options.input.contrast == tilt_series::Contrast::kDark);
+      arguments.view_scale == "on" || (arguments.view_scale == "auto" && is_dark);
+  if (arguments.activation != "auto")
+    options.field.activation = arguments.activation;
+  else if (is_dark)
+    options.field.activation = "identity";
   options.field.with_margin = options.specimen.with_margin;
   options.input.resample = options.fit.engine == "slab";
   reconstruct::check_options(options);
@@ -240,7 +247,7 @@ void add_reconstruct_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   add_input_options(command, arguments->options.input);
   add_specimen_options(command, arguments->options.specimen);
-  add_field_options(command, arguments->options.field);
+  add_field_options(command, *arguments);
   add_fit_options(command, *arguments);
   add_volume_options(command, arguments->options.volume);
   add_run_options(command, *arguments);

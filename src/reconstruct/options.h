@@ -13,7 +13,7 @@ struct FieldOptions {
   std::string tree = "uniform";  ///< or adaptive: leaves half and twice as wide where that pays
   int leaf_budget = 0;  ///< most leaves of an adaptive tree; 0: as many as the uniform one has
   double vertex_spacing = 1.0;  ///< between vertices, all axes; of leaves of that size
-  int rank = 16;                ///< of each mode, vm only
+  int rank = 24;                ///< of each mode, vm only
   bool with_margin = true;      ///< model what rays cross outside the region of interest
   double margin_spacing = 2.0;  ///< of samples and vertices there
   int margin_rank = 8;
@@ -28,20 +28,20 @@ struct FieldOptions {
 /// variations are relative to it and to the noise: weight / σ is used, with σ
 /// the typical noise of a ray in density units times pixels.
 struct FitOptions {
-  int epochs = 30;
+  int epochs = 40;
   int subsets = 16;                ///< interleaved tilt subsets: steps an epoch; at most one a view
   std::string engine = "slab";     ///< or ray: any view geometry, views as they were recorded
   int ray_samples = 0;             ///< N_max of eq. 10; 0: one a pixel of a leaf's diagonal
   std::int64_t rays_per_step = 0;  ///< about; 0: all rays of an epoch over `subsets`
   double learning_rate = 0.05;     ///< falls exponentially to learning_rate · final_rate
   double final_rate = 0.1;
-  double density_variation = 9.0;
+  double density_variation = 14.0;
   double factor_variation = 0.0;
   double boundary = 0.0;              ///< boundary consistency of leaves (eq. 6)
   double fourier = 0.0;               ///< isotropic Fourier prior (eq. 7)
   std::string fourier_ring = "mean";  ///< or max: what an axis may not exceed
   std::string penalty = "concave";    ///< or smooth, for both variations
-  double concavity = 0.1;             ///< τ of the concave penalty, in density units
+  double concavity = 0.05;            ///< τ of the concave penalty, in density units
   double gradient_floor = 1e-3;       ///< ε of both penalties, in density units a pixel
   bool fit_view_scale = false;        ///< per-view scale and offset as nuisances
   std::uint64_t seed = 1;

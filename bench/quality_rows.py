@@ -1,0 +1,138 @@
+"""Rows of a quality benchmark: a row is one way to reconstruct, run on one yardstick phantom
+(DESIGN §8) with one seed, scored against the truth and kept as one JSON file, so that a bench
+that was interrupted goes on with the row after. Seeds are not those of the tests."""
+
+import json
+import os
+import re
+import resource
+import statistics
+import subprocess
+import sys
+
+SEEDS = (101, 102, 103)
+HERE = os.path.dirname(os.path.abspath(__file__))
+PROJECT = os.path.dirname(HERE)
+
+
+def add_arguments(parser):
+    parser.add_argument("out", help="folder for phantoms and rows; a second run adds what is missing")
+    parser.add_argument("--program", default=os.path.join(PROJECT, "build/release/tomofield"))
+    parser.add_argument("--make-cell", help="make_cell.py, which makes the phantoms",
+                        default=os.path.join(PROJECT, "../shared/tools/make_cell.py"))
+    parser.add_argument("--size", type=int, default=128, help="thickness is 75/128 of it")
+    parser.add_argument("--seeds", default=",".join(map(str, SEEDS)))
+    parser.add_argument("--only", default="", help="rows whose name matches this expression")
+    parser.add_argument("--table", action="store_true", help="run nothing; print the table")
+
+
+def thickness_of(size):
+    return {128: 75, 256: 150, 512: 300}.get(size, round(size * 75 / 128))
+
+
+def phantom(options, kind, noise, seed):
+    """Folder of the phantom, made on demand. Kind A ends in the field of view, B does not."""
+    folder = os.path.join(options.out, "phantoms", f"{kind}{options.size}_{noise}_{seed}")
+    if not os.path.exists(os.path.join(folder, "tilt_series.tlt")):
+        subprocess.run(["/usr/bin/python3", options.make_cell, folder, "--size", str(options.size),
+                        "--thickness", str(thickness_of(options.size)), "--noise", str(noise),
+                        "--seed", str(seed)] + (["--extended"] if kind == "B" else []),
+                       check=True, stdout=subprocess.DEVNULL)
+    return folder
+
+
+def run_timed(command):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(command)}\n{done.stderr}")
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def measure(options, arguments, kind, noise, seed, scratch):
+    """Runs `tomofield ARGUMENTS…` on the phantom and scores what comes out."""
+    folder = phantom(options, kind, noise, seed)
+    volume = os.path.join(scratch, "volume.mrc")
+    command = [options.program, *arguments.split(), os.path.join(folder, "tilt_series.mrc"), "--tlt",
+               os.path.join(folder, "tilt_series.tlt"), "--thickness",
+               str(thickness_of(options.size)), "--contrast", "bright", "-o", volume, "--overwrite"]
+    command += ["--no-margin"] if kind == "A" else []
+    row = {"arguments": arguments, "kind": kind, "noise": noise, "seed": seed, "size": options.size}
+    row["core_seconds"] = run_timed(command)
+    scores = os.path.join(scratch, "scores.json")
+    truth = os.path.join(folder, "truth.mrc")
+    run_timed([options.program, "evaluate", volume, truth, "--json", scores, "--overwrite"])
+    with open(scores) as file:
+        row["scores"] = json.load(file)
+    with open(os.path.splitext(volume)[0] + ".json") as file:
+        figures = json.load(file)["figures"]
+    row.update({key: figures[key] for key in ("parameters", "leaves") if key in figures})
+    model = os.path.splitext(volume)[0] + ".h5"
+    if os.path.exists(model):
+        row["seam"] = script_json("seam.py", volume, "--truth", truth)["over_truth"]
+        row["streaks"] = (script_json("axis_streaks.py", volume)["ratio"]
+                          / script_json("axis_streaks.py", truth)["ratio"])
+        os.remove(model)
+    return row
+
+
+def script_json(script, *arguments):
+    done = subprocess.run(["/usr/bin/python3", os.path.join(HERE, script), *arguments], check=True,
+                          capture_output=True, text=True)
+    return json.loads(done.stdout)
+
+
+def run_rows(options, bench, rows):
+    """rows: {name: (arguments, kind, noise)}. Returns {name: [row of each seed]}."""
+    folder = os.path.join(options.out, bench)
+    scratch = os.path.join(folder, f"scratch-{os.getpid()}")
+    os.makedirs(scratch, exist_ok=True)
+    results = {}
+    for name, (arguments, kind, noise) in rows.items():
+        if not re.search(options.only, name):
+            continue
+        for seed in options.seeds.split(","):
+            safe = re.sub(r"[^\w.+-]+", "_", name)
+            path = os.path.join(folder, f"{safe}_{options.size}_{seed}.json")
+            if not os.path.exists(path):
+                if options.table:
+                    continue
+                row = measure(options, arguments, kind, noise, int(seed), scratch)
+                with open(path + ".part", "w") as file:
+                    json.dump(row, file, indent=1)
+                os.rename(path + ".part", path)
+                print(f"{name} seed {seed}: {psnr(row):.2f} dB, {row['core_seconds']:.0f} core-s",
+                      file=sys.stderr, flush=True)
+            with open(path) as file:
+                results.setdefault(name, []).append(json.load(file))
+    subprocess.run(["rm", "-rf", scratch], check=True)
+    return results
+
+
+def psnr(row):
+    return row["scores"]["psnr_raw_dB"]
+
+
+def ssim(row):
+    return row["scores"]["ssim_raw"]
+
+
+def mean_and_spread(values, digits=2):
+    if len(values) == 1:
+        return f"{values[0]:.{digits}f}"
+    return f"{statistics.mean(values):.{digits}f} ± {statistics.stdev(values):.{digits}f}"
+
+
+def print_table(results):
+    print("| row | PSNR, dB | SSIM | parameters | core-s | seam / truth's | streaks / truth's |")
+    print("|-|-|-|-|-|-|-|")
+    for name, rows in results.items():
+        cells = [name, mean_and_spread([psnr(r) for r in rows]),
+                 mean_and_spread([ssim(r) for r in rows], 3),
+                 f"{rows[0].get('parameters', 0) / 1e6:.2f} M",
+                 f"{statistics.median(r['core_seconds'] for r in rows):.0f}"]
+        for key in ("seam", "streaks"):
+            cells.append(mean_and_spread([r[key] for r in rows])
+                         if key in rows[0] else "")
+        print("| " + " | ".join(cells) + " |")
