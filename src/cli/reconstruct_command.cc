@@ -78,7 +78,18 @@ void add_field_options(CLI::App& command, Arguments& arguments) {
 void add_fit_options(CLI::App& command, Arguments& arguments) {
   const char* group = "Fit";
   reconstruct::FitOptions& fit = arguments.options.fit;
-  command.add_option("--epochs", fit.epochs, "passes over all views")
+  command.add_option("--epochs", fit.epochs, "passes over all views at full resolution")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--coarse-epochs", fit.coarse_epochs,
+                  "passes before them over binned views, with fewer vertices; 0: none")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--coarse-bin", fit.coarse_bin,
+                  "pixels of a coarse one on each axis, at most: a power of two that divides a "
+                  "sixteenth of a leaf's side")
       ->capture_default_str()
       ->group(group);
   command

@@ -176,6 +176,21 @@ std::vector<LeafOrigin> Field::edit(const QuadtreeEdit& edit,
   return std::move(edited.origins);
 }
 
+std::unique_ptr<Field> Field::resampled(std::vector<LeafShape> shapes) const {
+  auto after = make_field(kind(), tree_, thickness_, std::move(shapes));
+  after->bias = bias;
+  after->activation = activation;
+  base::parallel_for(tree_.num_leaves(), [&](std::int64_t i) {
+    const int leaf = static_cast<int>(i);
+    const LeafShape &from = shape(leaf), &to = after->shape(leaf);
+    TOMOFIELD_CHECK(
+        from.rank_x == to.rank_x && from.rank_y == to.rank_y && from.rank_z == to.rank_z,
+        "new vertices, not ranks");
+    resample_leaf(from, leaf_parameters(leaf), to, after->parameters_.data() + after->offset(leaf));
+  });
+  return after;
+}
+
 double vertex_height(double thickness) { return std::max(1.0, thickness - 1.0); }
 
 std::size_t count_parameters(const std::string& kind, const std::vector<LeafShape>& shapes) {

@@ -113,6 +113,11 @@ class Field {
   /// Starting values: every density close to act(bias).
   virtual void initialise(base::Random random, double scale) = 0;
 
+  /// The same field on the same tree with other vertices: every factor interpolated along
+  /// its axes. Nothing is lost where a leaf's vertices contain those that it had, as
+  /// with k (n − 1) + 1 for n. One shape a leaf, of the same ranks.
+  std::unique_ptr<Field> resampled(std::vector<LeafShape> shapes) const;
+
   /// Changes the tree, and with it the leaves' numbers and parameters. Every leaf keeps
   /// its vertex counts, so that a leaf half as wide is twice as fine (DESIGN §1). A
   /// split leaves the field as it is to rounding; a merge is the least-squares fit
@@ -132,6 +137,9 @@ class Field {
   /// Parameters of the quarter [x0, x0 + ½] × [y0, y0 + ½] (fractions of the leaf) of a leaf.
   virtual void sample_quarter(const LeafShape& shape, const float* leaf, double x0, double y0,
                               float* quarter) const = 0;
+  /// A leaf's parameters at other vertices.
+  virtual void resample_leaf(const LeafShape& from_shape, const float* from,
+                             const LeafShape& to_shape, float* to) const = 0;
   /// join_quarters() of every factor.
   virtual void join_leaves(const LeafShape& shape, const Quarters& leaves, float* joined) const = 0;
   /// Least-squares parameters of a merged leaf; `parameters` hold where to start.

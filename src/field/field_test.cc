@@ -164,6 +164,47 @@ TEST_P(EachField, DensityIsTheActivatedInterpolation) {
   }
 }
 
+// Calls visit(x, y, z) at points all over two_cells.
+template <typename Visit>
+void for_each_point(Visit&& visit) {
+  base::Random random(8);
+  for (int n = 0; n < 300; ++n)
+    visit(random.uniform(-15, 112), random.uniform(9, 72), random.uniform(0.5, kThickness - 0.5));
+}
+
+LeafShape with_vertices(LeafShape shape, int nx, int ny, int nz) {
+  shape.nx = nx;
+  shape.ny = ny;
+  shape.nz = nz;
+  return shape;
+}
+
+TEST_P(EachField, MoreVerticesBetweenThoseThatAreThereChangeNothing) {
+  const auto field = two_cells(GetParam(), 4.0f);
+  const auto finer = field->resampled({with_vertices(kFine, 9, 10, 13),  // 2, 3 and 2 times
+                                       with_vertices(kCoarse, 9, 5, 4)});
+  EXPECT_GT(finer->num_parameters(), 2 * field->num_parameters());
+  for_each_point([&](double x, double y, double z) {
+    ASSERT_NEAR(finer->density(x, y, z), field->density(x, y, z), 2e-6);
+  });
+}
+
+TEST_P(EachField, FewerVerticesTakeTheValuesThatAreThere) {
+  const auto field = two_cells(GetParam(), 0.0f);
+  const auto coarser = field->resampled({with_vertices(kFine, 4, 3, 5), kCoarse});
+  const Square square = field->tree().leaf(0).square;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      for (int k = 0; k < 5; ++k) {
+        const double x = static_cast<double>(square.x0) + 0.5 + 64.0 * i / 3 - 1e-9 * (i == 3);
+        const double y = static_cast<double>(square.y0) + 0.5 + 32.0 * j - 1e-9 * (j == 2);
+        const double z = 0.5 + (kThickness - 1) * k / 4;
+        EXPECT_NEAR(coarser->density(x, y, z), field->density(x, y, z), 3e-6);
+      }
+    }
+  }
+}
+
 TEST_P(EachField, DensityOutsideTheDomainIsZero) {
   const auto field = two_cells(GetParam(), 4.0f);
   EXPECT_GT(field->density(0, 20, 10), 0.0);

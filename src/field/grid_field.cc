@@ -135,6 +135,15 @@ void GridField::sample_quarter(const LeafShape& s, const float* leaf, double x0,
   halve_axis(along_x.data(), s.nx * s.nz, s.ny, 1, y0 * (s.ny - 1), quarter);
 }
 
+void GridField::resample_leaf(const LeafShape& f, const float* from, const LeafShape& t,
+                              float* to) const {
+  std::vector<float> along_x(static_cast<std::size_t>(t.nx) * f.nz * f.ny);
+  std::vector<float> along_xz(static_cast<std::size_t>(t.nx) * t.nz * f.ny);
+  resample_axis(from, 1, f.nx, f.nz * f.ny, t.nx, along_x.data());
+  resample_axis(along_x.data(), t.nx, f.nz, f.ny, t.nz, along_xz.data());
+  resample_axis(along_xz.data(), t.nx * t.nz, f.ny, 1, t.ny, to);
+}
+
 void GridField::join_leaves(const LeafShape& s, const Quarters& leaves, float* joined) const {
   join_quarters(leaves, {.x = s.nx, .middle = s.nz, .y = s.ny}, joined);
 }

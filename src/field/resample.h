@@ -17,6 +17,20 @@ struct AxisPoint {
   }
 };
 
+/// to[o, i, :] = from[o, :, :] by linear interpolation, n vertices to m on the same length.
+inline void resample_axis(const float* from, int outer, int n, int inner, int m, float* to) {
+  for (int o = 0; o < outer; ++o) {
+    for (int i = 0; i < m; ++i) {
+      const AxisPoint at(static_cast<double>(i) * (n - 1) / (m - 1), n);
+      const float fraction = static_cast<float>(at.fraction);
+      const float* lower = from + (static_cast<std::ptrdiff_t>(o) * n + at.lower) * inner;
+      float* out = to + (static_cast<std::ptrdiff_t>(o) * m + i) * inner;
+      for (int c = 0; c < inner; ++c)
+        out[c] = (1 - fraction) * lower[c] + fraction * lower[inner + c];
+    }
+  }
+}
+
 /// to[o, i, :] = from[o, first + i / 2, :] by linear interpolation, 0 <= i < n:
 /// the vertices of one half of an axis at half the spacing, which contain
 /// every vertex of that half, so that no breakpoint is lost.

@@ -387,6 +387,24 @@ void VmField::sample_quarter(const LeafShape& s, const float* leaf, double x0, d
   halve_axis(along_x.data(), s.nx, s.ny, s.rank_z, y_first, quarter + at.mxy);
 }
 
+void VmField::resample_leaf(const LeafShape& f, const float* from, const LeafShape& t,
+                            float* to) const {
+  const Layout at(f), into(t);
+  // [slow, fast, rank], the slow axis first.
+  const auto matrix = [&](std::size_t where, int slow, int fast, int rank, std::size_t target,
+                          int new_slow, int new_fast) {
+    std::vector<float> along_slow(static_cast<std::size_t>(new_slow) * fast * rank);
+    resample_axis(from + where, 1, slow, fast * rank, new_slow, along_slow.data());
+    resample_axis(along_slow.data(), new_slow, fast, rank, new_fast, to + target);
+  };
+  resample_axis(from + at.vx, 1, f.nx, f.rank_x, t.nx, to + into.vx);
+  matrix(at.myz, f.nz, f.ny, f.rank_x, into.myz, t.nz, t.ny);
+  resample_axis(from + at.vy, 1, f.ny, f.rank_y, t.ny, to + into.vy);
+  matrix(at.mxz, f.nx, f.nz, f.rank_y, into.mxz, t.nx, t.nz);
+  resample_axis(from + at.vz, 1, f.nz, f.rank_z, t.nz, to + into.vz);
+  matrix(at.mxy, f.nx, f.ny, f.rank_z, into.mxy, t.nx, t.ny);
+}
+
 void VmField::join_leaves(const LeafShape& s, const Quarters& leaves, float* joined) const {
   const Layout at(s);
   const auto join = [&](std::size_t where, const ArrayExtents& extents) {

@@ -44,6 +44,8 @@ class VmField final : public Field {
                           float* gradient) const override;
   void sample_quarter(const LeafShape& shape, const float* leaf, double x0, double y0,
                       float* quarter) const override;
+  void resample_leaf(const LeafShape& from_shape, const float* from, const LeafShape& to_shape,
+                     float* to) const override;
   void join_leaves(const LeafShape& shape, const Quarters& leaves, float* joined) const override;
   void fit_merged(const LeafShape& shape, const MergeTarget& target,
                   float* parameters) const override;

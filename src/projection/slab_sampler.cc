@@ -25,8 +25,8 @@ float* scratch(std::size_t size, int which) {
 }  // namespace
 
 SlabSampler::SlabSampler(const field::Field& field, const SampleGrid& grid, std::int64_t first_row,
-                         std::int64_t num_rows)
-    : field_(field), grid_(grid), first_row_(first_row), num_rows_(num_rows) {
+                         std::int64_t num_rows, int pixel)
+    : field_(field), grid_(grid), first_row_(first_row), num_rows_(num_rows), pixel_(pixel) {
   const auto& segments = grid.segments();
   row_origins_.assign(1, 0);
   for (std::size_t s = 0; s < segments.size(); ++s) {
@@ -39,7 +39,7 @@ SlabSampler::SlabSampler(const field::Field& field, const SampleGrid& grid, std:
       if (std::any_of(taps_z_.begin(), taps_z_.end(), known)) continue;
       TapsZ taps{.segment = s, .num_vertices = shape.nz, .lower = {}, .fraction = {}};
       for (int k = 0; k < segments[s].nz; ++k) {
-        const double height = (k + 0.5) * segments[s].hz - field::kPixelCentre;
+        const double height = pixel * (k + 0.5) * segments[s].hz - field::kPixelCentre;
         const field::AxisPoint at(height / field::vertex_height(field.thickness()) * (shape.nz - 1),
                                   shape.nz);
         taps.lower.push_back(static_cast<int>(at.lower));
@@ -48,12 +48,12 @@ SlabSampler::SlabSampler(const field::Field& field, const SampleGrid& grid, std:
       taps_z_.push_back(std::move(taps));
     }
   }
-  const std::int64_t band_rows = field.tree().roots().cell_size;
+  const std::int64_t band_rows = field.tree().roots().cell_size / pixel;
   TOMOFIELD_CHECK(field.tree().roots().y0 == first_row,
                   "slabs and root cells start at the same row");
   for (std::int64_t y = 0; y < num_rows; y += kLanes) {
     if (y % band_rows == 0) bands_.push_back({num_slabs(), num_slabs()});
-    slabs_.push_back(pieces_across(first_row + y, first_row + y + kLanes));
+    slabs_.push_back(pieces_across(y));
     bands_.back().end = num_slabs();
   }
 }
@@ -63,10 +63,10 @@ int SlabSampler::rows_in_slab(int slab) const {
       std::min<std::int64_t>(kLanes, num_rows_ - static_cast<std::int64_t>(slab) * kLanes));
 }
 
-std::vector<SlabSampler::Piece> SlabSampler::pieces_across(std::int64_t y0, std::int64_t y1) const {
+std::vector<SlabSampler::Piece> SlabSampler::pieces_across(std::int64_t row) const {
+  const std::int64_t y0 = first_row_ + pixel_ * row, y1 = y0 + pixel_ * kLanes;
   std::array<double, kLanes> y{};
-  for (int l = 0; l < kLanes; ++l)
-    y[static_cast<std::size_t>(l)] = static_cast<double>(y0 + l) + 0.5;
+  for (int l = 0; l < kLanes; ++l) y[static_cast<std::size_t>(l)] = row_centre(row + l);
   std::vector<Piece> pieces;
   for (const int leaf : field_.tree().leaves_across(y0, y1)) {
     const field::Square& square = field_.tree().leaf(leaf).square;
@@ -79,7 +79,7 @@ std::vector<SlabSampler::Piece> SlabSampler::pieces_across(std::int64_t y0, std:
       piece.leaf = leaf;
       piece.segment = s;
       for (int i = 0; i < segment.nx; ++i) {
-        const double x = segment.x0 + (i + 0.5) * segment.hx;
+        const double x = pixel_ * (segment.x0 + (i + 0.5) * segment.hx);
         if (field_.tree().find_leaf(x, y.front()) != leaf) continue;
         if (piece.lower_x.empty()) piece.first_sample = i;
         const field::AxisPoint at(field_.vertex_x(leaf, x), shape.nx);
@@ -146,7 +146,7 @@ void SlabSampler::decode_row(std::int64_t row, float* densities) const {
   for (const Piece& piece : slabs_[static_cast<std::size_t>(row / kLanes)]) {
     const field::LeafShape& shape = field_.shape(piece.leaf);
     float* values = scratch(shape.vertices_xz(), 0);
-    field_.row_values(piece.leaf, static_cast<double>(first_row_ + row) + 0.5, values);
+    field_.row_values(piece.leaf, row_centre(row), values);
     const TapsZ& z = taps_z(piece.segment, shape.nz);
     const int nz = grid_.segments()[piece.segment].nz;
     float* out =

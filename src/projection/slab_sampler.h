@@ -12,12 +12,13 @@ namespace tomofield::projection {
 /// Evaluates a field on the samples of a slab and carries gradients back: the
 /// bridge between leaves, which know nothing of sampling, and the projector,
 /// which knows nothing of leaves. Slab s covers rows
-/// [first_row + 16 s, first_row + 16 (s + 1)). Rebuild it when the tree changes.
-/// Thread-safe; `field` must outlive it and may change its parameters.
+/// first_row + pixel · [16 s, 16 (s + 1)): the grid and the rows count pixels of a
+/// coarse stage, `pixel` of the field's, in which first_row is given. Rebuild it when the tree
+/// changes. Thread-safe; `field` must outlive it and may change its parameters.
 class SlabSampler {
  public:
   SlabSampler(const field::Field& field, const SampleGrid& grid, std::int64_t first_row,
-              std::int64_t num_rows);
+              std::int64_t num_rows, int pixel = 1);
 
   int num_slabs() const { return static_cast<int>(slabs_.size()); }
   /// Rows of the volume in a slab: 16, or fewer in the last one.
@@ -60,14 +61,20 @@ class SlabSampler {
     std::vector<int> lower;
     std::vector<float> fraction;
   };
-  std::vector<Piece> pieces_across(std::int64_t y0, std::int64_t y1) const;
+  std::vector<Piece> pieces_across(std::int64_t row) const;
   const TapsZ& taps_z(std::size_t segment, int num_vertices) const;
   kernels::LeafPiece kernel_piece(const Piece& piece) const;
   std::ptrdiff_t sample_offset(const Piece& piece) const;
 
   const field::Field& field_;
   SampleGrid grid_;
+  /// In the field's coordinates, of row `row` counted from the first one.
+  double row_centre(std::int64_t row) const {
+    return static_cast<double>(first_row_) + pixel_ * (static_cast<double>(row) + 0.5);
+  }
+
   std::int64_t first_row_, num_rows_;
+  int pixel_;
   std::vector<std::vector<Piece>> slabs_;
   std::vector<Range> bands_;
   std::vector<TapsZ> taps_z_;

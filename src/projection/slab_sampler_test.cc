@@ -22,15 +22,15 @@ constexpr std::int64_t kFirstRow = -8;
 constexpr std::int64_t kRows = 90;  // the last slab has 10
 
 // Margin cells of 64 px on both sides of leaves of 64, 32 and 16 px, with
-// different numbers of vertices.
-std::unique_ptr<field::Field> uneven_field(const std::string& kind) {
+// different numbers of vertices. With `pixel` 2, the smallest are of 32 px.
+std::unique_ptr<field::Field> uneven_field(const std::string& kind, int pixel = 1) {
   using enum Region;
   const field::RootGrid roots{.x0 = -64, .y0 = kFirstRow, .cell_size = 64, .columns = 4, .rows = 2};
   field::Quadtree tree(roots, {kMargin, kInterest, kInterest, kMargin,  //
                                kMargin, kInterest, kInterest, kMargin});
   tree.split(1);
-  tree.split(2);
-  tree.split(12);  // second cell of interest of the second band
+  if (pixel == 1) tree.split(2);
+  tree.split(pixel == 1 ? 12 : 9);  // second cell of interest of the second band
   std::vector<field::LeafShape> shapes;
   for (int i = 0; i < tree.num_leaves(); ++i) {
     if (tree.leaf(i).region == kMargin) {
@@ -48,14 +48,14 @@ std::unique_ptr<field::Field> uneven_field(const std::string& kind) {
 }
 
 // The columns of interest at one pixel, the margins at four.
-SampleGrid uneven_grid() {
-  const auto segment = [](double x0, int nx, double h, int nz) {
+SampleGrid uneven_grid(int pixel = 1) {
+  const auto segment = [pixel](double x0, int nx, double h, int nz) {
     SampleSegment s;
-    s.x0 = x0;
-    s.nx = nx;
+    s.x0 = x0 / pixel;
+    s.nx = nx / pixel;
     s.hx = h;
     s.nz = nz;
-    s.hz = kThickness / nz;
+    s.hz = kThickness / pixel / nz;
     return s;
   };
   return SampleGrid({segment(0, 128, 1, 12), segment(-60, 15, 4, 3), segment(128, 16, 4, 3)});
@@ -63,14 +63,15 @@ SampleGrid uneven_grid() {
 
 // Calls visit(index into a slab buffer, x, y, z) for each sample.
 template <typename Visit>
-void for_each_sample(const SampleGrid& grid, int slab, Visit&& visit) {
+void for_each_sample(const SampleGrid& grid, int slab, Visit&& visit, int pixel = 1) {
   for (const SampleSegment& s : grid.segments()) {
     for (int k = 0; k < s.nz; ++k) {
       for (int i = 0; i < s.nx; ++i) {
         for (int l = 0; l < kLanes; ++l) {
           visit(static_cast<std::size_t>(s.origin + k * s.stride_z() + i * kLanes + l),
-                s.x0 + (i + 0.5) * s.hx, static_cast<double>(kFirstRow + slab * kLanes + l) + 0.5,
-                (k + 0.5) * s.hz);
+                pixel * (s.x0 + (i + 0.5) * s.hx),
+                static_cast<double>(kFirstRow) + pixel * (slab * kLanes + l + 0.5),
+                pixel * (k + 0.5) * s.hz);
         }
       }
     }
@@ -100,6 +101,37 @@ TEST_P(EachSampledField, DecodesTheDensityAtEverySample) {
     EXPECT_LE(largest, 3e-6) << "slab " << slab;
     EXPECT_EQ(samples, std::vector<float>(grid.size(), -7.0f)) << "padding was written";
     EXPECT_GT(written, 0u);
+  }
+}
+
+TEST_P(EachSampledField, DecodesCoarsePixelsToo) {
+  constexpr int kPixel = 2;
+  const auto field = uneven_field(GetParam(), kPixel);
+  const SampleGrid grid = uneven_grid(kPixel);
+  const SlabSampler sampler(*field, grid, kFirstRow, kRows / kPixel, kPixel);
+  ASSERT_EQ(sampler.num_slabs(), 3);
+  EXPECT_EQ(sampler.rows_in_slab(2), 13);
+  ASSERT_EQ(sampler.num_bands(), 2);
+  EXPECT_EQ(sampler.band(0).end, 2);
+  std::vector<float> row(sampler.row_size());
+  for (int slab = 0; slab < sampler.num_slabs(); ++slab) {
+    std::vector<float> samples(grid.size());
+    sampler.decode(slab, samples.data());
+    double largest = 0.0;
+    for_each_sample(
+        grid, slab,
+        [&](std::size_t at, double x, double y, double z) {
+          largest = std::max(largest,
+                             std::abs(static_cast<double>(samples[at]) - field->density(x, y, z)));
+        },
+        kPixel);
+    EXPECT_LE(largest, 3e-6) << "slab " << slab;
+    sampler.decode_row(slab * kLanes + 3, row.data());
+    const SampleSegment& first = grid.segments()[0];
+    EXPECT_NEAR(
+        row[static_cast<std::size_t>(5 * first.nz + 2)],
+        samples[static_cast<std::size_t>(first.origin + 2 * first.stride_z() + 5 * kLanes + 3)],
+        2e-6);
   }
 }
 

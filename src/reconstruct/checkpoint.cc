@@ -151,8 +151,7 @@ void restore_state(const std::string& path, const std::string& fingerprint,
         fmt::format("'{}' was made from another series or with other options (these differ: {})",
                     path, differences(found, fingerprint)));
   }
-  fit.set_field(std::move(stored));
-  Progress& progress = fit.progress();
+  Progress progress;
   progress.step = entry(state.integers, "step", path).at(0);
   progress.views = unflatten_views(entry(state.doubles, "views", path));
   progress.epoch_sums = unflatten_sums(entry(state.doubles, "epoch_sums", path));
@@ -160,6 +159,7 @@ void restore_state(const std::string& path, const std::string& fingerprint,
   progress.tree = unflatten_tree(entry(state.integers, "tree_updates", path),
                                  entry(state.doubles, "tree_errors", path));
   progress.held_out_error = entry(state.doubles, "held_out_error", path);
+  fit.go_on_from(std::move(progress), std::move(stored));
   if (fit.is_done()) return;
   optimize::Adam::State& adam = fit.optimizer().state();
   copy_moments(entry(state.floats, "adam_m", path), path, adam.m);

@@ -107,6 +107,28 @@ Domain make_domain(const geometry::RayGeometry& geometry, const geometry::Roi& r
   return cover(geometry.aligned.thickness, roi, reach_of_rays(geometry, roi), options);
 }
 
+const field::LeafShape& Domain::shape_in(field::Region region) const {
+  int leaf = 0;
+  while (tree.leaf(leaf).region != region) ++leaf;
+  return shapes[static_cast<std::size_t>(leaf)];
+}
+
+projection::SampleGrid sample_grid(const Domain& domain, double thickness, int bin) {
+  if (bin == 1) return domain.grid;
+  const auto& fine = domain.grid.segments();
+  const double x0 = fine.front().x0 / bin;
+  const double x1 = x0 + (fine.front().nx + bin - 1) / bin;
+  if (fine.size() == 1) return projection::make_sample_grid({x0, x1}, thickness / bin, x0, x1, 0);
+  const double spacing = fine.back().hx;
+  // Whole samples inside the field; half a one less, as the grid is rounded up.
+  const auto length = [spacing](double reach) {
+    return (std::floor(reach / spacing) - 0.5) * spacing;
+  };
+  return projection::make_sample_grid(
+      {x0 - length(x0 - domain.support.x0 / bin), x1 + length(domain.support.x1 / bin - x1)},
+      thickness / bin, x0, x1, spacing);
+}
+
 std::unique_ptr<field::Field> make_initial_field(const Domain& domain, double thickness,
                                                  double mean_density, const FieldOptions& options,
                                                  std::uint64_t seed) {

@@ -19,6 +19,9 @@ struct Domain {
   projection::SampleGrid grid;
   field::Quadtree tree;
   std::vector<field::LeafShape> shapes;
+
+  /// Of the leaves in a region, whatever becomes of the tree; it has some.
+  const field::LeafShape& shape_in(field::Region region) const;
 };
 
 Domain make_domain(const geometry::TiltGeometry& geometry, const geometry::Roi& roi,
@@ -27,6 +30,10 @@ Domain make_domain(const geometry::TiltGeometry& geometry, const geometry::Roi& 
 /// For views as they were recorded, whose rays also leave the region across its rows.
 Domain make_domain(const geometry::RayGeometry& geometry, const geometry::Roi& roi,
                    const FieldOptions& options);
+
+/// What `grid` covers at one sample a pixel of a stage, in its coordinates; margins end
+/// up to a sample earlier.
+projection::SampleGrid sample_grid(const Domain& domain, double thickness, int bin);
 
 /// A new field on the domain whose density is about `mean_density` everywhere.
 std::unique_ptr<field::Field> make_initial_field(const Domain& domain, double thickness,

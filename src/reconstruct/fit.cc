@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <utility>
 
+#include "base/log.h"
 #include "base/parallel.h"
 #include "base/random.h"
 #include "kernels/lanes.h"
@@ -86,17 +88,18 @@ Domain domain_of(const Measurement& measurement, const FieldOptions& options) {
                                   : make_domain(measurement.geometry, measurement.roi, options);
 }
 
-// The structure is open for this part of the epochs.
+// The structure is open for the coarse stage, or for this part of the only one.
 constexpr double kOpenPart = 0.4;
 
 TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
-                              const FitOptions& options) {
+                              const FitOptions& options, const Stage& first) {
   if (field.tree == "uniform") return {};
   const auto levels = leaves_by_level(domain.tree);
   const auto num_leaves = std::accumulate(levels.begin(), levels.end(), std::int64_t{0});
   return {std::max(field.leaf_size / 2, static_cast<int>(kernels::kLanes)),
           field.leaf_budget > 0 ? field.leaf_budget : static_cast<int>(num_leaves),
-          static_cast<std::int64_t>(kOpenPart * options.epochs), options.seed};
+          first.bin > 1 ? first.epochs - 1 : static_cast<std::int64_t>(kOpenPart * first.epochs),
+          options.seed};
 }
 
 }  // namespace
@@ -107,24 +110,70 @@ Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
       options_(with_at_most_one_subset_a_view(
           options,
           measurement.geometry.num_views() - static_cast<int>(measurement.held_out.size()))),
+      stages_(make_stages(field_options, options_)),
       domain_(domain_of(measurement, field_options)),
       field_(make_initial_field(domain_, measurement.geometry.thickness, measurement.mean_density,
                                 field_options, options.seed)),
       optimizer_(*field_, optimize::AdamOptions{}),
       fitted_views_(views_but(measurement.geometry.num_views(), measurement.held_out)),
-      projector_(measurement.geometry, domain_.grid),
-      tree_updates_(make_tree_updates(field_options, domain_, options)) {
-  for (const double sigma : measurement.noise_sigma)
+      tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())) {
+  if (options_.coarse_epochs > 0 && stages_.size() == 1 && options_.engine == "slab")
+    base::log_info(
+        "no coarse stage: leaves are too small (--leaf-size) for slabs of coarse pixels");
+  enter_stage();
+  if (stage().bin > 1) resample_field();
+  for (const double sigma : binned_->noise_sigma)
     progress_.views.push_back({1.0, 0.0, 1.0 / (sigma * sigma)});
   progress_.epoch_sums.resize(progress_.views.size());
+  follow_tree();
+}
+
+const Stage& Fit::stage() const {
+  const std::int64_t epoch = progress_.step / steps_per_epoch();
+  return *std::find_if(stages_.rbegin(), stages_.rend(),
+                       [&](const Stage& s) { return epoch >= s.first_epoch; });
+}
+
+// What is made for one resolution.
+void Fit::enter_stage() {
+  binned_.reset();  // before its successor needs memory
+  binned_.emplace(measurement_, stage().bin);
+  projector_.emplace(binned_->geometry,
+                     sample_grid(domain_, measurement_.geometry.thickness, stage().bin));
+}
+
+// To the vertices of the stage; the optimiser starts anew.
+void Fit::resample_field() {
+  std::vector<field::LeafShape> shapes;
+  const field::Quadtree& tree = field_->tree();
+  for (int leaf = 0; leaf < tree.num_leaves(); ++leaf)
+    shapes.push_back(coarser_shape(domain_.shape_in(tree.leaf(leaf).region), stage().bin));
+  field_ = field_->resampled(std::move(shapes));
+  optimizer_ = optimize::Adam(*field_, optimize::AdamOptions{});
+}
+
+// From the end of a stage to the start of the next.
+void Fit::refine() {
+  const int last_bin = std::prev(&stage())->bin;
+  enter_stage();
+  resample_field();
+  progress_.tree.is_frozen = true;
+  for (std::size_t v = 0; v < progress_.views.size(); ++v) {
+    const double sigma = binned_->noise_sigma[v];
+    progress_.views[v].weight = 1.0 / (sigma * sigma);
+    progress_.views[v].offset *= static_cast<double>(last_bin) / stage().bin;  // rays are longer
+  }
   follow_tree();
 }
 
 // What is made for one tree.
 void Fit::follow_tree() {
   gradient_.reset(field_->num_parameters());
-  sampler_.emplace(*field_, domain_.grid, domain_.first_row, domain_.num_rows);
-  const double noise = typical_noise(measurement_.noise_sigma);
+  const int bin = stage().bin;
+  sampler_.emplace(*field_, projector_->grid(), domain_.first_row,
+                   (domain_.num_rows + bin - 1) / bin, bin);
+  // These two count fine pixels: bin³ to one of the stage.
+  const double noise = typical_noise(binned_->noise_sigma) * bin * bin * bin;
   boundary_.emplace(*field_, leaves_of_bands(*sampler_), boundary_options(options_, noise));
   fourier_.emplace(*field_, measurement_.roi, fourier_options(options_, noise));
   if (measurement_.ray_geometry) {
@@ -138,7 +187,9 @@ void Fit::follow_tree() {
   }
 }
 
-void Fit::set_field(std::unique_ptr<field::Field> field) {
+void Fit::go_on_from(Progress progress, std::unique_ptr<field::Field> field) {
+  progress_ = std::move(progress);
+  enter_stage();
   field_ = std::move(field);
   optimizer_ = optimize::Adam(*field_, optimize::AdamOptions{});
   follow_tree();
@@ -148,26 +199,30 @@ int Fit::steps_per_epoch() const {
   return ray_term_ ? ray_term_->steps_per_epoch() : options_.subsets;
 }
 
-std::int64_t Fit::num_steps() const {
-  return static_cast<std::int64_t>(options_.epochs) * steps_per_epoch();
-}
+std::int64_t Fit::num_steps() const { return num_epochs() * steps_per_epoch(); }
+
+std::int64_t Fit::num_epochs() const { return stages_.back().first_epoch + stages_.back().epochs; }
 
 bool Fit::is_done() const {
   if (progress_.step == num_steps()) return true;
+  // Errors of a coarse stage are those of other pixels.
+  const auto first = static_cast<std::size_t>(stages_.back().first_epoch);
   const std::vector<double>& errors = progress_.held_out_error;
-  if (options_.patience == 0 || errors.empty()) return false;
-  return errors.end() - std::ranges::min_element(errors) > options_.patience;
+  if (options_.patience == 0 || errors.size() <= first) return false;
+  const auto fine =
+      std::ranges::subrange(errors.begin() + static_cast<std::ptrdiff_t>(first), errors.end());
+  return fine.end() - std::ranges::min_element(fine) > options_.patience;
 }
 
 HeldOutError Fit::held_out_error() const {
   std::vector<double> weights;
   for (const loss::ViewModel& view : progress_.views) weights.push_back(view.weight);
-  return reconstruct::held_out_error(*sampler_, projector_, *measurement_.rays,
-                                     measurement_.held_out, weights, options_.fit_view_scale);
+  return reconstruct::held_out_error(*sampler_, *projector_, *binned_->rays, measurement_.held_out,
+                                     weights, options_.fit_view_scale);
 }
 
 PredictedView Fit::predict_held_out(int view, const loss::ViewModel& model) const {
-  return predicted_view(*sampler_, projector_, *measurement_.rays, view, model);
+  return predicted_view(*sampler_, *projector_, *binned_->rays, view, model);
 }
 
 void Fit::run(const AfterStep& after_step) {
@@ -197,8 +252,11 @@ std::vector<int> Fit::subset_of_step(std::int64_t step) const {
 }
 
 double Fit::learning_rate(std::int64_t step) const {
-  const double done = static_cast<double>(step) / static_cast<double>(num_steps());
-  return options_.learning_rate * std::pow(options_.final_rate, done);
+  const Stage& s = stage();
+  const double done =
+      (static_cast<double>(step) / steps_per_epoch() - static_cast<double>(s.first_epoch)) /
+      s.epochs;
+  return s.first_rate * std::pow(s.last_rate / s.first_rate, done);
 }
 
 void Fit::take_step(const std::vector<int>& views) {
@@ -213,14 +271,14 @@ void Fit::take_step(const std::vector<int>& views) {
 
 // The data term of these views and total variation; returns dL/d bias.
 double Fit::add_slab_gradient(const std::vector<int>& views) {
-  ObjectiveWeights weights = objective_weights(options_, typical_noise(measurement_.noise_sigma));
+  ObjectiveWeights weights = objective_weights(options_, typical_noise(binned_->noise_sigma));
   // Each step looks at edges from another corner: forward differences alone treat
   // their two sides differently.
   base::Random directions(options_.seed,
                           kDirectionStream + static_cast<std::uint64_t>(progress_.step));
   weights.backward_x = directions.below(2) == 1;
   weights.backward_z = directions.below(2) == 1;
-  const SlabObjective objective(*sampler_, projector_, *measurement_.rays, *field_, weights);
+  const SlabObjective objective(*sampler_, *projector_, *binned_->rays, *field_, weights);
   const double multiplicity =
       static_cast<double>(fitted_views_.size()) / std::max(static_cast<double>(views.size()), 1.0);
   std::vector<BandResult> bands(static_cast<std::size_t>(sampler_->num_bands()));
@@ -278,6 +336,7 @@ void Fit::end_epoch() {
   if (!measurement_.held_out.empty()) score_held_out();
   const std::int64_t epochs_done = progress_.step / steps_per_epoch();
   if (tree_updates_.update(epochs_done, *field_, optimizer_.state(), progress_.tree)) follow_tree();
+  if (epochs_done > 0 && epochs_done == stage().first_epoch) refine();
 }
 
 }  // namespace tomofield::reconstruct

@@ -8,8 +8,6 @@
 #include <vector>
 
 #include "field/field.h"
-#include "geometry/ray_geometry.h"
-#include "geometry/tilt_geometry.h"
 #include "loss/boundary_consistency.h"
 #include "loss/data_term.h"
 #include "loss/fourier_prior.h"
@@ -18,26 +16,13 @@
 #include "projection/slab_sampler.h"
 #include "reconstruct/domain.h"
 #include "reconstruct/held_out.h"
+#include "reconstruct/measurement.h"
 #include "reconstruct/options.h"
 #include "reconstruct/ray_term.h"
+#include "reconstruct/stages.h"
 #include "reconstruct/tree_updates.h"
-#include "tilt_series/slab_views.h"
 
 namespace tomofield::reconstruct {
-
-/// What is fitted: the geometry, the measured rays (divided by the density
-/// unit) and the noise of each view in the same units.
-struct Measurement {
-  geometry::TiltGeometry geometry;
-  geometry::Roi roi;
-  const tilt_series::SlabViews* rays = nullptr;
-  std::vector<double> noise_sigma;
-  double mean_density = 0.0;
-  /// For the ray engine: how `rays`, which are then the views as recorded, look at the specimen.
-  std::optional<geometry::RayGeometry> ray_geometry;
-  /// Views that carry no loss and only tell how well the others predict them (slab engine).
-  std::vector<int> held_out;
-};
 
 /// Where a fit stands between two steps: everything that a resumed run needs
 /// beside the field and the optimiser.
@@ -52,7 +37,8 @@ struct Progress {
 
 /// The loop of DESIGN §5. With the slab engine, a step uses every slab and one
 /// subset of the views; with the ray engine, a random share of the rays of all
-/// views, while slabs without views carry the regularisers.
+/// views, while slabs without views carry the regularisers. With a coarse stage, the
+/// field has its vertices and steps until its epochs are over, and is refined then.
 class Fit {
  public:
   Fit(const Measurement& measurement, const FieldOptions& field_options, const FitOptions& options);
@@ -68,16 +54,16 @@ class Fit {
   HeldOutError held_out_error() const;
   PredictedView predict_held_out(int view, const loss::ViewModel& model) const;
   int steps_per_epoch() const;
+  std::int64_t num_epochs() const;  ///< of all stages
   const field::Field& field() const { return *field_; }
   field::Field& field() { return *field_; }
-  /// Goes on with another tree and parameters, of the same options; the optimiser starts anew.
-  void set_field(std::unique_ptr<field::Field> field);
+  /// Goes on where another fit of the same options stood; the optimiser starts anew.
+  void go_on_from(Progress progress, std::unique_ptr<field::Field> field);
   /// The fitted field, for good: the fit cannot go on afterwards.
   std::unique_ptr<field::Field> take_field() { return std::move(field_); }
   const optimize::Adam& optimizer() const { return optimizer_; }
   optimize::Adam& optimizer() { return optimizer_; }
   const Progress& progress() const { return progress_; }
-  Progress& progress() { return progress_; }
 
  private:
   std::vector<int> subset_of_step(std::int64_t step) const;
@@ -88,17 +74,23 @@ class Fit {
   double add_ray_gradient();
   void score_held_out();
   void end_epoch();
+  const Stage& stage() const;
+  void enter_stage();
+  void resample_field();
+  void refine();
   void follow_tree();
 
   const Measurement& measurement_;
   FitOptions options_;
+  std::vector<Stage> stages_;
   Domain domain_;
   std::unique_ptr<field::Field> field_;
   optimize::Adam optimizer_;
   Progress progress_;
   std::vector<int> fitted_views_;
   base::AlignedBuffer<float> gradient_;
-  projection::SlabProjector projector_;
+  std::optional<BinnedMeasurement> binned_;  ///< as the stage sees it
+  std::optional<projection::SlabProjector> projector_;
   std::optional<projection::SlabSampler> sampler_;
   std::optional<loss::BoundaryConsistency> boundary_;
   std::optional<loss::FourierPrior> fourier_;

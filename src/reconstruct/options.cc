@@ -66,6 +66,8 @@ std::vector<std::string> FieldOptions::faults() const {
 std::vector<std::string> FitOptions::faults() const {
   Faults faults;
   faults.require_between("--epochs", epochs, 1, kMost);
+  faults.require_between("--coarse-epochs", coarse_epochs, 0, kMost);
+  faults.require_between("--coarse-bin", coarse_bin, 2, 64);
   faults.require_between("--subsets", subsets, 1, kMost);
   faults.require_one_of("--engine", engine, "slab", "ray");
   faults.require_between("--ray-samples", ray_samples, 0, 1 << 20);

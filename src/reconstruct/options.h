@@ -28,13 +28,17 @@ struct FieldOptions {
 /// variations are relative to it and to the noise: weight / σ is used, with σ
 /// the typical noise of a ray in density units times pixels.
 struct FitOptions {
-  int epochs = 40;
+  int epochs = 40;                 ///< at full resolution
+  int coarse_epochs = 0;           ///< before them, with fewer pixels and vertices; 0: none
+  int coarse_bin = 2;              ///< how many times fewer on each axis, at most; a power of two
   int subsets = 16;                ///< interleaved tilt subsets: steps an epoch; at most one a view
   std::string engine = "slab";     ///< or ray: any view geometry, views as they were recorded
   int ray_samples = 0;             ///< N_max of eq. 10; 0: one a pixel of a leaf's diagonal
   std::int64_t rays_per_step = 0;  ///< about; 0: all rays of an epoch over `subsets`
   double learning_rate = 0.05;     ///< falls exponentially to learning_rate · final_rate
   double final_rate = 0.1;
+  double coarse_final_rate = 0.3;  ///< of the coarse stage
+  double refined_rate = 0.5;       ///< where the fine stage starts after a coarse one
   double density_variation = 14.0;
   double factor_variation = 0.0;
   double boundary = 0.0;              ///< boundary consistency of leaves (eq. 6)

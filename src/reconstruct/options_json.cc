@@ -68,12 +68,16 @@ json field_json(const FieldOptions& o) {
 
 json fit_json(const FitOptions& o) {
   return {{"epochs", o.epochs},
+          {"coarse_epochs", o.coarse_epochs},
+          {"coarse_bin", o.coarse_bin},
           {"subsets", o.subsets},
           {"engine", o.engine},
           {"ray_samples", o.ray_samples},
           {"rays_per_step", o.rays_per_step},
           {"learning_rate", o.learning_rate},
           {"final_rate", o.final_rate},
+          {"coarse_final_rate", o.coarse_final_rate},
+          {"refined_rate", o.refined_rate},
           {"density_variation", o.density_variation},
           {"factor_variation", o.factor_variation},
           {"boundary", o.boundary},

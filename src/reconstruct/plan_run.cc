@@ -9,6 +9,7 @@
 #include "reconstruct/domain.h"
 #include "reconstruct/fit.h"
 #include "reconstruct/reconstruct.h"
+#include "reconstruct/stages.h"
 #include "tilt_series/slab_views.h"
 #include "tomofield/error.h"
 
@@ -71,6 +72,11 @@ std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, co
   const std::size_t copies = resumes || options.field.tree == "adaptive" ? 7 : 4;
   const std::size_t parameters = copies * sizeof(float) * run.num_parameters;
   const std::size_t rays = tilt_series::SlabViews::least_memory(plan.rays_shape());
+  const int coarse_bin = make_stages(options.field, options.fit).front().bin;
+  const std::size_t coarse_rays =
+      coarse_bin == 1 ? 0
+                      : tilt_series::SlabViews::least_memory(
+                            tilt_series::SlabViews::binned_shape(plan.rays_shape(), coarse_bin));
   const int steps = steps_an_epoch(plan, options.fit);
   const int views_a_step = plan.ray_geometry ? 0 : (run.num_views + steps - 1) / steps;
   const std::size_t fitting = parameters + static_cast<std::size_t>(base::thread_count()) *
@@ -79,7 +85,7 @@ std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, co
       plan.ray_geometry
           ? RayTerm::working_memory(*plan.ray_geometry, domain, options.fit, plan.rays_shape())
           : 0;
-  return kProgram + rays + std::max(fitting + tracing, reading_memory(plan));
+  return kProgram + rays + coarse_rays + std::max(fitting + tracing, reading_memory(plan));
 }
 
 }  // namespace
@@ -97,7 +103,8 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.thickness = plan.geometry.thickness;
   run.num_leaves = domain.tree.num_leaves();
   run.num_parameters = most_parameters(domain, options.field);
-  run.num_steps = static_cast<std::int64_t>(options.fit.epochs) * steps_an_epoch(plan, options.fit);
+  const Stage last = make_stages(options.field, options.fit).back();
+  run.num_steps = (last.first_epoch + last.epochs) * steps_an_epoch(plan, options.fit);
   run.memory_bytes = estimate_memory(plan, domain, run, options);
   base::require_memory(run.memory_bytes, "this reconstruction",
                        "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, or "

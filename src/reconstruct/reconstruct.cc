@@ -102,7 +102,7 @@ std::filesystem::path directory_of(const std::filesystem::path& file) {
   return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
-base::ProgressReport progress_report(const Fit& fit, int num_epochs, std::int64_t first_step,
+base::ProgressReport progress_report(const Fit& fit, std::int64_t first_step,
                                      Clock::time_point start) {
   base::ProgressReport report;
   const double done = static_cast<double>(fit.progress().step),
@@ -112,10 +112,10 @@ base::ProgressReport progress_report(const Fit& fit, int num_epochs, std::int64_
   const double rate = (done - static_cast<double>(first_step)) / report.seconds_elapsed;
   report.seconds_left = (all - done) / rate;
   const auto& loss = fit.progress().data_loss;
-  const std::int64_t epoch = (fit.progress().step - 1) * num_epochs / fit.num_steps() + 1;
+  const std::int64_t epoch = (fit.progress().step - 1) / fit.steps_per_epoch() + 1;
   const auto& held_out = fit.progress().held_out_error;
   report.detail =
-      fmt::format("epoch {}/{}  loss {}{}  {:.1f} steps/s", epoch, num_epochs,
+      fmt::format("epoch {}/{}  loss {}{}  {:.1f} steps/s", epoch, fit.num_epochs(),
                   loss.empty() ? "-" : fmt::format("{:.4f}", loss.back()),
                   held_out.empty() ? "" : fmt::format("  held out {:.4f}", held_out.back()), rate);
   return report;
@@ -295,7 +295,7 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
   const std::int64_t first_step = fit.progress().step;
   bool stopped = false;
   fit.run([&](const Fit&) {
-    if (hooks.progress) hooks.progress(progress_report(fit, options.fit.epochs, first_step, start));
+    if (hooks.progress) hooks.progress(progress_report(fit, first_step, start));
     stopped = hooks.stop_requested && hooks.stop_requested() && !fit.is_done();
     if (stopped || seconds_since(last_checkpoint) > 60 * options.checkpoint_minutes) {
       save_checkpoint(paths.model, fit, model_info(series, options), fingerprint);

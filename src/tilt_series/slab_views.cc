@@ -57,7 +57,9 @@ std::size_t SlabViews::least_memory(const Shape& shape) {
 
 SlabViews::SlabViews(const Shape& shape, double unit, const ReadView& read_view,
                      const std::filesystem::path& scratch_dir)
-    : shape_(shape), num_slabs_(static_cast<int>((shape.num_rows + kLanes - 1) / kLanes)) {
+    : shape_(shape),
+      scratch_dir_(scratch_dir),
+      num_slabs_(static_cast<int>((shape.num_rows + kLanes - 1) / kLanes)) {
   const std::size_t lines = static_cast<std::size_t>(num_slabs_) * shape.num_views *
                             static_cast<std::size_t>(shape.width);
   const std::size_t ray_bytes = lines * kLanes * sizeof(float);
@@ -108,6 +110,42 @@ void SlabViews::fill(double unit, const ReadView& read_view) {
       }
     }
   }
+}
+
+SlabViews::Shape SlabViews::binned_shape(const Shape& shape, int bin) {
+  const std::int64_t rows = (shape.num_rows + bin - 1) / bin;
+  return {shape.num_views, (shape.width + bin - 1) / bin, rows, 0, rows};
+}
+
+std::unique_ptr<SlabViews> SlabViews::binned(int bin) const {
+  const Shape coarse = binned_shape(shape_, bin);
+  const auto read_view = [&](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
+    const int view = static_cast<int>(v);
+    for (std::int64_t y = 0; y < coarse.height; ++y) {
+      for (std::int64_t x = 0; x < coarse.width; ++x) {
+        const std::size_t at = static_cast<std::size_t>(y * coarse.width + x);
+        const auto [sum, count] = box_sum(view, x * bin, y * bin, bin);
+        valid[at] = 2 * count >= bin * bin;
+        image[at] = valid[at] ? static_cast<float>(sum / count) : 0.0f;
+      }
+    }
+  };
+  return std::make_unique<SlabViews>(coarse, bin, read_view, scratch_dir_);
+}
+
+// Over the rays that count in a box, and how many do.
+std::pair<double, int> SlabViews::box_sum(int view, std::int64_t x0, std::int64_t y0,
+                                          int size) const {
+  double sum = 0.0;
+  int count = 0;
+  for (std::int64_t y = y0; y < std::min(y0 + size, shape_.num_rows); ++y) {
+    for (std::int64_t x = x0; x < std::min(x0 + size, shape_.width); ++x) {
+      if (!counts(view, x, y)) continue;
+      sum += static_cast<double>(ray(view, x, y));
+      ++count;
+    }
+  }
+  return {sum, count};
 }
 
 std::int64_t SlabViews::num_valid(int view) const {

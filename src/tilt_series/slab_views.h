@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <span>
+#include <utility>
 
 #include "base/lanes.h"
 
@@ -35,6 +37,13 @@ class SlabViews {
   SlabViews(const SlabViews&) = delete;
   SlabViews& operator=(const SlabViews&) = delete;
 
+  /// Means over bin × bin pixels, from the first column and row on, in units `bin` times
+  /// as large, as rays count pixels; coarse pixels that at least half of their pixels
+  /// count for count. Columns and rows of fewer than `bin` are coarse ones too.
+  std::unique_ptr<SlabViews> binned(int bin) const;
+  /// The shape of `binned` ones.
+  static Shape binned_shape(const Shape& shape, int bin);
+
   const Shape& shape() const { return shape_; }
   int num_slabs() const { return num_slabs_; }
   const float* rays(int slab, int view) const;          ///< [x, lane]
@@ -53,10 +62,12 @@ class SlabViews {
 
  private:
   static constexpr std::int64_t kRows = base::kLanes;  // of a slab
+  std::pair<double, int> box_sum(int view, std::int64_t x0, std::int64_t y0, int size) const;
   void fill(double unit, const ReadView& read_view);
   std::size_t line(int slab, int view) const;
 
   Shape shape_;
+  std::filesystem::path scratch_dir_;
   int num_slabs_ = 0;
   std::size_t bytes_ = 0;
   void* memory_ = nullptr;

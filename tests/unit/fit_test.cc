@@ -14,7 +14,10 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
+#include "field/model_file.h"
 #include "kernels/lanes.h"
+#include "reconstruct/checkpoint.h"
+#include "scratch_directory.h"
 #include "simulate/project_phantom.h"
 
 namespace tomofield::reconstruct {
@@ -170,7 +173,8 @@ TEST_P(FindsTheBead, WhereItIs) {
   FieldOptions options = field_options(c.field);
   options.with_margin = c.with_margin;
   FitOptions fit_options;
-  fit_options.epochs = 12;
+  fit_options.coarse_epochs = 5;
+  fit_options.epochs = 10;
   Fit fit(series.measurement(), options, fit_options);
   fit.run([](const Fit&) { return true; });
   const auto found = center_of_mass(fit.field(), g);
@@ -297,6 +301,7 @@ TEST(Fit, EveryEpochUsesEachViewOnce) {
   geometry::TiltGeometry g = geometry::centred_geometry(16, 20, 8, tilts(-48, 48, 8));
   const BeadSeries series(g, Bead({8, 10, 4}), 4);
   FitOptions options;
+  options.coarse_epochs = 0;
   options.epochs = 2;
   options.subsets = 5;  // 13 views: subsets of 3 and 2
   Fit fit(series.measurement(), field_options("grid"), options);
@@ -319,10 +324,105 @@ TEST(Fit, EveryEpochUsesEachViewOnce) {
   EXPECT_EQ(fit.progress().data_loss.size(), 2u);
 }
 
+// 25 views of a bead, fitted in a coarse and a fine stage.
+class CoarseToFine : public ::testing::TestWithParam<const char*> {
+ protected:
+  static constexpr int kCoarseEpochs = 4, kEpochs = 3;
+  std::unique_ptr<Fit> make_fit(int coarse_epochs = kCoarseEpochs) const {
+    FieldOptions field = field_options(GetParam());
+    field.with_margin = false;
+    FitOptions options;
+    options.coarse_epochs = coarse_epochs;
+    options.epochs = kEpochs;
+    options.subsets = 5;
+    options.fit_view_scale = true;
+    return std::make_unique<Fit>(measurement_, field, options);
+  }
+  // Root mean square of the density's deviation from the bead's.
+  double error_of(const Fit& fit) const {
+    double squares = 0, n = 0;
+    for (double z = 0.5; z < 24; ++z) {
+      for (double y = 0.5; y < 43; ++y) {
+        for (double x = 0.5; x < 41; ++x, ++n) {
+          const auto inside = [&](const std::array<double, 3>& c, double radius) {
+            return std::hypot(x - c[0], y - c[1], z - c[2]) < radius;
+          };
+          const double truth =
+              inside(bead_.large, Bead::kLarge) || inside(bead_.small, Bead::kSmall) ? 1 : 0;
+          squares += std::pow(fit.field().density(x, y, z) - truth, 2);
+        }
+      }
+    }
+    return std::sqrt(squares / n);
+  }
+  const Bead bead_{{17.3, 20.6, 11.2}};
+  const BeadSeries series_{geometry::centred_geometry(41, 43, 24, tilts(-60, 60, 5)), bead_, 3};
+  const Measurement measurement_ = series_.measurement();
+};
+INSTANTIATE_TEST_SUITE_P(Kinds, CoarseToFine, ::testing::Values("vm", "grid"),
+                         [](const auto& kind) { return std::string(kind.param); });
+
+TEST_P(CoarseToFine, StartsTheFineStageCloserToTheSpecimen) {
+  const auto both = make_fit(), fine_alone = make_fit(0);
+  EXPECT_EQ(fine_alone->num_steps(), kEpochs * 5);
+  ASSERT_EQ(both->num_steps(), (kCoarseEpochs + kEpochs) * 5);
+  std::size_t coarse_size = 0, fine_size = 0;
+  double coarse_error = 0;
+  both->run([&](const Fit& fit) {
+    const std::int64_t step = fit.progress().step;
+    if (step == 1) coarse_size = fit.field().num_parameters();
+    if (step == kCoarseEpochs * 5) coarse_error = error_of(fit);  // just refined
+    fine_size = fit.field().num_parameters();
+    return true;
+  });
+  fine_alone->run([](const Fit&) { return true; });
+  EXPECT_EQ(fine_size, fine_alone->field().num_parameters());
+  EXPECT_LT(coarse_size, fine_size / 3);
+  EXPECT_EQ(both->progress().data_loss.size(), static_cast<std::size_t>(kCoarseEpochs + kEpochs));
+  EXPECT_LT(error_of(*both), error_of(*fine_alone));
+  EXPECT_LT(error_of(*both), coarse_error);
+}
+
+TEST_P(CoarseToFine, GoesOnFromACheckpointOfEitherStageToTheSameBits) {
+  const auto whole = make_fit();
+  whole->run([](const Fit&) { return true; });
+  for (const std::int64_t pause_at : {3, kCoarseEpochs * 5 - 1, kCoarseEpochs * 5, 27}) {
+    const testing::ScratchDirectory scratch;
+    const auto first = make_fit();
+    first->run([&](const Fit& fit) { return fit.progress().step != pause_at; });
+    field::ModelInfo info;
+    info.geometry = measurement_.geometry;
+    info.roi = measurement_.roi;
+    save_checkpoint(scratch / "fit.h5", *first, info, "{}");
+    field::TrainingState state;
+    field::Model model = field::load_model(scratch / "fit.h5", &state);
+    const auto second = make_fit();
+    restore_state("fit.h5", "{}", std::move(model.field), state, *second);
+    EXPECT_EQ(second->progress().step, pause_at);
+    second->run([](const Fit&) { return true; });
+    EXPECT_TRUE(std::ranges::equal(second->field().parameters(), whole->field().parameters()))
+        << pause_at;
+    EXPECT_EQ(second->progress().data_loss, whole->progress().data_loss);
+    EXPECT_EQ(second->progress().views[2].offset, whole->progress().views[2].offset);
+  }
+}
+
+TEST_P(CoarseToFine, SameBitsForAnyNumberOfThreads) {
+  const auto run = [&](int threads) {
+    base::set_thread_count(threads);
+    const auto fit = make_fit(1);
+    fit->run([](const Fit&) { return true; });
+    base::set_thread_count(0);
+    return std::vector<float>(fit->field().parameters().begin(), fit->field().parameters().end());
+  };
+  EXPECT_EQ(run(1), run(3));
+}
+
 TEST(Fit, StopsWhenToldAndGoesOnToTheSameBits) {
   geometry::TiltGeometry g = geometry::centred_geometry(16, 20, 8, tilts(-48, 48, 8));
   const BeadSeries series(g, Bead({8, 10, 4}), 4);
   FitOptions options;
+  options.coarse_epochs = 2;
   options.epochs = 3;
   const auto parameters = [&](std::int64_t pause_at) {
     Fit fit(series.measurement(), field_options("vm"), options);

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "geometry/ray_geometry.h"
+#include "geometry/tilt_geometry.h"
+#include "tilt_series/slab_views.h"
+
+namespace tomofield::reconstruct {
+
+/// What is fitted: the geometry, the measured rays (divided by the density
+/// unit) and the noise of each view in the same units.
+struct Measurement {
+  geometry::TiltGeometry geometry;
+  geometry::Roi roi;
+  const tilt_series::SlabViews* rays = nullptr;
+  std::vector<double> noise_sigma;
+  double mean_density = 0.0;
+  /// For the ray engine: how `rays`, which are then the views as recorded, look at the specimen.
+  std::optional<geometry::RayGeometry> ray_geometry;
+  /// Views that carry no loss and only tell how well the others predict them (slab engine).
+  std::vector<int> held_out;
+};
+
+/// A measurement in pixels `bin` times as wide, of which a density unit stays what it
+/// is: for coarse stages. `roi` stays in fine pixels, as the field does.
+struct BinnedMeasurement : Measurement {
+  BinnedMeasurement(const Measurement& fine, int bin);
+
+ private:
+  std::unique_ptr<tilt_series::SlabViews> own_rays_;
+};
+
+}  // namespace tomofield::reconstruct

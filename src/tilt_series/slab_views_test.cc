@@ -1,0 +1,76 @@
+#include "tilt_series/slab_views.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <span>
+
+#include "base/random.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+constexpr SlabViews::Shape kShape{
+    .num_views = 3, .width = 21, .height = 60, .first_row = 5, .num_rows = 39};
+constexpr double kUnit = 4.0;
+
+float pixel_of(std::size_t view, std::int64_t x, std::int64_t y) {
+  return static_cast<float>(
+      std::sin(static_cast<double>(x * 7 + y * 3) + static_cast<double>(view)));
+}
+
+// Three quarters of the pixels at random.
+bool is_valid(std::size_t view, std::int64_t x, std::int64_t y) {
+  return base::Random(11 + view, static_cast<std::uint64_t>(y * kShape.width + x)).below(4) > 0;
+}
+
+std::unique_ptr<SlabViews> make_views() {
+  const auto read = [](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
+    for (std::int64_t y = 0; y < kShape.height; ++y) {
+      for (std::int64_t x = 0; x < kShape.width; ++x) {
+        const auto at = static_cast<std::size_t>(y * kShape.width + x);
+        image[at] = pixel_of(view, x, y);
+        valid[at] = is_valid(view, x, y);
+      }
+    }
+  };
+  return std::make_unique<SlabViews>(kShape, kUnit, read, "/tmp");
+}
+
+TEST(SlabViews, BinnedAreMeansOfWhatCountsFromTheFirstRowOn) {
+  const auto fine = make_views();
+  for (const int bin : {2, 4}) {
+    const auto coarse = fine->binned(bin);
+    const SlabViews::Shape& shape = coarse->shape();
+    EXPECT_EQ(shape.width, (21 + bin - 1) / bin);
+    EXPECT_EQ(shape.num_rows, (39 + bin - 1) / bin);
+    std::int64_t counting = 0, not_counting = 0;
+    for (std::size_t v = 0; v < kShape.num_views; ++v) {
+      for (std::int64_t cy = 0; cy < shape.num_rows; ++cy) {
+        for (std::int64_t cx = 0; cx < shape.width; ++cx) {
+          double sum = 0;
+          int count = 0;
+          for (std::int64_t y = cy * bin; y < (cy + 1) * bin && y < kShape.num_rows; ++y) {
+            for (std::int64_t x = cx * bin; x < (cx + 1) * bin && x < kShape.width; ++x) {
+              if (!is_valid(v, x, y + kShape.first_row)) continue;
+              sum += static_cast<double>(pixel_of(v, x, y + kShape.first_row));
+              ++count;
+            }
+          }
+          const bool expected = count * 2 >= bin * bin;
+          ASSERT_EQ(coarse->counts(static_cast<int>(v), cx, cy), expected) << cx << " " << cy;
+          ++(expected ? counting : not_counting);
+          if (!expected) continue;
+          // Data units a density unit, and a ray is a bin-th as many pixels long.
+          ASSERT_NEAR(coarse->ray(static_cast<int>(v), cx, cy), sum / count / kUnit / bin, 1e-6);
+        }
+      }
+    }
+    EXPECT_GT(counting, 0);
+    EXPECT_GT(not_counting, 0);
+  }
+}
+
+}  // namespace
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,87 @@
+"""reconstruct's coarse stage: its options, its plan, and --resume in and after it.
+
+usage: coarse_to_fine_test.py TOMOFIELD SCRATCH_DIR"""
+
+import json
+import os
+import signal
+
+import h5py
+
+import harness
+
+COARSE, FINE, SUBSETS = 40, 3, 7
+OPTIONS = harness.merge(harness.QUICK, ["--leaf-size", 32, "--rank", 3, "--coarse-epochs", COARSE,
+                                        "--epochs", FINE, "--subsets", SUBSETS])
+series = harness.Series("series")
+
+
+def command(results, *options):
+    return ["reconstruct", *series.input, "-o", results.volume_path, *harness.merge(OPTIONS, options)]
+
+
+def fresh_results(name):
+    return harness.Results(os.path.join(harness.fresh_directory(name), "out.mrc"))
+
+
+def psnr(results):
+    return harness.psnr(results.volume, series.truth)
+
+
+whole = fresh_results("whole")
+harness.succeed(*command(whole))
+
+
+def test_plan_and_figures_count_both_stages():
+    plan = harness.succeed(*command(fresh_results("plan"), "--dry-run")).stdout
+    assert f"{(COARSE + FINE) * SUBSETS} steps" in plan, plan
+    with open(whole.json_path) as file:
+        document = json.load(file)
+    assert document["options"]["fit"]["coarse_epochs"] == COARSE
+    assert document["options"]["fit"]["coarse_bin"] == 2
+    assert document["figures"]["steps"] == (COARSE + FINE) * SUBSETS
+    assert len(document["figures"]["mean_squared_residual_per_noise_variance"]) == COARSE + FINE
+
+
+def test_the_coarse_stage_helps():
+    alone = fresh_results("alone")
+    harness.succeed(*command(alone, "--coarse-epochs", 0))
+    print(f"PSNR {psnr(whole):.2f} dB, {psnr(alone):.2f} dB without")
+    assert psnr(whole) > psnr(alone)
+
+
+def test_leaves_too_small_have_no_coarse_stage():
+    result = harness.succeed(*command(fresh_results("small"), "--leaf-size", 16))
+    assert "no coarse stage" in result.stderr and "--leaf-size" in result.stderr, result.stderr
+    result = harness.succeed(*command(fresh_results("off"), "--coarse-epochs", 0))
+    assert "no coarse stage" not in result.stderr, result.stderr
+
+
+def test_faulty_options_are_refused():
+    for option, value in (("--coarse-epochs", -1), ("--coarse-bin", 1), ("--coarse-bin", 65)):
+        result = harness.tomofield(*command(fresh_results("faulty"), option, value))
+        assert result.returncode == 2 and option in result.stderr, result
+
+
+def test_runs_stopped_in_either_stage_end_alike():
+    results = fresh_results("resumed")
+    parameters = set()
+    for _ in range(60):
+        run = harness.start(*command(results, "--resume", "--threads", 1))
+        for line in run.stderr:
+            if line.startswith("reconstruct "):  # a step is done
+                break
+        run.send_signal(signal.SIGTERM)
+        _, errors = run.communicate()
+        if run.returncode == 0:
+            break
+        assert run.returncode == 143, errors
+        with h5py.File(results.model_path) as model:
+            parameters.add(int(model["field/leaves/nx"][0]))
+    else:
+        harness.succeed(*command(results, "--resume"))
+    assert 17 in parameters, f"no run was caught in the coarse stage: {parameters}"
+    assert results.same_as(whole)
+
+
+harness.run_tests(globals())
