@@ -3,6 +3,7 @@
 #include <csignal>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "base/parallel.h"
@@ -27,6 +28,7 @@ struct Arguments {
   reconstruct::ReconstructOptions options;
   std::string view_scale = "auto";
   std::string activation = "auto";
+  std::optional<int> coarse_epochs;
   bool dry_run = false;
 };
 
@@ -82,9 +84,10 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->capture_default_str()
       ->group(group);
   command
-      .add_option("--coarse-epochs", fit.coarse_epochs,
-                  "passes before them over binned views, with fewer vertices; 0: none")
-      ->capture_default_str()
+      .add_option(
+          "--coarse-epochs", arguments.coarse_epochs,
+          "passes before them over binned views, with fewer vertices; 0: none; default: 8/3 "
+          "of --epochs")
       ->group(group);
   command
       .add_option("--coarse-bin", fit.coarse_bin,
@@ -221,6 +224,8 @@ void run(Arguments& arguments) {
   const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
   options.fit.fit_view_scale =
       arguments.view_scale == "on" || (arguments.view_scale == "auto" && is_dark);
+  options.fit.coarse_epochs =
+      arguments.coarse_epochs.value_or(reconstruct::usual_coarse_epochs(options.fit.epochs));
   if (arguments.activation != "auto")
     options.field.activation = arguments.activation;
   else if (is_dark)

@@ -28,7 +28,7 @@ struct FieldOptions {
 /// variations are relative to it and to the noise: weight / σ is used, with σ
 /// the typical noise of a ray in density units times pixels.
 struct FitOptions {
-  int epochs = 40;                 ///< at full resolution
+  int epochs = 30;                 ///< at full resolution
   int coarse_epochs = 0;           ///< before them, with fewer pixels and vertices; 0: none
   int coarse_bin = 2;              ///< how many times fewer on each axis, at most; a power of two
   int subsets = 16;                ///< interleaved tilt subsets: steps an epoch; at most one a view
@@ -53,6 +53,10 @@ struct FitOptions {
   int patience = 0;  ///< epochs without a better held-out error before it stops; 0: never
   std::vector<std::string> faults() const;
 };
+
+/// Coarse epochs that go with `epochs` fine ones: they cost an eighth each, so these
+/// take a third of the time (docs/results/ablation.md).
+inline int usual_coarse_epochs(int epochs) { return (8 * epochs + 2) / 3; }
 
 /// Throws Error with all the faults, if there are any.
 void require_no_faults(const std::vector<std::string>& faults);

@@ -185,11 +185,16 @@ TEST_F(FitWithHeldOut, StopsOnceTheErrorNoLongerFalls) {
   fit_options_.patience = 2;
   auto f = fit(1.0, 100);
   EXPECT_FALSE(f->is_done());
-  f->progress().held_out_error = {3.0, 1.0, 1.1};
+  const auto set_errors = [&](std::vector<double> errors) {
+    Progress progress = f->progress();
+    progress.held_out_error = std::move(errors);
+    f->go_on_from(std::move(progress), f->take_field());
+  };
+  set_errors({3.0, 1.0, 1.1});
   EXPECT_FALSE(f->is_done());
-  f->progress().held_out_error = {3.0, 1.0, 1.1, 1.2};
+  set_errors({3.0, 1.0, 1.1, 1.2});
   EXPECT_TRUE(f->is_done());
-  f->progress().held_out_error = {3.0, 1.0, 1.1, 0.9};
+  set_errors({3.0, 1.0, 1.1, 0.9});
   EXPECT_FALSE(f->is_done());
 }
 
