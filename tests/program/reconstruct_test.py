@@ -123,10 +123,10 @@ def test_same_seed_same_bytes_whatever_the_threads():
 
 def test_dark_contrast_is_the_inverted_density():
     dark = series.with_views("dark", 50 - series.views)
-    dark_options = ["--contrast", "dark", "--view-scale", "off"]
+    dark_options = ["--contrast", "dark", "--view-scale", "off", "--activation", "softplus"]
     found = dark.reconstruct("dark", *dark_options).volume
     # Dense is low, and an empty region 0: the empty beam, which the cell leaves free, is found.
-    np.testing.assert_allclose(-found, plain.volume, atol=0.01)
+    np.testing.assert_allclose(-found, plain.volume, atol=0.03)
     inverted = dark.reconstruct("inverted", *dark_options, "--invert").volume
     np.testing.assert_array_equal(inverted, -found)
     np.testing.assert_array_equal(series.reconstruct("negative", "--invert").volume, -plain.volume)
