@@ -6,7 +6,7 @@
 namespace tomofield::baseline {
 
 struct SirtOptions {
-  int iterations = 40;      ///< best for noisy phantoms, docs/results/baselines.md
+  int iterations = 40;      ///< best for noisy phantoms, docs/results/quality.md
   double relaxation = 1.0;  ///< converges for 0 < relaxation < 2
   bool non_negative = true;
   bool fit_view_scale = false;  ///< per-view scale and offset as nuisances

@@ -6,7 +6,7 @@
 namespace tomofield::baseline {
 
 struct TvOptions {
-  int iterations = 200;  ///< docs/results/baselines.md
+  int iterations = 200;  ///< docs/results/quality.md
   double weight = 3.0;   ///< λ, see reconstruct_tv
   bool non_negative = true;
   bool fit_view_scale = false;  ///< per-view scale and offset as nuisances
