@@ -46,8 +46,8 @@ ObjectiveWeights objective_weights(const FitOptions& options, double noise) {
   return weights;
 }
 
-// A jump at a face counts in total variation's units, and so does what stands
-// out on a Fourier axis: both are densities times a volume.
+// A jump at a face counts in total variation's units, density times area, and what
+// stands out on a Fourier axis as a density times a volume.
 loss::BoundaryOptions boundary_options(const FitOptions& options, double noise) {
   loss::BoundaryOptions boundary;
   boundary.weight = options.boundary / noise;
@@ -172,10 +172,10 @@ void Fit::follow_tree() {
   const int bin = stage().bin;
   sampler_.emplace(*field_, projector_->grid(), domain_.first_row,
                    (domain_.num_rows + bin - 1) / bin, bin);
-  // These two count fine pixels: bin³ to one of the stage.
-  const double noise = typical_noise(binned_->noise_sigma) * bin * bin * bin;
+  // These two count fine pixels: bin² of a face and bin³ of the volume to one of the stage.
+  const double noise = typical_noise(binned_->noise_sigma) * bin * bin;
   boundary_.emplace(*field_, leaves_of_bands(*sampler_), boundary_options(options_, noise));
-  fourier_.emplace(*field_, measurement_.roi, fourier_options(options_, noise));
+  fourier_.emplace(*field_, measurement_.roi, fourier_options(options_, noise * bin));
   if (measurement_.ray_geometry) {
     ray_term_ = std::make_unique<RayTerm>(*measurement_.ray_geometry, *measurement_.rays, *field_,
                                           domain_, options_);
@@ -202,6 +202,17 @@ int Fit::steps_per_epoch() const {
 std::int64_t Fit::num_steps() const { return num_epochs() * steps_per_epoch(); }
 
 std::int64_t Fit::num_epochs() const { return stages_.back().first_epoch + stages_.back().epochs; }
+
+double Fit::work(std::int64_t steps) const {
+  double work = 0.0;
+  for (const Stage& s : stages_) {
+    const std::int64_t first = s.first_epoch * steps_per_epoch();
+    const std::int64_t own = std::int64_t{s.epochs} * steps_per_epoch();
+    work += static_cast<double>(std::clamp<std::int64_t>(steps - first, 0, own)) /
+            (s.bin * s.bin * s.bin);
+  }
+  return work;
+}
 
 bool Fit::is_done() const {
   if (progress_.step == num_steps()) return true;

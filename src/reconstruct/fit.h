@@ -55,6 +55,9 @@ class Fit {
   PredictedView predict_held_out(int view, const loss::ViewModel& model) const;
   int steps_per_epoch() const;
   std::int64_t num_epochs() const;  ///< of all stages
+  const std::vector<Stage>& stages() const { return stages_; }
+  /// Of the first `steps` steps, in steps at full resolution: a coarse one costs 1 / bin³.
+  double work(std::int64_t steps) const;
   const field::Field& field() const { return *field_; }
   field::Field& field() { return *field_; }
   /// Goes on where another fit of the same options stood; the optimiser starts anew.

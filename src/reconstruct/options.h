@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -56,7 +57,10 @@ struct FitOptions {
 
 /// Coarse epochs that go with `epochs` fine ones: they cost an eighth each, so these
 /// take a third of the time (docs/results/ablation.md).
-inline int usual_coarse_epochs(int epochs) { return (8 * epochs + 2) / 3; }
+inline int usual_coarse_epochs(int epochs) {
+  return static_cast<int>(
+      std::clamp((8 * std::int64_t{epochs} + 2) / 3, std::int64_t{0}, std::int64_t{1'000'000'000}));
+}
 
 /// Throws Error with all the faults, if there are any.
 void require_no_faults(const std::vector<std::string>& faults);

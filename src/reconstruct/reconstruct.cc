@@ -105,14 +105,14 @@ std::filesystem::path directory_of(const std::filesystem::path& file) {
 base::ProgressReport progress_report(const Fit& fit, std::int64_t first_step,
                                      Clock::time_point start) {
   base::ProgressReport report;
-  const double done = static_cast<double>(fit.progress().step),
-               all = static_cast<double>(fit.num_steps());
+  const std::int64_t step = fit.progress().step;
+  const double done = fit.work(step), all = fit.work(fit.num_steps());
   report.fraction_done = done / all;
   report.seconds_elapsed = seconds_since(start);
-  const double rate = (done - static_cast<double>(first_step)) / report.seconds_elapsed;
-  report.seconds_left = (all - done) / rate;
+  report.seconds_left = (all - done) / (done - fit.work(first_step)) * report.seconds_elapsed;
+  const double rate = static_cast<double>(step - first_step) / report.seconds_elapsed;
   const auto& loss = fit.progress().data_loss;
-  const std::int64_t epoch = (fit.progress().step - 1) / fit.steps_per_epoch() + 1;
+  const std::int64_t epoch = (step - 1) / fit.steps_per_epoch() + 1;
   const auto& held_out = fit.progress().held_out_error;
   report.detail =
       fmt::format("epoch {}/{}  loss {}{}  {:.1f} steps/s", epoch, fit.num_epochs(),
@@ -202,6 +202,9 @@ void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOpti
   field::save_model(paths.model, model, &state);
   write_volume(model, options.volume, paths.volume);
   nlohmann::json figures = figures_json(model, fit.progress(), series, seconds);
+  for (const Stage& s : fit.stages())
+    figures["stages"].push_back(
+        {{"bin", s.bin}, {"first_epoch", s.first_epoch}, {"epochs", s.epochs}});
   figures["held_out"] = held_out;
   figures["tuning"] = tuned ? tuning_json(*tuned) : nlohmann::json(nullptr);
   io::write_json(

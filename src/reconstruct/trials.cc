@@ -109,8 +109,7 @@ class TrialFits {
 
   base::ProgressReport report(const Fit& fit, const TrialSettings& settings) const {
     const int expected = std::max(num_expected_, num_done_ + 1);
-    const double of_trial =
-        static_cast<double>(fit.progress().step) / static_cast<double>(fit.num_steps());
+    const double of_trial = fit.work(fit.progress().step) / fit.work(fit.num_steps());
     const auto& errors = fit.progress().held_out_error;
     base::ProgressReport report;
     report.fraction_done = (num_done_ + of_trial) / expected;
@@ -196,8 +195,9 @@ std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& fi
     base::log_info(fmt::format("tried tv {:8.3f}  rank {:3}  epochs {:4}: held-out error {:.5f}",
                                t.settings.variation, t.settings.rank, t.settings.epochs, t.error));
   }
-  base::log_info(fmt::format("tuned: --tv {:.3f} --rank {} --epochs {}", tuned.settings.variation,
-                             tuned.settings.rank, tuned.settings.epochs));
+  base::log_info(fmt::format("tuned: --tv {:.3f} --rank {} --epochs {} --coarse-epochs {}",
+                             tuned.settings.variation, tuned.settings.rank, tuned.settings.epochs,
+                             fit.coarse_epochs));
   return tuned;
 }
 

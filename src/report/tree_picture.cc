@@ -59,7 +59,9 @@ std::vector<float> central_slice(const field::Model& model) {
   box.size = {roi.width(), roi.height(), 1};
   box.centre_px = {0.5 * static_cast<double>(roi.x0 + roi.x1),
                    0.5 * static_cast<double>(roi.y0 + roi.y1), 0.5 * model.field->thickness()};
-  return field::sample_box(*model.field, box);
+  std::vector<float> slice = field::sample_box(*model.field, box);
+  for (float& value : slice) value *= static_cast<float>(model.output_scale());
+  return slice;
 }
 
 }  // namespace
