@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "baseline/voxel_problem.h"
 #include "io/json.h"
 #include "kernels/lanes.h"
@@ -23,7 +23,6 @@ namespace tomofield::baseline {
 namespace {
 
 using kernels::kLanes;
-using Clock = std::chrono::steady_clock;
 
 bool is_tv(const BaselineOptions& options) {
   return std::holds_alternative<TvOptions>(options.method);
@@ -203,17 +202,16 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
                      paths.volume.has_parent_path() ? paths.volume.parent_path() : ".");
   VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays, series.noise_sigma);
   const std::int64_t num_rays = problem.num_rays();
-  const auto start = Clock::now();
-  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
+  const base::Stopwatch running;
   const AfterIteration report = [&](const IterationReport& iteration, const VoxelVolume&) {
     if (progress)
-      progress(progress_report(iteration, num_iterations(options), num_rays, seconds()));
+      progress(progress_report(iteration, num_iterations(options), num_rays, running.seconds()));
   };
   const Solution solution =
       is_tv(options) ? reconstruct_tv(problem, std::get<TvOptions>(options.method),
                                       series.mean_density, report)
                      : reconstruct_sirt(problem, std::get<SirtOptions>(options.method), report);
-  const double fit_seconds = seconds();
+  const double fit_seconds = running.seconds();
 
   const field::ModelInfo info = volume_info(series, options);
   write_voxels(voxels_of(solution.densities), reconstruct::region_box(info, 1.0), info,

@@ -72,6 +72,7 @@ std::vector<SlabSampler::Piece> SlabSampler::pieces_across(std::int64_t row) con
     const field::Square& square = field_.tree().leaf(leaf).square;
     TOMOFIELD_CHECK(square.y0 <= y0 && square.y1() >= y1,
                     fmt::format("a slab straddles leaf {}", leaf));
+    const field::Quadtree::Bounds bounds = field_.tree().bounds(square);
     const field::LeafShape& shape = field_.shape(leaf);
     for (std::size_t s = 0; s < grid_.segments().size(); ++s) {
       const SampleSegment& segment = grid_.segments()[s];
@@ -80,7 +81,7 @@ std::vector<SlabSampler::Piece> SlabSampler::pieces_across(std::int64_t row) con
       piece.segment = s;
       for (int i = 0; i < segment.nx; ++i) {
         const double x = pixel_ * (segment.x0 + (i + 0.5) * segment.hx);
-        if (field_.tree().find_leaf(x, y.front()) != leaf) continue;
+        if (x < bounds.x0 || x >= bounds.x1) continue;
         if (piece.lower_x.empty()) piece.first_sample = i;
         const field::AxisPoint at(field_.vertex_x(leaf, x), shape.nx);
         piece.lower_x.push_back(static_cast<int>(at.lower));

@@ -174,17 +174,16 @@ void Fit::follow_tree() {
                    (domain_.num_rows + bin - 1) / bin, bin);
   // These two count fine pixels: bin² of a face and bin³ of the volume to one of the stage.
   const double noise = typical_noise(binned_->noise_sigma) * bin * bin;
-  boundary_.emplace(*field_, leaves_of_bands(*sampler_), boundary_options(options_, noise));
+  const auto bands = leaves_of_bands(*sampler_);
+  boundary_.emplace(*field_, bands, boundary_options(options_, noise));
   fourier_.emplace(*field_, measurement_.roi, fourier_options(options_, noise * bin));
   if (measurement_.ray_geometry) {
     ray_term_ = std::make_unique<RayTerm>(*measurement_.ray_geometry, *measurement_.rays, *field_,
                                           domain_, options_);
   }
   touched_leaves_.clear();
-  for (int band = 0; band < sampler_->num_bands(); ++band) {
-    const auto leaves = sampler_->leaves_of_band(band);
+  for (const std::vector<int>& leaves : bands)
     touched_leaves_.insert(touched_leaves_.end(), leaves.begin(), leaves.end());
-  }
 }
 
 void Fit::go_on_from(Progress progress, std::unique_ptr<field::Field> field) {

@@ -37,20 +37,6 @@ loss::ViewModel fitted_model(const loss::ViewSums& s, double weight) {
   return {scale, s.n > 0 ? (s.b - scale * s.p) / s.n : 0.0, weight};
 }
 
-// Sums of one view of a slab over its rays that count.
-loss::ViewSums sums_of(const std::uint16_t* mask, const float* measured, std::int64_t width,
-                       const float* predicted) {
-  loss::ViewSums sums;
-  for (std::int64_t x = 0; x < width; ++x) {
-    for (int lane = 0; lane < kLanes; ++lane, ++predicted, ++measured) {
-      if ((mask[x] >> lane & 1) == 0) continue;
-      const double p = static_cast<double>(*predicted), b = static_cast<double>(*measured);
-      sums += {1.0, p, b, p * p, p * b, b * b};
-    }
-  }
-  return sums;
-}
-
 // [slab][view]
 using SlabSums = std::vector<std::vector<loss::ViewSums>>;
 
@@ -61,11 +47,11 @@ SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
   SlabSums sums(static_cast<std::size_t>(measured.num_slabs()));
   base::parallel_for(measured.num_slabs(), [&](std::int64_t s) {
     const int slab = static_cast<int>(s);
-    const auto rays = predict(sampler, projector, views, slab);
+    auto rays = predict(sampler, projector, views, slab);
     for (std::size_t v = 0; v < views.size(); ++v) {
       sums[static_cast<std::size_t>(s)].push_back(
-          sums_of(measured.mask(slab, views[v]), measured.rays(slab, views[v]), width,
-                  rays.data() + static_cast<std::ptrdiff_t>(v) * width * kLanes));
+          loss::data_term({}, 1.0, measured.rays(slab, views[v]), measured.mask(slab, views[v]),
+                          width, rays.data() + static_cast<std::ptrdiff_t>(v) * width * kLanes));
     }
   });
   return sums;

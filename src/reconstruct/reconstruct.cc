@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -11,6 +10,7 @@
 
 #include "base/log.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "field/model_file.h"
 #include "io/json.h"
 #include "reconstruct/checkpoint.h"
@@ -23,12 +23,6 @@
 
 namespace tomofield::reconstruct {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // Each view's x-axis tilt, 2 × 2 matrix and shift.
 nlohmann::json alignment_json(const geometry::RayGeometry& g) {
@@ -103,12 +97,12 @@ std::filesystem::path directory_of(const std::filesystem::path& file) {
 }
 
 base::ProgressReport progress_report(const Fit& fit, std::int64_t first_step,
-                                     Clock::time_point start) {
+                                     const base::Stopwatch& running) {
   base::ProgressReport report;
   const std::int64_t step = fit.progress().step;
   const double done = fit.work(step), all = fit.work(fit.num_steps());
   report.fraction_done = done / all;
-  report.seconds_elapsed = seconds_since(start);
+  report.seconds_elapsed = running.seconds();
   report.seconds_left = (all - done) / (done - fit.work(first_step)) * report.seconds_elapsed;
   const double rate = static_cast<double>(step - first_step) / report.seconds_elapsed;
   const auto& loss = fit.progress().data_loss;
@@ -133,6 +127,13 @@ nlohmann::json tree_json(const TreeProgress& tree) {
                        {"leaves_by_level", u.leaves_by_level}});
   }
   return updates;
+}
+
+nlohmann::json stages_json(const std::vector<Stage>& stages) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const Stage& s : stages)
+    list.push_back({{"bin", s.bin}, {"first_epoch", s.first_epoch}, {"epochs", s.epochs}});
+  return list;
 }
 
 nlohmann::json figures_json(const field::Model& model, const Progress& progress,
@@ -202,14 +203,31 @@ void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOpti
   field::save_model(paths.model, model, &state);
   write_volume(model, options.volume, paths.volume);
   nlohmann::json figures = figures_json(model, fit.progress(), series, seconds);
-  for (const Stage& s : fit.stages())
-    figures["stages"].push_back(
-        {{"bin", s.bin}, {"first_epoch", s.first_epoch}, {"epochs", s.epochs}});
+  figures["stages"] = stages_json(fit.stages());
   figures["held_out"] = held_out;
   figures["tuning"] = tuned ? tuning_json(*tuned) : nlohmann::json(nullptr);
   io::write_json(
       paths.json,
       {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"figures", figures}});
+}
+
+// Chooses settings with some views held out, and puts them into the options of the
+// fit, which has them all. None if a stop was requested.
+std::optional<Tuned> tune_options(const PreparedSeries& series, const OutputPaths& paths,
+                                  const ReconstructHooks& hooks, ReconstructOptions& options) {
+  constexpr int kHoldOut = 8;
+  FitOptions trial_fit = options.fit;
+  if (trial_fit.hold_out == 0) trial_fit.hold_out = kHoldOut;
+  TrialFile file(paths.trials, fingerprint_of(options, series), options.resume);
+  const std::optional<Tuned> tuned =
+      tune(measurement_of(series, trial_fit), options.field, trial_fit, file,
+           {.progress = hooks.tune_progress, .stop_requested = hooks.stop_requested});
+  if (!tuned) return std::nullopt;
+  options.fit.hold_out = 0;
+  options.fit.density_variation = tuned->settings.variation;
+  options.fit.epochs = tuned->settings.epochs;
+  options.field.rank = tuned->settings.rank;
+  return tuned;
 }
 
 }  // namespace
@@ -256,29 +274,6 @@ void check_options(const ReconstructOptions& options) {
                        "it, or another name with -o");
 }
 
-namespace {
-
-// Chooses settings with some views held out, and puts them into the options of the
-// fit, which has them all. None if a stop was requested.
-std::optional<Tuned> tune_options(const PreparedSeries& series, const OutputPaths& paths,
-                                  const ReconstructHooks& hooks, ReconstructOptions& options) {
-  constexpr int kHoldOut = 8;
-  FitOptions trial_fit = options.fit;
-  if (trial_fit.hold_out == 0) trial_fit.hold_out = kHoldOut;
-  TrialFile file(paths.trials, fingerprint_of(options, series), options.resume);
-  const std::optional<Tuned> tuned =
-      tune(measurement_of(series, trial_fit), options.field, trial_fit, file,
-           {.progress = hooks.tune_progress, .stop_requested = hooks.stop_requested});
-  if (!tuned) return std::nullopt;
-  options.fit.hold_out = 0;
-  options.fit.density_variation = tuned->settings.variation;
-  options.fit.epochs = tuned->settings.epochs;
-  options.field.rank = tuned->settings.rank;
-  return tuned;
-}
-
-}  // namespace
-
 Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& requested,
                     const ReconstructHooks& hooks) {
   ReconstructOptions options = requested;
@@ -293,21 +288,21 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
   Fit fit(measurement, options.field, options.fit);
   if (options.resume) resume(paths, fingerprint, fit);
 
-  const auto start = Clock::now();
-  auto last_checkpoint = start;
+  const base::Stopwatch running;
+  base::Stopwatch since_checkpoint;
   const std::int64_t first_step = fit.progress().step;
   bool stopped = false;
   fit.run([&](const Fit&) {
-    if (hooks.progress) hooks.progress(progress_report(fit, first_step, start));
+    if (hooks.progress) hooks.progress(progress_report(fit, first_step, running));
     stopped = hooks.stop_requested && hooks.stop_requested() && !fit.is_done();
-    if (stopped || seconds_since(last_checkpoint) > 60 * options.checkpoint_minutes) {
+    if (stopped || since_checkpoint.seconds() > 60 * options.checkpoint_minutes) {
       save_checkpoint(paths.model, fit, model_info(series, options), fingerprint);
-      last_checkpoint = Clock::now();
+      since_checkpoint.restart();
     }
     return !stopped;
   });
   if (stopped) return Outcome::kStopped;
-  write_results(fit, series, options, tuned, paths, fingerprint, seconds_since(start));
+  write_results(fit, series, options, tuned, paths, fingerprint, running.seconds());
   return Outcome::kFinished;
 }
 

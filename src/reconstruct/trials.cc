@@ -3,27 +3,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <fstream>
 #include <memory>
 #include <utility>
 
 #include "base/log.h"
+#include "base/stopwatch.h"
 #include "io/json.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruct {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using nlohmann::json;
 
 // Rows of a trial: enough for edges in every direction, few enough for a dozen fits.
 constexpr std::int64_t kStripRows = 64;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 Trial trial_from(const json& entry) {
   return {.settings = {.variation = entry.at("tv"),
@@ -96,7 +91,7 @@ class TrialFits {
     options.density_variation = settings.variation;
     options.epochs = settings.epochs;
     options.patience = 0;
-    const auto start = Clock::now();
+    const base::Stopwatch running;
     Fit fit(strip_.measurement, field, options);
     fit.run([&](const Fit&) {
       if (hooks_.stop_requested && hooks_.stop_requested()) throw StopRequested();
@@ -104,7 +99,7 @@ class TrialFits {
       return true;
     });
     const HeldOutError error = fit.held_out_error();
-    return {settings, error.total, error.view_error, seconds_since(start)};
+    return {settings, error.total, error.view_error, running.seconds()};
   }
 
   base::ProgressReport report(const Fit& fit, const TrialSettings& settings) const {
@@ -113,7 +108,7 @@ class TrialFits {
     const auto& errors = fit.progress().held_out_error;
     base::ProgressReport report;
     report.fraction_done = (num_done_ + of_trial) / expected;
-    report.seconds_elapsed = seconds_since(start_);
+    report.seconds_elapsed = running_.seconds();
     report.seconds_left =
         report.seconds_elapsed * (1 - report.fraction_done) / report.fraction_done;
     report.detail =
@@ -128,7 +123,7 @@ class TrialFits {
   const FitOptions& fit_;
   TrialFile& file_;
   const TuneHooks& hooks_;
-  Clock::time_point start_ = Clock::now();
+  base::Stopwatch running_;
   int num_expected_;
   int num_done_ = 0;
 };
