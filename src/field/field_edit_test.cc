@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "central_difference.h"
 #include "field/field.h"
 #include "field/merge_factors.h"
 #include "random_arrays.h"
@@ -80,13 +81,9 @@ double misfit(const Field& leaf, const Field& quarters) {
 double misfit_slope(Field& leaf, const Field& quarters) {
   double squares = 0.0;
   for (float& parameter : leaf.parameters()) {
-    const float kept = parameter;
-    parameter = kept + 0.25f;
-    const double high = misfit(leaf, quarters);
-    parameter = kept - 0.25f;
-    const double low = misfit(leaf, quarters);
-    parameter = kept;
-    squares += std::pow((high - low) / 0.5, 2);
+    const double slope =
+        testing::central_difference(parameter, 0.25f, [&] { return misfit(leaf, quarters); });
+    squares += slope * slope;
   }
   return std::sqrt(squares);
 }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "central_difference.h"
 #include "field/variation_planes.h"
 #include "random_arrays.h"
 #include "tomofield/error.h"
@@ -237,13 +238,8 @@ TEST_P(EachField, SlabGradientIsTheDerivative) {
     std::vector<double> expected;
     for (std::size_t i = 0; i < count; ++i) {
       float& p = field->parameters()[field->offset(leaf) + i];
-      const float kept = p;
-      p = kept + 1.0f;
-      const double high = objective();
-      p = kept - 1.0f;
-      const double low = objective();
-      p = kept;
-      expected.push_back(static_cast<double>(before[i]) + (high - low) / 2.0);
+      expected.push_back(static_cast<double>(before[i]) +
+                         testing::central_difference(p, 1.0f, objective));
     }
     expect_near(gradient, expected, 2e-5);
   }
@@ -298,14 +294,7 @@ TEST_P(EachField, PointGradientIsTheDerivative) {
         return sum;
       };
       const auto derivative = [&](float& parameter) {
-        constexpr float kStep = 1.0f / 4096;
-        const float kept = parameter;
-        parameter = kept + kStep;
-        const double high = objective(), high_at = static_cast<double>(parameter);
-        parameter = kept - kStep;
-        const double low = objective(), low_at = static_cast<double>(parameter);
-        parameter = kept;
-        return (high - low) / (high_at - low_at);
+        return testing::central_difference(parameter, 1.0f / 4096, objective);
       };
       const std::size_t count = field->offset(leaf + 1) - field->offset(leaf);
       const auto before = random_floats(count, 8);

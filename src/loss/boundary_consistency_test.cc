@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "central_difference.h"
 #include "random_arrays.h"
 
 namespace tomofield::loss {
@@ -136,14 +137,8 @@ TEST_P(EachBoundaryField, GradientIsTheDerivative) {
   const auto field = uneven_field(GetParam());
   const Total at = evaluate(*field, kOptions, 3);
   const auto derivative = [&](float& parameter) {
-    constexpr float kStep = 1.0f / 512;
-    const float kept = parameter;
-    parameter = kept + kStep;
-    const double high = evaluate(*field, kOptions, 3).value;
-    parameter = kept - kStep;
-    const double low = evaluate(*field, kOptions, 3).value;
-    parameter = kept;
-    return (high - low) / static_cast<double>(2 * kStep);
+    return testing::central_difference(parameter, 1.0f / 512,
+                                       [&] { return evaluate(*field, kOptions, 3).value; });
   };
   EXPECT_NEAR(at.grad_bias, derivative(field->bias), 2e-3 * std::abs(at.grad_bias));
   double largest = 0.0;

@@ -11,6 +11,7 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
+#include "central_difference.h"
 #include "kernels/lanes.h"
 #include "projection/slab_projector.h"
 #include "projection/slab_sampler.h"
@@ -264,13 +265,7 @@ TEST_P(EachRayField, BackwardIsTheDerivative) {
     return sum;
   };
   const auto derivative = [&](float& p) {
-    const float kept = p, up = kept + 4e-3f, down = kept - 4e-3f;
-    p = up;
-    const double high = objective();
-    p = down;
-    const double low = objective();
-    p = kept;
-    return (high - low) / (static_cast<double>(up) - static_cast<double>(down));
+    return testing::central_difference(p, 4e-3f, objective);
   };
   EXPECT_NEAR(grad_bias, derivative(field.bias), 2e-3 * std::abs(grad_bias) + 0.05);
   base::Random random(15);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "central_difference.h"
 #include "kernels/lanes.h"
 #include "random_arrays.h"
 
@@ -156,13 +157,7 @@ TEST_P(EachSampledField, AdjointIsTheDerivative) {
     return sum;
   };
   const auto derivative = [&](float& p) {
-    const float kept = p, up = kept + 1e-3f, down = kept - 1e-3f;
-    p = up;
-    const double high = objective();
-    p = down;
-    const double low = objective();
-    p = kept;
-    return (high - low) / (static_cast<double>(up) - static_cast<double>(down));
+    return testing::central_difference(p, 1e-3f, objective);
   };
   EXPECT_NEAR(grad_bias, derivative(field->bias), 3e-3);
   base::Random random(12);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "central_difference.h"
 #include "kernels/lanes.h"
 #include "random_arrays.h"
 #include "reconstruct/domain.h"
@@ -133,13 +134,7 @@ class Problem {
 
   // Derivative of data_loss() + variation() by one float.
   double derivative(float& parameter) const {
-    const float kept = parameter, up = kept + 4e-3f, down = kept - 4e-3f;
-    parameter = up;
-    const double high = data_loss() + variation();
-    parameter = down;
-    const double low = data_loss() + variation();
-    parameter = kept;
-    return (high - low) / (static_cast<double>(up) - static_cast<double>(down));
+    return testing::central_difference(parameter, 4e-3f, [&] { return data_loss() + variation(); });
   }
 
  private:

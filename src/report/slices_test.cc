@@ -1,7 +1,6 @@
 #include "report/slices.h"
 
 #include <gtest/gtest.h>
-#include <png.h>
 #include <unistd.h>
 
 #include <cstdint>
@@ -11,29 +10,12 @@
 #include <vector>
 
 #include "io/mrc.h"
+#include "png_picture.h"
 
 namespace tomofield::report {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Picture {
-  std::int64_t width = 0, height = 0;
-  std::vector<std::uint8_t> pixels;
-  int at(std::int64_t x, std::int64_t y) const {
-    return pixels[static_cast<std::size_t>(y * width + x)];
-  }
-};
-
-Picture read_picture(const fs::path& path) {
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  EXPECT_TRUE(png_image_begin_read_from_file(&image, path.c_str())) << path;
-  image.format = PNG_FORMAT_GRAY;
-  Picture picture{image.width, image.height, std::vector<std::uint8_t>(PNG_IMAGE_SIZE(image))};
-  EXPECT_TRUE(png_image_finish_read(&image, nullptr, picture.pixels.data(), 0, nullptr));
-  return picture;
-}
 
 class SlicePictures : public ::testing::Test {
  protected:
@@ -73,14 +55,16 @@ TEST_F(SlicePictures, ShowEachVoxelAtItsPlace) {
   ASSERT_EQ(paths.size(), 3u);
   EXPECT_EQ(paths[1], directory_ / "out_xz.png");
   const std::int64_t zoom = 22;  // 24 × 22 is the first multiple of the narrowest past 512
-  const Picture xy = read_picture(paths[0]), xz = read_picture(paths[1]),
-                yz = read_picture(paths[2]);
+  const testing::PngPicture xy = testing::read_png(paths[0], PNG_FORMAT_GRAY),
+                            xz = testing::read_png(paths[1], PNG_FORMAT_GRAY),
+                            yz = testing::read_png(paths[2], PNG_FORMAT_GRAY);
   EXPECT_EQ(xy.width, nx * zoom);
   EXPECT_EQ(xy.height, ny * zoom);
   EXPECT_EQ(xz.height, nz * zoom);
   EXPECT_EQ(yz.width, ny * zoom);
   EXPECT_EQ(yz.height, nz * zoom);
-  const auto pixel = [zoom](const Picture& picture, std::int64_t right, std::int64_t up) {
+  const auto pixel = [zoom](const testing::PngPicture& picture, std::int64_t right,
+                            std::int64_t up) {
     return picture.at(right * zoom + zoom / 2, picture.height - 1 - up * zoom - zoom / 2);
   };
   EXPECT_EQ(pixel(xy, 3, 4), 255);
@@ -99,7 +83,8 @@ TEST_F(SlicePictures, GreysRunBetweenThePercentiles) {
   voxels[0] = 1e9f;  // an outlier must not take the scale with it
   voxels[1] = std::numeric_limits<float>::quiet_NaN();
   write(n, n, 1, voxels);
-  const Picture xy = read_picture(write_slice_pictures(mrc_, directory_ / "ramp")[0]);
+  const testing::PngPicture xy =
+      testing::read_png(write_slice_pictures(mrc_, directory_ / "ramp")[0], PNG_FORMAT_GRAY);
   ASSERT_EQ(xy.width, n);
   EXPECT_EQ(xy.at(0, 511), 255);  // the first voxel is at the bottom left
   EXPECT_EQ(xy.at(1, 511), 0);

@@ -1,7 +1,6 @@
 #include "report/tree_picture.h"
 
 #include <gtest/gtest.h>
-#include <png.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "png_picture.h"
 #include "scratch_directory.h"
 
 namespace tomofield::report {
@@ -18,26 +18,6 @@ namespace {
 
 using Colour = std::array<int, 3>;
 constexpr Colour kOrange{255, 140, 0};
-
-struct Picture {
-  std::int64_t width = 0, height = 0;
-  std::vector<std::uint8_t> pixels;
-  /// y upwards
-  Colour at(std::int64_t x, std::int64_t y) const {
-    const auto first = static_cast<std::size_t>(3 * ((height - 1 - y) * width + x));
-    return {pixels[first], pixels[first + 1], pixels[first + 2]};
-  }
-};
-
-Picture read_picture(const std::filesystem::path& path) {
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  EXPECT_TRUE(png_image_begin_read_from_file(&image, path.c_str())) << path;
-  image.format = PNG_FORMAT_RGB;
-  Picture picture{image.width, image.height, std::vector<std::uint8_t>(PNG_IMAGE_SIZE(image))};
-  EXPECT_TRUE(png_image_finish_read(&image, nullptr, picture.pixels.data(), 0, nullptr));
-  return picture;
-}
 
 // A cell of 64 px in quarters, the upper right one in quarters again; a ramp along x in the
 // density; a region of interest that starts inside the first leaf.
@@ -64,13 +44,15 @@ TEST(TreePicture, DrawsLeafBordersOverTheSlice) {
   const std::filesystem::path path = scratch.path() / "tree.png";
   const field::Model model = stepped_model();
   write_tree_picture(model, path);
-  const Picture picture = read_picture(path);
+  const auto picture = testing::read_png(path, PNG_FORMAT_RGB);
   const std::int64_t zoom = 9;  // 60 × 9 is the first multiple past 512
   ASSERT_EQ(picture.width, 60 * zoom);
   ASSERT_EQ(picture.height, 52 * zoom);
   const auto at = [&](double x, double y) {  // pixels of the view
-    return picture.at(static_cast<std::int64_t>((x - 4) * zoom),
-                      static_cast<std::int64_t>((y - 8) * zoom));
+    const auto column = static_cast<std::int64_t>((x - 4) * zoom);
+    const auto row = picture.height - 1 - static_cast<std::int64_t>((y - 8) * zoom);
+    return Colour{picture.at(column, row, 0), picture.at(column, row, 1),
+                  picture.at(column, row, 2)};
   };
   EXPECT_EQ(at(32, 20.5), kOrange);  // between the lower quarters
   EXPECT_EQ(at(10.5, 32), kOrange);  // between the left ones

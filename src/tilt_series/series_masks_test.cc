@@ -6,6 +6,7 @@
 
 #include "bead_series.h"
 #include "io/mrc.h"
+#include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
@@ -16,38 +17,15 @@ namespace {
 using testing::BeadScene;
 using testing::message_of;
 using testing::ScratchDirectory;
-
-/// value(x, y, section) as a stack of 4 Å a pixel.
-std::filesystem::path write_stack(
-    const std::filesystem::path& path, std::int64_t nx, std::int64_t ny, std::int64_t nz,
-    const std::function<float(std::int64_t, std::int64_t, std::int64_t)>& value) {
-  io::MrcSpec spec;
-  spec.nx = nx;
-  spec.ny = ny;
-  spec.nz = nz;
-  spec.is_volume = false;
-  spec.voxel_size_A = {4, 4, 4};
-  io::MrcWriter writer(path, spec);
-  std::vector<float> section(static_cast<std::size_t>(nx * ny));
-  for (std::int64_t z = 0; z < nz; ++z) {
-    for (std::int64_t i = 0; i < nx * ny; ++i) {
-      section[static_cast<std::size_t>(i)] = value(i % nx, i / nx, z);
-    }
-    writer.write_section(z, section);
-  }
-  writer.close();
-  return path;
-}
-
-float some_value(std::int64_t x, std::int64_t y, std::int64_t z) {
-  return static_cast<float>(100 + (x * 7 + y * 13 + z * 5) % 31);
-}
+using testing::some_value;
+using testing::write_stack;
 
 constexpr std::int64_t kWidth = 64, kHeight = 48;
+constexpr double kPixelSize = 4.0;
 
 TiltSeriesOptions plain_series(const ScratchDirectory& scratch) {
   TiltSeriesOptions options;
-  options.stack = write_stack(scratch / "a.st", kWidth, kHeight, 3, some_value);
+  options.stack = write_stack(scratch / "a.st", kWidth, kHeight, 3, some_value, kPixelSize);
   options.tlt = scratch.write("a.tlt", "-10\n0\n10\n");
   options.contrast = Contrast::kBright;
   return options;
@@ -89,10 +67,12 @@ void expect_refusal(const TiltSeriesOptions& options, const std::vector<std::str
 TEST(SeriesMasks, ZerosOfTheUsersMaskAreLeftOut) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = plain_series(scratch);
-  options.mask = write_stack(scratch / "mask.mrc", kWidth, kHeight, 3,
-                             [](std::int64_t x, std::int64_t y, std::int64_t z) {
-                               return x + y < 20 + 5 * z ? 0.0f : (x % 2 ? 1.0f : -3.0f);
-                             });
+  options.mask = write_stack(
+      scratch / "mask.mrc", kWidth, kHeight, 3,
+      [](std::int64_t x, std::int64_t y, std::int64_t z) {
+        return x + y < 20 + 5 * z ? 0.0f : (x % 2 ? 1.0f : -3.0f);
+      },
+      kPixelSize);
   options.exclude = "1";  // the mask has a section for this one too
   const TiltSeries series(options);
   for (std::size_t view = 0; view < 2; ++view) {
@@ -107,11 +87,11 @@ TEST(SeriesMasks, ZerosOfTheUsersMaskAreLeftOut) {
 TEST(SeriesMasks, AMaskOfAnotherSizeOrWithoutAMeasurementIsRefused) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = plain_series(scratch);
-  options.mask = write_stack(scratch / "small.mrc", kWidth, kHeight, 2, some_value);
+  options.mask = write_stack(scratch / "small.mrc", kWidth, kHeight, 2, some_value, kPixelSize);
   expect_refusal(options, {"small.mrc", "64 × 48 pixels and 2 sections", "a.st", "and 3"});
-  options.mask =
-      write_stack(scratch / "zero.mrc", kWidth, kHeight, 3,
-                  [](std::int64_t, std::int64_t, std::int64_t z) { return z == 1 ? 0.0f : 1.0f; });
+  options.mask = write_stack(
+      scratch / "zero.mrc", kWidth, kHeight, 3,
+      [](std::int64_t, std::int64_t, std::int64_t z) { return z == 1 ? 0.0f : 1.0f; }, kPixelSize);
   expect_refusal(options, {"section 2", "--mask", "--exclude 2"});
 }
 
@@ -135,11 +115,13 @@ TEST(SeriesMasks, FiducialsFollowAlignmentAndBinning) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options;
   // Bright 4 × 4 spots that the transforms must bring to where the fiducials' discs are.
-  options.stack = write_stack(scratch / "a.st", kWidth, kHeight, 3,
-                              [](std::int64_t x, std::int64_t y, std::int64_t) {
-                                const bool is_spot = x >= 38 && x < 42 && y >= 16 && y < 20;
-                                return is_spot ? 900.0f : static_cast<float>((x * 7 + y * 13) % 31);
-                              });
+  options.stack = write_stack(
+      scratch / "a.st", kWidth, kHeight, 3,
+      [](std::int64_t x, std::int64_t y, std::int64_t) {
+        const bool is_spot = x >= 38 && x < 42 && y >= 16 && y < 20;
+        return is_spot ? 900.0f : static_cast<float>((x * 7 + y * 13) % 31);
+      },
+      kPixelSize);
   options.tlt = scratch.write("a.tlt", "-10\n0\n10\n");
   options.contrast = Contrast::kBright;
   options.xf =
@@ -192,10 +174,12 @@ TEST(SeriesMasks, ADiameterThatCannotBeFoundIsRefused) {
 TEST(SeriesMasks, HotPixelsAreCountedAndLeftOut) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = plain_series(scratch);
-  options.stack = write_stack(scratch / "hot.st", kWidth, kHeight, 3,
-                              [](std::int64_t x, std::int64_t y, std::int64_t z) {
-                                return x == 10 && y == 20 && z == 1 ? 1e5f : some_value(x, y, z);
-                              });
+  options.stack = write_stack(
+      scratch / "hot.st", kWidth, kHeight, 3,
+      [](std::int64_t x, std::int64_t y, std::int64_t z) {
+        return x == 10 && y == 20 && z == 1 ? 1e5f : some_value(x, y, z);
+      },
+      kPixelSize);
   const TiltSeries series(options);
   EXPECT_EQ(series.mask_figures().num_bad_pixels, 1);
   const auto valid = valid_of(series, 1);
@@ -212,12 +196,13 @@ TiltSeriesOptions dark_series(const ScratchDirectory& scratch, const BeadScene& 
     tilts += fmt::format("{}\n", scene.tilt_deg[view]);
   }
   TiltSeriesOptions options;
-  options.stack = write_stack(scratch / "beads.st", scene.width, scene.height,
-                              static_cast<std::int64_t>(views.size()),
-                              [&](std::int64_t x, std::int64_t y, std::int64_t z) {
-                                const MaskedImage& view = views[static_cast<std::size_t>(z)];
-                                return 500 - view.values[view.index(x, y)];
-                              });
+  options.stack = write_stack(
+      scratch / "beads.st", scene.width, scene.height, static_cast<std::int64_t>(views.size()),
+      [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+        const MaskedImage& view = views[static_cast<std::size_t>(z)];
+        return 500 - view.values[view.index(x, y)];
+      },
+      kPixelSize);
   options.tlt = scratch.write("beads.tlt", tilts);
   options.pixel_size_A = 8.0;
   return options;
@@ -251,15 +236,17 @@ TEST(SeriesMasks, BrightSeriesAreSearchedOnlyWhenAsked) {
   scene.scatter_beads(6, 2);
   scene.contrast = 10;
   TiltSeriesOptions options = dark_series(scratch, scene);
-  options.stack = write_stack(scratch / "bright.st", scene.width, scene.height,
-                              static_cast<std::int64_t>(scene.tilt_deg.size()),
-                              [&, view = std::size_t{0}, image = scene.view(0)](
-                                  std::int64_t x, std::int64_t y, std::int64_t z) mutable {
-                                if (static_cast<std::size_t>(z) != view) {
-                                  image = scene.view(view = static_cast<std::size_t>(z));
-                                }
-                                return image.values[image.index(x, y)];
-                              });
+  options.stack = write_stack(
+      scratch / "bright.st", scene.width, scene.height,
+      static_cast<std::int64_t>(scene.tilt_deg.size()),
+      [&, view = std::size_t{0}, image = scene.view(0)](std::int64_t x, std::int64_t y,
+                                                        std::int64_t z) mutable {
+        if (static_cast<std::size_t>(z) != view) {
+          image = scene.view(view = static_cast<std::size_t>(z));
+        }
+        return image.values[image.index(x, y)];
+      },
+      kPixelSize);
   options.contrast = Contrast::kBright;
   EXPECT_EQ(TiltSeries(options).mask_figures().num_beads, 0u);
   options.bead_diameter_nm = 4.0;

@@ -4,7 +4,6 @@ usage: adaptive_tree_test.py TOMOFIELD SCRATCH_DIR"""
 
 import json
 import os
-import signal
 
 import h5py
 import numpy as np
@@ -106,21 +105,9 @@ def test_budget_is_kept():
 def test_interrupted_runs_end_alike():
     """Stopped after a different number of steps each time, before, between and after updates."""
     output = fresh_output("resumed")
-    stops = 0
-    for _ in range(40):
-        run = harness.start(*command(output, "--resume"))
-        for line in run.stderr:
-            if line.startswith("reconstruct "):  # a step is done
-                break
-        run.send_signal(signal.SIGTERM)
-        _, errors = run.communicate()
-        if run.returncode == 0:
-            break
-        assert run.returncode == 143, errors
-        stops += 1
-    else:
-        harness.succeed(*command(output, "--resume"))
-    assert stops > 0, "no run was caught"
+    stops = []
+    harness.finish_with_stops(command(output, "--resume"), lambda: stops.append(1), most=40)
+    assert stops, "no run was caught"
     for extension in (".mrc", ".h5", "_tree.png"):
         assert harness.read_bytes(output[:-4] + extension) == harness.read_bytes(
             whole[:-4] + extension), extension

@@ -4,7 +4,6 @@ usage: coarse_to_fine_test.py TOMOFIELD SCRATCH_DIR"""
 
 import json
 import os
-import signal
 
 import h5py
 
@@ -66,20 +65,12 @@ def test_faulty_options_are_refused():
 def test_runs_stopped_in_either_stage_end_alike():
     results = fresh_results("resumed")
     parameters = set()
-    for _ in range(60):
-        run = harness.start(*command(results, "--resume", "--threads", 1))
-        for line in run.stderr:
-            if line.startswith("reconstruct "):  # a step is done
-                break
-        run.send_signal(signal.SIGTERM)
-        _, errors = run.communicate()
-        if run.returncode == 0:
-            break
-        assert run.returncode == 143, errors
+
+    def remember_stage():
         with h5py.File(results.model_path) as model:
             parameters.add(int(model["field/leaves/nx"][0]))
-    else:
-        harness.succeed(*command(results, "--resume"))
+
+    harness.finish_with_stops(command(results, "--resume", "--threads", 1), remember_stage, most=60)
     assert 17 in parameters, f"no run was caught in the coarse stage: {parameters}"
     assert results.same_as(whole)
 

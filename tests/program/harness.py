@@ -4,6 +4,7 @@ import copy
 import glob
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -40,6 +41,23 @@ def succeed(*arguments, **keywords):
     result = tomofield(*arguments, **keywords)
     assert result.returncode == 0, (arguments, result.returncode, result.stderr)
     return result
+
+
+def finish_with_stops(command, after_stop, most):
+    """Runs a resumable command to its end, stopped by SIGTERM after its first step each time, as
+    long as `most` allows; after_stop() is called after every stop."""
+    for _ in range(most):
+        run = start(*command)
+        for line in run.stderr:
+            if line.startswith("reconstruct "):  # a step is done
+                break
+        run.send_signal(signal.SIGTERM)
+        _, errors = run.communicate()
+        if run.returncode == 0:
+            return
+        assert run.returncode == 143, errors
+        after_stop()
+    succeed(*command)
 
 
 def run_measured(*arguments):

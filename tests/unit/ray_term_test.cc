@@ -10,6 +10,7 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
+#include "central_difference.h"
 #include "random_arrays.h"
 #include "sphere_series.h"
 
@@ -143,15 +144,7 @@ TEST(RayTerm, GradientIsTheDerivativeOfTheLoss) {
   };
   std::vector<float> gradient(s.field->num_parameters(), 0.0f);
   const auto result = s.term.accumulate_gradient(kStep, models, gradient.data());
-  const auto derivative = [&](float& p) {
-    const float kept = p, up = kept + 4e-3f, down = kept - 4e-3f;
-    p = up;
-    const double high = loss();
-    p = down;
-    const double low = loss();
-    p = kept;
-    return (high - low) / (static_cast<double>(up) - static_cast<double>(down));
-  };
+  const auto derivative = [&](float& p) { return testing::central_difference(p, 4e-3f, loss); };
   base::set_thread_count(1);  // tiny pieces of work
   EXPECT_NEAR(result.grad_bias / derivative(s.field->bias), 1.0, 1e-3);
   base::Random random(4);
