@@ -83,6 +83,14 @@ def script_json(script, *arguments):
     return json.loads(done.stdout)
 
 
+def has_row(path, arguments):
+    """Whether the row is there, and of the same arguments: a row's name may get other ones."""
+    if not os.path.exists(path):
+        return False
+    with open(path) as file:
+        return json.load(file)["arguments"] == arguments
+
+
 def run_rows(options, bench, rows):
     """rows: {name: (arguments, kind, noise)}. Returns {name: [row of each seed]}."""
     folder = os.path.join(options.out, bench)
@@ -95,7 +103,7 @@ def run_rows(options, bench, rows):
         for seed in options.seeds.split(","):
             safe = re.sub(r"[^\w.+-]+", "_", name)
             path = os.path.join(folder, f"{safe}_{options.size}_{seed}.json")
-            if not os.path.exists(path):
+            if not has_row(path, arguments):
                 if options.table:
                     continue
                 row = measure(options, arguments, kind, noise, int(seed), scratch)

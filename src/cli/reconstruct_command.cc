@@ -29,6 +29,8 @@ struct Arguments {
   std::string view_scale = "auto";
   std::string activation = "auto";
   std::optional<int> coarse_epochs;
+  std::optional<double> variation;
+  std::string penalty = "auto";
   bool dry_run = false;
 };
 
@@ -121,16 +123,19 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->capture_default_str()
       ->group(group);
   command
-      .add_option("--tv", fit.density_variation,
-                  "weight of the density's total variation, in noise units")
-      ->capture_default_str()
+      .add_option("--tv", arguments.variation,
+                  "weight of the density's total variation, in noise units; default: 14, 5 if "
+                  "smooth")
       ->group(group);
   command
       .add_option("--tv-factors", fit.factor_variation, "weight of the factors' total variation")
       ->capture_default_str()
       ->group(group);
-  command.add_option("--tv-penalty", fit.penalty, "concave (keeps edges sharper) or smooth")
-      ->check(CLI::IsMember({"concave", "smooth"}))
+  command
+      .add_option("--tv-penalty", arguments.penalty,
+                  "concave (keeps edges sharp) or smooth; auto: what predicts held-out views "
+                  "better in two short trials, concave if --tv is given")
+      ->check(CLI::IsMember({"auto", "concave", "smooth"}))
       ->capture_default_str()
       ->group(group);
   command
@@ -161,8 +166,8 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->group(group);
   command
       .add_flag("--tune", arguments.options.tune,
-                "choose --tv, --rank and --epochs by the error of held-out views, then fit all "
-                "views with them")
+                "choose --tv-penalty, --tv, --rank and --epochs by the error of held-out views, "
+                "then fit all views with them")
       ->group(group);
   command
       .add_option("--early-stop", fit.patience,
@@ -226,6 +231,10 @@ void run(Arguments& arguments) {
       arguments.view_scale == "on" || (arguments.view_scale == "auto" && is_dark);
   options.fit.coarse_epochs =
       arguments.coarse_epochs.value_or(reconstruct::usual_coarse_epochs(options.fit.epochs));
+  options.choose_penalty = arguments.penalty == "auto" && !arguments.variation;
+  if (arguments.penalty != "auto") options.fit.penalty = arguments.penalty;
+  options.fit.density_variation =
+      arguments.variation.value_or(reconstruct::usual_variation(options.fit.penalty));
   if (arguments.activation != "auto")
     options.field.activation = arguments.activation;
   else if (is_dark)
@@ -248,7 +257,8 @@ void run(Arguments& arguments) {
     case reconstruct::Outcome::kStopped:
       throw stopped("the checkpoint is", paths.model, options);
     case reconstruct::Outcome::kStoppedTuning:
-      throw stopped("the finished trials are in", paths.trials, options);
+      if (options.tune) throw stopped("the finished trials are in", paths.trials, options);
+      throw ExitStatus{128 + g_signal, "stopped before the first checkpoint"};
   }
   print_files(paths);
   write_pictures(paths.volume, series, paths.picture_prefix);

@@ -35,15 +35,25 @@ double typical_noise(const std::vector<double>& sigmas) {
 // prior: what it must suppress is noise, and its best weight grows with the
 // noise's deviation rather than its variance (as in denoising, Rudin, Osher and
 // Fatemi 1992). Dividing by the noise makes one setting serve every size.
-ObjectiveWeights objective_weights(const FitOptions& options, double noise) {
+ObjectiveWeights objective_weights(const FitOptions& options, double noise, double concavity) {
   ObjectiveWeights weights;
   weights.density_variation = options.density_variation / noise;
   weights.factor_variation = options.factor_variation / noise;
   weights.density_penalty.epsilon = static_cast<float>(options.gradient_floor);
-  weights.density_penalty.concavity =
-      options.penalty == "concave" ? static_cast<float>(options.concavity) : 0.0f;
+  weights.density_penalty.concavity = static_cast<float>(concavity);
   weights.factor_penalty = weights.density_penalty;
   return weights;
+}
+
+// τ in density units, 0 for a smooth penalty. A voxel that is back-projected from N views has a
+// noise of about 0.9 σ / √N (ramp filter, σ of a ray in densities times pixels): steps well above
+// it are edges, which a concave penalty spares; below, noise would be taken for edges.
+// A τ much below any contrast leaves more local minima and no sharper edges.
+double concavity_of(const FitOptions& options, const std::vector<double>& sigmas) {
+  constexpr double kLeast = 0.02;
+  if (options.penalty == "smooth") return 0;
+  const double noise = typical_noise(sigmas) / std::sqrt(static_cast<double>(sigmas.size()));
+  return std::max(options.concavity * noise, kLeast);
 }
 
 // A jump at a face counts in total variation's units, density times area, and what
@@ -281,7 +291,8 @@ void Fit::take_step(const std::vector<int>& views) {
 
 // The data term of these views and total variation; returns dL/d bias.
 double Fit::add_slab_gradient(const std::vector<int>& views) {
-  ObjectiveWeights weights = objective_weights(options_, typical_noise(binned_->noise_sigma));
+  ObjectiveWeights weights = objective_weights(options_, typical_noise(binned_->noise_sigma),
+                                               concavity_of(options_, measurement_.noise_sigma));
   // Each step looks at edges from another corner: forward differences alone treat
   // their two sides differently.
   base::Random directions(options_.seed,

@@ -19,9 +19,9 @@ struct Measurement {
   std::vector<double> noise_sigma;
   double mean_density = 0.0;
   /// For the ray engine: how `rays`, which are then the views as recorded, look at the specimen.
-  std::optional<geometry::RayGeometry> ray_geometry;
+  std::optional<geometry::RayGeometry> ray_geometry = std::nullopt;
   /// Views that carry no loss and only tell how well the others predict them (slab engine).
-  std::vector<int> held_out;
+  std::vector<int> held_out = {};
 };
 
 /// A measurement in pixels `bin` times as wide, of which a density unit stays what it

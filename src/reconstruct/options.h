@@ -38,15 +38,15 @@ struct FitOptions {
   std::int64_t rays_per_step = 0;  ///< about; 0: all rays of an epoch over `subsets`
   double learning_rate = 0.05;     ///< falls exponentially to learning_rate · final_rate
   double final_rate = 0.1;
-  double coarse_final_rate = 0.3;  ///< of the coarse stage
-  double refined_rate = 0.5;       ///< where the fine stage starts after a coarse one
-  double density_variation = 14.0;
+  double coarse_final_rate = 0.3;   ///< of the coarse stage
+  double refined_rate = 0.5;        ///< where the fine stage starts after a coarse one
+  double density_variation = 14.0;  ///< see usual_variation
   double factor_variation = 0.0;
-  double boundary = 0.0;              ///< boundary consistency of leaves (eq. 6)
+  double boundary = 4.0;              ///< boundary consistency of leaves (eq. 6)
   double fourier = 0.0;               ///< isotropic Fourier prior (eq. 7)
   std::string fourier_ring = "mean";  ///< or max: what an axis may not exceed
   std::string penalty = "concave";    ///< or smooth, for both variations
-  double concavity = 0.05;            ///< τ of the concave penalty, in density units
+  double concavity = 0.4;             ///< τ of the concave penalty, in units of a voxel's noise
   double gradient_floor = 1e-3;       ///< ε of both penalties, in density units a pixel
   bool fit_view_scale = false;        ///< per-view scale and offset as nuisances
   std::uint64_t seed = 1;
@@ -60,6 +60,12 @@ struct FitOptions {
 inline int usual_coarse_epochs(int epochs) {
   return static_cast<int>(
       std::clamp((8 * std::int64_t{epochs} + 2) / 3, std::int64_t{0}, std::int64_t{1'000'000'000}));
+}
+
+/// The weight of the density's variation that goes with a penalty: a concave one counts
+/// large steps less, and so needs more (docs/results/ablation.md).
+inline double usual_variation(const std::string& penalty) {
+  return penalty == "smooth" ? 5.0 : FitOptions{}.density_variation;
 }
 
 /// Throws Error with all the faults, if there are any.

@@ -105,6 +105,7 @@ json options_json(const ReconstructOptions& options) {
           {"specimen", specimen_json(options.specimen)},
           {"field", field_json(options.field)},
           {"fit", fit_json(options.fit)},
+          {"choose_penalty", options.choose_penalty},
           {"tune", options.tune},
           {"volume", volume_json(options.volume)}};
 }

@@ -162,7 +162,8 @@ nlohmann::json figures_json(const field::Model& model, const Progress& progress,
 // What a tuning chose, and everything that it tried.
 nlohmann::json tuning_json(const Tuned& tuned) {
   return {{"chosen",
-           {{"tv", tuned.settings.variation},
+           {{"tv_penalty", tuned.settings.penalty},
+            {"tv", tuned.settings.variation},
             {"rank", tuned.settings.rank},
             {"epochs", tuned.settings.epochs}}},
           {"trials", trials_json(tuned.trials)}};
@@ -211,23 +212,35 @@ void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOpti
       {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"figures", figures}});
 }
 
-// Chooses settings with some views held out, and puts them into the options of the
-// fit, which has them all. None if a stop was requested.
-std::optional<Tuned> tune_options(const PreparedSeries& series, const OutputPaths& paths,
-                                  const ReconstructHooks& hooks, ReconstructOptions& options) {
+// Whether settings are to be chosen by views held out. A short series cannot spare
+// views for the penalty alone, and rays of raw views are not predicted.
+bool chooses_settings(const ReconstructOptions& options, const PreparedSeries& series) {
+  constexpr int kFewestViews = 14;
+  return options.tune || (options.choose_penalty && options.fit.engine == "slab" &&
+                          series.geometry.num_views() >= kFewestViews);
+}
+
+// The settings that predict views held out best. None if a stop was requested.
+std::optional<Tuned> choose_settings(const PreparedSeries& series, const OutputPaths& paths,
+                                     const ReconstructHooks& hooks,
+                                     const ReconstructOptions& options) {
   constexpr int kHoldOut = 8;
-  FitOptions trial_fit = options.fit;
-  if (trial_fit.hold_out == 0) trial_fit.hold_out = kHoldOut;
+  FitOptions fit = options.fit;
+  if (fit.hold_out == 0) fit.hold_out = kHoldOut;
+  const Measurement measurement = measurement_of(series, fit);
+  const TuneHooks tune_hooks{.progress = hooks.tune_progress,
+                             .stop_requested = hooks.stop_requested};
+  if (!options.tune) return tune_penalty(measurement, options.field, fit, tune_hooks);
   TrialFile file(paths.trials, fingerprint_of(options, series), options.resume);
-  const std::optional<Tuned> tuned =
-      tune(measurement_of(series, trial_fit), options.field, trial_fit, file,
-           {.progress = hooks.tune_progress, .stop_requested = hooks.stop_requested});
-  if (!tuned) return std::nullopt;
-  options.fit.hold_out = 0;
-  options.fit.density_variation = tuned->settings.variation;
-  options.fit.epochs = tuned->settings.epochs;
-  options.field.rank = tuned->settings.rank;
-  return tuned;
+  return tune(measurement, options.field, fit, options.choose_penalty, file, tune_hooks);
+}
+
+void apply(const TrialSettings& settings, ReconstructOptions& options) {
+  options.fit.penalty = settings.penalty;
+  options.fit.density_variation = settings.variation;
+  options.fit.epochs = settings.epochs;
+  options.field.rank = settings.rank;
+  if (options.tune) options.fit.hold_out = 0;  // the fit has all views
 }
 
 }  // namespace
@@ -281,8 +294,11 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
   const PreparedSeries series =
       prepare_series(tilt_series, options.specimen, directory_of(paths.volume));
   std::optional<Tuned> tuned;
-  if (options.tune && !(tuned = tune_options(series, paths, hooks, options)))
-    return Outcome::kStoppedTuning;
+  if (chooses_settings(options, series)) {
+    tuned = choose_settings(series, paths, hooks, options);
+    if (!tuned) return Outcome::kStoppedTuning;
+    apply(tuned->settings, options);
+  }
   const std::string fingerprint = fingerprint_of(options, series);
   const Measurement measurement = measurement_of(series, options.fit);
   Fit fit(measurement, options.field, options.fit);

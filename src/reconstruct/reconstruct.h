@@ -19,7 +19,8 @@ struct ReconstructOptions {
   SpecimenOptions specimen;
   FieldOptions field;
   FitOptions fit;
-  bool tune = false;  ///< choose the weight, rank and epochs by held-out error (tune.h)
+  bool choose_penalty = false;  ///< of total variation, by held-out error, in place of fit.penalty
+  bool tune = false;  ///< choose the weight, rank and epochs by held-out error too (tune.h)
   VolumeOptions volume;
   std::filesystem::path output;  ///< the volume; model, JSON and pictures lie beside it
   bool overwrite = false;

@@ -19,9 +19,14 @@ using nlohmann::json;
 
 // Rows of a trial: enough for edges in every direction, few enough for a dozen fits.
 constexpr std::int64_t kStripRows = 64;
+// Of those that compare penalties, which differ by more than weights do.
+constexpr std::int64_t kPenaltyRows = 32;
+constexpr int kPenaltyPart = 3;     // of a fit's epochs: one in so many
+constexpr int kPenaltyEpochs = 10;  // at least, before which little but noise has settled
 
 Trial trial_from(const json& entry) {
-  return {.settings = {.variation = entry.at("tv"),
+  return {.settings = {.penalty = entry.at("tv_penalty"),
+                       .variation = entry.at("tv"),
                        .rank = entry.at("rank"),
                        .epochs = entry.at("epochs")},
           .error = entry.at("held_out_error"),
@@ -35,9 +40,9 @@ struct Strip {
   Measurement measurement;
 };
 
-Strip middle_strip(const Measurement& whole) {
+Strip middle_strip(const Measurement& whole, std::int64_t most_rows) {
   const auto& shape = whole.rays->shape();
-  const std::int64_t rows = std::min(kStripRows, shape.num_rows);
+  const std::int64_t rows = std::min(most_rows, shape.num_rows);
   const std::int64_t first = (shape.num_rows - rows) / 2;
   const auto read = [&](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
     const int view = static_cast<int>(v);
@@ -64,23 +69,29 @@ struct StopRequested {};
 // Makes the trials of a search, with its progress.
 class TrialFits {
  public:
-  TrialFits(const Measurement& measurement, const FieldOptions& field, const FitOptions& fit,
-            TrialFile& file, const TuneHooks& hooks)
-      : strip_(middle_strip(measurement)),
+  TrialFits(const Measurement& measurement, std::int64_t rows, const FieldOptions& field,
+            const FitOptions& fit, const TuneHooks& hooks, int num_expected)
+      : strip_(middle_strip(measurement, rows)),
         field_(field),
         fit_(fit),
-        file_(file),
         hooks_(hooks),
-        num_expected_(expected_trials(field.kind == "vm")) {}
+        num_expected_(num_expected) {}
 
   Trial run(const TrialSettings& settings) {
-    std::optional<Trial> trial = file_.find(settings);
-    if (!trial) {
-      trial = fitted(settings);
-      file_.add(*trial);
-    }
+    Trial trial = fitted(settings);
     ++num_done_;
-    return *trial;
+    return trial;
+  }
+
+  // As run(), unless `file` has the trial already.
+  Trial run(const TrialSettings& settings, TrialFile& file) {
+    if (const std::optional<Trial> known = file.find(settings)) {
+      ++num_done_;
+      return *known;
+    }
+    Trial trial = run(settings);
+    file.add(trial);
+    return trial;
   }
 
  private:
@@ -88,6 +99,7 @@ class TrialFits {
     FieldOptions field = field_;
     FitOptions options = fit_;
     field.rank = settings.rank;
+    options.penalty = settings.penalty;
     options.density_variation = settings.variation;
     options.epochs = settings.epochs;
     options.patience = 0;
@@ -112,8 +124,8 @@ class TrialFits {
     report.seconds_left =
         report.seconds_elapsed * (1 - report.fraction_done) / report.fraction_done;
     report.detail =
-        fmt::format("trial {}/{}  tv {:.3g}  rank {}  epochs {}  held out {}", num_done_ + 1,
-                    expected, settings.variation, settings.rank, settings.epochs,
+        fmt::format("trial {}/{}  {} tv {:.3g}  rank {}  epochs {}  held out {}", num_done_ + 1,
+                    expected, settings.penalty, settings.variation, settings.rank, settings.epochs,
                     errors.empty() ? "-" : fmt::format("{:.4f}", errors.back()));
     return report;
   }
@@ -121,12 +133,19 @@ class TrialFits {
   Strip strip_;
   const FieldOptions& field_;
   const FitOptions& fit_;
-  TrialFile& file_;
   const TuneHooks& hooks_;
   base::Stopwatch running_;
   int num_expected_;
   int num_done_ = 0;
 };
+
+void log_trials(const std::vector<Trial>& trials) {
+  for (const Trial& t : trials) {
+    base::log_info(fmt::format("tried {} tv {:8.3f}  rank {:3}  epochs {:4}: held-out error {:.5f}",
+                               t.settings.penalty, t.settings.variation, t.settings.rank,
+                               t.settings.epochs, t.error));
+  }
+}
 
 }  // namespace
 
@@ -162,7 +181,8 @@ void TrialFile::add(const Trial& trial) {
 json trials_json(const std::vector<Trial>& trials) {
   json table = json::array();
   for (const Trial& t : trials) {
-    table.push_back({{"tv", t.settings.variation},
+    table.push_back({{"tv_penalty", t.settings.penalty},
+                     {"tv", t.settings.variation},
                      {"rank", t.settings.rank},
                      {"epochs", t.settings.epochs},
                      {"held_out_error", t.error},
@@ -173,26 +193,49 @@ json trials_json(const std::vector<Trial>& trials) {
 }
 
 std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& field,
-                          const FitOptions& fit, TrialFile& file, const TuneHooks& hooks) {
-  TrialFits fits(measurement, field, fit, file, hooks);
+                          const FitOptions& fit, bool tunes_penalty, TrialFile& file,
+                          const TuneHooks& hooks) {
+  const SearchSpace space{.penalty = tunes_penalty, .rank = field.kind == "vm"};
+  TrialFits fits(measurement, kStripRows, field, fit, hooks, expected_trials(space));
   // A run without total variation still needs a weight to search from.
   const double first =
-      fit.density_variation > 0 ? fit.density_variation : FitOptions{}.density_variation;
+      fit.density_variation > 0 ? fit.density_variation : usual_variation(fit.penalty);
   Tuned tuned;
   try {
     tuned.settings = search_settings(
-        {first, field.rank, fit.epochs}, field.kind == "vm",
-        [&](const TrialSettings& settings) { return fits.run(settings); }, tuned.trials);
+        {fit.penalty, first, field.rank, fit.epochs}, space,
+        [&](const TrialSettings& settings) { return fits.run(settings, file); }, tuned.trials);
   } catch (const StopRequested&) {
     return std::nullopt;
   }
-  for (const Trial& t : tuned.trials) {
-    base::log_info(fmt::format("tried tv {:8.3f}  rank {:3}  epochs {:4}: held-out error {:.5f}",
-                               t.settings.variation, t.settings.rank, t.settings.epochs, t.error));
+  log_trials(tuned.trials);
+  base::log_info(
+      fmt::format("tuned: --tv-penalty {} --tv {:.3f} --rank {} --epochs {} "
+                  "--coarse-epochs {}",
+                  tuned.settings.penalty, tuned.settings.variation, tuned.settings.rank,
+                  tuned.settings.epochs, fit.coarse_epochs));
+  return tuned;
+}
+
+std::optional<Tuned> tune_penalty(const Measurement& measurement, const FieldOptions& field,
+                                  const FitOptions& fit, const TuneHooks& hooks) {
+  FitOptions shorter = fit;
+  shorter.epochs = std::min(fit.epochs, std::max(fit.epochs / kPenaltyPart, kPenaltyEpochs));
+  shorter.coarse_epochs = fit.coarse_epochs * shorter.epochs / fit.epochs;
+  TrialFits fits(measurement, kPenaltyRows, field, shorter, hooks, 2);
+  Tuned tuned;
+  try {
+    tuned.settings =
+        choose_penalty({fit.penalty, fit.density_variation, field.rank, shorter.epochs},
+                       [&](const TrialSettings& settings) {
+                         tuned.trials.push_back(fits.run(settings));
+                         return tuned.trials.back();
+                       });
+  } catch (const StopRequested&) {
+    return std::nullopt;
   }
-  base::log_info(fmt::format("tuned: --tv {:.3f} --rank {} --epochs {} --coarse-epochs {}",
-                             tuned.settings.variation, tuned.settings.rank, tuned.settings.epochs,
-                             fit.coarse_epochs));
+  log_trials(tuned.trials);
+  tuned.settings.epochs = fit.epochs;
   return tuned;
 }
 

@@ -44,12 +44,19 @@ struct Tuned {
   std::vector<Trial> trials;
 };
 
-/// Chooses settings by search_settings(). A trial fits the views that
-/// `measurement` does not hold out, of a strip of rows in the middle: rays of a
-/// tilt about Y stay in their row, so a strip is the same problem, only shorter.
-/// Finished trials go to `file`, and those found there are not repeated. None if
-/// a stop was requested.
+/// Chooses settings by search_settings(), the penalty too if `tunes_penalty`. A trial
+/// fits the views that `measurement` does not hold out, of a strip of rows in the
+/// middle: rays of a tilt about Y stay in their row, so a strip is the same problem,
+/// only shorter. Finished trials go to `file`, and those found there are not
+/// repeated. None if a stop was requested.
 std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& field,
-                          const FitOptions& fit, TrialFile& file, const TuneHooks& hooks);
+                          const FitOptions& fit, bool tunes_penalty, TrialFile& file,
+                          const TuneHooks& hooks);
+
+/// Chooses the penalty alone, by choose_penalty(): two trials of a third of the epochs (ten
+/// at least, if it has as many) on half as many rows, a few per cent of a fit of 256 rows. None if
+/// a stop was requested.
+std::optional<Tuned> tune_penalty(const Measurement& measurement, const FieldOptions& field,
+                                  const FitOptions& fit, const TuneHooks& hooks);
 
 }  // namespace tomofield::reconstruct

@@ -1,14 +1,12 @@
 #include "reconstruct/tune.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace tomofield::reconstruct {
 namespace {
 
 constexpr int kMostSteps = 4;  // of the coarse search to one side: a factor of 256
-constexpr std::array kRanks = {8, 16, 24};
 
 class Search {
  public:
@@ -16,6 +14,10 @@ class Search {
       : best_(start), run_(run), trials_(trials) {}
 
   const TrialSettings& best() const { return best_; }
+
+  void choose_penalty() {
+    best_ = reconstruct::choose_penalty(best_, [this](const TrialSettings& s) { return trial(s); });
+  }
 
   // Coarse steps until the best weight has a worse one on either side; then finer ones.
   void choose_variation() {
@@ -36,21 +38,27 @@ class Search {
 
   void choose_rank() {
     std::vector<TrialSettings> candidates;
-    for (const int rank : kRanks) candidates.push_back({best_.variation, rank, best_.epochs});
+    for (const int thirds : {1, 2, 3}) {
+      candidates.push_back(best_);
+      candidates.back().rank = std::max(thirds * best_.rank / 3, 1);
+    }
     choose_cheapest(candidates);
   }
 
   void choose_epochs() {
-    const int epochs = best_.epochs;
     std::vector<TrialSettings> candidates;
-    for (const int n : {std::max(epochs / 2, 1), epochs, 2 * epochs})
-      candidates.push_back({best_.variation, best_.rank, n});
+    for (const int epochs : {std::max(best_.epochs / 2, 1), best_.epochs, 2 * best_.epochs}) {
+      candidates.push_back(best_);
+      candidates.back().epochs = epochs;
+    }
     choose_cheapest(candidates);
   }
 
  private:
   double error_with_variation(double variation) {
-    return trial({variation, best_.rank, best_.epochs}).error;
+    TrialSettings settings = best_;
+    settings.variation = variation;
+    return trial(settings).error;
   }
 
   // The largest weight tried whose error the best one does not beat by more than its
@@ -59,7 +67,8 @@ class Search {
     const Trial& best = *std::ranges::min_element(trials_, {}, &Trial::error);
     double largest = best.settings.variation;
     for (const Trial& t : trials_) {
-      if (t.error - best.error <= standard_error_of_difference(t, best))
+      if (t.settings.penalty == best_.penalty &&
+          t.error - best.error <= standard_error_of_difference(t, best))
         largest = std::max(largest, t.settings.variation);
     }
     return largest;
@@ -77,7 +86,8 @@ class Search {
 
   Trial trial(const TrialSettings& settings) {
     const auto same = [&](const Trial& t) {
-      return t.settings.rank == settings.rank && t.settings.epochs == settings.epochs &&
+      return t.settings.penalty == settings.penalty && t.settings.rank == settings.rank &&
+             t.settings.epochs == settings.epochs &&
              std::abs(t.settings.variation / settings.variation - 1) < 1e-9;
     };
     const auto known = std::ranges::find_if(trials_, same);
@@ -107,13 +117,25 @@ double standard_error_of_difference(const Trial& a, const Trial& b) {
   return std::sqrt(variance / count);
 }
 
-int expected_trials(bool tunes_rank) { return 7 + 2 + (tunes_rank ? 2 : 0); }
+TrialSettings choose_penalty(const TrialSettings& start, const RunTrial& run) {
+  TrialSettings concave = start, smooth = start;
+  concave.penalty = "concave";
+  smooth.penalty = "smooth";
+  for (TrialSettings* settings : {&concave, &smooth})
+    settings->variation = usual_variation(settings->penalty);
+  return run(smooth).error < run(concave).error ? smooth : concave;
+}
 
-TrialSettings search_settings(const TrialSettings& start, bool tunes_rank, const RunTrial& run,
-                              std::vector<Trial>& trials) {
+int expected_trials(const SearchSpace& space) {
+  return 7 + 2 + (space.penalty ? 1 : 0) + (space.rank ? 2 : 0);
+}
+
+TrialSettings search_settings(const TrialSettings& start, const SearchSpace& space,
+                              const RunTrial& run, std::vector<Trial>& trials) {
   Search search(start, run, trials);
+  if (space.penalty) search.choose_penalty();
   search.choose_variation();
-  if (tunes_rank) search.choose_rank();
+  if (space.rank) search.choose_rank();
   search.choose_epochs();
   return search.best();
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 namespace tomofield::reconstruct {
@@ -17,12 +18,17 @@ struct ImaginedSeries {
   double best_variation = 10;
   int needed_rank = 16, needed_epochs = 30;
   double gain = 0.1, scatter = 0;
+  double smooth_error = 0.05;  // more of a smooth penalty at its own best weight
   int num_trials = 0;
 
   Trial run(const TrialSettings& s) {
     ++num_trials;
-    const double doublings = std::log2(s.variation / best_variation);
-    double error = 1 + 0.02 * doublings * doublings;
+    const bool is_smooth = s.penalty == "smooth";
+    const double best =
+        is_smooth ? best_variation * usual_variation("smooth") / usual_variation("concave")
+                  : best_variation;
+    const double doublings = std::log2(s.variation / best);
+    double error = 1 + (is_smooth ? smooth_error : 0) + 0.02 * doublings * doublings;
     error += gain * std::max(0.0, std::log2(static_cast<double>(needed_rank) / s.rank));
     error += gain * std::max(0.0, std::log2(static_cast<double>(needed_epochs) / s.epochs));
     Trial trial{s, error, {}, 0};
@@ -34,9 +40,10 @@ struct ImaginedSeries {
   }
 };
 
-TrialSettings search(ImaginedSeries& series, std::vector<Trial>& trials, bool tunes_rank = true) {
+TrialSettings search(ImaginedSeries& series, std::vector<Trial>& trials,
+                     const SearchSpace& space = {.penalty = false}) {
   return search_settings(
-      {9, 16, 30}, tunes_rank, [&](const TrialSettings& s) { return series.run(s); }, trials);
+      {"concave", 9, 24, 30}, space, [&](const TrialSettings& s) { return series.run(s); }, trials);
 }
 
 TEST(SearchSettings, FindsTheWeightWithinAFactorOfRootTwo) {
@@ -54,8 +61,8 @@ TEST(SearchSettings, FindsTheWeightWithinAFactorOfRootTwo) {
 }
 
 TEST(SearchSettings, PaysForRankAndEpochsOnlyWhatHelps) {
-  ImaginedSeries modest{.needed_rank = 8, .needed_epochs = 15};
-  ImaginedSeries demanding{.needed_rank = 24, .needed_epochs = 60};
+  ImaginedSeries modest{.best_variation = 9, .needed_rank = 8, .needed_epochs = 15};
+  ImaginedSeries demanding{.best_variation = 9, .needed_rank = 24, .needed_epochs = 60};
   std::vector<Trial> trials;
   TrialSettings found = search(modest, trials);
   EXPECT_EQ(std::pair(found.rank, found.epochs), std::pair(8, 15));
@@ -63,7 +70,21 @@ TEST(SearchSettings, PaysForRankAndEpochsOnlyWhatHelps) {
   found = search(demanding, trials);
   EXPECT_EQ(std::pair(found.rank, found.epochs), std::pair(24, 60));
   trials.clear();
-  EXPECT_EQ(search(modest, trials, /*tunes_rank=*/false).rank, 16);
+  EXPECT_EQ(search(modest, trials, {.penalty = false, .rank = false}).rank, 24);
+}
+
+TEST(SearchSettings, TakesThePenaltyThatPredictsBetterAndItsOwnWeight) {
+  for (const double smooth_error : {0.05, -0.05}) {
+    ImaginedSeries series{.best_variation = 28, .smooth_error = smooth_error};
+    std::vector<Trial> trials;
+    const TrialSettings found = search(series, trials, {});
+    EXPECT_EQ(found.penalty, smooth_error > 0 ? "concave" : "smooth");
+    EXPECT_NEAR(found.variation, smooth_error > 0 ? 28 : 10, 1e-9);
+    EXPECT_EQ(choose_penalty({"concave", 3, 24, 30},
+                             [&](const TrialSettings& s) { return series.run(s); })
+                  .penalty,
+              found.penalty);
+  }
 }
 
 TEST(SearchSettings, TakesTheSmoothestOfWhatCannotBeToldApart) {
@@ -73,9 +94,15 @@ TEST(SearchSettings, TakesTheSmoothestOfWhatCannotBeToldApart) {
   EXPECT_GT(search(unsure, unsure_trials).variation, 9 * 1.4);
 }
 
+Trial with_errors(std::vector<double> view_error) {
+  Trial trial;
+  trial.view_error = std::move(view_error);
+  return trial;
+}
+
 TEST(StandardErrorOfDifference, IgnoresWhatTrialsShare) {
-  const Trial a{{}, 0, {1.0, 5.0, 2.0}, 0}, b{{}, 0, {1.1, 5.1, 2.1}, 0},
-      c{{}, 0, {2.0, 5.0, 2.0}, 0};
+  const Trial a = with_errors({1.0, 5.0, 2.0}), b = with_errors({1.1, 5.1, 2.1}),
+              c = with_errors({2.0, 5.0, 2.0});
   EXPECT_NEAR(standard_error_of_difference(a, b), 0.0, 1e-7);
   EXPECT_NEAR(standard_error_of_difference(a, c), 1.0 / 3, 1e-12);  // s = 1/√3, over √3
 }

@@ -22,7 +22,7 @@ PIXEL_SIZE = 13.37
 TILTS = np.arange(-60, 61, 6.0)
 # A fit of a tenth of a second that still finds the specimen.
 QUICK = ["--thickness", THICKNESS, "--contrast", "bright", "--no-margin", "--leaf-size", 16,
-         "--rank", 6, "--epochs", 8, "--subsets", 7]
+         "--rank", 6, "--epochs", 8, "--subsets", 7, "--tv-penalty", "concave"]
 
 
 def tomofield(*arguments, **keywords):
