@@ -205,6 +205,9 @@ void print_plan(const reconstruct::ReconstructOptions& options, const reconstruc
   fmt::print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {:.0f} voxels\n",
              plan.num_views, plan.view_width, plan.view_height, plan.pixel_size_A, plan.roi.width(),
              plan.roi.height(), plan.thickness);
+  if (plan.num_trials > 0)
+    fmt::print("about {} short trials first, that choose settings by held-out views\n",
+               plan.num_trials);
   fmt::print(
       "{} field, {} leaves, {} parameters; {} steps on {} threads; about {:.2f} GiB of memory\n",
       options.field.kind, plan.num_leaves, plan.num_parameters, plan.num_steps,

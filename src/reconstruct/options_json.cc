@@ -101,12 +101,9 @@ json volume_json(const VolumeOptions& o) {
 }  // namespace
 
 json options_json(const ReconstructOptions& options) {
-  return {{"input", input_json(options.input)},
-          {"specimen", specimen_json(options.specimen)},
-          {"field", field_json(options.field)},
-          {"fit", fit_json(options.fit)},
-          {"choose_penalty", options.choose_penalty},
-          {"tune", options.tune},
+  return {{"input", input_json(options.input)},       {"specimen", specimen_json(options.specimen)},
+          {"field", field_json(options.field)},       {"fit", fit_json(options.fit)},
+          {"choose_penalty", options.choose_penalty}, {"tune", options.tune},
           {"volume", volume_json(options.volume)}};
 }
 

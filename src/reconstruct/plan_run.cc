@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "reconstruct/domain.h"
 #include "reconstruct/fit.h"
+#include "reconstruct/held_out.h"
 #include "reconstruct/reconstruct.h"
 #include "reconstruct/stages.h"
 #include "tilt_series/slab_views.h"
@@ -46,8 +47,10 @@ std::size_t thread_memory(const PreparedSeries& plan, const Domain& domain, int 
 }
 
 int steps_an_epoch(const PreparedSeries& plan, const FitOptions& options) {
-  return plan.ray_geometry ? ray_steps_per_epoch(options, plan.rays_shape())
-                           : std::min(options.subsets, plan.geometry.num_views());
+  if (plan.ray_geometry) return ray_steps_per_epoch(options, plan.rays_shape());
+  const std::size_t held_out =
+      options.hold_out > 0 ? held_out_views(plan.geometry.tilt_deg, options.hold_out).size() : 0;
+  return std::min(options.subsets, plan.geometry.num_views() - static_cast<int>(held_out));
 }
 
 // Of the first tree, or of an adaptive one whose budget is used up.
@@ -104,6 +107,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.num_leaves = domain.tree.num_leaves();
   run.num_parameters = most_parameters(domain, options.field);
   const Stage last = make_stages(options.field, options.fit).back();
+  run.num_trials = options.num_trials(run.num_views);
   run.num_steps = (last.first_epoch + last.epochs) * steps_an_epoch(plan, options.fit);
   run.memory_bytes = estimate_memory(plan, domain, run, options);
   base::require_memory(run.memory_bytes, "this reconstruction",

@@ -13,7 +13,7 @@ using geometry::RayBundle;
 using projection::Ray;
 
 // Streams of the seed: what an epoch's batches and a step's samples are drawn from.
-constexpr std::uint64_t kBatchStream = std::uint64_t{1} << 40;
+constexpr std::uint64_t kBatchStream = std::uint64_t{1} << 44;
 constexpr std::uint64_t kSampleStream = std::uint64_t{2} << 40;
 
 // Rays that are traced and kept at once: some 100 samples each.

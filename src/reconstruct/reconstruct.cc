@@ -212,14 +212,6 @@ void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOpti
       {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"figures", figures}});
 }
 
-// Whether settings are to be chosen by views held out. A short series cannot spare
-// views for the penalty alone, and rays of raw views are not predicted.
-bool chooses_settings(const ReconstructOptions& options, const PreparedSeries& series) {
-  constexpr int kFewestViews = 14;
-  return options.tune || (options.choose_penalty && options.fit.engine == "slab" &&
-                          series.geometry.num_views() >= kFewestViews);
-}
-
 // The settings that predict views held out best. None if a stop was requested.
 std::optional<Tuned> choose_settings(const PreparedSeries& series, const OutputPaths& paths,
                                      const ReconstructHooks& hooks,
@@ -253,6 +245,12 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
   };
   return {volume, with(".h5"),           with(".json"),     with("_tree.png"),
           stem,   with("_held_out.png"), with("_tune.json")};
+}
+
+int ReconstructOptions::num_trials(int num_views) const {
+  constexpr int kFewestViews = 14;
+  if (tune) return expected_trials({.penalty = choose_penalty, .rank = field.kind == "vm"});
+  return choose_penalty && fit.engine == "slab" && num_views >= kFewestViews ? 2 : 0;
 }
 
 std::vector<std::string> ReconstructOptions::faults() const {
@@ -294,7 +292,7 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
   const PreparedSeries series =
       prepare_series(tilt_series, options.specimen, directory_of(paths.volume));
   std::optional<Tuned> tuned;
-  if (chooses_settings(options, series)) {
+  if (options.num_trials(series.geometry.num_views()) > 0) {
     tuned = choose_settings(series, paths, hooks, options);
     if (!tuned) return Outcome::kStoppedTuning;
     apply(tuned->settings, options);

@@ -26,6 +26,9 @@ struct ReconstructOptions {
   bool overwrite = false;
   bool resume = false;  ///< continue from the model file, if there is one
   double checkpoint_minutes = 5;
+  /// Trials of settings before the fit, about; 0: none are to be chosen. A series of few
+  /// views cannot spare any for the penalty alone, and rays of raw views are not predicted.
+  int num_trials(int num_views) const;
   /// Every fault that these options have by themselves, a sentence each.
   std::vector<std::string> faults() const;
 };
@@ -66,6 +69,7 @@ struct RunPlan {
   double thickness = 0;
   int num_leaves = 0;
   std::size_t num_parameters = 0;
+  int num_trials = 0;  ///< short fits before it, about, that choose settings
   std::int64_t num_steps = 0;
   std::size_t memory_bytes = 0;  ///< estimated peak
 };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <memory>
 #include <utility>
@@ -36,6 +37,7 @@ Trial trial_from(const json& entry) {
 
 // The middle rows of a measurement, copied.
 struct Strip {
+  double part = 1;  // of all rows
   std::unique_ptr<tilt_series::SlabViews> rays;
   Measurement measurement;
 };
@@ -54,7 +56,8 @@ Strip middle_strip(const Measurement& whole, std::int64_t most_rows) {
       }
     }
   };
-  Strip strip{.rays = std::make_unique<tilt_series::SlabViews>(
+  Strip strip{.part = static_cast<double>(rows) / static_cast<double>(shape.num_rows),
+              .rays = std::make_unique<tilt_series::SlabViews>(
                   tilt_series::SlabViews::Shape{shape.num_views, shape.width, rows, 0, rows}, 1.0,
                   read, std::filesystem::temp_directory_path()),
               .measurement = whole};
@@ -99,6 +102,7 @@ class TrialFits {
     FieldOptions field = field_;
     FitOptions options = fit_;
     field.rank = settings.rank;
+    field.leaf_budget = static_cast<int>(std::ceil(field.leaf_budget * strip_.part));
     options.penalty = settings.penalty;
     options.density_variation = settings.variation;
     options.epochs = settings.epochs;

@@ -68,13 +68,15 @@ def interrupted(results, kill_when, most=40):
 
 def test_killed_at_random_moments():
     chance = random.Random(5)
-    results = fresh_results("random")
 
     def kill_when(kills):
         moment = time.monotonic() + chance.uniform(0.05, 0.5) * duration
         return lambda: time.monotonic() > moment
 
-    kills = interrupted(results, kill_when, most=6)
+    for _ in range(5):  # a run may be much quicker than the one that was timed
+        results = fresh_results("random")
+        if kills := interrupted(results, kill_when, most=6):
+            break
     assert kills > 0
     assert results.same_as(undisturbed)
     assert not results.leftovers(), results.leftovers()
