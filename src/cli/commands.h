@@ -8,6 +8,7 @@ namespace tomofield::cli {
 // work and throws tomofield::Error for the user's mistakes. One file each:
 // src/cli/NAME_command.cc.
 void add_baseline_command(CLI::App& program);
+void add_compare_command(CLI::App& program);
 void add_evaluate_command(CLI::App& program);
 void add_export_command(CLI::App& program);
 void add_info_command(CLI::App& program);

@@ -28,6 +28,7 @@ void add_commands(CLI::App& program) {
   add_baseline_command(program);
   add_export_command(program);
   add_evaluate_command(program);
+  add_compare_command(program);
   add_simulate_command(program);
   add_info_command(program);
 }

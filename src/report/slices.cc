@@ -1,89 +1,23 @@
 #include "report/slices.h"
 
 #include <algorithm>
-#include <cstdint>
-#include <span>
 #include <string>
-#include <utility>
 
-#include "io/mrc.h"
-#include "io/png.h"
 #include "report/grey_scale.h"
+#include "report/slice.h"
 
 namespace tomofield::report {
-namespace {
-
-constexpr std::int64_t kChunkValues = std::int64_t{1} << 22;
-constexpr std::size_t kMaxSample = std::size_t{1} << 20;
-
-/// One plane [height, width] of a volume.
-struct Slice {
-  Slice(const char* axes, std::int64_t w, std::int64_t h)
-      : name(axes), width(w), height(h), values(static_cast<std::size_t>(w * h)) {}
-  float* row(std::int64_t y) { return values.data() + y * width; }
-  const float* row(std::int64_t y) const { return values.data() + y * width; }
-  std::string name;
-  std::int64_t width, height;
-  std::vector<float> values;
-};
-
-std::vector<Slice> read_central_slices(const io::MrcReader& file) {
-  const io::MrcHeader& h = file.header();
-  std::vector<Slice> slices{{"xy", h.nx, h.ny}, {"xz", h.nx, h.nz}, {"yz", h.ny, h.nz}};
-  Slice &xy = slices[0], &xz = slices[1], &yz = slices[2];
-  file.read_section(h.nz / 2, xy.values);
-  const std::int64_t chunk = std::clamp<std::int64_t>(kChunkValues / h.nx, 1, h.ny);
-  std::vector<float> rows(static_cast<std::size_t>(chunk * h.nx));
-  for (std::int64_t z = 0; z < h.nz; ++z) {
-    for (std::int64_t y = 0; y < h.ny; y += chunk) {
-      const std::int64_t count = std::min(chunk, h.ny - y);
-      file.read_rows(z, y, count, std::span(rows).first(static_cast<std::size_t>(count * h.nx)));
-      for (std::int64_t i = 0; i < count; ++i) {
-        const float* row = rows.data() + i * h.nx;
-        yz.row(z)[y + i] = row[h.nx / 2];
-        if (y + i == h.ny / 2) std::copy_n(row, h.nx, xz.row(z));
-      }
-    }
-  }
-  return slices;
-}
-
-/// One for all the slices.
-GreyScale grey_scale_of(const std::vector<Slice>& slices) {
-  std::size_t total = 0;
-  for (const Slice& slice : slices) total += slice.values.size();
-  const std::size_t stride = total / kMaxSample + 1;
-  std::vector<float> sample;
-  for (const Slice& slice : slices)
-    for (std::size_t i = 0; i < slice.values.size(); i += stride) sample.push_back(slice.values[i]);
-  return GreyScale(std::move(sample));
-}
-
-void write_picture(const std::filesystem::path& path, const Slice& slice, const GreyScale& scale,
-                   std::int64_t zoom) {
-  const std::int64_t width = slice.width * zoom, height = slice.height * zoom;
-  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width * height));
-  for (std::int64_t y = 0; y < height; ++y) {
-    const float* row = slice.row(slice.height - 1 - y / zoom);  // the first row at the bottom
-    for (std::int64_t x = 0; x < width; ++x)
-      pixels[static_cast<std::size_t>(y * width + x)] =
-          scale.grey(static_cast<double>(row[x / zoom]));
-  }
-  io::write_png_grey(path, width, height, pixels);
-}
-
-}  // namespace
 
 std::vector<std::filesystem::path> write_slice_pictures(const std::filesystem::path& mrc,
                                                         const std::filesystem::path& prefix) {
-  const auto slices = read_central_slices(io::MrcReader(mrc));
+  const auto slices = read_central_slices(mrc);
   const GreyScale scale = grey_scale_of(slices);
   const auto [narrowest, widest] = std::minmax({slices[0].width, slices[2].width});
   const std::int64_t zoom = picture_zoom(narrowest, widest);
   std::vector<std::filesystem::path> paths;
   for (const Slice& slice : slices) {
     paths.emplace_back(prefix.string() + "_" + slice.name + ".png");
-    write_picture(paths.back(), slice, scale, zoom);
+    write_slice_picture(paths.back(), slice, scale, zoom);
   }
   return paths;
 }

@@ -31,6 +31,7 @@ LAYERS = [
     "baseline",
     "simulate",
     "report",
+    "compare",
     "cli",
 ]
 SOURCES = {".h", ".cc", ".cu", ".cuh"}

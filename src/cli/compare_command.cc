@@ -1,0 +1,120 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/log.h"
+#include "cli/commands.h"
+#include "cli/common_options.h"
+#include "cli/exit_status.h"
+#include "cli/input_options.h"
+#include "cli/specimen_options.h"
+#include "compare/comparison.h"
+
+namespace tomofield::cli {
+namespace {
+
+volatile std::sig_atomic_t g_signal = 0;
+void remember_signal(int signal) { g_signal = signal; }
+
+struct Arguments {
+  tilt_series::TiltSeriesOptions input;  // checked here, read by the methods
+  reconstruct::SpecimenOptions specimen;
+  std::vector<std::string> names{"vm", "grid", "tv", "sirt"};
+  std::vector<std::string> others;
+  std::string truth, folder;
+  bool tune = false, overwrite = false;
+};
+
+// The words that say what the series is, as they were given: every method gets them.
+std::vector<std::string> series_words(const CLI::App& command,
+                                      const std::vector<std::string>& own_options) {
+  std::vector<std::string> words;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->count() == 0 || std::ranges::count(own_options, option->get_name()) > 0) continue;
+    const bool is_flag = option->get_items_expected_max() == 0;
+    if (!option->get_positional() || !option->get_lnames().empty())
+      words.push_back(option->get_name());
+    if (is_flag) continue;
+    const std::string value = fmt::format("{}", fmt::join(option->results(), ","));
+    // A value that begins with a minus would be taken for an option.
+    if (!words.empty() && words.back() == option->get_name() && value.rfind('-', 0) == 0)
+      words.back() += "=" + value;
+    else
+      words.push_back(value);
+  }
+  return words;
+}
+
+void run(const CLI::App& command, const Arguments& arguments,
+         const std::vector<std::string>& own_options) {
+  compare::CompareOptions options;
+  options.program = std::filesystem::read_symlink("/proc/self/exe");
+  options.series = {arguments.input.stack, series_words(command, own_options)};
+  options.methods = compare::choose_methods(arguments.names, arguments.others);
+  if (!arguments.truth.empty()) options.truth = arguments.truth;
+  options.tune = arguments.tune;
+  options.folder = arguments.folder;
+  options.overwrite = arguments.overwrite;
+  compare::check_comparison(options);
+  std::signal(SIGINT, remember_signal);
+  std::signal(SIGTERM, remember_signal);
+  const compare::RunHooks hooks{
+      .method_starts =
+          [](const compare::Method& method, bool is_there) {
+            base::log_info(fmt::format("{}: {}", method.name,
+                                       is_there ? "there already" : "running, its log beside it"));
+          },
+      .stop_requested = [] { return g_signal != 0; }};
+  if (compare::compare_methods(options, hooks) == compare::RowsOutcome::kStopped) {
+    throw ExitStatus(128 + g_signal,
+                     fmt::format("stopped; what is finished is in '{}': the same command goes on",
+                                 arguments.folder));
+  }
+  fmt::print(
+      "report    {}\nfigures   {}\ntable     {}\n", (options.folder / "report.html").string(),
+      (options.folder / "comparison.json").string(), (options.folder / "comparison.csv").string());
+}
+
+std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments) {
+  const char* group = "Comparison";
+  command
+      .add_option("--methods", arguments.names,
+                  "which, the first being the main one: vm, grid, tv, sirt")
+      ->delimiter(',')
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--also", arguments.others,
+                  "NAME=COMMAND: a method of your own, as in 'smooth=reconstruct --tv-penalty "
+                  "smooth'; may be repeated")
+      ->allow_extra_args(false)
+      ->group(group);
+  command.add_option("--truth", arguments.truth, "MRC volume to score against")->group(group);
+  command.add_flag("--tune", arguments.tune, "tune the methods that can be")->group(group);
+  command.add_option("-o,--output", arguments.folder, "folder of everything that it makes")
+      ->required()
+      ->group(group);
+  command.add_flag("--overwrite", arguments.overwrite, "make everything anew")->group(group);
+  return {"--methods", "--also", "--truth", "--tune", "--output", "--overwrite"};
+}
+
+}  // namespace
+
+void add_compare_command(CLI::App& program) {
+  CLI::App& command = *program.add_subcommand(
+      "compare", "several methods on one series: volumes, a table and a report.html side by side");
+  auto arguments = std::make_shared<Arguments>();
+  add_input_options(command, arguments->input);
+  add_specimen_options(command, arguments->specimen);
+  const auto own_options = add_own_options(command, *arguments);
+  add_common_options(command);
+  command.callback([&command, arguments, own_options] { run(command, *arguments, own_options); });
+}
+
+}  // namespace tomofield::cli

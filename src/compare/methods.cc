@@ -1,0 +1,78 @@
+#include "compare/methods.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+#include <sstream>
+
+#include "tomofield/error.h"
+
+namespace tomofield::compare {
+namespace {
+
+Method parse_method(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  const std::string name = text.substr(0, equals);
+  const bool can_be_a_file = !name.empty() && std::ranges::all_of(name, [](unsigned char c) {
+    return std::isalnum(c) || c == '-' || c == '_';
+  });
+  if (equals == std::string::npos || !can_be_a_file) {
+    throw Error(
+        fmt::format("--also '{}': give NAME=COMMAND, the name of letters, digits, - and _, such as "
+                    "'smooth=reconstruct --tv-penalty smooth'",
+                    text));
+  }
+  Method method{name, name, {}};
+  std::istringstream words(text.substr(equals + 1));
+  for (std::string word; words >> word;) method.arguments.push_back(word);
+  const std::string command = method.arguments.empty() ? "" : method.arguments.front();
+  if (command != "reconstruct" && command != "baseline") {
+    throw Error(fmt::format("--also '{}': the command must be reconstruct or baseline, not '{}'",
+                            text, command));
+  }
+  method.resumes = method.tunes = command == "reconstruct";
+  return method;
+}
+
+std::vector<std::string> names_of(const std::vector<Method>& methods) {
+  std::vector<std::string> names;
+  for (const Method& m : methods) names.push_back(m.name);
+  return names;
+}
+
+}  // namespace
+
+const std::vector<Method>& known_methods() {
+  static const std::vector<Method> methods{
+      {"vm", "tomofield", {"reconstruct"}, true, true},
+      {"grid", "tomofield, plain vertices", {"reconstruct", "--field", "grid"}, true, true},
+      {"tv", "total variation", {"baseline", "tv"}},
+      {"sirt", "SIRT", {"baseline", "sirt"}}};
+  return methods;
+}
+
+std::vector<Method> choose_methods(const std::vector<std::string>& names,
+                                   const std::vector<std::string>& others) {
+  std::vector<Method> chosen;
+  for (const std::string& name : names) {
+    const auto known = std::ranges::find(known_methods(), name, &Method::name);
+    if (known == known_methods().end()) {
+      throw Error(
+          fmt::format("--methods: there is no method '{}': give some of {}, or your own "
+                      "with --also",
+                      name, fmt::join(names_of(known_methods()), ", ")));
+    }
+    chosen.push_back(*known);
+  }
+  for (const std::string& other : others) chosen.push_back(parse_method(other));
+  std::vector<std::string> all = names_of(chosen);
+  std::ranges::sort(all);
+  const auto twice = std::ranges::adjacent_find(all);
+  if (twice != all.end())
+    throw Error(fmt::format("the method '{}' is there twice: give one another name", *twice));
+  return chosen;
+}
+
+}  // namespace tomofield::compare

@@ -1,0 +1,96 @@
+#include "compare/pictures.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "report/grey_scale.h"
+
+namespace tomofield::compare {
+namespace {
+
+constexpr std::int64_t kPictureWidth = 320;  // at least, where whole voxels allow it
+
+double standard_deviation(const report::Slice& plane, const Detail& d) {
+  double n = 0, sum = 0, squares = 0;
+  for (std::int64_t y = d.y0; y < d.y1; ++y) {
+    for (std::int64_t x = d.x0; x < d.x1; ++x) {
+      const double value = static_cast<double>(plane.row(y)[x]);
+      n += 1;
+      sum += value;
+      squares += value * value;
+    }
+  }
+  return std::sqrt(std::max(squares / n - sum / n * (sum / n), 0.0));
+}
+
+report::HtmlFigure figure(const Shown& volume, const report::Slice& slice, const char* suffix,
+                          const report::GreyScale& scale, const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / (volume.name + suffix + ".png");
+  const std::int64_t zoom = std::max<std::int64_t>(1, kPictureWidth / slice.width);
+  report::write_slice_picture(path, slice, scale, zoom);
+  return {path, volume.title};
+}
+
+}  // namespace
+
+Detail busiest_detail(const report::Slice& plane) {
+  const std::int64_t shorter = std::min(plane.width, plane.height);
+  const std::int64_t side = std::min(shorter, std::max<std::int64_t>(shorter / 3, 32));
+  const std::int64_t step = std::max<std::int64_t>(side / 2, 1);
+  Detail best{0, 0, side, side};
+  double largest = -1;
+  for (std::int64_t y = 0; y + side <= plane.height; y += step) {
+    for (std::int64_t x = 0; x + side <= plane.width; x += step) {
+      const Detail here{x, y, x + side, y + side};
+      const double deviation = standard_deviation(plane, here);
+      if (deviation > largest) {
+        largest = deviation;
+        best = here;
+      }
+    }
+  }
+  return best;
+}
+
+std::vector<report::HtmlFigure> plane_figures(const std::vector<Shown>& volumes,
+                                              std::size_t reference, std::size_t plane,
+                                              const std::filesystem::path& folder) {
+  const report::GreyScale scale = report::grey_scale_of(volumes[reference].planes);
+  std::vector<report::HtmlFigure> figures;
+  for (const Shown& volume : volumes) {
+    const report::Slice& slice = volume.planes[plane];
+    figures.push_back(figure(volume, slice, ("_" + slice.name).c_str(), scale, folder));
+  }
+  return figures;
+}
+
+std::vector<report::HtmlFigure> detail_figures(const std::vector<Shown>& volumes,
+                                               std::size_t reference, const Detail& detail,
+                                               const std::filesystem::path& folder) {
+  const auto cut = [&](const Shown& volume) {
+    return volume.planes.front().cut(detail.x0, detail.y0, detail.x1, detail.y1);
+  };
+  const report::GreyScale scale = report::grey_scale_of({cut(volumes[reference])});
+  std::vector<report::HtmlFigure> figures;
+  for (const Shown& volume : volumes)
+    figures.push_back(figure(volume, cut(volume), "_detail", scale, folder));
+  return figures;
+}
+
+std::vector<report::Curve> detail_profiles(const std::vector<Shown>& volumes, const Detail& detail,
+                                           double voxel_size_A) {
+  const double step = voxel_size_A > 0 ? voxel_size_A : 1.0;
+  const std::int64_t row = (detail.y0 + detail.y1) / 2;
+  std::vector<report::Curve> curves;
+  for (const Shown& volume : volumes) {
+    report::Curve curve{volume.title, {}};
+    for (std::int64_t x = detail.x0; x < detail.x1; ++x) {
+      curve.points.emplace_back(static_cast<double>(x - detail.x0) * step,
+                                static_cast<double>(volume.planes.front().row(row)[x]));
+    }
+    curves.push_back(std::move(curve));
+  }
+  return curves;
+}
+
+}  // namespace tomofield::compare

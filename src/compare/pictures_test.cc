@@ -1,0 +1,40 @@
+#include "compare/pictures.h"
+
+#include <gtest/gtest.h>
+
+namespace tomofield::compare {
+namespace {
+
+// Flat, but for a checkerboard of the columns and rows from 60 on.
+report::Slice plane_with_texture() {
+  report::Slice plane("xy", 128, 96);
+  for (std::int64_t y = 60; y < 90; ++y) {
+    for (std::int64_t x = 60; x < 90; ++x) plane.row(y)[x] = static_cast<float>((x + y) % 2);
+  }
+  return plane;
+}
+
+TEST(BusiestDetail, LiesWhereThePlaneVariesMost) {
+  const Detail detail = busiest_detail(plane_with_texture());
+  EXPECT_EQ(detail.x1 - detail.x0, 32);
+  EXPECT_EQ(detail.y1 - detail.y0, 32);
+  EXPECT_EQ(detail.x0, 64);
+  EXPECT_EQ(detail.y0, 64);
+}
+
+TEST(BusiestDetail, FitsIntoSmallPlanes) {
+  const Detail detail = busiest_detail(report::Slice("xy", 20, 9));
+  EXPECT_EQ(detail.x1, 9);
+  EXPECT_EQ(detail.y1, 9);
+}
+
+TEST(DetailProfiles, RunThroughTheMiddleOfTheDetail) {
+  const Shown volume{"a", "A", {plane_with_texture()}};
+  const auto curves = detail_profiles({volume}, {62, 60, 66, 70}, 2.5);
+  ASSERT_EQ(curves.size(), 1u);
+  const std::vector<std::pair<double, double>> expected{{0, 1}, {2.5, 0}, {5, 1}, {7.5, 0}};
+  EXPECT_EQ(curves[0].points, expected);  // row 65
+}
+
+}  // namespace
+}  // namespace tomofield::compare

@@ -1,0 +1,69 @@
+#include "report/slice.h"
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include "io/mrc.h"
+#include "io/png.h"
+
+namespace tomofield::report {
+namespace {
+
+constexpr std::int64_t kChunkValues = std::int64_t{1} << 22;
+constexpr std::size_t kMaxSample = std::size_t{1} << 20;
+
+}  // namespace
+
+Slice Slice::cut(std::int64_t x0, std::int64_t y0, std::int64_t x1, std::int64_t y1) const {
+  Slice part(name, x1 - x0, y1 - y0);
+  for (std::int64_t y = y0; y < y1; ++y) std::copy(row(y) + x0, row(y) + x1, part.row(y - y0));
+  return part;
+}
+
+std::vector<Slice> read_central_slices(const std::filesystem::path& mrc) {
+  const io::MrcReader file(mrc);
+  const io::MrcHeader& h = file.header();
+  std::vector<Slice> slices{{"xy", h.nx, h.ny}, {"xz", h.nx, h.nz}, {"yz", h.ny, h.nz}};
+  Slice &xy = slices[0], &xz = slices[1], &yz = slices[2];
+  file.read_section(h.nz / 2, xy.values);
+  const std::int64_t chunk = std::clamp<std::int64_t>(kChunkValues / h.nx, 1, h.ny);
+  std::vector<float> rows(static_cast<std::size_t>(chunk * h.nx));
+  for (std::int64_t z = 0; z < h.nz; ++z) {
+    for (std::int64_t y = 0; y < h.ny; y += chunk) {
+      const std::int64_t count = std::min(chunk, h.ny - y);
+      file.read_rows(z, y, count, std::span(rows).first(static_cast<std::size_t>(count * h.nx)));
+      for (std::int64_t i = 0; i < count; ++i) {
+        const float* row = rows.data() + i * h.nx;
+        yz.row(z)[y + i] = row[h.nx / 2];
+        if (y + i == h.ny / 2) std::copy_n(row, h.nx, xz.row(z));
+      }
+    }
+  }
+  return slices;
+}
+
+GreyScale grey_scale_of(const std::vector<Slice>& slices) {
+  std::size_t total = 0;
+  for (const Slice& slice : slices) total += slice.values.size();
+  const std::size_t stride = total / kMaxSample + 1;
+  std::vector<float> sample;
+  for (const Slice& slice : slices)
+    for (std::size_t i = 0; i < slice.values.size(); i += stride) sample.push_back(slice.values[i]);
+  return GreyScale(std::move(sample));
+}
+
+void write_slice_picture(const std::filesystem::path& path, const Slice& slice,
+                         const GreyScale& scale, std::int64_t zoom) {
+  const std::int64_t width = slice.width * zoom, height = slice.height * zoom;
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width * height));
+  for (std::int64_t y = 0; y < height; ++y) {
+    const float* row = slice.row(slice.height - 1 - y / zoom);  // the first row at the bottom
+    for (std::int64_t x = 0; x < width; ++x)
+      pixels[static_cast<std::size_t>(y * width + x)] =
+          scale.grey(static_cast<double>(row[x / zoom]));
+  }
+  io::write_png_grey(path, width, height, pixels);
+}
+
+}  // namespace tomofield::report
