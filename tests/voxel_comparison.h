@@ -24,10 +24,11 @@ class OneThread : public ::testing::Test {
 
 /// The voxels of a sphere series without margins: nothing lies outside.
 /// `series` must outlive it.
-inline baseline::VoxelProblem voxel_problem(const SphereSeries& series) {
+inline baseline::VoxelProblem voxel_problem(const SphereSeries& series,
+                                            const baseline::ViewHandling& handling = {}) {
   return {series.geometry,
           projection::make_sample_grid(series.geometry, 0, SphereSeries::kWidth, 0), *series.rays,
-          series.noise_sigma};
+          series.noise_sigma, handling};
 }
 
 /// Calls body(x, y, z, density) for each voxel of the region of interest.

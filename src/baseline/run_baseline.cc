@@ -14,6 +14,7 @@
 #include "io/json.h"
 #include "kernels/lanes.h"
 #include "projection/sample_grid.h"
+#include "reconstruct/held_out.h"
 #include "reconstruct/mask_json.h"
 #include "reconstruct/options_json.h"
 #include "reconstruct/result_files.h"
@@ -24,14 +25,6 @@ namespace {
 
 using kernels::kLanes;
 
-bool is_tv(const BaselineOptions& options) {
-  return std::holds_alternative<TvOptions>(options.method);
-}
-
-int num_iterations(const BaselineOptions& options) {
-  return std::visit([](const auto& method) { return method.iterations; }, options.method);
-}
-
 projection::SampleGrid grid_of(const reconstruct::PreparedSeries& series,
                                const BaselineOptions& options) {
   return projection::make_sample_grid(series.geometry, static_cast<double>(series.roi.x0),
@@ -39,16 +32,21 @@ projection::SampleGrid grid_of(const reconstruct::PreparedSeries& series,
                                       options.specimen.with_margin ? options.margin_spacing : 0.0);
 }
 
-// Volumes: densities and inverse column sums, or densities, Kᵀ y and three
-// gradient duals. The rays, and with TV a dual of each.
+std::vector<int> views_held_out(const reconstruct::PreparedSeries& series,
+                                const BaselineOptions& options) {
+  if (options.hold_out == 0) return {};
+  return reconstruct::held_out_views(series.geometry.tilt_deg, options.hold_out);
+}
+
+// What the method holds of each slab, and a slab and its rays for each thread.
 std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
-                            const projection::SampleGrid& grid, bool with_tv) {
+                            const projection::SampleGrid& grid, const MethodFacts& method) {
   constexpr std::size_t kFixed = std::size_t{48} << 20;  // program and libraries
   const std::size_t slabs = static_cast<std::size_t>((plan.roi.height() + kLanes - 1) / kLanes);
   const std::size_t rays = static_cast<std::size_t>(plan.geometry.num_views()) *
                            static_cast<std::size_t>(plan.geometry.width) * kLanes;
-  const std::size_t volumes = with_tv ? 5 : 2;
-  const std::size_t values_of_slab = volumes * grid.size() + (with_tv ? 2 : 1) * rays;
+  const std::size_t values_of_slab = static_cast<std::size_t>(method.volumes) * grid.size() +
+                                     static_cast<std::size_t>(method.detectors) * rays;
   const std::size_t values_of_thread = grid.size() + rays;
   return kFixed +
          sizeof(float) * (slabs * values_of_slab +
@@ -99,29 +97,25 @@ field::ModelInfo volume_info(const reconstruct::PreparedSeries& series,
   return info;
 }
 
-nlohmann::json method_json(const SirtOptions& o) {
-  return {{"name", "sirt"},
-          {"iterations", o.iterations},
-          {"relaxation", o.relaxation},
-          {"non_negative", o.non_negative},
-          {"fit_view_scale", o.fit_view_scale}};
-}
-
-nlohmann::json method_json(const TvOptions& o) {
-  return {{"name", "tv"},
-          {"iterations", o.iterations},
-          {"weight", o.weight},
-          {"non_negative", o.non_negative},
-          {"fit_view_scale", o.fit_view_scale}};
-}
-
 nlohmann::json options_json(const BaselineOptions& options) {
   return {{"input", reconstruct::input_json(options.input)},
           {"specimen", reconstruct::specimen_json(options.specimen)},
           {"with_margin", options.specimen.with_margin},
           {"margin_spacing", options.margin_spacing},
-          {"method",
-           std::visit([](const auto& method) { return method_json(method); }, options.method)}};
+          {"fit_view_scale", options.fit_view_scale},
+          {"hold_out", options.hold_out},
+          {"method", json_of(options.method)}};
+}
+
+// How well the densities predict the views that were not fitted; null if all were.
+nlohmann::json held_out_json(const VoxelProblem& problem, const std::vector<int>& views,
+                             bool fit_view_scale, VoxelVolume& densities) {
+  if (views.empty()) return nullptr;
+  std::vector<double> weights;
+  for (const double sigma : problem.noise_sigma()) weights.push_back(1 / (sigma * sigma));
+  return reconstruct::report_held_out(reconstruct::score_views(view_sums(problem, views, densities),
+                                                               views, weights, fit_view_scale),
+                                      problem.projector().geometry().tilt_deg);
 }
 
 nlohmann::json figures_json(const Solution& solution, const VoxelProblem& problem,
@@ -150,9 +144,12 @@ nlohmann::json figures_json(const Solution& solution, const VoxelProblem& proble
 
 BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays) {
   const std::vector<double>& objective = solution.objective;
-  const double before = objective[(objective.size() - 1) * 9 / 10];
-  return {2 * solution.data_loss.back() / static_cast<double>(num_rays),
-          (before - objective.back()) / objective.back()};
+  BaselineSummary summary{2 * solution.data_loss.back() / static_cast<double>(num_rays), {}};
+  if (objective.size() > 1) {
+    const double before = objective[(objective.size() - 1) * 9 / 10];
+    summary.last_decrease = (before - objective.back()) / objective.back();
+  }
+  return summary;
 }
 
 }  // namespace
@@ -178,6 +175,7 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
         "--xtilt out (the volume is then turned by it), or use reconstruct",
         planned.x_tilt_deg));
   }
+  views_held_out(planned, options);  // throws if there are none
   const projection::SampleGrid grid = grid_of(planned, options);
   BaselinePlan plan;
   plan.num_views = planned.geometry.num_views();
@@ -188,7 +186,7 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
     plan.num_voxels += static_cast<std::size_t>(segment.nx) * static_cast<std::size_t>(segment.nz) *
                        static_cast<std::size_t>(planned.roi.height());
   }
-  plan.memory_bytes = estimate_memory(planned, grid, is_tv(options));
+  plan.memory_bytes = estimate_memory(planned, grid, facts_of(options.method));
   base::require_memory(plan.memory_bytes, "this baseline",
                        "use a larger --bin or --margin-spacing, or a smaller --roi or --thickness");
   return plan;
@@ -200,25 +198,28 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   const reconstruct::PreparedSeries series =
       prepare_series(tilt_series, options.specimen,
                      paths.volume.has_parent_path() ? paths.volume.parent_path() : ".");
-  VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays, series.noise_sigma);
+  const std::vector<int> held_out = views_held_out(series, options);
+  VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays, series.noise_sigma,
+                       {held_out, options.fit_view_scale});
   const std::int64_t num_rays = problem.num_rays();
+  const MethodFacts method = facts_of(options.method);
   const base::Stopwatch running;
   const AfterIteration report = [&](const IterationReport& iteration, const VoxelVolume&) {
     if (progress)
-      progress(progress_report(iteration, num_iterations(options), num_rays, running.seconds()));
+      progress(progress_report(iteration, method.iterations, num_rays, running.seconds()));
   };
-  const Solution solution =
-      is_tv(options) ? reconstruct_tv(problem, std::get<TvOptions>(options.method),
-                                      series.mean_density, report)
-                     : reconstruct_sirt(problem, std::get<SirtOptions>(options.method), report);
+  Solution solution = reconstruct(problem, options.method, series.mean_density, report);
   const double fit_seconds = running.seconds();
 
   const field::ModelInfo info = volume_info(series, options);
   write_voxels(voxels_of(solution.densities), reconstruct::region_box(info, 1.0), info,
-               is_tv(options) ? "baseline tv" : "baseline sirt", options.volume, paths.volume);
-  io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
-                              {"options", options_json(options)},
-                              {"figures", figures_json(solution, problem, series, fit_seconds)}});
+               fmt::format("baseline {}", method.name), options.volume, paths.volume);
+  nlohmann::json figures = figures_json(solution, problem, series, fit_seconds);
+  figures["held_out"] =
+      held_out_json(problem, held_out, options.fit_view_scale, solution.densities);
+  io::write_json(
+      paths.json,
+      {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"figures", figures}});
   return summary_of(solution, num_rays);
 }
 

@@ -1,11 +1,10 @@
 #pragma once
 
 #include <filesystem>
-#include <variant>
+#include <optional>
 
 #include "base/progress.h"
-#include "baseline/sirt.h"
-#include "baseline/tv_reconstruction.h"
+#include "baseline/method.h"
 #include "reconstruct/prepare.h"
 #include "reconstruct/write_volume.h"
 #include "tilt_series/tilt_series.h"
@@ -17,7 +16,9 @@ struct BaselineOptions {
   tilt_series::TiltSeriesOptions input;
   reconstruct::SpecimenOptions specimen;
   double margin_spacing = 2.0;  ///< binned pixels between samples of the margins
-  std::variant<SirtOptions, TvOptions> method;
+  Method method;
+  bool fit_view_scale = false;        ///< per-view scale and offset as nuisances
+  int hold_out = 0;                   ///< keep every so-manieth view from the fit; 0: none
   reconstruct::VolumeOptions volume;  ///< `box` stays empty: voxels are where they were fitted
   std::filesystem::path output;       ///< the volume; JSON and pictures lie beside it
   bool overwrite = false;
@@ -50,8 +51,9 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
 /// What is left to say when it is done.
 struct BaselineSummary {
   double mean_squared_residual = 0;  ///< in units of the noise's variance
-  /// By how much the objective fell in the last tenth of the iterations, as a fraction of it.
-  double last_decrease = 0;
+  /// By how much the objective fell in the last tenth of the iterations, as a fraction of it;
+  /// of iterative methods.
+  std::optional<double> last_decrease;
 };
 
 /// Reads the series, reconstructs, writes the volume (MRC, the input's units and contrast),

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "baseline/solver.h"
 #include "baseline/voxel_problem.h"
 
@@ -9,13 +11,13 @@ struct SirtOptions {
   int iterations = 40;      ///< best for noisy phantoms, docs/results/quality.md
   double relaxation = 1.0;  ///< converges for 0 < relaxation < 2
   bool non_negative = true;
-  bool fit_view_scale = false;  ///< per-view scale and offset as nuisances
+
+  MethodFacts facts() const { return {"sirt", iterations, 2, 1}; }
+  nlohmann::json json() const;
 };
 
 /// Simultaneous iterative reconstruction (Gilbert 1972), weighted, from zero densities:
-///   x ← x + relaxation · C Aᵀ R W (b − A x)
-/// with R the inverse row sums of A, W = 1/σ² of each view, and C the inverse column
-/// sums of W A over the rays that count. It minimises ½ Σ (residual / σ)² / ray length,
+/// the step of row_action.h with all views at once. It minimises ½ Σ (residual / σ)² / ray length,
 /// has no prior, and is therefore stopped before it has fitted the noise.
 Solution reconstruct_sirt(VoxelProblem& problem, const SirtOptions& options,
                           const AfterIteration& after_iteration);

@@ -86,12 +86,26 @@ TEST_F(Sirt, FittedScalesUndoTheGainsOfViews) {
   const SphereSeries series(gains);
   SirtOptions o = options(30);
   const double without = solve(series, o).data_loss.back();
-  o.fit_view_scale = true;
-  VoxelProblem problem = testing::voxel_problem(series);
+  VoxelProblem problem = testing::voxel_problem(series, {.fit_scale = true});
   const Solution solution =
       reconstruct_sirt(problem, o, [](const IterationReport&, const VoxelVolume&) {});
   EXPECT_LT(solution.data_loss.back(), 0.8 * without);
   EXPECT_NEAR(problem.view_model(14).scale / problem.view_model(15).scale, 1.1 / 0.9, 0.06);
+}
+
+TEST_F(Sirt, ViewsHeldOutDoNotCount) {
+  SphereSeries::Options bad;
+  bad.scale_of_view.assign(31, 1.0);
+  bad.scale_of_view[15] = -5.0;
+  const SphereSeries series, with_nonsense(bad);
+  const auto held_out = [](const SphereSeries& s) {
+    VoxelProblem problem = testing::voxel_problem(s, {.held_out = {2, 15}});
+    EXPECT_EQ(problem.views().size(), 29u);
+    return reconstruct_sirt(problem, options(5), [](const IterationReport&, const VoxelVolume&) {});
+  };
+  const Solution solution = held_out(series);
+  EXPECT_TRUE(testing::same_bits(solution.densities, held_out(with_nonsense).densities));
+  EXPECT_FALSE(testing::same_bits(solution.densities, solve(series, options(5)).densities));
 }
 
 TEST_F(Sirt, ReportsEveryIterationWithTheFiguresThatItBeganWith) {

@@ -1,5 +1,10 @@
 #pragma once
 
+#include <cstddef>
+#include <vector>
+
+#include "baseline/voxel_volume.h"
+#include "kernels/lanes.h"
 #include "projection/sample_grid.h"
 
 namespace tomofield::baseline {
@@ -23,5 +28,46 @@ void gradient_of_row(const projection::SampleSegment& segment, int k, int num_ro
 void add_gradient_adjoint_of_row(const projection::SampleSegment& segment, int k,
                                  const GradientFactors& factors, const float* p_x, const float* p_y,
                                  const float* p_z, const float* p_y_below, float* samples);
+
+/// K x of one z row of a slab: `count` values each, of the samples from `row` on in a slab buffer.
+struct GradientRow {
+  GradientFactors factors;
+  std::ptrdiff_t row = 0;
+  std::size_t count = 0;
+  const float *x = nullptr, *y = nullptr, *z = nullptr;
+};
+
+/// Calls body(GradientRow) for each z row of a slab; factors_of(segment) are those of K.
+template <typename FactorsOf, typename Body>
+void for_each_gradient_row(const VoxelVolume& volume, int slab, FactorsOf&& factors_of,
+                           Body&& body) {
+  const float* above = slab + 1 < volume.num_slabs() ? volume.slab(slab + 1) : nullptr;
+  thread_local std::vector<float> gradient;
+  for (const projection::SampleSegment& segment : volume.grid().segments()) {
+    const std::size_t count = static_cast<std::size_t>(segment.nx) * kernels::kLanes;
+    gradient.resize(3 * count);
+    float *x = gradient.data(), *y = x + count, *z = y + count;
+    const GradientFactors factors = factors_of(segment);
+    for (int k = 0; k < segment.nz; ++k) {
+      gradient_of_row(segment, k, volume.rows_in_slab(slab), factors, volume.slab(slab), above, x,
+                      y, z);
+      body(GradientRow{factors, segment.origin + k * segment.stride_z(), count, x, y, z});
+    }
+  }
+}
+
+/// samples += Kᵀ p of a slab, for volumes p like those of add_gradient_adjoint_of_row.
+template <typename FactorsOf>
+void add_gradient_adjoint(const VoxelVolume& p_x, const VoxelVolume& p_y, const VoxelVolume& p_z,
+                          int slab, FactorsOf&& factors_of, float* samples) {
+  const float* below = slab > 0 ? p_y.slab(slab - 1) : nullptr;
+  for (const projection::SampleSegment& segment : p_x.grid().segments()) {
+    const GradientFactors factors = factors_of(segment);
+    for (int k = 0; k < segment.nz; ++k) {
+      add_gradient_adjoint_of_row(segment, k, factors, p_x.slab(slab), p_y.slab(slab),
+                                  p_z.slab(slab), below, samples);
+    }
+  }
+}
 
 }  // namespace tomofield::baseline

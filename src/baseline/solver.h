@@ -10,7 +10,15 @@
 
 namespace tomofield::baseline {
 
-/// What an iterative reconstruction ends with. The histories have one entry for
+/// What a method is called and what it needs besides its own scratch space.
+struct MethodFacts {
+  const char* name;
+  int iterations;  ///< passes over the views
+  int volumes;     ///< held at once, the densities among them
+  int detectors;   ///< held at once, of all views of a slab, the measured rays among them
+};
+
+/// What a reconstruction ends with. The histories of iterative ones have one entry for
 /// the starting densities and one for the densities after each iteration.
 struct Solution {
   VoxelVolume densities;

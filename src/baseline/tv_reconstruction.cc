@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "baseline/slab_gradient.h"
 #include "kernels/lanes.h"
+#include "reconstruct/concavity.h"
 
 namespace tomofield::baseline {
 namespace {
@@ -22,8 +25,47 @@ constexpr double kBalance = 2.0;
 // Over-relaxation, below 2: 1.9 needs two thirds of the iterations of 1.
 constexpr float kRelaxation = 1.9f;
 
+// Weights of the concave penalty: first taken after half of the iterations, then so many times in
+// all, evenly spread.
+constexpr int kReweightings = 8;
+
+bool takes_weights_after(int iteration, const TvOptions& options) {
+  if (options.penalty == "smooth" || iteration == 0) return false;
+  const int first = options.iterations / 2;
+  const int interval = std::max(1, (options.iterations - first) / kReweightings);
+  return iteration >= first && iteration < options.iterations &&
+         (iteration - first) % interval == 0;
+}
+
+// Those of κ λ h_x h_z ∇.
+struct ScaledFactors {
+  double scale;  // κ λ
+  GradientFactors operator()(const SampleSegment& segment) const {
+    const double area = scale * segment.hx * segment.hz;
+    return {static_cast<float>(area / segment.hx), static_cast<float>(area),
+            static_cast<float>(area / segment.hz)};
+  }
+};
+
+// Σ κ λ h_x h_z φ(|∇x|) of a row of K x; τ = 0: smooth.
+double penalty_of_row(const GradientRow& row, double tau) {
+  // K x is κ λ h_x h_z ∇x, of which the factor in y is the scale: y has unit spacing.
+  const float t = row.factors.y * static_cast<float>(tau);
+  float sums[kLanes] = {};
+  for (std::size_t at = 0; at < row.count; at += kLanes) {
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      const std::size_t i = at + l;
+      const float m = std::sqrt(row.x[i] * row.x[i] + row.y[i] * row.y[i] + row.z[i] * row.z[i]);
+      sums[l] += t > 0 ? t * std::log(1 + m / t) : m;
+    }
+  }
+  double sum = 0.0;
+  for (const float of_lane : sums) sum += static_cast<double>(of_lane);
+  return sum;
+}
+
 // The saddle-point problem, in rows K = (κ A / σ_view ; κ λ h_x h_z ∇) of like size:
-//   min_x max_q,p  ⟨K x, (q, p)⟩ − κ² |q|² / 2 − κ ⟨q, b / σ⟩   with |p| <= 1/κ, x >= 0.
+//   min_x max_q,p  ⟨K x, (q, p)⟩ − κ² |q|² / 2 − κ ⟨q, b / σ⟩   with |p| <= w/κ, x >= 0.
 // An iteration, with relaxation ρ and y = (q, p):
 //   y′ = prox(y + s K x);  y ← y + ρ (y′ − y);  x′ = prox(x − τ Kᵀ (2 y′ − y));  x ← x + ρ (x′ − x)
 // Dual first, so that A x of the current x, and with it the objective, comes for
@@ -32,26 +74,30 @@ class ChambollePock {
  public:
   ChambollePock(VoxelProblem& problem, const TvOptions& options, double start);
 
-  // The step of q and p. Returns λ Σ h_x h_z |∇x| and, each slab's, the sums of the data term of x.
+  // The step of q and p. Returns λ Σ h_x h_z φ(|∇x|) and, each slab's, the sums of the data term of
+  // x.
   double step_duals(std::vector<std::vector<loss::ViewSums>>& data_of_slab);
   // The step of x. The last one is not relaxed: it ends where x >= 0 holds.
   void step_densities(bool is_last);
+  // Takes the weights w of the concave penalty from x.
+  void take_weights();
   VoxelVolume& densities() { return x_; }
 
  private:
   void measure_steps();
-  GradientFactors factors(const SampleSegment& segment) const;
   void step_ray_duals(int slab, const float* residuals);
   double step_gradient_duals(int slab);
-  void add_gradient_adjoint(int slab, float* samples) const;
   void take_step(int slab, const float* adjoint, float relaxation);
 
   VoxelProblem& problem_;
   TvOptions options_;
+  ScaledFactors factors_of_;
   ThreadScratch scratch_;
   VoxelVolume x_;        // densities
   VoxelVolume adjoint_;  // Kᵀ y of the last duals
   VoxelVolume px_, py_, pz_;
+  double tau_of_penalty_ = 0;           // in density units, 0: smooth
+  std::optional<VoxelVolume> weights_;  // w; none: 1 everywhere
   std::vector<base::AlignedBuffer<float>>
       q_;                   // κ q / σ_view, one buffer a slab: the residual / σ² at the optimum
   std::vector<float> tau_;  // steps of the densities [segment][z][x], the same in every row
@@ -60,6 +106,7 @@ class ChambollePock {
 ChambollePock::ChambollePock(VoxelProblem& problem, const TvOptions& options, double start)
     : problem_(problem),
       options_(options),
+      factors_of_{kBalance * options.weight},
       scratch_(problem.detector_size(), problem.grid().size()),
       x_(problem.grid(), problem.num_rows()),
       adjoint_(problem.grid(), problem.num_rows()),
@@ -68,35 +115,22 @@ ChambollePock::ChambollePock(VoxelProblem& problem, const TvOptions& options, do
       pz_(problem.grid(), problem.num_rows()) {
   for (int slab = 0; slab < problem.num_slabs(); ++slab) q_.emplace_back(problem.detector_size());
   measure_steps();
-  const float density = static_cast<float>(options.non_negative ? std::max(0.0, start) : start);
-  base::parallel_for(problem.num_slabs(), [&](std::int64_t slab) {
-    const int s = static_cast<int>(slab);
-    for_each_sample_row(problem.grid(), [&](const SampleSegment& segment, std::ptrdiff_t row) {
-      for (std::ptrdiff_t i = 0; i < segment.nx; ++i)
-        std::fill_n(x_.slab(s) + row + i * kLanes, x_.rows_in_slab(s), density);
-    });
-  });
-}
-
-GradientFactors ChambollePock::factors(const SampleSegment& segment) const {
-  const double scale = kBalance * options_.weight * segment.hx * segment.hz;
-  return {static_cast<float>(scale / segment.hx), static_cast<float>(scale),
-          static_cast<float>(scale / segment.hz)};
+  x_.fill(static_cast<float>(options.non_negative ? std::max(0.0, start) : start));
+  if (options.penalty == "concave")
+    tau_of_penalty_ = reconstruct::concavity(options.concavity, problem.noise_sigma());
 }
 
 // τ, the inverse column sums of |K|. Masked rays are counted: steps may be smaller than need be.
 void ChambollePock::measure_steps() {
   float* detector = scratch_.detector();
-  for (const int view : problem_.views()) {
-    const double row_scale = kBalance * std::sqrt(problem_.view_model(view).weight);
-    std::fill_n(detector + view * problem_.width() * kLanes, problem_.width() * kLanes,
-                static_cast<float>(row_scale));
-  }
+  problem_.for_each_ray(problem_.views(), [&](const auto& model, float, std::size_t at) {
+    std::fill_n(detector + at, kLanes, static_cast<float>(kBalance * std::sqrt(model.weight)));
+  });
   float* sums = scratch_.cleared_samples();
-  problem_.backproject(detector, sums);
+  problem_.backproject(problem_.views(), detector, sums);
   tau_.resize(problem_.grid().size() / kLanes);
   for_each_sample_row(problem_.grid(), [&](const SampleSegment& segment, std::ptrdiff_t row) {
-    const GradientFactors k = factors(segment);
+    const GradientFactors k = factors_of_(segment);
     for (std::ptrdiff_t at = row; at < row + std::ptrdiff_t{segment.nx} * kLanes; at += kLanes)
       tau_[static_cast<std::size_t>(at / kLanes)] = 1.0f / (sums[at] + 2 * (k.x + k.y + k.z));
   });
@@ -106,85 +140,72 @@ double ChambollePock::step_duals(std::vector<std::vector<loss::ViewSums>>& data_
   return sum_over_slabs(problem_.num_slabs(), [&](int slab) {
     float* residuals = scratch_.detector();
     data_of_slab[static_cast<std::size_t>(slab)] =
-        problem_.residuals(slab, x_.slab(slab), residuals);
+        problem_.residuals(slab, problem_.views(), x_.slab(slab), residuals);
     step_ray_duals(slab, residuals);
     return step_gradient_duals(slab);
   });
 }
 
 void ChambollePock::step_ray_duals(int slab, const float* residuals) {
-  float* q = q_[static_cast<std::size_t>(slab)].data();
-  for (const int view : problem_.views()) {
-    const loss::ViewModel& model = problem_.view_model(view);
+  float* q_of_slab = q_[static_cast<std::size_t>(slab)].data();
+  problem_.for_each_ray(problem_.views(), [&](const auto& model, float length, std::size_t at) {
     // A of this view is scaled, so its row sums are too, and residuals carry the scale once.
     const double per_sigma = std::sqrt(model.weight);
-    const double scaled = kBalance / (model.scale * model.scale);
-    for (std::int64_t x = 0; x < problem_.width(); ++x) {
-      const std::int64_t ray = view * problem_.width() + x;
-      const double step =
-          scaled / static_cast<double>(problem_.ray_lengths()[static_cast<std::size_t>(ray)]);
-      const float rate = static_cast<float>(step * per_sigma);
-      const float shrink = static_cast<float>(1.0 / (1.0 + step / per_sigma));
-      for (int l = 0; l < kLanes; ++l) {
-        const std::int64_t i = ray * kLanes + l;
-        q[i] += kRelaxation * (shrink * (q[i] + rate * residuals[i]) - q[i]);
-      }
+    const double step = kBalance / (model.scale * model.scale) / static_cast<double>(length);
+    const float rate = static_cast<float>(step * per_sigma);
+    const float shrink = static_cast<float>(1.0 / (1.0 + step / per_sigma));
+    for (std::size_t i = at; i < at + kLanes; ++i) {
+      float& q = q_of_slab[i];
+      q += kRelaxation * (shrink * (q + rate * residuals[i]) - q);
     }
-  }
+  });
 }
 
-// Returns λ Σ h_x h_z |∇x| of the slab.
+// Returns λ Σ h_x h_z φ(|∇x|) of the slab.
 double ChambollePock::step_gradient_duals(int slab) {
-  const float* above = slab + 1 < problem_.num_slabs() ? x_.slab(slab + 1) : nullptr;
-  const float radius = static_cast<float>(1.0 / kBalance);
-  thread_local std::vector<float> gradient;
-  double variation = 0.0;
-  for (const SampleSegment& segment : problem_.grid().segments()) {
-    const std::size_t count = static_cast<std::size_t>(segment.nx) * kLanes;
-    gradient.resize(3 * count);
-    float *gx = gradient.data(), *gy = gx + count, *gz = gy + count;
-    const GradientFactors k = factors(segment);
-    const float step = 0.5f / std::max({k.x, k.y, k.z});
-    for (int z = 0; z < segment.nz; ++z) {
-      gradient_of_row(segment, z, x_.rows_in_slab(slab), k, x_.slab(slab), above, gx, gy, gz);
-      const std::ptrdiff_t row = segment.origin + z * segment.stride_z();
-      float *px = px_.slab(slab) + row, *py = py_.slab(slab) + row, *pz = pz_.slab(slab) + row;
-      float sums[kLanes] = {};
-      for (std::size_t at = 0; at < count; at += kLanes) {
-        for (std::size_t l = 0; l < kLanes; ++l) {
-          const std::size_t i = at + l;
-          sums[l] += std::sqrt(gx[i] * gx[i] + gy[i] * gy[i] + gz[i] * gz[i]);
-          const float x = px[i] + step * gx[i], y = py[i] + step * gy[i], z1 = pz[i] + step * gz[i];
-          const float inside = radius / std::max(radius, std::sqrt(x * x + y * y + z1 * z1));
-          px[i] += kRelaxation * (inside * x - px[i]);
-          py[i] += kRelaxation * (inside * y - py[i]);
-          pz[i] += kRelaxation * (inside * z1 - pz[i]);
-        }
-      }
-      for (const float sum : sums) variation += static_cast<double>(sum);
+  thread_local std::vector<float> ones;
+  double penalty = 0.0;
+  for_each_gradient_row(x_, slab, factors_of_, [&](const GradientRow& g) {
+    penalty += penalty_of_row(g, tau_of_penalty_);
+    ones.resize(std::max(ones.size(), g.count), 1.0f);
+    const float* weight = weights_ ? weights_->slab(slab) + g.row : ones.data();
+    const float step = 0.5f / std::max({g.factors.x, g.factors.y, g.factors.z});
+    float *px = px_.slab(slab) + g.row, *py = py_.slab(slab) + g.row, *pz = pz_.slab(slab) + g.row;
+    for (std::size_t i = 0; i < g.count; ++i) {
+      const float x = px[i] + step * g.x[i], y = py[i] + step * g.y[i], z = pz[i] + step * g.z[i];
+      const float radius = weight[i] * static_cast<float>(1.0 / kBalance);
+      const float inside = radius / std::max(radius, std::sqrt(x * x + y * y + z * z));
+      px[i] += kRelaxation * (inside * x - px[i]);
+      py[i] += kRelaxation * (inside * y - py[i]);
+      pz[i] += kRelaxation * (inside * z - pz[i]);
     }
-  }
-  return variation / kBalance;
+  });
+  return penalty / kBalance;
+}
+
+void ChambollePock::take_weights() {
+  if (!weights_) weights_.emplace(problem_.grid(), problem_.num_rows());
+  base::parallel_for(problem_.num_slabs(), [&](std::int64_t index) {
+    const int slab = static_cast<int>(index);
+    for_each_gradient_row(x_, slab, factors_of_, [&](const GradientRow& g) {
+      const float t = g.factors.y * static_cast<float>(tau_of_penalty_);
+      float* weight = weights_->slab(slab) + g.row;
+      for (std::size_t i = 0; i < g.count; ++i) {
+        const float m = std::sqrt(g.x[i] * g.x[i] + g.y[i] * g.y[i] + g.z[i] * g.z[i]);
+        weight[i] = t / (t + m);
+      }
+    });
+  });
 }
 
 void ChambollePock::step_densities(bool is_last) {
   base::parallel_for(problem_.num_slabs(), [&](std::int64_t index) {
     const int slab = static_cast<int>(index);
     float* adjoint = scratch_.cleared_samples();
-    problem_.backproject(q_[static_cast<std::size_t>(slab)].data(), adjoint);
-    add_gradient_adjoint(slab, adjoint);
+    problem_.backproject(problem_.views(), q_[static_cast<std::size_t>(slab)].data(), adjoint);
+    add_gradient_adjoint(px_, py_, pz_, slab, factors_of_, adjoint);
     take_step(slab, adjoint, is_last ? 1.0f : kRelaxation);
   });
-}
-
-void ChambollePock::add_gradient_adjoint(int slab, float* samples) const {
-  const float* below = slab > 0 ? py_.slab(slab - 1) : nullptr;
-  for (const SampleSegment& segment : problem_.grid().segments()) {
-    const GradientFactors k = factors(segment);
-    for (int z = 0; z < segment.nz; ++z)
-      add_gradient_adjoint_of_row(segment, z, k, px_.slab(slab), py_.slab(slab), pz_.slab(slab),
-                                  below, samples);
-  }
 }
 
 void ChambollePock::take_step(int slab, const float* adjoint, float relaxation) {
@@ -204,6 +225,14 @@ void ChambollePock::take_step(int slab, const float* adjoint, float relaxation) 
 
 }  // namespace
 
+nlohmann::json TvOptions::json() const {
+  return {{"iterations", iterations},
+          {"weight", weight},
+          {"penalty", penalty},
+          {"concavity", concavity},
+          {"non_negative", non_negative}};
+}
+
 Solution reconstruct_tv(VoxelProblem& problem, const TvOptions& options, double start,
                         const AfterIteration& after_iteration) {
   ChambollePock solver(problem, options, start);
@@ -217,7 +246,8 @@ Solution reconstruct_tv(VoxelProblem& problem, const TvOptions& options, double 
     objective.push_back(data_loss.back() + variation);
     if (iteration == options.iterations) break;
     solver.step_densities(iteration + 1 == options.iterations);
-    if (options.fit_view_scale) problem.fit_view_models(data);
+    if (takes_weights_after(iteration + 1, options)) solver.take_weights();
+    problem.fit_view_models(data);
     after_iteration({iteration + 1, data_loss.back(), objective.back()}, solver.densities());
   }
   return {std::move(solver.densities()), std::move(data_loss), std::move(objective)};

@@ -58,8 +58,8 @@ TEST_F(Tv, ObjectiveOfAConstantIsItsDataTerm) {
     for (int view = 0; view < series.geometry.num_views(); ++view) {
       const float* rays = series.rays->rays(slab, view);
       for (std::int64_t x = 0; x < SphereSeries::kWidth; ++x) {
-        const double length = static_cast<double>(
-            problem.ray_lengths()[static_cast<std::size_t>(view * SphereSeries::kWidth + x)]);
+        const double length =
+            static_cast<double>(problem.ray_lengths(view)[static_cast<std::size_t>(x)]);
         for (int lane = 0; lane < 16; ++lane) {
           if ((series.rays->mask(slab, view)[x] >> lane & 1) == 0) continue;
           expected +=
@@ -82,8 +82,8 @@ TEST_F(Tv, AHugeWeightLeavesTheBestConstant) {
     for (int view = 0; view < series.geometry.num_views(); ++view) {
       for (std::int64_t i = 0; i < SphereSeries::kWidth * 16; ++i) {
         if ((series.rays->mask(slab, view)[i / 16] >> (i % 16) & 1) == 0) continue;
-        const double length = static_cast<double>(
-            problem.ray_lengths()[static_cast<std::size_t>(view * SphereSeries::kWidth + i / 16)]);
+        const double length =
+            static_cast<double>(problem.ray_lengths(view)[static_cast<std::size_t>(i / 16)]);
         product += length * static_cast<double>(series.rays->rays(slab, view)[i]);
         square += length * length;
       }
@@ -105,6 +105,21 @@ TEST_F(Tv, MoreWeightMeansLessVariation) {
   };
   EXPECT_LT(variation(10), variation(3));
   EXPECT_LT(variation(3), variation(1));
+}
+
+TvOptions concave(int iterations, double weight) {
+  TvOptions result = options(iterations, weight);
+  result.penalty = "concave";
+  return result;
+}
+
+TEST_F(Tv, ConcavePenaltyOfHugeTauIsTheSmoothOne) {
+  const SphereSeries series;
+  TvOptions o = concave(60, 3);
+  o.concavity = 1e5;
+  const Solution almost = solve(testing::voxel_problem(series), o);
+  const Solution smooth = solve(testing::voxel_problem(series), options(60, 3));
+  EXPECT_NEAR(almost.objective.back(), smooth.objective.back(), 1e-3 * smooth.objective.back());
 }
 
 TEST_F(Tv, SlabsAreSeamless) {

@@ -2,68 +2,106 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "baseline/voxel_volume.h"
 #include "geometry/tilt_geometry.h"
+#include "kernels/lanes.h"
 #include "loss/data_term.h"
 #include "projection/slab_projector.h"
 #include "tilt_series/slab_views.h"
 
 namespace tomofield::baseline {
 
-/// What both baselines fit: ½ Σ ((scale A x + offset − b) / σ_view)² over the
+/// What is done with single views.
+struct ViewHandling {
+  std::vector<int> held_out = {};  ///< kept from the fit, ascending
+  bool fit_scale = false;          ///< per-view scale and offset as nuisances
+};
+
+/// What all baselines fit: ½ Σ ((scale A x + offset − b) / σ_view)² over the
 /// rays that count, for densities x at the samples of `grid`. Everything is in
 /// the density units of the main method. `rays` must outlive it.
+///
+/// A detector is a slab's rays of some views, one after the other: [view, x, lane].
 class VoxelProblem {
  public:
   VoxelProblem(const geometry::TiltGeometry& geometry, projection::SampleGrid grid,
-               const tilt_series::SlabViews& rays, const std::vector<double>& noise_sigma);
+               const tilt_series::SlabViews& rays, const std::vector<double>& noise_sigma,
+               const ViewHandling& handling = {});
 
   const projection::SlabProjector& projector() const { return projector_; }
   const projection::SampleGrid& grid() const { return projector_.grid(); }
+  const tilt_series::SlabViews& rays() const { return rays_; }
   std::int64_t num_rows() const { return rays_.shape().num_rows; }
   int num_slabs() const { return rays_.num_slabs(); }
+  /// The views that are fitted, ascending.
   const std::vector<int>& views() const { return views_; }
   const loss::ViewModel& view_model(int view) const {
     return models_[static_cast<std::size_t>(view)];
   }
-  const std::vector<loss::ViewModel>& view_models() const { return models_; }
+  /// Of all views.
+  const std::vector<double>& noise_sigma() const { return noise_sigma_; }
   std::int64_t width() const { return projector_.geometry().width; }
-  /// Floats of a slab's rays, [view, x, lane].
+  /// Floats of a detector of the views that are fitted.
   std::size_t detector_size() const { return projector_.detector_size(views_.size()); }
-  /// Rays that count.
+  /// Rays that count, of the views that are fitted.
   std::int64_t num_rays() const;
 
-  /// Row sums of A, [view, x]: the length of each ray within the samples, at
+  /// Row sums of A, [x]: the length of each ray of a view within the samples, at
   /// least one pixel. They are the same for every row of the detector.
-  const std::vector<float>& ray_lengths() const { return ray_lengths_; }
+  std::span<const float> ray_lengths(int view) const {
+    return std::span(ray_lengths_).subspan(static_cast<std::size_t>(view * width()), row_size());
+  }
+  /// Calls body(view model, ray length, at) for each pixel of a detector row of these
+  /// views; `at` is where its lanes lie in their detector.
+  template <typename Body>
+  void for_each_ray(std::span<const int> views, Body&& body) const {
+    std::size_t at = 0;
+    for (const int view : views) {
+      for (const float length : ray_lengths(view)) {
+        body(view_model(view), length, at);
+        at += kernels::kLanes;
+      }
+    }
+  }
 
-  /// detector ← scale (scale A x + offset − b) for the rays of a slab, 0 for
+  /// detector ← scale (scale A x + offset − b) for the rays of a slab of these views, 0 for
   /// those that do not count. Writes the padding of `samples`. Returns sums, one each view.
-  std::vector<loss::ViewSums> residuals(int slab, float* samples, float* detector) const;
-  /// ½ Σ (residual / σ)² of one slab or, with added sums, of all.
+  std::vector<loss::ViewSums> residuals(int slab, std::span<const int> views, float* samples,
+                                        float* detector) const;
+  /// ½ Σ (residual / σ)² of one slab or, with added sums, of all; sums of the fitted views.
   double data_loss(const std::vector<loss::ViewSums>& sums) const;
 
   /// samples += Aᵀ detector, of a slab.
-  void backproject(const float* detector, float* samples) const {
-    projector_.backward(detector, views_, samples);
+  void backproject(std::span<const int> views, const float* detector, float* samples) const {
+    projector_.backward(detector, views, samples);
   }
 
-  /// Fits scale and offset of each view to the sums of all slabs (loss/data_term.h).
+  /// Fits scale and offset of each view to the sums of all slabs (loss/data_term.h),
+  /// if the problem is to.
   void fit_view_models(const std::vector<loss::ViewSums>& sums);
 
-  /// detector ← value(view) for the rays of a slab that count, 0 for the others.
-  void fill_counted(int slab, const std::vector<float>& value_of_view, float* detector) const;
+  /// detector ← 1 / σ² of the view for the rays of a slab that count, 0 for the others.
+  void fill_weights(int slab, std::span<const int> views, float* detector) const;
 
  private:
+  std::size_t row_size() const { return static_cast<std::size_t>(width()); }
   void measure_ray_lengths();
 
   projection::SlabProjector projector_;
   const tilt_series::SlabViews& rays_;
+  std::vector<double> noise_sigma_;
+  bool fits_scale_;
   std::vector<int> views_;
-  std::vector<loss::ViewModel> models_;
-  std::vector<float> ray_lengths_;
+  std::vector<loss::ViewModel> models_;  // of all views
+  std::vector<float> ray_lengths_;       // [view, x], of all views
 };
+
+/// The sums of these views over all slabs, for the densities of a volume, whose padding it writes.
+std::vector<loss::ViewSums> view_sums(const VoxelProblem& problem, std::span<const int> views,
+                                      VoxelVolume& densities);
 
 /// The sums of all slabs, added in their order: the same for any thread count.
 std::vector<loss::ViewSums> total(const std::vector<std::vector<loss::ViewSums>>& sums_of_slab);

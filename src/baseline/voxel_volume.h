@@ -34,6 +34,19 @@ class VoxelVolume {
         std::min<std::int64_t>(kernels::kLanes, num_rows_ - std::int64_t{slab} * kernels::kLanes));
   }
 
+  void fill(float density) {
+    base::parallel_for(num_slabs(), [&](std::int64_t index) {
+      const int s = static_cast<int>(index);
+      for (const projection::SampleSegment& segment : grid_.segments()) {
+        for (int k = 0; k < segment.nz; ++k) {
+          float* row = slab(s) + segment.origin + k * segment.stride_z();
+          for (std::ptrdiff_t i = 0; i < segment.nx; ++i)
+            std::fill_n(row + i * kernels::kLanes, rows_in_slab(s), density);
+        }
+      }
+    });
+  }
+
   float* slab(int index) { return slabs_[static_cast<std::size_t>(index)].data(); }
   const float* slab(int index) const { return slabs_[static_cast<std::size_t>(index)].data(); }
 

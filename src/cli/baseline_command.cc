@@ -18,48 +18,87 @@
 namespace tomofield::cli {
 namespace {
 
+constexpr double kMostViews = 1e9;
+
 template <typename Method>
 struct Arguments {
   baseline::BaselineOptions options;
   Method method;
   std::string view_scale = "auto";
-  std::string non_negative = "on";
+  std::string non_negative = "auto";
   bool dry_run = false;
 };
+
+bool is_on(const std::string& value, bool automatic) {
+  return value == "on" || (value == "auto" && automatic);
+}
+
+void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts& method) {
+  fmt::print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {:.0f} voxels\n",
+             plan.num_views, plan.geometry.width, plan.geometry.height, plan.pixel_size_A,
+             plan.roi.width(), plan.roi.height(), plan.geometry.thickness);
+  fmt::print(
+      "{} voxels with the margins; {} iteration{} on {} threads; about {:.2f} GiB of memory\n",
+      plan.num_voxels, method.iterations, method.iterations == 1 ? "" : "s", base::thread_count(),
+      static_cast<double>(plan.memory_bytes) / (1 << 30));
+}
+
+void print_summary(const baseline::BaselineSummary& summary) {
+  fmt::print("mean squared residual {:.4f} of the noise's variance", summary.mean_squared_residual);
+  if (summary.last_decrease) {
+    fmt::print("; the objective fell by {:.2g} % in the last tenth of the iterations",
+               100 * *summary.last_decrease);
+  }
+  fmt::print("\n");
+}
 
 template <typename Method>
 void run(Arguments<Method>& arguments) {
   baseline::BaselineOptions& options = arguments.options;
   Method& method = arguments.method;
-  method.fit_view_scale =
-      arguments.view_scale == "on" ||
-      (arguments.view_scale == "auto" && options.input.contrast == tilt_series::Contrast::kDark);
-  method.non_negative = arguments.non_negative == "on";
+  const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
+  options.fit_view_scale = is_on(arguments.view_scale, is_dark);
+  if constexpr (requires { method.non_negative; })
+    method.non_negative = is_on(arguments.non_negative, !is_dark);
   options.method = method;
   reconstruct::require_no_faults(options.specimen.faults());
   baseline::check_outputs(options);
   const tilt_series::TiltSeries series(options.input);
-  const baseline::BaselinePlan plan = baseline::plan_baseline(series, options);
-  fmt::print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {:.0f} voxels\n",
-             plan.num_views, plan.geometry.width, plan.geometry.height, plan.pixel_size_A,
-             plan.roi.width(), plan.roi.height(), plan.geometry.thickness);
-  fmt::print(
-      "{} voxels with the margins; {} iterations on {} threads; about {:.2f} GiB of memory\n",
-      plan.num_voxels, method.iterations, base::thread_count(),
-      static_cast<double>(plan.memory_bytes) / (1 << 30));
+  print_plan(baseline::plan_baseline(series, options), method.facts());
   if (arguments.dry_run) return;
-  const auto summary = baseline::run_baseline(series, options, make_progress_bar("baseline"));
-  fmt::print(
-      "mean squared residual {:.4f} of the noise's variance; the objective fell by {:.2g} % in the "
-      "last tenth of the iterations\n",
-      summary.mean_squared_residual, 100 * summary.last_decrease);
+  print_summary(baseline::run_baseline(series, options, make_progress_bar("baseline")));
   const baseline::BaselinePaths paths = baseline::baseline_paths(options.output);
   fmt::print("tomogram  {}\nfigures   {}\n", paths.volume.string(), paths.json.string());
   write_pictures(paths.volume, series, paths.picture_prefix);
 }
 
+// Of every method.
 template <typename Method>
-void add_method_options(CLI::App& command, Arguments<Method>& arguments) {
+void add_fit_options(CLI::App& command, Arguments<Method>& arguments) {
+  const char* group = "Fit";
+  baseline::BaselineOptions& options = arguments.options;
+  command
+      .add_option("--view-scale", arguments.view_scale,
+                  "fit a scale and an offset a view; auto: for dark contrast")
+      ->check(CLI::IsMember({"auto", "on", "off"}))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--margin-spacing", options.margin_spacing,
+                  "pixels between samples of the margin")
+      ->check(number_between(1.0, 64.0))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--hold-out", options.hold_out,
+                  "keep every so-manieth view from the fit and report how well it is predicted")
+      ->check(number_between(2, kMostViews))
+      ->group(group);
+}
+
+// Of those that iterate.
+template <typename Method>
+void add_iteration_options(CLI::App& command, Arguments<Method>& arguments) {
   const char* group = "Method";
   command.add_option("--iterations", arguments.method.iterations, "passes over all views")
       ->check(number_above(0))
@@ -68,20 +107,8 @@ void add_method_options(CLI::App& command, Arguments<Method>& arguments) {
   command
       .add_option("--non-negative", arguments.non_negative,
                   "keep densities at or above zero (of dark contrast: nothing brighter than the "
-                  "empty beam)")
-      ->check(CLI::IsMember({"on", "off"}))
-      ->capture_default_str()
-      ->group(group);
-  command
-      .add_option("--view-scale", arguments.view_scale,
-                  "fit a scale and an offset a view; auto: for dark contrast")
+                  "empty beam); auto: not for dark contrast, whose zero is uncertain")
       ->check(CLI::IsMember({"auto", "on", "off"}))
-      ->capture_default_str()
-      ->group(group);
-  command
-      .add_option("--margin-spacing", arguments.options.margin_spacing,
-                  "pixels between samples of the margin")
-      ->check(number_between(1.0, 64.0))
       ->capture_default_str()
       ->group(group);
 }
@@ -107,12 +134,37 @@ std::shared_ptr<Arguments<Method>> add_method(CLI::App& command) {
   auto arguments = std::make_shared<Arguments<Method>>();
   add_input_options(command, arguments->options.input);
   add_specimen_options(command, arguments->options.specimen);
-  add_method_options(command, *arguments);
+  if constexpr (requires { arguments->method.iterations; })
+    add_iteration_options(command, *arguments);
+  add_fit_options(command, *arguments);
   add_volume_options(command, arguments->options.volume);
   add_run_options(command, *arguments);
   add_common_options(command);
   command.callback([arguments] { run(*arguments); });
   return arguments;
+}
+
+void add_wbp(CLI::App& baseline) {
+  CLI::App& command = *baseline.add_subcommand(
+      "wbp", "weighted (filtered) back-projection: a ramp with a roll-off");
+  baseline::RampFilterOptions& filter = add_method<baseline::WbpOptions>(command)->method.filter;
+  const char* group = "Method";
+  command.add_option("--window", filter.window, "factor of the ramp: ramp (none), cosine or hann")
+      ->check(CLI::IsMember({"ramp", "cosine", "hann"}))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--cutoff", filter.cutoff,
+                  "frequency in cycles a pixel up to which the ramp rises; 0.5: all")
+      ->check(number_between(0.01, 0.5))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--falloff", filter.falloff,
+                  "sigma of the Gaussian, in cycles a pixel, by which it falls beyond")
+      ->check(number_between(0.001, 0.5))
+      ->capture_default_str()
+      ->group(group);
 }
 
 void add_sirt(CLI::App& baseline) {
@@ -137,14 +189,21 @@ void add_tv(CLI::App& baseline) {
       ->check(number_above(0))
       ->capture_default_str()
       ->group("Method");
+  command
+      .add_option("--penalty", arguments->method.penalty,
+                  "smooth: total variation; concave: spares edges, reweighted")
+      ->check(CLI::IsMember({"smooth", "concave"}))
+      ->capture_default_str()
+      ->group("Method");
 }
 
 }  // namespace
 
 void add_baseline_command(CLI::App& program) {
-  CLI::App& command = *program.add_subcommand(
-      "baseline", "reconstructions on a voxel grid, to compare with: sirt or tv");
+  CLI::App& command =
+      *program.add_subcommand("baseline", "reconstructions on a voxel grid, to compare with");
   command.require_subcommand(1);
+  add_wbp(command);
   add_sirt(command);
   add_tv(command);
 }

@@ -10,6 +10,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "kernels/lanes.h"
+#include "reconstruct/concavity.h"
 #include "reconstruct/slab_objective.h"
 
 namespace tomofield::reconstruct {
@@ -22,13 +23,6 @@ constexpr double kBiasRate = 0.02;
 // each step's differences.
 constexpr std::uint64_t kOrderStream = 1000;
 constexpr std::uint64_t kDirectionStream = std::uint64_t{1} << 40;
-
-// Root mean square noise of the views, in density units times pixels.
-double typical_noise(const std::vector<double>& sigmas) {
-  double precision = 0.0;
-  for (const double sigma : sigmas) precision += 1.0 / (sigma * sigma);
-  return std::sqrt(static_cast<double>(sigmas.size()) / precision);
-}
 
 // The residuals are in units of the noise, so a prior that were the same for
 // every series would have one weight there. Total variation is not such a
@@ -45,15 +39,9 @@ ObjectiveWeights objective_weights(const FitOptions& options, double noise, doub
   return weights;
 }
 
-// τ in density units, 0 for a smooth penalty. A voxel that is back-projected from N views has a
-// noise of about 0.9 σ / √N (ramp filter, σ of a ray in densities times pixels): steps well above
-// it are edges, which a concave penalty spares; below, noise would be taken for edges.
-// A τ much below any contrast leaves more local minima and no sharper edges.
+// τ in density units, 0 for a smooth penalty.
 double concavity_of(const FitOptions& options, const std::vector<double>& sigmas) {
-  constexpr double kLeast = 0.02;
-  if (options.penalty == "smooth") return 0;
-  const double noise = typical_noise(sigmas) / std::sqrt(static_cast<double>(sigmas.size()));
-  return std::max(options.concavity * noise, kLeast);
+  return options.penalty == "smooth" ? 0.0 : concavity(options.concavity, sigmas);
 }
 
 // A jump at a face counts in total variation's units, density times area, and what

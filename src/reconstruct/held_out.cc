@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <numeric>
 #include <utility>
 
 #include "base/aligned_buffer.h"
+#include "base/log.h"
 #include "base/parallel.h"
 #include "kernels/lanes.h"
 #include "tomofield/error.h"
@@ -78,18 +80,14 @@ std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every) 
   return views;
 }
 
-HeldOutError held_out_error(const projection::SlabSampler& sampler,
-                            const projection::SlabProjector& projector,
-                            const tilt_series::SlabViews& measured, std::vector<int> views,
-                            std::span<const double> noise_weight, bool fit_view_scale) {
-  const SlabSums sums = sums_of_slabs(sampler, projector, measured, views);
+HeldOutError score_views(const std::vector<loss::ViewSums>& sums, std::vector<int> views,
+                         std::span<const double> noise_weight, bool fit_view_scale) {
   HeldOutError error;
   error.views = std::move(views);
   double squares = 0, rays = 0;
   for (std::size_t v = 0; v < error.views.size(); ++v) {
     const double weight = noise_weight[static_cast<std::size_t>(error.views[v])];
-    loss::ViewSums view;
-    for (const auto& slab : sums) view += slab[v];
+    const loss::ViewSums& view = sums[v];
     error.models.push_back(fit_view_scale ? fitted_model(view, weight)
                                           : loss::ViewModel{1.0, 0.0, weight});
     const double view_squares = weight * view.squared_residual(error.models.back());
@@ -99,6 +97,27 @@ HeldOutError held_out_error(const projection::SlabSampler& sampler,
   }
   error.total = rays > 0 ? squares / rays : 0.0;
   return error;
+}
+
+HeldOutError held_out_error(const projection::SlabSampler& sampler,
+                            const projection::SlabProjector& projector,
+                            const tilt_series::SlabViews& measured, std::vector<int> views,
+                            std::span<const double> noise_weight, bool fit_view_scale) {
+  std::vector<loss::ViewSums> sums(views.size());
+  for (const auto& slab : sums_of_slabs(sampler, projector, measured, views)) {
+    for (std::size_t v = 0; v < views.size(); ++v) sums[v] += slab[v];
+  }
+  return score_views(sums, std::move(views), noise_weight, fit_view_scale);
+}
+
+nlohmann::json report_held_out(const HeldOutError& error, const std::vector<double>& tilt_deg) {
+  base::log_info(fmt::format("held out: {} views, error {:.4f}", error.views.size(), error.total));
+  nlohmann::json views = nlohmann::json::array();
+  for (std::size_t i = 0; i < error.views.size(); ++i) {
+    const auto view = static_cast<std::size_t>(error.views[i]);
+    views.push_back({{"view", view}, {"tilt_deg", tilt_deg[view]}, {"error", error.view_error[i]}});
+  }
+  return {{"error", error.total}, {"views", views}};
 }
 
 PredictedView predicted_view(const projection::SlabSampler& sampler,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <vector>
 
@@ -25,14 +26,20 @@ struct HeldOutError {
   double total = 0;                     ///< over all of their rays
 };
 
-/// The error of `views`; `noise_weight` holds 1 / variance of the noise of each
-/// view of the series. With `fit_view_scale`, a view's scale and offset are least
-/// squares on that view alone: they are nuisances of its exposure, which no other
-/// view tells. The sums are the same for any number of threads.
+/// The error of `views` with these sums, one each; `noise_weight` holds 1 / variance of the noise
+/// of each view of the series. With `fit_view_scale`, a view's scale and offset are least
+/// squares on that view alone: they are nuisances of its exposure, which no other view tells.
+HeldOutError score_views(const std::vector<loss::ViewSums>& sums, std::vector<int> views,
+                         std::span<const double> noise_weight, bool fit_view_scale);
+
+/// The error of a field. The sums are the same for any number of threads.
 HeldOutError held_out_error(const projection::SlabSampler& sampler,
                             const projection::SlabProjector& projector,
                             const tilt_series::SlabViews& measured, std::vector<int> views,
                             std::span<const double> noise_weight, bool fit_view_scale);
+
+/// Logs the error; returns it and that of each view, for the figures of a run.
+nlohmann::json report_held_out(const HeldOutError& error, const std::vector<double>& tilt_deg);
 
 /// A view as measured and as a field predicts it: [y, x], rows of the region of
 /// interest; NaN where there is no measurement.

@@ -169,36 +169,25 @@ nlohmann::json tuning_json(const Tuned& tuned) {
           {"trials", trials_json(tuned.trials)}};
 }
 
-nlohmann::json held_out_json(const HeldOutError& error, const PreparedSeries& series,
-                             const std::vector<double>& by_epoch) {
-  nlohmann::json views = nlohmann::json::array();
-  for (std::size_t i = 0; i < error.views.size(); ++i) {
-    const auto view = static_cast<std::size_t>(error.views[i]);
-    views.push_back({{"view", view},
-                     {"tilt_deg", series.geometry.tilt_deg[view]},
-                     {"error", error.view_error[i]}});
-  }
-  return {{"error", error.total}, {"error_by_epoch", by_epoch}, {"views", views}};
-}
-
 // The error of the views held out, and a picture of the one nearest to zero tilt.
-nlohmann::json report_held_out(const Fit& fit, const PreparedSeries& series,
-                               const std::filesystem::path& picture) {
+nlohmann::json score_fit(const Fit& fit, const PreparedSeries& series,
+                         const std::filesystem::path& picture) {
   const HeldOutError error = fit.held_out_error();
   const auto nearest = std::ranges::min_element(error.views, {}, [&](int view) {
     return std::abs(series.geometry.tilt_deg[static_cast<std::size_t>(view)]);
   });
   const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
   write_held_out_picture(picture, fit.predict_held_out(*nearest, model));
-  base::log_info(fmt::format("held out: {} views, error {:.4f}", error.views.size(), error.total));
-  return held_out_json(error, series, fit.progress().held_out_error);
+  nlohmann::json json = report_held_out(error, series.geometry.tilt_deg);
+  json["error_by_epoch"] = fit.progress().held_out_error;
+  return json;
 }
 
 void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOptions& options,
                    const std::optional<Tuned>& tuned, const OutputPaths& paths,
                    const std::string& fingerprint, double seconds) {
   nlohmann::json held_out = nullptr;
-  if (options.fit.hold_out > 0) held_out = report_held_out(fit, series, paths.held_out_picture);
+  if (options.fit.hold_out > 0) held_out = score_fit(fit, series, paths.held_out_picture);
   const field::TrainingState state = progress_state(fit, fingerprint);
   field::Model model{model_info(series, options), fit.take_field()};
   field::save_model(paths.model, model, &state);

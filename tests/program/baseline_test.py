@@ -1,4 +1,4 @@
-"""baseline sirt and tv from end to end: the inputs, outputs and errors of reconstruct.
+"""The baselines from end to end: the inputs, outputs and errors of reconstruct.
 
 usage: baseline_test.py TOMOFIELD SCRATCH_DIR"""
 
@@ -15,7 +15,13 @@ from harness import HEIGHT, PIXEL_SIZE, THICKNESS, TILTS, WIDTH, psnr, read_byte
 
 EMPTY_BEAM = 500.0
 DEFAULTS = ["--thickness", THICKNESS, "--contrast", "bright", "--no-margin"]
-METHODS = {"sirt": ["--iterations", 12], "tv": ["--iterations", 40, "--weight", 2]}
+METHODS = {
+    "wbp": [],
+    "sirt": ["--iterations", 12],
+    "tv": ["--iterations", 40, "--weight", 2],
+}
+ITERATIVE = {method: options for method, options in METHODS.items() if options}
+WEAK = {"sirt": [], "tv": ["--weight", 0.1]}  # not smoothed so much that nothing is negative
 
 series = harness.Series("series")
 
@@ -60,14 +66,13 @@ def test_specimen_is_found_and_tv_is_the_better_one():
     flat = psnr(np.full_like(series.truth, series.truth.mean()), series.truth)
     gain = {method: psnr(plain[method].volume, series.truth) - flat for method in METHODS}
     print({method: f"{value:.2f} dB" for method, value in gain.items()}, "above a flat volume")
-    assert gain["sirt"] > 2 and gain["tv"] > gain["sirt"] + 0.5, gain
+    assert gain["wbp"] > 1 and gain["sirt"] > 2 and gain["tv"] > gain["sirt"] + 0.5, gain
 
 
 def test_densities_are_not_negative_unless_allowed():
-    for method, results in plain.items():
-        assert results.volume.min() >= 0
-        weak = ["--weight", 0.1] if method == "tv" else []
-        free, _ = baseline(method, "free", "--non-negative", "off", *weak)
+    for method in ITERATIVE:
+        assert plain[method].volume.min() >= 0
+        free, _ = baseline(method, "free", "--non-negative", "off", *WEAK[method])
         assert free.volume.min() < 0, method
         assert free.record["options"]["method"]["non_negative"] is False
 
@@ -79,15 +84,57 @@ def test_json_has_figures_and_every_option():
         assert options["specimen"]["thickness"] == THICKNESS
         assert options["with_margin"] is False
         assert options["method"]["name"] == method
-        iterations = METHODS[method][1]
+        assert figures["held_out"] is None
+        assert figures["size_px"] == [WIDTH, HEIGHT, THICKNESS]
+        np.testing.assert_allclose([view["tilt_deg"] for view in figures["views"]], TILTS)
+    for method, (_, iterations, *_) in ITERATIVE.items():
+        options, figures = plain[method].record["options"], plain[method].record["figures"]
         assert options["method"]["iterations"] == iterations
         for history in ("mean_squared_residual_per_noise_variance", "objective"):
             values = figures[history]
             assert len(values) == iterations + 1 and values[-1] < 0.5 * values[0], history
-        assert figures["size_px"] == [WIDTH, HEIGHT, THICKNESS]
-        np.testing.assert_allclose([view["tilt_deg"] for view in figures["views"]], TILTS)
+    assert plain["wbp"].record["options"]["method"]["window"] == "hann"
     assert plain["tv"].record["options"]["method"]["weight"] == 2
     assert plain["sirt"].record["options"]["method"]["relaxation"] == 1
+
+
+def test_held_out_views_are_predicted_and_not_fitted():
+    every = 4
+    held_out = list(range(every // 2, len(TILTS) - 1, every))
+    broken = series.views.copy()
+    broken[held_out[1]] = broken[held_out[1], :, ::-1]
+    broken = series.with_views("broken", broken)
+    for method in METHODS:
+        results, run = baseline(method, "held-out", "--hold-out", every)
+        figures = results.record["figures"]
+        errors = {view["view"]: view["error"] for view in figures["held_out"]["views"]}
+        assert list(errors) == held_out
+        assert f"held out: {len(held_out)} views, error" in run.stderr
+        residual = figures["mean_squared_residual_per_noise_variance"][-1]
+        print(f"{method}: held out {figures['held_out']['error']:.2f}, fitted {residual:.2f}")
+        assert method == "wbp" or figures["held_out"]["error"] > residual  # which fits none
+        assert len(figures["views"]) == len(TILTS) - len(held_out)
+        other, _ = baseline(method, "held-out-broken", "--hold-out", every, source=broken)
+        worse = {v["view"]: v["error"] for v in other.record["figures"]["held_out"]["views"]}
+        assert worse[held_out[1]] > 2 * errors[held_out[1]]
+        np.testing.assert_allclose(other.volume, results.volume, atol=2e-3)
+
+
+def test_concave_penalty_is_another_one():
+    results, _ = baseline("tv", "concave", "--penalty", "concave", "--weight", 5)
+    assert results.record["options"]["method"]["penalty"] == "concave"
+    assert psnr(results.volume, series.truth) > psnr(plain["sirt"].volume, series.truth)
+    assert read_bytes(results.volume_path) != read_bytes(plain["tv"].volume_path)
+
+
+def test_wider_roll_off_smooths_along_x():
+    def roughness(volume):
+        return np.mean(np.diff(volume, axis=2) ** 2)
+
+    rough = [roughness(plain["wbp"].volume)]
+    for options in (["--window", "ramp"], ["--window", "ramp", "--cutoff", 0.15]):
+        rough.append(roughness(baseline("wbp", "roll-off", *options)[0].volume))
+    assert rough[1] > 1.2 * rough[0] and rough[2] < 0.8 * rough[1], rough
 
 
 def test_region_of_interest_is_a_part_of_the_whole():
@@ -144,15 +191,14 @@ def test_dry_run_writes_nothing():
 def test_existing_results_are_kept_unless_overwritten():
     for method, results in plain.items():
         before = read_bytes(results.volume_path)
-        arguments = ["baseline", method, *series.input, *DEFAULTS, "-o", results.volume_path,
-                     "--iterations", 1]
+        arguments = ["baseline", method, *series.input, *DEFAULTS, "-o", results.volume_path]
         refused = harness.tomofield(*arguments)
         assert refused.returncode == 2, refused.stderr
         assert results.volume_path in refused.stderr and "--overwrite" in refused.stderr
         assert read_bytes(results.volume_path) == before
         copy, _ = baseline(method, "overwritten")
         arguments[arguments.index(results.volume_path)] = copy.volume_path
-        harness.succeed(*arguments, "--overwrite")
+        harness.succeed(*arguments, *METHODS[method], "--overwrite", "--invert")
         assert read_bytes(copy.volume_path) != before
 
 
@@ -164,17 +210,24 @@ def test_bad_input_gets_a_sentence_and_nothing_is_written():
         (["--weight", "-1"], series, "weight"),
         (["--roi", "0,0,4000,10"], series, "--roi"),
         (["--margin-spacing", 0.1], series, "margin-spacing"),
+        (["--penalty", "sharp"], series, "penalty"),
+        (["--hold-out", 1], series, "hold-out"),
+        (["--hold-out", 1000], series, "--hold-out 1000"),
         ([], short, str(len(TILTS))),
+        (["--window", "box"], series, "window"),
+        (["--cutoff", 0.6], series, "cutoff"),
+        (["--falloff", 0], series, "falloff"),
     ]
     for options, source, expected in cases:
-        results, run = baseline("tv", "bad", *options, source=source, run=harness.tomofield)
+        method = "wbp" if expected in ("window", "cutoff", "falloff") else "tv"
+        results, run = baseline(method, "bad", *options, source=source, run=harness.tomofield)
         assert run.returncode == 2, (options, run.returncode, run.stderr)
         assert expected in run.stderr and "internal" not in run.stderr, run.stderr
         assert not results.leftovers() and not os.path.exists(results.volume_path)
 
 
 def test_a_method_has_to_be_named():
-    for arguments in (["baseline"], ["baseline", "wbp", *series.input]):
+    for arguments in (["baseline"], ["baseline", "art", *series.input]):
         run = harness.tomofield(*arguments)
         assert run.returncode == 2 and run.stderr, (arguments, run.stderr)
 

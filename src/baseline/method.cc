@@ -1,0 +1,44 @@
+#include "baseline/method.h"
+
+#include <nlohmann/json.hpp>
+
+namespace tomofield::baseline {
+namespace {
+
+Solution reconstruct_with(const WbpOptions& options, VoxelProblem& problem, double mean_density,
+                          const AfterIteration& after_iteration) {
+  return reconstruct_wbp(problem, options, mean_density, after_iteration);
+}
+
+Solution reconstruct_with(const SirtOptions& options, VoxelProblem& problem, double,
+                          const AfterIteration& after_iteration) {
+  return reconstruct_sirt(problem, options, after_iteration);
+}
+
+Solution reconstruct_with(const TvOptions& options, VoxelProblem& problem, double mean_density,
+                          const AfterIteration& after_iteration) {
+  return reconstruct_tv(problem, options, mean_density, after_iteration);
+}
+
+}  // namespace
+
+MethodFacts facts_of(const Method& method) {
+  return std::visit([](const auto& options) { return options.facts(); }, method);
+}
+
+nlohmann::json json_of(const Method& method) {
+  nlohmann::json json = std::visit([](const auto& options) { return options.json(); }, method);
+  json["name"] = facts_of(method).name;
+  return json;
+}
+
+Solution reconstruct(VoxelProblem& problem, const Method& method, double mean_density,
+                     const AfterIteration& after_iteration) {
+  return std::visit(
+      [&](const auto& options) {
+        return reconstruct_with(options, problem, mean_density, after_iteration);
+      },
+      method);
+}
+
+}  // namespace tomofield::baseline

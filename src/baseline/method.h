@@ -1,0 +1,26 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <variant>
+
+#include "baseline/sirt.h"
+#include "baseline/solver.h"
+#include "baseline/tv_reconstruction.h"
+#include "baseline/voxel_problem.h"
+#include "baseline/wbp.h"
+
+namespace tomofield::baseline {
+
+/// The options of one of the methods. Each has facts() and json(), and an overload of
+/// reconstruct_with() in method.cc: that and a line here are all that a method needs.
+using Method = std::variant<WbpOptions, SirtOptions, TvOptions>;
+
+MethodFacts facts_of(const Method& method);
+/// The name and every option.
+nlohmann::json json_of(const Method& method);
+
+/// Reconstructs with it. `mean_density` is that of the specimen, in density units.
+Solution reconstruct(VoxelProblem& problem, const Method& method, double mean_density,
+                     const AfterIteration& after_iteration);
+
+}  // namespace tomofield::baseline

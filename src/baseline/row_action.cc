@@ -1,0 +1,49 @@
+#include "baseline/row_action.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+
+#include "baseline/voxel_volume.h"
+#include "kernels/lanes.h"
+
+namespace tomofield::baseline {
+
+using kernels::kLanes;
+
+double weigh_rays(const VoxelProblem& problem, std::span<const int> views, float* residuals) {
+  double sum_of_all = 0.0;
+  problem.for_each_ray(views, [&](const loss::ViewModel& model, float length, std::size_t at) {
+    // The residuals carry the view's scale once, and A does too.
+    const double weight = model.weight / (model.scale * model.scale);
+    const float factor = static_cast<float>(weight) / length;
+    float sum = 0.0f;
+    for (int l = 0; l < kLanes; ++l) {
+      float& r = residuals[at + static_cast<std::size_t>(l)];
+      sum += factor * r * r;
+      r *= factor;
+    }
+    sum_of_all += static_cast<double>(sum);
+  });
+  return sum_of_all;
+}
+
+void inverse_column_sums(const VoxelProblem& problem, int slab, std::span<const int> views,
+                         float* detector, float* inverse) {
+  problem.fill_weights(slab, views, detector);
+  problem.backproject(views, detector, inverse);
+  for (float& sum : std::span(inverse, problem.grid().size())) sum = sum > 0.0f ? 1.0f / sum : 0.0f;
+}
+
+void take_step(const projection::SampleGrid& grid, double relaxation, bool non_negative,
+               const float* inverse_columns, const float* gradient, float* densities) {
+  const float step = static_cast<float>(relaxation);
+  const float lowest = non_negative ? 0.0f : std::numeric_limits<float>::lowest();
+  for_each_sample_row(grid, [&](const projection::SampleSegment& segment, std::ptrdiff_t row) {
+    const std::ptrdiff_t end = row + static_cast<std::ptrdiff_t>(segment.nx) * kLanes;
+    for (std::ptrdiff_t i = row; i < end; ++i)
+      densities[i] = std::max(lowest, densities[i] - step * inverse_columns[i] * gradient[i]);
+  });
+}
+
+}  // namespace tomofield::baseline
