@@ -8,11 +8,9 @@
 
 namespace tomofield::reconstruct {
 
-/// What stands in the way of writing results, found out before any work. Throws
-/// Error if two results would be one file, one would replace a file that the
-/// series is read from (even with --overwrite), the first cannot be written
-/// where it shall go, or, unless `may_replace`, one exists; `advice` then says
-/// what can be done instead. Pictures of slices (report/slices.h) are results too.
+/// What stands in the way of writing the results of a series (io/output_files.h): none
+/// may replace a file that the series is read from. Pictures of slices (report/slices.h) are
+/// results too.
 void check_result_files(std::vector<std::filesystem::path> results,
                         const std::filesystem::path& picture_prefix,
                         const tilt_series::TiltSeriesOptions& input, bool may_replace,

@@ -1,0 +1,39 @@
+#include "io/output_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <system_error>
+
+#include "io/atomic_file.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+
+namespace fs = std::filesystem;
+
+void check_output_files(const std::vector<fs::path>& results, const std::vector<fs::path>& inputs,
+                        bool may_replace, const std::string& advice) {
+  for (auto it = results.begin(); it != results.end(); ++it) {
+    if (std::find(it + 1, results.end(), *it) != results.end()) {
+      throw Error(
+          fmt::format("two results would both be '{}': give them different names (a volume's "
+                      "ends in .mrc)",
+                      it->string()));
+    }
+    for (const fs::path& file : inputs) {
+      std::error_code absent;
+      if (!fs::equivalent(*it, file, absent)) continue;
+      throw Error(fmt::format(
+          "the result '{}' would replace the input '{}': give another name or directory",
+          it->string(), file.string()));
+    }
+  }
+  for (const fs::path& result : results) {
+    if (!may_replace && fs::exists(result))
+      throw Error(fmt::format("'{}' exists: {}", result.string(), advice));
+    const AtomicFile probe(result);
+  }
+}
+
+}  // namespace tomofield::io
