@@ -1,29 +1,30 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "cli/commands.h"
+#include "cli/common_options.h"
+#include "cli/evaluate_options.h"
 #include "evaluate/compare.h"
+#include "evaluate/fsc_files.h"
+#include "io/atomic_file.h"
 #include "io/json.h"
-#include "tomofield/error.h"
+#include "report/fsc_picture.h"
 
 namespace tomofield::cli {
 namespace {
 
-struct EvaluateArguments {
-  std::string reconstruction;
-  std::string truth;
-  std::vector<std::int64_t> box;
-  std::string json;
-  bool overwrite = false;
+// Everything that is written, after all of it was found.
+struct Findings {
+  nlohmann::json figures;
+  std::optional<evaluate::Fsc> fsc;
+  std::string profile_csv;
 };
 
-void print_table(const evaluate::Comparison& comparison) {
+void print_comparison(const evaluate::Comparison& comparison) {
   const auto& [psnr, ssim, box] = comparison;
   const base::Shape3 shape = box.shape();
   fmt::print("              raw    affine\n");
@@ -35,22 +36,101 @@ void print_table(const evaluate::Comparison& comparison) {
              box.first[0], box.first[1], box.first[2]);
 }
 
+// Where a curve falls below a threshold, or why there is no such place.
+std::string crossing_text(const evaluate::Fsc& fsc, const evaluate::FscCurve& curve,
+                          double threshold) {
+  if (const auto at = evaluate::crossing_A(fsc.frequency_per_A, curve, threshold))
+    return fmt::format("{:.4g} Å", *at);
+  const bool is_above =
+      std::ranges::any_of(curve.correlation, [&](double value) { return value >= threshold; });
+  return is_above ? "never" : "at once";
+}
+
+void print_crossings(const char* name, const evaluate::Fsc& fsc, const evaluate::FscCurve& curve) {
+  fmt::print("{:<14} {:>10} {:>10}\n", name, crossing_text(fsc, curve, 0.5),
+             crossing_text(fsc, curve, 0.143));
+}
+
+void print_fsc(const evaluate::Fsc& fsc) {
+  fmt::print("FSC falls below {:>8} {:>10}\n", "0.5", "0.143");
+  print_crossings("everywhere", fsc, fsc.all);
+  if (fsc.measured) print_crossings("measured", fsc, *fsc.measured);
+  if (fsc.missing) print_crossings("missing wedge", fsc, *fsc.missing);
+}
+
+void print_contrast(const evaluate::ContrastScore& score, const evaluate::Regions& regions,
+                    bool chosen) {
+  fmt::print("CNR {:.4f}, ENL {:.4f} (normalised to [0, 1] from {:.6g} … {:.6g})\n", score.cnr,
+             score.enl, score.low, score.high);
+  fmt::print("regions {}:", chosen ? "chosen" : "given");
+  for (const auto& box : regions.foreground) fmt::print(" --foreground {}", to_text(box));
+  for (const auto& box : regions.background) fmt::print(" --background {}", to_text(box));
+  fmt::print("\n");
+}
+
+void compare_with_truth(const EvaluateArguments& arguments, Findings& findings) {
+  const evaluate::VolumePair pair =
+      evaluate::read_pair(arguments.volume, *arguments.truth, arguments.box);
+  const evaluate::Comparison comparison = evaluate::compare(pair);
+  findings.figures.update(
+      evaluate::comparison_json(comparison, arguments.volume, *arguments.truth));
+  print_comparison(comparison);
+  if (!arguments.profile) return;
+  findings.profile_csv = evaluate::profile_csv(
+      *arguments.profile, pair.second.voxel_size_A,
+      {{"volume", evaluate::line_profile(pair.first, pair.box, *arguments.profile)},
+       {"truth", evaluate::line_profile(pair.second, pair.box, *arguments.profile)}});
+}
+
+void correlate(const EvaluateArguments& arguments, Findings& findings) {
+  const evaluate::FscFiles files{arguments.volume, *arguments.fsc_with, arguments.fsc_mask,
+                                 arguments.box, arguments.tilts};
+  findings.fsc = evaluate::correlate_files(files);
+  findings.figures["fsc"] = evaluate::fsc_json(*findings.fsc, files);
+  print_fsc(*findings.fsc);
+}
+
+void measure_contrast(const EvaluateArguments& arguments, const base::Volume& volume,
+                      Findings& findings) {
+  const bool chosen = arguments.regions.foreground.empty();
+  const evaluate::Regions regions = chosen ? evaluate::choose_regions(volume) : arguments.regions;
+  const evaluate::ContrastScore score = evaluate::contrast_score(volume, regions);
+  findings.figures["contrast"] = evaluate::contrast_json(score, regions);
+  findings.figures["contrast"]["regions_chosen"] = chosen;
+  print_contrast(score, regions, chosen);
+}
+
+// What a volume tells by itself.
+void examine(const EvaluateArguments& arguments, Findings& findings) {
+  const bool has_profile = arguments.profile && !arguments.truth;
+  const bool nothing_asked = !arguments.truth && !arguments.fsc_with && !arguments.profile;
+  const bool has_contrast =
+      arguments.contrast || !arguments.regions.foreground.empty() || nothing_asked;
+  if (!has_contrast && !has_profile) return;
+  const base::Volume volume = evaluate::read_volume(arguments.volume);
+  if (has_contrast) measure_contrast(arguments, volume, findings);
+  if (!has_profile) return;
+  findings.profile_csv = evaluate::profile_csv(
+      *arguments.profile, volume.voxel_size_A,
+      {{"volume",
+        evaluate::line_profile(volume, evaluate::whole_box(volume.shape), *arguments.profile)}});
+}
+
+void write_findings(const EvaluateArguments& arguments, const Findings& findings) {
+  if (arguments.json) io::write_json(*arguments.json, findings.figures);
+  if (arguments.fsc_csv) io::write_text_file(*arguments.fsc_csv, evaluate::fsc_csv(*findings.fsc));
+  if (arguments.fsc_picture) report::write_fsc_picture(*findings.fsc, *arguments.fsc_picture);
+  if (arguments.profile_csv) io::write_text_file(*arguments.profile_csv, findings.profile_csv);
+}
+
 void run_evaluate(const EvaluateArguments& arguments) {
-  if (!arguments.json.empty() && !arguments.overwrite && std::filesystem::exists(arguments.json))
-    throw Error(fmt::format("'{}' exists: give another name, or --overwrite to replace it",
-                            arguments.json));
-  std::optional<evaluate::Box> box;
-  if (!arguments.box.empty()) {
-    box.emplace();
-    std::copy_n(arguments.box.begin(), 3, box->first.begin());
-    std::copy_n(arguments.box.begin() + 3, 3, box->last.begin());
-  }
-  const auto comparison = evaluate::compare_files(arguments.reconstruction, arguments.truth, box);
-  if (!arguments.json.empty()) {
-    io::write_json(arguments.json, evaluate::comparison_json(comparison, arguments.reconstruction,
-                                                             arguments.truth));
-  }
-  print_table(comparison);
+  arguments.check();
+  Findings findings;
+  findings.figures["reconstruction"] = arguments.volume.string();
+  if (arguments.truth) compare_with_truth(arguments, findings);
+  if (arguments.fsc_with) correlate(arguments, findings);
+  examine(arguments, findings);
+  write_findings(arguments, findings);
 }
 
 }  // namespace
@@ -59,17 +139,9 @@ void add_evaluate_command(CLI::App& program) {
   auto arguments = std::make_shared<EvaluateArguments>();
   CLI::App* command = program.add_subcommand(
       "evaluate",
-      "Score a volume against the truth: PSNR and SSIM, raw and after the best scale "
-      "and offset");
-  command->add_option("reconstruction", arguments->reconstruction, "MRC volume")->required();
-  command->add_option("truth", arguments->truth, "MRC volume")->required();
-  command
-      ->add_option("--box", arguments->box,
-                   "x0,y0,z0,x1,y1,z1: voxels of the truth, zero-based, the last excluded")
-      ->delimiter(',')
-      ->expected(6);
-  command->add_option("--json", arguments->json, "Write the figures to this file");
-  command->add_flag("--overwrite", arguments->overwrite, "Replace the file of --json");
+      "Score a volume: against the truth, against another half, or by its own contrast and noise");
+  add_evaluate_options(*command, *arguments);
+  add_common_options(*command);
   command->callback([arguments] { run_evaluate(*arguments); });
 }
 

@@ -108,9 +108,9 @@ TEST(Compare, IsTheSameForAnyNumberOfThreads) {
   const base::Volume truth = random_volume({64, 70, 40}, 5), other = random_volume({64, 70, 40}, 6);
   const int threads = base::thread_count();
   base::set_thread_count(1);
-  const Comparison one = compare(other, truth);
+  const Comparison one = compare({other, truth, whole_box(truth.shape)});
   base::set_thread_count(3);
-  const Comparison three = compare(other, truth);
+  const Comparison three = compare({other, truth, whole_box(truth.shape)});
   base::set_thread_count(threads);
   EXPECT_EQ(one.psnr.raw_dB, three.psnr.raw_dB);
   EXPECT_EQ(one.psnr.affine_dB, three.psnr.affine_dB);

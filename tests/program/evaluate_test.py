@@ -1,4 +1,4 @@
-"""evaluate against the yardstick's score and scikit-image.
+"""evaluate against the yardstick's score, scikit-image, and plain numpy.
 
 usage: evaluate_test.py TOMOFIELD SCRATCH_DIR"""
 
@@ -12,6 +12,7 @@ import sys
 import mrcfile
 import numpy as np
 import scipy.ndimage
+import skimage.io
 from skimage.metrics import structural_similarity
 
 PROGRAM, SCRATCH = sys.argv[1], sys.argv[2]
@@ -170,6 +171,239 @@ def test_existing_figures_are_kept_unless_asked():
     result = run(file, file, "--json", path("kept.json"))
     assert result.returncode == 2 and "--overwrite" in result.stderr
     assert open(path("kept.json")).read() == "mine"
+
+
+def frequencies(shape):
+    """kz, ky, kx of each Fourier voxel in cycles a voxel."""
+    return np.meshgrid(*[np.fft.fftfreq(n, 1 / n).round() / n for n in shape], indexing="ij")
+
+
+def wedge(shape, low, high):
+    """Fourier voxels that views from low to high degrees measure (CONVENTIONS: x = X cos + Z sin)."""
+    kz, _, kx = frequencies(shape)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle = np.degrees(np.arctan(kz / kx))
+    return ((angle >= low) & (angle <= high)) | ((kx == 0) & (kz == 0))
+
+
+def soft_edges(shape):
+    window = np.ones(shape)
+    for axis, n in enumerate(shape):
+        depth = np.minimum(np.arange(n), np.arange(n)[::-1]) + 0.5
+        factor = np.sin(np.pi / 2 * np.minimum(1, depth / (n / 8))) ** 2
+        window *= factor.reshape([-1 if a == axis else 1 for a in range(3)])
+    return window
+
+
+def expected_fsc(first, second, weights, chosen):
+    """Correlation and number of chosen Fourier voxels of each shell, 1 to half the longest axis."""
+    spectra = []
+    for volume in (first.astype(np.float64), second.astype(np.float64)):
+        spectra.append(np.fft.fftn(weights * (volume - np.average(volume, weights=weights))))
+    longest = max(first.shape)
+    radius = np.sqrt(sum(k**2 for k in reversed(frequencies(first.shape))))
+    shell = np.floor(radius * longest + 0.5).astype(int)
+    curve, count = [], []
+    for s in range(1, longest // 2 + 1):
+        a, b = (spectrum[(shell == s) & chosen] for spectrum in spectra)
+        count.append(a.size)
+        power = np.sum(abs(a) ** 2) * np.sum(abs(b) ** 2)
+        curve.append(np.sum(a * b.conj()).real / np.sqrt(power) if a.size else np.nan)
+    return np.array(curve), count
+
+
+def as_floats(values):
+    return np.array([np.nan if v is None else v for v in values], dtype=float)
+
+
+def check_curve(found, expected):
+    curve, count = expected
+    assert found["voxels"] == count
+    np.testing.assert_allclose(as_floats(found["correlation"]), curve, atol=2e-5)
+
+
+def expected_crossing(curve, frequency, threshold):
+    known = ~np.isnan(curve)
+    curve, frequency = curve[known], frequency[known]
+    below = np.flatnonzero(curve < threshold)
+    if below.size == 0 or below[0] == 0:
+        return None
+    i = below[0]
+    # np.interp wants ascending values: between the two shells the curve falls.
+    return 1 / np.interp(threshold, curve[[i, i - 1]], frequency[[i, i - 1]])
+
+
+def half_volumes(shape, seed, tilts):
+    """A structure that two halves share below a resolution and within the tilts, and their noise."""
+    random = np.random.default_rng(seed)
+    kz, ky, kx = frequencies(shape)
+    fall = np.exp(-60 * (kz**2 + ky**2 + kx**2)) * np.where(wedge(shape, *tilts), 1, 0.05)
+    signal = np.fft.ifftn(np.fft.fftn(random.normal(size=shape)) * fall).real
+    noise = 0.5 * signal.std()
+    return [(signal + noise * random.normal(size=shape)).astype(np.float32) for _ in range(2)]
+
+
+def test_fsc_against_numpy():
+    tilts = (-60, 35)  # not alike, so that the sign of the tilts shows
+    for seed, shape in enumerate([(20, 48, 30), (33, 27, 45), (40, 16, 40)]):
+        first, second = half_volumes(shape, seed, tilts)
+        files = [save("a.mrc", first, 7.5), "--fsc", save("b.mrc", second, 7.5)]
+        score, result = evaluate(*files, "--tilt-range=%g,%g" % tilts)
+        fsc, inside = score["fsc"], wedge(shape, *tilts)
+        frequency = np.array(fsc["frequency_per_A"])
+        np.testing.assert_allclose(frequency, np.arange(1, max(shape) // 2 + 1) / max(shape) / 7.5)
+        for name, chosen in (("all", inside | True), ("measured", inside), ("missing", ~inside)):
+            expected = expected_fsc(first, second, soft_edges(shape), chosen)
+            check_curve(fsc[name], expected)
+            for threshold in (0.5, 0.143):
+                crossing = expected_crossing(expected[0], frequency, threshold)
+                found = fsc[name][f"resolution_at_{threshold}_A"]
+                assert (found is None) == (crossing is None), (name, threshold, found, crossing)
+                if crossing:
+                    assert abs(found - crossing) < 1e-2, (name, threshold, found, crossing)
+                    assert "%.4g Å" % found in result.stdout
+        assert fsc["measured"]["resolution_at_0.5_A"] is not None
+        assert np.nanmean(as_floats(fsc["missing"]["correlation"])) < np.nanmean(
+            as_floats(fsc["measured"]["correlation"]))
+        # Other tilts put other Fourier voxels in the wedge: mirrored they are not the same.
+        mirrored, _ = evaluate(*files, "--tilt-range=%g,%g" % (-tilts[1], -tilts[0]))
+        assert mirrored["fsc"]["measured"]["correlation"] != fsc["measured"]["correlation"]
+        np.testing.assert_allclose(mirrored["fsc"]["all"]["correlation"], fsc["all"]["correlation"])
+
+
+def test_fsc_under_a_mask_and_in_a_box():
+    shape = (24, 30, 36)
+    first, second = half_volumes(shape, 5, (-90, 90))
+    z, y, x = np.indices(shape)
+    mask = np.clip(12 - np.hypot(np.hypot(z - 11, y - 16), x - 15), 0, 1).astype(np.float32)
+    files = [save("a.mrc", first), "--fsc", save("b.mrc", second)]
+    masked, _ = evaluate(*files, "--fsc-mask", save("mask.mrc", mask))
+    everything = np.full(shape, True)
+    check_curve(masked["fsc"]["all"], expected_fsc(first, second, mask, everything))
+    part = (slice(2, 22), slice(3, 27), slice(5, 33))
+    boxed, _ = evaluate(*files, "--fsc-mask", path("mask.mrc"), "--box", "5,3,2,33,27,22")
+    check_curve(boxed["fsc"]["all"],
+                expected_fsc(first[part], second[part], mask[part], everything[part]))
+    assert "psnr_raw_dB" not in boxed and boxed["fsc"]["box_first"] == [5, 3, 2]
+    for mask_file, words in ((save("m.mrc", 2 * mask), "from 0 to 1"),
+                             (save("m2.mrc", mask[1:]), "36 × 30 × 23"),
+                             (save("m3.mrc", 0 * mask), "not all be 0")):
+        result = run(*files, "--fsc-mask", mask_file)
+        assert result.returncode == 2 and words in result.stderr, result
+
+
+def test_fsc_table_and_picture():
+    first, second = half_volumes((20, 32, 32), 6, (-50, 50))
+    files = [save("a.mrc", first), "--fsc", save("b.mrc", second), "--tilt-range=-50,50"]
+    score, _ = evaluate(*files, "--fsc-csv", path("fsc.csv"), "--fsc-picture", path("fsc.png"))
+    table = np.genfromtxt(path("fsc.csv"), delimiter=",", names=True)
+    fsc = score["fsc"]
+    np.testing.assert_allclose(table["frequency_per_A"], fsc["frequency_per_A"], rtol=1e-6)
+    np.testing.assert_allclose(table["resolution_A"], 1 / table["frequency_per_A"], rtol=1e-4)
+    for column, name in (("fsc", "all"), ("fsc_measured", "measured"), ("fsc_missing", "missing")):
+        np.testing.assert_allclose(table[column], as_floats(fsc[name]["correlation"]), atol=1e-6)
+    picture = skimage.io.imread(path("fsc.png"))
+    assert picture.shape == (480, 720, 3)
+    # The blue line follows the curve: its height above the axis in units of the axes.
+    blue = np.argwhere((picture == (30, 100, 200)).all(axis=2) & (np.arange(480) > 30)[:, None])
+    curve, frequency = table["fsc_measured"], table["frequency_per_A"]
+    columns = 84 + (690 - 84) * frequency / frequency[-1]
+    for s in (3, 8, 12):
+        rows = blue[abs(blue[:, 1] - columns[s]) <= 1, 0]
+        expected = 480 - (64 + (440 - 64) * (curve[s] + 0.2) / 1.25)
+        assert rows.min() - 2 <= expected <= rows.max() + 2, (s, rows, expected)
+
+
+def test_contrast_against_numpy():
+    reconstruction, _ = random_pair((24, 60, 51), 11)
+    file = save("a.mrc", 40 * reconstruction - 7)
+    volume = (reconstruction - reconstruction.min()) / np.ptp(reconstruction)
+    front = np.concatenate([volume[2:8, 10:20, 30:45].ravel(), volume[12:15, 1:4, 2:9].ravel()])
+    back = volume[15:22, 40:55, 5:25]
+    score, result = evaluate(file, "--foreground", "30,10,2,45,20,8", "--foreground",
+                             "2,1,12,9,4,15", "--background=5,40,15,25,55,22")
+    found = score["contrast"]
+    cnr = abs(front.mean() - back.mean()) / np.sqrt((front.var() + back.var()) / 2)
+    assert abs(found["cnr"] / cnr - 1) < 1e-4, (found, cnr)
+    assert abs(found["enl"] / (back.mean() ** 2 / back.var()) - 1) < 1e-4, found
+    assert found["foreground"] == ["30,10,2,45,20,8", "2,1,12,9,4,15"]
+    assert not found["regions_chosen"] and "30,10,2,45,20,8" in result.stdout
+
+
+def chosen_cubes(volume, side):
+    """The documented rule: corners z, y, x of the foreground and the background."""
+    starts = [n % side // 2 + side * np.arange(n // side) for n in volume.shape]
+    corners = [(z, y, x) for z in starts[0] for y in starts[1] for x in starts[2]]
+    cubes = [volume[tuple(slice(c, c + side) for c in corner)] for corner in corners]
+    mean, variance = np.array([c.mean() for c in cubes]), np.array([c.var() for c in cubes])
+    nearest = np.argsort(abs(mean - np.median(mean)), kind="stable")[: (len(cubes) + 1) // 2]
+    background = min(nearest, key=lambda i: variance[i])
+    cnr = abs(mean - mean[background]) / np.sqrt((variance + variance[background]) / 2)
+    return corners[np.argmax(cnr)], corners[background]
+
+
+def test_regions_are_chosen_by_the_rule_and_can_be_handed_on():
+    volume, other = random_pair((40, 61, 83), 12)
+    score, result = evaluate(save("a.mrc", volume))
+    found = score["contrast"]
+    assert found["regions_chosen"] and "psnr_raw_dB" not in score
+    expected = chosen_cubes(volume.astype(np.float64), 5)
+    for name, (z, y, x) in zip(("foreground", "background"), expected):
+        assert found[name] == [f"{x},{y},{z},{x + 5},{y + 5},{z + 5}"], (name, found)
+    options = result.stdout.split("regions chosen:")[1].split()
+    again, _ = evaluate(path("a.mrc"), *options)
+    assert again["contrast"]["cnr"] == found["cnr"] and again["contrast"]["enl"] == found["enl"]
+    handed, _ = evaluate(save("b.mrc", other), path("a.mrc"), "--cnr", *options)
+    assert handed["contrast"]["foreground"] == found["foreground"] and "psnr_raw_dB" in handed
+
+
+def test_profile_against_scipy():
+    reconstruction, truth = random_pair((24, 60, 51), 13)
+    files = save("a.mrc", reconstruction[1:-1], 12.5), save("b.mrc", truth, 12.5)
+    ends = np.array([[3.5, 4.25, 5.0], [48.0, 50.0, 20.5]])
+    line = ",".join("%g" % v for v in ends.ravel())
+    evaluate(*files, "--profile", line, "--profile-csv", path("profile.csv"))
+    table = np.genfromtxt(path("profile.csv"), delimiter=",", names=True)
+    length = np.linalg.norm(ends[1] - ends[0])
+    steps = np.arange(int(length) + 1)
+    np.testing.assert_allclose(table["distance_A"], 12.5 * steps, rtol=1e-5)
+    points = ends[0] + steps[:, None] / length * (ends[1] - ends[0])
+    for column, volume in (("volume", reconstruction), ("truth", truth)):
+        expected = scipy.ndimage.map_coordinates(
+            volume.astype(np.float64), points.T[::-1] - 0.5, order=1)
+        np.testing.assert_allclose(table[column], expected, atol=1e-6)
+    evaluate(files[1], "--profile", line, "--profile-csv", path("alone.csv"))
+    alone = np.genfromtxt(path("alone.csv"), delimiter=",", names=True)
+    np.testing.assert_array_equal(alone["volume"], table["truth"])
+    result = run(files[1], "--profile", "1,1,1,52,3,3", "--profile-csv", path("none.csv"))
+    assert result.returncode == 2 and "0,0,0,51,60,24" in result.stderr, result
+
+
+def test_options_that_do_not_fit_are_refused():
+    volume, _ = random_pair((24, 60, 51), 14)
+    file, other = save("a.mrc", volume), save("b.mrc", volume)
+    kept = save("kept.csv", volume)
+    for options, words in (
+        (["--tilt-range=-60,60"], "--fsc"),
+        (["--fsc", other, "--tilt-range=60,-60"], "lower"),
+        (["--fsc", other, "--tilt-range=-60,100"], "90"),
+        (["--fsc", other, "--fsc-csv", kept], "--overwrite"),
+        (["--fsc", other, "--fsc-csv", other, "--overwrite"], "would replace the input"),
+        (["--fsc", other, "--fsc-csv", path("x"), "--json", path("x")], "two results"),
+        (["--fsc", other, "--fsc-csv", path("absent/x.csv")], "absent"),
+        (["--foreground", "1,2,3,4,5,6"], "--background"),
+        (["--foreground", "1,2,3,4,5", "--background", "1,2,3,4,5,6"], "six whole numbers"),
+        (["--foreground", "1,2,3,4,5,6", "--background", "1,2,3,60,5,6"], "0,0,0,51,60,24"),
+        (["--profile", "1,2,3,4,5,6"], "--profile-csv"),
+        (["--box", "1,2,3,40,50,20"], "--fsc"),
+        (["--fsc", save("flat.mrc", 0 * volume)], "constant"),
+        (["--fsc", save("turned.mrc", volume.transpose(1, 0, 2))], "--axes"),
+    ):
+        result = run(file, *options)
+        assert result.returncode == 2 and words in result.stderr, (options, result)
+    assert mrcfile.read(kept).shape == volume.shape
+    tiny = run(save("tiny.mrc", volume[:2, :4, :9]))
+    assert tiny.returncode == 2 and "--foreground" in tiny.stderr, tiny
 
 
 def main():

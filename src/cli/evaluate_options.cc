@@ -1,0 +1,172 @@
+#include "cli/evaluate_options.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "cli/number_checks.h"
+#include "io/output_files.h"
+#include "io/text_lines.h"
+#include "tomofield/error.h"
+
+namespace tomofield::cli {
+namespace {
+
+constexpr const char* kBoxType = "X0,Y0,Z0,X1,Y1,Z1";
+
+/// A box of whole numbers; nothing for any other text.
+std::optional<evaluate::Box> parse_box(const std::string& text) {
+  const std::vector<std::string> words = CLI::detail::split(text, ',');
+  if (words.size() != 6) return std::nullopt;
+  evaluate::Box box;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const auto number = io::parse_integer(words[i]);
+    if (!number) return std::nullopt;
+    (i < 3 ? box.first : box.last)[i % 3] = *number;
+  }
+  return box;
+}
+
+CLI::Validator box_check() {
+  return {[](std::string& text) -> std::string {
+            if (parse_box(text)) return {};
+            return fmt::format(
+                "a box must be six whole numbers, x0,y0,z0,x1,y1,z1: zero-based voxels, the last "
+                "excluded; not {}",
+                text);
+          },
+          ""};
+}
+
+CLI::Option* add_boxes(CLI::App& command, const std::string& name,
+                       std::vector<evaluate::Box>& boxes, const char* help) {
+  return command
+      .add_option_function<std::vector<std::string>>(
+          name,
+          [&boxes](const std::vector<std::string>& texts) {
+            for (const std::string& text : texts) boxes.push_back(*parse_box(text));
+          },
+          help)
+      ->check(box_check())
+      ->type_name(kBoxType)
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+void add_comparison_options(CLI::App& command, EvaluateArguments& arguments) {
+  command.add_option("volume", arguments.volume, "MRC volume")->type_name("VOLUME")->required();
+  command
+      .add_option("truth", arguments.truth,
+                  "MRC volume to score it against: PSNR and SSIM, raw and after the best scale and "
+                  "offset")
+      ->type_name("TRUTH");
+  command
+      .add_option_function<std::string>(
+          "--box", [&arguments](const std::string& text) { arguments.box = parse_box(text); },
+          "compare (PSNR, SSIM, FSC) within these voxels of the other volume only, zero-based, the "
+          "last excluded")
+      ->check(box_check())
+      ->type_name(kBoxType);
+}
+
+void add_fsc_options(CLI::App& command, EvaluateArguments& arguments) {
+  const char* group = "Fourier shell correlation";
+  const auto add_file = [&](const char* name, std::optional<std::filesystem::path>& file,
+                            const char* help) {
+    return command.add_option(name, file, help)->type_name("FILE")->group(group);
+  };
+  CLI::Option* fsc = add_file("--fsc", arguments.fsc_with,
+                              "correlate with this MRC volume: the other half, or the truth");
+  add_file("--fsc-mask", arguments.fsc_mask,
+           "MRC volume with weights from 0 to 1, soft at its edges; default: all, faded over the "
+           "outer eighth at every face")
+      ->needs(fsc);
+  command
+      .add_option_function<std::vector<double>>(
+          "--tilt-range",
+          [&arguments](const std::vector<double>& tilts) {
+            arguments.tilts = {tilts[0], tilts[1]};
+          },
+          "lowest and highest tilt in degrees, as in --tilt-range=-60,50: correlate what the views "
+          "measured and the missing wedge apart as well (tilt axis Y)")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(number_between(-90.0, 90.0))
+      ->type_name("LOW,HIGH")
+      ->needs(fsc)
+      ->group(group);
+  add_file("--fsc-csv", arguments.fsc_csv, "write the curves as a table")->needs(fsc);
+  add_file("--fsc-picture", arguments.fsc_picture, "draw the curves (PNG)")->needs(fsc);
+}
+
+void add_contrast_options(CLI::App& command, EvaluateArguments& arguments) {
+  const char* group = "Contrast and noise";
+  command
+      .add_flag("--cnr", arguments.contrast,
+                "contrast-to-noise ratio and equivalent number of looks; regions are chosen unless "
+                "given (default where nothing else is asked for)")
+      ->group(group);
+  CLI::Option* foreground =
+      add_boxes(command, "--foreground", arguments.regions.foreground,
+                "voxels of VOLUME that show structure; may be given several times");
+  CLI::Option* background = add_boxes(command, "--background", arguments.regions.background,
+                                      "voxels that show none; may be given several times");
+  foreground->needs(background)->group(group);
+  background->needs(foreground)->group(group);
+}
+
+void add_profile_options(CLI::App& command, EvaluateArguments& arguments) {
+  const char* group = "Line profile";
+  CLI::Option* line =
+      command
+          .add_option_function<std::vector<double>>(
+              "--profile",
+              [&arguments](const std::vector<double>& v) {
+                arguments.profile = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+              },
+              "sample a line between two points, in voxels (of TRUTH, if there is one), voxel i "
+              "covering [i, i+1)")
+          ->delimiter(',')
+          ->expected(6)
+          ->check(number_between(-1e9, 1e9))
+          ->type_name(kBoxType)
+          ->group(group);
+  CLI::Option* csv =
+      command.add_option("--profile-csv", arguments.profile_csv, "write the profile to this table")
+          ->type_name("FILE")
+          ->group(group);
+  line->needs(csv);
+  csv->needs(line);
+}
+
+}  // namespace
+
+void EvaluateArguments::check() const {
+  if (box && !truth && !fsc_with)
+    throw Error("--box restricts a comparison: name a truth to compare with, or give --fsc");
+  if (tilts && !(tilts->low_deg < tilts->high_deg))
+    throw Error(
+        fmt::format("--tilt-range must be from a lower to a higher tilt, not from {:g}° to "
+                    "{:g}°",
+                    tilts->low_deg, tilts->high_deg));
+  std::vector<std::filesystem::path> inputs{volume}, outputs;
+  for (const auto& file : {truth, fsc_with, fsc_mask})
+    if (file) inputs.push_back(*file);
+  for (const auto& file : {json, fsc_csv, fsc_picture, profile_csv})
+    if (file) outputs.push_back(*file);
+  io::check_output_files(outputs, inputs, overwrite,
+                         "give another name, or --overwrite to replace it");
+}
+
+void add_evaluate_options(CLI::App& command, EvaluateArguments& arguments) {
+  add_comparison_options(command, arguments);
+  add_fsc_options(command, arguments);
+  add_contrast_options(command, arguments);
+  add_profile_options(command, arguments);
+  command.add_option("--json", arguments.json, "write all figures to this file")->type_name("FILE");
+  command.add_flag("--overwrite", arguments.overwrite, "replace existing files");
+}
+
+}  // namespace tomofield::cli

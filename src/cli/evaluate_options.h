@@ -1,0 +1,39 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <optional>
+
+#include "evaluate/box.h"
+#include "evaluate/contrast.h"
+#include "evaluate/fsc.h"
+#include "evaluate/profile.h"
+
+namespace tomofield::cli {
+
+/// What `evaluate` was asked for.
+struct EvaluateArguments {
+  std::filesystem::path volume;
+  std::optional<std::filesystem::path> truth;
+  std::optional<evaluate::Box> box;
+
+  std::optional<std::filesystem::path> fsc_with, fsc_mask, fsc_csv, fsc_picture;
+  std::optional<evaluate::TiltRange> tilts;
+
+  bool contrast = false;
+  evaluate::Regions regions;  ///< empty: to be chosen
+
+  std::optional<evaluate::LineSegment> profile;
+  std::optional<std::filesystem::path> profile_csv;
+
+  std::optional<std::filesystem::path> json;
+  bool overwrite = false;
+
+  /// Throws Error for options that need others, and for outputs that must not be written.
+  void check() const;
+};
+
+/// Registers everything. `arguments` must outlive the parsing.
+void add_evaluate_options(CLI::App& command, EvaluateArguments& arguments);
+
+}  // namespace tomofield::cli

@@ -1,0 +1,49 @@
+#include "evaluate/box.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <vector>
+
+namespace tomofield::evaluate {
+
+Box whole_box(const base::Shape3& shape) { return {{}, {shape.nx, shape.ny, shape.nz}}; }
+
+Box whole_box(const io::MrcReader& file) {
+  return whole_box(base::Shape3{file.header().nx, file.header().ny, file.header().nz});
+}
+
+bool lies_within(const Box& box, const Box& outer) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (box.first[axis] < outer.first[axis] || box.last[axis] > outer.last[axis] ||
+        box.first[axis] >= box.last[axis])
+      return false;
+  }
+  return true;
+}
+
+std::string to_text(const Box& box) {
+  return fmt::format("{},{},{},{},{},{}", box.first[0], box.first[1], box.first[2], box.last[0],
+                     box.last[1], box.last[2]);
+}
+
+base::Volume read_box(const io::MrcReader& file, const Box& box) {
+  base::Volume volume(box.shape(), file.header().voxel_size_A[0]);
+  const base::Shape3& shape = volume.shape;
+  std::vector<float> rows(static_cast<std::size_t>(file.header().nx * shape.ny));
+  for (std::int64_t z = 0; z < shape.nz; ++z) {
+    file.read_rows(box.first[2] + z, box.first[1], shape.ny, rows);
+    for (std::int64_t y = 0; y < shape.ny; ++y) {
+      const auto from = rows.begin() + y * file.header().nx + box.first[0];
+      std::copy(from, from + shape.nx, &volume.at(0, y, z));
+    }
+  }
+  return volume;
+}
+
+base::Volume read_volume(const std::filesystem::path& path) {
+  const io::MrcReader file(path);
+  return read_box(file, whole_box(file));
+}
+
+}  // namespace tomofield::evaluate

@@ -1,0 +1,243 @@
+#include "evaluate/fsc.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+
+#include "base/check.h"
+#include "base/parallel.h"
+#include "evaluate/fourier_transform.h"
+#include "tomofield/error.h"
+
+namespace tomofield::evaluate {
+namespace {
+
+// Sums over the Fourier voxels of a shell.
+struct ShellSums {
+  double product = 0.0, first = 0.0, second = 0.0;
+  std::int64_t voxels = 0;
+  void operator+=(const ShellSums& other) {
+    product += other.product;
+    first += other.first;
+    second += other.second;
+    voxels += other.voxels;
+  }
+};
+
+// [shell]: frequencies that the tilts cover, and those that they do not.
+struct WedgeSums {
+  std::vector<ShellSums> measured, missing;
+};
+
+std::int64_t longest_axis(const base::Shape3& shape) {
+  return std::max({shape.nx, shape.ny, shape.nz});
+}
+
+// Adds body(z) of all sections in their order.
+template <typename Body>
+auto sum_sections(std::int64_t nz, const Body& body) {
+  std::vector<decltype(body(std::int64_t{}))> parts(static_cast<std::size_t>(nz));
+  base::parallel_for(nz, [&](std::int64_t z) { parts[static_cast<std::size_t>(z)] = body(z); });
+  double sum = 0.0;
+  for (const double part : parts) sum += part;
+  return sum;
+}
+
+void check_weights(const base::Volume& weights) {
+  const auto [low, high] = std::minmax_element(weights.data.begin(), weights.data.end());
+  const bool is_finite =
+      std::ranges::all_of(weights.data, [](float w) { return std::isfinite(w); });
+  if (is_finite && *low >= 0.0f && *high <= 1.0f && *high > 0.0f) return;
+  throw Error(
+      fmt::format("the mask's voxels run from {} to {}: they must lie from 0 to 1 and not all be 0",
+                  *low, *high));
+}
+
+// What the transform is taken of: values[i] = scale · weight[i] (volume[i] − mean), with a mean
+// square of 1, so that both volumes fit one complex transform in single precision.
+struct Normalised {
+  const base::Volume& volume;
+  const base::Volume& weights;
+  double mean = 0.0, scale = 0.0;
+
+  Normalised(const base::Volume& v, const base::Volume& w) : volume(v), weights(w) {
+    const std::int64_t section = v.shape.nx * v.shape.ny;
+    const auto sum = [&](const auto& term) {
+      return sum_sections(v.shape.nz, [&](std::int64_t z) {
+        double total = 0.0;
+        for (std::int64_t i = z * section; i < (z + 1) * section; ++i)
+          total += term(static_cast<std::size_t>(i));
+        return total;
+      });
+    };
+    const auto weight = [&](std::size_t i) { return static_cast<double>(w.data[i]); };
+    const auto value = [&](std::size_t i) { return static_cast<double>(v.data[i]); };
+    mean = sum([&](std::size_t i) { return weight(i) * value(i); }) / sum(weight);
+    const double squares = sum([&](std::size_t i) {
+      const double centred = weight(i) * (value(i) - mean);
+      return centred * centred;
+    });
+    if (!std::isfinite(squares))
+      throw Error("a volume has NaN or infinite voxels: no shell correlation means anything");
+    // Of a constant volume rounding leaves about 10⁻³² of its square.
+    if (!(squares > 1e-20 * mean * mean))
+      throw Error("a volume is constant under the mask: it correlates with nothing");
+    scale = std::sqrt(static_cast<double>(v.data.size()) / squares);
+  }
+
+  float operator()(std::size_t i) const {
+    return static_cast<float>(scale * static_cast<double>(weights.data[i]) *
+                              (static_cast<double>(volume.data[i]) - mean));
+  }
+};
+
+// Transform of first + i second: both volumes for one transform.
+std::vector<std::complex<float>> joint_transform(const Normalised& first,
+                                                 const Normalised& second) {
+  const base::Shape3& shape = first.volume.shape;
+  std::vector<std::complex<float>> values(shape.voxels());
+  base::parallel_for(shape.nz, [&](std::int64_t z) {
+    const std::size_t section = static_cast<std::size_t>(shape.nx * shape.ny);
+    const std::size_t begin = static_cast<std::size_t>(z) * section;
+    for (std::size_t i = begin; i < begin + section; ++i) values[i] = {first(i), second(i)};
+  });
+  transform_volume(shape, values);
+  return values;
+}
+
+// The sums of one section kz of a joint transform F. The volumes are real, so their own are
+// A(k) = (F(k) + conj F(−k)) / 2 and B(k) = (F(k) − conj F(−k)) / 2i.
+WedgeSums section_sums(const base::Shape3& shape, const std::vector<std::complex<float>>& joint,
+                       std::int64_t kz, const TiltRange& tilts) {
+  const std::int64_t longest = longest_axis(shape);
+  const std::size_t shells = static_cast<std::size_t>(longest / 2);
+  WedgeSums sums{std::vector<ShellSums>(shells), std::vector<ShellSums>(shells)};
+  const auto row = [&](std::int64_t y, std::int64_t z) {
+    return joint.data() + (z * shape.ny + y) * shape.nx;
+  };
+  const auto cycles = [](std::int64_t k, std::int64_t n) {
+    return static_cast<double>(signed_frequency(k, n)) / static_cast<double>(n);
+  };
+  const double z = cycles(kz, shape.nz);
+  for (std::int64_t ky = 0; ky < shape.ny; ++ky) {
+    const double y = cycles(ky, shape.ny);
+    const std::complex<float>* there = row(ky, kz);
+    const std::complex<float>* opposite =
+        row((shape.ny - ky) % shape.ny, (shape.nz - kz) % shape.nz);
+    for (std::int64_t kx = 0; kx < shape.nx; ++kx) {
+      const double x = cycles(kx, shape.nx);
+      const double radius = std::sqrt(x * x + y * y + z * z);
+      const auto shell = std::lround(radius * static_cast<double>(longest));
+      if (shell < 1 || shell > static_cast<long>(shells)) continue;
+      const std::complex<double> f(there[kx]), g(std::conj(opposite[(shape.nx - kx) % shape.nx]));
+      const std::complex<double> a = 0.5 * (f + g), b = std::complex(0.0, -0.5) * (f - g);
+      auto& set = tilts.covers(x, z) ? sums.measured : sums.missing;
+      set[static_cast<std::size_t>(shell - 1)] +=
+          {a.real() * b.real() + a.imag() * b.imag(), std::norm(a), std::norm(b), 1};
+    }
+  }
+  return sums;
+}
+
+WedgeSums shell_sums(const base::Shape3& shape, const std::vector<std::complex<float>>& joint,
+                     const TiltRange& tilts) {
+  std::vector<WedgeSums> sections(static_cast<std::size_t>(shape.nz));
+  base::parallel_for(shape.nz, [&](std::int64_t kz) {
+    sections[static_cast<std::size_t>(kz)] = section_sums(shape, joint, kz, tilts);
+  });
+  WedgeSums total = sections.front();
+  for (std::size_t section = 1; section < sections.size(); ++section) {
+    for (std::size_t s = 0; s < total.measured.size(); ++s) {
+      total.measured[s] += sections[section].measured[s];
+      total.missing[s] += sections[section].missing[s];
+    }
+  }
+  return total;
+}
+
+FscCurve curve_of(const std::vector<ShellSums>& shells) {
+  FscCurve curve;
+  for (const ShellSums& sum : shells) {
+    const double power = std::sqrt(sum.first * sum.second);
+    curve.correlation.push_back(power > 0.0 ? sum.product / power
+                                            : std::numeric_limits<double>::quiet_NaN());
+    curve.voxels.push_back(sum.voxels);
+  }
+  return curve;
+}
+
+}  // namespace
+
+bool TiltRange::covers(double kx, double kz) const {
+  if (kx == 0.0 && kz == 0.0) return true;
+  const double angle = kx == 0.0 ? 90.0 : std::atan(kz / kx) * 180.0 / std::numbers::pi;
+  return low_deg <= angle && angle <= high_deg;
+}
+
+base::Volume edge_window(const base::Shape3& shape) {
+  const auto axis = [](std::int64_t n) {
+    std::vector<double> window;
+    const double edge = static_cast<double>(n) / 8.0;
+    for (std::int64_t i = 0; i < n; ++i) {
+      const double from_face = static_cast<double>(std::min(i, n - 1 - i)) + 0.5;
+      const double s = std::sin(0.5 * std::numbers::pi * std::min(1.0, from_face / edge));
+      window.push_back(s * s);
+    }
+    return window;
+  };
+  const auto x = axis(shape.nx), y = axis(shape.ny), z = axis(shape.nz);
+  base::Volume weights(shape);
+  std::size_t i = 0;
+  for (const double wz : z)
+    for (const double wy : y)
+      for (const double wx : x) weights.data[i++] = static_cast<float>(wx * wy * wz);
+  return weights;
+}
+
+Fsc fourier_shell_correlation(const base::Volume& first, const base::Volume& second,
+                              const base::Volume& weights, const std::optional<TiltRange>& tilts) {
+  const base::Shape3& shape = first.shape;
+  TOMOFIELD_CHECK(second.shape == shape && weights.shape == shape, "all of one shape");
+  const std::int64_t longest = longest_axis(shape);
+  if (longest < 4) throw Error("shell correlation needs an axis of 4 voxels or more");
+  check_weights(weights);
+  const auto joint = joint_transform(Normalised(first, weights), Normalised(second, weights));
+  const TiltRange all_tilts{-90.0, 90.0};
+  WedgeSums sums = shell_sums(shape, joint, tilts.value_or(all_tilts));
+  Fsc fsc;
+  if (tilts) {
+    fsc.measured = curve_of(sums.measured);
+    fsc.missing = curve_of(sums.missing);
+  }
+  for (std::size_t s = 0; s < sums.measured.size(); ++s) {
+    sums.measured[s] += sums.missing[s];
+    fsc.frequency_per_A.push_back(static_cast<double>(s + 1) /
+                                  (static_cast<double>(longest) * second.voxel_size_A));
+  }
+  fsc.all = curve_of(sums.measured);
+  return fsc;
+}
+
+std::optional<double> crossing_A(std::span<const double> frequency_per_A, const FscCurve& curve,
+                                 double threshold) {
+  std::optional<std::size_t> above;
+  for (std::size_t s = 0; s < curve.correlation.size(); ++s) {
+    const double value = curve.correlation[s];
+    if (std::isnan(value)) continue;
+    if (value >= threshold) {
+      above = s;
+      continue;
+    }
+    if (!above) return std::nullopt;
+    const double before = curve.correlation[*above];
+    const double f0 = frequency_per_A[*above], f1 = frequency_per_A[s];
+    return 1.0 / (f0 + (f1 - f0) * (before - threshold) / (before - value));
+  }
+  return std::nullopt;
+}
+
+}  // namespace tomofield::evaluate
