@@ -13,11 +13,14 @@
 #include "cli/common_options.h"
 #include "cli/exit_status.h"
 #include "cli/input_options.h"
+#include "cli/number_checks.h"
 #include "cli/specimen_options.h"
 #include "compare/comparison.h"
 
 namespace tomofield::cli {
 namespace {
+
+constexpr double kMostViews = 1e9;
 
 volatile std::sig_atomic_t g_signal = 0;
 void remember_signal(int signal) { g_signal = signal; }
@@ -25,10 +28,11 @@ void remember_signal(int signal) { g_signal = signal; }
 struct Arguments {
   tilt_series::TiltSeriesOptions input;  // checked here, read by the methods
   reconstruct::SpecimenOptions specimen;
-  std::vector<std::string> names{"vm", "grid", "tv", "sirt"};
+  std::vector<std::string> names{"vm", "tv", "sirt", "wbp"};
   std::vector<std::string> others;
   std::string truth, folder;
-  bool tune = false, overwrite = false;
+  bool tune = false, halves = false, overwrite = false;
+  int hold_out = 0;
 };
 
 // The words that say what the series is, as they were given: every method gets them.
@@ -55,19 +59,22 @@ void run(const CLI::App& command, const Arguments& arguments,
          const std::vector<std::string>& own_options) {
   compare::CompareOptions options;
   options.program = std::filesystem::read_symlink("/proc/self/exe");
-  options.series = {arguments.input.stack, series_words(command, own_options)};
+  options.input = arguments.input;
+  options.series_words = series_words(command, own_options);
   options.methods = compare::choose_methods(arguments.names, arguments.others);
   if (!arguments.truth.empty()) options.truth = arguments.truth;
   options.tune = arguments.tune;
+  options.halves = arguments.halves;
+  options.hold_out = arguments.hold_out;
   options.folder = arguments.folder;
   options.overwrite = arguments.overwrite;
   compare::check_comparison(options);
   std::signal(SIGINT, remember_signal);
   std::signal(SIGTERM, remember_signal);
   const compare::RunHooks hooks{
-      .method_starts =
-          [](const compare::Method& method, bool is_there) {
-            base::log_info(fmt::format("{}: {}", method.name,
+      .run_starts =
+          [](const compare::Run& run, bool is_there) {
+            base::log_info(fmt::format("{}: {}", run.name,
                                        is_there ? "there already" : "running, its log beside it"));
           },
       .stop_requested = [] { return g_signal != 0; }};
@@ -84,8 +91,9 @@ void run(const CLI::App& command, const Arguments& arguments,
 std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments) {
   const char* group = "Comparison";
   command
-      .add_option("--methods", arguments.names,
-                  "which, the first being the main one: vm, grid, tv, sirt")
+      .add_option(
+          "--methods", arguments.names,
+          "which, the first being the main one: vm, grid, tv, tv-concave, sart-tv, sirt, wbp")
       ->delimiter(',')
       ->capture_default_str()
       ->group(group);
@@ -97,11 +105,22 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
       ->group(group);
   command.add_option("--truth", arguments.truth, "MRC volume to score against")->group(group);
   command.add_flag("--tune", arguments.tune, "tune the methods that can be")->group(group);
+  command
+      .add_flag("--halves", arguments.halves,
+                "run every method on the odd and on the even views too, and correlate the two")
+      ->group(group);
+  command
+      .add_option("--hold-out", arguments.hold_out,
+                  "run every method without every so-manieth view too, and report how well it "
+                  "predicts them")
+      ->check(number_between(2, kMostViews))
+      ->group(group);
   command.add_option("-o,--output", arguments.folder, "folder of everything that it makes")
       ->required()
       ->group(group);
   command.add_flag("--overwrite", arguments.overwrite, "make everything anew")->group(group);
-  return {"--methods", "--also", "--truth", "--tune", "--output", "--overwrite"};
+  return {"--methods",  "--also",   "--truth",     "--tune",   "--halves",
+          "--hold-out", "--output", "--overwrite", "--exclude"};
 }
 
 }  // namespace

@@ -6,8 +6,9 @@
 #include <system_error>
 
 #include "compare/pictures.h"
+#include "compare/runs.h"
+#include "compare/scores.h"
 #include "compare/table.h"
-#include "evaluate/compare.h"
 #include "io/atomic_file.h"
 #include "io/json.h"
 #include "io/mrc.h"
@@ -19,29 +20,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// PSNR and SSIM of every volume against the truth, as they are and after the best scale and offset.
-void add_truth_scores(const std::vector<Row>& rows, const fs::path& truth, Table& table) {
-  std::vector<std::optional<double>> psnr, affine_psnr, ssim, affine_ssim;
-  for (const Row& row : rows) {
-    const evaluate::Comparison scores = evaluate::compare_files(row.volume, truth, std::nullopt);
-    psnr.push_back(scores.psnr.raw_dB);
-    affine_psnr.push_back(scores.psnr.affine_dB);
-    ssim.push_back(scores.ssim.raw);
-    affine_ssim.push_back(scores.ssim.affine);
-  }
-  constexpr auto kHigher = Column::Better::kHigher;
-  table.add({"psnr_dB", "PSNR, dB", kHigher, 2}, psnr);
-  table.add({"psnr_affine_dB", "PSNR, scaled", kHigher, 2}, affine_psnr);
-  table.add({"ssim", "SSIM", kHigher, 3}, ssim);
-  table.add({"ssim_affine", "SSIM, scaled", kHigher, 3}, affine_ssim);
-}
-
 // What is shown side by side: the truth, if it has the size of the volumes, and every volume.
 std::vector<Shown> shown_volumes(const std::vector<Row>& rows,
                                  const std::optional<fs::path>& truth) {
   std::vector<Shown> shown;
   for (const Row& row : rows)
-    shown.push_back({row.method.name, row.method.title, report::read_central_slices(row.volume)});
+    shown.push_back({row.run.name, row.run.method.title, report::read_central_slices(row.volume)});
   if (!truth) return shown;
   Shown reference{"truth", "truth", report::read_central_slices(*truth)};
   const auto same_size = [](const report::Slice& a, const report::Slice& b) {
@@ -80,22 +64,33 @@ void add_pictures(const CompareOptions& options, const std::vector<Row>& rows,
 void add_commands(const std::vector<Row>& rows, report::HtmlPage& page) {
   std::string listing;
   for (const Row& row : rows) {
-    listing += fmt::format("tomofield {} -o {}\n", fmt::join(row.command, " "),
+    listing += fmt::format("tomofield {} -o {}\n", fmt::join(row.run.command, " "),
                            row.volume.filename().string());
   }
   page.add_heading("Commands");
   page.add_listing(listing);
 }
 
+// Shell correlations over spatial frequency, with the usual thresholds to read them by.
+void add_correlations(const Scores& scores, report::HtmlPage& page) {
+  for (const auto& [title, curves] : scores.correlations) {
+    page.add_heading(title);
+    page.add_svg(report::curve_plot_svg(
+        {.x_title = "frequency, 1/Å", .y_title = "FSC", .y_range = {-0.1, 1.05}}, curves));
+  }
+}
+
 std::string report_page(const CompareOptions& options, const std::vector<Row>& rows,
-                        const Table& table) {
-  report::HtmlPage page("Comparison: " + options.series.stack.filename().string());
+                        const Table& table, const Scores& scores) {
+  report::HtmlPage page("Comparison: " + options.input.stack.filename().string());
   page.add_paragraph(fmt::format(
       "tomofield {}; {} methods on {}. The main method is {}; bold is the best of a column, an "
       "orange cell is better than the main method's.",
-      TOMOFIELD_VERSION, rows.size(), options.series.stack.string(), rows.front().method.title));
+      TOMOFIELD_VERSION, rows.size(), options.input.stack.string(), rows.front().run.method.title));
   page.add_table(table_cells(table));
+  page.add_paragraph(scores.remark);
   add_pictures(options, rows, page);
+  add_correlations(scores, page);
   add_commands(rows, page);
   return page.document();
 }
@@ -104,11 +99,11 @@ nlohmann::json comparison_json(const CompareOptions& options, const std::vector<
                                const Table& table) {
   nlohmann::json methods = table_json(table);
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    methods[i]["command"] = rows[i].command;
+    methods[i]["command"] = rows[i].run.command;
     methods[i]["volume"] = rows[i].volume.string();
   }
   return {{"tomofield", TOMOFIELD_VERSION},
-          {"series", options.series.stack.string()},
+          {"series", options.input.stack.string()},
           {"truth", options.truth ? nlohmann::json(options.truth->string()) : nullptr},
           {"methods", methods}};
 }
@@ -117,8 +112,8 @@ nlohmann::json comparison_json(const CompareOptions& options, const std::vector<
 
 void check_comparison(const CompareOptions& options) {
   if (options.methods.empty()) throw Error("a comparison needs a method: give --methods or --also");
-  if (!fs::exists(options.series.stack))
-    throw Error(fmt::format("the series '{}' does not exist", options.series.stack.string()));
+  if (!fs::exists(options.input.stack))
+    throw Error(fmt::format("the series '{}' does not exist", options.input.stack.string()));
   if (options.truth) io::MrcReader{*options.truth};
   std::error_code fault;
   fs::create_directories(options.folder, fault);
@@ -129,15 +124,19 @@ void check_comparison(const CompareOptions& options) {
 }
 
 RowsOutcome compare_methods(const CompareOptions& options, const RunHooks& hooks) {
+  const tilt_series::TiltSeries series(options.input);
+  const PlannedRuns plan = plan_runs(options, series);
   std::vector<Row> rows;
-  if (run_rows(options.program, options.series, options.methods, options.folder, options.tune,
-               options.overwrite, hooks, rows) == RowsOutcome::kStopped)
+  if (run_rows(options.program, options.input.stack, plan.runs, options.folder, options.overwrite,
+               hooks, rows) == RowsOutcome::kStopped)
     return RowsOutcome::kStopped;
-  Table table = table_of_costs(rows);
-  if (options.truth) add_truth_scores(rows, *options.truth, table);
-  io::write_json(options.folder / "comparison.json", comparison_json(options, rows, table));
+  const std::vector<Row> volumes(
+      rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(options.methods.size()));
+  Table table = table_of_costs(volumes);
+  const Scores scores = add_scores(options, plan.purposes, rows, table);
+  io::write_json(options.folder / "comparison.json", comparison_json(options, volumes, table));
   io::write_text_file(options.folder / "comparison.csv", table_csv(table));
-  io::write_text_file(options.folder / "report.html", report_page(options, rows, table));
+  io::write_text_file(options.folder / "report.html", report_page(options, volumes, table, scores));
   return RowsOutcome::kFinished;
 }
 

@@ -7,15 +7,19 @@
 #include <vector>
 
 #include "compare/rows.h"
+#include "tilt_series/tilt_series.h"
 
 namespace tomofield::compare {
 
 struct CompareOptions {
   std::filesystem::path program;  ///< tomofield itself
-  Series series;
+  tilt_series::TiltSeriesOptions input;
+  std::vector<std::string> series_words;       ///< of the command line, without --exclude
   std::vector<Method> methods;                 ///< the first is the main one
   std::optional<std::filesystem::path> truth;  ///< MRC volume
   bool tune = false;                           ///< --tune for methods that know it
+  bool halves = false;  ///< run on odd and even views as well, for the correlation of the two
+  int hold_out = 0;     ///< run without every so-manieth view as well, 0: not
   std::filesystem::path folder;
   bool overwrite = false;
 };

@@ -49,7 +49,9 @@ const std::vector<Method>& known_methods() {
       {"vm", "tomofield", {"reconstruct"}, true, true},
       {"grid", "tomofield, plain vertices", {"reconstruct", "--field", "grid"}, true, true},
       {"tv", "total variation", {"baseline", "tv"}},
-      {"sirt", "SIRT", {"baseline", "sirt"}}};
+      {"tv-concave", "total variation, concave", {"baseline", "tv", "--penalty", "concave"}},
+      {"sirt", "SIRT", {"baseline", "sirt"}},
+      {"wbp", "weighted back-projection", {"baseline", "wbp"}}};
   return methods;
 }
 

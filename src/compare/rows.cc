@@ -21,13 +21,6 @@ json state_of(const fs::path& stack) {
           {"written", fs::last_write_time(stack).time_since_epoch().count()}};
 }
 
-std::vector<std::string> command_of(const Method& method, const Series& series, bool tune) {
-  std::vector<std::string> command = method.arguments;
-  command.insert(command.end(), series.arguments.begin(), series.arguments.end());
-  if (tune && method.tunes) command.push_back("--tune");
-  return command;
-}
-
 json read_json(const fs::path& path) {
   std::ifstream file(path);
   const json document = json::parse(file, nullptr, /*allow_exceptions=*/false);
@@ -50,15 +43,15 @@ std::string last_line(const fs::path& log) {
 // Runs one method; false if it was stopped.
 bool run(const fs::path& program, const fs::path& log, const RunHooks& hooks, Row& row) {
   std::vector<std::string> command{program.string()};
-  command.insert(command.end(), row.command.begin(), row.command.end());
+  command.insert(command.end(), row.run.command.begin(), row.run.command.end());
   command.insert(command.end(), {"-o", row.volume.string()});
   const bool has_checkpoint = fs::exists(fs::path(row.volume).replace_extension(".h5"));
-  command.push_back(row.method.resumes && has_checkpoint ? "--resume" : "--overwrite");
+  command.push_back(row.run.method.resumes && has_checkpoint ? "--resume" : "--overwrite");
   const ChildResult result = run_child(command, log, hooks.stop_requested);
   if (hooks.stop_requested && hooks.stop_requested()) return false;
   if (result.exit_status != 0) {
     throw Error(fmt::format("{} failed with status {}: {} (all that it said is in '{}')",
-                            row.method.name, result.exit_status, last_line(log), log.string()));
+                            row.run.name, result.exit_status, last_line(log), log.string()));
   }
   row.core_seconds = result.core_seconds;
   row.wall_seconds = result.wall_seconds;
@@ -67,7 +60,7 @@ bool run(const fs::path& program, const fs::path& log, const RunHooks& hooks, Ro
 }
 
 json row_json(const Row& row, const json& state) {
-  return {{"command", row.command},
+  return {{"command", row.run.command},
           {"series", state},
           {"core_seconds", row.core_seconds},
           {"wall_seconds", row.wall_seconds},
@@ -78,7 +71,8 @@ json row_json(const Row& row, const json& state) {
 bool is_done(const fs::path& file, const json& state, Row& row) {
   if (!fs::exists(file) || !fs::exists(row.volume)) return false;
   const json stored = read_json(file);
-  if (stored.value("command", json()) != row.command || stored.value("series", json()) != state) {
+  if (stored.value("command", json()) != row.run.command ||
+      stored.value("series", json()) != state) {
     throw Error(fmt::format(
         "'{}' is of another series or of other options: give another folder with -o, or "
         "--overwrite to make everything in this one anew",
@@ -97,24 +91,21 @@ void remove_results(const fs::path& folder, const std::string& name) {
 
 }  // namespace
 
-RowsOutcome run_rows(const fs::path& program, const Series& series,
-                     const std::vector<Method>& methods, const fs::path& folder, bool tune,
-                     bool overwrite, const RunHooks& hooks, std::vector<Row>& rows) {
-  const json state = state_of(series.stack);
-  for (const Method& method : methods) {
-    if (overwrite) remove_results(folder, method.name);
-    Row row{.method = method,
-            .command = command_of(method, series, tune),
-            .volume = folder / (method.name + ".mrc"),
-            .figures = {}};
-    const fs::path file = folder / (method.name + ".row.json");
+RowsOutcome run_rows(const fs::path& program, const fs::path& stack, const std::vector<Run>& runs,
+                     const fs::path& folder, bool overwrite, const RunHooks& hooks,
+                     std::vector<Row>& rows) {
+  const json state = state_of(stack);
+  for (const Run& wanted : runs) {
+    if (overwrite) remove_results(folder, wanted.name);
+    Row row{.run = wanted, .volume = folder / (wanted.name + ".mrc"), .figures = {}};
+    const fs::path file = folder / (wanted.name + ".row.json");
     const bool is_there = is_done(file, state, row);
-    if (hooks.method_starts) hooks.method_starts(method, is_there);
+    if (hooks.run_starts) hooks.run_starts(wanted, is_there);
     if (!is_there) {
-      if (!run(program, folder / (method.name + ".log"), hooks, row)) return RowsOutcome::kStopped;
+      if (!run(program, folder / (wanted.name + ".log"), hooks, row)) return RowsOutcome::kStopped;
       io::write_json(file, row_json(row, state));
     }
-    row.figures = read_json(folder / (method.name + ".json")).at("figures");
+    row.figures = read_json(folder / (wanted.name + ".json")).at("figures");
     rows.push_back(std::move(row));
   }
   return RowsOutcome::kFinished;

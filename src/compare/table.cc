@@ -48,7 +48,7 @@ Table table_of_costs(const std::vector<Row>& rows) {
   Table table;
   std::vector<std::optional<double>> core, wall, memory, parameters;
   for (const Row& row : rows) {
-    table.methods.push_back(row.method);
+    table.methods.push_back(row.run.method);
     core.push_back(row.core_seconds);
     wall.push_back(row.wall_seconds);
     memory.push_back(static_cast<double>(row.peak_bytes) / (1 << 20));

@@ -1,0 +1,122 @@
+#include "compare/scores.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <optional>
+#include <span>
+
+#include "evaluate/compare.h"
+#include "evaluate/contrast.h"
+#include "evaluate/fsc_files.h"
+
+namespace tomofield::compare {
+namespace {
+
+using Figures = std::vector<std::optional<double>>;
+using Better = Column::Better;
+namespace fs = std::filesystem;
+
+void add_truth_scores(std::span<const Row> rows, const fs::path& truth, Table& table) {
+  Figures psnr, affine_psnr, ssim, affine_ssim;
+  for (const Row& row : rows) {
+    const evaluate::Comparison scores = evaluate::compare(evaluate::read_pair(row.volume, truth, std::nullopt));
+    psnr.push_back(scores.psnr.raw_dB);
+    affine_psnr.push_back(scores.psnr.affine_dB);
+    ssim.push_back(scores.ssim.raw);
+    affine_ssim.push_back(scores.ssim.affine);
+  }
+  table.add({"psnr_dB", "PSNR, dB", Better::kHigher, 2}, psnr);
+  table.add({"psnr_affine_dB", "PSNR, scaled", Better::kHigher, 2}, affine_psnr);
+  table.add({"ssim", "SSIM", Better::kHigher, 3}, ssim);
+  table.add({"ssim_affine", "SSIM, scaled", Better::kHigher, 3}, affine_ssim);
+}
+
+std::string boxes_text(const std::vector<evaluate::Box>& boxes) {
+  std::vector<std::string> texts;
+  for (const evaluate::Box& box : boxes) texts.push_back(evaluate::to_text(box));
+  return fmt::format("{}", fmt::join(texts, " and "));
+}
+
+// On the main method's regions; returns which they are.
+std::string add_contrast(std::span<const Row> rows, Table& table) {
+  const evaluate::Regions regions =
+      evaluate::choose_regions(evaluate::read_volume(rows.front().volume));
+  Figures cnr, enl;
+  for (const Row& row : rows) {
+    const auto score = evaluate::contrast_score(evaluate::read_volume(row.volume), regions);
+    cnr.push_back(score.cnr);
+    enl.push_back(score.enl);
+  }
+  table.add({"cnr", "CNR", Better::kHigher, 2}, cnr);
+  table.add({"enl", "ENL", Better::kHigher, 1}, enl);
+  return fmt::format("CNR and ENL: foreground {}, background {} (x0,y0,z0,x1,y1,z1 in voxels).",
+                     boxes_text(regions.foreground), boxes_text(regions.background));
+}
+
+// Correlates pairs of volumes, a pair a method; the resolution at `threshold` becomes a column.
+std::vector<report::Curve> add_correlation(std::span<const Row> rows,
+                                           const std::vector<fs::path>& others, double threshold,
+                                           Column column, Table& table) {
+  Figures crossings;
+  std::vector<report::Curve> curves;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const evaluate::Fsc fsc = evaluate::correlate_files({rows[i].volume, others[i], {}, {}, {}});
+    crossings.push_back(evaluate::crossing_A(fsc.frequency_per_A, fsc.all, threshold));
+    report::Curve curve{rows[i].run.method.title, {}};
+    for (std::size_t s = 0; s < fsc.frequency_per_A.size(); ++s)
+      curve.points.emplace_back(fsc.frequency_per_A[s], fsc.all.correlation[s]);
+    curves.push_back(std::move(curve));
+  }
+  table.add(std::move(column), crossings);
+  return curves;
+}
+
+void add_held_out_errors(std::span<const Row> rows, Table& table) {
+  Figures errors;
+  for (const Row& row : rows) {
+    const auto held_out = row.figures.value("held_out", nlohmann::json());
+    errors.push_back(held_out.is_object() ? std::optional(held_out.at("error").get<double>())
+                                          : std::nullopt);
+  }
+  table.add({"held_out_error", "held-out error", Better::kLower, 4}, errors);
+}
+
+}  // namespace
+
+Scores add_scores(const CompareOptions& options, const std::vector<Purpose>& purposes,
+                  const std::vector<Row>& rows, Table& table) {
+  const auto rows_for = [&](Purpose purpose) -> std::span<const Row> {
+    const auto found = std::ranges::find(purposes, purpose);
+    if (found == purposes.end()) return {};
+    const std::size_t count = options.methods.size();
+    return std::span(rows).subspan(static_cast<std::size_t>(found - purposes.begin()) * count,
+                                   count);
+  };
+  const std::span<const Row> volumes = rows_for(Purpose::kVolume);
+  Scores scores;
+  if (options.truth) {
+    add_truth_scores(volumes, *options.truth, table);
+    const std::vector<fs::path> truths(volumes.size(), *options.truth);
+    scores.correlations.emplace_back(
+        "Shell correlation with the truth",
+        add_correlation(volumes, truths, 0.5,
+                        {"fsc_truth_0.5_A", "FSC 0.5 with the truth, Å", Better::kLower, 1},
+                        table));
+  }
+  scores.remark = add_contrast(volumes, table);
+  if (options.halves) {
+    std::vector<fs::path> even;
+    for (const Row& row : rows_for(Purpose::kEvenViews)) even.push_back(row.volume);
+    scores.correlations.emplace_back(
+        "Shell correlation of odd and even views",
+        add_correlation(rows_for(Purpose::kOddViews), even, 0.143,
+                        {"fsc_halves_0.143_A", "FSC 0.143 of halves, Å", Better::kLower, 1},
+                        table));
+  }
+  if (options.hold_out > 0) add_held_out_errors(rows_for(Purpose::kHeldOutViews), table);
+  return scores;
+}
+
+}  // namespace tomofield::compare
