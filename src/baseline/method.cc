@@ -15,6 +15,11 @@ Solution reconstruct_with(const SirtOptions& options, VoxelProblem& problem, dou
   return reconstruct_sirt(problem, options, after_iteration);
 }
 
+Solution reconstruct_with(const SartTvOptions& options, VoxelProblem& problem, double mean_density,
+                          const AfterIteration& after_iteration) {
+  return reconstruct_sart_tv(problem, options, mean_density, after_iteration);
+}
+
 Solution reconstruct_with(const TvOptions& options, VoxelProblem& problem, double mean_density,
                           const AfterIteration& after_iteration) {
   return reconstruct_tv(problem, options, mean_density, after_iteration);

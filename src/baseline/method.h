@@ -3,6 +3,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <variant>
 
+#include "baseline/sart_tv.h"
 #include "baseline/sirt.h"
 #include "baseline/solver.h"
 #include "baseline/tv_reconstruction.h"
@@ -13,7 +14,7 @@ namespace tomofield::baseline {
 
 /// The options of one of the methods. Each has facts() and json(), and an overload of
 /// reconstruct_with() in method.cc: that and a line here are all that a method needs.
-using Method = std::variant<WbpOptions, SirtOptions, TvOptions>;
+using Method = std::variant<WbpOptions, SirtOptions, SartTvOptions, TvOptions>;
 
 MethodFacts facts_of(const Method& method);
 /// The name and every option.

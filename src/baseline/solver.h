@@ -36,25 +36,27 @@ struct IterationReport {
 /// Called after every iteration, with the densities that it ended with.
 using AfterIteration = std::function<void(const IterationReport&, const VoxelVolume&)>;
 
-/// A slab's rays and a slab's samples for each thread of base::parallel_for.
+/// A slab's rays and some buffers of a slab's samples for each thread of base::parallel_for.
 class ThreadScratch {
  public:
-  ThreadScratch(std::size_t detector_size, std::size_t slab_size) {
-    for (int t = 0; t < base::thread_count(); ++t) {
-      detectors_.emplace_back(detector_size);
-      samples_.emplace_back(slab_size);
-    }
+  ThreadScratch(std::size_t detector_size, std::size_t slab_size, std::size_t num_buffers = 1)
+      : num_buffers_(num_buffers) {
+    const std::size_t threads = static_cast<std::size_t>(base::thread_count());
+    for (std::size_t i = 0; i < threads; ++i) detectors_.emplace_back(detector_size);
+    for (std::size_t i = 0; i < threads * num_buffers; ++i) samples_.emplace_back(slab_size);
   }
   float* detector() { return detectors_[thread()].data(); }
   /// Zeros.
-  float* cleared_samples() {
-    samples_[thread()].fill(0.0f);
-    return samples_[thread()].data();
+  float* cleared_samples(std::size_t buffer = 0) {
+    base::AlignedBuffer<float>& samples = samples_[thread() * num_buffers_ + buffer];
+    samples.fill(0.0f);
+    return samples.data();
   }
 
  private:
   static std::size_t thread() { return static_cast<std::size_t>(base::thread_index()); }
-  std::vector<base::AlignedBuffer<float>> detectors_, samples_;
+  std::size_t num_buffers_;
+  std::vector<base::AlignedBuffer<float>> detectors_, samples_;  // [thread], [thread, buffer]
 };
 
 }  // namespace tomofield::baseline

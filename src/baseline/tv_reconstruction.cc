@@ -25,13 +25,15 @@ constexpr double kBalance = 2.0;
 // Over-relaxation, below 2: 1.9 needs two thirds of the iterations of 1.
 constexpr float kRelaxation = 1.9f;
 
-// Weights of the concave penalty: first taken after half of the iterations, then so many times in
-// all, evenly spread.
+// Weights of the concave penalty: first taken after three tenths of the iterations, then so many
+// times in all, evenly spread. Until then they are what they are on an edge of 1 τ, so that what
+// the first ones are taken from is not too smooth.
 constexpr int kReweightings = 8;
+constexpr float kFirstWeight = 0.5f;
 
 bool takes_weights_after(int iteration, const TvOptions& options) {
   if (options.penalty == "smooth" || iteration == 0) return false;
-  const int first = options.iterations / 2;
+  const int first = options.iterations * 3 / 10;
   const int interval = std::max(1, (options.iterations - first) / kReweightings);
   return iteration >= first && iteration < options.iterations &&
          (iteration - first) % interval == 0;
@@ -84,6 +86,7 @@ class ChambollePock {
   VoxelVolume& densities() { return x_; }
 
  private:
+  void begin_concave_penalty();
   void measure_steps();
   void step_ray_duals(int slab, const float* residuals);
   double step_gradient_duals(int slab);
@@ -106,7 +109,7 @@ class ChambollePock {
 ChambollePock::ChambollePock(VoxelProblem& problem, const TvOptions& options, double start)
     : problem_(problem),
       options_(options),
-      factors_of_{kBalance * options.weight},
+      factors_of_{kBalance * options.weight.value_or(options.usual_weight())},
       scratch_(problem.detector_size(), problem.grid().size()),
       x_(problem.grid(), problem.num_rows()),
       adjoint_(problem.grid(), problem.num_rows()),
@@ -116,8 +119,14 @@ ChambollePock::ChambollePock(VoxelProblem& problem, const TvOptions& options, do
   for (int slab = 0; slab < problem.num_slabs(); ++slab) q_.emplace_back(problem.detector_size());
   measure_steps();
   x_.fill(static_cast<float>(options.non_negative ? std::max(0.0, start) : start));
-  if (options.penalty == "concave")
-    tau_of_penalty_ = reconstruct::concavity(options.concavity, problem.noise_sigma());
+  if (options.penalty == "concave") begin_concave_penalty();
+}
+
+void ChambollePock::begin_concave_penalty() {
+  tau_of_penalty_ = reconstruct::concavity(options_.concavity, problem_.noise_sigma());
+  weights_.emplace(problem_.grid(), problem_.num_rows());
+  for (int slab = 0; slab < problem_.num_slabs(); ++slab)
+    std::fill_n(weights_->slab(slab), problem_.grid().size(), kFirstWeight);
 }
 
 // τ, the inverse column sums of |K|. Masked rays are counted: steps may be smaller than need be.
@@ -184,7 +193,6 @@ double ChambollePock::step_gradient_duals(int slab) {
 }
 
 void ChambollePock::take_weights() {
-  if (!weights_) weights_.emplace(problem_.grid(), problem_.num_rows());
   base::parallel_for(problem_.num_slabs(), [&](std::int64_t index) {
     const int slab = static_cast<int>(index);
     for_each_gradient_row(x_, slab, factors_of_, [&](const GradientRow& g) {
@@ -227,7 +235,7 @@ void ChambollePock::take_step(int slab, const float* adjoint, float relaxation) 
 
 nlohmann::json TvOptions::json() const {
   return {{"iterations", iterations},
-          {"weight", weight},
+          {"weight", weight.value_or(usual_weight())},
           {"penalty", penalty},
           {"concavity", concavity},
           {"non_negative", non_negative}};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 
 #include "baseline/solver.h"
@@ -10,11 +11,13 @@ namespace tomofield::baseline {
 
 struct TvOptions {
   int iterations = 200;            ///< docs/results/quality.md
-  double weight = 3.0;             ///< λ, see reconstruct_tv
+  std::optional<double> weight;    ///< λ, see reconstruct_tv; none: usual_weight()
   std::string penalty = "smooth";  ///< or concave
-  double concavity = 0.4;          ///< τ of the concave penalty, in units of a voxel's noise
+  double concavity = 1.6;          ///< τ of the concave penalty, in units of a voxel's noise
   bool non_negative = true;
 
+  /// A concave penalty counts large steps less, and so needs more (docs/baselines.md).
+  double usual_weight() const { return penalty == "concave" ? 8.0 : 3.0; }
   MethodFacts facts() const { return {"tv", iterations, penalty == "concave" ? 6 : 5, 2}; }
   nlohmann::json json() const;
 };
@@ -29,7 +32,8 @@ struct TvOptions {
 /// density variation weight.
 ///
 /// The concave penalty is majorised by a weighted variation, Σ w |∇x| with w = 1 / (1 + |∇x| / τ)
-/// of an earlier x (Candès, Wakin and Boyd 2008): first w = 1, then it is taken anew now and then.
+/// of an earlier x (Candès, Wakin and Boyd 2008): first w is constant, then it is taken anew now
+/// and then.
 ///
 /// Solved by the primal–dual hybrid gradient method of Chambolle and Pock (2011),
 /// with the diagonal preconditioning of Pock and Chambolle (2011), eq. 10 with

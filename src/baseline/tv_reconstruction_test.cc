@@ -113,6 +113,14 @@ TvOptions concave(int iterations, double weight) {
   return result;
 }
 
+TEST_F(Tv, WeightsTakenAnewLowerTheConcaveObjective) {
+  const SphereSeries series;
+  const Solution solution = solve(testing::voxel_problem(series), concave(400, 8));
+  // The first weights are taken after three tenths of the iterations.
+  EXPECT_LT(solution.objective.back(), 0.99 * solution.objective[120]);
+  EXPECT_LT(solution.objective[400], 1.001 * solution.objective[300]);
+}
+
 TEST_F(Tv, ConcavePenaltyOfHugeTauIsTheSmoothOne) {
   const SphereSeries series;
   TvOptions o = concave(60, 3);
@@ -120,6 +128,20 @@ TEST_F(Tv, ConcavePenaltyOfHugeTauIsTheSmoothOne) {
   const Solution almost = solve(testing::voxel_problem(series), o);
   const Solution smooth = solve(testing::voxel_problem(series), options(60, 3));
   EXPECT_NEAR(almost.objective.back(), smooth.objective.back(), 1e-3 * smooth.objective.back());
+}
+
+TEST_F(Tv, ConcavePenaltySparesEdges) {
+  const SphereSeries series;
+  // Weights about the best one of each.
+  const auto least_error = [&](const auto& options_of, const std::vector<double>& weights) {
+    double least = testing::rms_truth();
+    for (const double weight : weights) {
+      const Solution solution = solve(testing::voxel_problem(series), options_of(150, weight));
+      least = std::min(least, testing::rms_error(solution.densities));
+    }
+    return least;
+  };
+  EXPECT_LT(least_error(concave, {36, 54}), 0.97 * least_error(options, {12, 18, 27}));
 }
 
 TEST_F(Tv, SlabsAreSeamless) {

@@ -147,7 +147,8 @@ std::shared_ptr<Arguments<Method>> add_method(CLI::App& command) {
 void add_wbp(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
       "wbp", "weighted (filtered) back-projection: a ramp with a roll-off");
-  baseline::RampFilterOptions& filter = add_method<baseline::WbpOptions>(command)->method.filter;
+  const auto arguments = add_method<baseline::WbpOptions>(command);
+  baseline::RampFilterOptions& filter = arguments->method.filter;
   const char* group = "Method";
   command.add_option("--window", filter.window, "factor of the ramp: ramp (none), cosine or hann")
       ->check(CLI::IsMember({"ramp", "cosine", "hann"}))
@@ -178,23 +179,53 @@ void add_sirt(CLI::App& baseline) {
       ->group("Method");
 }
 
+void add_sart_tv(CLI::App& baseline) {
+  CLI::App& command = *baseline.add_subcommand(
+      "sart-tv", "ordered subsets of views, with steps down the total variation between passes");
+  const auto arguments = add_method<baseline::SartTvOptions>(command);
+  baseline::SartTvOptions& method = arguments->method;
+  const char* group = "Method";
+  command.add_option("--subsets", method.subsets, "interleaved subsets of the views in a pass")
+      ->check(number_above(0))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--relaxation", method.relaxation,
+                  "length of a subset's step in the first pass, between 0 and 2; it falls")
+      ->check(number_between(0.01, 1.99))
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--tv-steps", method.tv_steps, "down the total variation after each pass")
+      ->check(number_above(0))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--weight", method.weight,
+                  "length of these steps altogether, over that of the change which the pass made")
+      ->check(number_above(0))
+      ->capture_default_str()
+      ->group(group);
+}
+
 void add_tv(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
       "tv", "least squares with total variation, by Chambolle and Pock's method");
   const auto arguments = add_method<baseline::TvOptions>(command);
+  baseline::TvOptions& method = arguments->method;
+  const char* group = "Method";
   command
-      .add_option("--weight", arguments->method.weight,
+      .add_option("--weight", method.weight,
                   "of the total variation, in noise units: half the sum of squared residuals over "
-                  "the noise's variance, plus this times the sum of the density's gradients")
+                  "the noise's variance, plus this times the sum of the density's gradients; "
+                  "default: 3, 8 if concave")
       ->check(number_above(0))
-      ->capture_default_str()
-      ->group("Method");
+      ->group(group);
   command
-      .add_option("--penalty", arguments->method.penalty,
+      .add_option("--penalty", method.penalty,
                   "smooth: total variation; concave: spares edges, reweighted")
       ->check(CLI::IsMember({"smooth", "concave"}))
       ->capture_default_str()
-      ->group("Method");
+      ->group(group);
 }
 
 }  // namespace
@@ -205,6 +236,7 @@ void add_baseline_command(CLI::App& program) {
   command.require_subcommand(1);
   add_wbp(command);
   add_sirt(command);
+  add_sart_tv(command);
   add_tv(command);
 }
 
