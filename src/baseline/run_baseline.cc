@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "base/stopwatch.h"
 #include "baseline/voxel_problem.h"
+#include "evaluate/view_errors.h"
 #include "io/json.h"
 #include "kernels/lanes.h"
 #include "projection/sample_grid.h"
@@ -113,9 +114,9 @@ nlohmann::json held_out_json(const VoxelProblem& problem, const std::vector<int>
   if (views.empty()) return nullptr;
   std::vector<double> weights;
   for (const double sigma : problem.noise_sigma()) weights.push_back(1 / (sigma * sigma));
-  return reconstruct::report_held_out(reconstruct::score_views(view_sums(problem, views, densities),
-                                                               views, weights, fit_view_scale),
-                                      problem.projector().geometry().tilt_deg);
+  return reconstruct::report_held_out(
+      evaluate::view_errors(views, {view_sums(problem, views, densities)}, weights, fit_view_scale),
+      problem.projector().geometry().tilt_deg);
 }
 
 nlohmann::json figures_json(const Solution& solution, const VoxelProblem& problem,

@@ -12,6 +12,7 @@
 #include "evaluate/fsc_files.h"
 #include "io/atomic_file.h"
 #include "io/json.h"
+#include "reconstruct/volume_score.h"
 #include "report/fsc_picture.h"
 
 namespace tomofield::cli {
@@ -90,6 +91,18 @@ void correlate(const EvaluateArguments& arguments, Findings& findings) {
   print_fsc(*findings.fsc);
 }
 
+void reproject(const EvaluateArguments& arguments, Findings& findings) {
+  reconstruct::VolumeScoreOptions options{arguments.volume, arguments.input, arguments.specimen,
+                                          arguments.hold_out};
+  options.input.stack = *arguments.series;
+  const reconstruct::VolumeScore score = reconstruct::score_volume(options);
+  findings.figures["reprojection"] = reconstruct::volume_score_json(score, options);
+  fmt::print("reprojection error {:.4f} of the noise's variance in {} views\n", score.errors.total,
+             score.errors.views.size());
+  for (std::size_t v = 0; v < score.tilt_deg.size(); ++v)
+    fmt::print("  {:7.2f}°  {:.4f}\n", score.tilt_deg[v], score.errors.view_error[v]);
+}
+
 void measure_contrast(const EvaluateArguments& arguments, const base::Volume& volume,
                       Findings& findings) {
   const bool chosen = arguments.regions.foreground.empty();
@@ -103,7 +116,8 @@ void measure_contrast(const EvaluateArguments& arguments, const base::Volume& vo
 // What a volume tells by itself.
 void examine(const EvaluateArguments& arguments, Findings& findings) {
   const bool has_profile = arguments.profile && !arguments.truth;
-  const bool nothing_asked = !arguments.truth && !arguments.fsc_with && !arguments.profile;
+  const bool nothing_asked =
+      !arguments.truth && !arguments.fsc_with && !arguments.profile && !arguments.series;
   const bool has_contrast =
       arguments.contrast || !arguments.regions.foreground.empty() || nothing_asked;
   if (!has_contrast && !has_profile) return;
@@ -129,6 +143,7 @@ void run_evaluate(const EvaluateArguments& arguments) {
   findings.figures["reconstruction"] = arguments.volume.string();
   if (arguments.truth) compare_with_truth(arguments, findings);
   if (arguments.fsc_with) correlate(arguments, findings);
+  if (arguments.series) reproject(arguments, findings);
   examine(arguments, findings);
   write_findings(arguments, findings);
 }

@@ -6,7 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "cli/input_options.h"
 #include "cli/number_checks.h"
+#include "cli/specimen_options.h"
 #include "io/output_files.h"
 #include "io/text_lines.h"
 #include "tomofield/error.h"
@@ -141,6 +143,30 @@ void add_profile_options(CLI::App& command, EvaluateArguments& arguments) {
   csv->needs(line);
 }
 
+// How the series is read and where the volume lies in it: nothing without --series.
+void add_reprojection_options(CLI::App& command, EvaluateArguments& arguments) {
+  const char* group = "Reprojection error";
+  CLI::Option* series =
+      command
+          .add_option("--series", arguments.series,
+                      "tilt series (MRC stack) that the volume shall explain: projects it and "
+                      "compares, after the best scale and offset of each view. Options as for "
+                      "reconstruct")
+          ->type_name("STACK")
+          ->group(group);
+  const std::size_t first = command.get_options().size();
+  command
+      .add_option("--hold-out", arguments.hold_out,
+                  "score only the views that reconstruct --hold-out N keeps from the fit")
+      ->check(number_above(0))
+      ->type_name("N")
+      ->group(group);
+  add_series_options(command, arguments.input);
+  add_place_options(command, arguments.specimen);
+  const std::vector<CLI::Option*> options = command.get_options();
+  for (std::size_t i = first; i < options.size(); ++i) options[i]->needs(series);
+}
+
 }  // namespace
 
 void EvaluateArguments::check() const {
@@ -152,7 +178,7 @@ void EvaluateArguments::check() const {
                     "{:g}°",
                     tilts->low_deg, tilts->high_deg));
   std::vector<std::filesystem::path> inputs{volume}, outputs;
-  for (const auto& file : {truth, fsc_with, fsc_mask})
+  for (const auto& file : {truth, fsc_with, fsc_mask, series})
     if (file) inputs.push_back(*file);
   for (const auto& file : {json, fsc_csv, fsc_picture, profile_csv})
     if (file) outputs.push_back(*file);
@@ -165,6 +191,7 @@ void add_evaluate_options(CLI::App& command, EvaluateArguments& arguments) {
   add_fsc_options(command, arguments);
   add_contrast_options(command, arguments);
   add_profile_options(command, arguments);
+  add_reprojection_options(command, arguments);
   command.add_option("--json", arguments.json, "write all figures to this file")->type_name("FILE");
   command.add_flag("--overwrite", arguments.overwrite, "replace existing files");
 }

@@ -8,6 +8,8 @@
 #include "evaluate/contrast.h"
 #include "evaluate/fsc.h"
 #include "evaluate/profile.h"
+#include "reconstruct/prepare.h"
+#include "tilt_series/tilt_series.h"
 
 namespace tomofield::cli {
 
@@ -25,6 +27,11 @@ struct EvaluateArguments {
 
   std::optional<evaluate::LineSegment> profile;
   std::optional<std::filesystem::path> profile_csv;
+
+  std::optional<std::filesystem::path> series;
+  tilt_series::TiltSeriesOptions input;  ///< how the series is read
+  reconstruct::SpecimenOptions specimen;
+  int hold_out = 0;
 
   std::optional<std::filesystem::path> json;
   bool overwrite = false;

@@ -119,13 +119,17 @@ void add_mask_options(CLI::App& command, TiltSeriesOptions& options) {
 
 }  // namespace
 
+void add_series_options(CLI::App& command, TiltSeriesOptions& options) {
+  add_alignment_options(command, options);
+  add_image_options(command, options);
+  add_mask_options(command, options);
+}
+
 void add_input_options(CLI::App& command, TiltSeriesOptions& options) {
   command.add_option("stack", options.stack, "Tilt series: an MRC stack, raw or aligned")
       ->type_name("STACK")
       ->required();
-  add_alignment_options(command, options);
-  add_image_options(command, options);
-  add_mask_options(command, options);
+  add_series_options(command, options);
 }
 
 }  // namespace tomofield::cli

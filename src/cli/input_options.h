@@ -6,8 +6,10 @@
 
 namespace tomofield::cli {
 
-/// Registers the positional stack and every option that says what the tilt
-/// series is and how it is read. `options` must outlive the parsing.
+/// Registers every option that says how a tilt series is read. `options` must outlive the parsing.
+void add_series_options(CLI::App& command, tilt_series::TiltSeriesOptions& options);
+
+/// The same, and the positional stack that it is read from.
 void add_input_options(CLI::App& command, tilt_series::TiltSeriesOptions& options);
 
 }  // namespace tomofield::cli

@@ -4,11 +4,20 @@
 
 namespace tomofield::cli {
 
+namespace {
+
+const char* const kGroup = "Specimen (unbinned pixels of the aligned view)";
+
+}  // namespace
+
 void add_specimen_options(CLI::App& command, reconstruct::SpecimenOptions& options) {
-  const char* group = "Specimen (unbinned pixels of the aligned view)";
   command.add_option("--thickness", options.thickness, "thickness of the tomogram along Z")
       ->required()
-      ->group(group);
+      ->group(kGroup);
+  add_place_options(command, options);
+}
+
+void add_place_options(CLI::App& command, reconstruct::SpecimenOptions& options) {
   command
       .add_option_function<std::vector<long>>(
           "--roi",
@@ -19,11 +28,11 @@ void add_specimen_options(CLI::App& command, reconstruct::SpecimenOptions& optio
       ->delimiter(',')
       ->expected(4)
       ->type_name("INT,INT,INT,INT")
-      ->group(group);
+      ->group(kGroup);
   command.add_option("--hand", options.hand, "1: x = X cos + Z sin; -1: mirrored in Z")
       ->check(CLI::IsMember({1, -1}))
       ->capture_default_str()
-      ->group(group);
+      ->group(kGroup);
   command
       .add_option_function<std::vector<double>>(
           "--center",
@@ -36,12 +45,12 @@ void add_specimen_options(CLI::App& command, reconstruct::SpecimenOptions& optio
       ->delimiter(',')
       ->expected(1, 2)
       ->type_name("FLOAT[,FLOAT]")
-      ->group(group);
+      ->group(kGroup);
   command
       .add_flag_callback(
           "--no-margin", [&options] { options.with_margin = false; },
           "the specimen ends inside the field of view: model nothing outside")
-      ->group(group);
+      ->group(kGroup);
 }
 
 }  // namespace tomofield::cli

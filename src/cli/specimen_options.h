@@ -9,5 +9,7 @@ namespace tomofield::cli {
 /// Registers --thickness, --roi, --hand, --center and --no-margin: what every
 /// command that reconstructs has to know of the specimen.
 void add_specimen_options(CLI::App& command, reconstruct::SpecimenOptions& options);
+/// The same without --thickness: where a volume that there is lies in the views.
+void add_place_options(CLI::App& command, reconstruct::SpecimenOptions& options);
 
 }  // namespace tomofield::cli

@@ -31,16 +31,7 @@ base::AlignedBuffer<float> predict(const projection::SlabSampler& sampler,
   return rays;
 }
 
-// Least squares of measured ≈ scale · predicted + offset.
-loss::ViewModel fitted_model(const loss::ViewSums& s, double weight) {
-  const double spread = s.n * s.pp - s.p * s.p;
-  const bool is_flat = !(spread > 1e-9 * s.n * s.pp);
-  const double scale = is_flat ? 1.0 : (s.n * s.pb - s.p * s.b) / spread;
-  return {scale, s.n > 0 ? (s.b - scale * s.p) / s.n : 0.0, weight};
-}
-
-// [slab][view]
-using SlabSums = std::vector<std::vector<loss::ViewSums>>;
+using evaluate::SlabSums;
 
 SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
                        const projection::SlabProjector& projector,
@@ -80,34 +71,12 @@ std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every) 
   return views;
 }
 
-HeldOutError score_views(const std::vector<loss::ViewSums>& sums, std::vector<int> views,
-                         std::span<const double> noise_weight, bool fit_view_scale) {
-  HeldOutError error;
-  error.views = std::move(views);
-  double squares = 0, rays = 0;
-  for (std::size_t v = 0; v < error.views.size(); ++v) {
-    const double weight = noise_weight[static_cast<std::size_t>(error.views[v])];
-    const loss::ViewSums& view = sums[v];
-    error.models.push_back(fit_view_scale ? fitted_model(view, weight)
-                                          : loss::ViewModel{1.0, 0.0, weight});
-    const double view_squares = weight * view.squared_residual(error.models.back());
-    error.view_error.push_back(view.n > 0 ? view_squares / view.n : 0.0);
-    squares += view_squares;
-    rays += view.n;
-  }
-  error.total = rays > 0 ? squares / rays : 0.0;
-  return error;
-}
-
 HeldOutError held_out_error(const projection::SlabSampler& sampler,
                             const projection::SlabProjector& projector,
                             const tilt_series::SlabViews& measured, std::vector<int> views,
                             std::span<const double> noise_weight, bool fit_view_scale) {
-  std::vector<loss::ViewSums> sums(views.size());
-  for (const auto& slab : sums_of_slabs(sampler, projector, measured, views)) {
-    for (std::size_t v = 0; v < views.size(); ++v) sums[v] += slab[v];
-  }
-  return score_views(sums, std::move(views), noise_weight, fit_view_scale);
+  const SlabSums sums = sums_of_slabs(sampler, projector, measured, views);
+  return evaluate::view_errors(std::move(views), sums, noise_weight, fit_view_scale);
 }
 
 nlohmann::json report_held_out(const HeldOutError& error, const std::vector<double>& tilt_deg) {

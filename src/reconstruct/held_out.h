@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "evaluate/view_errors.h"
 #include "loss/data_term.h"
 #include "projection/slab_projector.h"
 #include "projection/slab_sampler.h"
@@ -19,20 +20,10 @@ namespace tomofield::reconstruct {
 std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every);
 
 /// How well a field predicts views that it was not fitted to.
-struct HeldOutError {
-  std::vector<int> views;
-  std::vector<loss::ViewModel> models;  ///< of each of the views: what it was scored with
-  std::vector<double> view_error;       ///< mean squared residual over the noise variance
-  double total = 0;                     ///< over all of their rays
-};
+using HeldOutError = evaluate::ViewErrors;
 
-/// The error of `views` with these sums, one each; `noise_weight` holds 1 / variance of the noise
-/// of each view of the series. With `fit_view_scale`, a view's scale and offset are least
-/// squares on that view alone: they are nuisances of its exposure, which no other view tells.
-HeldOutError score_views(const std::vector<loss::ViewSums>& sums, std::vector<int> views,
-                         std::span<const double> noise_weight, bool fit_view_scale);
-
-/// The error of a field. The sums are the same for any number of threads.
+/// The error of `views` (evaluate/view_errors.h). The sums are the same for any
+/// number of threads.
 HeldOutError held_out_error(const projection::SlabSampler& sampler,
                             const projection::SlabProjector& projector,
                             const tilt_series::SlabViews& measured, std::vector<int> views,

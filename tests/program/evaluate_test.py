@@ -379,6 +379,61 @@ def test_profile_against_scipy():
     assert result.returncode == 2 and "0,0,0,51,60,24" in result.stderr, result
 
 
+def simulate(name, thickness, *options):
+    """A cell's truth, and the options that hand its tilt series to evaluate."""
+    directory = path(name)
+    subprocess.run([PROGRAM, "simulate", directory, "--size", "48", "--thickness", str(thickness),
+                    "--noise", "0.05", "--tilts=-60:60:6", *options], check=True,
+                   capture_output=True)
+    series = [os.path.join(directory, "tilt_series.mrc"), "--contrast", "bright", "--tlt",
+              os.path.join(directory, "tilt_series.tlt")]
+    return os.path.join(directory, "truth.mrc"), ["--series", *series]
+
+
+def test_reprojection_error():
+    truth, series = simulate("cell", 24)
+    score, result = evaluate(truth, *series, "--no-margin")
+    found = score["reprojection"]
+    # The noise is all that the truth does not explain, but for its voxels' edges.
+    assert 0.9 < found["error"] < 1.5, found["error"]
+    assert len(found["views"]) == 21 and "reprojection error %.4f" % found["error"] in result.stdout
+    flat = found["views"][10]
+    assert flat["tilt_deg"] == 0
+    volume, view = mrcfile.read(truth).astype(np.float64), mrcfile.read(series[1])[10]
+    scale, offset = np.polyfit(volume.sum(axis=0).ravel(), view.ravel(), 1)
+    residual = np.mean((scale * volume.sum(axis=0) + offset - view) ** 2)
+    np.testing.assert_allclose(flat["scale"], scale, rtol=1e-4)
+    np.testing.assert_allclose(flat["offset"], offset, atol=1e-3)
+    np.testing.assert_allclose(flat["error"] * flat["noise_sigma"] ** 2, residual, rtol=1e-3)
+    # Any units and contrast; but not the other hand, nor a volume that lacks something.
+    other, _ = evaluate(save("units.mrc", -30 * volume), *series, "--no-margin")
+    np.testing.assert_allclose(other["reprojection"]["error"], found["error"], rtol=1e-3)
+    mirrored, _ = evaluate(truth, *series, "--no-margin", "--hand", "-1")
+    assert mirrored["reprojection"]["error"] > 1.5 * found["error"], mirrored
+    blurred, _ = evaluate(save("soft.mrc", scipy.ndimage.gaussian_filter(volume, 2)), *series,
+                          "--no-margin", "--hold-out", "5")
+    assert blurred["reprojection"]["error"] > 1.2 * found["error"], blurred
+    assert [v["view"] for v in blurred["reprojection"]["views"]] == [2, 7, 12, 17]
+
+
+def test_reprojection_of_a_specimen_that_goes_on_outside():
+    truth, series = simulate("slab", 16, "--extended")
+    inside, _ = evaluate(truth, *series)
+    everywhere, _ = evaluate(truth, *series, "--no-margin")
+    assert inside["reprojection"]["error"] < 1.5 < everywhere["reprojection"]["error"] / 2
+    volume = mrcfile.read(truth)
+    part, _ = evaluate(save("part.mrc", volume[:, 3:40, 4:44]), *series, "--roi", "4,3,44,40")
+    assert part["reprojection"]["error"] < 1.5
+    for file, options, words in (
+        (path("part.mrc"), series, "--roi"),
+        (truth, [*series[:4], "--tlt", path("absent.tlt")], "absent.tlt"),
+        (truth, [*series, "--json", series[1], "--overwrite"], "replace the input"),
+        (truth, ["--hold-out", "5"], "--series"),
+    ):
+        result = run(file, *options)
+        assert result.returncode == 2 and words in result.stderr, (options, result)
+
+
 def test_options_that_do_not_fit_are_refused():
     volume, _ = random_pair((24, 60, 51), 14)
     file, other = save("a.mrc", volume), save("b.mrc", volume)

@@ -1,0 +1,123 @@
+#include "evaluate/reprojection.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "base/aligned_buffer.h"
+#include "base/check.h"
+#include "base/parallel.h"
+#include "kernels/lanes.h"
+#include "projection/sample_grid.h"
+#include "projection/slab_projector.h"
+#include "tomofield/error.h"
+
+namespace tomofield::evaluate {
+namespace {
+
+using kernels::kLanes;
+
+// Samples of a slab at the centres of the voxels; lanes past the last row stay zero.
+void copy_slab(const base::Volume& volume, int slab, const projection::SampleSegment& segment,
+               float* samples) {
+  const std::int64_t first_row = std::int64_t{slab} * kLanes;
+  const std::int64_t rows = std::min<std::int64_t>(kLanes, volume.shape.ny - first_row);
+  for (std::int64_t z = 0; z < volume.shape.nz; ++z) {
+    float* row = samples + segment.origin + z * segment.stride_z();
+    for (std::int64_t lane = 0; lane < rows; ++lane)
+      for (std::int64_t x = 0; x < volume.shape.nx; ++x)
+        row[x * kLanes + lane] = volume.at(x, first_row + lane, z);
+  }
+}
+
+// Whether a ray stays within the centres of the outermost voxels across x as long as it
+// crosses samples, which fade over half a voxel beyond the thickness.
+bool stays_inside(const VolumePlace& place, int view, double u) {
+  const geometry::TiltGeometry& g = place.geometry;
+  const double low = static_cast<double>(place.roi.x0) + 0.5;
+  const double high = static_cast<double>(place.roi.x1) - 0.5;
+  return std::ranges::all_of(std::array{-0.5, g.thickness + 0.5}, [&](double z) {
+    const double x = g.ray_x(view, u, z);
+    return low <= x && x <= high;
+  });
+}
+
+// The rays of a view that are scored, of all rows: [x].
+std::vector<char> scored_pixels(const VolumePlace& place, int view) {
+  std::vector<char> scored;
+  for (std::int64_t x = 0; x < place.geometry.width; ++x)
+    scored.push_back(place.is_whole_specimen ||
+                     stays_inside(place, view, static_cast<double>(x) + 0.5));
+  return scored;
+}
+
+// Sums in double, ray by ray: volumes may have offsets that are large against their contrast.
+loss::ViewSums ray_sums(const float* measured, const std::uint16_t* mask,
+                        const std::vector<char>& scored, const float* predicted) {
+  loss::ViewSums sums;
+  for (std::size_t x = 0; x < scored.size(); ++x) {
+    for (std::size_t lane = 0; scored[x] && lane < kLanes; ++lane) {
+      if ((mask[x] >> lane & 1) == 0) continue;
+      const std::size_t ray = x * kLanes + lane;
+      loss::ray_data_term({}, 1.0, static_cast<double>(measured[ray]),
+                          static_cast<double>(predicted[ray]), sums);
+    }
+  }
+  return sums;
+}
+
+std::vector<loss::ViewSums> slab_sums(const projection::SlabProjector& projector,
+                                      const base::Volume& volume,
+                                      const tilt_series::SlabViews& measured,
+                                      std::span<const int> views,
+                                      const std::vector<std::vector<char>>& scored, int slab) {
+  const std::int64_t width = projector.geometry().width;
+  base::AlignedBuffer<float> samples(projector.grid().size());
+  base::AlignedBuffer<float> rays(projector.detector_size(views.size()));
+  copy_slab(volume, slab, projector.grid().segments().front(), samples.data());
+  projector.forward(samples.data(), views, rays.data());
+  std::vector<loss::ViewSums> sums;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const float* predicted = rays.data() + static_cast<std::ptrdiff_t>(v) * width * kLanes;
+    sums.push_back(ray_sums(measured.rays(slab, views[v]), measured.mask(slab, views[v]), scored[v],
+                            predicted));
+  }
+  return sums;
+}
+
+void require_rays(const SlabSums& sums, std::span<const int> views, const VolumePlace& place) {
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    if (std::ranges::any_of(sums, [v](const auto& slab) { return slab[v].n > 0; })) continue;
+    throw Error(fmt::format(
+        "no ray of the view at {:g}° stays within the volume: give --no-margin if the specimen "
+        "ends inside it, or leave the view out with --exclude",
+        place.geometry.tilt_deg[static_cast<std::size_t>(views[v])]));
+  }
+}
+
+}  // namespace
+
+ViewErrors reprojection_errors(const base::Volume& volume, const VolumePlace& place,
+                               const tilt_series::SlabViews& measured, std::vector<int> views,
+                               std::span<const double> noise_weight) {
+  const projection::SlabProjector projector(
+      place.geometry,
+      projection::make_sample_grid(place.geometry, static_cast<double>(place.roi.x0),
+                                   static_cast<double>(place.roi.x1), 0.0));
+  const projection::SampleSegment& segment = projector.grid().segments().front();
+  TOMOFIELD_CHECK(segment.nx == volume.shape.nx && segment.nz == volume.shape.nz &&
+                      measured.shape().num_rows == volume.shape.ny,
+                  "one voxel a sample");
+  std::vector<std::vector<char>> scored;
+  for (const int view : views) scored.push_back(scored_pixels(place, view));
+  SlabSums sums(static_cast<std::size_t>(measured.num_slabs()));
+  base::parallel_for(measured.num_slabs(), [&](std::int64_t slab) {
+    sums[static_cast<std::size_t>(slab)] =
+        slab_sums(projector, volume, measured, views, scored, static_cast<int>(slab));
+  });
+  require_rays(sums, views, place);
+  return view_errors(std::move(views), sums, noise_weight, true);
+}
+
+}  // namespace tomofield::evaluate
