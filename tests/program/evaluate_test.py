@@ -173,6 +173,17 @@ def test_existing_figures_are_kept_unless_asked():
     assert open(path("kept.json")).read() == "mine"
 
 
+def simulate(name, thickness, *options, tilts="-60:60:6"):
+    """A cell's truth, and the options that hand its tilt series to evaluate."""
+    directory = path(name)
+    subprocess.run([PROGRAM, "simulate", directory, "--size", "48", "--thickness", str(thickness),
+                    "--noise", "0.05", "--tilts=" + tilts, *options], check=True,
+                   capture_output=True)
+    series = [os.path.join(directory, "tilt_series.mrc"), "--contrast", "bright", "--tlt",
+              os.path.join(directory, "tilt_series.tlt")]
+    return os.path.join(directory, "truth.mrc"), ["--series", *series]
+
+
 def frequencies(shape):
     """kz, ky, kx of each Fourier voxel in cycles a voxel."""
     return np.meshgrid(*[np.fft.fftfreq(n, 1 / n).round() / n for n in shape], indexing="ij")
@@ -269,6 +280,23 @@ def test_fsc_against_numpy():
         mirrored, _ = evaluate(*files, "--tilt-range=%g,%g" % (-tilts[1], -tilts[0]))
         assert mirrored["fsc"]["measured"]["correlation"] != fsc["measured"]["correlation"]
         np.testing.assert_allclose(mirrored["fsc"]["all"]["correlation"], fsc["all"]["correlation"])
+
+
+def test_the_wedge_is_where_no_view_looked():
+    # A reconstruction from tilts of mostly one sign knows what these views measured.
+    truth, series = simulate("lopsided", 24, tilts="-60:10:5")
+    volume = path("sirt.mrc")
+    subprocess.run([PROGRAM, "baseline", "sirt", *series[1:], "--thickness", "24", "--no-margin",
+                    "--iterations", "15", "-o", volume], check=True, capture_output=True)
+
+    def mean_correlation(tilts):
+        fsc = evaluate(volume, "--fsc", truth, "--tilt-range=" + tilts)[0]["fsc"]
+        return [np.mean(fsc[name]["correlation"][4:16]) for name in ("measured", "missing")]
+
+    measured, missing = mean_correlation("-60,10")
+    mirrored_measured, mirrored_missing = mean_correlation("-10,60")
+    assert measured > mirrored_measured + 0.1 and missing < mirrored_missing - 0.1, (
+        measured, missing, mirrored_measured, mirrored_missing)
 
 
 def test_fsc_under_a_mask_and_in_a_box():
@@ -377,17 +405,6 @@ def test_profile_against_scipy():
     np.testing.assert_array_equal(alone["volume"], table["truth"])
     result = run(files[1], "--profile", "1,1,1,52,3,3", "--profile-csv", path("none.csv"))
     assert result.returncode == 2 and "0,0,0,51,60,24" in result.stderr, result
-
-
-def simulate(name, thickness, *options):
-    """A cell's truth, and the options that hand its tilt series to evaluate."""
-    directory = path(name)
-    subprocess.run([PROGRAM, "simulate", directory, "--size", "48", "--thickness", str(thickness),
-                    "--noise", "0.05", "--tilts=-60:60:6", *options], check=True,
-                   capture_output=True)
-    series = [os.path.join(directory, "tilt_series.mrc"), "--contrast", "bright", "--tlt",
-              os.path.join(directory, "tilt_series.tlt")]
-    return os.path.join(directory, "truth.mrc"), ["--series", *series]
 
 
 def test_reprojection_error():
