@@ -91,9 +91,9 @@ void run(const CLI::App& command, const Arguments& arguments,
 std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments) {
   const char* group = "Comparison";
   command
-      .add_option(
-          "--methods", arguments.names,
-          "which, the first being the main one: vm, grid, tv, tv-concave, sart-tv, sirt, wbp")
+      .add_option("--methods", arguments.names,
+                  "which, the first being the main one: vm, grid, tv, tv-concave, sart-tv, sirt, "
+                  "wbp")
       ->delimiter(',')
       ->capture_default_str()
       ->group(group);

@@ -50,6 +50,7 @@ const std::vector<Method>& known_methods() {
       {"grid", "tomofield, plain vertices", {"reconstruct", "--field", "grid"}, true, true},
       {"tv", "total variation", {"baseline", "tv"}},
       {"tv-concave", "total variation, concave", {"baseline", "tv", "--penalty", "concave"}},
+      {"sart-tv", "SART with total variation", {"baseline", "sart-tv"}},
       {"sirt", "SIRT", {"baseline", "sirt"}},
       {"wbp", "weighted back-projection", {"baseline", "wbp"}}};
   return methods;

@@ -21,7 +21,8 @@ namespace fs = std::filesystem;
 void add_truth_scores(std::span<const Row> rows, const fs::path& truth, Table& table) {
   Figures psnr, affine_psnr, ssim, affine_ssim;
   for (const Row& row : rows) {
-    const evaluate::Comparison scores = evaluate::compare(evaluate::read_pair(row.volume, truth, std::nullopt));
+    const evaluate::Comparison scores =
+        evaluate::compare(evaluate::read_pair(row.volume, truth, std::nullopt));
     psnr.push_back(scores.psnr.raw_dB);
     affine_psnr.push_back(scores.psnr.affine_dB);
     ssim.push_back(scores.ssim.raw);

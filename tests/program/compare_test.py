@@ -58,6 +58,26 @@ def test_every_method_is_run_scored_and_shown():
     assert abs(shades[0] - shades[1]) < 40, shades
 
 
+def test_halves_and_held_out_views_give_figures_without_a_truth():
+    folder = harness.fresh_directory("halves")
+    compare(folder, "--halves", "--hold-out", 4, "--exclude", "3")
+    rows = json.loads(read(folder, "comparison.json"))["methods"]
+    assert [row["method"] for row in rows] == ["sirt", "ours"]
+    for row in rows:
+        assert row["cnr"] > 0 and row["enl"] > 0 and "fsc_halves_0.143_A" in row, row
+        by_hand = os.path.join(folder, "by_hand")
+        harness.succeed(*row["command"], "-o", by_hand + ".mrc", "--overwrite", "--hold-out", 4)
+        with open(by_hand + ".json") as file:
+            assert json.load(file)["figures"]["held_out"]["error"] == row["held_out_error"], row
+        views = {}
+        for half in ("odd", "even"):
+            with open(os.path.join(folder, f"{row['method']}.{half}.json")) as file:
+                record = json.load(file)
+            views[half] = {view["tilt_deg"] for view in record["figures"]["views"]}
+        assert not views["odd"] & views["even"] and len(views["odd"] | views["even"]) == 20
+    assert "Shell correlation of odd and even views" in read(folder, "report.html")
+
+
 def test_it_goes_on_where_it_stopped():
     folder = harness.fresh_directory("resumed")
     run = compare(folder, epochs=20000, run=harness.start)
