@@ -103,6 +103,13 @@ class Search {
 
 }  // namespace
 
+bool most_views_prefer(const Trial& a, const Trial& b) {
+  const std::size_t n = std::min(a.view_error.size(), b.view_error.size());
+  std::size_t prefer_a = 0;
+  for (std::size_t v = 0; v < n; ++v) prefer_a += a.view_error[v] < b.view_error[v] ? 1 : 0;
+  return 2 * prefer_a > n;
+}
+
 double standard_error_of_difference(const Trial& a, const Trial& b) {
   const std::size_t n = std::min(a.view_error.size(), b.view_error.size());
   if (n < 2) return 0;
@@ -123,7 +130,8 @@ TrialSettings choose_penalty(const TrialSettings& start, const RunTrial& run) {
   smooth.penalty = "smooth";
   for (TrialSettings* settings : {&concave, &smooth})
     settings->variation = usual_variation(settings->penalty);
-  return run(smooth).error < run(concave).error ? smooth : concave;
+  const Trial with_concave = run(concave), with_smooth = run(smooth);
+  return most_views_prefer(with_smooth, with_concave) ? smooth : concave;
 }
 
 int expected_trials(const SearchSpace& space) {

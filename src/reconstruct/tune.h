@@ -34,8 +34,9 @@ struct SearchSpace {
   bool rank = true;     ///< of fields that have one
 };
 
-/// The penalty of total variation, with its usual weight, that predicts held-out views
-/// better: edges as sharp as a concave one makes them are right for some specimens only.
+/// The penalty of total variation, with its usual weight, that predicts most of the
+/// held-out views better (of equally many the concave one): edges as sharp as a concave one makes
+/// them are right for some specimens only.
 TrialSettings choose_penalty(const TrialSettings& start, const RunTrial& run);
 
 /// The settings that predict held-out views best, one at a time: the penalty; the weight
@@ -50,6 +51,10 @@ TrialSettings search_settings(const TrialSettings& start, const SearchSpace& spa
 
 /// Trials that a search makes, if its best weight is near the first.
 int expected_trials(const SearchSpace& space);
+
+/// Whether a predicts more than half of the views held out better than b. Unlike the mean
+/// error, this cannot be decided by one view at the end of the tilts, which all predict badly.
+bool most_views_prefer(const Trial& a, const Trial& b);
 
 /// Standard error of the mean difference of two trials over the views held out:
 /// the views' own noise is common to both and drops out.

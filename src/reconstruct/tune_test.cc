@@ -100,6 +100,14 @@ Trial with_errors(std::vector<double> view_error) {
   return trial;
 }
 
+TEST(MostViewsPrefer, CountsViewsWhateverTheirErrors) {
+  const Trial often = with_errors({1.0, 5.0, 2.0, 9.0}), rarely = with_errors({1.1, 5.1, 2.1, 3.0});
+  EXPECT_TRUE(most_views_prefer(often, rarely));
+  EXPECT_FALSE(most_views_prefer(rarely, often));
+  const Trial half = with_errors({1.1, 5.1, 1.9, 3.0});
+  EXPECT_FALSE(most_views_prefer(half, with_errors({1.0, 5.0, 2.0, 9.0})));
+}
+
 TEST(StandardErrorOfDifference, IgnoresWhatTrialsShare) {
   const Trial a = with_errors({1.0, 5.0, 2.0}), b = with_errors({1.1, 5.1, 2.1}),
               c = with_errors({2.0, 5.0, 2.0});
