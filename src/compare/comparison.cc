@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <system_error>
 
 #include "compare/pictures.h"
@@ -20,7 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What is shown side by side: the truth, if it has the size of the volumes, and every volume.
+// What is shown side by side: the truth, if it has the size of the volumes, and every volume. The
+// first decides the grey scale and the detail.
 std::vector<Shown> shown_volumes(const std::vector<Row>& rows,
                                  const std::optional<fs::path>& truth) {
   std::vector<Shown> shown;
@@ -41,18 +44,17 @@ void add_pictures(const CompareOptions& options, const std::vector<Row>& rows,
   const fs::path folder = options.folder / "pictures";
   fs::create_directories(folder);
   const std::vector<Shown> shown = shown_volumes(rows, options.truth);
-  const std::size_t reference = 0;  // the truth, or the main method
-  const Detail detail = busiest_detail(shown[reference].planes.front());
+  const Detail detail = busiest_detail(shown.front().planes.front());
   page.add_heading("Central slices");
   page.add_paragraph("All on one grey scale: 0.5 to 99.5 percentiles of the first volume.");
   for (std::size_t plane = 0; plane < 3; ++plane) {
     page.add_paragraph(std::array{"XY", "XZ", "YZ"}[plane]);
-    page.add_figures(plane_figures(shown, reference, plane, folder));
+    page.add_figures(plane_figures(shown, plane, folder));
   }
   page.add_heading("Detail");
   page.add_paragraph(fmt::format("Where the XY slice varies most: x {} to {}, y {} to {}.",
                                  detail.x0, detail.x1 - 1, detail.y0, detail.y1 - 1));
-  page.add_figures(detail_figures(shown, reference, detail, folder));
+  page.add_figures(detail_figures(shown, detail, folder));
   const double voxel_A = io::MrcReader(rows.front().volume).header().voxel_size_A[0];
   page.add_heading("Profile");
   page.add_paragraph("Density along x through the middle of the detail, in the file's units.");
@@ -71,7 +73,7 @@ void add_commands(const std::vector<Row>& rows, report::HtmlPage& page) {
   page.add_listing(listing);
 }
 
-// Shell correlations over spatial frequency, with the usual thresholds to read them by.
+// Shell correlations over spatial frequency.
 void add_correlations(const Scores& scores, report::HtmlPage& page) {
   for (const auto& [title, curves] : scores.correlations) {
     page.add_heading(title);

@@ -27,13 +27,12 @@ struct Detail {
 Detail busiest_detail(const report::Slice& plane);
 
 /// The same plane (0: xy, 1: xz, 2: yz) of every volume on one grey scale, that of the
-/// `reference`-th. PNG files go to `folder`.
-std::vector<report::HtmlFigure> plane_figures(const std::vector<Shown>& volumes,
-                                              std::size_t reference, std::size_t plane,
+/// first. PNG files go to `folder`.
+std::vector<report::HtmlFigure> plane_figures(const std::vector<Shown>& volumes, std::size_t plane,
                                               const std::filesystem::path& folder);
 /// The detail of every xy plane, likewise.
 std::vector<report::HtmlFigure> detail_figures(const std::vector<Shown>& volumes,
-                                               std::size_t reference, const Detail& detail,
+                                               const Detail& detail,
                                                const std::filesystem::path& folder);
 /// Densities along x through the middle of the detail; distances in Å, or voxels without size.
 std::vector<report::Curve> detail_profiles(const std::vector<Shown>& volumes, const Detail& detail,

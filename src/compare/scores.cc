@@ -42,11 +42,12 @@ std::string boxes_text(const std::vector<evaluate::Box>& boxes) {
 
 // On the main method's regions; returns which they are.
 std::string add_contrast(std::span<const Row> rows, Table& table) {
-  const evaluate::Regions regions =
-      evaluate::choose_regions(evaluate::read_volume(rows.front().volume));
+  evaluate::Regions regions;
   Figures cnr, enl;
   for (const Row& row : rows) {
-    const auto score = evaluate::contrast_score(evaluate::read_volume(row.volume), regions);
+    const base::Volume volume = evaluate::read_volume(row.volume);
+    if (&row == &rows.front()) regions = evaluate::choose_regions(volume);
+    const auto score = evaluate::contrast_score(volume, regions);
     cnr.push_back(score.cnr);
     enl.push_back(score.enl);
   }
