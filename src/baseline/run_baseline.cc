@@ -10,8 +10,9 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
+#include "baseline/held_out.h"
+#include "baseline/tune.h"
 #include "baseline/voxel_problem.h"
-#include "evaluate/view_errors.h"
 #include "io/json.h"
 #include "kernels/lanes.h"
 #include "projection/sample_grid.h"
@@ -19,6 +20,7 @@
 #include "reconstruct/mask_json.h"
 #include "reconstruct/options_json.h"
 #include "reconstruct/result_files.h"
+#include "reconstruct/trials.h"
 #include "tomofield/error.h"
 
 namespace tomofield::baseline {
@@ -35,13 +37,18 @@ projection::SampleGrid grid_of(const reconstruct::PreparedSeries& series,
 
 std::vector<int> views_held_out(const reconstruct::PreparedSeries& series,
                                 const BaselineOptions& options) {
-  if (options.hold_out == 0) return {};
-  return reconstruct::held_out_views(series.geometry.tilt_deg, options.hold_out);
+  if (options.hold_out == 0 && !options.tune) return {};
+  return reconstruct::held_out_views(series.geometry.tilt_deg, options.hold_out > 0
+                                                                   ? options.hold_out
+                                                                   : reconstruct::kTrialHoldOut);
 }
 
-// What the method holds of each slab, and a slab and its rays for each thread.
+// What the method holds of each slab, and a slab and its rays for each thread; a tuning has copies
+// of the rays of its rows.
 std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
-                            const projection::SampleGrid& grid, const MethodFacts& method) {
+                            const projection::SampleGrid& grid, const MethodFacts& method,
+                            bool tunes) {
+  constexpr std::size_t kTrialSlabs = reconstruct::kTrialRows / kLanes;
   constexpr std::size_t kFixed = std::size_t{48} << 20;  // program and libraries
   const std::size_t slabs = static_cast<std::size_t>((plan.roi.height() + kLanes - 1) / kLanes);
   const std::size_t rays = static_cast<std::size_t>(plan.geometry.num_views()) *
@@ -49,8 +56,9 @@ std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
   const std::size_t values_of_slab = static_cast<std::size_t>(method.volumes) * grid.size() +
                                      static_cast<std::size_t>(method.detectors) * rays;
   const std::size_t values_of_thread = grid.size() + rays;
+  const std::size_t copied_slabs = tunes ? std::min<std::size_t>(slabs, kTrialSlabs) : 0;
   return kFixed +
-         sizeof(float) * (slabs * values_of_slab +
+         sizeof(float) * (slabs * values_of_slab + copied_slabs * rays +
                           static_cast<std::size_t>(base::thread_count()) * values_of_thread);
 }
 
@@ -105,6 +113,7 @@ nlohmann::json options_json(const BaselineOptions& options) {
           {"margin_spacing", options.margin_spacing},
           {"fit_view_scale", options.fit_view_scale},
           {"hold_out", options.hold_out},
+          {"tune", options.tune},
           {"method", json_of(options.method)}};
 }
 
@@ -112,11 +121,8 @@ nlohmann::json options_json(const BaselineOptions& options) {
 nlohmann::json held_out_json(const VoxelProblem& problem, const std::vector<int>& views,
                              bool fit_view_scale, VoxelVolume& densities) {
   if (views.empty()) return nullptr;
-  std::vector<double> weights;
-  for (const double sigma : problem.noise_sigma()) weights.push_back(1 / (sigma * sigma));
-  return reconstruct::report_held_out(
-      evaluate::view_errors(views, {view_sums(problem, views, densities)}, weights, fit_view_scale),
-      problem.projector().geometry().tilt_deg);
+  return reconstruct::report_held_out(held_out_errors(problem, views, fit_view_scale, densities),
+                                      problem.projector().geometry().tilt_deg);
 }
 
 nlohmann::json figures_json(const Solution& solution, const VoxelProblem& problem,
@@ -141,6 +147,27 @@ nlohmann::json figures_json(const Solution& solution, const VoxelProblem& proble
           {"threads", base::thread_count()},
           {"mask", reconstruct::mask_json(series)},
           {"views", views}};
+}
+
+AfterIteration report_to(const base::ProgressSink& progress, const MethodFacts& method,
+                         std::int64_t num_rays) {
+  return [&progress, method, num_rays, running = base::Stopwatch()](
+             const IterationReport& iteration, const VoxelVolume&) {
+    if (progress)
+      progress(progress_report(iteration, method.iterations, num_rays, running.seconds()));
+  };
+}
+
+void write_results(const Solution& solution, const reconstruct::PreparedSeries& series,
+                   const BaselineOptions& options, const nlohmann::json& figures,
+                   const BaselinePaths& paths) {
+  const field::ModelInfo info = volume_info(series, options);
+  write_voxels(voxels_of(solution.densities), reconstruct::region_box(info, 1.0), info,
+               fmt::format("baseline {}", facts_of(options.method).name), options.volume,
+               paths.volume);
+  io::write_json(
+      paths.json,
+      {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"figures", figures}});
 }
 
 BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays) {
@@ -187,41 +214,42 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
     plan.num_voxels += static_cast<std::size_t>(segment.nx) * static_cast<std::size_t>(segment.nz) *
                        static_cast<std::size_t>(planned.roi.height());
   }
-  plan.memory_bytes = estimate_memory(planned, grid, facts_of(options.method));
+  plan.memory_bytes = estimate_memory(planned, grid, facts_of(options.method), options.tune);
   base::require_memory(plan.memory_bytes, "this baseline",
                        "use a larger --bin or --margin-spacing, or a smaller --roi or --thickness");
   return plan;
 }
 
 BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
-                             const BaselineOptions& options, const base::ProgressSink& progress) {
+                             const BaselineOptions& requested, const BaselineProgress& progress) {
+  BaselineOptions options = requested;
   const BaselinePaths paths = baseline_paths(options.output);
   const reconstruct::PreparedSeries series =
       prepare_series(tilt_series, options.specimen,
                      paths.volume.has_parent_path() ? paths.volume.parent_path() : ".");
-  const std::vector<int> held_out = views_held_out(series, options);
+  std::vector<int> held_out = views_held_out(series, options);
+  nlohmann::json tuning = nullptr;
+  if (options.tune) {
+    const Tuned tuned =
+        tune(options.method, {series, grid_of(series, options), held_out, options.fit_view_scale},
+             progress.tuning);
+    tuning = tuning_json(tuned);
+    options.method = tuned.method;
+    options.hold_out = 0;  // the fit has all views
+    held_out.clear();
+  }
   VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays, series.noise_sigma,
                        {held_out, options.fit_view_scale});
-  const std::int64_t num_rays = problem.num_rays();
-  const MethodFacts method = facts_of(options.method);
   const base::Stopwatch running;
-  const AfterIteration report = [&](const IterationReport& iteration, const VoxelVolume&) {
-    if (progress)
-      progress(progress_report(iteration, method.iterations, num_rays, running.seconds()));
-  };
-  Solution solution = reconstruct(problem, options.method, series.mean_density, report);
-  const double fit_seconds = running.seconds();
-
-  const field::ModelInfo info = volume_info(series, options);
-  write_voxels(voxels_of(solution.densities), reconstruct::region_box(info, 1.0), info,
-               fmt::format("baseline {}", method.name), options.volume, paths.volume);
-  nlohmann::json figures = figures_json(solution, problem, series, fit_seconds);
+  Solution solution =
+      reconstruct(problem, options.method, series.mean_density,
+                  report_to(progress.reconstruction, facts_of(options.method), problem.num_rays()));
+  nlohmann::json figures = figures_json(solution, problem, series, running.seconds());
   figures["held_out"] =
       held_out_json(problem, held_out, options.fit_view_scale, solution.densities);
-  io::write_json(
-      paths.json,
-      {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"figures", figures}});
-  return summary_of(solution, num_rays);
+  figures["tuning"] = tuning;
+  write_results(solution, series, options, figures, paths);
+  return summary_of(solution, problem.num_rays());
 }
 
 }  // namespace tomofield::baseline

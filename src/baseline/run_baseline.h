@@ -19,6 +19,7 @@ struct BaselineOptions {
   Method method;
   bool fit_view_scale = false;        ///< per-view scale and offset as nuisances
   int hold_out = 0;                   ///< keep every so-manieth view from the fit; 0: none
+  bool tune = false;                  ///< choose settings by held-out views, then fit all (tune.h)
   reconstruct::VolumeOptions volume;  ///< `box` stays empty: voxels are where they were fitted
   std::filesystem::path output;       ///< the volume; JSON and pictures lie beside it
   bool overwrite = false;
@@ -56,10 +57,15 @@ struct BaselineSummary {
   std::optional<double> last_decrease;
 };
 
-/// Reads the series, reconstructs, writes the volume (MRC, the input's units and contrast),
-/// and the figures and resolved options (JSON). Call
-/// check_outputs() and plan_baseline() first: this starts at once.
+/// Where the progress of a run goes.
+struct BaselineProgress {
+  base::ProgressSink tuning, reconstruction;
+};
+
+/// Reads the series, tunes if it shall, reconstructs, writes the volume (MRC, the input's units and
+/// contrast), and the figures and resolved options (JSON). Call check_outputs() and plan_baseline()
+/// first: this starts at once.
 BaselineSummary run_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options,
-                             const base::ProgressSink& progress);
+                             const BaselineProgress& progress);
 
 }  // namespace tomofield::baseline

@@ -33,8 +33,9 @@ struct IterationReport {
   double objective = 0.0;
 };
 
-/// Called after every iteration, with the densities that it ended with.
-using AfterIteration = std::function<void(const IterationReport&, const VoxelVolume&)>;
+/// Called after every iteration, with the densities that it ended with, of which it may write the
+/// padding.
+using AfterIteration = std::function<void(const IterationReport&, VoxelVolume&)>;
 
 /// A slab's rays and some buffers of a slab's samples for each thread of base::parallel_for.
 class ThreadScratch {

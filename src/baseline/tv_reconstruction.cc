@@ -32,7 +32,7 @@ constexpr int kReweightings = 8;
 constexpr float kFirstWeight = 0.5f;
 
 bool takes_weights_after(int iteration, const TvOptions& options) {
-  if (options.penalty == "smooth" || iteration == 0) return false;
+  if (options.penalty != "concave" || iteration == 0) return false;
   const int first = options.iterations * 3 / 10;
   const int interval = std::max(1, (options.iterations - first) / kReweightings);
   return iteration >= first && iteration < options.iterations &&
@@ -236,7 +236,7 @@ void ChambollePock::take_step(int slab, const float* adjoint, float relaxation) 
 nlohmann::json TvOptions::json() const {
   return {{"iterations", iterations},
           {"weight", weight.value_or(usual_weight())},
-          {"penalty", penalty},
+          {"penalty", penalty.value_or("smooth")},
           {"concavity", concavity},
           {"non_negative", non_negative}};
 }

@@ -10,10 +10,10 @@
 namespace tomofield::baseline {
 
 struct TvOptions {
-  int iterations = 200;            ///< docs/results/quality.md
-  std::optional<double> weight;    ///< λ, see reconstruct_tv; none: usual_weight()
-  std::string penalty = "smooth";  ///< or concave
-  double concavity = 1.6;          ///< τ of the concave penalty, in units of a voxel's noise
+  int iterations = 200;                ///< docs/results/quality.md
+  std::optional<double> weight;        ///< λ, see reconstruct_tv; none: usual_weight()
+  std::optional<std::string> penalty;  ///< smooth, also if none is given, or concave
+  double concavity = 1.6;              ///< τ of the concave penalty, in units of a voxel's noise
   bool non_negative = true;
 
   /// A concave penalty counts large steps less, and so needs more (docs/baselines.md).

@@ -5,6 +5,7 @@
 
 #include "base/parallel.h"
 #include "baseline/run_baseline.h"
+#include "baseline/tune.h"
 #include "cli/commands.h"
 #include "cli/common_options.h"
 #include "cli/input_options.h"
@@ -66,7 +67,8 @@ void run(Arguments<Method>& arguments) {
   const tilt_series::TiltSeries series(options.input);
   print_plan(baseline::plan_baseline(series, options), method.facts());
   if (arguments.dry_run) return;
-  print_summary(baseline::run_baseline(series, options, make_progress_bar("baseline")));
+  print_summary(baseline::run_baseline(series, options,
+                                       {make_progress_bar("tune"), make_progress_bar("baseline")}));
   const baseline::BaselinePaths paths = baseline::baseline_paths(options.output);
   fmt::print("tomogram  {}\nfigures   {}\n", paths.volume.string(), paths.json.string());
   write_pictures(paths.volume, series, paths.picture_prefix);
@@ -94,6 +96,13 @@ void add_fit_options(CLI::App& command, Arguments<Method>& arguments) {
                   "keep every so-manieth view from the fit and report how well it is predicted")
       ->check(number_between(2, kMostViews))
       ->group(group);
+  if constexpr (baseline::Tunable<Method>) {
+    command
+        .add_flag("--tune", options.tune,
+                  "choose the weight, or what else regularises, by the error of held-out views, "
+                  "then reconstruct from all views with it")
+        ->group(group);
+  }
 }
 
 // Of those that iterate.
@@ -221,10 +230,11 @@ void add_tv(CLI::App& baseline) {
       ->check(number_above(0))
       ->group(group);
   command
-      .add_option("--penalty", method.penalty,
-                  "smooth: total variation; concave: spares edges, reweighted")
+      .add_option(
+          "--penalty", method.penalty,
+          "smooth: total variation; concave: spares edges, reweighted; default: smooth, and "
+          "with --tune the one that predicts held-out views better")
       ->check(CLI::IsMember({"smooth", "concave"}))
-      ->capture_default_str()
       ->group(group);
 }
 

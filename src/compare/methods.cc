@@ -12,6 +12,9 @@
 namespace tomofield::compare {
 namespace {
 
+// Of the baselines.
+bool can_tune(const std::string& baseline) { return baseline != "wbp"; }
+
 Method parse_method(const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::string name = text.substr(0, equals);
@@ -32,7 +35,8 @@ Method parse_method(const std::string& text) {
     throw Error(fmt::format("--also '{}': the command must be reconstruct or baseline, not '{}'",
                             text, command));
   }
-  method.resumes = method.tunes = command == "reconstruct";
+  method.resumes = command == "reconstruct";
+  method.tunes = method.resumes || (method.arguments.size() > 1 && can_tune(method.arguments[1]));
   return method;
 }
 
@@ -48,10 +52,14 @@ const std::vector<Method>& known_methods() {
   static const std::vector<Method> methods{
       {"vm", "tomofield", {"reconstruct"}, true, true},
       {"grid", "tomofield, plain vertices", {"reconstruct", "--field", "grid"}, true, true},
-      {"tv", "total variation", {"baseline", "tv"}},
-      {"tv-concave", "total variation, concave", {"baseline", "tv", "--penalty", "concave"}},
-      {"sart-tv", "SART with total variation", {"baseline", "sart-tv"}},
-      {"sirt", "SIRT", {"baseline", "sirt"}},
+      {"tv", "total variation", {"baseline", "tv"}, false, true},
+      {"tv-concave",
+       "total variation, concave",
+       {"baseline", "tv", "--penalty", "concave"},
+       false,
+       true},
+      {"sart-tv", "SART with total variation", {"baseline", "sart-tv"}, false, true},
+      {"sirt", "SIRT", {"baseline", "sirt"}, false, true},
       {"wbp", "weighted back-projection", {"baseline", "wbp"}}};
   return methods;
 }

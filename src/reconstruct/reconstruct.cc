@@ -205,9 +205,8 @@ void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOpti
 std::optional<Tuned> choose_settings(const PreparedSeries& series, const OutputPaths& paths,
                                      const ReconstructHooks& hooks,
                                      const ReconstructOptions& options) {
-  constexpr int kHoldOut = 8;
   FitOptions fit = options.fit;
-  if (fit.hold_out == 0) fit.hold_out = kHoldOut;
+  if (fit.hold_out == 0) fit.hold_out = kTrialHoldOut;
   const Measurement measurement = measurement_of(series, fit);
   const TuneHooks tune_hooks{.progress = hooks.tune_progress,
                              .stop_requested = hooks.stop_requested};

@@ -18,8 +18,6 @@ namespace {
 
 using nlohmann::json;
 
-// Rows of a trial: enough for edges in every direction, few enough for a dozen fits.
-constexpr std::int64_t kStripRows = 64;
 // Of those that compare penalties, which differ by more than weights do.
 constexpr std::int64_t kPenaltyRows = 32;
 constexpr int kPenaltyPart = 3;     // of a fit's epochs: one in so many
@@ -30,8 +28,7 @@ Trial trial_from(const json& entry) {
                        .variation = entry.at("tv"),
                        .rank = entry.at("rank"),
                        .epochs = entry.at("epochs")},
-          .error = entry.at("held_out_error"),
-          .view_error = entry.at("held_out_error_by_view"),
+          .score = {entry.at("held_out_error"), entry.at("held_out_error_by_view")},
           .seconds = entry.at("seconds")};
 }
 
@@ -43,26 +40,12 @@ struct Strip {
 };
 
 Strip middle_strip(const Measurement& whole, std::int64_t most_rows) {
-  const auto& shape = whole.rays->shape();
-  const std::int64_t rows = std::min(most_rows, shape.num_rows);
-  const std::int64_t first = (shape.num_rows - rows) / 2;
-  const auto read = [&](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
-    const int view = static_cast<int>(v);
-    for (std::int64_t y = 0; y < rows; ++y) {
-      for (std::int64_t x = 0; x < shape.width; ++x) {
-        const auto at = static_cast<std::size_t>(y * shape.width + x);
-        image[at] = whole.rays->ray(view, x, first + y);
-        valid[at] = whole.rays->counts(view, x, first + y);
-      }
-    }
-  };
-  Strip strip{.part = static_cast<double>(rows) / static_cast<double>(shape.num_rows),
-              .rays = std::make_unique<tilt_series::SlabViews>(
-                  tilt_series::SlabViews::Shape{shape.num_views, shape.width, rows, 0, rows}, 1.0,
-                  read, std::filesystem::temp_directory_path()),
-              .measurement = whole};
+  const std::int64_t all_rows = whole.rays->shape().num_rows;
+  Strip strip{.rays = whole.rays->middle_rows(most_rows), .measurement = whole};
+  const std::int64_t rows = strip.rays->shape().num_rows;
+  strip.part = static_cast<double>(rows) / static_cast<double>(all_rows);
   strip.measurement.rays = strip.rays.get();
-  strip.measurement.roi.y0 = whole.roi.y0 + first;
+  strip.measurement.roi.y0 = whole.roi.y0 + (all_rows - rows) / 2;
   strip.measurement.roi.y1 = strip.measurement.roi.y0 + rows;
   return strip;
 }
@@ -115,7 +98,7 @@ class TrialFits {
       return true;
     });
     const HeldOutError error = fit.held_out_error();
-    return {settings, error.total, error.view_error, running.seconds()};
+    return {settings, {error.total, error.view_error}, running.seconds()};
   }
 
   base::ProgressReport report(const Fit& fit, const TrialSettings& settings) const {
@@ -147,7 +130,7 @@ void log_trials(const std::vector<Trial>& trials) {
   for (const Trial& t : trials) {
     base::log_info(fmt::format("tried {} tv {:8.3f}  rank {:3}  epochs {:4}: held-out error {:.5f}",
                                t.settings.penalty, t.settings.variation, t.settings.rank,
-                               t.settings.epochs, t.error));
+                               t.settings.epochs, t.score.error));
   }
 }
 
@@ -189,8 +172,8 @@ json trials_json(const std::vector<Trial>& trials) {
                      {"tv", t.settings.variation},
                      {"rank", t.settings.rank},
                      {"epochs", t.settings.epochs},
-                     {"held_out_error", t.error},
-                     {"held_out_error_by_view", t.view_error},
+                     {"held_out_error", t.score.error},
+                     {"held_out_error_by_view", t.score.view_error},
                      {"seconds", t.seconds}});
   }
   return table;
@@ -200,7 +183,7 @@ std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& fi
                           const FitOptions& fit, bool tunes_penalty, TrialFile& file,
                           const TuneHooks& hooks) {
   const SearchSpace space{.penalty = tunes_penalty, .rank = field.kind == "vm"};
-  TrialFits fits(measurement, kStripRows, field, fit, hooks, expected_trials(space));
+  TrialFits fits(measurement, kTrialRows, field, fit, hooks, expected_trials(space));
   // A run without total variation still needs a weight to search from.
   const double first =
       fit.density_variation > 0 ? fit.density_variation : usual_variation(fit.penalty);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -33,6 +34,12 @@ class TrialFile {
 
 /// The table of what was tried.
 nlohmann::json trials_json(const std::vector<Trial>& trials);
+
+/// Rows of a trial, in the middle: enough for edges in every direction, few enough for a dozen
+/// fits.
+constexpr std::int64_t kTrialRows = 64;
+/// Views that a trial holds out, if nothing else is asked for: every so-manieth.
+constexpr int kTrialHoldOut = 8;
 
 struct TuneHooks {
   base::ProgressSink progress;

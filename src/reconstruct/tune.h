@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "reconstruct/options.h"
+#include "reconstruct/weight_search.h"
 
 namespace tomofield::reconstruct {
 
@@ -20,8 +21,7 @@ struct TrialSettings {
 /// A trial fit and how well it predicts the views held out.
 struct Trial {
   TrialSettings settings = {};
-  double error = 0;                     ///< mean squared residual over the noise variance
-  std::vector<double> view_error = {};  ///< the same of each view held out
+  HeldOutScore score = {};
   double seconds = 0;
 };
 
@@ -40,8 +40,7 @@ struct SearchSpace {
 TrialSettings choose_penalty(const TrialSettings& start, const RunTrial& run);
 
 /// The settings that predict held-out views best, one at a time: the penalty; the weight
-/// of total variation by a 1-D search on a logarithmic scale, factors of 4, then 2,
-/// then √2 about the best; the rank among a third, two thirds and all of that of
+/// of total variation by search_weight(); the rank among a third, two thirds and all of that of
 /// `start`; and the epochs among half, once and twice those of `start`. What is better by no more
 /// than the standard error of the difference over the views counts as equal, and then the largest
 /// weight (the smoothest), the smallest rank and the fewest epochs win. No settings are
@@ -51,13 +50,5 @@ TrialSettings search_settings(const TrialSettings& start, const SearchSpace& spa
 
 /// Trials that a search makes, if its best weight is near the first.
 int expected_trials(const SearchSpace& space);
-
-/// Whether a predicts more than half of the views held out better than b. Unlike the mean
-/// error, this cannot be decided by one view at the end of the tilts, which all predict badly.
-bool most_views_prefer(const Trial& a, const Trial& b);
-
-/// Standard error of the mean difference of two trials over the views held out:
-/// the views' own noise is common to both and drops out.
-double standard_error_of_difference(const Trial& a, const Trial& b);
 
 }  // namespace tomofield::reconstruct

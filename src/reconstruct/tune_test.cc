@@ -31,10 +31,10 @@ struct ImaginedSeries {
     double error = 1 + (is_smooth ? smooth_error : 0) + 0.02 * doublings * doublings;
     error += gain * std::max(0.0, std::log2(static_cast<double>(needed_rank) / s.rank));
     error += gain * std::max(0.0, std::log2(static_cast<double>(needed_epochs) / s.epochs));
-    Trial trial{s, error, {}, 0};
+    Trial trial{s, {error, {}}, 0};
     for (int view = 0; view < 12; ++view) {
       const double sign = (view + num_trials) % 2 == 0 ? 1 : -1;
-      trial.view_error.push_back(error + 0.3 * view + sign * scatter);
+      trial.score.view_error.push_back(error + 0.3 * view + sign * scatter);
     }
     return trial;
   }
@@ -92,27 +92,6 @@ TEST(SearchSettings, TakesTheSmoothestOfWhatCannotBeToldApart) {
   std::vector<Trial> trials, unsure_trials;
   EXPECT_NEAR(search(sure, trials).variation, 9, 1e-9);
   EXPECT_GT(search(unsure, unsure_trials).variation, 9 * 1.4);
-}
-
-Trial with_errors(std::vector<double> view_error) {
-  Trial trial;
-  trial.view_error = std::move(view_error);
-  return trial;
-}
-
-TEST(MostViewsPrefer, CountsViewsWhateverTheirErrors) {
-  const Trial often = with_errors({1.0, 5.0, 2.0, 9.0}), rarely = with_errors({1.1, 5.1, 2.1, 3.0});
-  EXPECT_TRUE(most_views_prefer(often, rarely));
-  EXPECT_FALSE(most_views_prefer(rarely, often));
-  const Trial half = with_errors({1.1, 5.1, 1.9, 3.0});
-  EXPECT_FALSE(most_views_prefer(half, with_errors({1.0, 5.0, 2.0, 9.0})));
-}
-
-TEST(StandardErrorOfDifference, IgnoresWhatTrialsShare) {
-  const Trial a = with_errors({1.0, 5.0, 2.0}), b = with_errors({1.1, 5.1, 2.1}),
-              c = with_errors({2.0, 5.0, 2.0});
-  EXPECT_NEAR(standard_error_of_difference(a, b), 0.0, 1e-7);
-  EXPECT_NEAR(standard_error_of_difference(a, c), 1.0 / 3, 1e-12);  // s = 1/√3, over √3
 }
 
 }  // namespace

@@ -38,6 +38,21 @@ std::unique_ptr<SlabViews> make_views() {
   return std::make_unique<SlabViews>(kShape, kUnit, read, "/tmp");
 }
 
+TEST(SlabViews, MiddleRowsAreCopied) {
+  const auto all = make_views();
+  const auto middle = all->middle_rows(20);
+  ASSERT_EQ(middle->shape().num_rows, 20);
+  for (int v = 0; v < 3; ++v) {
+    for (std::int64_t y = 0; y < 20; ++y) {
+      for (std::int64_t x = 0; x < kShape.width; ++x) {
+        ASSERT_EQ(middle->counts(v, x, y), all->counts(v, x, y + 9));
+        ASSERT_EQ(middle->ray(v, x, y), all->ray(v, x, y + 9));
+      }
+    }
+  }
+  EXPECT_EQ(all->middle_rows(100)->checksum(), all->checksum());
+}
+
 TEST(SlabViews, BinnedAreMeansOfWhatCountsFromTheFirstRowOn) {
   const auto fine = make_views();
   for (const int bin : {2, 4}) {

@@ -134,6 +134,26 @@ def test_concave_penalty_is_another_one():
     assert read_bytes(results.volume_path) != read_bytes(plain["tv"].volume_path)
 
 
+def test_tuned_settings_are_better_than_bad_ones_and_used_for_all_views():
+    bad = {"sart-tv": ["--weight", 30, "--iterations", 4], "tv": ["--weight", 300], "sirt": ["--iterations", 3]}
+    for method, options in bad.items():
+        worse, _ = baseline(method, "bad", *options)
+        results, run = baseline(method, "tuned", *options, "--tune", "--hold-out", 4)
+        figures, used = results.record["figures"], results.record["options"]
+        tuning, chosen = figures["tuning"], figures["tuning"]["chosen"]
+        assert used["method"] == chosen and used["tune"] and figures["held_out"] is None
+        assert len(figures["views"]) == len(TILTS)
+        assert run.stderr.count("tried --") == len(tuning["trials"]) and "tuned: --" in run.stderr
+        assert all(len(trial["held_out_error_by_view"]) == 5 for trial in tuning["trials"])
+        gain = psnr(results.volume, series.truth) - psnr(worse.volume, series.truth)
+        print(f"{method}: tuned {gain:.2f} dB above {options}")
+        assert gain > 0.3, (method, chosen)
+        settings = [word for key in ("weight", "iterations") if key in chosen
+                    for word in (f"--{key}", repr(chosen[key]))]
+        by_hand, _ = baseline(method, "by-hand", *settings)
+        assert read_bytes(by_hand.volume_path) == read_bytes(results.volume_path)
+
+
 def test_wider_roll_off_smooths_along_x():
     def roughness(volume):
         return np.mean(np.diff(volume, axis=2) ** 2)
@@ -227,6 +247,7 @@ def test_bad_input_gets_a_sentence_and_nothing_is_written():
         (["--subsets", 0], series, "subsets"),
         (["--tv-steps", 0], series, "tv-steps"),
         (["--relaxation", 2], series, "relaxation"),
+        (["--tune", "--hold-out", 1000], series, "--hold-out 1000"),
     ]
     method_of = {"window": "wbp", "cutoff": "wbp", "falloff": "wbp", "subsets": "sart-tv",
                  "tv-steps": "sart-tv", "relaxation": "sirt"}

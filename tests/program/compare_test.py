@@ -78,6 +78,19 @@ def test_halves_and_held_out_views_give_figures_without_a_truth():
     assert "Shell correlation of odd and even views" in read(folder, "report.html")
 
 
+def test_every_method_that_can_be_is_tuned():
+    folder = harness.fresh_directory("tuned")
+    harness.succeed("compare", *series.input, *QUICK, "-o", folder, "--tune", "--methods", "wbp",
+                    "--also", "s=baseline sirt --iterations 5", "--also",
+                    "t=baseline tv --iterations 20 --weight 90")
+    tunings = {}
+    for name in ("wbp", "s", "t"):
+        with open(os.path.join(folder, name + ".json")) as file:
+            tunings[name] = json.load(file)["figures"]["tuning"]
+    assert tunings["wbp"] is None and tunings["s"]["chosen"]["iterations"] > 5
+    assert tunings["t"]["chosen"]["weight"] < 90
+
+
 def test_it_goes_on_where_it_stopped():
     folder = harness.fresh_directory("resumed")
     run = compare(folder, epochs=20000, run=harness.start)

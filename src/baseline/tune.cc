@@ -1,0 +1,187 @@
+#include "baseline/tune.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "base/log.h"
+#include "base/stopwatch.h"
+#include "baseline/held_out.h"
+#include "reconstruct/trials.h"
+
+namespace tomofield::baseline {
+namespace {
+
+using reconstruct::HeldOutScore;
+
+constexpr int kExpectedTrials = 9;  // if the best weight is near the first
+
+// The settings that a tuning may change, as they are written on the command line.
+std::string settings_text(const Method& method) {
+  const nlohmann::json json = json_of(method);
+  std::string text;
+  for (const char* key : {"penalty", "weight", "iterations"}) {
+    if (!json.contains(key)) continue;
+    const nlohmann::json& value = json[key];
+    text += fmt::format(
+        " --{} {}", key,
+        value.is_string() ? value.get<std::string>() : fmt::format("{:.4g}", value.get<double>()));
+  }
+  return text;
+}
+
+// Makes the trials of a search, with its progress; none twice.
+class Trials {
+ public:
+  Trials(const TrialData& data, const base::ProgressSink& progress)
+      : data_(data),
+        progress_(progress),
+        rays_(data.series.rays->middle_rows(reconstruct::kTrialRows)) {}
+
+  HeldOutScore score(const Method& method) {
+    const nlohmann::json settings = json_of(method);
+    const auto known = std::ranges::find_if(
+        trials_, [&](const Trial& t) { return json_of(t.method) == settings; });
+    if (known != trials_.end()) return known->score;
+    run(method, [&](int iteration) {
+      return iteration == facts_of(method).iterations ? std::optional(method) : std::nullopt;
+    });
+    return trials_.back().score;
+  }
+
+  // One run, scored after each of these numbers of iterations, which ascend.
+  template <StopsEarly Options>
+  std::vector<HeldOutScore> scores(Options options, const std::vector<int>& iterations) {
+    options.iterations = iterations.back();
+    const std::size_t first = trials_.size();
+    run(options, [&, stopped = options](int iteration) mutable {
+      stopped.iterations = iteration;
+      return std::ranges::binary_search(iterations, iteration) ? std::optional<Method>(stopped)
+                                                               : std::nullopt;
+    });
+    std::vector<HeldOutScore> scores;
+    for (std::size_t i = first; i < trials_.size(); ++i) scores.push_back(trials_[i].score);
+    return scores;
+  }
+
+  std::vector<Trial> take() { return std::move(trials_); }
+
+ private:
+  // Adds a trial after each iteration for which trial_after names what it is a trial of.
+  template <typename TrialAfter>
+  void run(const Method& method, TrialAfter trial_after) {
+    VoxelProblem problem(data_.series.geometry, data_.grid, *rays_, data_.series.noise_sigma,
+                         {data_.held_out, data_.fit_view_scale});
+    const base::Stopwatch running;
+    const AfterIteration after_iteration = [&](const IterationReport& report,
+                                               VoxelVolume& densities) {
+      report_progress(method, report.iteration);
+      const std::optional<Method> tried = trial_after(report.iteration);
+      if (!tried) return;
+      const evaluate::ViewErrors errors =
+          held_out_errors(problem, data_.held_out, data_.fit_view_scale, densities);
+      trials_.push_back({*tried, {errors.total, errors.view_error}, running.seconds()});
+      base::log_info(
+          fmt::format("tried{}: held-out error {:.5f}", settings_text(*tried), errors.total));
+    };
+    reconstruct(problem, method, data_.series.mean_density, after_iteration);
+    ++num_runs_;
+  }
+
+  void report_progress(const Method& method, int iteration) const {
+    if (!progress_) return;
+    const int expected = std::max(kExpectedTrials, num_runs_ + 1);
+    base::ProgressReport report;
+    report.fraction_done =
+        (num_runs_ + static_cast<double>(iteration) / facts_of(method).iterations) / expected;
+    report.seconds_elapsed = running_.seconds();
+    report.seconds_left =
+        report.seconds_elapsed * (1 - report.fraction_done) / report.fraction_done;
+    report.detail = fmt::format("trial {}/{} {}", num_runs_ + 1, expected, settings_text(method));
+    progress_(report);
+  }
+
+  const TrialData& data_;
+  const base::ProgressSink& progress_;
+  std::unique_ptr<tilt_series::SlabViews> rays_;
+  base::Stopwatch running_;
+  std::vector<Trial> trials_;
+  int num_runs_ = 0;
+};
+
+TvOptions with_better_penalty(const TvOptions& options, Trials& trials) {
+  if (options.penalty || options.weight) return options;
+  TvOptions concave = options, smooth = options;
+  concave.penalty = "concave";
+  smooth.penalty = "smooth";
+  const HeldOutScore with_concave = trials.score(concave), with_smooth = trials.score(smooth);
+  return reconstruct::most_views_prefer(with_smooth, with_concave) ? smooth : concave;
+}
+
+double first_weight(const TvOptions& options) {
+  return options.weight.value_or(options.usual_weight());
+}
+template <HasWeight Options>
+double first_weight(const Options& options) {
+  return options.weight;
+}
+
+template <HasWeight Options>
+void choose_weight(Options& options, Trials& trials) {
+  options.weight = reconstruct::search_weight(first_weight(options), [&](double weight) {
+    Options other = options;
+    other.weight = weight;
+    return trials.score(other);
+  });
+}
+
+template <StopsEarly Options>
+void choose_iterations(Options& options, Trials& trials) {
+  constexpr int kSteps = 4;  // to either side
+  std::vector<int> ladder;
+  for (int step = -kSteps; step <= kSteps; ++step) {
+    const int iterations =
+        static_cast<int>(std::lround(options.iterations * std::exp2(0.5 * step)));
+    if (iterations > (ladder.empty() ? 0 : ladder.back())) ladder.push_back(iterations);
+  }
+  options.iterations =
+      ladder[reconstruct::first_as_good_as_the_best(trials.scores(options, ladder))];
+}
+
+template <typename Options>
+Method tuned(Options options, Trials& trials) {
+  if constexpr (std::same_as<Options, TvOptions>) options = with_better_penalty(options, trials);
+  if constexpr (HasWeight<Options>) choose_weight(options, trials);
+  if constexpr (StopsEarly<Options>) choose_iterations(options, trials);
+  return options;
+}
+
+}  // namespace
+
+Tuned tune(const Method& start, const TrialData& data, const base::ProgressSink& progress) {
+  Trials trials(data, progress);
+  const Method method =
+      std::visit([&](const auto& options) { return tuned(options, trials); }, start);
+  base::log_info(fmt::format("tuned:{}", settings_text(method)));
+  return {method, trials.take()};
+}
+
+nlohmann::json tuning_json(const Tuned& tuned) {
+  nlohmann::json trials = nlohmann::json::array();
+  for (const Trial& t : tuned.trials) {
+    nlohmann::json entry = json_of(t.method);
+    entry["held_out_error"] = t.score.error;
+    entry["held_out_error_by_view"] = t.score.view_error;
+    entry["seconds"] = t.seconds;
+    trials.push_back(std::move(entry));
+  }
+  return {{"chosen", json_of(tuned.method)}, {"trials", trials}};
+}
+
+}  // namespace tomofield::baseline

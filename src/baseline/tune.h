@@ -1,0 +1,56 @@
+#pragma once
+
+#include <concepts>
+#include <nlohmann/json_fwd.hpp>
+#include <vector>
+
+#include "base/progress.h"
+#include "baseline/method.h"
+#include "projection/sample_grid.h"
+#include "reconstruct/prepare.h"
+#include "reconstruct/weight_search.h"
+
+namespace tomofield::baseline {
+
+/// Methods that tune() can choose something of.
+template <typename Options>
+concept HasWeight = requires(Options options) {
+  options.weight;
+};
+template <typename Options>
+concept StopsEarly = std::same_as<Options, SirtOptions> || std::same_as<Options, SartTvOptions>;
+template <typename Options>
+concept Tunable = HasWeight<Options> || StopsEarly<Options>;
+
+/// A method with its settings, and how well it predicts the views held out.
+struct Trial {
+  Method method;
+  reconstruct::HeldOutScore score = {};
+  double seconds = 0;
+};
+
+struct Tuned {
+  Method method;
+  std::vector<Trial> trials;  ///< in order
+};
+
+/// What trials are made on.
+struct TrialData {
+  const reconstruct::PreparedSeries& series;
+  projection::SampleGrid grid;
+  std::vector<int> held_out;  ///< views, ascending
+  bool fit_view_scale = false;
+};
+
+/// Chooses the settings that predict the held-out views best, by the rules of the main method's
+/// tuning (reconstruct/tune.h) and on as many rows in the middle: the penalty, if
+/// neither it nor a weight is given, by a vote of the views on both with their usual weights; the
+/// weight by search_weight(); and of methods that stop early the number of iterations, between a
+/// quarter and four times that of `start` in steps of √2, all of one run, the fewest of those that
+/// cannot be told from the best. Methods that are not Tunable stay as they are.
+Tuned tune(const Method& start, const TrialData& data, const base::ProgressSink& progress);
+
+/// What was chosen, and every trial.
+nlohmann::json tuning_json(const Tuned& tuned);
+
+}  // namespace tomofield::baseline
