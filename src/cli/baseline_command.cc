@@ -8,6 +8,7 @@
 #include "baseline/tune.h"
 #include "cli/commands.h"
 #include "cli/common_options.h"
+#include "cli/fit_options.h"
 #include "cli/input_options.h"
 #include "cli/number_checks.h"
 #include "cli/pictures.h"
@@ -19,8 +20,6 @@
 namespace tomofield::cli {
 namespace {
 
-constexpr double kMostViews = 1e9;
-
 template <typename Method>
 struct Arguments {
   baseline::BaselineOptions options;
@@ -30,14 +29,9 @@ struct Arguments {
   bool dry_run = false;
 };
 
-bool is_on(const std::string& value, bool automatic) {
-  return value == "on" || (value == "auto" && automatic);
-}
-
 void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts& method) {
-  fmt::print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {:.0f} voxels\n",
-             plan.num_views, plan.geometry.width, plan.geometry.height, plan.pixel_size_A,
-             plan.roi.width(), plan.roi.height(), plan.geometry.thickness);
+  print_sizes({plan.num_views, plan.geometry.width, plan.geometry.height, plan.pixel_size_A,
+               plan.roi, plan.geometry.thickness});
   fmt::print(
       "{} voxels with the margins; {} iteration{} on {} threads; about {:.2f} GiB of memory\n",
       plan.num_voxels, method.iterations, method.iterations == 1 ? "" : "s", base::thread_count(),
@@ -77,31 +71,14 @@ void run(Arguments<Method>& arguments) {
 // Of every method.
 template <typename Method>
 void add_fit_options(CLI::App& command, Arguments<Method>& arguments) {
-  const char* group = "Fit";
   baseline::BaselineOptions& options = arguments.options;
-  command
-      .add_option("--view-scale", arguments.view_scale,
-                  "fit a scale and an offset a view; auto: for dark contrast")
-      ->check(CLI::IsMember({"auto", "on", "off"}))
-      ->capture_default_str()
-      ->group(group);
-  command
-      .add_option("--margin-spacing", options.margin_spacing,
-                  "pixels between samples of the margin")
-      ->check(number_between(1.0, 64.0))
-      ->capture_default_str()
-      ->group(group);
-  command
-      .add_option("--hold-out", options.hold_out,
-                  "keep every so-manieth view from the fit and report how well it is predicted")
-      ->check(number_between(2, kMostViews))
-      ->group(group);
+  add_shared_fit_options(command, {options.margin_spacing, options.hold_out, arguments.view_scale});
   if constexpr (baseline::Tunable<Method>) {
     command
         .add_flag("--tune", options.tune,
                   "choose the weight, or what else regularises, by the error of held-out views, "
                   "then reconstruct from all views with it")
-        ->group(group);
+        ->group("Fit");
   }
 }
 

@@ -10,6 +10,7 @@
 #include "cli/commands.h"
 #include "cli/common_options.h"
 #include "cli/exit_status.h"
+#include "cli/fit_options.h"
 #include "cli/input_options.h"
 #include "cli/number_checks.h"
 #include "cli/pictures.h"
@@ -63,11 +64,6 @@ void add_field_options(CLI::App& command, Arguments& arguments) {
       ->capture_default_str()
       ->group(group);
   command.add_option("--rank", field.rank, "components of each mode (vm)")
-      ->capture_default_str()
-      ->group(group);
-  command
-      .add_option("--margin-spacing", field.margin_spacing,
-                  "pixels between samples and vertices of the margin")
       ->capture_default_str()
       ->group(group);
   command
@@ -154,16 +150,8 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->check(CLI::IsMember({"mean", "max"}))
       ->capture_default_str()
       ->group(group);
-  command
-      .add_option("--view-scale", arguments.view_scale,
-                  "fit a scale and an offset a view; auto: for dark contrast")
-      ->check(CLI::IsMember({"auto", "on", "off"}))
-      ->capture_default_str()
-      ->group(group);
-  command
-      .add_option("--hold-out", fit.hold_out,
-                  "keep every so-manieth view from the fit and report how well it is predicted")
-      ->group(group);
+  add_shared_fit_options(
+      command, {arguments.options.field.margin_spacing, fit.hold_out, arguments.view_scale});
   command
       .add_flag("--tune", arguments.options.tune,
                 "choose --tv-penalty, --tv, --rank and --epochs by the error of held-out views, "
@@ -202,9 +190,8 @@ void add_run_options(CLI::App& command, Arguments& arguments) {
 }
 
 void print_plan(const reconstruct::ReconstructOptions& options, const reconstruct::RunPlan& plan) {
-  fmt::print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {:.0f} voxels\n",
-             plan.num_views, plan.view_width, plan.view_height, plan.pixel_size_A, plan.roi.width(),
-             plan.roi.height(), plan.thickness);
+  print_sizes({plan.num_views, plan.view_width, plan.view_height, plan.pixel_size_A, plan.roi,
+               plan.thickness});
   if (plan.num_trials > 0)
     fmt::print("about {} short trials first, that choose settings by held-out views\n",
                plan.num_trials);
@@ -230,8 +217,7 @@ ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
 void run(Arguments& arguments) {
   reconstruct::ReconstructOptions& options = arguments.options;
   const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
-  options.fit.fit_view_scale =
-      arguments.view_scale == "on" || (arguments.view_scale == "auto" && is_dark);
+  options.fit.fit_view_scale = is_on(arguments.view_scale, is_dark);
   options.fit.coarse_epochs =
       arguments.coarse_epochs.value_or(reconstruct::usual_coarse_epochs(options.fit.epochs));
   options.choose_penalty = arguments.penalty == "auto" && !arguments.variation;

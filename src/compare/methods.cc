@@ -12,8 +12,13 @@
 namespace tomofield::compare {
 namespace {
 
-// Of the baselines.
-bool can_tune(const std::string& baseline) { return baseline != "wbp"; }
+// As the known method with the same first words, such as "baseline tv".
+bool can_tune(const std::vector<std::string>& arguments) {
+  return std::ranges::any_of(known_methods(), [&](const Method& known) {
+    const auto& words = known.arguments;
+    return known.tunes && std::ranges::mismatch(words, arguments).in1 == words.end();
+  });
+}
 
 Method parse_method(const std::string& text) {
   const std::size_t equals = text.find('=');
@@ -36,7 +41,7 @@ Method parse_method(const std::string& text) {
                             text, command));
   }
   method.resumes = command == "reconstruct";
-  method.tunes = method.resumes || (method.arguments.size() > 1 && can_tune(method.arguments[1]));
+  method.tunes = can_tune(method.arguments);
   return method;
 }
 

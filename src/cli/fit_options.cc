@@ -1,0 +1,41 @@
+#include "cli/fit_options.h"
+
+#include <fmt/core.h>
+
+#include "cli/number_checks.h"
+
+namespace tomofield::cli {
+
+void add_shared_fit_options(CLI::App& command, const SharedFitOptions& options) {
+  constexpr double kMostViews = 1e9;
+  const char* group = "Fit";
+  command
+      .add_option("--view-scale", options.view_scale,
+                  "fit a scale and an offset a view; auto: for dark contrast")
+      ->check(CLI::IsMember({"auto", "on", "off"}))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--margin-spacing", options.margin_spacing,
+                  "pixels between samples of the margin")
+      ->check(number_between(1.0, 64.0))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--hold-out", options.hold_out,
+                  "keep every so-manieth view from the fit and report how well it is predicted")
+      ->check(number_between(2, kMostViews))
+      ->group(group);
+}
+
+bool is_on(const std::string& value, bool automatic) {
+  return value == "on" || (value == "auto" && automatic);
+}
+
+void print_sizes(const Sizes& sizes) {
+  fmt::print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {:.0f} voxels\n",
+             sizes.num_views, sizes.view_width, sizes.view_height, sizes.pixel_size_A,
+             sizes.roi.width(), sizes.roi.height(), sizes.thickness);
+}
+
+}  // namespace tomofield::cli

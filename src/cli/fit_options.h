@@ -1,0 +1,35 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <string>
+
+#include "geometry/tilt_geometry.h"
+
+namespace tomofield::cli {
+
+/// Options of every command that reconstructs, whatever the method.
+struct SharedFitOptions {
+  double& margin_spacing;
+  int& hold_out;
+  std::string& view_scale;  ///< auto, on or off: see is_on()
+};
+
+/// Registers --view-scale, --margin-spacing and --hold-out.
+void add_shared_fit_options(CLI::App& command, const SharedFitOptions& options);
+
+/// The meaning of auto, on or off.
+bool is_on(const std::string& value, bool automatic);
+
+/// What is reconstructed from what.
+struct Sizes {
+  int num_views;
+  std::int64_t view_width, view_height;
+  double pixel_size_A;
+  geometry::Roi roi;
+  double thickness;
+};
+/// The first line of what a command says before it starts.
+void print_sizes(const Sizes& sizes);
+
+}  // namespace tomofield::cli
