@@ -29,7 +29,8 @@ struct Arguments {
   reconstruct::ReconstructOptions options;
   std::string view_scale = "auto";
   std::string activation = "auto";
-  std::optional<int> coarse_epochs;
+  std::optional<int> epochs, coarse_epochs;
+  std::optional<double> learning_rate;
   std::optional<double> variation;
   std::string penalty = "auto";
   bool dry_run = false;
@@ -78,14 +79,15 @@ void add_field_options(CLI::App& command, Arguments& arguments) {
 void add_fit_options(CLI::App& command, Arguments& arguments) {
   const char* group = "Fit";
   reconstruct::FitOptions& fit = arguments.options.fit;
-  command.add_option("--epochs", fit.epochs, "passes over all views at full resolution")
-      ->capture_default_str()
+  command
+      .add_option("--epochs", arguments.epochs,
+                  "passes over all views at full resolution; default: 30, 10 of a grid")
       ->group(group);
   command
       .add_option(
           "--coarse-epochs", arguments.coarse_epochs,
           "passes before them over binned views, with fewer vertices; 0: none; default: 8/3 "
-          "of --epochs")
+          "of --epochs, of a grid 8 times as many")
       ->group(group);
   command
       .add_option("--coarse-bin", fit.coarse_bin,
@@ -115,8 +117,8 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->capture_default_str()
       ->group(group);
   command
-      .add_option("--learning-rate", fit.learning_rate, "of the first step; it falls exponentially")
-      ->capture_default_str()
+      .add_option("--learning-rate", arguments.learning_rate,
+                  "of the first step; it falls exponentially; default: 0.05, 0.035 of a grid")
       ->group(group);
   command
       .add_option("--tv", arguments.variation,
@@ -214,12 +216,21 @@ ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
                   file.string(), options.overwrite ? " instead of --overwrite" : "")};
 }
 
+void set_schedule(Arguments& arguments) {
+  const std::string& kind = arguments.options.field.kind;
+  const reconstruct::Schedule usual = reconstruct::usual_schedule(kind);
+  reconstruct::FitOptions& fit = arguments.options.fit;
+  fit.epochs = arguments.epochs.value_or(usual.epochs);
+  fit.coarse_epochs =
+      arguments.coarse_epochs.value_or(reconstruct::usual_coarse_epochs(kind, fit.epochs));
+  fit.learning_rate = arguments.learning_rate.value_or(usual.learning_rate);
+}
+
 void run(Arguments& arguments) {
   reconstruct::ReconstructOptions& options = arguments.options;
   const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
   options.fit.fit_view_scale = is_on(arguments.view_scale, is_dark);
-  options.fit.coarse_epochs =
-      arguments.coarse_epochs.value_or(reconstruct::usual_coarse_epochs(options.fit.epochs));
+  set_schedule(arguments);
   options.choose_penalty = arguments.penalty == "auto" && !arguments.variation;
   if (arguments.penalty != "auto") options.fit.penalty = arguments.penalty;
   options.fit.density_variation =

@@ -23,7 +23,7 @@ std::vector<Face> shared_faces(const field::Quadtree& tree);
 
 struct BoundaryOptions {
   double weight = 0.0;    ///< per px² of face and density unit; 0 is off
-  double spacing = 4.0;   ///< px: one random point in each square of this side
+  double spacing = 8.0;   ///< px: one random point in each square of this side
   double epsilon = 1e-3;  ///< density units; smooths the root where both sides agree
   std::uint64_t seed = 1;
 };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -55,11 +56,23 @@ struct FitOptions {
   std::vector<std::string> faults() const;
 };
 
-/// Coarse epochs that go with `epochs` fine ones: they cost an eighth each, so these
-/// take a third of the time (docs/results/ablation.md).
-inline int usual_coarse_epochs(int epochs) {
+/// Where the optimisation starts from and how long it takes, by the kind of field.
+struct Schedule {
+  int epochs;            ///< at full resolution
+  double coarse_epochs;  ///< for each of these; a coarse one costs an eighth
+  double learning_rate;  ///< of the first step
+};
+
+/// Plain vertices converge in a third of the epochs that factors need, and in smaller steps
+/// (docs/results/ablation.md).
+inline Schedule usual_schedule(const std::string& field_kind) {
+  return field_kind == "grid" ? Schedule{10, 8.0, 0.035} : Schedule{30, 8.0 / 3.0, 0.05};
+}
+
+/// Coarse epochs that go with `epochs` fine ones.
+inline int usual_coarse_epochs(const std::string& field_kind, int epochs) {
   return static_cast<int>(
-      std::clamp((8 * std::int64_t{epochs} + 2) / 3, std::int64_t{0}, std::int64_t{1'000'000'000}));
+      std::clamp(std::round(usual_schedule(field_kind).coarse_epochs * epochs), 0.0, 1e9));
 }
 
 /// The weight of the density's variation that goes with a penalty: a concave one counts
