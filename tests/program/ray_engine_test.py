@@ -85,7 +85,8 @@ class RawSeries:
     def command(self, name, alignment, *options):
         self.results = harness.Results(os.path.join(harness.fresh_directory(name), "out.mrc"))
         defaults = ["--contrast", "bright", "--thickness", THICKNESS, "--field", "grid",
-                    "--leaf-size", 16, "--epochs", 12, "--engine", "ray", "--threads", 1]
+                    "--leaf-size", 16, "--epochs", 12, "--learning-rate", 0.05,
+                    "--engine", "ray", "--threads", 1]
         return ["reconstruct", *alignment, "-o", self.results.volume_path,
                 *harness.merge(defaults, options)]
 
