@@ -14,6 +14,7 @@
 #include "io/atomic_file.h"
 #include "io/json.h"
 #include "io/mrc.h"
+#include "report/fsc_picture.h"
 #include "report/html.h"
 #include "tomofield/error.h"
 
@@ -44,17 +45,20 @@ void add_pictures(const CompareOptions& options, const std::vector<Row>& rows,
   const fs::path folder = options.folder / "pictures";
   fs::create_directories(folder);
   const std::vector<Shown> shown = shown_volumes(rows, options.truth);
+  const report::GreyScale scale = report::grey_scale_of(shown.front().planes);
   const Detail detail = busiest_detail(shown.front().planes.front());
   page.add_heading("Central slices");
-  page.add_paragraph("All on one grey scale: 0.5 to 99.5 percentiles of the first volume.");
+  page.add_paragraph(
+      "All, and the details below, on one grey scale: 0.5 to 99.5 percentiles of the first "
+      "volume.");
   for (std::size_t plane = 0; plane < 3; ++plane) {
     page.add_paragraph(std::array{"XY", "XZ", "YZ"}[plane]);
-    page.add_figures(plane_figures(shown, plane, folder));
+    page.add_figures(plane_figures(shown, plane, scale, folder));
   }
   page.add_heading("Detail");
   page.add_paragraph(fmt::format("Where the XY slice varies most: x {} to {}, y {} to {}.",
                                  detail.x0, detail.x1 - 1, detail.y0, detail.y1 - 1));
-  page.add_figures(detail_figures(shown, detail, folder));
+  page.add_figures(detail_figures(shown, detail, scale, folder));
   const double voxel_A = io::MrcReader(rows.front().volume).header().voxel_size_A[0];
   page.add_heading("Profile");
   page.add_paragraph("Density along x through the middle of the detail, in the file's units.");
@@ -77,8 +81,8 @@ void add_commands(const std::vector<Row>& rows, report::HtmlPage& page) {
 void add_correlations(const Scores& scores, report::HtmlPage& page) {
   for (const auto& [title, curves] : scores.correlations) {
     page.add_heading(title);
-    page.add_svg(report::curve_plot_svg(
-        {.x_title = "frequency, 1/Å", .y_title = "FSC", .y_range = {-0.1, 1.05}}, curves));
+    const double highest = curves.front().points.back().first;
+    page.add_svg(report::curve_plot_svg(report::fsc_axes(highest), curves));
   }
 }
 

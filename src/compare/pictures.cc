@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "report/grey_scale.h"
-
 namespace tomofield::compare {
 namespace {
 
@@ -53,8 +51,8 @@ Detail busiest_detail(const report::Slice& plane) {
 }
 
 std::vector<report::HtmlFigure> plane_figures(const std::vector<Shown>& volumes, std::size_t plane,
+                                              const report::GreyScale& scale,
                                               const std::filesystem::path& folder) {
-  const report::GreyScale scale = report::grey_scale_of(volumes.front().planes);
   std::vector<report::HtmlFigure> figures;
   for (const Shown& volume : volumes) {
     const report::Slice& slice = volume.planes[plane];
@@ -64,12 +62,11 @@ std::vector<report::HtmlFigure> plane_figures(const std::vector<Shown>& volumes,
 }
 
 std::vector<report::HtmlFigure> detail_figures(const std::vector<Shown>& volumes,
-                                               const Detail& detail,
+                                               const Detail& detail, const report::GreyScale& scale,
                                                const std::filesystem::path& folder) {
   const auto cut = [&](const Shown& volume) {
     return volume.planes.front().cut(detail.x0, detail.y0, detail.x1, detail.y1);
   };
-  const report::GreyScale scale = report::grey_scale_of({cut(volumes.front())});
   std::vector<report::HtmlFigure> figures;
   for (const Shown& volume : volumes)
     figures.push_back(figure(volume, cut(volume), "_detail", scale, folder));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "report/curve_plot.h"
+#include "report/grey_scale.h"
 #include "report/html.h"
 #include "report/slice.h"
 
@@ -26,13 +27,13 @@ struct Detail {
 /// standard deviation, on a lattice of half its side.
 Detail busiest_detail(const report::Slice& plane);
 
-/// The same plane (0: xy, 1: xz, 2: yz) of every volume on one grey scale, that of the
-/// first. PNG files go to `folder`.
+/// The same plane (0: xy, 1: xz, 2: yz) of every volume. PNG files go to `folder`.
 std::vector<report::HtmlFigure> plane_figures(const std::vector<Shown>& volumes, std::size_t plane,
+                                              const report::GreyScale& scale,
                                               const std::filesystem::path& folder);
 /// The detail of every xy plane, likewise.
 std::vector<report::HtmlFigure> detail_figures(const std::vector<Shown>& volumes,
-                                               const Detail& detail,
+                                               const Detail& detail, const report::GreyScale& scale,
                                                const std::filesystem::path& folder);
 /// Densities along x through the middle of the detail; distances in Å, or voxels without size.
 std::vector<report::Curve> detail_profiles(const std::vector<Shown>& volumes, const Detail& detail,

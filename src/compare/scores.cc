@@ -10,6 +10,7 @@
 #include "evaluate/compare.h"
 #include "evaluate/contrast.h"
 #include "evaluate/fsc_files.h"
+#include "report/fsc_picture.h"
 
 namespace tomofield::compare {
 namespace {
@@ -66,10 +67,8 @@ std::vector<report::Curve> add_correlation(std::span<const Row> rows,
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const evaluate::Fsc fsc = evaluate::correlate_files({rows[i].volume, others[i], {}, {}, {}});
     crossings.push_back(evaluate::crossing_A(fsc.frequency_per_A, fsc.all, threshold));
-    report::Curve curve{rows[i].run.method.title, {}};
-    for (std::size_t s = 0; s < fsc.frequency_per_A.size(); ++s)
-      curve.points.emplace_back(fsc.frequency_per_A[s], fsc.all.correlation[s]);
-    curves.push_back(std::move(curve));
+    curves.push_back(
+        report::fsc_curve(rows[i].run.method.title, fsc.frequency_per_A, fsc.all.correlation));
   }
   table.add(std::move(column), crossings);
   return curves;

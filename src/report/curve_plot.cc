@@ -6,24 +6,34 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <string_view>
 
-#include "report/html.h"
+#include "report/plot_surface.h"
 
 namespace tomofield::report {
 namespace {
 
 // The drawing area in a picture of kWidth × kHeight; the legend is at its right.
-constexpr double kWidth = 900, kHeight = 360;
-constexpr double kLeft = 70, kRight = 660, kTop = 15, kBottom = 305;
+constexpr int kWidth = 900, kHeight = 360;
+constexpr double kLeft = 70, kRight = 660, kTop = 30, kBottom = 305;
 
 // Told apart by people who see colours differently (Okabe and Ito 2008).
-constexpr std::array<std::string_view, 8> kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
-                                                      "#e69f00", "#56b4e9", "#000000", "#b0a000"};
+constexpr std::array<Colour, 8> kColours = {{{0x00, 0x72, 0xb2},
+                                             {0xd5, 0x5e, 0x00},
+                                             {0x00, 0x9e, 0x73},
+                                             {0xcc, 0x79, 0xa7},
+                                             {0xe6, 0x9f, 0x00},
+                                             {0x56, 0xb4, 0xe9},
+                                             {0x00, 0x00, 0x00},
+                                             {0xb0, 0xa0, 0x00}}};
+constexpr Colour kGrid{0xdd, 0xdd, 0xdd};
+constexpr double kCurveWidth = 1.6;
 
 using Range = std::pair<double, double>;
+using Coordinate = double std::pair<double, double>::*;
+using Point = PlotSurface::Point;
 
-Range range_of(const std::vector<Curve>& curves, double std::pair<double, double>::*coordinate) {
+Range range_of(const Range& wanted, const std::vector<Curve>& curves, Coordinate coordinate) {
+  if (wanted.first < wanted.second) return wanted;
   Range range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   for (const Curve& curve : curves) {
     for (const auto& point : curve.points) {
@@ -35,78 +45,82 @@ Range range_of(const std::vector<Curve>& curves, double std::pair<double, double
   return std::isfinite(range.first) ? range : Range{0, 1};
 }
 
+std::vector<Tick> ticks_of(const std::vector<Tick>& wanted, const Range& range) {
+  if (!wanted.empty()) return wanted;
+  std::vector<Tick> ticks;
+  for (const double at : round_ticks(range.first, range.second))
+    ticks.push_back({at, fmt::format("{:g}", at)});
+  return ticks;
+}
+
 class Plot {
  public:
-  Plot(const PlotAxes& axes, const std::vector<Curve>& curves)
-      : x_(axes.x_range.first < axes.x_range.second
-               ? axes.x_range
-               : range_of(curves, &std::pair<double, double>::first)),
-        y_(axes.y_range.first < axes.y_range.second
-               ? axes.y_range
-               : range_of(curves, &std::pair<double, double>::second)) {}
+  Plot(const PlotAxes& axes, const std::vector<Curve>& curves, PlotSurface& surface)
+      : axes_(axes),
+        curves_(curves),
+        surface_(surface),
+        x_(range_of(axes.x_range, curves, &Range::first)),
+        y_(range_of(axes.y_range, curves, &Range::second)) {}
 
-  std::string grid() const {
-    std::string svg;
-    for (const double tick : round_ticks(x_.first, x_.second)) {
-      svg += line(at_x(tick), kTop, at_x(tick), kBottom);
-      svg += text(at_x(tick), kBottom + 18, "middle", fmt::format("{:g}", tick));
+  void draw() const {
+    draw_axes();
+    for (std::size_t i = 0; i < curves_.size(); ++i) {
+      const Colour& colour = kColours[i % kColours.size()];
+      draw_curve(curves_[i], colour);
+      draw_name(i, colour);
     }
-    for (const double tick : round_ticks(y_.first, y_.second)) {
-      svg += line(kLeft, at_y(tick), kRight, at_y(tick));
-      svg += text(kLeft - 6, at_y(tick) + 4, "end", fmt::format("{:g}", tick));
-    }
-    return svg;
-  }
-
-  // Pieces between points that are not finite.
-  std::string path(const Curve& curve, std::string_view colour) const {
-    std::string d;
-    bool goes_on = false;
-    for (const auto& [x, y] : curve.points) {
-      if (!std::isfinite(x) || !std::isfinite(y)) {
-        goes_on = false;
-        continue;
-      }
-      d += fmt::format("{}{:.1f} {:.1f} ", goes_on ? "L" : "M", at_x(x),
-                       std::clamp(at_y(y), kTop, kBottom));
-      goes_on = true;
-    }
-    return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"/>\n", d,
-                       colour);
-  }
-
-  static std::string text(double x, double y, std::string_view anchor, std::string_view words) {
-    return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n", x, y,
-                       anchor, html_text(words));
   }
 
  private:
+  void draw_axes() const {
+    for (const Tick& tick : ticks_of(axes_.x_ticks, x_)) {
+      const double x = at_x(tick.at);
+      surface_.draw_line({{x, kTop}, {x, kBottom}}, 1, kGrid);
+      surface_.draw_text({x, kBottom + 20}, Anchor::kMiddle, tick.label);
+    }
+    for (const Tick& tick : ticks_of(axes_.y_ticks, y_)) {
+      const double y = at_y(tick.at);
+      surface_.draw_line({{kLeft, y}, {kRight, y}}, 1, kGrid);
+      surface_.draw_text({kLeft - 6, y + 5}, Anchor::kEnd, tick.label);
+    }
+    surface_.draw_text({(kLeft + kRight) / 2, kHeight - 10}, Anchor::kMiddle, axes_.x_title);
+    surface_.draw_text({kLeft, kTop - 10}, Anchor::kStart, axes_.y_title);
+  }
+
+  // Pieces between points that are not finite.
+  void draw_curve(const Curve& curve, const Colour& colour) const {
+    std::vector<Point> piece;
+    const auto end_piece = [&] {
+      if (piece.size() > 1) surface_.draw_line(piece, kCurveWidth, colour);
+      piece.clear();
+    };
+    for (const auto& [x, y] : curve.points) {
+      if (std::isfinite(x) && std::isfinite(y))
+        piece.push_back({at_x(x), std::clamp(at_y(y), kTop, kBottom)});
+      else
+        end_piece();
+    }
+    end_piece();
+  }
+
+  void draw_name(std::size_t index, const Colour& colour) const {
+    const double y = kTop + 12 + 20 * static_cast<double>(index);
+    surface_.draw_line({{kRight + 15, y - 5}, {kRight + 40, y - 5}}, 3, colour);
+    surface_.draw_text({kRight + 48, y}, Anchor::kStart, curves_[index].name);
+  }
+
   double at_x(double x) const {
     return kLeft + (x - x_.first) / (x_.second - x_.first) * (kRight - kLeft);
   }
   double at_y(double y) const {
     return kBottom - (y - y_.first) / (y_.second - y_.first) * (kBottom - kTop);
   }
-  static std::string line(double x0, double y0, double x1, double y1) {
-    return fmt::format(
-        "<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"#ddd\"/>\n", x0, y0,
-        x1, y1);
-  }
 
+  const PlotAxes& axes_;
+  const std::vector<Curve>& curves_;
+  PlotSurface& surface_;
   Range x_, y_;
 };
-
-std::string legend(const std::vector<Curve>& curves) {
-  std::string svg;
-  for (std::size_t i = 0; i < curves.size(); ++i) {
-    const double y = kTop + 12 + 20 * static_cast<double>(i);
-    svg += fmt::format(
-        "<line x1=\"{0}\" y1=\"{1}\" x2=\"{2}\" y2=\"{1}\" stroke=\"{3}\" stroke-width=\"3\"/>\n",
-        kRight + 15, y - 4, kRight + 40, kColours[i % kColours.size()]);
-    svg += Plot::text(kRight + 48, y, "start", curves[i].name);
-  }
-  return svg;
-}
 
 }  // namespace
 
@@ -128,20 +142,16 @@ std::vector<double> round_ticks(double low, double high) {
 }
 
 std::string curve_plot_svg(const PlotAxes& axes, const std::vector<Curve>& curves) {
-  const Plot plot(axes, curves);
-  std::string svg = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
-      "height=\"{1}\" font-family=\"system-ui, sans-serif\" font-size=\"13\">\n",
-      kWidth, kHeight);
-  svg += plot.grid();
-  for (std::size_t i = 0; i < curves.size(); ++i)
-    svg += plot.path(curves[i], kColours[i % kColours.size()]);
-  svg += legend(curves);
-  svg += Plot::text((kLeft + kRight) / 2, kHeight - 10, "middle", axes.x_title);
-  svg += fmt::format(
-      "<text transform=\"translate(16 {:.0f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-      (kTop + kBottom) / 2, html_text(axes.y_title));
-  return svg + "</svg>\n";
+  SvgSurface surface(kWidth, kHeight);
+  Plot(axes, curves, surface).draw();
+  return surface.element();
+}
+
+void write_curve_plot(const PlotAxes& axes, const std::vector<Curve>& curves,
+                      const std::filesystem::path& path) {
+  PngSurface surface(kWidth, kHeight);
+  Plot(axes, curves, surface).draw();
+  surface.write(path);
 }
 
 }  // namespace tomofield::report

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <limits>
+
+#include "png_picture.h"
+#include "scratch_directory.h"
 
 namespace tomofield::report {
 namespace {
@@ -26,8 +30,46 @@ TEST(CurvePlot, DrawsEveryCurveAndItsName) {
   EXPECT_NE(svg.find(">second</text>"), std::string::npos);
   EXPECT_NE(svg.find(">a &amp; b</text>"), std::string::npos);
   // The first curve: from the lower left corner to the top and, past the hole, back down.
-  EXPECT_NE(svg.find("d=\"M70.0 305.0 L217.5 15.0 M512.5 15.0 L660.0 305.0 \""), std::string::npos)
-      << svg;
+  EXPECT_NE(svg.find("d=\"M70.0 305.0 L217.5 30.0 \""), std::string::npos) << svg;
+  EXPECT_NE(svg.find("d=\"M512.5 30.0 L660.0 305.0 \""), std::string::npos) << svg;
+}
+
+TEST(CurvePlot, HasTheTicksThatAreGiven) {
+  const std::string svg = curve_plot_svg({.x_title = "x",
+                                          .y_title = "y",
+                                          .x_range = {0, 2},
+                                          .y_range = {0, 1},
+                                          .y_ticks = {{0.5, "half"}}},
+                                         {});
+  EXPECT_NE(svg.find("d=\"M70.0 167.5 L660.0 167.5 \""), std::string::npos) << svg;
+  EXPECT_NE(svg.find(">half</text>"), std::string::npos);
+  EXPECT_EQ(svg.find(">0.8</text>"), std::string::npos);
+  EXPECT_NE(svg.find(">1.5</text>"), std::string::npos);
+}
+
+TEST(CurvePlot, IsTheSameOnPixels) {
+  const testing::ScratchDirectory directory;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  write_curve_plot({.x_title = "x", .y_title = "y", .y_range = {0, 1}},
+                   {{"", {{0.0, 0.0}, {0.25, 0.25}, {0.5, nan}, {0.75, 0.75}, {1.0, 5.0}}}},
+                   directory / "plot.png");
+  const auto picture = testing::read_png(directory / "plot.png", PNG_FORMAT_RGB);
+  ASSERT_EQ(picture.width, 900);
+  ASSERT_EQ(picture.height, 360);
+  int drawn = 0;
+  for (std::int64_t y = 0; y < picture.height; ++y) {
+    for (std::int64_t x = 0; x <= 662; ++x) {
+      if (picture.at(x, y, 0) != 0x00 || picture.at(x, y, 1) != 0x72) continue;
+      ++drawn;
+      EXPECT_TRUE(x <= 217 + 2 || x >= 512 - 2) << x << ", the gap";
+      EXPECT_GE(y, 30 - 2) << "beyond the axis";
+      // Rising to the right along the diagonal, and from 0.75 to the end of the axis.
+      const double height = (305.0 - static_cast<double>(y)) / 275;
+      const double along = (static_cast<double>(x) - 70) / 590;
+      EXPECT_NEAR(height, along, 0.02) << x << " " << y;
+    }
+  }
+  EXPECT_GT(drawn, 500);
 }
 
 }  // namespace

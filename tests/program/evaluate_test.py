@@ -331,14 +331,14 @@ def test_fsc_table_and_picture():
     for column, name in (("fsc", "all"), ("fsc_measured", "measured"), ("fsc_missing", "missing")):
         np.testing.assert_allclose(table[column], as_floats(fsc[name]["correlation"]), atol=1e-6)
     picture = skimage.io.imread(path("fsc.png"))
-    assert picture.shape == (480, 720, 3)
-    # The blue line follows the curve: its height above the axis in units of the axes.
-    blue = np.argwhere((picture == (30, 100, 200)).all(axis=2) & (np.arange(480) > 30)[:, None])
+    assert picture.shape == (360, 900, 3)
+    # The second line follows the curve: its height above the axis in units of the axes.
+    drawn = np.argwhere((picture == (0xd5, 0x5e, 0)).all(axis=2))
     curve, frequency = table["fsc_measured"], table["frequency_per_A"]
-    columns = 84 + (690 - 84) * frequency / frequency[-1]
+    columns = 70 + (660 - 70) * frequency / frequency[-1]
     for s in (3, 8, 12):
-        rows = blue[abs(blue[:, 1] - columns[s]) <= 1, 0]
-        expected = 480 - (64 + (440 - 64) * (curve[s] + 0.2) / 1.25)
+        rows = drawn[abs(drawn[:, 1] - columns[s]) <= 1, 0]
+        expected = 305 - (305 - 30) * (curve[s] + 0.2) / 1.25
         assert rows.min() - 2 <= expected <= rows.max() + 2, (s, rows, expected)
 
 

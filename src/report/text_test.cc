@@ -1,12 +1,12 @@
-#include "report/line_plot.h"
+#include "report/text.h"
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <limits>
+#include <array>
+#include <cstdint>
+#include <vector>
 
 #include "png_picture.h"
-#include "report/text.h"
 #include "scratch_directory.h"
 
 namespace tomofield::report {
@@ -48,31 +48,6 @@ TEST(Text, LettersAreWhereTheyBelong) {
   }
   EXPECT_EQ(of_l, 11 * kDot * kDot);
   EXPECT_EQ(of_ring, 16 * kDot * kDot);
-}
-
-TEST(LinePlot, DrawsTheLineFromEndToEndWithItsGap) {
-  const testing::ScratchDirectory directory;
-  LinePlot plot;
-  plot.x = {0.0, 0.25, 0.5, 0.75, 1.0};
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  plot.lines.push_back({"", kRed, {0.0, 0.25, nan, 0.75, 5.0}});
-  write_line_plot(plot, directory / "plot.png");
-  const auto picture = testing::read_png(directory / "plot.png", PNG_FORMAT_RGB);
-  const auto red = pixels_of(picture, kRed);
-  ASSERT_FALSE(red.empty());
-  std::int64_t left = picture.width, right = 0, top = picture.height, bottom = 0;
-  for (const auto& [x, y] : red) {
-    left = std::min(left, x), right = std::max(right, x);
-    top = std::min(top, y), bottom = std::max(bottom, y);
-  }
-  const auto quarter = (right - left) / 4;
-  for (const auto& [x, y] : red)
-    EXPECT_TRUE(x <= left + quarter + 2 || x >= left + 3 * quarter - 2) << x;
-  // Rising to the right, and values beyond the axis end at it.
-  EXPECT_EQ(red.front()[0] > (left + right) / 2, true);
-  EXPECT_EQ(red.back()[0] < (left + right) / 2, true);
-  EXPECT_GT(top, 20);
-  EXPECT_LT(bottom, picture.height - 40);
 }
 
 }  // namespace

@@ -1,0 +1,62 @@
+#include "report/plot_surface.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "report/html.h"
+#include "report/text.h"
+
+namespace tomofield::report {
+namespace {
+
+constexpr Colour kWhite{255, 255, 255}, kBlack{0, 0, 0};
+
+std::int64_t nearest(double value) { return std::lround(value); }
+
+}  // namespace
+
+SvgSurface::SvgSurface(int width, int height)
+    : svg_(fmt::format(
+          "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
+          "height=\"{1}\" font-family=\"system-ui, sans-serif\" font-size=\"13\">\n",
+          width, height)) {}
+
+void SvgSurface::draw_line(const std::vector<Point>& points, double width, const Colour& colour) {
+  std::string path;
+  for (const Point& point : points)
+    path += fmt::format("{}{:.1f} {:.1f} ", path.empty() ? "M" : "L", point.x, point.y);
+  svg_ += fmt::format(
+      "<path d=\"{}\" fill=\"none\" stroke=\"#{:02x}{:02x}{:02x}\" stroke-width=\"{}\"/>\n", path,
+      colour[0], colour[1], colour[2], width);
+}
+
+void SvgSurface::draw_text(Point at, Anchor anchor, std::string_view text) {
+  const char* const name = anchor == Anchor::kStart    ? "start"
+                           : anchor == Anchor::kMiddle ? "middle"
+                                                       : "end";
+  svg_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n", at.x, at.y,
+                      name, html_text(text));
+}
+
+PngSurface::PngSurface(int width, int height) : canvas_(width, height, kWhite) {}
+
+void PngSurface::draw_line(const std::vector<Point>& points, double width, const Colour& colour) {
+  const int thickness = std::max(1, static_cast<int>(nearest(width)));
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    canvas_.draw_line(points[i - 1].x, up(points[i - 1].y), points[i].x, up(points[i].y), thickness,
+                      colour);
+  }
+}
+
+void PngSurface::draw_text(Point at, Anchor anchor, std::string_view text) {
+  const std::int64_t width = text_width(text);
+  const std::int64_t before = anchor == Anchor::kStart    ? 0
+                              : anchor == Anchor::kMiddle ? width / 2
+                                                          : width;
+  report::draw_text(canvas_, nearest(at.x) - before, nearest(up(at.y)), text, kBlack);
+}
+
+}  // namespace tomofield::report

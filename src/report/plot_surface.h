@@ -1,0 +1,53 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "report/canvas.h"
+
+namespace tomofield::report {
+
+/// Where on a text its position lies.
+enum class Anchor { kStart, kMiddle, kEnd };
+
+/// What a plot is drawn on: pixels, x to the right and y downwards from the upper left.
+class PlotSurface {
+ public:
+  struct Point {
+    double x, y;
+  };
+
+  virtual ~PlotSurface() = default;
+  virtual void draw_line(const std::vector<Point>& points, double width, const Colour& colour) = 0;
+  /// One line; `at` is on its base line.
+  virtual void draw_text(Point at, Anchor anchor, std::string_view text) = 0;
+};
+
+class SvgSurface : public PlotSurface {
+ public:
+  SvgSurface(int width, int height);
+  void draw_line(const std::vector<Point>& points, double width, const Colour& colour) override;
+  void draw_text(Point at, Anchor anchor, std::string_view text) override;
+  /// The SVG element.
+  std::string element() const { return svg_ + "</svg>\n"; }
+
+ private:
+  std::string svg_;
+};
+
+class PngSurface : public PlotSurface {
+ public:
+  PngSurface(int width, int height);
+  void draw_line(const std::vector<Point>& points, double width, const Colour& colour) override;
+  void draw_text(Point at, Anchor anchor, std::string_view text) override;
+  /// Replaces `path`. Throws Error.
+  void write(const std::filesystem::path& path) const { canvas_.write(path); }
+
+ private:
+  double up(double y) const { return static_cast<double>(canvas_.height()) - 1 - y; }
+  Canvas canvas_;
+};
+
+}  // namespace tomofield::report
