@@ -20,8 +20,7 @@ using nlohmann::json;
 
 // Of those that compare penalties, which differ by more than weights do.
 constexpr std::int64_t kPenaltyRows = 32;
-constexpr int kPenaltyPart = 3;     // of a fit's epochs: one in so many
-constexpr int kPenaltyEpochs = 10;  // at least, before which little but noise has settled
+constexpr double kPenaltyPart = 0.5;  // of the epochs that plain vertices need
 
 Trial trial_from(const json& entry) {
   return {.settings = {.penalty = entry.at("tv_penalty"),
@@ -126,6 +125,18 @@ class TrialFits {
   int num_done_ = 0;
 };
 
+// Half the schedule of plain vertices; as much less as `fit` is less than usual for its field.
+FitOptions penalty_trial_options(const std::string& field_kind, const FitOptions& fit) {
+  const Schedule usual = usual_schedule("grid");
+  const double part =
+      std::min(1.0, static_cast<double>(fit.epochs) / usual_schedule(field_kind).epochs);
+  FitOptions shorter = fit;
+  shorter.epochs = std::max(1, static_cast<int>(std::lround(kPenaltyPart * part * usual.epochs)));
+  if (fit.coarse_epochs > 0) shorter.coarse_epochs = usual_coarse_epochs("grid", shorter.epochs);
+  shorter.learning_rate = usual.learning_rate;
+  return shorter;
+}
+
 void log_trials(const std::vector<Trial>& trials) {
   for (const Trial& t : trials) {
     base::log_info(fmt::format("tried {} tv {:8.3f}  rank {:3}  epochs {:4}: held-out error {:.5f}",
@@ -206,10 +217,10 @@ std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& fi
 
 std::optional<Tuned> tune_penalty(const Measurement& measurement, const FieldOptions& field,
                                   const FitOptions& fit, const TuneHooks& hooks) {
-  FitOptions shorter = fit;
-  shorter.epochs = std::min(fit.epochs, std::max(fit.epochs / kPenaltyPart, kPenaltyEpochs));
-  shorter.coarse_epochs = fit.coarse_epochs * shorter.epochs / fit.epochs;
-  TrialFits fits(measurement, kPenaltyRows, field, shorter, hooks, 2);
+  FieldOptions plain = field;
+  plain.kind = "grid";
+  const FitOptions shorter = penalty_trial_options(field.kind, fit);
+  TrialFits fits(measurement, kPenaltyRows, plain, shorter, hooks, 2);
   Tuned tuned;
   try {
     tuned.settings =

@@ -60,9 +60,10 @@ std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& fi
                           const FitOptions& fit, bool tunes_penalty, TrialFile& file,
                           const TuneHooks& hooks);
 
-/// Chooses the penalty alone, by choose_penalty(): two trials of a third of the epochs (ten
-/// at least, if it has as many) on half as many rows, a few per cent of a fit of 256 rows. None if
-/// a stop was requested.
+/// Chooses the penalty alone, by choose_penalty(): two trials on half as many rows, of plain
+/// vertices whatever the field, since which penalty is right is the specimen's affair and they
+/// converge in a fraction of the time: a few per cent of a fit of 256 rows. None if a stop was
+/// requested.
 std::optional<Tuned> tune_penalty(const Measurement& measurement, const FieldOptions& field,
                                   const FitOptions& fit, const TuneHooks& hooks);
 
