@@ -5,10 +5,10 @@ that was interrupted goes on with the row after. Seeds are not those of the test
 import json
 import os
 import re
-import resource
 import statistics
 import subprocess
 import sys
+import tempfile
 
 SEEDS = (101, 102, 103)
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -41,13 +41,16 @@ def phantom(options, kind, noise, seed):
     return folder
 
 
-def run_timed(command):
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(command)}\n{done.stderr}")
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+def run_measured(command):
+    """Core-seconds and the largest memory in MiB of a command and what it started."""
+    with tempfile.TemporaryFile("w+") as errors:
+        run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors)
+        _, status, usage = os.wait4(run.pid, 0)
+        run.returncode = os.waitstatus_to_exitcode(status)
+        if run.returncode != 0:
+            errors.seek(0)
+            sys.exit(f"{' '.join(command)}\n{errors.read()}")
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
 
 
 def measure(options, arguments, kind, noise, seed, scratch):
@@ -59,10 +62,10 @@ def measure(options, arguments, kind, noise, seed, scratch):
                str(thickness_of(options.size)), "--contrast", "bright", "-o", volume, "--overwrite"]
     command += ["--no-margin"] if kind == "A" else []
     row = {"arguments": arguments, "kind": kind, "noise": noise, "seed": seed, "size": options.size}
-    row["core_seconds"] = run_timed(command)
+    row["core_seconds"], row["peak_MiB"] = run_measured(command)
     scores = os.path.join(scratch, "scores.json")
     truth = os.path.join(folder, "truth.mrc")
-    run_timed([options.program, "evaluate", volume, truth, "--json", scores, "--overwrite"])
+    run_measured([options.program, "evaluate", volume, truth, "--json", scores, "--overwrite"])
     with open(scores) as file:
         row["scores"] = json.load(file)
     with open(os.path.splitext(volume)[0] + ".json") as file:
@@ -91,30 +94,49 @@ def has_row(path, arguments):
         return json.load(file)["arguments"] == arguments
 
 
+class Rows:
+    """The rows of a bench; within it (`with`) what is missing is measured."""
+
+    def __init__(self, options, bench):
+        self.options = options
+        self.folder = os.path.join(options.out, bench)
+        self.scratch = os.path.join(self.folder, f"scratch-{os.getpid()}")
+
+    def __enter__(self):
+        os.makedirs(self.scratch, exist_ok=True)
+        return self
+
+    def __exit__(self, *_):
+        subprocess.run(["rm", "-rf", self.scratch], check=True)
+
+    def row(self, name, arguments, kind, noise, seed):
+        """The row of this name and seed, measured if it must be; none if it may not (--table)."""
+        safe = re.sub(r"[^\w.+-]+", "_", name)
+        path = os.path.join(self.folder, f"{safe}_{self.options.size}_{seed}.json")
+        if not has_row(path, arguments):
+            if self.options.table:
+                return None
+            row = measure(self.options, arguments, kind, noise, seed, self.scratch)
+            with open(path + ".part", "w") as file:
+                json.dump(row, file, indent=1)
+            os.rename(path + ".part", path)
+            print(f"{name} seed {seed}: {psnr(row):.2f} dB, {row['core_seconds']:.0f} core-s",
+                  file=sys.stderr, flush=True)
+        with open(path) as file:
+            return json.load(file)
+
+
 def run_rows(options, bench, rows):
     """rows: {name: (arguments, kind, noise)}. Returns {name: [row of each seed]}."""
-    folder = os.path.join(options.out, bench)
-    scratch = os.path.join(folder, f"scratch-{os.getpid()}")
-    os.makedirs(scratch, exist_ok=True)
     results = {}
-    for name, (arguments, kind, noise) in rows.items():
-        if not re.search(options.only, name):
-            continue
-        for seed in options.seeds.split(","):
-            safe = re.sub(r"[^\w.+-]+", "_", name)
-            path = os.path.join(folder, f"{safe}_{options.size}_{seed}.json")
-            if not has_row(path, arguments):
-                if options.table:
-                    continue
-                row = measure(options, arguments, kind, noise, int(seed), scratch)
-                with open(path + ".part", "w") as file:
-                    json.dump(row, file, indent=1)
-                os.rename(path + ".part", path)
-                print(f"{name} seed {seed}: {psnr(row):.2f} dB, {row['core_seconds']:.0f} core-s",
-                      file=sys.stderr, flush=True)
-            with open(path) as file:
-                results.setdefault(name, []).append(json.load(file))
-    subprocess.run(["rm", "-rf", scratch], check=True)
+    with Rows(options, bench) as measured:
+        for name, (arguments, kind, noise) in rows.items():
+            if not re.search(options.only, name):
+                continue
+            for seed in options.seeds.split(","):
+                row = measured.row(name, arguments, kind, noise, int(seed))
+                if row:
+                    results.setdefault(name, []).append(row)
     return results
 
 
