@@ -12,6 +12,7 @@
 #include "cli/commands.h"
 #include "cli/common_options.h"
 #include "cli/exit_status.h"
+#include "cli/fit_options.h"
 #include "cli/input_options.h"
 #include "cli/number_checks.h"
 #include "cli/specimen_options.h"
@@ -28,6 +29,7 @@ void remember_signal(int signal) { g_signal = signal; }
 struct Arguments {
   tilt_series::TiltSeriesOptions input;  // checked here, read by the methods
   reconstruct::SpecimenOptions specimen;
+  std::string view_scale = "auto";  // likewise
   std::vector<std::string> names{"vm", "tv", "sirt", "wbp"};
   std::vector<std::string> others;
   std::string truth, folder;
@@ -131,6 +133,7 @@ void add_compare_command(CLI::App& program) {
   auto arguments = std::make_shared<Arguments>();
   add_input_options(command, arguments->input);
   add_specimen_options(command, arguments->specimen);
+  add_view_scale(command, arguments->view_scale);
   const auto own_options = add_own_options(command, *arguments);
   add_common_options(command);
   command.callback([&command, arguments, own_options] { run(command, *arguments, own_options); });

@@ -6,26 +6,35 @@
 
 namespace tomofield::cli {
 
-void add_shared_fit_options(CLI::App& command, const SharedFitOptions& options) {
-  constexpr double kMostViews = 1e9;
-  const char* group = "Fit";
+namespace {
+
+constexpr const char* kGroup = "Fit";
+
+}  // namespace
+
+void add_view_scale(CLI::App& command, std::string& value) {
   command
-      .add_option("--view-scale", options.view_scale,
+      .add_option("--view-scale", value,
                   "fit a scale and an offset a view; auto: for dark contrast")
       ->check(CLI::IsMember({"auto", "on", "off"}))
       ->capture_default_str()
-      ->group(group);
+      ->group(kGroup);
+}
+
+void add_shared_fit_options(CLI::App& command, const SharedFitOptions& options) {
+  constexpr double kMostViews = 1e9;
+  add_view_scale(command, options.view_scale);
   command
       .add_option("--margin-spacing", options.margin_spacing,
                   "pixels between samples of the margin")
       ->check(number_between(1.0, 64.0))
       ->capture_default_str()
-      ->group(group);
+      ->group(kGroup);
   command
       .add_option("--hold-out", options.hold_out,
                   "keep every so-manieth view from the fit and report how well it is predicted")
       ->check(number_between(2, kMostViews))
-      ->group(group);
+      ->group(kGroup);
 }
 
 bool is_on(const std::string& value, bool automatic) {

@@ -15,6 +15,8 @@ struct SharedFitOptions {
   std::string& view_scale;  ///< auto, on or off: see is_on()
 };
 
+/// Registers --view-scale: auto, on or off.
+void add_view_scale(CLI::App& command, std::string& value);
 /// Registers --view-scale, --margin-spacing and --hold-out.
 void add_shared_fit_options(CLI::App& command, const SharedFitOptions& options);
 

@@ -82,11 +82,13 @@ def test_every_method_that_can_be_is_tuned():
     folder = harness.fresh_directory("tuned")
     harness.succeed("compare", *series.input, *QUICK, "-o", folder, "--tune", "--methods", "wbp",
                     "--also", "s=baseline sirt --iterations 5", "--also",
-                    "t=baseline tv --iterations 20 --weight 90")
+                    "t=baseline tv --iterations 20 --weight 90", "--view-scale", "on")
     tunings = {}
     for name in ("wbp", "s", "t"):
         with open(os.path.join(folder, name + ".json")) as file:
-            tunings[name] = json.load(file)["figures"]["tuning"]
+            record = json.load(file)
+        assert record["options"]["fit_view_scale"] is True
+        tunings[name] = record["figures"]["tuning"]
     assert tunings["wbp"] is None and tunings["s"]["chosen"]["iterations"] > 5
     assert tunings["t"]["chosen"]["weight"] < 90
 
