@@ -8,8 +8,6 @@
 namespace tomofield::reconstruct {
 namespace {
 
-constexpr int kDepth = 1;  // of the uniform tree: margin leaves are root cells
-
 field::LeafShape leaf_shape(double size, double thickness, double spacing, double spacing_z,
                             int rank) {
   const auto vertices = [](double length, double step) {
@@ -56,7 +54,7 @@ Domain cover(double thickness, const geometry::Roi& roi, geometry::Extent2 reach
     reach.x1 = std::max(reach.x1, s.x1());
   }
   const field::RootGrid roots =
-      root_grid(roi, reach, static_cast<std::int64_t>(options.leaf_size) << kDepth);
+      root_grid(roi, reach, static_cast<std::int64_t>(options.leaf_size) << options.depth);
   // Slabs start with the cells; below the region there are whole ones or none.
   const auto end_row = static_cast<std::int64_t>(std::ceil(reach.y1));
   reach.y0 = static_cast<double>(roots.y0);
@@ -72,7 +70,7 @@ Domain cover(double thickness, const geometry::Roi& roi, geometry::Extent2 reach
     }
   }
   field::Quadtree tree(roots, regions);
-  tree.split_to_level(field::Region::kInterest, kDepth);
+  tree.split_to_level(field::Region::kInterest, options.depth);
   std::vector<field::LeafShape> shapes;
   // Along z all leaves are as fine as the finest ones are in the plane.
   const double spacing_z = options.vertex_spacing / (options.tree == "adaptive" ? 2 : 1);

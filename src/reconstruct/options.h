@@ -13,6 +13,7 @@ struct FieldOptions {
   std::string kind = "vm";       ///< vm or grid
   int leaf_size = 32;            ///< side of a leaf, a multiple of 16
   std::string tree = "uniform";  ///< or adaptive: leaves half and twice as wide where that pays
+  int depth = 1;                 ///< of a uniform tree's leaves; those of the margin have 0
   int leaf_budget = 0;  ///< most leaves of an adaptive tree; 0: as many as the uniform one has
   double vertex_spacing = 1.0;  ///< between vertices, all axes; of leaves of that size
   int rank = 24;                ///< of each mode, vm only
@@ -33,6 +34,7 @@ struct FitOptions {
   int epochs = 30;                 ///< at full resolution
   int coarse_epochs = 0;           ///< before them, with fewer pixels and vertices; 0: none
   int coarse_bin = 2;              ///< how many times fewer on each axis, at most; a power of two
+  int coarse_stages = 1;           ///< each of half the pixel of the one before
   int subsets = 16;                ///< interleaved tilt subsets: steps an epoch; at most one a view
   std::string engine = "slab";     ///< or ray: any view geometry, views as they were recorded
   int ray_samples = 0;             ///< N_max of eq. 10; 0: one a pixel of a leaf's diagonal

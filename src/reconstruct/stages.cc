@@ -21,11 +21,21 @@ int coarse_bin(const FieldOptions& field, const FitOptions& fit) {
 }  // namespace
 
 std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit) {
-  const double last_rate = fit.learning_rate * fit.final_rate;
-  const int bin = coarse_bin(field, fit);
-  if (bin == 1) return {{1, 0, fit.epochs, fit.learning_rate, last_rate}};
-  return {{bin, 0, fit.coarse_epochs, fit.learning_rate, fit.learning_rate * fit.coarse_final_rate},
-          {1, fit.coarse_epochs, fit.epochs, fit.learning_rate * fit.refined_rate, last_rate}};
+  std::vector<int> bins;
+  for (int bin = coarse_bin(field, fit); bin > 1 && std::ssize(bins) < fit.coarse_stages; bin /= 2)
+    bins.push_back(bin);
+  std::vector<Stage> stages;
+  std::int64_t first_epoch = 0;
+  double first_rate = fit.learning_rate;
+  for (int left = static_cast<int>(bins.size()); left > 0; --left) {
+    const int epochs = static_cast<int>((fit.coarse_epochs - first_epoch) / left);
+    stages.push_back({bins[bins.size() - static_cast<std::size_t>(left)], first_epoch, epochs,
+                      first_rate, fit.learning_rate * fit.coarse_final_rate});
+    first_epoch += epochs;
+    first_rate = fit.learning_rate * fit.refined_rate;
+  }
+  stages.push_back({1, first_epoch, fit.epochs, first_rate, fit.learning_rate * fit.final_rate});
+  return stages;
 }
 
 field::LeafShape coarser_shape(field::LeafShape shape, int bin) {

@@ -17,8 +17,8 @@ struct Stage {
   double first_rate = 0, last_rate = 0;  ///< learning rates; they fall exponentially
 };
 
-/// A coarse stage, unless it is off or leaves are too small for slabs of coarse
-/// pixels, and the fine one. The ray engine has no coarse stage.
+/// Coarse stages, which share the coarse epochs, unless they are off or leaves are too small for
+/// slabs of coarse pixels, and the fine one. The ray engine has none but that.
 std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit);
 
 /// A leaf's vertices `bin` times as far apart, to the next whole number of them.

@@ -48,6 +48,28 @@ TEST(Stages, FollowOneAnother) {
   EXPECT_EQ(make_stages({}, fit)[0].first_rate, fit.learning_rate);
 }
 
+TEST(Stages, SeveralCoarseOnesShareTheirEpochs) {
+  FieldOptions field;
+  field.leaf_size = 128;
+  FitOptions fit;
+  fit.coarse_epochs = 8;
+  fit.coarse_bin = 8;
+  fit.coarse_stages = 3;
+  fit.epochs = 5;
+  const auto stages = make_stages(field, fit);
+  ASSERT_EQ(stages.size(), 4u);
+  std::int64_t first_epoch = 0;
+  for (std::size_t s = 0; s < 4; ++s) {
+    EXPECT_EQ(stages[s].bin, 8 >> s);
+    EXPECT_EQ(stages[s].first_epoch, first_epoch);
+    EXPECT_EQ(stages[s].epochs, s == 0 ? 2 : s == 3 ? 5 : 3);
+    EXPECT_LT(stages[s].last_rate, stages[s].first_rate);
+    first_epoch += stages[s].epochs;
+  }
+  fit.coarse_bin = 2;
+  EXPECT_EQ(make_stages(field, fit).size(), 2u);
+}
+
 TEST(Stages, CoarserShapesContainEveryOtherVertex) {
   const field::LeafShape coarse =
       coarser_shape({.nx = 33, .ny = 33, .nz = 76, .rank_x = 4, .rank_y = 5, .rank_z = 6}, 2);
