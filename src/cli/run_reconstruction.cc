@@ -1,0 +1,71 @@
+#include "cli/run_reconstruction.h"
+
+#include <fmt/core.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include "base/parallel.h"
+#include "cli/exit_status.h"
+#include "cli/fit_options.h"
+#include "cli/pictures.h"
+#include "cli/progress_bar.h"
+
+namespace tomofield::cli {
+namespace {
+
+volatile std::sig_atomic_t g_signal = 0;
+void remember_signal(int signal) { g_signal = signal; }
+
+void print_plan(const reconstruct::ReconstructOptions& options, const reconstruct::RunPlan& plan) {
+  print_sizes({plan.num_views, plan.view_width, plan.view_height, plan.pixel_size_A, plan.roi,
+               plan.thickness});
+  if (plan.num_trials > 0)
+    fmt::print("about {} short trials first, that choose settings by held-out views\n",
+               plan.num_trials);
+  fmt::print(
+      "{} field, {} leaves, {} parameters; {} steps on {} threads; about {:.2f} GiB of memory\n",
+      options.field.kind, plan.num_leaves, plan.num_parameters, plan.num_steps,
+      base::thread_count(), static_cast<double>(plan.memory_bytes) / (1 << 30));
+}
+
+void print_files(const reconstruct::OutputPaths& paths) {
+  fmt::print("tomogram  {}\nmodel     {}\nfigures   {}\n", paths.volume.string(),
+             paths.model.string(), paths.json.string());
+}
+
+ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
+                   const reconstruct::ReconstructOptions& options) {
+  return {
+      128 + g_signal,
+      fmt::format("stopped; {} '{}': continue with the same command and --resume{}", what_is_there,
+                  file.string(), options.overwrite ? " instead of --overwrite" : "")};
+}
+
+}  // namespace
+
+void run_reconstruction(const tilt_series::TiltSeries& series,
+                        const reconstruct::ReconstructOptions& options, bool dry_run) {
+  print_plan(options, reconstruct::plan_run(series, options));
+  if (dry_run) return;
+  std::signal(SIGINT, remember_signal);
+  std::signal(SIGTERM, remember_signal);
+  const reconstruct::ReconstructHooks hooks{.progress = make_progress_bar("reconstruct"),
+                                            .tune_progress = make_progress_bar("tune"),
+                                            .stop_requested = [] { return g_signal != 0; }};
+  const reconstruct::OutputPaths paths = reconstruct::output_paths(options.output);
+  switch (reconstruct::reconstruct(series, options, hooks)) {
+    case reconstruct::Outcome::kFinished:
+      break;
+    case reconstruct::Outcome::kStopped:
+      throw stopped("the checkpoint is", paths.model, options);
+    case reconstruct::Outcome::kStoppedTuning:
+      if (options.tune) throw stopped("the finished trials are in", paths.trials, options);
+      throw ExitStatus{128 + g_signal, "stopped before the first checkpoint"};
+  }
+  print_files(paths);
+  write_pictures(paths.volume, series, paths.picture_prefix);
+  if (options.field.tree == "adaptive") write_tree_picture(paths.model, paths.tree_picture);
+}
+
+}  // namespace tomofield::cli

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "reconstruct/reconstruct.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::cli {
+
+/// Prints the plan of a fit, runs it, with progress and until it is interrupted, and writes its
+/// pictures. Only the plan if `dry_run`. Call reconstruct::check_options() first. Throws ExitStatus
+/// when it was stopped by a signal, with what there is to go on from.
+void run_reconstruction(const tilt_series::TiltSeries& series,
+                        const reconstruct::ReconstructOptions& options, bool dry_run);
+
+}  // namespace tomofield::cli
