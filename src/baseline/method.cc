@@ -25,10 +25,32 @@ Solution reconstruct_with(const TvOptions& options, VoxelProblem& problem, doubl
   return reconstruct_tv(problem, options, mean_density, after_iteration);
 }
 
+Solution reconstruct_with(const IngpOptions& options, VoxelProblem& problem, double mean_density,
+                          const AfterIteration& after_iteration) {
+  return reconstruct_ingp(problem, options, mean_density, after_iteration);
+}
+
+Solution reconstruct_with(const ImplicitOptions& options, VoxelProblem& problem,
+                          double mean_density, const AfterIteration& after_iteration) {
+  return reconstruct_implicit(problem, options, mean_density, after_iteration);
+}
+
 }  // namespace
 
 MethodFacts facts_of(const Method& method) {
   return std::visit([](const auto& options) { return options.facts(); }, method);
+}
+
+MethodSize size_of(const Method& method, const projection::SampleGrid& grid,
+                   std::int64_t num_rows) {
+  return std::visit(
+      [&](const auto& options) -> MethodSize {
+        if constexpr (requires { options.size(grid, num_rows); })
+          return options.size(grid, num_rows);
+        else
+          return {num_voxels(grid, num_rows), 0};
+      },
+      method);
 }
 
 nlohmann::json json_of(const Method& method) {

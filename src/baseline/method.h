@@ -3,6 +3,8 @@
 #include <nlohmann/json_fwd.hpp>
 #include <variant>
 
+#include "baseline/implicit.h"
+#include "baseline/ingp.h"
 #include "baseline/sart_tv.h"
 #include "baseline/sirt.h"
 #include "baseline/solver.h"
@@ -14,9 +16,12 @@ namespace tomofield::baseline {
 
 /// The options of one of the methods. Each has facts() and json(), and an overload of
 /// reconstruct_with() in method.cc: that and a line here are all that a method needs.
-using Method = std::variant<WbpOptions, SirtOptions, SartTvOptions, TvOptions>;
+using Method =
+    std::variant<WbpOptions, SirtOptions, SartTvOptions, TvOptions, IngpOptions, ImplicitOptions>;
 
 MethodFacts facts_of(const Method& method);
+/// Of a method whose options do not say it in a size(), every voxel is a parameter.
+MethodSize size_of(const Method& method, const projection::SampleGrid& grid, std::int64_t num_rows);
 /// The name and every option.
 nlohmann::json json_of(const Method& method);
 

@@ -47,7 +47,7 @@ std::vector<int> views_held_out(const reconstruct::PreparedSeries& series,
 // of the rays of its rows.
 std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
                             const projection::SampleGrid& grid, const MethodFacts& method,
-                            bool tunes) {
+                            const MethodSize& size, bool tunes) {
   constexpr std::size_t kTrialSlabs = reconstruct::kTrialRows / kLanes;
   constexpr std::size_t kFixed = std::size_t{48} << 20;  // program and libraries
   const std::size_t slabs = static_cast<std::size_t>((plan.roi.height() + kLanes - 1) / kLanes);
@@ -57,7 +57,7 @@ std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
                                      static_cast<std::size_t>(method.detectors) * rays;
   const std::size_t values_of_thread = grid.size() + rays;
   const std::size_t copied_slabs = tunes ? std::min<std::size_t>(slabs, kTrialSlabs) : 0;
-  return kFixed +
+  return kFixed + size.bytes +
          sizeof(float) * (slabs * values_of_slab + copied_slabs * rays +
                           static_cast<std::size_t>(base::thread_count()) * values_of_thread);
 }
@@ -126,7 +126,8 @@ nlohmann::json held_out_json(const VoxelProblem& problem, const std::vector<int>
 }
 
 nlohmann::json figures_json(const Solution& solution, const VoxelProblem& problem,
-                            const reconstruct::PreparedSeries& series, double seconds) {
+                            const reconstruct::PreparedSeries& series, std::size_t num_parameters,
+                            double seconds) {
   nlohmann::json views = nlohmann::json::array();
   for (const int view : problem.views()) {
     const std::size_t v = static_cast<std::size_t>(view);
@@ -135,10 +136,13 @@ nlohmann::json figures_json(const Solution& solution, const VoxelProblem& proble
                      {"offset", problem.view_model(view).offset * series.unit},
                      {"noise_sigma", series.noise_sigma[v] * series.unit}});
   }
+  for (std::size_t i = 0; i < solution.noise_sigma.size(); ++i)
+    views[i]["learned_noise_sigma"] = solution.noise_sigma[i] * series.unit;
   std::vector<double> residuals;
   for (const double loss : solution.data_loss)
     residuals.push_back(2 * loss / static_cast<double>(problem.num_rays()));
-  return {{"mean_squared_residual_per_noise_variance", residuals},
+  return {{"parameters", num_parameters},
+          {"mean_squared_residual_per_noise_variance", residuals},
           {"objective", solution.objective},
           {"density_unit", series.unit},
           {"pixel_size_A", series.pixel_size_A},
@@ -210,11 +214,10 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
   plan.geometry = planned.geometry;
   plan.roi = planned.roi;
   plan.pixel_size_A = planned.pixel_size_A;
-  for (const projection::SampleSegment& segment : grid.segments()) {
-    plan.num_voxels += static_cast<std::size_t>(segment.nx) * static_cast<std::size_t>(segment.nz) *
-                       static_cast<std::size_t>(planned.roi.height());
-  }
-  plan.memory_bytes = estimate_memory(planned, grid, facts_of(options.method), options.tune);
+  plan.num_voxels = num_voxels(grid, planned.roi.height());
+  const MethodSize size = size_of(options.method, grid, planned.roi.height());
+  plan.num_parameters = size.num_parameters;
+  plan.memory_bytes = estimate_memory(planned, grid, facts_of(options.method), size, options.tune);
   base::require_memory(plan.memory_bytes, "this baseline",
                        "use a larger --bin or --margin-spacing, or a smaller --roi or --thickness");
   return plan;
@@ -244,7 +247,10 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   Solution solution =
       reconstruct(problem, options.method, series.mean_density,
                   report_to(progress.reconstruction, facts_of(options.method), problem.num_rays()));
-  nlohmann::json figures = figures_json(solution, problem, series, running.seconds());
+  const double fit_seconds = running.seconds();
+  const MethodSize size = size_of(options.method, problem.grid(), problem.num_rows());
+  nlohmann::json figures =
+      figures_json(solution, problem, series, size.num_parameters, fit_seconds);
   figures["held_out"] =
       held_out_json(problem, held_out, options.fit_view_scale, solution.densities);
   figures["tuning"] = tuning;

@@ -41,8 +41,9 @@ struct BaselinePlan {
   geometry::TiltGeometry geometry;
   geometry::Roi roi;
   double pixel_size_A = 0;
-  std::size_t num_voxels = 0;    ///< with the margins
-  std::size_t memory_bytes = 0;  ///< estimated peak
+  std::size_t num_voxels = 0;      ///< with the margins
+  std::size_t num_parameters = 0;  ///< that are fitted: the voxels, or a network's
+  std::size_t memory_bytes = 0;    ///< estimated peak
 };
 
 /// Throws Error for options that do not fit the series, and when the memory

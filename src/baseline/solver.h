@@ -18,12 +18,21 @@ struct MethodFacts {
   int detectors;   ///< held at once, of all views of a slab, the measured rays among them
 };
 
+/// How much of it a method needs for a series: what it fits, and the memory that it takes besides
+/// the volumes and detectors.
+struct MethodSize {
+  std::size_t num_parameters;
+  std::size_t bytes;
+};
+
 /// What a reconstruction ends with. The histories of iterative ones have one entry for
 /// the starting densities and one for the densities after each iteration.
 struct Solution {
   VoxelVolume densities;
   std::vector<double> data_loss;  ///< ½ Σ (residual / σ)²
   std::vector<double> objective;  ///< what is minimised
+  /// Of the fitted views, in density units times pixels, if the method learns it.
+  std::vector<double> noise_sigma = {};
 };
 
 /// An iteration that is done; the figures are those of the densities that it began with.

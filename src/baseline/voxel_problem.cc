@@ -45,15 +45,19 @@ std::int64_t VoxelProblem::num_rays() const {
 }
 
 std::vector<loss::ViewSums> VoxelProblem::residuals(int slab, std::span<const int> views,
-                                                    float* samples, float* detector) const {
+                                                    float* samples, float* detector,
+                                                    std::uint16_t lanes) const {
   std::fill_n(detector, projector_.detector_size(views.size()), 0.0f);
   projector_.forward(samples, views, detector);
   std::vector<loss::ViewSums> sums;
+  std::vector<std::uint16_t> mask(row_size());
   for (const int view : views) {
+    for (std::size_t x = 0; x < mask.size(); ++x)
+      mask[x] = static_cast<std::uint16_t>(rays_.mask(slab, view)[x] & lanes);
     loss::ViewModel model = view_model(view);
     model.weight = 1.0;
-    sums.push_back(loss::data_term(model, 1.0, rays_.rays(slab, view), rays_.mask(slab, view),
-                                   width(), detector));
+    sums.push_back(
+        loss::data_term(model, 1.0, rays_.rays(slab, view), mask.data(), width(), detector));
     detector += width() * kLanes;
   }
   return sums;

@@ -69,8 +69,9 @@ class VoxelProblem {
 
   /// detector ← scale (scale A x + offset − b) for the rays of a slab of these views, 0 for
   /// those that do not count. Writes the padding of `samples`. Returns sums, one each view.
+  /// Only rays of these `lanes`, a bit each, count.
   std::vector<loss::ViewSums> residuals(int slab, std::span<const int> views, float* samples,
-                                        float* detector) const;
+                                        float* detector, std::uint16_t lanes = kAllLanes) const;
   /// ½ Σ (residual / σ)² of one slab or, with added sums, of all; sums of the fitted views.
   double data_loss(const std::vector<loss::ViewSums>& sums) const;
 
@@ -87,6 +88,7 @@ class VoxelProblem {
   void fill_weights(int slab, std::span<const int> views, float* detector) const;
 
  private:
+  static constexpr std::uint16_t kAllLanes = 0xffff;
   std::size_t row_size() const { return static_cast<std::size_t>(width()); }
   void measure_ray_lengths();
 

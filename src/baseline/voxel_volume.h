@@ -66,6 +66,14 @@ void for_each_sample_row(const projection::SampleGrid& grid, Body&& body) {
   }
 }
 
+/// Of all slabs, with the margins.
+inline std::size_t num_voxels(const projection::SampleGrid& grid, std::int64_t num_rows) {
+  std::size_t count = 0;
+  for (const projection::SampleSegment& segment : grid.segments())
+    count += static_cast<std::size_t>(segment.nx) * static_cast<std::size_t>(segment.nz);
+  return count * static_cast<std::size_t>(num_rows);
+}
+
 /// Sum of body(slab) over all slabs, in their order whatever the thread count.
 template <typename Body>
 double sum_over_slabs(int num_slabs, Body&& body) {

@@ -14,6 +14,7 @@
 #include "cli/pictures.h"
 #include "cli/progress_bar.h"
 #include "cli/specimen_options.h"
+#include "cli/tensorf_command.h"
 #include "cli/volume_options.h"
 #include "reconstruct/options.h"
 
@@ -33,9 +34,11 @@ void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts&
   print_sizes({plan.num_views, plan.geometry.width, plan.geometry.height, plan.pixel_size_A,
                plan.roi, plan.geometry.thickness});
   fmt::print(
-      "{} voxels with the margins; {} iteration{} on {} threads; about {:.2f} GiB of memory\n",
-      plan.num_voxels, method.iterations, method.iterations == 1 ? "" : "s", base::thread_count(),
-      static_cast<double>(plan.memory_bytes) / (1 << 30));
+      "{} voxels with the margins, {} parameters; {} iteration{} on {} threads; about {:.2f} GiB "
+      "of "
+      "memory\n",
+      plan.num_voxels, plan.num_parameters, method.iterations, method.iterations == 1 ? "" : "s",
+      base::thread_count(), static_cast<double>(plan.memory_bytes) / (1 << 30));
 }
 
 void print_summary(const baseline::BaselineSummary& summary) {
@@ -215,16 +218,87 @@ void add_tv(CLI::App& baseline) {
       ->group(group);
 }
 
+// Of the methods that fit a network.
+void add_network_options(CLI::App& command, baseline::NetworkOptions& method) {
+  const char* group = "Method";
+  constexpr int kMostLayers = 16, kWidest = 1024;
+  command.add_option("--hidden-layers", method.hidden_layers, "of the network")
+      ->check(number_between(1, kMostLayers))
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--width", method.width, "neurons of a hidden layer")
+      ->check(number_between(1, kWidest))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--learning-rate", method.learning_rate, "of the first step; it falls to a tenth")
+      ->check(number_above(0))
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--seed", method.seed, "of everything random")
+      ->check(seed_check())
+      ->capture_default_str()
+      ->group(group);
+}
+
+void add_ingp(CLI::App& baseline) {
+  CLI::App& command = *baseline.add_subcommand(
+      "ingp", "a multi-resolution hash grid and a small network, as in Instant-NGP");
+  const auto arguments = add_method<baseline::IngpOptions>(command);
+  add_network_options(command, arguments->method);
+  baseline::HashGridOptions& grid = arguments->method.grid;
+  const char* group = "Method";
+  command.add_option("--levels", grid.levels, "grids, from coarse to fine")
+      ->check(number_between(1, 32))
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--coarsest", grid.coarsest, "pixels between vertices of the coarsest level")
+      ->check(number_between(0.25, 1024))
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--finest", grid.finest, "pixels between vertices of the finest level")
+      ->check(number_between(0.25, 1024))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--table-bits", grid.table_bits,
+                  "log2 of the most vertices that a level stores; where it has more, they share "
+                  "entries by a hash")
+      ->check(number_between(4, 28))
+      ->capture_default_str()
+      ->group(group);
+}
+
+void add_implicit(CLI::App& baseline) {
+  CLI::App& command = *baseline.add_subcommand(
+      "implicit", "a network of coordinates, which learns the noise of each view");
+  const auto arguments = add_method<baseline::ImplicitOptions>(command);
+  add_network_options(command, arguments->method);
+  command
+      .add_option("--features", arguments->method.features,
+                  "plane waves of random direction that the network is given for a position")
+      ->check(number_between(1, 4096))
+      ->capture_default_str()
+      ->group("Method");
+  command.add_option("--shortest", arguments->method.shortest, "wavelength of them, in pixels")
+      ->check(number_between(1, 1024))
+      ->capture_default_str()
+      ->group("Method");
+}
+
 }  // namespace
 
 void add_baseline_command(CLI::App& program) {
   CLI::App& command =
-      *program.add_subcommand("baseline", "reconstructions on a voxel grid, to compare with");
+      *program.add_subcommand("baseline", "reconstructions by other methods, to compare with");
   command.require_subcommand(1);
   add_wbp(command);
   add_sirt(command);
   add_sart_tv(command);
   add_tv(command);
+  add_ingp(command);
+  add_implicit(command);
+  add_tensorf(command);
 }
 
 }  // namespace tomofield::cli

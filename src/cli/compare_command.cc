@@ -95,7 +95,7 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
   command
       .add_option("--methods", arguments.names,
                   "which, the first being the main one: vm, grid, tv, tv-concave, sart-tv, sirt, "
-                  "wbp")
+                  "wbp, tensorf, tensorf-plain, tensorf-ifp, ingp, implicit")
       ->delimiter(',')
       ->capture_default_str()
       ->group(group);

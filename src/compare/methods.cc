@@ -65,7 +65,15 @@ const std::vector<Method>& known_methods() {
        true},
       {"sart-tv", "SART with total variation", {"baseline", "sart-tv"}, false, true},
       {"sirt", "SIRT", {"baseline", "sirt"}, false, true},
-      {"wbp", "weighted back-projection", {"baseline", "wbp"}}};
+      {"wbp", "weighted back-projection", {"baseline", "wbp"}},
+      {"tensorf", "TensoRF with total variation", {"baseline", "tensorf"}, true},
+      {"tensorf-plain", "TensoRF", {"baseline", "tensorf", "--tv", "0"}, true},
+      {"tensorf-ifp",
+       "TensoRF with total variation and Fourier prior",
+       {"baseline", "tensorf", "--ifp", "0.1"},
+       true},
+      {"ingp", "hash grid and network", {"baseline", "ingp"}},
+      {"implicit", "network of coordinates", {"baseline", "implicit"}}};
   return methods;
 }
 

@@ -1,0 +1,21 @@
+#pragma once
+
+#include "baseline/hash_grid.h"
+#include "baseline/network_fit.h"
+
+namespace tomofield::baseline {
+
+/// A multi-resolution hash grid and a small network (Instant-NGP, Müller et al. 2022).
+struct IngpOptions : NetworkOptions {
+  HashGridOptions grid;
+
+  MethodFacts facts() const { return {"ingp", iterations, 1, 1}; }
+  nlohmann::json json() const;
+  MethodSize size(const projection::SampleGrid& samples, std::int64_t num_rows) const;
+};
+
+/// See fit_network().
+Solution reconstruct_ingp(VoxelProblem& problem, const IngpOptions& options, double mean_density,
+                          const AfterIteration& after_iteration);
+
+}  // namespace tomofield::baseline

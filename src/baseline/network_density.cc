@@ -1,0 +1,205 @@
+#include "baseline/network_density.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "base/parallel.h"
+#include "kernels/lanes.h"
+
+namespace tomofield::baseline {
+namespace {
+
+using kernels::kLanes;
+
+// Columns that go through the network at once: few enough for the L2 cache.
+constexpr int kChunk = 128;
+
+// β of softplus, per density unit (reconstruct::FieldOptions).
+constexpr float kSharpness = 5;
+
+// Parts of a slab whose gradients are summed apart: their order, not the threads', decides the
+// bits.
+constexpr std::size_t kParts = 16;
+
+std::vector<int> layer_widths(int num_features, const NetworkDensity::Shape& shape) {
+  std::vector<int> widths{num_features};
+  widths.insert(widths.end(), static_cast<std::size_t>(shape.hidden_layers), shape.width);
+  return widths;
+}
+
+double lowest_x(const projection::SampleGrid& grid) {
+  double low = std::numeric_limits<double>::infinity();
+  for (const projection::SampleSegment& segment : grid.segments()) low = std::min(low, segment.x0);
+  return low;
+}
+
+// What the network adds to: softplus of it is the mean density.
+float bias_of(const NetworkDensity::Shape& shape) {
+  constexpr double kLeast = 1e-3;
+  return static_cast<float>(
+      shape.non_negative
+          ? std::log(std::expm1(kSharpness * std::max(shape.mean_density, kLeast))) / kSharpness
+          : shape.mean_density);
+}
+
+// Calls body(i, sample) for the i-th point of some columns, `sample` of the z row that the first
+// column starts.
+template <typename Body>
+void for_each_point(int num_columns, const RowSet& rows, Body&& body) {
+  std::size_t i = 0;
+  for (int column = 0; column < num_columns; ++column) {
+    for (int row = 0; row < rows.num_rows; ++row)
+      body(i++, column * static_cast<int>(kLanes) + rows.first + row * RowSet::kStride);
+  }
+}
+
+std::ptrdiff_t first_sample(const projection::SampleSegment& segment, int k, int column) {
+  return segment.origin + k * segment.stride_z() + column * kLanes;
+}
+
+float softplus(float x) {
+  return std::max(x, 0.0f) + std::log1p(std::exp(-kSharpness * std::abs(x))) / kSharpness;
+}
+float softplus_slope(float x) { return 1 / (1 + std::exp(-kSharpness * x)); }
+
+}  // namespace
+
+std::uint16_t RowSet::lanes() const {
+  unsigned bits = 0;
+  for (int row = 0; row < num_rows; ++row) bits |= 1u << (first + row * kStride);
+  return static_cast<std::uint16_t>(bits);
+}
+
+std::vector<RowSet> RowSet::all(std::int64_t num_rows) {
+  std::vector<RowSet> sets;
+  for (int slab = 0; slab * kLanes < num_rows; ++slab) {
+    const int of_slab = static_cast<int>(std::min<std::int64_t>(kLanes, num_rows - slab * kLanes));
+    for (int first = 0; first < std::min(kStride, of_slab); ++first)
+      sets.push_back({slab, first, (of_slab - first + kStride - 1) / kStride});
+  }
+  return sets;
+}
+
+Point box_of(const projection::SampleGrid& grid, std::int64_t num_rows) {
+  double high_x = 0, depth = 0;
+  for (const projection::SampleSegment& segment : grid.segments()) {
+    high_x = std::max(high_x, segment.x1());
+    depth = std::max(depth, segment.nz * segment.hz);
+  }
+  return {static_cast<float>(high_x - lowest_x(grid)), static_cast<float>(num_rows),
+          static_cast<float>(depth)};
+}
+
+NetworkDensity::NetworkDensity(const projection::SampleGrid& grid, std::int64_t num_rows,
+                               std::unique_ptr<PointEncoding> encoding, const Shape& shape)
+    : low_x_(lowest_x(grid)),
+      encoding_(std::move(encoding)),
+      network_(layer_widths(encoding_->num_features(), shape), shape.activation),
+      non_negative_(shape.non_negative),
+      bias_(bias_of(shape)),
+      parameters_(encoding_->num_parameters() + network_.num_parameters()),
+      parts_(kParts * network_.num_parameters()) {
+  for (const projection::SampleSegment& segment : grid.segments()) {
+    for (int k = 0; k < segment.nz; ++k) {
+      for (int first = 0; first < segment.nx; first += kChunk) {
+        chunks_.push_back({&segment, k, first, std::min(kChunk, segment.nx - first), num_columns_});
+        num_columns_ += static_cast<std::size_t>(chunks_.back().size);
+      }
+    }
+  }
+  const int most_rows = num_rows < kLanes ? RowSet::all(num_rows).front().num_rows
+                                          : static_cast<int>(kLanes) / RowSet::kStride;
+  points_.resize(num_columns_ * static_cast<std::size_t>(most_rows));
+  if (encoding_->num_parameters() > 0)
+    grad_features_.resize(points_.size() * static_cast<std::size_t>(encoding_->num_features()));
+  encoding_->initialize(shape.seed, parameters());
+  network_.initialize(shape.seed + 1, parameters().subspan(encoding_->num_parameters()));
+}
+
+std::size_t NetworkDensity::memory_bytes(int num_threads) const {
+  const std::size_t batch = kChunk * (kLanes / RowSet::kStride) * network_.values_per_point();
+  return sizeof(float) * (parameters_.size() + grad_features_.size() + parts_.size() +
+                          3 * points_.size() + static_cast<std::size_t>(num_threads) * batch);
+}
+
+std::span<const float> NetworkDensity::encoding_parameters() const {
+  return {parameters_.data(), encoding_->num_parameters()};
+}
+
+std::span<const float> NetworkDensity::network_parameters() const {
+  return {parameters_.data() + encoding_->num_parameters(), network_.num_parameters()};
+}
+
+std::span<Point> NetworkDensity::points_of(const Chunk& chunk, const RowSet& rows) {
+  const auto num_rows = static_cast<std::size_t>(rows.num_rows);
+  return std::span(points_).subspan(chunk.index * num_rows,
+                                    static_cast<std::size_t>(chunk.size) * num_rows);
+}
+
+// What softplus is taken of.
+std::span<float> NetworkDensity::evaluate(const Chunk& chunk, const RowSet& rows,
+                                          DenseNetwork::Batch& batch) {
+  const projection::SampleSegment& s = *chunk.segment;
+  const std::span<Point> points = points_of(chunk, rows);
+  for_each_point(chunk.size, rows, [&](std::size_t i, int sample) {
+    const int column = chunk.first + sample / static_cast<int>(kLanes);
+    const int row = rows.slab * static_cast<int>(kLanes) + sample % static_cast<int>(kLanes);
+    points[i] = {static_cast<float>(s.x0 + (column + 0.5) * s.hx - low_x_),
+                 static_cast<float>(row) + 0.5f, static_cast<float>((chunk.k + 0.5) * s.hz)};
+  });
+  const int num_points = static_cast<int>(points.size());
+  encoding_->encode(points, encoding_parameters(), network_.inputs(num_points, batch));
+  const std::span<float> values = network_.forward(network_parameters(), num_points, batch);
+  for (float& value : values) value += bias_;
+  return values;
+}
+
+void NetworkDensity::decode(const RowSet& rows, float* samples) {
+  base::parallel_for(std::ssize(chunks_), [&](std::int64_t index) {
+    thread_local DenseNetwork::Batch batch;
+    const Chunk& chunk = chunks_[static_cast<std::size_t>(index)];
+    const std::span<const float> values = evaluate(chunk, rows, batch);
+    float* out = samples + first_sample(*chunk.segment, chunk.k, chunk.first);
+    for_each_point(chunk.size, rows, [&](std::size_t i, int sample) {
+      out[sample] = non_negative_ ? softplus(values[i]) : values[i];
+    });
+  });
+}
+
+void NetworkDensity::accumulate(const RowSet& rows, const float* grad_samples,
+                                std::span<float> gradient) {
+  const std::size_t count = network_.num_parameters();
+  base::parallel_for(kParts, [&](std::int64_t part) {
+    thread_local DenseNetwork::Batch batch;
+    const std::size_t p = static_cast<std::size_t>(part);
+    const std::span<float> sum = std::span(parts_).subspan(p * count, count);
+    std::ranges::fill(sum, 0.0f);
+    for (std::size_t c = p; c < chunks_.size(); c += kParts)
+      accumulate_chunk(chunks_[c], rows, grad_samples, batch, sum);
+  });
+  const std::span<float> of_network = gradient.subspan(encoding_->num_parameters());
+  for (std::size_t p = 0; p < kParts; ++p)
+    for (std::size_t i = 0; i < count; ++i) of_network[i] += parts_[p * count + i];
+  const std::size_t num_points = num_columns_ * static_cast<std::size_t>(rows.num_rows);
+  encoding_->accumulate(std::span(points_).first(num_points), grad_features_.data(), gradient);
+}
+
+void NetworkDensity::accumulate_chunk(const Chunk& chunk, const RowSet& rows,
+                                      const float* grad_samples, DenseNetwork::Batch& batch,
+                                      std::span<float> gradient) {
+  const std::span<float> values = evaluate(chunk, rows, batch);
+  const float* g = grad_samples + first_sample(*chunk.segment, chunk.k, chunk.first);
+  for_each_point(chunk.size, rows, [&](std::size_t i, int sample) {
+    values[i] = g[sample] * (non_negative_ ? softplus_slope(values[i]) : 1.0f);
+  });
+  const std::span<const float> by_features =
+      network_.backward(network_parameters(), values, batch, gradient);
+  if (grad_features_.empty()) return;
+  const std::size_t first = chunk.index * static_cast<std::size_t>(rows.num_rows) *
+                            static_cast<std::size_t>(encoding_->num_features());
+  std::ranges::copy(by_features, grad_features_.data() + first);
+}
+
+}  // namespace tomofield::baseline

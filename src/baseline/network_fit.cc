@@ -1,0 +1,164 @@
+#include "baseline/network_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "base/random.h"
+#include "baseline/lazy_adam.h"
+#include "baseline/network_density.h"
+#include "baseline/noise_levels.h"
+#include "kernels/lanes.h"
+
+namespace tomofield::baseline {
+namespace {
+
+constexpr double kRateFall = 0.1;   // of the learning rate, over all steps
+constexpr double kNoiseRate = 0.1;  // of the noise's levels, which falls likewise
+
+NetworkDensity::Shape shape_of(const NetworkOptions& options, double mean_density) {
+  return {options.hidden_layers, options.width, options.activation,
+          options.non_negative,  mean_density,  options.seed};
+}
+
+std::vector<std::size_t> shuffled(std::size_t count, std::uint64_t seed, int iteration) {
+  std::vector<std::size_t> order(count);
+  std::iota(order.begin(), order.end(), 0);
+  base::Random random(seed, static_cast<std::uint64_t>(iteration) + 1);
+  for (std::size_t i = count; i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);
+  return order;
+}
+
+class NetworkFit {
+ public:
+  NetworkFit(VoxelProblem& problem, const NetworkOptions& options,
+             std::unique_ptr<PointEncoding> encoding, double mean_density, bool learns_noise)
+      : problem_(problem),
+        options_(options),
+        density_(problem.grid(), problem.num_rows(), std::move(encoding),
+                 shape_of(options, mean_density)),
+        adam_(density_.num_parameters()),
+        solution_{VoxelVolume(problem.grid(), problem.num_rows()), {}, {}, {}},
+        detector_(problem.detector_size()),
+        gradient_(problem.grid().size()),
+        row_sets_(RowSet::all(problem.num_rows())),
+        sums_(row_sets_.size()) {
+    if (learns_noise) noise_.emplace(sigma_of_views());
+  }
+
+  Solution run(const AfterIteration& after_iteration) {
+    for (int iteration = 0; iteration < options_.iterations; ++iteration) {
+      for (const std::size_t set : shuffled(row_sets_.size(), options_.seed, iteration))
+        take_step(set);
+      finish_pass();
+      after_iteration({iteration + 1, solution_.data_loss.back(), solution_.objective.back()},
+                      solution_.densities);
+    }
+    for (std::size_t set = 0; set < row_sets_.size(); ++set) find_residuals(set);
+    finish_pass();
+    if (noise_) solution_.noise_sigma = sigma_of_views();
+    return std::move(solution_);
+  }
+
+ private:
+  // The number of residuals of each view, and the sum of their squares.
+  struct Squares {
+    std::vector<double> counts, sums;
+  };
+  Squares squares_of(const std::vector<loss::ViewSums>& sums) const {
+    Squares squares;
+    for (std::size_t v = 0; v < sums.size(); ++v) {
+      squares.counts.push_back(sums[v].n);
+      squares.sums.push_back(sums[v].squared_residual(problem_.view_model(problem_.views()[v])));
+    }
+    return squares;
+  }
+
+  std::vector<double> sigma_of_views() const {
+    std::vector<double> sigma;
+    for (std::size_t v = 0; v < problem_.views().size(); ++v) {
+      const auto view = static_cast<std::size_t>(problem_.views()[v]);
+      sigma.push_back(noise_ ? noise_->sigma(v) : problem_.noise_sigma()[view]);
+    }
+    return sigma;
+  }
+
+  // Densities and residuals of a set of rows, as they are.
+  void find_residuals(std::size_t set) {
+    const RowSet& rows = row_sets_[set];
+    float* samples = solution_.densities.slab(rows.slab);
+    density_.decode(rows, samples);
+    sums_[set] =
+        problem_.residuals(rows.slab, problem_.views(), samples, detector_.data(), rows.lanes());
+  }
+
+  void take_step(std::size_t set) {
+    find_residuals(set);
+    float* rays = detector_.data();
+    const std::int64_t rays_of_view = problem_.width() * kernels::kLanes;
+    for (const double sigma : sigma_of_views()) {
+      const float weight = static_cast<float>(1 / (sigma * sigma));
+      for (std::int64_t i = 0; i < rays_of_view; ++i) *rays++ *= weight;
+    }
+    gradient_.fill(0.0f);
+    problem_.backproject(problem_.views(), detector_.data(), gradient_.data());
+    density_.accumulate(row_sets_[set], gradient_.data(), adam_.gradient());
+    const double all_steps =
+        static_cast<double>(options_.iterations) * static_cast<double>(row_sets_.size());
+    const double fall = std::pow(kRateFall, static_cast<double>(num_steps_) / all_steps);
+    ++num_steps_;
+    adam_.step(options_.learning_rate * fall, density_.parameters());
+    if (!noise_) return;
+    const Squares squares = squares_of(sums_[set]);
+    noise_->step(squares.counts, squares.sums, kNoiseRate * fall);
+  }
+
+  // By the sums of all rows, each as they were when their turn came.
+  void finish_pass() {
+    const std::vector<loss::ViewSums> all = total(sums_);
+    solution_.data_loss.push_back(problem_.data_loss(all));
+    const Squares squares = squares_of(all);
+    solution_.objective.push_back(noise_ ? noise_->objective(squares.counts, squares.sums)
+                                         : solution_.data_loss.back());
+    problem_.fit_view_models(all);
+  }
+
+  VoxelProblem& problem_;
+  const NetworkOptions& options_;
+  NetworkDensity density_;
+  LazyAdam adam_;
+  std::optional<NoiseLevels> noise_;
+  Solution solution_;
+  base::AlignedBuffer<float> detector_, gradient_;
+  std::vector<RowSet> row_sets_;
+  std::vector<std::vector<loss::ViewSums>> sums_;  // [set of rows][view]
+  std::int64_t num_steps_ = 0;
+};
+
+}  // namespace
+
+nlohmann::json NetworkOptions::json() const {
+  return {{"iterations", iterations},       {"hidden_layers", hidden_layers}, {"width", width},
+          {"learning_rate", learning_rate}, {"non_negative", non_negative},   {"seed", seed}};
+}
+
+MethodSize network_size(const projection::SampleGrid& grid, std::int64_t num_rows,
+                        std::unique_ptr<PointEncoding> encoding, const NetworkOptions& options) {
+  const NetworkDensity density(grid, num_rows, std::move(encoding), shape_of(options, 0));
+  constexpr std::size_t kOfAdam = 3 * sizeof(float);  // gradient and two moments
+  return {density.num_parameters(),
+          density.memory_bytes(base::thread_count()) + kOfAdam * density.num_parameters()};
+}
+
+Solution fit_network(VoxelProblem& problem, const NetworkOptions& options,
+                     std::unique_ptr<PointEncoding> encoding, double mean_density,
+                     bool learns_noise, const AfterIteration& after_iteration) {
+  return NetworkFit(problem, options, std::move(encoding), mean_density, learns_noise)
+      .run(after_iteration);
+}
+
+}  // namespace tomofield::baseline

@@ -1,0 +1,117 @@
+#include "cli/tensorf_command.h"
+
+#include <memory>
+#include <string>
+
+#include "baseline/tensorf.h"
+#include "cli/common_options.h"
+#include "cli/fit_options.h"
+#include "cli/input_options.h"
+#include "cli/number_checks.h"
+#include "cli/run_reconstruction.h"
+#include "cli/specimen_options.h"
+
+#include "cli/volume_options.h"
+
+namespace tomofield::cli {
+namespace {
+
+struct Arguments {
+  reconstruct::ReconstructOptions options = baseline::tensorf_options();
+  std::string view_scale = "auto";
+  bool dry_run = false;
+};
+
+void add_method_options(CLI::App& command, Arguments& arguments) {
+  const char* group = "Method";
+  constexpr double kMost = 1e9;
+  reconstruct::FitOptions& fit = arguments.options.fit;
+  command.add_option("--rank", arguments.options.field.rank, "components of each mode")
+      ->check(number_between(1, 256))
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--epochs", fit.epochs, "passes over all views at full resolution")
+      ->check(number_between(1, kMost))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option(
+          "--coarse-epochs", fit.coarse_epochs,
+          "passes before them, with an eighth, a quarter and half the vertices on each axis "
+          "in turn; 0: none")
+      ->check(number_between(0, kMost))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--tv", fit.density_variation,
+                  "weight of the density's total variation, in noise units; 0: none")
+      ->check(number_between(0, kMost))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--ifp", fit.fourier,
+                  "weight of the isotropic Fourier prior, against streaks along X and Y; 0: none")
+      ->check(number_between(0, kMost))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--learning-rate", fit.learning_rate, "of the first step; it falls exponentially")
+      ->check(number_above(0))
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--seed", fit.seed, "of everything random")
+      ->check(seed_check())
+      ->capture_default_str()
+      ->group(group);
+}
+
+void add_run_options(CLI::App& command, Arguments& arguments) {
+  const char* group = "Running";
+  reconstruct::ReconstructOptions& options = arguments.options;
+  command
+      .add_option("-o,--output", options.output,
+                  "the tomogram; model (.h5), figures (.json) and pictures go beside it")
+      ->required()
+      ->group(group);
+  command.add_flag("--overwrite", options.overwrite, "replace existing results")->group(group);
+  command
+      .add_flag("--resume", options.resume, "continue from the model file of an interrupted run")
+      ->excludes("--overwrite")
+      ->group(group);
+  command
+      .add_flag("--dry-run", arguments.dry_run,
+                "check everything, print what would be done and the memory it needs")
+      ->group(group);
+}
+
+void run(Arguments& arguments) {
+  reconstruct::ReconstructOptions& options = arguments.options;
+  const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
+  options.fit.fit_view_scale = is_on(arguments.view_scale, is_dark);
+  if (is_dark) options.field.activation = "identity";
+  options.field.with_margin = options.specimen.with_margin;
+  reconstruct::check_options(options);
+  const tilt_series::TiltSeries series(options.input);
+  baseline::cover_with_one_node(plan_series(series, options.specimen).roi, options);
+  run_reconstruction(series, options, arguments.dry_run);
+}
+
+}  // namespace
+
+void add_tensorf(CLI::App& baseline) {
+  CLI::App& command = *baseline.add_subcommand(
+      "tensorf", "one factorised tensor for all, coarse to fine, as in TensoRF");
+  const auto arguments = std::make_shared<Arguments>();
+  reconstruct::ReconstructOptions& options = arguments->options;
+  add_input_options(command, options.input);
+  add_specimen_options(command, options.specimen);
+  add_method_options(command, *arguments);
+  add_shared_fit_options(
+      command, {options.field.margin_spacing, options.fit.hold_out, arguments->view_scale});
+  add_volume_options(command, options.volume);
+  add_run_options(command, *arguments);
+  add_common_options(command);
+  command.callback([arguments] { run(*arguments); });
+}
+
+}  // namespace tomofield::cli

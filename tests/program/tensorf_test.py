@@ -1,0 +1,102 @@
+"""baseline tensorf: one node for all, by the machinery of reconstruct.
+
+usage: tensorf_test.py TOMOFIELD SCRATCH_DIR"""
+
+import json
+import os
+import signal
+
+import numpy as np
+
+import harness
+from harness import HEIGHT, THICKNESS, TILTS, WIDTH, psnr, read_bytes
+
+series = harness.Series("series")
+QUICK = ["--thickness", THICKNESS, "--contrast", "bright", "--no-margin", "--rank", 10, "--epochs", 8,
+         "--coarse-epochs", 12]
+
+
+def tensorf(name, *options, source=series, run=harness.succeed):
+    output = os.path.join(harness.fresh_directory(name), "out.mrc")
+    result = run("baseline", "tensorf", *source.input, "-o", output, *harness.merge(QUICK, options))
+    return harness.Results(output), result
+
+
+def record_of(results):
+    with open(results.json_path, encoding="utf-8") as file:
+        return json.load(file)
+
+
+plain, _ = tensorf("plain")
+
+
+def test_specimen_is_found():
+    flat = psnr(np.full_like(series.truth, series.truth.mean()), series.truth)
+    gain = psnr(plain.volume, series.truth) - flat
+    print(f"{gain:.2f} dB above a flat volume")
+    assert plain.volume.shape == (THICKNESS, HEIGHT, WIDTH) and gain > 2.5, gain
+    assert all(os.path.exists(path) for path in plain.all_paths)
+
+
+def test_one_node_holds_everything():
+    record = record_of(plain)
+    options = record["options"]
+    assert options["field"]["leaf_size"] >= WIDTH and options["field"]["depth"] == 0
+    assert options["fit"]["boundary"] == 0 and options["fit"]["penalty"] == "smooth"
+    n, nz, rank = options["field"]["leaf_size"] + 1, THICKNESS, 10
+    # VX, VY, VZ and MYZ, MXZ, MXY; and the decoder.
+    count = rank * (2 * n + nz + n * n + 2 * n * nz)
+    assert 0 <= record["figures"]["parameters"] - count < 10, count
+
+
+def test_variation_smooths_and_prior_takes_from_the_axes():
+    def roughness(volume):
+        return np.abs(np.diff(volume, axis=2)).mean()
+
+    def axes(volume):
+        spectrum = np.abs(np.fft.fft2(volume)) ** 2
+        return (spectrum[:, 0, 2:-1].sum() + spectrum[:, 2:-1, 0].sum()) / spectrum[:, 1:, 1:].sum()
+
+    without, _ = tensorf("without-tv", "--tv", 0)
+    assert roughness(without.volume) > 1.1 * roughness(plain.volume)
+    prior, _ = tensorf("ifp", "--ifp", 30)
+    assert axes(prior.volume) < 0.95 * axes(plain.volume)
+
+
+def test_held_out_views_are_scored():
+    results, run = tensorf("held-out", "--hold-out", 5)
+    held_out = record_of(results)["figures"]["held_out"]
+    assert len(held_out["views"]) == len(TILTS) // 5 and "held out:" in run.stderr
+
+
+def test_it_goes_on_where_it_was_stopped():
+    output = os.path.join(harness.fresh_directory("resumed"), "out.mrc")
+    command = ["baseline", "tensorf", *series.input, "-o", output, *QUICK, "--resume"]
+    run = harness.start(*command)
+    for line in run.stderr:
+        if line.startswith("reconstruct "):
+            break
+    run.send_signal(signal.SIGTERM)
+    _, errors = run.communicate()
+    assert run.returncode in (0, 143), errors
+    harness.succeed(*command)
+    # The optimiser's moments are in the checkpoint.
+    assert read_bytes(output) == read_bytes(plain.volume_path)
+
+
+def test_dry_run_writes_nothing():
+    results, run = tensorf("dry", "--dry-run")
+    assert "1 leaves" in run.stdout and "GiB" in run.stdout, run.stdout
+    assert not os.path.exists(results.volume_path)
+
+
+def test_mistakes_get_a_sentence():
+    for options, expected in ((["--rank", 0], "rank"), (["--tv", -1], "tv"), (["--ifp", "nan"], "ifp"),
+                              (["--hold-out", 1], "hold-out"), (["--coarse-epochs", -1], "coarse-epochs"),
+                              (["--roi", "0,0,4000,10"], "--roi"), (["--thickness", 0], "thickness")):
+        results, run = tensorf("bad", *options, run=harness.tomofield)
+        assert run.returncode == 2 and expected in run.stderr, (options, run.stderr)
+        assert "internal" not in run.stderr and not os.path.exists(results.volume_path)
+
+
+harness.run_tests(globals())
