@@ -30,7 +30,7 @@ class Faults {
     if (value == first || value == second) return;
     found_.push_back(fmt::format("{} must be {} or {}, not '{}'", option, first, second, value));
   }
-  void add(std::string fault) { found_.push_back(std::move(fault)); }
+  void add(std::string_view fault) { found_.emplace_back(fault); }
   std::vector<std::string> take() { return std::move(found_); }
 
  private:
