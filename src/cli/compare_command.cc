@@ -94,8 +94,8 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
   const char* group = "Comparison";
   command
       .add_option("--methods", arguments.names,
-                  "which, the first being the main one: vm, grid, tv, tv-concave, sart-tv, sirt, "
-                  "wbp, tensorf, tensorf-plain, tensorf-ifp, ingp, implicit")
+                  fmt::format("which, the first being the main one: {}",
+                              fmt::join(compare::names_of(compare::known_methods()), ", ")))
       ->delimiter(',')
       ->capture_default_str()
       ->group(group);
@@ -106,7 +106,10 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
       ->allow_extra_args(false)
       ->group(group);
   command.add_option("--truth", arguments.truth, "MRC volume to score against")->group(group);
-  command.add_flag("--tune", arguments.tune, "tune the methods that can be")->group(group);
+  command
+      .add_flag("--tune", arguments.tune,
+                "tune the methods that have --tune; runs for --hold-out stay untuned")
+      ->group(group);
   command
       .add_flag("--halves", arguments.halves,
                 "run every method on the odd and on the even views too, and correlate the two")

@@ -32,7 +32,7 @@ Method parse_method(const std::string& text) {
                     "'smooth=reconstruct --tv-penalty smooth'",
                     text));
   }
-  Method method{name, name, {}};
+  Method method{.name = name, .title = name, .arguments = {}};
   std::istringstream words(text.substr(equals + 1));
   for (std::string word; words >> word;) method.arguments.push_back(word);
   const std::string command = method.arguments.empty() ? "" : method.arguments.front();
@@ -45,35 +45,53 @@ Method parse_method(const std::string& text) {
   return method;
 }
 
+}  // namespace
+
 std::vector<std::string> names_of(const std::vector<Method>& methods) {
   std::vector<std::string> names;
   for (const Method& m : methods) names.push_back(m.name);
   return names;
 }
 
-}  // namespace
-
 const std::vector<Method>& known_methods() {
   static const std::vector<Method> methods{
-      {"vm", "tomofield", {"reconstruct"}, true, true},
-      {"grid", "tomofield, plain vertices", {"reconstruct", "--field", "grid"}, true, true},
-      {"tv", "total variation", {"baseline", "tv"}, false, true},
-      {"tv-concave",
-       "total variation, concave",
-       {"baseline", "tv", "--penalty", "concave"},
-       false,
-       true},
-      {"sart-tv", "SART with total variation", {"baseline", "sart-tv"}, false, true},
-      {"sirt", "SIRT", {"baseline", "sirt"}, false, true},
-      {"wbp", "weighted back-projection", {"baseline", "wbp"}},
-      {"tensorf", "TensoRF with total variation", {"baseline", "tensorf"}, true},
-      {"tensorf-plain", "TensoRF", {"baseline", "tensorf", "--tv", "0"}, true},
-      {"tensorf-ifp",
-       "TensoRF with total variation and Fourier prior",
-       {"baseline", "tensorf", "--ifp", "0.1"},
-       true},
-      {"ingp", "hash grid and network", {"baseline", "ingp"}},
-      {"implicit", "network of coordinates", {"baseline", "implicit"}}};
+      {.name = "vm",
+       .title = "tomofield",
+       .arguments = {"reconstruct"},
+       .resumes = true,
+       .tunes = true},
+      {.name = "grid",
+       .title = "tomofield, plain vertices",
+       .arguments = {"reconstruct", "--field", "grid"},
+       .resumes = true,
+       .tunes = true},
+      {.name = "tv", .title = "total variation", .arguments = {"baseline", "tv"}, .tunes = true},
+      {.name = "tv-concave",
+       .title = "total variation, concave",
+       .arguments = {"baseline", "tv", "--penalty", "concave"},
+       .tunes = true},
+      {.name = "sart-tv",
+       .title = "SART with total variation",
+       .arguments = {"baseline", "sart-tv"},
+       .tunes = true},
+      {.name = "sirt", .title = "SIRT", .arguments = {"baseline", "sirt"}, .tunes = true},
+      {.name = "wbp", .title = "weighted back-projection", .arguments = {"baseline", "wbp"}},
+      {.name = "tensorf",
+       .title = "TensoRF with total variation",
+       .arguments = {"baseline", "tensorf"},
+       .resumes = true},
+      {.name = "tensorf-plain",
+       .title = "TensoRF",
+       .arguments = {"baseline", "tensorf", "--tv", "0"},
+       .resumes = true},
+      {.name = "tensorf-ifp",
+       .title = "TensoRF with total variation and Fourier prior",
+       .arguments = {"baseline", "tensorf", "--ifp", "0.1"},
+       .resumes = true},
+      {.name = "ingp", .title = "hash grid and network", .arguments = {"baseline", "ingp"}},
+      {.name = "implicit",
+       .title = "network of coordinates",
+       .arguments = {"baseline", "implicit"}}};
   return methods;
 }
 

@@ -18,6 +18,9 @@ struct Method {
 /// The methods that have a name.
 const std::vector<Method>& known_methods();
 
+/// In order.
+std::vector<std::string> names_of(const std::vector<Method>& methods);
+
 /// The methods of a comparison, in order: `names` of known ones, then `others`, each
 /// NAME=COMMAND with the words of a tomofield command, as in
 /// "smooth=reconstruct --tv-penalty smooth". Throws Error for unknown names, for names that

@@ -13,7 +13,7 @@ namespace tomofield::compare {
 
 /// What the report shows of the scores beside the table.
 struct Scores {
-  std::string remark;  ///< what the contrast was measured in
+  std::string remark;  ///< what has to be known about the table
   /// Shell correlations: what is correlated, and a curve a method.
   std::vector<std::pair<std::string, std::vector<report::Curve>>> correlations;
 };

@@ -82,7 +82,7 @@ def test_every_method_that_can_be_is_tuned():
     folder = harness.fresh_directory("tuned")
     harness.succeed("compare", *series.input, *QUICK, "-o", folder, "--tune", "--methods", "wbp",
                     "--also", "s=baseline sirt --iterations 5", "--also",
-                    "t=baseline tv --iterations 20 --weight 90", "--view-scale", "on")
+                    "t=baseline tv --iterations 20 --weight 90", "--view-scale", "on", "--hold-out", 4)
     tunings = {}
     for name in ("wbp", "s", "t"):
         with open(os.path.join(folder, name + ".json")) as file:
@@ -91,6 +91,9 @@ def test_every_method_that_can_be_is_tuned():
         tunings[name] = record["figures"]["tuning"]
     assert tunings["wbp"] is None and tunings["s"]["chosen"]["iterations"] > 5
     assert tunings["t"]["chosen"]["weight"] < 90
+    with open(os.path.join(folder, "t.held_out.json")) as file:
+        assert json.load(file)["options"]["method"]["weight"] == 90
+    assert "before they were tuned" in read(folder, "report.html")
 
 
 def test_it_goes_on_where_it_stopped():
