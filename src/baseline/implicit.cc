@@ -26,12 +26,13 @@ nlohmann::json ImplicitOptions::json() const {
 
 MethodSize ImplicitOptions::size(const projection::SampleGrid& samples,
                                  std::int64_t num_rows) const {
-  return network_size(samples, num_rows, encoding_of(*this), *this);
+  return network_size(samples, num_rows, *encoding_of(*this), *this);
 }
 
 Solution reconstruct_implicit(VoxelProblem& problem, const ImplicitOptions& options,
                               double mean_density, const AfterIteration& after_iteration) {
-  return fit_network(problem, options, encoding_of(options), mean_density, true, after_iteration);
+  return fit_network(problem, options, encoding_of(options), mean_density, /*learns_noise=*/true,
+                     after_iteration);
 }
 
 }  // namespace tomofield::baseline

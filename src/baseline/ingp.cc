@@ -26,13 +26,13 @@ nlohmann::json IngpOptions::json() const {
 }
 
 MethodSize IngpOptions::size(const projection::SampleGrid& samples, std::int64_t num_rows) const {
-  return network_size(samples, num_rows, encoding_of(*this, samples, num_rows), *this);
+  return network_size(samples, num_rows, *encoding_of(*this, samples, num_rows), *this);
 }
 
 Solution reconstruct_ingp(VoxelProblem& problem, const IngpOptions& options, double mean_density,
                           const AfterIteration& after_iteration) {
   return fit_network(problem, options, encoding_of(options, problem.grid(), problem.num_rows()),
-                     mean_density, false, after_iteration);
+                     mean_density, /*learns_noise=*/false, after_iteration);
 }
 
 }  // namespace tomofield::baseline

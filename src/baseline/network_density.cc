@@ -23,10 +23,10 @@ constexpr float kSharpness = 5;
 // bits.
 constexpr std::size_t kParts = 16;
 
-std::vector<int> layer_widths(int num_features, const NetworkDensity::Shape& shape) {
-  std::vector<int> widths{num_features};
+DenseNetwork network_of(const PointEncoding& encoding, const NetworkDensity::Shape& shape) {
+  std::vector<int> widths{encoding.num_features()};
   widths.insert(widths.end(), static_cast<std::size_t>(shape.hidden_layers), shape.width);
-  return widths;
+  return DenseNetwork(std::move(widths), shape.activation);
 }
 
 double lowest_x(const projection::SampleGrid& grid) {
@@ -96,11 +96,9 @@ NetworkDensity::NetworkDensity(const projection::SampleGrid& grid, std::int64_t 
                                std::unique_ptr<PointEncoding> encoding, const Shape& shape)
     : low_x_(lowest_x(grid)),
       encoding_(std::move(encoding)),
-      network_(layer_widths(encoding_->num_features(), shape), shape.activation),
+      network_(network_of(*encoding_, shape)),
       non_negative_(shape.non_negative),
-      bias_(bias_of(shape)),
-      parameters_(encoding_->num_parameters() + network_.num_parameters()),
-      parts_(kParts * network_.num_parameters()) {
+      bias_(bias_of(shape)) {
   for (const projection::SampleSegment& segment : grid.segments()) {
     for (int k = 0; k < segment.nz; ++k) {
       for (int first = 0; first < segment.nx; first += kChunk) {
@@ -109,19 +107,43 @@ NetworkDensity::NetworkDensity(const projection::SampleGrid& grid, std::int64_t 
       }
     }
   }
-  const int most_rows = num_rows < kLanes ? RowSet::all(num_rows).front().num_rows
-                                          : static_cast<int>(kLanes) / RowSet::kStride;
-  points_.resize(num_columns_ * static_cast<std::size_t>(most_rows));
-  if (encoding_->num_parameters() > 0)
-    grad_features_.resize(points_.size() * static_cast<std::size_t>(encoding_->num_features()));
+  const Counts counts = counts_of(grid, num_rows, *encoding_, network_);
+  parameters_ = base::AlignedBuffer<float>(counts.parameters);
+  points_.resize(counts.points);
+  grad_features_.resize(counts.grad_features);
+  parts_.resize(counts.parts);
   encoding_->initialize(shape.seed, parameters());
   network_.initialize(shape.seed + 1, parameters().subspan(encoding_->num_parameters()));
 }
 
-std::size_t NetworkDensity::memory_bytes(int num_threads) const {
-  const std::size_t batch = kChunk * (kLanes / RowSet::kStride) * network_.values_per_point();
-  return sizeof(float) * (parameters_.size() + grad_features_.size() + parts_.size() +
-                          3 * points_.size() + static_cast<std::size_t>(num_threads) * batch);
+NetworkDensity::Counts NetworkDensity::counts_of(const projection::SampleGrid& grid,
+                                                 std::int64_t num_rows,
+                                                 const PointEncoding& encoding,
+                                                 const DenseNetwork& network) {
+  std::size_t columns = 0;
+  for (const projection::SampleSegment& segment : grid.segments())
+    columns += static_cast<std::size_t>(segment.nx) * static_cast<std::size_t>(segment.nz);
+  const std::int64_t most_rows =
+      (std::min<std::int64_t>(num_rows, kLanes) + RowSet::kStride - 1) / RowSet::kStride;
+  const std::size_t points = columns * static_cast<std::size_t>(most_rows);
+  const bool is_fitted = encoding.num_parameters() > 0;
+  return {
+      .parameters = encoding.num_parameters() + network.num_parameters(),
+      .points = points,
+      .grad_features = is_fitted ? points * static_cast<std::size_t>(encoding.num_features()) : 0,
+      .parts = kParts * network.num_parameters()};
+}
+
+MethodSize NetworkDensity::size(const projection::SampleGrid& grid, std::int64_t num_rows,
+                                const PointEncoding& encoding, const Shape& shape,
+                                int num_threads) {
+  const DenseNetwork network = network_of(encoding, shape);
+  const Counts counts = counts_of(grid, num_rows, encoding, network);
+  const std::size_t batch = kChunk * (kLanes / RowSet::kStride) * network.values_per_point();
+  return {counts.parameters,
+          sizeof(Point) * counts.points +
+              sizeof(float) * (counts.parameters + counts.grad_features + counts.parts +
+                               static_cast<std::size_t>(num_threads) * batch)};
 }
 
 std::span<const float> NetworkDensity::encoding_parameters() const {

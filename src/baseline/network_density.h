@@ -8,6 +8,7 @@
 #include "base/aligned_buffer.h"
 #include "baseline/dense_network.h"
 #include "baseline/point_encoding.h"
+#include "baseline/solver.h"
 #include "projection/sample_grid.h"
 
 namespace tomofield::baseline {
@@ -47,8 +48,10 @@ class NetworkDensity {
   /// Of the encoding, then of the network.
   std::span<float> parameters() { return parameters_; }
   std::size_t num_parameters() const { return parameters_.size(); }
-  /// What it holds, and what so many threads need besides.
-  std::size_t memory_bytes(int num_threads) const;
+  /// The parameters of such a density, and what it and so many threads take: known before anything
+  /// is allocated.
+  static MethodSize size(const projection::SampleGrid& grid, std::int64_t num_rows,
+                         const PointEncoding& encoding, const Shape& shape, int num_threads);
 
   /// Densities of some rows of a slab's samples; the others stay as they are.
   void decode(const RowSet& rows, float* samples);
@@ -63,6 +66,12 @@ class NetworkDensity {
     int k, first, size;
     std::size_t index;  ///< of the first column, among all
   };
+  // How many values there are of each kind.
+  struct Counts {
+    std::size_t parameters, points, grad_features, parts;
+  };
+  static Counts counts_of(const projection::SampleGrid& grid, std::int64_t num_rows,
+                          const PointEncoding& encoding, const DenseNetwork& network);
   std::span<const float> encoding_parameters() const;
   std::span<const float> network_parameters() const;
   std::span<Point> points_of(const Chunk& chunk, const RowSet& rows);

@@ -140,5 +140,20 @@ TEST(RowSet, AllAreEveryRowOnce) {
   }
 }
 
+TEST(NetworkDensity, SizeIsKnownBeforeAnythingIsAllocated) {
+  const NetworkDensity::Shape shape{.hidden_layers = 2, .width = 6};
+  EXPECT_EQ(NetworkDensity::size(kGrid, kNumRows, *hash_grid(), shape, 1).num_parameters,
+            density_of(hash_grid(), true).num_parameters());
+  projection::SampleSegment huge;
+  huge.nx = huge.nz = 1 << 20;
+  const HashGrid encoding({1e6f, 16.0f, 1e6f}, {.levels = 32, .finest = 1.0, .table_bits = 28});
+  const projection::SampleGrid grid({huge});
+  const MethodSize size = NetworkDensity::size(grid, 16, encoding, shape, 1);
+  // Four rows of points, of 12 bytes and 64 features each.
+  const double points = 4 * std::exp2(40.0);
+  EXPECT_GE(static_cast<double>(size.bytes), (12 + 4 * 64) * points);
+  EXPECT_LT(static_cast<double>(size.bytes), 1.01 * (12 + 4 * 64) * points);
+}
+
 }  // namespace
 }  // namespace tomofield::baseline

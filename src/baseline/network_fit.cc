@@ -147,11 +147,12 @@ nlohmann::json NetworkOptions::json() const {
 }
 
 MethodSize network_size(const projection::SampleGrid& grid, std::int64_t num_rows,
-                        std::unique_ptr<PointEncoding> encoding, const NetworkOptions& options) {
-  const NetworkDensity density(grid, num_rows, std::move(encoding), shape_of(options, 0));
+                        const PointEncoding& encoding, const NetworkOptions& options) {
   constexpr std::size_t kOfAdam = 3 * sizeof(float);  // gradient and two moments
-  return {density.num_parameters(),
-          density.memory_bytes(base::thread_count()) + kOfAdam * density.num_parameters()};
+  MethodSize size =
+      NetworkDensity::size(grid, num_rows, encoding, shape_of(options, 0), base::thread_count());
+  size.bytes += kOfAdam * size.num_parameters;
+  return size;
 }
 
 Solution fit_network(VoxelProblem& problem, const NetworkOptions& options,

@@ -24,7 +24,7 @@ struct NetworkOptions {
 
 /// The parameters of a network and the memory that its fit takes.
 MethodSize network_size(const projection::SampleGrid& grid, std::int64_t num_rows,
-                        std::unique_ptr<PointEncoding> encoding, const NetworkOptions& options);
+                        const PointEncoding& encoding, const NetworkOptions& options);
 
 /// Fits a network (network_density.h) to the views by Adam and samples it at the voxels. There is
 /// no prior but what the network finds easy. Every step goes by the data term of all views in a
