@@ -16,15 +16,19 @@ namespace {
 constexpr int kWidth = 900, kHeight = 360;
 constexpr double kLeft = 70, kRight = 660, kTop = 30, kBottom = 305;
 
-// Told apart by people who see colours differently (Okabe and Ito 2008).
-constexpr std::array<Colour, 8> kColours = {{{0x00, 0x72, 0xb2},
-                                             {0xd5, 0x5e, 0x00},
-                                             {0x00, 0x9e, 0x73},
-                                             {0xcc, 0x79, 0xa7},
-                                             {0xe6, 0x9f, 0x00},
-                                             {0x56, 0xb4, 0xe9},
-                                             {0x00, 0x00, 0x00},
-                                             {0xb0, 0xa0, 0x00}}};
+// The first eight are told apart by people who see colours differently (Okabe and Ito 2008).
+constexpr std::array<Colour, 12> kColours = {{{0x00, 0x72, 0xb2},
+                                              {0xd5, 0x5e, 0x00},
+                                              {0x00, 0x9e, 0x73},
+                                              {0xcc, 0x79, 0xa7},
+                                              {0xe6, 0x9f, 0x00},
+                                              {0x56, 0xb4, 0xe9},
+                                              {0x00, 0x00, 0x00},
+                                              {0xb0, 0xa0, 0x00},
+                                              {0x6a, 0x3d, 0x9a},
+                                              {0x8c, 0x51, 0x0a},
+                                              {0x90, 0x90, 0x90},
+                                              {0x00, 0x44, 0x1b}}};
 constexpr Colour kGrid{0xdd, 0xdd, 0xdd};
 constexpr double kCurveWidth = 1.6;
 

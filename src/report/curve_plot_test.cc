@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <set>
 
 #include "png_picture.h"
 #include "scratch_directory.h"
@@ -32,6 +33,16 @@ TEST(CurvePlot, DrawsEveryCurveAndItsName) {
   // The first curve: from the lower left corner to the top and, past the hole, back down.
   EXPECT_NE(svg.find("d=\"M70.0 305.0 L217.5 30.0 \""), std::string::npos) << svg;
   EXPECT_NE(svg.find("d=\"M512.5 30.0 L660.0 305.0 \""), std::string::npos) << svg;
+}
+
+TEST(CurvePlot, TwelveCurvesHaveColoursOfTheirOwn) {
+  const std::string svg = curve_plot_svg({.x_title = "x", .y_title = "y"},
+                                         std::vector<Curve>(12, Curve{"curve", {{0, 0}, {1, 1}}}));
+  std::set<std::string> colours;
+  const std::string key = "stroke=\"";
+  for (std::size_t at = svg.find(key); at != std::string::npos; at = svg.find(key, at + 1))
+    colours.insert(svg.substr(at + key.size(), 7));
+  EXPECT_EQ(colours.size(), 12u + 1u);  // and the grid's
 }
 
 TEST(CurvePlot, HasTheTicksThatAreGiven) {
