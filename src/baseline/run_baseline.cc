@@ -203,8 +203,8 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
   const reconstruct::PreparedSeries planned = plan_series(series, options.specimen);
   if (planned.x_tilt_deg != 0.0) {
     throw Error(fmt::format(
-        "the series has an x-axis tilt of {}°, which the voxel baselines do not turn back: leave "
-        "--xtilt out (the volume is then turned by it), or use reconstruct",
+        "the series has an x-axis tilt of {}°, which this baseline does not turn back: leave "
+        "--xtilt out (the volume is then turned by it), or use reconstruct or baseline tensorf",
         planned.x_tilt_deg));
   }
   views_held_out(planned, options);  // throws if there are none
