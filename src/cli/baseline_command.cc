@@ -79,7 +79,8 @@ void add_fit_options(CLI::App& command, Arguments<Method>& arguments) {
   if constexpr (baseline::Tunable<Method>) {
     command
         .add_flag("--tune", options.tune,
-                  "choose the weight, or what else regularises, by the error of held-out views, "
+                  "choose the weight, or what else regularises, by the error of held-out views "
+                  "(every 8th, or those of --hold-out), "
                   "then reconstruct from all views with it")
         ->group("Fit");
   }
@@ -88,18 +89,11 @@ void add_fit_options(CLI::App& command, Arguments<Method>& arguments) {
 // Of those that iterate.
 template <typename Method>
 void add_iteration_options(CLI::App& command, Arguments<Method>& arguments) {
-  const char* group = "Method";
   command.add_option("--iterations", arguments.method.iterations, "passes over all views")
       ->check(number_above(0))
       ->capture_default_str()
-      ->group(group);
-  command
-      .add_option("--non-negative", arguments.non_negative,
-                  "keep densities at or above zero (of dark contrast: nothing brighter than the "
-                  "empty beam); auto: not for dark contrast, whose zero is uncertain")
-      ->check(CLI::IsMember({"auto", "on", "off"}))
-      ->capture_default_str()
-      ->group(group);
+      ->group("Method");
+  add_non_negative(command, arguments.non_negative);
 }
 
 template <typename Method>
@@ -296,9 +290,9 @@ void add_baseline_command(CLI::App& program) {
   add_sirt(command);
   add_sart_tv(command);
   add_tv(command);
+  add_tensorf(command);
   add_ingp(command);
   add_implicit(command);
-  add_tensorf(command);
 }
 
 }  // namespace tomofield::cli

@@ -5,7 +5,6 @@
 #include "cli/number_checks.h"
 
 namespace tomofield::cli {
-
 namespace {
 
 constexpr const char* kGroup = "Fit";
@@ -35,6 +34,16 @@ void add_shared_fit_options(CLI::App& command, const SharedFitOptions& options) 
                   "keep every so-manieth view from the fit and report how well it is predicted")
       ->check(number_between(2, kMostViews))
       ->group(kGroup);
+}
+
+void add_non_negative(CLI::App& command, std::string& value) {
+  command
+      .add_option("--non-negative", value,
+                  "keep densities at or above zero (of dark contrast: nothing brighter than the "
+                  "empty beam); auto: not for dark contrast, whose zero is uncertain")
+      ->check(CLI::IsMember({"auto", "on", "off"}))
+      ->capture_default_str()
+      ->group("Method");
 }
 
 bool is_on(const std::string& value, bool automatic) {

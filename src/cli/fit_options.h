@@ -20,6 +20,9 @@ void add_view_scale(CLI::App& command, std::string& value);
 /// Registers --view-scale, --margin-spacing and --hold-out.
 void add_shared_fit_options(CLI::App& command, const SharedFitOptions& options);
 
+/// Registers --non-negative of a baseline: auto, on or off.
+void add_non_negative(CLI::App& command, std::string& value);
+
 /// The meaning of auto, on or off.
 bool is_on(const std::string& value, bool automatic);
 

@@ -160,27 +160,6 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->group(group);
 }
 
-void add_run_options(CLI::App& command, Arguments& arguments) {
-  const char* group = "Running";
-  reconstruct::ReconstructOptions& o = arguments.options;
-  command
-      .add_option("-o,--output", o.output,
-                  "the tomogram; model (.h5), figures (.json) and pictures go beside it")
-      ->required()
-      ->group(group);
-  command.add_flag("--overwrite", o.overwrite, "replace existing results")->group(group);
-  command.add_flag("--resume", o.resume, "continue from the model file of an interrupted run")
-      ->excludes("--overwrite")
-      ->group(group);
-  command.add_option("--checkpoint-minutes", o.checkpoint_minutes, "between checkpoints")
-      ->capture_default_str()
-      ->group(group);
-  command
-      .add_flag("--dry-run", arguments.dry_run,
-                "check everything, print what would be done and the memory it needs")
-      ->group(group);
-}
-
 void set_schedule(Arguments& arguments) {
   const std::string& kind = arguments.options.field.kind;
   const reconstruct::Schedule usual = reconstruct::usual_schedule(kind);
@@ -222,7 +201,7 @@ void add_reconstruct_command(CLI::App& program) {
   add_field_options(command, *arguments);
   add_fit_options(command, *arguments);
   add_volume_options(command, arguments->options.volume);
-  add_run_options(command, *arguments);
+  add_run_options(command, arguments->options, arguments->dry_run);
   add_common_options(command);
   command.callback([arguments] { run(*arguments); });
 }

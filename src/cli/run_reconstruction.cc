@@ -23,10 +23,10 @@ void print_plan(const reconstruct::ReconstructOptions& options, const reconstruc
   if (plan.num_trials > 0)
     fmt::print("about {} short trials first, that choose settings by held-out views\n",
                plan.num_trials);
-  fmt::print(
-      "{} field, {} leaves, {} parameters; {} steps on {} threads; about {:.2f} GiB of memory\n",
-      options.field.kind, plan.num_leaves, plan.num_parameters, plan.num_steps,
-      base::thread_count(), static_cast<double>(plan.memory_bytes) / (1 << 30));
+  fmt::print("{} field, {} {}, {} parameters; {} steps on {} threads; about {:.2f} GiB of memory\n",
+             options.field.kind, plan.num_leaves, plan.num_leaves == 1 ? "leaf" : "leaves",
+             plan.num_parameters, plan.num_steps, base::thread_count(),
+             static_cast<double>(plan.memory_bytes) / (1 << 30));
 }
 
 void print_files(const reconstruct::OutputPaths& paths) {
@@ -43,6 +43,27 @@ ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
 }
 
 }  // namespace
+
+void add_run_options(CLI::App& command, reconstruct::ReconstructOptions& options, bool& dry_run) {
+  const char* group = "Running";
+  command
+      .add_option("-o,--output", options.output,
+                  "the tomogram; model (.h5), figures (.json) and pictures go beside it")
+      ->required()
+      ->group(group);
+  command.add_flag("--overwrite", options.overwrite, "replace existing results")->group(group);
+  command
+      .add_flag("--resume", options.resume, "continue from the model file of an interrupted run")
+      ->excludes("--overwrite")
+      ->group(group);
+  command.add_option("--checkpoint-minutes", options.checkpoint_minutes, "between checkpoints")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_flag("--dry-run", dry_run,
+                "check everything, print what would be done and the memory it needs")
+      ->group(group);
+}
 
 void run_reconstruction(const tilt_series::TiltSeries& series,
                         const reconstruct::ReconstructOptions& options, bool dry_run) {

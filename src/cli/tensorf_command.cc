@@ -10,7 +10,6 @@
 #include "cli/number_checks.h"
 #include "cli/run_reconstruction.h"
 #include "cli/specimen_options.h"
-
 #include "cli/volume_options.h"
 
 namespace tomofield::cli {
@@ -19,6 +18,7 @@ namespace {
 struct Arguments {
   reconstruct::ReconstructOptions options = baseline::tensorf_options();
   std::string view_scale = "auto";
+  std::string non_negative = "auto";
   bool dry_run = false;
 };
 
@@ -54,6 +54,7 @@ void add_method_options(CLI::App& command, Arguments& arguments) {
       ->check(number_between(0, kMost))
       ->capture_default_str()
       ->group(group);
+  add_non_negative(command, arguments.non_negative);
   command
       .add_option("--learning-rate", fit.learning_rate, "of the first step; it falls exponentially")
       ->check(number_above(0))
@@ -65,30 +66,11 @@ void add_method_options(CLI::App& command, Arguments& arguments) {
       ->group(group);
 }
 
-void add_run_options(CLI::App& command, Arguments& arguments) {
-  const char* group = "Running";
-  reconstruct::ReconstructOptions& options = arguments.options;
-  command
-      .add_option("-o,--output", options.output,
-                  "the tomogram; model (.h5), figures (.json) and pictures go beside it")
-      ->required()
-      ->group(group);
-  command.add_flag("--overwrite", options.overwrite, "replace existing results")->group(group);
-  command
-      .add_flag("--resume", options.resume, "continue from the model file of an interrupted run")
-      ->excludes("--overwrite")
-      ->group(group);
-  command
-      .add_flag("--dry-run", arguments.dry_run,
-                "check everything, print what would be done and the memory it needs")
-      ->group(group);
-}
-
 void run(Arguments& arguments) {
   reconstruct::ReconstructOptions& options = arguments.options;
   const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
   options.fit.fit_view_scale = is_on(arguments.view_scale, is_dark);
-  if (is_dark) options.field.activation = "identity";
+  options.field.activation = is_on(arguments.non_negative, !is_dark) ? "softplus" : "identity";
   options.field.with_margin = options.specimen.with_margin;
   reconstruct::check_options(options);
   const tilt_series::TiltSeries series(options.input);
@@ -109,7 +91,7 @@ void add_tensorf(CLI::App& baseline) {
   add_shared_fit_options(
       command, {options.field.margin_spacing, options.fit.hold_out, arguments->view_scale});
   add_volume_options(command, options.volume);
-  add_run_options(command, *arguments);
+  add_run_options(command, arguments->options, arguments->dry_run);
   add_common_options(command);
   command.callback([arguments] { run(*arguments); });
 }

@@ -63,6 +63,13 @@ def test_variation_smooths_and_prior_takes_from_the_axes():
     assert axes(prior.volume) < 0.95 * axes(plain.volume)
 
 
+def test_densities_are_not_negative_unless_allowed():
+    negative = series.with_views("negative", -series.views)
+    kept, _ = tensorf("kept", source=negative)
+    free, _ = tensorf("free", "--non-negative", "off", source=negative)
+    assert kept.volume.min() >= 0 > free.volume.mean()
+
+
 def test_held_out_views_are_scored():
     results, run = tensorf("held-out", "--hold-out", 5)
     held_out = record_of(results)["figures"]["held_out"]
@@ -86,7 +93,7 @@ def test_it_goes_on_where_it_was_stopped():
 
 def test_dry_run_writes_nothing():
     results, run = tensorf("dry", "--dry-run")
-    assert "1 leaves" in run.stdout and "GiB" in run.stdout, run.stdout
+    assert "1 leaf," in run.stdout and "GiB" in run.stdout, run.stdout
     assert not os.path.exists(results.volume_path)
 
 
