@@ -9,6 +9,7 @@
 
 #include <cerrno>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <thread>
 
@@ -33,6 +34,8 @@ pid_t start(const std::vector<std::string>& command, const std::filesystem::path
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log.c_str(),
                                    O_WRONLY | O_CREAT | O_TRUNC, 0644);
   posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+  // OpenMP's threads spin while they wait, the longer the more else the machine has to do.
+  setenv("OMP_WAIT_POLICY", "passive", /*overwrite=*/0);
   pid_t child = 0;
   const int fault = posix_spawn(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);

@@ -17,9 +17,10 @@ struct ChildResult {
 };
 
 /// Runs `command` (the program's path first) to its end, with all that it says in the file
-/// `log`: a process of its own, so that its time and memory are its own. `stop_requested`
-/// is asked often; when it says so, the child is asked to stop (SIGTERM) and waited for.
-/// Throws Error if the log cannot be written or the program not be started.
+/// `log`: a process of its own, so that its time and memory are its own; its threads sleep while
+/// they wait (OMP_WAIT_POLICY, unless it is set), so that core-seconds are of work.
+/// `stop_requested` is asked often; when it says so, the child is asked to stop (SIGTERM) and
+/// waited for. Throws Error if the log cannot be written or the program not be started.
 ChildResult run_child(const std::vector<std::string>& command, const std::filesystem::path& log,
                       const std::function<bool()>& stop_requested);
 
