@@ -2,6 +2,7 @@
 (DESIGN §8) with one seed, scored against the truth and kept as one JSON file, so that a bench
 that was interrupted goes on with the row after. Seeds are not those of the tests."""
 
+import collections
 import json
 import os
 import re
@@ -9,42 +10,63 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import time
 
 SEEDS = (101, 102, 103)
 HERE = os.path.dirname(os.path.abspath(__file__))
 PROJECT = os.path.dirname(HERE)
 
 
-def add_arguments(parser):
+def add_folder_arguments(parser):
+    """What every bench of rows has."""
     parser.add_argument("out", help="folder for phantoms and rows; a second run adds what is missing")
     parser.add_argument("--program", default=os.path.join(PROJECT, "build/release/tomofield"))
     parser.add_argument("--make-cell", help="make_cell.py, which makes the phantoms",
                         default=os.path.join(PROJECT, "../shared/tools/make_cell.py"))
-    parser.add_argument("--size", type=int, default=128, help="thickness is 75/128 of it")
-    parser.add_argument("--seeds", default=",".join(map(str, SEEDS)))
     parser.add_argument("--only", default="", help="rows whose name matches this expression")
     parser.add_argument("--table", action="store_true", help="run nothing; print the table")
+
+
+def add_arguments(parser):
+    add_folder_arguments(parser)
+    parser.add_argument("--size", type=int, default=128, help="thickness is 75/128 of it")
+    parser.add_argument("--seeds", default=",".join(map(str, SEEDS)))
 
 
 def thickness_of(size):
     return {128: 75, 256: 150, 512: 300}.get(size, round(size * 75 / 128))
 
 
-def phantom(options, kind, noise, seed):
-    """Folder of the phantom, made on demand. Kind A ends in the field of view, B does not."""
-    folder = os.path.join(options.out, "phantoms", f"{kind}{options.size}_{noise}_{seed}")
+def phantom(options, kind, size, noise, seed, thickness=None):
+    """Folder of the phantom, made on demand. Kind A ends in the field of view, B does not; the
+    thickness is the yardstick's unless given."""
+    thickness = thickness or thickness_of(size)
+    shape = f"{size}" if thickness == thickness_of(size) else f"{size}x{thickness}"
+    folder = os.path.join(options.out, "phantoms", f"{kind}{shape}_{noise}_{seed}")
     if not os.path.exists(os.path.join(folder, "tilt_series.tlt")):
-        subprocess.run(["/usr/bin/python3", options.make_cell, folder, "--size", str(options.size),
-                        "--thickness", str(thickness_of(options.size)), "--noise", str(noise),
+        subprocess.run(["/usr/bin/python3", options.make_cell, folder, "--size", str(size),
+                        "--thickness", str(thickness), "--noise", str(noise),
                         "--seed", str(seed)] + (["--extended"] if kind == "B" else []),
                        check=True, stdout=subprocess.DEVNULL)
     return folder
 
 
+def series_arguments(folder, thickness):
+    """What tells tomofield of the series in a folder of phantom() or of `tomofield simulate`."""
+    return [os.path.join(folder, "tilt_series.mrc"), "--tlt",
+            os.path.join(folder, "tilt_series.tlt"), "--thickness", str(thickness), "--contrast",
+            "bright"]
+
+
+Usage = collections.namedtuple("Usage", "core_seconds peak_MiB wall_seconds")
+
+
 def run_measured(command):
-    """Core-seconds and the largest memory in MiB of a command and what it started."""
+    """Core-seconds, the largest memory in MiB, and seconds by the clock of a command and what it
+    started."""
     # Threads that spin while they wait would count, the more the busier the machine is.
     environment = {"OMP_WAIT_POLICY": "passive", **os.environ}
+    start = time.monotonic()
     with tempfile.TemporaryFile("w+") as errors:
         run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors, env=environment)
         _, status, usage = os.wait4(run.pid, 0)
@@ -52,24 +74,31 @@ def run_measured(command):
         if run.returncode != 0:
             errors.seek(0)
             sys.exit(f"{' '.join(command)}\n{errors.read()}")
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    return Usage(usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024, time.monotonic() - start)
+
+
+def estimated_MiB(command):
+    """The memory that a command of tomofield says it needs, to 0.01 GiB; to 0.1 GiB where it fails
+    because this machine has less."""
+    done = subprocess.run([*command, "--dry-run"], capture_output=True, text=True)
+    said = re.search(r"about ([\d.]+) GiB\s+of memory", done.stdout + done.stderr)
+    if not said:
+        sys.exit(f"{' '.join(command)} --dry-run\n{done.stderr}{done.stdout}")
+    return 1024 * float(said.group(1))
 
 
 def measure(options, arguments, kind, noise, seed, scratch):
     """Runs `tomofield ARGUMENTS…` on the phantom and scores what comes out."""
-    folder = phantom(options, kind, noise, seed)
+    folder = phantom(options, kind, options.size, noise, seed)
     volume = os.path.join(scratch, "volume.mrc")
-    command = [options.program, *arguments.split(), os.path.join(folder, "tilt_series.mrc"), "--tlt",
-               os.path.join(folder, "tilt_series.tlt"), "--thickness",
-               str(thickness_of(options.size)), "--contrast", "bright", "-o", volume, "--overwrite"]
+    command = [options.program, *arguments.split(),
+               *series_arguments(folder, thickness_of(options.size)), "-o", volume, "--overwrite"]
     command += ["--no-margin"] if kind == "A" else []
     row = {"arguments": arguments, "kind": kind, "noise": noise, "seed": seed, "size": options.size}
-    row["core_seconds"], row["peak_MiB"] = run_measured(command)
-    scores = os.path.join(scratch, "scores.json")
+    usage = run_measured(command)
+    row["core_seconds"], row["peak_MiB"] = usage.core_seconds, usage.peak_MiB
     truth = os.path.join(folder, "truth.mrc")
-    run_measured([options.program, "evaluate", volume, truth, "--json", scores, "--overwrite"])
-    with open(scores) as file:
-        row["scores"] = json.load(file)
+    row["scores"] = score(options, volume, truth, scratch)
     with open(os.path.splitext(volume)[0] + ".json") as file:
         figures = json.load(file)["figures"]
     row.update({key: figures[key] for key in ("parameters", "leaves") if key in figures})
@@ -80,6 +109,14 @@ def measure(options, arguments, kind, noise, seed, scratch):
                           / script_json("axis_streaks.py", truth)["ratio"])
         os.remove(model)
     return row
+
+
+def score(options, volume, truth, scratch):
+    """What `tomofield evaluate` says of a volume."""
+    scores = os.path.join(scratch, "scores.json")
+    run_measured([options.program, "evaluate", volume, truth, "--json", scores, "--overwrite"])
+    with open(scores) as file:
+        return json.load(file)
 
 
 def script_json(script, *arguments):
@@ -111,21 +148,30 @@ class Rows:
     def __exit__(self, *_):
         subprocess.run(["rm", "-rf", self.scratch], check=True)
 
-    def row(self, name, arguments, kind, noise, seed):
-        """The row of this name and seed, measured if it must be; none if it may not (--table)."""
-        safe = re.sub(r"[^\w.+-]+", "_", name)
-        path = os.path.join(self.folder, f"{safe}_{self.options.size}_{seed}.json")
+    def kept(self, name, arguments, make, may_make=True):
+        """The row of this name and these arguments; what is missing is made by make(scratch folder)
+        if it may be, else there is none."""
+        path = os.path.join(self.folder, re.sub(r"[^\w.+-]+", "_", name) + ".json")
         if not has_row(path, arguments):
-            if self.options.table:
+            if self.options.table or not may_make:
                 return None
-            row = measure(self.options, arguments, kind, noise, seed, self.scratch)
+            row = {**make(self.scratch), "arguments": arguments}
             with open(path + ".part", "w") as file:
                 json.dump(row, file, indent=1)
             os.rename(path + ".part", path)
-            print(f"{name} seed {seed}: {psnr(row):.2f} dB, {row['core_seconds']:.0f} core-s",
-                  file=sys.stderr, flush=True)
         with open(path) as file:
             return json.load(file)
+
+    def row(self, name, arguments, kind, noise, seed):
+        """The row of this name and seed, measured if it must be; none if it may not (--table)."""
+
+        def make(scratch):
+            row = measure(self.options, arguments, kind, noise, seed, scratch)
+            print(f"{name} seed {seed}: {psnr(row):.2f} dB, {row['core_seconds']:.0f} core-s",
+                  file=sys.stderr, flush=True)
+            return row
+
+        return self.kept(f"{name}_{self.options.size}_{seed}", arguments, make)
 
 
 def run_rows(options, bench, rows):

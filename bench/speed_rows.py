@@ -1,0 +1,228 @@
+"""Rows of the speed bench, bench/run: what to measure and how. A row's measure(scratch folder)
+returns {row name: {figure: [values]}}, as a rule of one row and one value."""
+
+import dataclasses
+import functools
+import json
+import os
+import subprocess
+import sys
+import typing
+
+import quality_rows
+import wide_band
+from quality_rows import run_measured
+
+SEED = 101
+NOISE = 0.05
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    group: str
+    name: str
+    arguments: str  # a kept row of the same name and other arguments is measured again
+    measure: typing.Callable
+
+
+@dataclasses.dataclass(frozen=True)
+class WideSeries:
+    """A series too large for a bench: of `rows` of its rows, epochs are timed."""
+
+    width: int = 4096
+    thickness: int = 1024
+    tilt_step: float = 2  # -60 to 60: 61 views
+    rows: int = 64
+    field: str = "--leaf-size 64 --vertex-spacing 2.5 --rank 8"
+    timed_epochs: int = 2  # of full resolution; of the coarse stage
+    timed_coarse_epochs: int = 4
+
+    def epochs(self):
+        """The defaults of reconstruct: (at full resolution, coarse)."""
+        return (10, 80) if "--field grid" in self.field else (30, 80)
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """Everything that a run measures."""
+
+    shapes: tuple = ((256, 150), (512, 300), (1024, 300))  # pixels, thickness of yardstick A
+    methods: tuple = (("default", "reconstruct"), ("grid", "reconstruct --field grid"),
+                      ("sirt", "baseline sirt"))
+    wide: WideSeries = WideSeries()
+    size: tuple = (("pixels", 128), ("thickness", 64), ("tilt step", 2), ("rank", 16))
+    sizes: tuple = (("pixels", (64, 128, 256)), ("thickness", (32, 64, 128)),
+                    ("tilt step", (4, 2, 1)), ("rank", (8, 16, 32)))
+    size_epochs: int = 4
+    kernel_rounds: int = 25
+
+
+QUICK_FIT = "--epochs 1 --coarse-epochs 0 --tv-penalty concave --rank 4"
+QUICK = Plan(shapes=((64, 38),),
+             methods=(("default", f"reconstruct {QUICK_FIT}"),
+                      ("grid", f"reconstruct --field grid {QUICK_FIT}"),
+                      ("sirt", "baseline sirt --iterations 2")),
+             wide=WideSeries(width=64, thickness=32, tilt_step=20, rows=32,
+                             field="--leaf-size 32 --rank 4"),
+             size=(("pixels", 48), ("thickness", 24), ("tilt step", 12), ("rank", 4)),
+             sizes=(("pixels", (32, 48)), ("rank", (4, 8))), size_epochs=1, kernel_rounds=1)
+
+
+def all_rows(options, plan, programs):
+    """programs: {name: command with placeholders}, of other programs."""
+    return [Row("kernels", "kernels", f"{plan.kernel_rounds} rounds",
+                functools.partial(measure_kernels, options, plan.kernel_rounds)),
+            *reconstruction_rows(options, plan, programs),
+            wide_row(options, plan.wide), *size_rows(options, plan)]
+
+
+def measure_kernels(options, rounds, scratch):
+    """Every case of bench_kernels as a row, and one row a SIMD target of what they amount to."""
+    if not os.path.exists(options.bench_kernels):
+        sys.exit(f"there is no '{options.bench_kernels}': build the target bench_kernels, or choose "
+                 "other rows with --only")
+    output = os.path.join(scratch, "kernels.json")
+    run_measured([options.bench_kernels, output, str(rounds)])
+    with open(output) as file:
+        report = json.load(file)
+    rows = {}
+    for target in report["targets"]:
+        name = f"kernels {target['target']}"
+        rows[name] = {figure: [value] for figure, value in target["ratios"].items()}
+        for case in target["cases"]:
+            rows[f"{name}: {case['name']}"] = {
+                "seconds_a_call": case["seconds"], "flops": [case["flops"]],
+                "bytes": [case["bytes"]], "nominal_updates": [case["nominal_updates"]]}
+    return rows
+
+
+def reconstruction_rows(options, plan, programs):
+    for shape in plan.shapes:
+        title = f"A {shape[0]}/{shape[1]}"
+        for method, arguments in plan.methods:
+            name = f"{title} {method}"
+            yield Row("reconstructions", name, arguments,
+                      functools.partial(measure_ours, options, shape, name, arguments))
+        for program, command in programs.items():
+            name = f"{title} {program}"
+            yield Row("reconstructions", name, command,
+                      functools.partial(measure_other, options, shape, name, command))
+
+
+def figures_of(usage):
+    return {key: [value] for key, value in usage._asdict().items()}
+
+
+def yardstick(options, shape):
+    return quality_rows.phantom(options, "A", shape[0], NOISE, SEED, shape[1])
+
+
+def measure_ours(options, shape, name, arguments, scratch):
+    folder, volume = yardstick(options, shape), os.path.join(scratch, "volume.mrc")
+    command = [options.program, *arguments.split(),
+               *quality_rows.series_arguments(folder, shape[1]), "--no-margin", "-o", volume,
+               "--overwrite"]
+    figures = {"estimated_MiB": [quality_rows.estimated_MiB(command)],
+               **figures_of(run_measured(command))}
+    scores = quality_rows.score(options, volume, os.path.join(folder, "truth.mrc"), scratch)
+    with open(os.path.join(scratch, "volume.json")) as file:
+        parameters = json.load(file)["figures"].get("parameters")
+    if parameters is not None:
+        figures["parameters"] = [parameters]
+    return {name: {**figures, "psnr_dB": [scores["psnr_raw_dB"]],
+                   "psnr_affine_dB": [scores["psnr_affine_dB"]]}}
+
+
+def measure_other(options, shape, name, command, scratch):
+    """Another program, which is scored with the best scale and offset: its units are its own."""
+    folder, volume = yardstick(options, shape), os.path.join(scratch, "other.mrc")
+    if os.path.exists(volume):
+        os.remove(volume)
+    places = {"stack": os.path.join(folder, "tilt_series.mrc"),
+              "tlt": os.path.join(folder, "tilt_series.tlt"), "thickness": shape[1],
+              "output": volume}
+    figures = figures_of(run_measured([word.format_map(places) for word in command.split()]))
+    if not os.path.exists(volume):
+        sys.exit(f"'{command}' ended well but wrote no volume to {{output}}")
+    scores = quality_rows.score(options, volume, os.path.join(folder, "truth.mrc"), scratch)
+    return {name: {**figures, "psnr_affine_dB": [scores["psnr_affine_dB"]]}}
+
+
+def wide_row(options, wide):
+    name = f"wide {wide.width}x{wide.width}/{wide.thickness}"
+    return Row("wide", name, f"{wide.rows} rows {wide.field}",
+               functools.partial(measure_wide, options, wide, name))
+
+
+def measure_wide(options, wide, name, scratch):
+    """Core-hours of the whole series from the band: a run is a start, so many epochs of full
+    resolution and so many coarse ones, each as long as the band is high."""
+    folder = wide_band.band_series(options, wide)
+    command = [options.program, "reconstruct", *wide.field.split(), "--tv-penalty", "concave",
+               *quality_rows.series_arguments(folder, wide.thickness), "--mode", "12", "-o",
+               os.path.join(scratch, "band.mrc"), "--overwrite"]
+
+    def run(epochs, coarse_epochs):
+        return run_measured([*command, "--epochs", str(epochs), "--coarse-epochs",
+                             str(coarse_epochs)])
+
+    start, longer = run(1, 0), run(1 + wide.timed_epochs, 0)
+    coarse = run(1, wide.timed_coarse_epochs)
+    figures = {"peak_of_band_MiB": [longer.peak_MiB],
+               "estimated_of_band_MiB": [quality_rows.estimated_MiB(command)],
+               "estimated_of_whole_MiB": [wide_band.estimate_of_whole(options, wide, folder)]}
+    for kind, clock in (("core", "core_seconds"), ("wall", "wall_seconds")):
+        first, second, third = (getattr(usage, clock) for usage in (start, longer, coarse))
+        epoch = (second - first) / wide.timed_epochs
+        coarse_epoch = (third - first) / wide.timed_coarse_epochs
+        epochs, coarse_epochs = wide.epochs()
+        whole = first - epoch + epochs * epoch + coarse_epochs * coarse_epoch
+        figures[f"epoch_of_band_{kind}_s"] = [epoch]
+        figures[f"coarse_epoch_of_band_{kind}_s"] = [coarse_epoch]
+        figures[f"{kind}_hours"] = [whole * wide.width / wide.rows / 3600]
+    return {name: figures}
+
+
+def size_rows(options, plan):
+    """One size varied at a time; the size that all axes share is one row."""
+    seen = set()
+    for axis, values in plan.sizes:
+        for value in values:
+            size = {**dict(plan.size), axis: value}
+            name = size_name(size)
+            if name not in seen:
+                seen.add(name)
+                arguments = (f"reconstruct --tv-penalty concave --epochs {plan.size_epochs} "
+                             f"--coarse-epochs 0 --rank {size['rank']}")
+                yield Row("sizes", name, arguments,
+                          functools.partial(measure_size, options, size, name, arguments))
+
+
+def num_views(tilt_step):
+    return round(120 / tilt_step) + 1
+
+
+def size_name(size):
+    return (f"size {size['pixels']}x{size['pixels']}/{size['thickness']}, "
+            f"{num_views(size['tilt step'])} views, rank {size['rank']}")
+
+
+def simulated(options, size):
+    """Folder of a simulated series −60 … 60° of a specimen that ends in the field of view."""
+    folder = os.path.join(options.out, "phantoms",
+                          f"s{size['pixels']}x{size['thickness']}_{size['tilt step']}")
+    if not os.path.exists(os.path.join(folder, "tilt_series.tlt")):
+        subprocess.run([options.program, "simulate", folder, "--size", str(size["pixels"]),
+                        "--thickness", str(size["thickness"]),
+                        f"--tilts=-60:60:{size['tilt step']}", "--no-truth", "--overwrite"],
+                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return folder
+
+
+def measure_size(options, size, name, arguments, scratch):
+    series = quality_rows.series_arguments(simulated(options, size), size["thickness"])
+    figures = figures_of(run_measured(
+        [options.program, *arguments.split(), *series, "--no-margin", "-o",
+         os.path.join(scratch, "volume.mrc"), "--overwrite"]))
+    return {name: {**figures, "pixels": [size["pixels"] ** 2], "thickness": [size["thickness"]],
+                   "views": [num_views(size["tilt step"])], "rank": [size["rank"]]}}
