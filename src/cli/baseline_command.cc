@@ -63,6 +63,7 @@ void run(Arguments<Method>& arguments) {
   baseline::check_outputs(options);
   const tilt_series::TiltSeries series(options.input);
   print_plan(baseline::plan_baseline(series, options), method.facts());
+  if (options.tune) fmt::print("short trials first, that choose settings by held-out views\n");
   if (arguments.dry_run) return;
   print_summary(baseline::run_baseline(series, options,
                                        {make_progress_bar("tune"), make_progress_bar("baseline")}));
@@ -216,7 +217,9 @@ void add_tv(CLI::App& baseline) {
 void add_network_options(CLI::App& command, baseline::NetworkOptions& method) {
   const char* group = "Method";
   constexpr int kMostLayers = 16, kWidest = 1024;
-  command.add_option("--hidden-layers", method.hidden_layers, "of the network")
+  command
+      .add_option("--hidden-layers", method.hidden_layers,
+                  "layers of neurons between what is given for a position and its density")
       ->check(number_between(1, kMostLayers))
       ->capture_default_str()
       ->group(group);
@@ -274,7 +277,9 @@ void add_implicit(CLI::App& baseline) {
       ->check(number_between(1, 4096))
       ->capture_default_str()
       ->group("Method");
-  command.add_option("--shortest", arguments->method.shortest, "wavelength of them, in pixels")
+  command
+      .add_option("--shortest", arguments->method.shortest,
+                  "shortest wavelength of them, in pixels")
       ->check(number_between(1, 1024))
       ->capture_default_str()
       ->group("Method");
