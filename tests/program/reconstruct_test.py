@@ -205,6 +205,7 @@ def test_config_file():
 
     config = write('thickness = 24\ncontrast = "bright"\nno-margin = true\nleaf-size = 16\n'
                    'rank = 6\nepochs = 3 # fewer\nsubsets = 7\nroi = [0, 0, 48, 36]\n'
+                   'tv-penalty = "concave"\n'
                    'overwrite = false\n')
     output = os.path.join(directory, "out.mrc")
     harness.succeed("reconstruct", *series.input, "-o", output, "--config", config, "--epochs", 8)

@@ -75,7 +75,8 @@ def test_the_penalty_is_what_predicts_held_out_views_better():
     written = json.load(open(output[:-len(".mrc")] + ".json"))
     trials = {t["tv_penalty"]: t for t in written["figures"]["tuning"]["trials"]}
     assert {t: trials[t]["tv"] for t in trials} == {"concave": 14, "smooth": 5}, trials
-    assert all(len(t["held_out_error_by_view"]) == 2 and t["epochs"] == 8 for t in trials.values())
+    assert all(len(t["held_out_error_by_view"]) == 2 for t in trials.values())
+    assert all(t["epochs"] == 1 for t in trials.values())  # half of what plain vertices need for QUICK's
     errors = {t: np.array(trials[t]["held_out_error_by_view"]) for t in trials}
     is_smooth = 2 * np.sum(errors["smooth"] < errors["concave"]) > len(errors["smooth"])
     better = "smooth" if is_smooth else "concave"
