@@ -153,7 +153,7 @@ def draw_roofline(pyplot, rows):
     drawing, panel = pyplot.subplots(figsize=(8, 5), constrained_layout=True)
     cases = [row for row in rows if row["name"].startswith(target + ": ")]
     intensities = [figure(row, "flops")[0] / figure(row, "bytes")[0] for row in cases]
-    for number_, (row, intensity) in enumerate(zip(cases, intensities)):
+    for position, (row, intensity) in enumerate(zip(cases, intensities)):
         seconds = statistics.median(figure(row, "seconds_a_call"))
         name, speed = row["name"].removeprefix(target + ": "), figure(row, "flops")[0] / seconds / 1e9
         if name.startswith("two loads"):
@@ -162,7 +162,7 @@ def draw_roofline(pyplot, rows):
             panel.annotate(name, (ends[0], speed * ends[0] / intensity), fontsize=8)
         else:
             panel.plot(intensity, speed, "o", label=name,
-                       color=pyplot.get_cmap("tab20")(number_ % 20))
+                       color=pyplot.get_cmap("tab20")(position % 20))
     panel.set(xscale="log", yscale="log", xlabel="FLOPs a byte", ylabel="GFLOP/s", title=target)
     panel.legend(fontsize=7)
     return drawing

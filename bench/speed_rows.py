@@ -27,13 +27,14 @@ class Row:
 
 @dataclasses.dataclass(frozen=True)
 class WideSeries:
-    """A series too large for a bench: of `rows` of its rows, epochs are timed."""
+    """A series too large for a bench: of `rows` of its rows, whole leaves, epochs are timed. The
+    field is one that fits 10 GiB with the whole series."""
 
     width: int = 4096
     thickness: int = 1024
     tilt_step: float = 2  # -60 to 60: 61 views
-    rows: int = 64
-    field: str = "--leaf-size 64 --vertex-spacing 2.5 --rank 8"
+    rows: int = 128
+    field: str = "--leaf-size 128 --vertex-spacing 2.5 --rank 6 --margin-spacing 8"
     timed_epochs: int = 2  # of full resolution; of the coarse stage
     timed_coarse_epochs: int = 4
 
