@@ -1,7 +1,6 @@
 #include "baseline/lazy_adam.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "base/parallel.h"
 #include "kernels/adam.h"
@@ -34,12 +33,10 @@ void LazyAdam::step_block(std::size_t block, double learning_rate, std::span<flo
   const std::size_t count = std::min(kBlock, gradient_.size() - first);
   const std::span<float> gradient = std::span(gradient_).subspan(first, count);
   if (std::ranges::all_of(gradient, [](float g) { return g == 0.0f; })) return;
-  const double t = ++steps_[block];
-  kernels::AdamStep adam;
-  adam.rate_m =
-      static_cast<float>(learning_rate / (1 - std::pow(static_cast<double>(adam.beta1), t)));
-  adam.rate_v = static_cast<float>(1 / std::sqrt(1 - std::pow(static_cast<double>(adam.beta2), t)));
-  kernels::adam_step(adam, static_cast<std::ptrdiff_t>(count), parameters.data() + first,
+  const kernels::AdamStep usual;
+  const kernels::AdamStep step =
+      kernels::corrected_step(usual.beta1, usual.beta2, learning_rate, ++steps_[block]);
+  kernels::adam_step(step, static_cast<std::ptrdiff_t>(count), parameters.data() + first,
                      gradient.data(), m_.data() + first, v_.data() + first);
 }
 

@@ -7,6 +7,7 @@
 
 #include "base/parallel.h"
 #include "kernels/lanes.h"
+#include "reconstruct/domain.h"
 
 namespace tomofield::baseline {
 namespace {
@@ -35,13 +36,10 @@ double lowest_x(const projection::SampleGrid& grid) {
   return low;
 }
 
-// What the network adds to: softplus of it is the mean density.
+// What the network adds to.
 float bias_of(const NetworkDensity::Shape& shape) {
-  constexpr double kLeast = 1e-3;
   return static_cast<float>(
-      shape.non_negative
-          ? std::log(std::expm1(kSharpness * std::max(shape.mean_density, kLeast))) / kSharpness
-          : shape.mean_density);
+      reconstruct::bias_of_density(shape.mean_density, shape.non_negative ? kSharpness : 0));
 }
 
 // Calls body(i, sample) for the i-th point of some columns, `sample` of the z row that the first

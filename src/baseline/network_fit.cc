@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "base/random.h"
+#include "base/shuffle.h"
 #include "baseline/lazy_adam.h"
 #include "baseline/network_density.h"
 #include "baseline/noise_levels.h"
@@ -23,14 +23,6 @@ constexpr double kNoiseRate = 0.1;  // of the noise's levels, which falls likewi
 NetworkDensity::Shape shape_of(const NetworkOptions& options, double mean_density) {
   return {options.hidden_layers, options.width, options.activation,
           options.non_negative,  mean_density,  options.seed};
-}
-
-std::vector<std::size_t> shuffled(std::size_t count, std::uint64_t seed, int iteration) {
-  std::vector<std::size_t> order(count);
-  std::iota(order.begin(), order.end(), 0);
-  base::Random random(seed, static_cast<std::uint64_t>(iteration) + 1);
-  for (std::size_t i = count; i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);
-  return order;
 }
 
 class NetworkFit {
@@ -52,8 +44,8 @@ class NetworkFit {
 
   Solution run(const AfterIteration& after_iteration) {
     for (int iteration = 0; iteration < options_.iterations; ++iteration) {
-      for (const std::size_t set : shuffled(row_sets_.size(), options_.seed, iteration))
-        take_step(set);
+      const base::Random random(options_.seed, static_cast<std::uint64_t>(iteration) + 1);
+      for (const std::size_t set : base::shuffled(row_sets_.size(), random)) take_step(set);
       finish_pass();
       after_iteration({iteration + 1, solution_.data_loss.back(), solution_.objective.back()},
                       solution_.densities);

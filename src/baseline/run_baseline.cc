@@ -64,13 +64,9 @@ std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
 
 base::ProgressReport progress_report(const IterationReport& report, int num_iterations,
                                      std::int64_t num_rays, double seconds) {
-  base::ProgressReport progress;
-  progress.fraction_done = static_cast<double>(report.iteration) / num_iterations;
-  progress.seconds_elapsed = seconds;
-  progress.seconds_left = seconds / report.iteration * (num_iterations - report.iteration);
-  progress.detail = fmt::format("iteration {}  loss {:.4f}", report.iteration,
-                                2 * report.data_loss / static_cast<double>(num_rays));
-  return progress;
+  return base::progress_at(static_cast<double>(report.iteration) / num_iterations, seconds,
+                           fmt::format("iteration {}  loss {:.4f}", report.iteration,
+                                       2 * report.data_loss / static_cast<double>(num_rays)));
 }
 
 // Voxels of the region of interest, slab by slab.

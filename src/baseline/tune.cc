@@ -97,14 +97,10 @@ class Trials {
   void report_progress(const Method& method, int iteration) const {
     if (!progress_) return;
     const int expected = std::max(kExpectedTrials, num_runs_ + 1);
-    base::ProgressReport report;
-    report.fraction_done =
-        (num_runs_ + static_cast<double>(iteration) / facts_of(method).iterations) / expected;
-    report.seconds_elapsed = running_.seconds();
-    report.seconds_left =
-        report.seconds_elapsed * (1 - report.fraction_done) / report.fraction_done;
-    report.detail = fmt::format("trial {}/{} {}", num_runs_ + 1, expected, settings_text(method));
-    progress_(report);
+    progress_(base::progress_at(
+        (num_runs_ + static_cast<double>(iteration) / facts_of(method).iterations) / expected,
+        running_.seconds(),
+        fmt::format("trial {}/{} {}", num_runs_ + 1, expected, settings_text(method))));
   }
 
   const TrialData& data_;

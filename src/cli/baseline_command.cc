@@ -35,8 +35,7 @@ void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts&
                plan.roi, plan.geometry.thickness});
   fmt::print(
       "{} voxels with the margins, {} parameters; {} iteration{} on {} threads; about {:.2f} GiB "
-      "of "
-      "memory\n",
+      "of memory\n",
       plan.num_voxels, plan.num_parameters, method.iterations, method.iterations == 1 ? "" : "s",
       base::thread_count(), static_cast<double>(plan.memory_bytes) / (1 << 30));
 }
@@ -81,8 +80,7 @@ void add_fit_options(CLI::App& command, Arguments<Method>& arguments) {
     command
         .add_flag("--tune", options.tune,
                   "choose the weight, or what else regularises, by the error of held-out views "
-                  "(every 8th, or those of --hold-out), "
-                  "then reconstruct from all views with it")
+                  "(every 8th, or those of --hold-out), then reconstruct from all views with it")
         ->group("Fit");
   }
 }
@@ -232,10 +230,7 @@ void add_network_options(CLI::App& command, baseline::NetworkOptions& method) {
       ->check(number_above(0))
       ->capture_default_str()
       ->group(group);
-  command.add_option("--seed", method.seed, "of everything random")
-      ->check(seed_check())
-      ->capture_default_str()
-      ->group(group);
+  add_seed(command, method.seed, group);
 }
 
 void add_ingp(CLI::App& baseline) {

@@ -46,6 +46,13 @@ void add_non_negative(CLI::App& command, std::string& value) {
       ->group("Method");
 }
 
+void add_seed(CLI::App& command, std::uint64_t& seed, const char* group) {
+  command.add_option("--seed", seed, "of everything random")
+      ->check(seed_check())
+      ->capture_default_str()
+      ->group(group);
+}
+
 bool is_on(const std::string& value, bool automatic) {
   return value == "on" || (value == "auto" && automatic);
 }

@@ -23,6 +23,9 @@ void add_shared_fit_options(CLI::App& command, const SharedFitOptions& options);
 /// Registers --non-negative of a baseline: auto, on or off.
 void add_non_negative(CLI::App& command, std::string& value);
 
+/// Registers --seed in a group of options.
+void add_seed(CLI::App& command, std::uint64_t& seed, const char* group);
+
 /// The meaning of auto, on or off.
 bool is_on(const std::string& value, bool automatic);
 

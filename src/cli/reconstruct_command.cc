@@ -6,7 +6,6 @@
 #include "cli/common_options.h"
 #include "cli/fit_options.h"
 #include "cli/input_options.h"
-#include "cli/number_checks.h"
 #include "cli/run_reconstruction.h"
 #include "cli/specimen_options.h"
 #include "cli/volume_options.h"
@@ -154,10 +153,7 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
                   "epochs without a better held-out error after which the fit stops; 0: never")
       ->capture_default_str()
       ->group(group);
-  command.add_option("--seed", fit.seed, "of everything random")
-      ->check(seed_check())
-      ->capture_default_str()
-      ->group(group);
+  add_seed(command, fit.seed, group);
 }
 
 void set_schedule(Arguments& arguments) {

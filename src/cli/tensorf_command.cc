@@ -60,10 +60,7 @@ void add_method_options(CLI::App& command, Arguments& arguments) {
       ->check(number_above(0))
       ->capture_default_str()
       ->group(group);
-  command.add_option("--seed", fit.seed, "of everything random")
-      ->check(seed_check())
-      ->capture_default_str()
-      ->group(group);
+  add_seed(command, fit.seed, group);
 }
 
 void run(Arguments& arguments) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 
 namespace tomofield::kernels {
@@ -14,6 +15,16 @@ struct AdamStep {
   float rate_m = 0.0f, rate_v = 1.0f;
   float epsilon = 1e-12f;
 };
+
+/// The t-th step (t ≥ 1) with its bias corrections.
+inline AdamStep corrected_step(double beta1, double beta2, double learning_rate, double t) {
+  AdamStep step;
+  step.beta1 = static_cast<float>(beta1);
+  step.beta2 = static_cast<float>(beta2);
+  step.rate_m = static_cast<float>(learning_rate / (1 - std::pow(beta1, t)));
+  step.rate_v = static_cast<float>(1 / std::sqrt(1 - std::pow(beta2, t)));
+  return step;
+}
 
 void adam_step(const AdamStep& step, std::ptrdiff_t count, float* parameters, float* gradient,
                float* m, float* v);

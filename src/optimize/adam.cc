@@ -18,11 +18,8 @@ void Adam::step(field::Field& field, const std::vector<int>& leaves,
     const int leaf = leaves[static_cast<std::size_t>(i)];
     const double t = static_cast<double>(++state_.leaf_steps[static_cast<std::size_t>(leaf)]);
     const std::size_t first = field.offset(leaf);
-    kernels::AdamStep step;
-    step.beta1 = static_cast<float>(options_.beta1);
-    step.beta2 = static_cast<float>(options_.beta2);
-    step.rate_m = static_cast<float>(learning_rate / (1 - std::pow(options_.beta1, t)));
-    step.rate_v = static_cast<float>(1 / std::sqrt(1 - std::pow(options_.beta2, t)));
+    const kernels::AdamStep step =
+        kernels::corrected_step(options_.beta1, options_.beta2, learning_rate, t);
     kernels::adam_step(step, static_cast<std::ptrdiff_t>(field.offset(leaf + 1) - first),
                        field.parameters().data() + first, gradient.data() + first,
                        state_.m.data() + first, state_.v.data() + first);

@@ -127,16 +127,19 @@ projection::SampleGrid sample_grid(const Domain& domain, double thickness, int b
       thickness / bin, x0, x1, spacing);
 }
 
+double bias_of_density(double density, double beta) {
+  if (beta <= 0) return density;
+  const double positive = std::max(density, 1e-3);
+  return std::log(std::expm1(beta * positive)) / beta;
+}
+
 std::unique_ptr<field::Field> make_initial_field(const Domain& domain, double thickness,
                                                  double mean_density, const FieldOptions& options,
                                                  std::uint64_t seed) {
   auto field = field::make_field(options.kind, domain.tree, thickness, domain.shapes);
   const double beta = options.activation == "softplus" ? options.sharpness : 0.0;
   field->activation.beta = static_cast<float>(beta);
-  // The inverse of softplus; a mean density of zero or less has none, so a small one stands in.
-  const double positive = std::max(mean_density, 1e-3);
-  field->bias =
-      static_cast<float>(beta > 0 ? std::log(std::expm1(beta * positive)) / beta : mean_density);
+  field->bias = static_cast<float>(bias_of_density(mean_density, beta));
   field->initialise(base::Random(seed), options.initial_scale);
   return field;
 }

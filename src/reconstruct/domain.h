@@ -35,6 +35,10 @@ Domain make_domain(const geometry::RayGeometry& geometry, const geometry::Roi& r
 /// up to a sample earlier.
 projection::SampleGrid sample_grid(const Domain& domain, double thickness, int bin);
 
+/// The bias whose activation is `density`, by the inverse of softplus of sharpness β (0: the
+/// identity). A density of zero or less has none, so a small one stands in.
+double bias_of_density(double density, double beta);
+
 /// A new field on the domain whose density is about `mean_density` everywhere.
 std::unique_ptr<field::Field> make_initial_field(const Domain& domain, double thickness,
                                                  double mean_density, const FieldOptions& options,

@@ -9,6 +9,7 @@
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/random.h"
+#include "base/shuffle.h"
 #include "kernels/lanes.h"
 #include "reconstruct/concavity.h"
 #include "reconstruct/slab_objective.h"
@@ -246,15 +247,12 @@ void Fit::run(const AfterStep& after_step) {
 // epoch in random order: a subset covers the whole tilt range evenly.
 std::vector<int> Fit::subset_of_step(std::int64_t step) const {
   const std::int64_t epoch = step / options_.subsets;
-  base::Random random(options_.seed, kOrderStream + static_cast<std::uint64_t>(epoch));
-  std::vector<int> order(static_cast<std::size_t>(options_.subsets));
-  std::iota(order.begin(), order.end(), 0);
-  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);
+  const auto subsets = static_cast<std::size_t>(options_.subsets);
+  const std::vector<std::size_t> order = base::shuffled(
+      subsets, base::Random(options_.seed, kOrderStream + static_cast<std::uint64_t>(epoch)));
   std::vector<int> views;
-  const auto first =
-      static_cast<std::size_t>(order[static_cast<std::size_t>(step % options_.subsets)]);
-  for (std::size_t i = first; i < fitted_views_.size();
-       i += static_cast<std::size_t>(options_.subsets))
+  for (std::size_t i = order[static_cast<std::size_t>(step) % subsets]; i < fitted_views_.size();
+       i += subsets)
     views.push_back(fitted_views_[i]);
   return views;
 }

@@ -104,16 +104,11 @@ class TrialFits {
     const int expected = std::max(num_expected_, num_done_ + 1);
     const double of_trial = fit.work(fit.progress().step) / fit.work(fit.num_steps());
     const auto& errors = fit.progress().held_out_error;
-    base::ProgressReport report;
-    report.fraction_done = (num_done_ + of_trial) / expected;
-    report.seconds_elapsed = running_.seconds();
-    report.seconds_left =
-        report.seconds_elapsed * (1 - report.fraction_done) / report.fraction_done;
-    report.detail =
+    return base::progress_at(
+        (num_done_ + of_trial) / expected, running_.seconds(),
         fmt::format("trial {}/{}  {} tv {:.3g}  rank {}  epochs {}  held out {}", num_done_ + 1,
                     expected, settings.penalty, settings.variation, settings.rank, settings.epochs,
-                    errors.empty() ? "-" : fmt::format("{:.4f}", errors.back()));
-    return report;
+                    errors.empty() ? "-" : fmt::format("{:.4f}", errors.back())));
   }
 
   Strip strip_;
