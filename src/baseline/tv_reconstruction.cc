@@ -25,18 +25,29 @@ constexpr double kBalance = 2.0;
 // Over-relaxation, below 2: 1.9 needs two thirds of the iterations of 1.
 constexpr float kRelaxation = 1.9f;
 
+// Scales and offsets of views are fitted to densities that have taken shape, now and then: those
+// that fit the first, nearly flat volumes are arbitrary, and each change asks for other steps.
+constexpr int kViewFitInterval = 10;
+
 // Weights of the concave penalty: first taken after three tenths of the iterations, then so many
 // times in all, evenly spread. Until then they are what they are on an edge of 1 τ, so that what
 // the first ones are taken from is not too smooth.
 constexpr int kReweightings = 8;
 constexpr float kFirstWeight = 0.5f;
 
+// By then the densities have taken shape.
+int settled(const TvOptions& options) { return options.iterations * 3 / 10; }
+
 bool takes_weights_after(int iteration, const TvOptions& options) {
   if (options.penalty != "concave" || iteration == 0) return false;
-  const int first = options.iterations * 3 / 10;
+  const int first = settled(options);
   const int interval = std::max(1, (options.iterations - first) / kReweightings);
   return iteration >= first && iteration < options.iterations &&
          (iteration - first) % interval == 0;
+}
+
+bool fits_views_after(int iteration, const TvOptions& options) {
+  return iteration >= settled(options) && iteration % kViewFitInterval == 0;
 }
 
 // Those of κ λ h_x h_z ∇.
@@ -83,11 +94,12 @@ class ChambollePock {
   void step_densities(bool is_last);
   // Takes the weights w of the concave penalty from x.
   void take_weights();
+  // τ from the views' scales as they are.
+  void measure_steps();
   VoxelVolume& densities() { return x_; }
 
  private:
   void begin_concave_penalty();
-  void measure_steps();
   void step_ray_duals(int slab, const float* residuals);
   double step_gradient_duals(int slab);
   void take_step(int slab, const float* adjoint, float relaxation);
@@ -133,7 +145,8 @@ void ChambollePock::begin_concave_penalty() {
 void ChambollePock::measure_steps() {
   float* detector = scratch_.detector();
   problem_.for_each_ray(problem_.views(), [&](const auto& model, float, std::size_t at) {
-    std::fill_n(detector + at, kLanes, static_cast<float>(kBalance * std::sqrt(model.weight)));
+    std::fill_n(detector + at, kLanes,
+                static_cast<float>(kBalance * model.scale * std::sqrt(model.weight)));
   });
   float* sums = scratch_.cleared_samples();
   problem_.backproject(problem_.views(), detector, sums);
@@ -255,7 +268,10 @@ Solution reconstruct_tv(VoxelProblem& problem, const TvOptions& options, double 
     if (iteration == options.iterations) break;
     solver.step_densities(iteration + 1 == options.iterations);
     if (takes_weights_after(iteration + 1, options)) solver.take_weights();
-    problem.fit_view_models(data);
+    if (fits_views_after(iteration + 1, options)) {
+      problem.fit_view_models(data);
+      solver.measure_steps();
+    }
     after_iteration({iteration + 1, data_loss.back(), objective.back()}, solver.densities());
   }
   return {std::move(solver.densities()), std::move(data_loss), std::move(objective)};
