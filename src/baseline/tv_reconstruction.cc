@@ -25,8 +25,8 @@ constexpr double kBalance = 2.0;
 // Over-relaxation, below 2: 1.9 needs two thirds of the iterations of 1.
 constexpr float kRelaxation = 1.9f;
 
-// Scales and offsets of views are fitted to densities that have taken shape, now and then: those
-// that fit the first, nearly flat volumes are arbitrary, and each change asks for other steps.
+// Over-relaxed densities swing about from one iteration to the next. Scales and offsets of views
+// that are fitted to each of them swing with them, and more and more; so they are fitted to few.
 constexpr int kViewFitInterval = 10;
 
 // Weights of the concave penalty: first taken after three tenths of the iterations, then so many
@@ -35,19 +35,12 @@ constexpr int kViewFitInterval = 10;
 constexpr int kReweightings = 8;
 constexpr float kFirstWeight = 0.5f;
 
-// By then the densities have taken shape.
-int settled(const TvOptions& options) { return options.iterations * 3 / 10; }
-
 bool takes_weights_after(int iteration, const TvOptions& options) {
   if (options.penalty != "concave" || iteration == 0) return false;
-  const int first = settled(options);
+  const int first = options.iterations * 3 / 10;
   const int interval = std::max(1, (options.iterations - first) / kReweightings);
   return iteration >= first && iteration < options.iterations &&
          (iteration - first) % interval == 0;
-}
-
-bool fits_views_after(int iteration, const TvOptions& options) {
-  return iteration >= settled(options) && iteration % kViewFitInterval == 0;
 }
 
 // Those of κ λ h_x h_z ∇.
@@ -268,7 +261,7 @@ Solution reconstruct_tv(VoxelProblem& problem, const TvOptions& options, double 
     if (iteration == options.iterations) break;
     solver.step_densities(iteration + 1 == options.iterations);
     if (takes_weights_after(iteration + 1, options)) solver.take_weights();
-    if (fits_views_after(iteration + 1, options)) {
+    if ((iteration + 1) % kViewFitInterval == 0) {
       problem.fit_view_models(data);
       solver.measure_steps();
     }

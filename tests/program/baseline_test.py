@@ -14,6 +14,7 @@ import skimage.io
 import harness
 from harness import HEIGHT, PIXEL_SIZE, THICKNESS, TILTS, WIDTH, psnr, read_bytes
 
+SHARED = os.environ.get("TOMOFIELD_SHARED", "")
 EMPTY_BEAM = 500.0
 DEFAULTS = ["--thickness", THICKNESS, "--contrast", "bright", "--no-margin", "--threads", 1]
 METHODS = {
@@ -193,6 +194,22 @@ def test_tuned_settings_are_better_than_bad_ones_and_used_for_all_views():
                     for word in (f"--{key}", repr(chosen[key]))]  # repr: all digits
         by_hand, _ = baseline(method, "by-hand", *settings)
         assert read_bytes(by_hand.volume_path) == read_bytes(results.volume_path)
+
+
+def test_fitted_view_scales_do_not_upset_total_variation():
+    # The dust's residuals are many times its noise: scales fitted to each of the first volumes grew.
+    folder = os.path.join(SHARED, "data/idp_haadf")
+    if not os.path.exists(folder):
+        print("skipped: there is no ../shared/data/idp_haadf")
+        return
+    objective = {}
+    for view_scale in ("off", "on"):
+        output = os.path.join(harness.fresh_directory(f"dust-{view_scale}"), "out.mrc")
+        harness.succeed("baseline", "tv", os.path.join(folder, "haadf_tilt_tomviz_aligned.ali"), "--tlt",
+                        os.path.join(folder, "haadf_tilt_raw.rawtlt"), "--contrast", "bright",
+                        "--thickness", 32, "--iterations", 20, "--view-scale", view_scale, "-o", output)
+        objective[view_scale] = Baseline(output).record["figures"]["objective"][-1]
+    assert objective["on"] < 1.5 * objective["off"], objective
 
 
 def test_wider_roll_off_smooths_along_x():
