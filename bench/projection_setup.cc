@@ -43,14 +43,16 @@ geometry::TiltGeometry yardstick_geometry(int thickness) {
   return geometry::centred_geometry(kWidth, kWidth, thickness, tilts);
 }
 
-ProjectionSetup::ProjectionSetup(int thickness, int stride)
-    : geometry_(yardstick_geometry(thickness)),
+ProjectionSetup::ProjectionSetup(int thickness, int stride, int num_slabs)
+    : num_slabs_(num_slabs),
+      geometry_(yardstick_geometry(thickness)),
       grid_(projection::make_sample_grid(geometry_, 0, kWidth, 0)),
       projector_(geometry_, grid_) {
   for (int v = 0; v < geometry_.num_views(); v += stride) views_.push_back(v);
-  samples_.reset(grid_.size());
-  gradient_.reset(grid_.size());
-  detector_.reset(projector_.detector_size(views_.size()));
+  const auto count = static_cast<std::size_t>(num_slabs);
+  samples_.reset(count * grid_.size());
+  gradient_.reset(count * grid_.size());
+  detector_.reset(count * projector_.detector_size(views_.size()));
   fill_randomly(samples_, 1);
   fill_randomly(detector_, 2);
 }
@@ -58,8 +60,9 @@ ProjectionSetup::ProjectionSetup(int thickness, int stride)
 Case ProjectionSetup::work(const std::string& name) const {
   Case c;
   c.name = name;
-  c.updates = kWidth * kernels::kLanes * geometry_.thickness * static_cast<double>(views_.size());
-  c.done = updates_done(geometry_, views_);
+  c.updates = num_slabs_ * kWidth * kernels::kLanes * geometry_.thickness *
+              static_cast<double>(views_.size());
+  c.done = num_slabs_ * updates_done(geometry_, views_);
   c.flops = 4 * c.done;
   c.bytes = 8 * c.done;
   return c;
@@ -70,7 +73,8 @@ Case ProjectionSetup::forward_case(const std::string& name,
   Case c = work(name);
   c.run = [self] {
     self->detector_.fill(0.0f);
-    self->projector_.forward(self->samples_.data(), self->views_, self->detector_.data());
+    self->projector_.forward(self->samples_.data(), self->views_, self->detector_.data(),
+                             self->num_slabs_);
   };
   return c;
 }
@@ -80,7 +84,8 @@ Case ProjectionSetup::adjoint_case(const std::string& name,
   Case c = work(name);
   c.run = [self] {
     self->gradient_.fill(0.0f);
-    self->projector_.backward(self->detector_.data(), self->views_, self->gradient_.data());
+    self->projector_.backward(self->detector_.data(), self->views_, self->gradient_.data(),
+                              self->num_slabs_);
   };
   return c;
 }

@@ -11,11 +11,11 @@
 
 namespace tomofield::bench {
 
-/// A slab of 256 × 16 × thickness voxels under every `stride`-th of the 94
+/// `num_slabs` slabs of 256 × 16 × thickness voxels under every `stride`-th of the 94
 /// views of the yardstick, −70 … 69.5°, and the buffers to project it.
 class ProjectionSetup {
  public:
-  ProjectionSetup(int thickness, int stride);
+  ProjectionSetup(int thickness, int stride, int num_slabs = 1);
 
   Case forward_case(const std::string& name, std::shared_ptr<ProjectionSetup> self) const;
   Case adjoint_case(const std::string& name, std::shared_ptr<ProjectionSetup> self) const;
@@ -27,6 +27,7 @@ class ProjectionSetup {
  private:
   Case work(const std::string& name) const;
 
+  int num_slabs_;
   geometry::TiltGeometry geometry_;
   projection::SampleGrid grid_;
   projection::SlabProjector projector_;

@@ -28,18 +28,25 @@ struct LineCrossing {
   float weight = 0;
 };
 
+/// Slabs that are treated together, one or two: they are crossed alike, so what a crossing's
+/// indices and weights cost is paid once. Those of the second lie so many floats after the first's.
+struct Slabs {
+  int count = 1;
+  std::ptrdiff_t samples_apart = 0, detectors_apart = 0;
+};
+
 /// detector[u, lane] += Σ_lines weight Σ_j hat(position(u) − j) samples_j[lane],
 /// for pixels [first, end). All lines belong to one view: same detector, same step.
 /// `stride` is the distance between samples in floats; the samples of all lines lie within 2³¹.
 /// Traffic a pixel and line: two cache lines of samples; the detector once for all lines.
 void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stride, int first,
-                   int end, float* detector);
+                   int end, float* detector, const Slabs& slabs = {});
 
 /// The adjoint: samples[j, lane] += Σ_views weight Σ_u hat(position_view(u) − j) detector_view[u,
 /// lane] for samples j in [first, end), padding included. All crossings belong to one line; all
 /// detectors lie within 2³¹ floats. Traffic a sample and view: two cache lines of the detector
 /// (more for |step| < 1); the sample once for all views.
 void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t stride, int first,
-                       int end, float* samples);
+                       int end, float* samples, const Slabs& slabs = {});
 
 }  // namespace tomofield::kernels

@@ -14,6 +14,7 @@ namespace {
 
 using kernels::kLanes;
 using kernels::LineCrossing;
+using kernels::Slabs;
 
 using Beam = SlabProjector::Beam;
 
@@ -149,22 +150,31 @@ void for_each_part(const Crossing& c, Visit&& visit) {
   }
 }
 
-void project_parts(const Crossing& c, std::ptrdiff_t stride, float* detector) {
+void project_parts(const Crossing& c, std::ptrdiff_t stride, const Slabs& slabs, float* detector) {
   for_each_part(c, [&](int pixel, std::ptrdiff_t lower, float low_weight, float high_weight) {
     const float* sample = c.line.samples + lower * stride;
     float* out = detector + static_cast<std::ptrdiff_t>(pixel) * kLanes;
-    for (int l = 0; l < kLanes; ++l)
-      out[l] += low_weight * sample[l] + high_weight * sample[stride + l];
+    for (int s = 0; s < slabs.count; ++s) {
+      for (int l = 0; l < kLanes; ++l)
+        out[l] += low_weight * sample[l] + high_weight * sample[stride + l];
+      sample += slabs.samples_apart;
+      out += slabs.detectors_apart;
+    }
   });
 }
 
-void backproject_parts(const Crossing& c, std::ptrdiff_t stride, float* samples) {
+void backproject_parts(const Crossing& c, std::ptrdiff_t stride, const Slabs& slabs,
+                       float* samples) {
   for_each_part(c, [&](int pixel, std::ptrdiff_t lower, float low_weight, float high_weight) {
     float* sample = samples + lower * stride;
     const float* in = c.line.detector + static_cast<std::ptrdiff_t>(pixel) * kLanes;
-    for (int l = 0; l < kLanes; ++l) {
-      sample[l] += low_weight * in[l];
-      sample[stride + l] += high_weight * in[l];
+    for (int s = 0; s < slabs.count; ++s) {
+      for (int l = 0; l < kLanes; ++l) {
+        sample[l] += low_weight * in[l];
+        sample[stride + l] += high_weight * in[l];
+      }
+      sample += slabs.samples_apart;
+      in += slabs.detectors_apart;
     }
   });
 }
@@ -190,7 +200,8 @@ PixelRange pixels_of_tile(const Beam& beam, const Family& family, double middle_
 }
 
 void project_family(const Family& family, const std::vector<Beam>& beams, int width,
-                    const float* samples, std::span<const int> views, float* detector) {
+                    const Slabs& slabs, const float* samples, std::span<const int> views,
+                    float* detector) {
   std::vector<std::array<LineCrossing, kLinesAtOnce>> lines(views.size());
   const auto beam_of = [&](std::size_t v) -> const Beam& {
     return beams[static_cast<std::size_t>(views[v])];
@@ -205,7 +216,7 @@ void project_family(const Family& family, const std::vector<Beam>& beams, int wi
       for (int l = 0; l < count; ++l) {
         Crossing c = crossing(beam_of(v), family, first + l, width);
         c.line.samples = samples + family.origin + (first + l) * family.line_stride;
-        project_parts(c, family.sample_stride, rays_of(v));
+        project_parts(c, family.sample_stride, slabs, rays_of(v));
         lines[v][static_cast<std::size_t>(l)] = c.line;
       }
     }
@@ -215,14 +226,15 @@ void project_family(const Family& family, const std::vector<Beam>& beams, int wi
         const PixelRange pixels =
             pixels_of_tile(beam_of(v), family, first + 0.5 * (count - 1), tile, width);
         kernels::project_lines(lines[v].data(), count, family.sample_stride, pixels.first,
-                               pixels.end, rays_of(v));
+                               pixels.end, rays_of(v), slabs);
       }
     }
   }
 }
 
 void backproject_family(const Family& family, const std::vector<Beam>& beams, int width,
-                        const float* detector, std::span<const int> views, float* samples) {
+                        const Slabs& slabs, const float* detector, std::span<const int> views,
+                        float* samples) {
   std::array<std::vector<LineCrossing>, kLinesAtOnce> crossings;
   const int first_sample = family.cut_low ? -1 : 0;
   const int end_sample = family.num_samples + (family.cut_high ? 1 : 0);
@@ -236,7 +248,7 @@ void backproject_family(const Family& family, const std::vector<Beam>& beams, in
         if (beam.flat != family.flat) continue;
         Crossing c = crossing(beam, family, first + l, width);
         c.line.detector = detector + static_cast<std::ptrdiff_t>(v) * width * kLanes;
-        backproject_parts(c, family.sample_stride,
+        backproject_parts(c, family.sample_stride, slabs,
                           samples + family.origin + (first + l) * family.line_stride);
         of_line.push_back(c.line);
       }
@@ -246,10 +258,10 @@ void backproject_family(const Family& family, const std::vector<Beam>& beams, in
       const int tile_end = std::min(end_sample, tile + kSamplesAtOnce);
       for (int v = 0; v < num_views; v += kViewsAtOnce) {
         for (int l = 0; l < count; ++l) {
-          kernels::backproject_lines(crossings[static_cast<std::size_t>(l)].data() + v,
-                                     std::min(kViewsAtOnce, num_views - v), family.sample_stride,
-                                     tile, tile_end,
-                                     samples + family.origin + (first + l) * family.line_stride);
+          kernels::backproject_lines(
+              crossings[static_cast<std::size_t>(l)].data() + v,
+              std::min(kViewsAtOnce, num_views - v), family.sample_stride, tile, tile_end,
+              samples + family.origin + (first + l) * family.line_stride, slabs);
         }
       }
     }
@@ -273,24 +285,47 @@ std::size_t SlabProjector::detector_size(std::size_t num_views) const {
   return (num_views * static_cast<std::size_t>(geometry_.width) + 1) * kLanes;
 }
 
-void SlabProjector::forward(float* samples, std::span<const int> views, float* detector) const {
+// Slabs are projected in pairs, the last of an odd number alone.
+template <typename ProjectSlabs>
+void for_each_pair(int num_slabs, std::ptrdiff_t samples, std::ptrdiff_t detector,
+                   const ProjectSlabs& project) {
+  for (int slab = 0; slab < num_slabs; slab += 2)
+    project(Slabs{std::min(2, num_slabs - slab), samples, detector}, slab * samples,
+            slab * detector);
+}
+
+void SlabProjector::forward(float* samples, std::span<const int> views, float* detector,
+                            int num_slabs) const {
   const int width = static_cast<int>(geometry_.width);
+  const auto samples_apart = static_cast<std::ptrdiff_t>(grid_.size());
+  const auto detectors_apart = static_cast<std::ptrdiff_t>(detector_size(views.size()));
   for (std::size_t i = 0; i < beams_.size(); ++i) {
     const SampleSegment& s = grid_.segments()[i];
-    fill_padding(s, samples);
-    project_family(rows_of(s), beams_[i], width, samples, views, detector);
-    project_family(columns_of(s), beams_[i], width, samples, views, detector);
+    for (int slab = 0; slab < num_slabs; ++slab) fill_padding(s, samples + slab * samples_apart);
+    for_each_pair(
+        num_slabs, samples_apart, detectors_apart, [&](const Slabs& slabs, auto at, auto rays) {
+          project_family(rows_of(s), beams_[i], width, slabs, samples + at, views, detector + rays);
+          project_family(columns_of(s), beams_[i], width, slabs, samples + at, views,
+                         detector + rays);
+        });
   }
 }
 
-void SlabProjector::backward(const float* detector, std::span<const int> views,
-                             float* samples) const {
+void SlabProjector::backward(const float* detector, std::span<const int> views, float* samples,
+                             int num_slabs) const {
   const int width = static_cast<int>(geometry_.width);
+  const auto samples_apart = static_cast<std::ptrdiff_t>(grid_.size());
+  const auto detectors_apart = static_cast<std::ptrdiff_t>(detector_size(views.size()));
   for (std::size_t i = 0; i < beams_.size(); ++i) {
     const SampleSegment& s = grid_.segments()[i];
-    backproject_family(rows_of(s), beams_[i], width, detector, views, samples);
-    backproject_family(columns_of(s), beams_[i], width, detector, views, samples);
-    fold_padding(s, samples);
+    for_each_pair(num_slabs, samples_apart, detectors_apart,
+                  [&](const Slabs& slabs, auto at, auto rays) {
+                    backproject_family(rows_of(s), beams_[i], width, slabs, detector + rays, views,
+                                       samples + at);
+                    backproject_family(columns_of(s), beams_[i], width, slabs, detector + rays,
+                                       views, samples + at);
+                  });
+    for (int slab = 0; slab < num_slabs; ++slab) fold_padding(s, samples + slab * samples_apart);
   }
 }
 

@@ -34,10 +34,14 @@ class SlabProjector {
   /// which is read.
   std::size_t detector_size(std::size_t num_views) const;
 
-  /// detector += A samples for the named views. Writes the padding of `samples`.
-  void forward(float* samples, std::span<const int> views, float* detector) const;
+  /// detector += A samples for the named views. Writes the padding of `samples`. Of several
+  /// slabs, samples follow each other (grid().size() floats), and so do detectors
+  /// (detector_size(views.size())); two together take less time than one after the other.
+  void forward(float* samples, std::span<const int> views, float* detector,
+               int num_slabs = 1) const;
   /// samples += Aᵀ detector. The padding of `samples` is zero before and after.
-  void backward(const float* detector, std::span<const int> views, float* samples) const;
+  void backward(const float* detector, std::span<const int> views, float* samples,
+                int num_slabs = 1) const;
 
  private:
   geometry::TiltGeometry geometry_;

@@ -29,8 +29,8 @@ std::size_t reading_memory(const PreparedSeries& plan) {
   return static_cast<std::size_t>(kCopies * kBytesPerPixel * (raw + binned));
 }
 
-// What each thread works on: samples of two slabs and a gradient, rows for the total
-// variation, the views of a step, a leaf's vertices; and then a part of the volume.
+// What each thread works on: a pair of slabs with their gradient and the views of a step, rows for
+// the total variation, a leaf's vertices; and then a part of the volume.
 std::size_t thread_memory(const PreparedSeries& plan, const Domain& domain, int views_a_step) {
   constexpr std::size_t kRow = base::kLanes * sizeof(float);
   const std::size_t slab = domain.grid.size() * sizeof(float);
@@ -43,7 +43,7 @@ std::size_t thread_memory(const PreparedSeries& plan, const Domain& domain, int 
       std::size_t{16} << 20,
       static_cast<std::size_t>(static_cast<double>(plan.roi.width()) * plan.geometry.thickness) *
           kRow);
-  return 3 * slab + 3 * slab / base::kLanes + views + leaf + written;
+  return 2 * (2 * slab + views) + 3 * slab / base::kLanes + leaf + written;
 }
 
 int steps_an_epoch(const PreparedSeries& plan, const FitOptions& options) {

@@ -11,19 +11,22 @@ namespace tomofield::reconstruct {
 using kernels::kLanes;
 using projection::SampleSegment;
 
-// What a thread needs for a band; kept between calls.
+// Slabs that are projected together (projection/slab_projector.h).
+constexpr int kPair = 2;
+
+// What a thread needs for a band; kept between calls. Slabs and detectors of a pair follow each
+// other.
 struct SlabObjective::Workspace {
-  base::AlignedBuffer<float> samples, next_samples, grad_samples, detector;
+  base::AlignedBuffer<float> samples, grad_samples, detector;
   base::AlignedBuffer<float> flux, row, next_row;
 
   void fit(std::size_t slab_size, std::size_t detector_size, std::size_t row_size) {
     // Padding has to start as zeros and stays so: a new layout needs new buffers.
-    if (samples.size() != slab_size) {
-      samples.reset(slab_size);
-      next_samples.reset(slab_size);
-      grad_samples.reset(slab_size);
+    if (samples.size() != kPair * slab_size) {
+      samples.reset(kPair * slab_size);
+      grad_samples.reset(kPair * slab_size);
     }
-    detector.reserve(detector_size);
+    detector.reserve(kPair * detector_size);
     if (row.size() != row_size) {
       flux.reset(row_size);
       row.reset(row_size);
@@ -46,32 +49,20 @@ BandResult SlabObjective::accumulate_gradient(int band_index, std::span<const in
                                               std::span<const loss::ViewModel> models,
                                               double multiplicity, float* gradient) const {
   thread_local Workspace w;
-  const std::size_t detector_size = projector_.detector_size(views.size());
-  w.fit(projector_.grid().size(), detector_size, sampler_.row_size());
+  w.fit(projector_.grid().size(), projector_.detector_size(views.size()), sampler_.row_size());
   const auto band = sampler_.band(band_index);
-  const std::int64_t width = projector_.geometry().width;
   BandResult result;
   result.views.resize(views.size());
 
-  sampler_.decode(band.first, w.samples.data());
-  start_flux(band.first, w);
-  for (int slab = band.first; slab < band.end; ++slab) {
-    const float* above = density_above(slab, band, w);
-
-    std::fill_n(w.detector.data(), detector_size, 0.0f);
-    projector_.forward(w.samples.data(), views, w.detector.data());
-    for (std::size_t v = 0; v < views.size(); ++v) {
-      result.views[v] +=
-          loss::data_term(models[static_cast<std::size_t>(views[v])], multiplicity,
-                          measured_.rays(slab, views[v]), measured_.mask(slab, views[v]), width,
-                          w.detector.data() + static_cast<std::ptrdiff_t>(v) * width * kLanes);
-    }
-    w.grad_samples.fill(0.0f);
-    projector_.backward(w.detector.data(), views, w.grad_samples.data());
-    add_variation(slab, above, w, result);
-    result.grad_bias +=
-        sampler_.decode_adjoint(slab, w.samples.data(), w.grad_samples.data(), gradient);
-    std::swap(w.samples, w.next_samples);
+  for (int slab = band.first; slab < band.end; slab += kPair) {
+    const projection::SlabSampler::Range pair{slab, std::min(slab + kPair, band.end)};
+    for_each_slab(pair, w, [&](int at, float* samples, float*) { sampler_.decode(at, samples); });
+    if (slab == band.first) start_flux(slab, w);
+    add_data_term(pair, views, models, multiplicity, w, result);
+    for_each_slab(pair, w, [&](int at, float* samples, float* grad_samples) {
+      add_variation(at, samples, density_above(at, pair, samples, w), grad_samples, w, result);
+      result.grad_bias += sampler_.decode_adjoint(at, samples, grad_samples, gradient);
+    });
   }
   if (weights_.factor_variation > 0) {
     for (const int leaf : sampler_.leaves_of_band(band_index)) {
@@ -80,6 +71,38 @@ BandResult SlabObjective::accumulate_gradient(int band_index, std::span<const in
     }
   }
   return result;
+}
+
+// body(slab, its samples, their gradient)
+template <typename Body>
+void SlabObjective::for_each_slab(const projection::SlabSampler::Range& pair, Workspace& w,
+                                  const Body& body) const {
+  std::size_t at = 0;
+  for (int slab = pair.first; slab < pair.end; ++slab, at += projector_.grid().size())
+    body(slab, w.samples.data() + at, w.grad_samples.data() + at);
+}
+
+// Its gradient takes the place of what was in `grad_samples`.
+void SlabObjective::add_data_term(const projection::SlabSampler::Range& pair,
+                                  std::span<const int> views,
+                                  std::span<const loss::ViewModel> models, double multiplicity,
+                                  Workspace& w, BandResult& result) const {
+  const std::int64_t width = projector_.geometry().width;
+  const std::size_t detector_size = projector_.detector_size(views.size());
+  const int count = pair.end - pair.first;
+  std::fill_n(w.detector.data(), static_cast<std::size_t>(count) * detector_size, 0.0f);
+  projector_.forward(w.samples.data(), views, w.detector.data(), count);
+  float* detector = w.detector.data();
+  for (int slab = pair.first; slab < pair.end; ++slab, detector += detector_size) {
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      result.views[v] +=
+          loss::data_term(models[static_cast<std::size_t>(views[v])], multiplicity,
+                          measured_.rays(slab, views[v]), measured_.mask(slab, views[v]), width,
+                          detector + static_cast<std::ptrdiff_t>(v) * width * kLanes);
+    }
+  }
+  w.grad_samples.fill(0.0f);
+  projector_.backward(w.detector.data(), views, w.grad_samples.data(), count);
 }
 
 kernels::SlabVariation SlabObjective::variation_of(std::size_t index) const {
@@ -97,14 +120,14 @@ kernels::SlabVariation SlabObjective::variation_of(std::size_t index) const {
   return variation;
 }
 
-void SlabObjective::add_variation(int slab, const float* above, Workspace& w,
-                                  BandResult& result) const {
+void SlabObjective::add_variation(int slab, const float* samples, const float* above,
+                                  float* grad_samples, Workspace& w, BandResult& result) const {
   if (weights_.density_variation <= 0) return;
   for (std::size_t s = 0; s < projector_.grid().segments().size(); ++s) {
     const std::ptrdiff_t origin = projector_.grid().segments()[s].origin;
     kernels::SlabVariation variation = variation_of(s);
-    variation.samples = w.samples.data() + origin;
-    variation.gradient = w.grad_samples.data() + origin;
+    variation.samples = samples + origin;
+    variation.gradient = grad_samples + origin;
     variation.num_rows = sampler_.rows_in_slab(slab);
     variation.above = above == nullptr ? nullptr : above + sampler_.row_origin(s);
     variation.flux = w.flux.data() + sampler_.row_origin(s);
@@ -125,17 +148,15 @@ void SlabObjective::start_flux(int slab, Workspace& w) const {
   }
 }
 
-// The first row past a slab, and on the way the samples of the slab that holds
-// it when that is in the same band: each slab of a band is decoded once.
-const float* SlabObjective::density_above(int slab, const projection::SlabSampler::Range& band,
-                                          Workspace& w) const {
-  if (slab + 1 < band.end) {
-    sampler_.decode(slab + 1, w.next_samples.data());
-    copy_first_row(w.next_samples.data(), w.next_row.data());
-    return w.next_row.data();
-  }
+// The first row past a slab of a pair; none past the last slab of all.
+const float* SlabObjective::density_above(int slab, const projection::SlabSampler::Range& pair,
+                                          const float* samples, Workspace& w) const {
   if (slab + 1 == sampler_.num_slabs()) return nullptr;
-  if (weights_.density_variation > 0) sampler_.decode_row((slab + 1) * kLanes, w.next_row.data());
+  if (slab + 1 < pair.end) {
+    copy_first_row(samples + projector_.grid().size(), w.next_row.data());
+  } else if (weights_.density_variation > 0) {
+    sampler_.decode_row((slab + 1) * kLanes, w.next_row.data());
+  }
   return w.next_row.data();
 }
 

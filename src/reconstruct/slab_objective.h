@@ -46,10 +46,17 @@ class SlabObjective {
 
  private:
   struct Workspace;
-  void add_variation(int slab, const float* above, Workspace& w, BandResult& result) const;
+  template <typename Body>
+  void for_each_slab(const projection::SlabSampler::Range& pair, Workspace& w,
+                     const Body& body) const;
+  void add_data_term(const projection::SlabSampler::Range& pair, std::span<const int> views,
+                     std::span<const loss::ViewModel> models, double multiplicity, Workspace& w,
+                     BandResult& result) const;
+  void add_variation(int slab, const float* samples, const float* above, float* grad_samples,
+                     Workspace& w, BandResult& result) const;
   void start_flux(int slab, Workspace& w) const;
-  const float* density_above(int slab, const projection::SlabSampler::Range& band,
-                             Workspace& w) const;
+  const float* density_above(int slab, const projection::SlabSampler::Range& pair,
+                             const float* samples, Workspace& w) const;
   void copy_first_row(const float* samples, float* row) const;
   kernels::SlabVariation variation_of(std::size_t segment) const;
 

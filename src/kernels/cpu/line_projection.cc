@@ -55,12 +55,16 @@ struct Sums {
   Vec of_tap0[kVecs], of_tap1[kVecs];
 };
 
-template <int kItem>
-HWY_INLINE void add_item(const float* source, std::ptrdiff_t next, const TapTable& table, int t,
-                         Vec weights0, Vec weights1, Sums& sums) {
+// Where the second of two slabs lies, in floats after the first.
+struct Apart {
+  std::ptrdiff_t source, out;
+};
+
+template <int kItem, int kSlabs>
+HWY_INLINE void add_item(const float* source, std::ptrdiff_t next, const Apart& apart,
+                         const TapTable& table, int t, Vec weights0, Vec weights1, Sums* sums) {
   const Tag d;
-  const float* const tap0 = source + table.index[t][kItem];
-  const float* const tap1 = tap0 + next;
+  const float* tap0 = source + table.index[t][kItem];
 #if HWY_TARGET == HWY_SCALAR
   weights0 = hn::Set(d, table.weight0[t][kItem]);
   weights1 = hn::Set(d, table.weight1[t][kItem]);
@@ -68,33 +72,45 @@ HWY_INLINE void add_item(const float* source, std::ptrdiff_t next, const TapTabl
   weights0 = hn::Broadcast<kItem>(weights0);
   weights1 = hn::Broadcast<kItem>(weights1);
 #endif
-  for (int v = 0; v < kVecs; ++v) {
-    sums.of_tap0[v] = hn::MulAdd(weights0, hn::LoadU(d, tap0 + v * kVecLanes), sums.of_tap0[v]);
-    sums.of_tap1[v] = hn::MulAdd(weights1, hn::LoadU(d, tap1 + v * kVecLanes), sums.of_tap1[v]);
+  for (int s = 0; s < kSlabs; ++s, tap0 += apart.source) {
+    const float* const tap1 = tap0 + next;
+    for (int v = 0; v < kVecs; ++v) {
+      sums[s].of_tap0[v] =
+          hn::MulAdd(weights0, hn::LoadU(d, tap0 + v * kVecLanes), sums[s].of_tap0[v]);
+      sums[s].of_tap1[v] =
+          hn::MulAdd(weights1, hn::LoadU(d, tap1 + v * kVecLanes), sums[s].of_tap1[v]);
+    }
   }
 }
 
 // Adds what `num_tables` tables take to destinations [0, count), `stride`
 // floats apart. Sources that follow each other are `next` floats apart.
+template <int kSlabs>
 HWY_INLINE void gather(const TapTable* tables, int num_tables, const float* source,
-                       std::ptrdiff_t next, int count, std::ptrdiff_t stride, float* out) {
+                       std::ptrdiff_t next, const Apart& apart, int count, std::ptrdiff_t stride,
+                       float* out) {
   const Tag d;
   for (int t = 0; t < count; ++t, out += stride) {
-    Sums sums;
-    for (int v = 0; v < kVecs; ++v) {
-      sums.of_tap0[v] = hn::LoadU(d, out + v * kVecLanes);
-      sums.of_tap1[v] = hn::Zero(d);
+    Sums sums[kSlabs];
+    for (int s = 0; s < kSlabs; ++s) {
+      for (int v = 0; v < kVecs; ++v) {
+        sums[s].of_tap0[v] = hn::LoadU(d, out + s * apart.out + v * kVecLanes);
+        sums[s].of_tap1[v] = hn::Zero(d);
+      }
     }
     for (int i = 0; i < num_tables; ++i) {
       const Vec weights0 = hn::LoadDup128(d, tables[i].weight0[t]);
       const Vec weights1 = hn::LoadDup128(d, tables[i].weight1[t]);
-      add_item<0>(source, next, tables[i], t, weights0, weights1, sums);
-      add_item<1>(source, next, tables[i], t, weights0, weights1, sums);
-      add_item<2>(source, next, tables[i], t, weights0, weights1, sums);
-      add_item<3>(source, next, tables[i], t, weights0, weights1, sums);
+      add_item<0, kSlabs>(source, next, apart, tables[i], t, weights0, weights1, sums);
+      add_item<1, kSlabs>(source, next, apart, tables[i], t, weights0, weights1, sums);
+      add_item<2, kSlabs>(source, next, apart, tables[i], t, weights0, weights1, sums);
+      add_item<3, kSlabs>(source, next, apart, tables[i], t, weights0, weights1, sums);
     }
-    for (int v = 0; v < kVecs; ++v)
-      hn::StoreU(hn::Add(sums.of_tap0[v], sums.of_tap1[v]), d, out + v * kVecLanes);
+    for (int s = 0; s < kSlabs; ++s) {
+      for (int v = 0; v < kVecs; ++v)
+        hn::StoreU(hn::Add(sums[s].of_tap0[v], sums[s].of_tap1[v]), d,
+                   out + s * apart.out + v * kVecLanes);
+    }
   }
 }
 
@@ -189,8 +205,9 @@ HWY_INLINE void fill_forward(const LineCrossing* lines, int count, const float* 
   }
 }
 
-void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stride, int first,
-                   int end, float* detector) {
+template <int kSlabs>
+HWY_INLINE void project_slabs(const LineCrossing* lines, int num_lines, std::ptrdiff_t stride,
+                              int first, int end, const Apart& apart, float* detector) {
   TapTable tables[kMaxTables];
   for (int group = 0; group < num_lines; group += kMaxTables * kItems) {
     const float* const source = lines[group].samples;
@@ -201,9 +218,19 @@ void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stri
         fill_forward(lines + l, std::min(kItems, num_lines - l), source, stride, tile, tile_end,
                      tables[num_tables++]);
       }
-      gather(tables, num_tables, source, stride, tile_end - tile, kLanes,
-             detector + static_cast<std::ptrdiff_t>(tile) * kLanes);
+      gather<kSlabs>(tables, num_tables, source, stride, apart, tile_end - tile, kLanes,
+                     detector + static_cast<std::ptrdiff_t>(tile) * kLanes);
     }
+  }
+}
+
+void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stride, int first,
+                   int end, float* detector, const Slabs& slabs) {
+  const Apart apart{slabs.samples_apart, slabs.detectors_apart};
+  if (slabs.count == 2) {
+    project_slabs<2>(lines, num_lines, stride, first, end, apart, detector);
+  } else {
+    project_slabs<1>(lines, num_lines, stride, first, end, apart, detector);
   }
 }
 
@@ -298,16 +325,17 @@ HWY_INLINE void fill_adjoint(const PixelPair* pairs, int count, const float* sou
   }
 }
 
-void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t stride, int first,
-                       int end, float* samples) {
+template <int kSlabs>
+HWY_INLINE void backproject_slabs(const LineCrossing* views, int num_views, std::ptrdiff_t stride,
+                                  int first, int end, const Apart& apart, float* samples) {
   TapTable tables[kMaxTables];
   PixelPair items[kItems];
   for (int tile = first; tile < end; tile += kTile) {
     const int tile_end = std::min(end, tile + kTile);
     int num_tables = 0, count = 0;
     const auto use_tables = [&]() HWY_ATTR {
-      gather(tables, num_tables, views->detector, kLanes, tile_end - tile, stride,
-             samples + tile * stride);
+      gather<kSlabs>(tables, num_tables, views->detector, kLanes, apart, tile_end - tile, stride,
+                     samples + tile * stride);
       num_tables = 0;
     };
     const auto fill_table = [&]() HWY_ATTR {
@@ -328,6 +356,16 @@ void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t 
   }
 }
 
+void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t stride, int first,
+                       int end, float* samples, const Slabs& slabs) {
+  const Apart apart{slabs.detectors_apart, slabs.samples_apart};
+  if (slabs.count == 2) {
+    backproject_slabs<2>(views, num_views, stride, first, end, apart, samples);
+  } else {
+    backproject_slabs<1>(views, num_views, stride, first, end, apart, samples);
+  }
+}
+
 }  // namespace tomofield::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -336,12 +374,12 @@ namespace tomofield::kernels {
 HWY_EXPORT(project_lines);
 HWY_EXPORT(backproject_lines);
 void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stride, int first,
-                   int end, float* detector) {
-  HWY_DYNAMIC_DISPATCH(project_lines)(lines, num_lines, stride, first, end, detector);
+                   int end, float* detector, const Slabs& slabs) {
+  HWY_DYNAMIC_DISPATCH(project_lines)(lines, num_lines, stride, first, end, detector, slabs);
 }
 void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t stride, int first,
-                       int end, float* samples) {
-  HWY_DYNAMIC_DISPATCH(backproject_lines)(views, num_views, stride, first, end, samples);
+                       int end, float* samples, const Slabs& slabs) {
+  HWY_DYNAMIC_DISPATCH(backproject_lines)(views, num_views, stride, first, end, samples, slabs);
 }
 }  // namespace tomofield::kernels
 #endif
