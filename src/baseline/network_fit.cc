@@ -85,7 +85,7 @@ class NetworkFit {
     float* samples = solution_.densities.slab(rows.slab);
     density_.decode(rows, samples);
     sums_[set] =
-        problem_.residuals(rows.slab, problem_.views(), samples, detector_.data(), rows.lanes());
+        problem_.residuals({rows.slab}, problem_.views(), samples, detector_.data(), rows.lanes());
   }
 
   void take_step(std::size_t set) {

@@ -33,30 +33,32 @@ class Sart {
       : problem_(problem),
         non_negative_(options.non_negative),
         subsets_(interleaved_subsets(problem, options.subsets)),
-        scratch_(problem.projector().detector_size(subsets_.front().size()), problem.grid().size(),
-                 3) {}
+        scratch_(problem, subsets_.front().size(), 3) {}
 
   // A step with each subset. Rows do not depend on each other, so neither do slabs. Returns how far
   // the densities moved.
   double pass(double relaxation, VoxelVolume& densities) {
-    return std::sqrt(sum_over_slabs(problem_.num_slabs(), [&](int slab) {
-      float* x = densities.slab(slab);
-      float* before = scratch_.cleared_samples(0);
-      std::copy_n(x, problem_.grid().size(), before);
-      for (const std::vector<int>& views : subsets_) step(slab, views, relaxation, x);
-      return squared_distance(problem_.grid(), x, before);
+    return std::sqrt(sum_over_pairs(problem_.num_slabs(), [&](const SlabPair& pair) {
+      float *x = densities.slab(pair.first), *before = scratch_.cleared_samples(0);
+      const std::size_t size = problem_.grid().size();
+      std::copy_n(x, static_cast<std::size_t>(pair.count) * size, before);
+      for (const std::vector<int>& views : subsets_) step(pair, views, relaxation, x);
+      double moved = 0.0;
+      for (int i = 0; i < pair.count; ++i, x += size, before += size)
+        moved += squared_distance(problem_.grid(), x, before);
+      return moved;
     }));
   }
 
  private:
-  void step(int slab, const std::vector<int>& views, double relaxation, float* x) {
+  void step(const SlabPair& pair, const std::vector<int>& views, double relaxation, float* x) {
     float* detector = scratch_.detector();
     float *inverse_columns = scratch_.cleared_samples(1), *gradient = scratch_.cleared_samples(2);
-    inverse_column_sums(problem_, slab, views, detector, inverse_columns);
-    problem_.residuals(slab, views, x, detector);
-    weigh_rays(problem_, views, detector);
-    problem_.backproject(views, detector, gradient);
-    take_step(problem_.grid(), relaxation, non_negative_, inverse_columns, gradient, x);
+    inverse_column_sums(problem_, pair, views, detector, inverse_columns);
+    problem_.residuals(pair, views, x, detector);
+    weigh_rays(problem_, pair, views, detector);
+    problem_.backproject(views, detector, gradient, pair.count);
+    take_step(problem_.grid(), pair, relaxation, non_negative_, inverse_columns, gradient, x);
   }
 
   const VoxelProblem& problem_;

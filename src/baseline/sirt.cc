@@ -15,26 +15,24 @@ Solution reconstruct_sirt(VoxelProblem& problem, const SirtOptions& options,
                           const AfterIteration& after_iteration) {
   Solution solution{VoxelVolume(problem.grid(), problem.num_rows()), {}, {}};
   VoxelVolume& densities = solution.densities;
-  ThreadScratch scratch(problem.detector_size(), problem.grid().size());
+  ThreadScratch scratch(problem);
   VoxelVolume inverse_columns(problem.grid(), problem.num_rows());
-  base::parallel_for(problem.num_slabs(), [&](std::int64_t index) {
-    const int slab = static_cast<int>(index);
-    inverse_column_sums(problem, slab, problem.views(), scratch.detector(),
-                        inverse_columns.slab(slab));
+  for_each_pair(problem.num_slabs(), [&](const SlabPair& pair) {
+    inverse_column_sums(problem, pair, problem.views(), scratch.detector(),
+                        inverse_columns.slab(pair.first));
   });
-  std::vector<std::vector<loss::ViewSums>> sums(static_cast<std::size_t>(problem.num_slabs()));
+  std::vector<std::vector<loss::ViewSums>> sums(problem.num_pairs());
   for (int iteration = 0;; ++iteration) {
     const bool is_last = iteration == options.iterations;
-    solution.objective.push_back(sum_over_slabs(problem.num_slabs(), [&](int slab) {
-      float* residuals = scratch.detector();
-      sums[static_cast<std::size_t>(slab)] =
-          problem.residuals(slab, problem.views(), densities.slab(slab), residuals);
-      const double objective = weigh_rays(problem, problem.views(), residuals) / 2;
+    solution.objective.push_back(sum_over_pairs(problem.num_slabs(), [&](const SlabPair& pair) {
+      float *residuals = scratch.detector(), *x = densities.slab(pair.first);
+      sums[pair.index()] = problem.residuals(pair, problem.views(), x, residuals);
+      const double objective = weigh_rays(problem, pair, problem.views(), residuals) / 2;
       if (is_last) return objective;
       float* gradient = scratch.cleared_samples();
-      problem.backproject(problem.views(), residuals, gradient);
-      take_step(problem.grid(), options.relaxation, options.non_negative,
-                inverse_columns.slab(slab), gradient, densities.slab(slab));
+      problem.backproject(problem.views(), residuals, gradient, pair.count);
+      take_step(problem.grid(), pair, options.relaxation, options.non_negative,
+                inverse_columns.slab(pair.first), gradient, x);
       return objective;
     }));
     const std::vector<loss::ViewSums> all = total(sums);

@@ -6,6 +6,7 @@
 
 #include "base/aligned_buffer.h"
 #include "base/parallel.h"
+#include "baseline/voxel_problem.h"
 #include "baseline/voxel_volume.h"
 
 namespace tomofield::baseline {
@@ -46,14 +47,20 @@ struct IterationReport {
 /// padding.
 using AfterIteration = std::function<void(const IterationReport&, VoxelVolume&)>;
 
-/// A slab's rays and some buffers of a slab's samples for each thread of base::parallel_for.
+/// The rays of a pair of slabs and some buffers of its samples for each thread of
+/// base::parallel_for.
 class ThreadScratch {
  public:
-  ThreadScratch(std::size_t detector_size, std::size_t slab_size, std::size_t num_buffers = 1)
+  /// For the views that are fitted.
+  explicit ThreadScratch(const VoxelProblem& problem)
+      : ThreadScratch(problem, problem.views().size(), 1) {}
+  ThreadScratch(const VoxelProblem& problem, std::size_t num_views, std::size_t num_buffers)
       : num_buffers_(num_buffers) {
     const std::size_t threads = static_cast<std::size_t>(base::thread_count());
-    for (std::size_t i = 0; i < threads; ++i) detectors_.emplace_back(detector_size);
-    for (std::size_t i = 0; i < threads * num_buffers; ++i) samples_.emplace_back(slab_size);
+    for (std::size_t i = 0; i < threads; ++i)
+      detectors_.emplace_back(2 * problem.projector().detector_size(num_views));
+    for (std::size_t i = 0; i < threads * num_buffers; ++i)
+      samples_.emplace_back(2 * problem.grid().size());
   }
   float* detector() { return detectors_[thread()].data(); }
   /// Zeros.

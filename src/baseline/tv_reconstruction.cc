@@ -80,9 +80,9 @@ class ChambollePock {
  public:
   ChambollePock(VoxelProblem& problem, const TvOptions& options, double start);
 
-  // The step of q and p. Returns λ Σ h_x h_z φ(|∇x|) and, each slab's, the sums of the data term of
+  // The step of q and p. Returns λ Σ h_x h_z φ(|∇x|) and, each pair's, the sums of the data term of
   // x.
-  double step_duals(std::vector<std::vector<loss::ViewSums>>& data_of_slab);
+  double step_duals(std::vector<std::vector<loss::ViewSums>>& data_of_pair);
   // The step of x. The last one is not relaxed: it ends where x >= 0 holds.
   void step_densities(bool is_last);
   // Takes the weights w of the concave penalty from x.
@@ -93,7 +93,7 @@ class ChambollePock {
 
  private:
   void begin_concave_penalty();
-  void step_ray_duals(int slab, const float* residuals);
+  void step_ray_duals(const float* residuals, float* q_of_slab);
   double step_gradient_duals(int slab);
   void take_step(int slab, const float* adjoint, float relaxation);
 
@@ -107,7 +107,7 @@ class ChambollePock {
   double tau_of_penalty_ = 0;           // in density units, 0: smooth
   std::optional<VoxelVolume> weights_;  // w; none: 1 everywhere
   std::vector<base::AlignedBuffer<float>>
-      q_;                   // κ q / σ_view, one buffer a slab: the residual / σ² at the optimum
+      q_;                   // κ q / σ_view, one buffer a pair: the residual / σ² at the optimum
   std::vector<float> tau_;  // steps of the densities [segment][z][x], the same in every row
 };
 
@@ -115,13 +115,14 @@ ChambollePock::ChambollePock(VoxelProblem& problem, const TvOptions& options, do
     : problem_(problem),
       options_(options),
       factors_of_{kBalance * options.weight.value_or(options.usual_weight())},
-      scratch_(problem.detector_size(), problem.grid().size()),
+      scratch_(problem),
       x_(problem.grid(), problem.num_rows()),
       adjoint_(problem.grid(), problem.num_rows()),
       px_(problem.grid(), problem.num_rows()),
       py_(problem.grid(), problem.num_rows()),
       pz_(problem.grid(), problem.num_rows()) {
-  for (int slab = 0; slab < problem.num_slabs(); ++slab) q_.emplace_back(problem.detector_size());
+  for (std::size_t pair = 0; pair < problem.num_pairs(); ++pair)
+    q_.emplace_back(2 * problem.detector_size());
   measure_steps();
   x_.fill(static_cast<float>(options.non_negative ? std::max(0.0, start) : start));
   if (options.penalty == "concave") begin_concave_penalty();
@@ -151,18 +152,23 @@ void ChambollePock::measure_steps() {
   });
 }
 
-double ChambollePock::step_duals(std::vector<std::vector<loss::ViewSums>>& data_of_slab) {
-  return sum_over_slabs(problem_.num_slabs(), [&](int slab) {
-    float* residuals = scratch_.detector();
-    data_of_slab[static_cast<std::size_t>(slab)] =
-        problem_.residuals(slab, problem_.views(), x_.slab(slab), residuals);
-    step_ray_duals(slab, residuals);
-    return step_gradient_duals(slab);
+double ChambollePock::step_duals(std::vector<std::vector<loss::ViewSums>>& data_of_pair) {
+  return sum_over_pairs(problem_.num_slabs(), [&](const SlabPair& pair) {
+    float *residuals = scratch_.detector(), *q = q_[pair.index()].data();
+    data_of_pair[pair.index()] =
+        problem_.residuals(pair, problem_.views(), x_.slab(pair.first), residuals);
+    double penalty = 0.0;
+    for (int slab = pair.first; slab < pair.end(); ++slab) {
+      step_ray_duals(residuals, q);
+      penalty += step_gradient_duals(slab);
+      residuals += problem_.detector_size();
+      q += problem_.detector_size();
+    }
+    return penalty;
   });
 }
 
-void ChambollePock::step_ray_duals(int slab, const float* residuals) {
-  float* q_of_slab = q_[static_cast<std::size_t>(slab)].data();
+void ChambollePock::step_ray_duals(const float* residuals, float* q_of_slab) {
   problem_.for_each_ray(problem_.views(), [&](const auto& model, float length, std::size_t at) {
     // A of this view is scaled, so its row sums are too, and residuals carry the scale once.
     const double per_sigma = std::sqrt(model.weight);
@@ -213,12 +219,13 @@ void ChambollePock::take_weights() {
 }
 
 void ChambollePock::step_densities(bool is_last) {
-  base::parallel_for(problem_.num_slabs(), [&](std::int64_t index) {
-    const int slab = static_cast<int>(index);
+  for_each_pair(problem_.num_slabs(), [&](const SlabPair& pair) {
     float* adjoint = scratch_.cleared_samples();
-    problem_.backproject(problem_.views(), q_[static_cast<std::size_t>(slab)].data(), adjoint);
-    add_gradient_adjoint(px_, py_, pz_, slab, factors_of_, adjoint);
-    take_step(slab, adjoint, is_last ? 1.0f : kRelaxation);
+    problem_.backproject(problem_.views(), q_[pair.index()].data(), adjoint, pair.count);
+    for (int slab = pair.first; slab < pair.end(); ++slab, adjoint += problem_.grid().size()) {
+      add_gradient_adjoint(px_, py_, pz_, slab, factors_of_, adjoint);
+      take_step(slab, adjoint, is_last ? 1.0f : kRelaxation);
+    }
   });
 }
 
@@ -250,12 +257,11 @@ nlohmann::json TvOptions::json() const {
 Solution reconstruct_tv(VoxelProblem& problem, const TvOptions& options, double start,
                         const AfterIteration& after_iteration) {
   ChambollePock solver(problem, options, start);
-  std::vector<std::vector<loss::ViewSums>> data_of_slab(
-      static_cast<std::size_t>(problem.num_slabs()));
+  std::vector<std::vector<loss::ViewSums>> data_of_pair(problem.num_pairs());
   std::vector<double> data_loss, objective;
   for (int iteration = 0;; ++iteration) {
-    const double variation = solver.step_duals(data_of_slab);
-    const std::vector<loss::ViewSums> data = total(data_of_slab);
+    const double variation = solver.step_duals(data_of_pair);
+    const std::vector<loss::ViewSums> data = total(data_of_pair);
     data_loss.push_back(problem.data_loss(data));
     objective.push_back(data_loss.back() + variation);
     if (iteration == options.iterations) break;

@@ -44,21 +44,24 @@ std::int64_t VoxelProblem::num_rays() const {
   return count;
 }
 
-std::vector<loss::ViewSums> VoxelProblem::residuals(int slab, std::span<const int> views,
-                                                    float* samples, float* detector,
-                                                    std::uint16_t lanes) const {
-  std::fill_n(detector, projector_.detector_size(views.size()), 0.0f);
-  projector_.forward(samples, views, detector);
-  std::vector<loss::ViewSums> sums;
+std::vector<loss::ViewSums> VoxelProblem::residuals(const SlabPair& slabs,
+                                                    std::span<const int> views, float* samples,
+                                                    float* detector, std::uint16_t lanes) const {
+  const std::size_t size = detector_size(views);
+  std::fill_n(detector, static_cast<std::size_t>(slabs.count) * size, 0.0f);
+  projector_.forward(samples, views, detector, slabs.count);
+  std::vector<loss::ViewSums> sums(views.size());
   std::vector<std::uint16_t> mask(row_size());
-  for (const int view : views) {
-    for (std::size_t x = 0; x < mask.size(); ++x)
-      mask[x] = static_cast<std::uint16_t>(rays_.mask(slab, view)[x] & lanes);
-    loss::ViewModel model = view_model(view);
-    model.weight = 1.0;
-    sums.push_back(
-        loss::data_term(model, 1.0, rays_.rays(slab, view), mask.data(), width(), detector));
-    detector += width() * kLanes;
+  for (int slab = slabs.first; slab < slabs.end(); ++slab, detector += size) {
+    float* rays = detector;
+    for (std::size_t v = 0; v < views.size(); ++v, rays += width() * kLanes) {
+      for (std::size_t x = 0; x < mask.size(); ++x)
+        mask[x] = static_cast<std::uint16_t>(rays_.mask(slab, views[v])[x] & lanes);
+      loss::ViewModel model = view_model(views[v]);
+      model.weight = 1.0;
+      sums[v] +=
+          loss::data_term(model, 1.0, rays_.rays(slab, views[v]), mask.data(), width(), rays);
+    }
   }
   return sums;
 }
@@ -93,20 +96,19 @@ void VoxelProblem::fill_weights(int slab, std::span<const int> views, float* det
 
 std::vector<loss::ViewSums> view_sums(const VoxelProblem& problem, std::span<const int> views,
                                       VoxelVolume& densities) {
-  std::vector<std::vector<loss::ViewSums>> sums(static_cast<std::size_t>(problem.num_slabs()));
-  base::parallel_for(problem.num_slabs(), [&](std::int64_t index) {
-    const int slab = static_cast<int>(index);
-    base::AlignedBuffer<float> detector(problem.projector().detector_size(views.size()));
-    sums[static_cast<std::size_t>(slab)] =
-        problem.residuals(slab, views, densities.slab(slab), detector.data());
+  std::vector<std::vector<loss::ViewSums>> sums(problem.num_pairs());
+  for_each_pair(problem.num_slabs(), [&](const SlabPair& pair) {
+    base::AlignedBuffer<float> detector(2 * problem.detector_size(views));
+    sums[pair.index()] =
+        problem.residuals(pair, views, densities.slab(pair.first), detector.data());
   });
   return total(sums);
 }
 
-std::vector<loss::ViewSums> total(const std::vector<std::vector<loss::ViewSums>>& sums_of_slab) {
-  std::vector<loss::ViewSums> all = sums_of_slab.front();
-  for (std::size_t slab = 1; slab < sums_of_slab.size(); ++slab) {
-    for (std::size_t v = 0; v < all.size(); ++v) all[v] += sums_of_slab[slab][v];
+std::vector<loss::ViewSums> total(const std::vector<std::vector<loss::ViewSums>>& sums_of_part) {
+  std::vector<loss::ViewSums> all = sums_of_part.front();
+  for (std::size_t part = 1; part < sums_of_part.size(); ++part) {
+    for (std::size_t v = 0; v < all.size(); ++v) all[v] += sums_of_part[part][v];
   }
   return all;
 }

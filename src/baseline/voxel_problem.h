@@ -24,7 +24,8 @@ struct ViewHandling {
 /// rays that count, for densities x at the samples of `grid`. Everything is in
 /// the density units of the main method. `rays` must outlive it.
 ///
-/// A detector is a slab's rays of some views, one after the other: [view, x, lane].
+/// A detector is a slab's rays of some views, one after the other: [view, x, lane]. Those of a
+/// pair of slabs follow each other, detector_size(views) floats apart.
 class VoxelProblem {
  public:
   VoxelProblem(const geometry::TiltGeometry& geometry, projection::SampleGrid grid,
@@ -36,6 +37,7 @@ class VoxelProblem {
   const tilt_series::SlabViews& rays() const { return rays_; }
   std::int64_t num_rows() const { return rays_.shape().num_rows; }
   int num_slabs() const { return rays_.num_slabs(); }
+  std::size_t num_pairs() const { return static_cast<std::size_t>(num_slabs() + 1) / 2; }
   /// The views that are fitted, ascending.
   const std::vector<int>& views() const { return views_; }
   const loss::ViewModel& view_model(int view) const {
@@ -44,8 +46,11 @@ class VoxelProblem {
   /// Of all views.
   const std::vector<double>& noise_sigma() const { return noise_sigma_; }
   std::int64_t width() const { return projector_.geometry().width; }
-  /// Floats of a detector of the views that are fitted.
-  std::size_t detector_size() const { return projector_.detector_size(views_.size()); }
+  /// Floats of a detector of the views that are fitted, or of these.
+  std::size_t detector_size() const { return detector_size(views_); }
+  std::size_t detector_size(std::span<const int> views) const {
+    return projector_.detector_size(views.size());
+  }
   /// Rays that count, of the views that are fitted.
   std::int64_t num_rays() const;
 
@@ -67,17 +72,19 @@ class VoxelProblem {
     }
   }
 
-  /// detector ← scale (scale A x + offset − b) for the rays of a slab of these views, 0 for
+  /// detector ← scale (scale A x + offset − b) for the rays of some slabs of these views, 0 for
   /// those that do not count. Writes the padding of `samples`. Returns sums, one each view.
   /// Only rays of these `lanes`, a bit each, count.
-  std::vector<loss::ViewSums> residuals(int slab, std::span<const int> views, float* samples,
-                                        float* detector, std::uint16_t lanes = kAllLanes) const;
+  std::vector<loss::ViewSums> residuals(const SlabPair& slabs, std::span<const int> views,
+                                        float* samples, float* detector,
+                                        std::uint16_t lanes = kAllLanes) const;
   /// ½ Σ (residual / σ)² of one slab or, with added sums, of all; sums of the fitted views.
   double data_loss(const std::vector<loss::ViewSums>& sums) const;
 
-  /// samples += Aᵀ detector, of a slab.
-  void backproject(std::span<const int> views, const float* detector, float* samples) const {
-    projector_.backward(detector, views, samples);
+  /// samples += Aᵀ detector, of so many slabs.
+  void backproject(std::span<const int> views, const float* detector, float* samples,
+                   int num_slabs = 1) const {
+    projector_.backward(detector, views, samples, num_slabs);
   }
 
   /// Fits scale and offset of each view to the sums of all slabs (loss/data_term.h),
@@ -105,7 +112,7 @@ class VoxelProblem {
 std::vector<loss::ViewSums> view_sums(const VoxelProblem& problem, std::span<const int> views,
                                       VoxelVolume& densities);
 
-/// The sums of all slabs, added in their order: the same for any thread count.
-std::vector<loss::ViewSums> total(const std::vector<std::vector<loss::ViewSums>>& sums_of_slab);
+/// The sums of all parts, added in their order: the same for any thread count.
+std::vector<loss::ViewSums> total(const std::vector<std::vector<loss::ViewSums>>& sums_of_part);
 
 }  // namespace tomofield::baseline

@@ -54,11 +54,11 @@ Solution reconstruct_wbp(const VoxelProblem& problem, const WbpOptions& options,
   const std::vector<double> weights = weights_of_views(problem);
   const std::vector<double> left_out = constants(problem, densities);
   const std::vector<int>& views = problem.views();
-  ThreadScratch scratch(problem.detector_size(), problem.grid().size());
+  ThreadScratch scratch(problem);
   base::parallel_for(problem.num_slabs(), [&](std::int64_t index) {
     const int slab = static_cast<int>(index);
     float* detector = scratch.detector();
-    problem.residuals(slab, views, densities.slab(slab), detector);
+    problem.residuals({slab}, views, densities.slab(slab), detector);
     for (std::size_t v = 0; v < views.size(); ++v) {
       float* rays = detector + static_cast<std::ptrdiff_t>(v) * problem.width() * kLanes;
       const float constant = static_cast<float>(left_out[v]);
