@@ -98,7 +98,7 @@ TEST_F(SartTv, ColumnSumsAreThoseOfRaysThatCount) {
   const std::vector<int> views = {3, 12, 30};
   const std::size_t size = problem.projector().detector_size(views.size());
   base::AlignedBuffer<float> detector(size), weights(size), inverse(problem.grid().size());
-  inverse_column_sums(problem, 0, views, detector.data(), inverse.data());
+  inverse_column_sums(problem, {0}, views, detector.data(), inverse.data());
   double columns = 0;
   for (const float value : std::span(inverse.data(), problem.grid().size()))
     columns += value > 0 ? 1 / static_cast<double>(value) : 0;

@@ -16,6 +16,7 @@
 #include "io/mrc.h"
 #include "kernels/lanes.h"
 #include "random_arrays.h"
+#include "simd_targets.h"
 #include "simulate/ellipsoid.h"
 #include "simulate/project_phantom.h"
 
@@ -110,6 +111,30 @@ TEST_P(Adjoint, DotProductsAgree) {
     EXPECT_NEAR(testing::dot(projected, rays), inside, 2e-6 * scale);
     EXPECT_GT(scale, 0.0);
   }
+}
+
+// Three slabs are a pair and one more; cut faces (margins) go another way than whole lines.
+TEST_P(Adjoint, SlabsTogetherAreEachAlone) {
+  const AdjointCase& c = GetParam();
+  const TiltGeometry g = centred_geometry(c.width, 3 * kLanes, c.thickness, kAngles);
+  const SampleGrid grid = make_sample_grid(g, c.x0, c.x1, c.margin_spacing);
+  const SlabProjector projector(g, grid);
+  const auto views = all_views(g);
+  const std::size_t rays_size = projector.detector_size(views.size());
+  testing::for_each_simd_target([&] {
+    auto samples = testing::random_floats(3 * grid.size(), 1);
+    auto rays = testing::random_floats(3 * rays_size, 2);
+    std::vector<float> alone(3 * grid.size()), together(3 * grid.size());
+    for (std::size_t s = 0; s < 3; ++s)
+      projector.backward(rays.data() + s * rays_size, views, alone.data() + s * grid.size());
+    projector.backward(rays.data(), views, together.data(), 3);
+    EXPECT_EQ(together, alone);
+    auto seen_together = rays;
+    for (std::size_t s = 0; s < 3; ++s)
+      projector.forward(samples.data() + s * grid.size(), views, rays.data() + s * rays_size);
+    projector.forward(samples.data(), views, seen_together.data(), 3);
+    EXPECT_EQ(seen_together, rays);
+  });
 }
 
 TEST(SlabProjector, BothDirectionsAddToWhatIsThere) {
