@@ -16,10 +16,10 @@ namespace tomofield::bench {
 using kernels::kLanes;
 
 std::vector<Case> projection_cases() {
-  const auto setup = std::make_shared<ProjectionSetup>(64, 1);
-  const auto two = std::make_shared<ProjectionSetup>(64, 1, 2);
-  const auto st = std::make_shared<ProjectionSetup>(150, 10, 2);
-  return {setup->forward_case(kForward, setup), setup->adjoint_case(kAdjoint, setup), two->forward_case("two forward", two), two->adjoint_case("two adjoint", two),st->forward_case("step: two forward", st), st->adjoint_case("step: two adjoint", st)};
+  const auto setup = std::make_shared<ProjectionSetup>(64, 1, kSlabsTogether);
+  const auto alone = std::make_shared<ProjectionSetup>(64, 1, 1);
+  return {setup->forward_case(kForward, setup), setup->adjoint_case(kAdjoint, setup),
+          alone->forward_case(kForwardAlone, alone), alone->adjoint_case(kAdjointAlone, alone)};
 }
 
 std::vector<Case> load_bound_cases() {

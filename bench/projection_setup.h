@@ -15,7 +15,7 @@ namespace tomofield::bench {
 /// views of the yardstick, −70 … 69.5°, and the buffers to project it.
 class ProjectionSetup {
  public:
-  ProjectionSetup(int thickness, int stride, int num_slabs = 1);
+  ProjectionSetup(int thickness, int stride, int num_slabs);
 
   Case forward_case(const std::string& name, std::shared_ptr<ProjectionSetup> self) const;
   Case adjoint_case(const std::string& name, std::shared_ptr<ProjectionSetup> self) const;

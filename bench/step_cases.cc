@@ -184,8 +184,8 @@ Case data_case(const std::shared_ptr<ProjectionSetup>& p) {
 }  // namespace
 
 std::vector<Case> step_cases() {
-  const auto projection =
-      std::make_shared<ProjectionSetup>(kThickness, reconstruct::FitOptions{}.subsets);
+  const auto projection = std::make_shared<ProjectionSetup>(
+      kThickness, reconstruct::FitOptions{}.subsets, kSlabsTogether);
   const auto step = std::make_shared<StepSetup>("grid");
   step->values.fill(0.1f);
   const auto decoding = std::make_shared<LeafDecoding>(*step);
