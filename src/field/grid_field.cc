@@ -6,6 +6,7 @@
 #include "field/merge_target.h"
 #include "field/resample.h"
 #include "field/variation_planes.h"
+#include "kernels/column_interpolation.h"
 #include "kernels/small_gemm.h"
 
 namespace tomofield::field {
@@ -40,6 +41,19 @@ struct RowMatrix {
   }
 };
 
+// Whether the rows lie between neighbouring vertices, each a vertex further than the one before.
+bool are_a_vertex_apart(const LaneRows& rows) {
+  for (int l = 1; l < kLanes; ++l)
+    if (rows.lower[l] != rows.lower[0] + l) return false;
+  return true;
+}
+
+kernels::Columns columns(const LeafShape& s, const LaneRows& rows) {
+  return {.count = static_cast<std::ptrdiff_t>(s.vertices_xz()),
+          .stride = s.ny,
+          .fraction = rows.fraction.data()};
+}
+
 // Calls body(vertex, weight) for the eight vertices around a point.
 template <typename Body>
 void for_each_corner(const LeafShape& s, const PointTaps& taps, int point, const Body& body) {
@@ -65,6 +79,10 @@ std::size_t GridField::count(const LeafShape& s) { return s.vertices_xz() * s.ny
 
 void GridField::add_slab_values(int leaf, const LaneRows& rows, float* values) const {
   const LeafShape& s = shape(leaf);
+  if (are_a_vertex_apart(rows)) {
+    kernels::interpolate_columns(columns(s, rows), leaf_parameters(leaf) + rows.lower[0], values);
+    return;
+  }
   const RowMatrix m(rows);
   small_gemm({.rows = static_cast<std::ptrdiff_t>(s.vertices_xz()),
               .depth = m.count,
@@ -81,6 +99,10 @@ void GridField::add_slab_values(int leaf, const LaneRows& rows, float* values) c
 void GridField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
                               float* gradient) const {
   const LeafShape& s = shape(leaf);
+  if (are_a_vertex_apart(rows)) {
+    kernels::spread_columns(columns(s, rows), grad_values, gradient + rows.lower[0]);
+    return;
+  }
   const RowMatrix m(rows);
   small_gemm({.rows = static_cast<std::ptrdiff_t>(s.vertices_xz()),
               .depth = kLanes,
