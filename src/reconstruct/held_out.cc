@@ -46,6 +46,7 @@ SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
           loss::data_term({}, 1.0, measured.rays(slab, views[v]), measured.mask(slab, views[v]),
                           width, rays.data() + static_cast<std::ptrdiff_t>(v) * width * kLanes));
     }
+    measured.release(slab);
   });
   return sums;
 }

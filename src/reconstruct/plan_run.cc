@@ -29,6 +29,8 @@ std::size_t reading_memory(const PreparedSeries& plan) {
   return static_cast<std::size_t>(kCopies * kBytesPerPixel * (raw + binned));
 }
 
+constexpr int kSlabsOfThread = 2;  // a pair
+
 // What each thread works on: a pair of slabs with their gradient and the views of a step, rows for
 // the total variation, a leaf's vertices; and then a part of the volume.
 std::size_t thread_memory(const PreparedSeries& plan, const Domain& domain, int views_a_step) {
@@ -43,7 +45,7 @@ std::size_t thread_memory(const PreparedSeries& plan, const Domain& domain, int 
       std::size_t{16} << 20,
       static_cast<std::size_t>(static_cast<double>(plan.roi.width()) * plan.geometry.thickness) *
           kRow);
-  return 2 * (2 * slab + views) + 3 * slab / base::kLanes + leaf + written;
+  return kSlabsOfThread * (2 * slab + views) + 3 * slab / base::kLanes + leaf + written;
 }
 
 int steps_an_epoch(const PreparedSeries& plan, const FitOptions& options) {
@@ -74,12 +76,14 @@ std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, co
       options.resume && std::filesystem::exists(output_paths(options.output).model);
   const std::size_t copies = resumes || options.field.tree == "adaptive" ? 7 : 4;
   const std::size_t parameters = copies * sizeof(float) * run.num_parameters;
-  const std::size_t rays = tilt_series::SlabViews::least_memory(plan.rays_shape());
+  const int slabs_in_use = kSlabsOfThread * base::thread_count();
+  const std::size_t rays = tilt_series::SlabViews::resident_memory(plan.rays_shape(), slabs_in_use);
   const int coarse_bin = make_stages(options.field, options.fit).front().bin;
   const std::size_t coarse_rays =
-      coarse_bin == 1 ? 0
-                      : tilt_series::SlabViews::least_memory(
-                            tilt_series::SlabViews::binned_shape(plan.rays_shape(), coarse_bin));
+      coarse_bin == 1
+          ? 0
+          : tilt_series::SlabViews::resident_memory(
+                tilt_series::SlabViews::binned_shape(plan.rays_shape(), coarse_bin), slabs_in_use);
   const int steps = steps_an_epoch(plan, options.fit);
   const int views_a_step = plan.ray_geometry ? 0 : (run.num_views + steps - 1) / steps;
   const std::size_t fitting = parameters + static_cast<std::size_t>(base::thread_count()) *

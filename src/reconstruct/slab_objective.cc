@@ -100,6 +100,7 @@ void SlabObjective::add_data_term(const projection::SlabSampler::Range& pair,
                           measured_.rays(slab, views[v]), measured_.mask(slab, views[v]), width,
                           detector + static_cast<std::ptrdiff_t>(v) * width * kLanes);
     }
+    measured_.release(slab);
   }
   w.grad_samples.fill(0.0f);
   projector_.backward(w.detector.data(), views, w.grad_samples.data(), count);

@@ -20,9 +20,6 @@ namespace {
 
 using base::kLanes;
 
-// Up to here a series is kept in memory: a 1K series of 60 views is 250 MB.
-constexpr std::size_t kInMemoryBytes = std::size_t{1} << 30;
-
 void* map_scratch_file(const std::filesystem::path& dir, std::size_t bytes) {
   std::string name = (dir / "tomofield-rays-XXXXXX").string();
   const int fd = mkstemp(name.data());
@@ -49,22 +46,28 @@ void* map_scratch_file(const std::filesystem::path& dir, std::size_t bytes) {
 
 }  // namespace
 
-std::size_t SlabViews::least_memory(const Shape& shape) {
+std::size_t SlabViews::bytes(const Shape& shape) {
   const std::size_t slabs = static_cast<std::size_t>((shape.num_rows + kLanes - 1) / kLanes);
   const std::size_t lines = slabs * shape.num_views * static_cast<std::size_t>(shape.width);
-  return std::min(lines * (kLanes * sizeof(float) + sizeof(std::uint16_t)), kInMemoryBytes);
+  return lines * (kLanes * sizeof(float) + sizeof(std::uint16_t));
+}
+
+std::size_t SlabViews::resident_memory(const Shape& shape, int slabs_in_use) {
+  const std::size_t all = bytes(shape);
+  if (all <= kInMemoryBytes) return all;
+  Shape used = shape;
+  used.num_rows = std::min<std::int64_t>(shape.num_rows, std::int64_t{slabs_in_use} * kLanes);
+  return bytes(used);
 }
 
 SlabViews::SlabViews(const Shape& shape, double unit, const ReadView& read_view,
-                     const std::filesystem::path& scratch_dir)
+                     const std::filesystem::path& scratch_dir, std::size_t in_memory_bytes)
     : shape_(shape),
       scratch_dir_(scratch_dir),
-      num_slabs_(static_cast<int>((shape.num_rows + kLanes - 1) / kLanes)) {
-  const std::size_t lines = static_cast<std::size_t>(num_slabs_) * shape.num_views *
-                            static_cast<std::size_t>(shape.width);
-  const std::size_t ray_bytes = lines * kLanes * sizeof(float);
-  bytes_ = ray_bytes + lines * sizeof(std::uint16_t);
-  if (bytes_ <= kInMemoryBytes) {
+      num_slabs_(static_cast<int>((shape.num_rows + kLanes - 1) / kLanes)),
+      bytes_(bytes(shape)),
+      is_in_file_(bytes_ > in_memory_bytes) {
+  if (!is_in_file_) {
     memory_ = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (memory_ == MAP_FAILED)
       throw Error(fmt::format("not enough memory for the rays: {} bytes", bytes_));
@@ -72,7 +75,7 @@ SlabViews::SlabViews(const Shape& shape, double unit, const ReadView& read_view,
     memory_ = map_scratch_file(scratch_dir, bytes_);
   }
   rays_ = static_cast<float*>(memory_);
-  mask_ = reinterpret_cast<std::uint16_t*>(static_cast<char*>(memory_) + ray_bytes);
+  mask_ = reinterpret_cast<std::uint16_t*>(rays_ + line(num_slabs_, 0) * kLanes);
   try {
     fill(unit, read_view);
   } catch (...) {
@@ -90,6 +93,22 @@ std::size_t SlabViews::line(int slab, int view) const {
 
 const float* SlabViews::rays(int slab, int view) const { return rays_ + line(slab, view) * kLanes; }
 const std::uint16_t* SlabViews::mask(int slab, int view) const { return mask_ + line(slab, view); }
+
+// Pages of the file stay in the kernel's cache as long as there is memory for them. What is not
+// whole pages stays.
+void SlabViews::release_bytes(std::size_t first, std::size_t count) const {
+  if (!is_in_file_) return;
+  const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  const std::size_t begin = (first + page - 1) / page * page, end = (first + count) / page * page;
+  if (end > begin) madvise(static_cast<char*>(memory_) + begin, end - begin, MADV_DONTNEED);
+}
+
+void SlabViews::release(int slab) const {
+  constexpr std::size_t kRayBytes = kLanes * sizeof(float);
+  release_bytes(line(slab, 0) * kRayBytes, line(1, 0) * kRayBytes);
+  release_bytes((line(num_slabs_, 0) * kRayBytes) + line(slab, 0) * sizeof(std::uint16_t),
+                line(1, 0) * sizeof(std::uint16_t));
+}
 
 void SlabViews::fill(double unit, const ReadView& read_view) {
   const std::size_t width = static_cast<std::size_t>(shape_.width);
@@ -109,6 +128,7 @@ void SlabViews::fill(double unit, const ReadView& read_view) {
         mask_[to + x] = static_cast<std::uint16_t>(mask_[to + x] | 1u << lane);
       }
     }
+    release_bytes(0, bytes_);
   }
 }
 
@@ -129,6 +149,7 @@ std::unique_ptr<SlabViews> SlabViews::binned(int bin) const {
         image[at] = valid[at] ? static_cast<float>(sum / count) : 0.0f;
       }
     }
+    release_bytes(0, bytes_);
   };
   return std::make_unique<SlabViews>(coarse, bin, read_view, scratch_dir_);
 }
@@ -175,10 +196,15 @@ std::int64_t SlabViews::num_valid(int view) const {
 }
 
 std::uint64_t SlabViews::checksum() const {
+  constexpr std::size_t kBlock = std::size_t{16} << 20;
   const auto* words = static_cast<const std::uint32_t*>(memory_);
   std::uint64_t hash = 0xcbf29ce484222325ULL;
-  for (std::size_t i = 0; i < bytes_ / sizeof(std::uint32_t); ++i)
-    hash = (hash ^ words[i]) * 0x100000001b3ULL;
+  for (std::size_t first = 0; first < bytes_; first += kBlock) {
+    const std::size_t end = std::min(first + kBlock, bytes_);
+    for (std::size_t i = first / sizeof(std::uint32_t); i < end / sizeof(std::uint32_t); ++i)
+      hash = (hash ^ words[i]) * 0x100000001b3ULL;
+    release_bytes(first, end - first);
+  }
   return hash;
 }
 

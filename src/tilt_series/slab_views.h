@@ -27,12 +27,15 @@ class SlabViews {
     std::int64_t width = 0, height = 0;        ///< of a view
     std::int64_t first_row = 0, num_rows = 0;  ///< rows of the view that slabs cover
   };
-  /// Memory that they take at least: large series may be paged out to their file.
-  static std::size_t least_memory(const Shape& shape);
+  /// Up to here a series is kept in memory: a 1K series of 60 views is 250 MB.
+  static constexpr std::size_t kInMemoryBytes = std::size_t{1} << 30;
+  /// Memory that they take while so many slabs are in use: of large series, what has not been
+  /// released.
+  static std::size_t resident_memory(const Shape& shape, int slabs_in_use);
 
   /// Intensities are divided by `unit`. Throws Error if the scratch file cannot be made.
   SlabViews(const Shape& shape, double unit, const ReadView& read_view,
-            const std::filesystem::path& scratch_dir);
+            const std::filesystem::path& scratch_dir, std::size_t in_memory_bytes = kInMemoryBytes);
   ~SlabViews();
   SlabViews(const SlabViews&) = delete;
   SlabViews& operator=(const SlabViews&) = delete;
@@ -50,6 +53,8 @@ class SlabViews {
   int num_slabs() const { return num_slabs_; }
   const float* rays(int slab, int view) const;          ///< [x, lane]
   const std::uint16_t* mask(int slab, int view) const;  ///< [x], bit = lane
+  /// Those of a large series leave the process's memory until they are used again.
+  void release(int slab) const;
   /// Whether the ray of a pixel counts, and its value; y is counted from the first row.
   bool counts(int view, std::int64_t x, std::int64_t y) const {
     return mask(static_cast<int>(y / kRows), view)[x] >> (y % kRows) & 1;
@@ -65,13 +70,16 @@ class SlabViews {
  private:
   static constexpr std::int64_t kRows = base::kLanes;  // of a slab
   std::pair<double, int> box_sum(int view, std::int64_t x0, std::int64_t y0, int size) const;
+  static std::size_t bytes(const Shape& shape);
   void fill(double unit, const ReadView& read_view);
+  void release_bytes(std::size_t first, std::size_t count) const;
   std::size_t line(int slab, int view) const;
 
   Shape shape_;
   std::filesystem::path scratch_dir_;
   int num_slabs_ = 0;
   std::size_t bytes_ = 0;
+  bool is_in_file_ = false;
   void* memory_ = nullptr;
   float* rays_ = nullptr;
   std::uint16_t* mask_ = nullptr;

@@ -1,9 +1,11 @@
 #include "tilt_series/slab_views.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <span>
 
 #include "base/random.h"
@@ -51,6 +53,38 @@ TEST(SlabViews, MiddleRowsAreCopied) {
     }
   }
   EXPECT_EQ(all->middle_rows(100)->checksum(), all->checksum());
+}
+
+// Pages of files that the process holds, in bytes.
+std::size_t mapped_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  std::size_t size = 0, resident = 0, shared = 0;
+  statm >> size >> resident >> shared;
+  return shared * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+}
+
+TEST(SlabViews, ThoseOfALargeSeriesAreReleasedAndComeBack) {
+  constexpr SlabViews::Shape kWide{.num_views = 4, .width = 4000, .height = 48, .num_rows = 48};
+  const auto read = [](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
+    for (std::size_t i = 0; i < image.size(); ++i) {
+      image[i] = static_cast<float>(view + i % 977);
+      valid[i] = i % 5 > 0;
+    }
+  };
+  const SlabViews in_memory(kWide, kUnit, read, "/tmp");
+  const SlabViews in_file(kWide, kUnit, read, "/tmp", 1000);
+  const std::size_t before = mapped_bytes();
+  EXPECT_EQ(in_file.num_valid(3), in_memory.num_valid(3));
+  float sum = 0;
+  for (int v = 0; v < 4; ++v)
+    for (std::int64_t i = 0; i < kWide.width * 16; ++i) sum += in_file.rays(1, v)[i];
+  EXPECT_GT(sum, 0);
+  constexpr std::size_t kSlab = 4 * 4000 * 64;
+  EXPECT_GT(mapped_bytes(), before + kSlab * 9 / 10);
+  for (int slab = 0; slab < 3; ++slab) in_file.release(slab);
+  EXPECT_LT(mapped_bytes(), before + kSlab / 10);
+  EXPECT_EQ(in_file.checksum(), in_memory.checksum());
+  EXPECT_LT(mapped_bytes(), before + kSlab / 10);
 }
 
 TEST(SlabViews, BinnedAreMeansOfWhatCountsFromTheFirstRowOn) {
