@@ -20,6 +20,7 @@
 #include "reconstruct/mask_json.h"
 #include "reconstruct/options_json.h"
 #include "reconstruct/result_files.h"
+#include "reconstruct/trial_series.h"
 #include "reconstruct/trials.h"
 #include "tomofield/error.h"
 
@@ -37,10 +38,8 @@ projection::SampleGrid grid_of(const reconstruct::PreparedSeries& series,
 
 std::vector<int> views_held_out(const reconstruct::PreparedSeries& series,
                                 const BaselineOptions& options) {
-  if (options.hold_out == 0 && !options.tune) return {};
-  return reconstruct::held_out_views(series.geometry.tilt_deg, options.hold_out > 0
-                                                                   ? options.hold_out
-                                                                   : reconstruct::kTrialHoldOut);
+  if (options.hold_out == 0) return {};
+  return reconstruct::held_out_views(series.geometry.tilt_deg, options.hold_out);
 }
 
 // What the method holds of each slab, and a pair of slabs and its rays for each thread; a tuning has
@@ -203,7 +202,8 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
         "--xtilt out (the volume is then turned by it), or use reconstruct or baseline tensorf",
         planned.x_tilt_deg));
   }
-  views_held_out(planned, options);  // throws if there are none
+  const std::vector<int> held_out = views_held_out(planned, options);  // throws if there are none
+  if (options.tune) reconstruct::trial_views(planned.geometry.tilt_deg, held_out);  // or too few
   const projection::SampleGrid grid = grid_of(planned, options);
   BaselinePlan plan;
   plan.num_views = planned.geometry.num_views();
@@ -226,7 +226,7 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   const reconstruct::PreparedSeries series =
       prepare_series(tilt_series, options.specimen,
                      paths.volume.has_parent_path() ? paths.volume.parent_path() : ".");
-  std::vector<int> held_out = views_held_out(series, options);
+  const std::vector<int> held_out = views_held_out(series, options);
   nlohmann::json tuning = nullptr;
   if (options.tune) {
     const Tuned tuned =
@@ -234,8 +234,6 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
              progress.tuning);
     tuning = tuning_json(tuned);
     options.method = tuned.method;
-    options.hold_out = 0;  // the fit has all views
-    held_out.clear();
   }
   VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays, series.noise_sigma,
                        {held_out, options.fit_view_scale});

@@ -19,7 +19,7 @@ struct BaselineOptions {
   Method method;
   bool fit_view_scale = false;        ///< per-view scale and offset as nuisances
   int hold_out = 0;                   ///< keep every so-manieth view from the fit; 0: none
-  bool tune = false;                  ///< choose settings by held-out views, then fit all (tune.h)
+  bool tune = false;                  ///< choose settings by other views than these (tune.h)
   reconstruct::VolumeOptions volume;  ///< `box` stays empty: voxels are where they were fitted
   std::filesystem::path output;       ///< the volume; JSON and pictures lie beside it
   bool overwrite = false;

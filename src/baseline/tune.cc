@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -13,6 +12,7 @@
 #include "base/log.h"
 #include "base/stopwatch.h"
 #include "baseline/held_out.h"
+#include "reconstruct/trial_series.h"
 #include "reconstruct/trials.h"
 
 namespace tomofield::baseline {
@@ -42,7 +42,9 @@ class Trials {
   Trials(const TrialData& data, const base::ProgressSink& progress)
       : data_(data),
         progress_(progress),
-        rays_(data.series.rays->middle_rows(reconstruct::kTrialRows)) {}
+        series_(reconstruct::make_trial_series(data.series.geometry, data.series.noise_sigma,
+                                               *data.series.rays, data.scored,
+                                               reconstruct::kTrialRows)) {}
 
   HeldOutScore score(const Method& method) {
     const nlohmann::json settings = json_of(method);
@@ -70,14 +72,16 @@ class Trials {
     return scores;
   }
 
-  std::vector<Trial> take() { return std::move(trials_); }
+  Tuned take(const Method& chosen) {
+    return {chosen, std::move(trials_), std::move(series_.views.predicted)};
+  }
 
  private:
   // Adds a trial after each iteration for which trial_after names what it is a trial of.
   template <typename TrialAfter>
   void run(const Method& method, TrialAfter trial_after) {
-    VoxelProblem problem(data_.series.geometry, data_.grid, *rays_, data_.series.noise_sigma,
-                         {data_.held_out, data_.fit_view_scale});
+    VoxelProblem problem(series_.geometry, data_.grid, *series_.rays, series_.noise_sigma,
+                         {series_.held_out, data_.fit_view_scale});
     const base::Stopwatch running;
     const AfterIteration after_iteration = [&](const IterationReport& report,
                                                VoxelVolume& densities) {
@@ -85,7 +89,7 @@ class Trials {
       const std::optional<Method> tried = trial_after(report.iteration);
       if (!tried) return;
       const evaluate::ViewErrors errors =
-          held_out_errors(problem, data_.held_out, data_.fit_view_scale, densities);
+          held_out_errors(problem, series_.held_out, data_.fit_view_scale, densities);
       trials_.push_back({*tried, {errors.total, errors.view_error}, running.seconds()});
       base::log_info(
           fmt::format("tried{}: held-out error {:.5f}", settings_text(*tried), errors.total));
@@ -105,7 +109,7 @@ class Trials {
 
   const TrialData& data_;
   const base::ProgressSink& progress_;
-  std::unique_ptr<tilt_series::SlabViews> rays_;
+  reconstruct::TrialSeries series_;
   base::Stopwatch running_;
   std::vector<Trial> trials_;
   int num_runs_ = 0;
@@ -165,7 +169,7 @@ Tuned tune(const Method& start, const TrialData& data, const base::ProgressSink&
   const Method method =
       std::visit([&](const auto& options) { return tuned(options, trials); }, start);
   base::log_info(fmt::format("tuned:{}", settings_text(method)));
-  return {method, trials.take()};
+  return trials.take(method);
 }
 
 nlohmann::json tuning_json(const Tuned& tuned) {
@@ -177,7 +181,9 @@ nlohmann::json tuning_json(const Tuned& tuned) {
     entry["seconds"] = t.seconds;
     trials.push_back(std::move(entry));
   }
-  return {{"chosen", json_of(tuned.method)}, {"trials", trials}};
+  return {{"predicted_views", tuned.predicted_views},
+          {"chosen", json_of(tuned.method)},
+          {"trials", trials}};
 }
 
 }  // namespace tomofield::baseline

@@ -31,19 +31,21 @@ struct Trial {
 
 struct Tuned {
   Method method;
-  std::vector<Trial> trials;  ///< in order
+  std::vector<Trial> trials;         ///< in order
+  std::vector<int> predicted_views;  ///< by which they were chosen
 };
 
 /// What trials are made on.
 struct TrialData {
   const reconstruct::PreparedSeries& series;
   projection::SampleGrid grid;
-  std::vector<int> held_out;  ///< views, ascending
+  std::vector<int> scored;  ///< views that score the result: no trial sees them; ascending
   bool fit_view_scale = false;
 };
 
-/// Chooses the settings that predict the held-out views best, by the rules of the main method's
-/// tuning (reconstruct/tune.h) and on as many rows in the middle: the penalty, if
+/// Chooses the settings that predict views held out from the trials best, by the rules of the main
+/// method's tuning (reconstruct/tune.h) and on the same rows and views
+/// (reconstruct/trial_series.h): the penalty, if
 /// neither it nor a weight is given, by a vote of the views on both with their usual weights; the
 /// weight by search_weight(); and of methods that stop early the number of iterations, between a
 /// quarter and four times that of `start` in steps of √2, all of one run, the fewest of those that

@@ -79,8 +79,9 @@ void add_fit_options(CLI::App& command, Arguments<Method>& arguments) {
   if constexpr (baseline::Tunable<Method>) {
     command
         .add_flag("--tune", options.tune,
-                  "choose the weight, or what else regularises, by the error of held-out views "
-                  "(every 8th, or those of --hold-out), then reconstruct from all views with it")
+                  "choose the weight, or what else regularises, by how well short trials predict "
+                  "every 8th view, then reconstruct from all views with it (but those of "
+                  "--hold-out, which no trial sees)")
         ->group("Fit");
   }
 }

@@ -145,8 +145,9 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       command, {arguments.options.field.margin_spacing, fit.hold_out, arguments.view_scale});
   command
       .add_flag("--tune", arguments.options.tune,
-                "choose --tv-penalty, --tv, --rank and --epochs by the error of held-out views, "
-                "then fit all views with them")
+                "choose --tv-penalty, --tv, --rank and --epochs by how well short trials predict "
+                "every 8th view, then fit all views with them (but those of --hold-out, which no "
+                "trial sees)")
       ->group(group);
   command
       .add_option("--early-stop", fit.patience,

@@ -108,7 +108,7 @@ Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
     : measurement_(measurement),
       options_(with_at_most_one_subset_a_view(
           options,
-          measurement.geometry.num_views() - static_cast<int>(measurement.held_out.size()))),
+          measurement.num_fitted_views())),
       stages_(make_stages(field_options, options_)),
       domain_(domain_of(measurement, field_options)),
       field_(make_initial_field(domain_, measurement.geometry.thickness, measurement.mean_density,

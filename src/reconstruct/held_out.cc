@@ -80,14 +80,17 @@ HeldOutError held_out_error(const projection::SlabSampler& sampler,
   return evaluate::view_errors(std::move(views), sums, noise_weight, fit_view_scale);
 }
 
-nlohmann::json report_held_out(const HeldOutError& error, const std::vector<double>& tilt_deg) {
-  base::log_info(fmt::format("held out: {} views, error {:.4f}", error.views.size(), error.total));
+nlohmann::json report_held_out(const HeldOutError& error, const std::vector<double>& tilt_deg,
+                               bool stopped_by_them) {
+  base::log_info(fmt::format(
+      "held out: {} views, error {:.4f}{}", error.views.size(), error.total,
+      stopped_by_them ? " (they also chose when to stop, so others are predicted less well)" : ""));
   nlohmann::json views = nlohmann::json::array();
   for (std::size_t i = 0; i < error.views.size(); ++i) {
     const auto view = static_cast<std::size_t>(error.views[i]);
     views.push_back({{"view", view}, {"tilt_deg", tilt_deg[view]}, {"error", error.view_error[i]}});
   }
-  return {{"error", error.total}, {"views", views}};
+  return {{"error", error.total}, {"independent", !stopped_by_them}, {"views", views}};
 }
 
 PredictedView predicted_view(const projection::SlabSampler& sampler,

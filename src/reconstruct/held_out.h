@@ -29,8 +29,10 @@ HeldOutError held_out_error(const projection::SlabSampler& sampler,
                             const tilt_series::SlabViews& measured, std::vector<int> views,
                             std::span<const double> noise_weight, bool fit_view_scale);
 
-/// Logs the error; returns it and that of each view, for the figures of a run.
-nlohmann::json report_held_out(const HeldOutError& error, const std::vector<double>& tilt_deg);
+/// Logs the error; returns it and that of each view, for the figures of a run. With
+/// `stopped_by_them` the same views decided when the fit stopped, and both say so.
+nlohmann::json report_held_out(const HeldOutError& error, const std::vector<double>& tilt_deg,
+                               bool stopped_by_them = false);
 
 /// A view as measured and as a field predicts it: [y, x], rows of the region of
 /// interest; NaN where there is no measurement.

@@ -22,6 +22,8 @@ struct Measurement {
   std::optional<geometry::RayGeometry> ray_geometry = std::nullopt;
   /// Views that carry no loss and only tell how well the others predict them (slab engine).
   std::vector<int> held_out = {};
+
+  int num_fitted_views() const { return geometry.num_views() - static_cast<int>(held_out.size()); }
 };
 
 /// A measurement in pixels `bin` times as wide, of which a density unit stays what it

@@ -11,6 +11,7 @@
 #include "reconstruct/held_out.h"
 #include "reconstruct/reconstruct.h"
 #include "reconstruct/stages.h"
+#include "reconstruct/trial_series.h"
 #include "tilt_series/slab_views.h"
 #include "tomofield/error.h"
 
@@ -48,11 +49,18 @@ std::size_t thread_memory(const PreparedSeries& plan, const Domain& domain, int 
   return kSlabsOfThread * (2 * slab + views) + 3 * slab / base::kLanes + leaf + written;
 }
 
+std::vector<int> views_held_out(const PreparedSeries& plan, const FitOptions& options) {
+  return options.hold_out > 0 ? held_out_views(plan.geometry.tilt_deg, options.hold_out)
+                              : std::vector<int>{};
+}
+
+int num_fitted_views(const PreparedSeries& plan, const FitOptions& options) {
+  return plan.geometry.num_views() - static_cast<int>(views_held_out(plan, options).size());
+}
+
 int steps_an_epoch(const PreparedSeries& plan, const FitOptions& options) {
   if (plan.ray_geometry) return ray_steps_per_epoch(options, plan.rays_shape());
-  const std::size_t held_out =
-      options.hold_out > 0 ? held_out_views(plan.geometry.tilt_deg, options.hold_out).size() : 0;
-  return std::min(options.subsets, plan.geometry.num_views() - static_cast<int>(held_out));
+  return std::min(options.subsets, num_fitted_views(plan, options));
 }
 
 // Of the first tree, or of an adaptive one whose budget is used up.
@@ -111,7 +119,9 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.num_leaves = domain.tree.num_leaves();
   run.num_parameters = most_parameters(domain, options.field);
   const Stage last = make_stages(options.field, options.fit).back();
-  run.num_trials = options.num_trials(run.num_views);
+  run.num_trials = options.num_trials(num_fitted_views(plan, options.fit));
+  if (run.num_trials > 0)  // throws if there are too few
+    trial_views(plan.geometry.tilt_deg, views_held_out(plan, options.fit));
   run.num_steps = (last.first_epoch + last.epochs) * steps_an_epoch(plan, options.fit);
   run.memory_bytes = estimate_memory(plan, domain, run, options);
   base::require_memory(run.memory_bytes, "this reconstruction",

@@ -161,7 +161,8 @@ nlohmann::json figures_json(const field::Model& model, const Progress& progress,
 
 // What a tuning chose, and everything that it tried.
 nlohmann::json tuning_json(const Tuned& tuned) {
-  return {{"chosen",
+  return {{"predicted_views", tuned.predicted_views},
+          {"chosen",
            {{"tv_penalty", tuned.settings.penalty},
             {"tv", tuned.settings.variation},
             {"rank", tuned.settings.rank},
@@ -170,7 +171,7 @@ nlohmann::json tuning_json(const Tuned& tuned) {
 }
 
 // The error of the views held out, and a picture of the one nearest to zero tilt.
-nlohmann::json score_fit(const Fit& fit, const PreparedSeries& series,
+nlohmann::json score_fit(const Fit& fit, const PreparedSeries& series, bool stopped_by_them,
                          const std::filesystem::path& picture) {
   const HeldOutError error = fit.held_out_error();
   const auto nearest = std::ranges::min_element(error.views, {}, [&](int view) {
@@ -178,7 +179,7 @@ nlohmann::json score_fit(const Fit& fit, const PreparedSeries& series,
   });
   const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
   write_held_out_picture(picture, fit.predict_held_out(*nearest, model));
-  nlohmann::json json = report_held_out(error, series.geometry.tilt_deg);
+  nlohmann::json json = report_held_out(error, series.geometry.tilt_deg, stopped_by_them);
   json["error_by_epoch"] = fit.progress().held_out_error;
   return json;
 }
@@ -187,7 +188,8 @@ void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOpti
                    const std::optional<Tuned>& tuned, const OutputPaths& paths,
                    const std::string& fingerprint, double seconds) {
   nlohmann::json held_out = nullptr;
-  if (options.fit.hold_out > 0) held_out = score_fit(fit, series, paths.held_out_picture);
+  if (options.fit.hold_out > 0)
+    held_out = score_fit(fit, series, options.fit.patience > 0, paths.held_out_picture);
   const field::TrainingState state = progress_state(fit, fingerprint);
   field::Model model{model_info(series, options), fit.take_field()};
   field::save_model(paths.model, model, &state);
@@ -201,18 +203,15 @@ void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOpti
       {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"figures", figures}});
 }
 
-// The settings that predict views held out best. None if a stop was requested.
-std::optional<Tuned> choose_settings(const PreparedSeries& series, const OutputPaths& paths,
-                                     const ReconstructHooks& hooks,
+// The settings that predict views held out from trials best. None if a stop was requested.
+std::optional<Tuned> choose_settings(const PreparedSeries& series, const Measurement& measurement,
+                                     const OutputPaths& paths, const ReconstructHooks& hooks,
                                      const ReconstructOptions& options) {
-  FitOptions fit = options.fit;
-  if (fit.hold_out == 0) fit.hold_out = kTrialHoldOut;
-  const Measurement measurement = measurement_of(series, fit);
   const TuneHooks tune_hooks{.progress = hooks.tune_progress,
                              .stop_requested = hooks.stop_requested};
-  if (!options.tune) return tune_penalty(measurement, options.field, fit, tune_hooks);
+  if (!options.tune) return tune_penalty(measurement, options.field, options.fit, tune_hooks);
   TrialFile file(paths.trials, fingerprint_of(options, series), options.resume);
-  return tune(measurement, options.field, fit, options.choose_penalty, file, tune_hooks);
+  return tune(measurement, options.field, options.fit, options.choose_penalty, file, tune_hooks);
 }
 
 void apply(const TrialSettings& settings, ReconstructOptions& options) {
@@ -220,7 +219,6 @@ void apply(const TrialSettings& settings, ReconstructOptions& options) {
   options.fit.density_variation = settings.variation;
   options.fit.epochs = settings.epochs;
   options.field.rank = settings.rank;
-  if (options.tune) options.fit.hold_out = 0;  // the fit has all views
 }
 
 }  // namespace
@@ -235,10 +233,10 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
           stem,   with("_held_out.png"), with("_tune.json")};
 }
 
-int ReconstructOptions::num_trials(int num_views) const {
+int ReconstructOptions::num_trials(int num_fitted_views) const {
   constexpr int kFewestViews = 14;
   if (tune) return expected_trials({.penalty = choose_penalty, .rank = field.kind == "vm"});
-  return choose_penalty && fit.engine == "slab" && num_views >= kFewestViews ? 2 : 0;
+  return choose_penalty && fit.engine == "slab" && num_fitted_views >= kFewestViews ? 2 : 0;
 }
 
 std::vector<std::string> ReconstructOptions::faults() const {
@@ -264,7 +262,7 @@ void check_options(const ReconstructOptions& options) {
   std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json};
   if (options.field.tree == "adaptive") results.push_back(paths.tree_picture);
   if (options.tune) results.push_back(paths.trials);
-  if (options.fit.hold_out > 0 && !options.tune) results.push_back(paths.held_out_picture);
+  if (options.fit.hold_out > 0) results.push_back(paths.held_out_picture);
   check_result_files(
       std::move(results), paths.picture_prefix, options.input, options.overwrite || resumes,
       options.resume ? "there is no checkpoint to resume, so give --overwrite to start over and "
@@ -279,14 +277,14 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
   const OutputPaths paths = output_paths(options.output);
   const PreparedSeries series =
       prepare_series(tilt_series, options.specimen, directory_of(paths.volume));
+  const Measurement measurement = measurement_of(series, options.fit);
   std::optional<Tuned> tuned;
-  if (options.num_trials(series.geometry.num_views()) > 0) {
-    tuned = choose_settings(series, paths, hooks, options);
+  if (options.num_trials(measurement.num_fitted_views()) > 0) {
+    tuned = choose_settings(series, measurement, paths, hooks, options);
     if (!tuned) return Outcome::kStoppedTuning;
     apply(tuned->settings, options);
   }
   const std::string fingerprint = fingerprint_of(options, series);
-  const Measurement measurement = measurement_of(series, options.fit);
   Fit fit(measurement, options.field, options.fit);
   if (options.resume) resume(paths, fingerprint, fit);
 

@@ -26,9 +26,9 @@ struct ReconstructOptions {
   bool overwrite = false;
   bool resume = false;  ///< continue from the model file, if there is one
   double checkpoint_minutes = 5;
-  /// Trials of settings before the fit, about; 0: none are to be chosen. A series of few
+  /// Trials of settings before the fit, about; 0: none are to be chosen. A fit of few
   /// views cannot spare any for the penalty alone, and rays of raw views are not predicted.
-  int num_trials(int num_views) const;
+  int num_trials(int num_fitted_views) const;
   /// Every fault that these options have by themselves, a sentence each.
   std::vector<std::string> faults() const;
 };

@@ -11,6 +11,7 @@
 #include "base/log.h"
 #include "base/stopwatch.h"
 #include "io/json.h"
+#include "reconstruct/trial_series.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruct {
@@ -31,22 +32,29 @@ Trial trial_from(const json& entry) {
           .seconds = entry.at("seconds")};
 }
 
-// The middle rows of a measurement, copied.
+// What trials are made on.
 struct Strip {
   double part = 1;  // of all rows
-  std::unique_ptr<tilt_series::SlabViews> rays;
-  Measurement measurement;
+  TrialSeries series;
+  Measurement measurement;  // of `series`
 };
 
 Strip middle_strip(const Measurement& whole, std::int64_t most_rows) {
   const std::int64_t all_rows = whole.rays->shape().num_rows;
-  Strip strip{.rays = whole.rays->middle_rows(most_rows), .measurement = whole};
-  const std::int64_t rows = strip.rays->shape().num_rows;
-  strip.part = static_cast<double>(rows) / static_cast<double>(all_rows);
-  strip.measurement.rays = strip.rays.get();
-  strip.measurement.roi.y0 = whole.roi.y0 + (all_rows - rows) / 2;
-  strip.measurement.roi.y1 = strip.measurement.roi.y0 + rows;
-  return strip;
+  TrialSeries series =
+      make_trial_series(whole.geometry, whole.noise_sigma, *whole.rays, whole.held_out, most_rows);
+  const std::int64_t rows = series.rays->shape().num_rows;
+  geometry::Roi roi = whole.roi;
+  roi.y0 += (all_rows - rows) / 2;
+  roi.y1 = roi.y0 + rows;
+  Measurement measurement{.geometry = series.geometry,
+                          .roi = roi,
+                          .rays = series.rays.get(),
+                          .noise_sigma = series.noise_sigma,
+                          .mean_density = whole.mean_density,
+                          .held_out = series.held_out};
+  return {static_cast<double>(rows) / static_cast<double>(all_rows), std::move(series),
+          std::move(measurement)};
 }
 
 struct StopRequested {};
@@ -78,6 +86,8 @@ class TrialFits {
     file.add(trial);
     return trial;
   }
+
+  const std::vector<int>& predicted_views() const { return strip_.series.views.predicted; }
 
  private:
   Trial fitted(const TrialSettings& settings) {
@@ -194,6 +204,7 @@ std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& fi
   const double first =
       fit.density_variation > 0 ? fit.density_variation : usual_variation(fit.penalty);
   Tuned tuned;
+  tuned.predicted_views = fits.predicted_views();
   try {
     tuned.settings = search_settings(
         {fit.penalty, first, field.rank, fit.epochs}, space,
@@ -217,6 +228,7 @@ std::optional<Tuned> tune_penalty(const Measurement& measurement, const FieldOpt
   const FitOptions shorter = penalty_trial_options(field.kind, fit);
   TrialFits fits(measurement, kPenaltyRows, plain, shorter, hooks, 2);
   Tuned tuned;
+  tuned.predicted_views = fits.predicted_views();
   try {
     tuned.settings =
         choose_penalty({fit.penalty, fit.density_variation, field.rank, shorter.epochs},

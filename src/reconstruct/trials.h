@@ -38,8 +38,6 @@ nlohmann::json trials_json(const std::vector<Trial>& trials);
 /// Rows of a trial, in the middle: enough for edges in every direction, few enough for a dozen
 /// fits.
 constexpr std::int64_t kTrialRows = 64;
-/// Views that a trial holds out, if nothing else is asked for: every so-manieth.
-constexpr int kTrialHoldOut = 8;
 
 struct TuneHooks {
   base::ProgressSink progress;
@@ -49,13 +47,13 @@ struct TuneHooks {
 struct Tuned {
   TrialSettings settings;
   std::vector<Trial> trials;
+  std::vector<int> predicted_views;  ///< by which they were chosen
 };
 
-/// Chooses settings by search_settings(), the penalty too if `tunes_penalty`. A trial
-/// fits the views that `measurement` does not hold out, of a strip of rows in the
-/// middle: rays of a tilt about Y stay in their row, so a strip is the same problem,
-/// only shorter. Finished trials go to `file`, and those found there are not
-/// repeated. None if a stop was requested.
+/// Chooses settings by search_settings(), the penalty too if `tunes_penalty`. Trials are made on
+/// a strip of rows in the middle and without the views that `measurement` holds out to score the
+/// result (trial_series.h). Finished trials go to `file`, and those found there are not
+/// repeated. None if a stop was requested. Throws Error for too few views.
 std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& field,
                           const FitOptions& fit, bool tunes_penalty, TrialFile& file,
                           const TuneHooks& hooks);

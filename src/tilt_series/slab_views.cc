@@ -154,11 +154,12 @@ std::unique_ptr<SlabViews> SlabViews::binned(int bin) const {
   return std::make_unique<SlabViews>(coarse, bin, read_view, scratch_dir_);
 }
 
-std::unique_ptr<SlabViews> SlabViews::middle_rows(std::int64_t most_rows) const {
+std::unique_ptr<SlabViews> SlabViews::middle_rows(std::int64_t most_rows,
+                                                  std::span<const int> views) const {
   const std::int64_t rows = std::min(most_rows, shape_.num_rows);
   const std::int64_t first = (shape_.num_rows - rows) / 2;
   const auto read_view = [&](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
-    const int view = static_cast<int>(v);
+    const int view = views[v];
     for (std::int64_t y = 0; y < rows; ++y) {
       for (std::int64_t x = 0; x < shape_.width; ++x) {
         const auto at = static_cast<std::size_t>(y * shape_.width + x);
@@ -167,7 +168,7 @@ std::unique_ptr<SlabViews> SlabViews::middle_rows(std::int64_t most_rows) const 
       }
     }
   };
-  const Shape shape{shape_.num_views, shape_.width, rows, 0, rows};
+  const Shape shape{views.size(), shape_.width, rows, 0, rows};
   return std::make_unique<SlabViews>(shape, 1.0, read_view, scratch_dir_);
 }
 

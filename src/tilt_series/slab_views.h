@@ -44,8 +44,8 @@ class SlabViews {
   /// as large, as rays count pixels; coarse pixels that at least half of their pixels
   /// count for count. Columns and rows of fewer than `bin` are coarse ones too.
   std::unique_ptr<SlabViews> binned(int bin) const;
-  /// A copy of so many rows in the middle, or of all if there are fewer.
-  std::unique_ptr<SlabViews> middle_rows(std::int64_t most_rows) const;
+  /// A copy of so many rows in the middle, or of all if there are fewer, of these views.
+  std::unique_ptr<SlabViews> middle_rows(std::int64_t most_rows, std::span<const int> views) const;
   /// The shape of `binned` ones.
   static Shape binned_shape(const Shape& shape, int bin);
 

@@ -27,6 +27,7 @@ METHODS = {
 }
 ITERATIVE = {method: options for method, options in METHODS.items() if options}
 NETWORKS = ["ingp", "implicit"]
+TUNED = ["sirt", "sart-tv", "tv"]
 ONE_PASS = {method: ["--iterations", 1] for method in NETWORKS}  # where how well they fit is no matter
 WEAK = {"sart-tv": ["--weight", 0.1], "tv": ["--weight", 0.1]}  # not smoothed so much that nothing is negative
 
@@ -180,7 +181,7 @@ def test_tuned_settings_are_better_than_bad_ones_and_used_for_all_views():
     bad = {"sart-tv": ["--weight", 30, "--iterations", 3], "tv": ["--weight", 40], "sirt": ["--iterations", 3]}
     for method, options in bad.items():
         worse, _ = baseline(method, "bad", *options)
-        results, run = baseline(method, "tuned", *options, "--tune", "--hold-out", 4)
+        results, run = baseline(method, "tuned", *options, "--tune")
         figures, used = results.record["figures"], results.record["options"]
         tuning, chosen = figures["tuning"], figures["tuning"]["chosen"]
         assert used["method"] == chosen and used["tune"] and figures["held_out"] is None
@@ -210,6 +211,22 @@ def test_fitted_view_scales_do_not_upset_total_variation():
                         "--thickness", 32, "--iterations", 20, "--view-scale", view_scale, "-o", output)
         objective[view_scale] = Baseline(output).record["figures"]["objective"][-1]
     assert objective["on"] < 1.5 * objective["off"], objective
+
+
+def test_views_that_score_the_result_have_no_say_in_its_settings():
+    every = 4
+    scored = list(range(every // 2, len(TILTS) - 1, every))
+    broken = series.views.copy()
+    broken[scored] = broken[scored, :, ::-1]
+    broken = series.with_views("broken", broken)
+    for method in TUNED:
+        figures = [baseline(method, "scored", "--tune", "--iterations", 8, "--hold-out", every,
+                            source=source)[0].record["figures"] for source in (series, broken)]
+        harness.assert_same_tuning(*(f["tuning"] for f in figures))
+        assert not set(figures[0]["tuning"]["predicted_views"]) & set(scored)
+        assert [view["view"] for view in figures[0]["held_out"]["views"]] == scored
+        assert figures[0]["held_out"]["independent"] is True
+        assert figures[1]["held_out"]["error"] > 2 * figures[0]["held_out"]["error"]
 
 
 def test_wider_roll_off_smooths_along_x():

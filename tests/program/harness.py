@@ -180,6 +180,13 @@ def psnr(volume, truth):
     return -10 * np.log10(np.mean((volume - truth) ** 2))
 
 
+def assert_same_tuning(one, other):
+    """The same trials gave the same errors, but for what sums over all views have lost."""
+    assert one["predicted_views"] == other["predicted_views"] and one["chosen"] == other["chosen"]
+    errors = [[t["held_out_error_by_view"] for t in tuning["trials"]] for tuning in (one, other)]
+    np.testing.assert_allclose(*errors, rtol=1e-6)
+
+
 def run_tests(tests):
     """Runs every test_ function of a script and removes what they wrote."""
     for name, test in list(tests.items()):

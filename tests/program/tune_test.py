@@ -53,6 +53,7 @@ def test_early_stop_ends_the_fit_and_resumes_as_finished():
     results = series.reconstruct("early", *options)
     curve = record(results)["figures"]["held_out"]["error_by_epoch"]
     assert len(curve) < 200 and len(curve) == np.argmin(curve) + 3, curve
+    assert record(results)["figures"]["held_out"]["independent"] is False
     before = read_bytes(results.volume_path)
     harness.succeed("reconstruct", *series.input, "-o", results.volume_path,
                     *harness.merge(harness.QUICK, options), "--resume")
@@ -75,7 +76,7 @@ def test_the_penalty_is_what_predicts_held_out_views_better():
     written = json.load(open(output[:-len(".mrc")] + ".json"))
     trials = {t["tv_penalty"]: t for t in written["figures"]["tuning"]["trials"]}
     assert {t: trials[t]["tv"] for t in trials} == {"concave": 14, "smooth": 5}, trials
-    assert all(len(t["held_out_error_by_view"]) == 2 for t in trials.values())
+    assert all(len(t["held_out_error_by_view"]) == 5 for t in trials.values())
     assert all(t["epochs"] == 1 for t in trials.values())  # half of what plain vertices need for QUICK's
     errors = {t: np.array(trials[t]["held_out_error_by_view"]) for t in trials}
     is_smooth = 2 * np.sum(errors["smooth"] < errors["concave"]) > len(errors["smooth"])
@@ -86,6 +87,26 @@ def test_the_penalty_is_what_predicts_held_out_views_better():
     by_hand = output.replace("out.mrc", "by_hand.mrc")
     harness.succeed(*command, by_hand, *options, "--tv-penalty", better)
     assert read_bytes(by_hand) == read_bytes(output)
+
+
+def test_views_that_score_the_result_have_no_say_in_its_settings():
+    every = 4
+    scored = list(range(every // 2, len(TILTS) - 1, every))
+    broken = series.views.copy()
+    broken[scored] = broken[scored, :, ::-1]
+    broken = series.with_views("broken", broken)
+    auto = [option for option in harness.QUICK if option not in ("--tv-penalty", "concave")]
+    for options in (auto, harness.merge(auto, ["--tune", "--epochs", 2])):
+        figures = []
+        for source in (series, broken):
+            output = os.path.join(harness.fresh_directory("scored"), "out.mrc")
+            harness.succeed("reconstruct", *source.input, "-o", output,
+                            *harness.merge(options, ["--hold-out", every]))
+            figures.append(json.load(open(output[:-len(".mrc")] + ".json"))["figures"])
+        harness.assert_same_tuning(*(f["tuning"] for f in figures))
+        assert not set(figures[0]["tuning"]["predicted_views"]) & set(scored)
+        assert [view["view"] for view in figures[0]["held_out"]["views"]] == scored
+        assert figures[1]["held_out"]["error"] > 2 * figures[0]["held_out"]["error"]
 
 
 TUNE = harness.merge(harness.QUICK, ["--epochs", 4, "--tune"])
