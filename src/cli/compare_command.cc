@@ -107,8 +107,10 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
       ->group(group);
   command.add_option("--truth", arguments.truth, "MRC volume to score against")->group(group);
   command
-      .add_flag("--tune", arguments.tune,
-                "tune the methods that have --tune; runs for --hold-out stay untuned")
+      .add_flag(
+          "--tune", arguments.tune,
+          "tune the methods that have --tune, in every run anew: those for --hold-out without "
+          "the views that score them")
       ->group(group);
   command
       .add_flag("--halves", arguments.halves,

@@ -46,11 +46,10 @@ PlannedRuns plan_runs(const CompareOptions& options, const tilt_series::TiltSeri
       run.command.insert(run.command.end(), options.series_words.begin(),
                          options.series_words.end());
       if (!exclude.empty()) run.command.insert(run.command.end(), {"--exclude", exclude});
-      // Not tuned: --tune chooses by the views that it holds out, and then fits them as well.
       if (purpose == Purpose::kHeldOutViews)
         run.command.insert(run.command.end(), {"--hold-out", std::to_string(options.hold_out)});
-      else if (options.tune && method.tunes)
-        run.command.push_back("--tune");
+      // Anew for every purpose: settings that were chosen on all views have seen those held out.
+      if (options.tune && method.tunes) run.command.push_back("--tune");
       plan.runs.push_back(std::move(run));
     }
   }

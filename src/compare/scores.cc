@@ -118,7 +118,8 @@ Scores add_scores(const CompareOptions& options, const std::vector<Purpose>& pur
   }
   if (options.hold_out > 0) add_held_out_errors(rows_for(Purpose::kHeldOutViews), table);
   if (options.hold_out > 0 && options.tune)
-    scores.remark += " Held-out errors are those of the methods before they were tuned.";
+    scores.remark +=
+        " Held-out errors are of runs that were tuned anew, without the views that score them.";
   return scores;
 }
 

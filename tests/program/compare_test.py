@@ -91,9 +91,17 @@ def test_every_method_that_can_be_is_tuned():
         tunings[name] = record["figures"]["tuning"]
     assert tunings["wbp"] is None and tunings["s"]["chosen"]["iterations"] > 5
     assert tunings["t"]["chosen"]["weight"] < 90
-    with open(os.path.join(folder, "t.held_out.json")) as file:
-        assert json.load(file)["options"]["method"]["weight"] == 90
-    assert "before they were tuned" in read(folder, "report.html")
+    rows = {row["method"]: row for row in json.loads(read(folder, "comparison.json"))["methods"]}
+    for name in ("s", "t"):
+        with open(os.path.join(folder, name + ".held_out.json")) as file:
+            record = json.load(file)
+        held_out, tuning = record["figures"]["held_out"], record["figures"]["tuning"]
+        assert record["options"]["method"] == tuning["chosen"], "the runs that score are not tuned"
+        assert rows[name]["held_out_error"] == held_out["error"]
+        scored = {view["view"] for view in held_out["views"]}
+        assert scored and not scored & set(tuning["predicted_views"])
+    assert record["options"]["method"]["weight"] < 90
+    assert "tuned anew" in read(folder, "report.html")
 
 
 def test_it_goes_on_where_it_stopped():
