@@ -170,13 +170,7 @@ void write_results(const Solution& solution, const reconstruct::PreparedSeries& 
 }
 
 BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays) {
-  const std::vector<double>& objective = solution.objective;
-  BaselineSummary summary{2 * solution.data_loss.back() / static_cast<double>(num_rays), {}};
-  if (objective.size() > 1) {
-    const double before = objective[(objective.size() - 1) * 9 / 10];
-    summary.last_decrease = (before - objective.back()) / objective.back();
-  }
-  return summary;
+  return {2 * solution.data_loss.back() / static_cast<double>(num_rays), last_decrease(solution)};
 }
 
 }  // namespace

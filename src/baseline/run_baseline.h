@@ -52,10 +52,8 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
 
 /// What is left to say when it is done.
 struct BaselineSummary {
-  double mean_squared_residual = 0;  ///< in units of the noise's variance
-  /// By how much the objective fell in the last tenth of the iterations, as a fraction of it;
-  /// of iterative methods.
-  std::optional<double> last_decrease;
+  double mean_squared_residual = 0;     ///< in units of the noise's variance
+  std::optional<double> last_decrease;  ///< see last_decrease(); of iterative methods
 };
 
 /// Where the progress of a run goes.

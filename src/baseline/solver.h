@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "base/aligned_buffer.h"
@@ -35,6 +36,10 @@ struct Solution {
   /// Of the fitted views, in density units times pixels, if the method learns it.
   std::vector<double> noise_sigma = {};
 };
+
+/// By how much the objective fell in the last tenth of the iterations, as a fraction of it; none of
+/// a method that does not iterate.
+std::optional<double> last_decrease(const Solution& solution);
 
 /// An iteration that is done; the figures are those of the densities that it began with.
 struct IterationReport {

@@ -2,6 +2,7 @@
 
 #include <concepts>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <vector>
 
 #include "base/progress.h"
@@ -27,6 +28,7 @@ struct Trial {
   Method method;
   reconstruct::HeldOutScore score = {};
   double seconds = 0;
+  std::optional<double> last_decrease = {};  ///< of its own run: see last_decrease()
 };
 
 struct Tuned {
@@ -45,11 +47,12 @@ struct TrialData {
 
 /// Chooses the settings that predict views held out from the trials best, by the rules of the main
 /// method's tuning (reconstruct/tune.h) and on the same rows and views
-/// (reconstruct/trial_series.h): the penalty, if
-/// neither it nor a weight is given, by a vote of the views on both with their usual weights; the
-/// weight by search_weight(); and of methods that stop early the number of iterations, between a
-/// quarter and four times that of `start` in steps of √2, all of one run, the fewest of those that
-/// cannot be told from the best. Methods that are not Tunable stay as they are.
+/// (reconstruct/trial_series.h): the penalty, if neither it nor a weight is given, by a vote of the
+/// views on both with their usual weights; the weight by search_weight(); and of methods that stop
+/// early the number of iterations, between a quarter and four times that of `start` in steps of √2,
+/// all of one run, the fewest of those that cannot be told from the best. Methods that are not
+/// Tunable stay as they are. Of `tv` everything is tried anew with more iterations until the trial
+/// that is chosen has converged; what is chosen has the iterations of `start`.
 Tuned tune(const Method& start, const TrialData& data, const base::ProgressSink& progress);
 
 /// What was chosen, and every trial.

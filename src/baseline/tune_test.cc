@@ -59,9 +59,10 @@ TEST_F(BaselineTune, FindsABetterWeightFromEitherEnd) {
     EXPECT_LT(*chosen.weight, 20) << start;
     EXPECT_LT(error_of(chosen), 0.8 * error_of(tv(start))) << start;
     EXPECT_EQ(chosen.penalty, std::nullopt) << "a weight belongs to its penalty";
-    std::set<double> weights;
+    std::set<std::pair<double, int>> weights;
     for (const Trial& t : found.trials) {
-      weights.insert(*std::get<TvOptions>(t.method).weight);
+      const auto& options = std::get<TvOptions>(t.method);
+      weights.emplace(*options.weight, options.iterations);
       EXPECT_EQ(t.score.view_error.size(), 5u);
     }
     EXPECT_EQ(weights.size(), found.trials.size()) << "tried twice";
@@ -78,6 +79,22 @@ TEST_F(BaselineTune, TriesBothPenaltiesIfNothingIsSaid) {
   TvOptions concave = tv({});
   concave.penalty = "concave";
   EXPECT_EQ(std::get<TvOptions>(tuned(concave).method).penalty, "concave");
+}
+
+TEST_F(BaselineTune, IsNotMisledByIterationsThatAreTooFew) {
+  TvOptions few = tv({}), many = tv({});
+  few.penalty = many.penalty = "smooth";
+  few.iterations = 5;
+  many.iterations = 200;
+  const Tuned with_few = tuned(few), with_many = tuned(many);
+  EXPECT_EQ(std::get<TvOptions>(with_few.method).iterations, 5);
+  EXPECT_EQ(std::get<TvOptions>(with_few.trials.front().method).iterations, 5);
+  EXPECT_GE(std::get<TvOptions>(with_few.trials.back().method).iterations, 20);
+  EXPECT_EQ(std::get<TvOptions>(with_many.trials.back().method).iterations, 200);
+  const double ratio =
+      *std::get<TvOptions>(with_few.method).weight / *std::get<TvOptions>(with_many.method).weight;
+  EXPECT_GT(ratio, 0.6);
+  EXPECT_LT(ratio, 1.7);
 }
 
 TEST_F(BaselineTune, StopsBeforeTheNoiseIsFitted) {

@@ -81,7 +81,7 @@ TrialSettings choose_penalty(const TrialSettings& start, const RunTrial& run) {
 }
 
 int expected_trials(const SearchSpace& space) {
-  return 7 + 2 + (space.penalty ? 1 : 0) + (space.rank ? 2 : 0);
+  return kUsualWeights + 2 + (space.penalty ? 1 : 0) + (space.rank ? 2 : 0);
 }
 
 TrialSettings search_settings(const TrialSettings& start, const SearchSpace& space,

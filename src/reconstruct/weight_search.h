@@ -26,6 +26,9 @@ std::size_t first_as_good_as_the_best(const std::vector<HeldOutScore>& scores);
 /// The score of a weight; asked for the same weight again it must give the same.
 using ScoreOfWeight = std::function<HeldOutScore(double weight)>;
 
+/// Weights that search_weight() tries where the best is near the first.
+constexpr int kUsualWeights = 7;
+
 /// The weight of a regulariser that predicts held-out views best: by a 1-D search on a
 /// logarithmic scale, factors of 4 (to 256), then 2, then √2 about the best. Of the weights tried
 /// that cannot be told from the best the largest (the smoothest volume) is taken: where held-out
