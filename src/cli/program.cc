@@ -35,7 +35,7 @@ void add_commands(CLI::App& program) {
 
 // The subcommand that was called, as the user writes it.
 std::string command_name(const CLI::App& program) {
-  std::string name = "tomofield";
+  std::string name = program.get_name();
   for (const CLI::App* app = &program; !app->get_subcommands().empty();) {
     app = app->get_subcommands().front();
     name += " " + app->get_name();
@@ -60,7 +60,8 @@ void require_known_command(const CLI::App& program, const std::vector<std::strin
 
 int run_program(int argc, char** argv) {
   CLI::App program{
-      "tomofield: clean tomograms from aligned tilt series by continuous density fields"};
+      "tomofield: clean tomograms from aligned tilt series by continuous density fields",
+      "tomofield"};
   program.set_version_flag("--version", "tomofield " TOMOFIELD_VERSION);
   program.require_subcommand(1);
   base::set_log_sink(print_log);
