@@ -15,7 +15,9 @@ struct ImplicitOptions : NetworkOptions {
   int features = 128;      ///< plane waves that the network is given (fourier_encoding.h)
   double shortest = 20.0;  ///< wavelength of them, pixels
 
-  MethodFacts facts() const { return {"implicit", iterations, 1, 1}; }
+  MethodFacts facts() const {
+    return {"implicit", iterations, 1, 1, "; or a smaller --width, or fewer --features"};
+  }
   nlohmann::json json() const;
   MethodSize size(const projection::SampleGrid& samples, std::int64_t num_rows) const;
 };

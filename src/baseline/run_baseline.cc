@@ -208,8 +208,11 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
   const MethodSize size = size_of(options.method, grid, planned.roi.height());
   plan.num_parameters = size.num_parameters;
   plan.memory_bytes = estimate_memory(planned, grid, facts_of(options.method), size, options.tune);
-  base::require_memory(plan.memory_bytes, "this baseline",
-                       "use a larger --bin or --margin-spacing, or a smaller --roi or --thickness");
+  const std::string advice = fmt::format(
+      "use a larger --bin or --margin-spacing, a smaller --roi or --thickness, or fewer "
+      "--threads{}",
+      facts_of(options.method).memory_advice);
+  base::require_memory(plan.memory_bytes, "this baseline", advice.c_str());
   return plan;
 }
 

@@ -217,6 +217,12 @@ def test_options_that_make_no_sense():
                   "--leaf-size", 1)
 
 
+def test_usage_is_what_is_typed():
+    for words in ([], ["reconstruct"], ["baseline"], ["baseline", "tv"], ["compare"]):
+        usage = f"Usage: {' '.join(['tomofield', *words])} [OPTIONS]"
+        assert usage in harness.succeed(*words, "--help").stdout, usage
+
+
 def refuse_output(words, output, *options):
     refuse(words, "reconstruct", stack, "-o", output, *GOOD, *options)
 
@@ -288,6 +294,10 @@ def test_memory_is_estimated_first():
                                            "--roi", "0,0,4096,16")
     assert status == 2 and (mebibytes < 1024 or is_sanitized()), (status, text, mebibytes)
     assert re.search(r"tomofield: .*needs about \d{3,}\.\d GiB .* \d+\.\d GiB .*--bin", text), text
+    for method, own in (("ingp", "--table-bits"), ("implicit", "--width"), ("sirt", "--threads")):
+        status, text, _ = run_measured("baseline", method, large, *options, "--thickness", 100000,
+                                       "--roi", "0,0,4096,16")
+        assert status == 2 and re.search(r"GiB.*--bin.*" + own, text), text
     assert os.listdir(os.path.dirname(out)) == before == []
     os.remove(large)
 
