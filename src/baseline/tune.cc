@@ -20,7 +20,8 @@ namespace {
 
 using reconstruct::HeldOutScore;
 
-constexpr int kExpectedTrials = 9;  // if the best weight is near the first
+constexpr int kLadderSteps = 4;  // of numbers of iterations, of √2, to either side of the first
+constexpr int kCutoffs = 7;      // a √2 apart
 
 // A trial of `tv` is at its minimum when the objective falls by no more than this part in the last
 // tenth of the iterations. Before, a held-out error says how near it is rather than how good the
@@ -32,7 +33,7 @@ constexpr int kMostIterations = 400;  // of trials that are not there yet
 std::string settings_text(const Method& method) {
   const nlohmann::json json = json_of(method);
   std::string text;
-  for (const char* key : {"penalty", "weight", "iterations"}) {
+  for (const char* key : {"penalty", "weight", "iterations", "cutoff"}) {
     if (!json.contains(key)) continue;
     const nlohmann::json& value = json[key];
     text += fmt::format(
@@ -79,6 +80,12 @@ class Trials {
     return scores;
   }
 
+  // Says for the progress what comes: about so many runs, with so many iterations in all.
+  void expect(int runs, int iterations) {
+    expected_runs_ = num_runs_ + runs;
+    expected_iterations_ = iterations_done_ + iterations;
+  }
+
   Tuned take(const Method& chosen) {
     return {chosen, std::move(trials_), std::move(series_.views.predicted)};
   }
@@ -105,16 +112,18 @@ class Trials {
     const Solution solution =
         reconstruct(problem, method, data_.series.mean_density, after_iteration);
     ++num_runs_;
+    iterations_done_ += facts_of(method).iterations;
     return last_decrease(solution);
   }
 
   void report_progress(const Method& method, int iteration) const {
     if (!progress_) return;
-    const int expected = std::max(kExpectedTrials, num_runs_ + 1);
+    const int run = num_runs_ + 1;
+    const int iterations =
+        std::max(expected_iterations_, iterations_done_ + facts_of(method).iterations);
     progress_(base::progress_at(
-        (num_runs_ + static_cast<double>(iteration) / facts_of(method).iterations) / expected,
-        running_.seconds(),
-        fmt::format("trial {}/{} {}", num_runs_ + 1, expected, settings_text(method))));
+        static_cast<double>(iterations_done_ + iteration) / iterations, running_.seconds(),
+        fmt::format("trial {}/{} {}", run, std::max(expected_runs_, run), settings_text(method))));
   }
 
   const TrialData& data_;
@@ -122,11 +131,14 @@ class Trials {
   reconstruct::TrialSeries series_;
   base::Stopwatch running_;
   std::vector<Trial> trials_;
-  int num_runs_ = 0;
+  int num_runs_ = 0, expected_runs_ = 0;
+  int iterations_done_ = 0, expected_iterations_ = 0;
 };
 
+bool votes_on_penalty(const TvOptions& options) { return !options.penalty && !options.weight; }
+
 TvOptions with_better_penalty(const TvOptions& options, Trials& trials) {
-  if (options.penalty || options.weight) return options;
+  if (!votes_on_penalty(options)) return options;
   TvOptions concave = options, smooth = options;
   concave.penalty = "concave";
   smooth.penalty = "smooth";
@@ -152,22 +164,39 @@ void choose_weight(Options& options, Trials& trials) {
   });
 }
 
+int on_ladder(int first, int step) {
+  return static_cast<int>(std::lround(first * std::exp2(0.5 * step)));
+}
+
 template <StopsEarly Options>
 void choose_iterations(Options& options, Trials& trials) {
-  constexpr int kSteps = 4;  // to either side
   std::vector<int> ladder;
-  for (int step = -kSteps; step <= kSteps; ++step) {
-    const int iterations =
-        static_cast<int>(std::lround(options.iterations * std::exp2(0.5 * step)));
+  for (int step = -kLadderSteps; step <= kLadderSteps; ++step) {
+    const int iterations = on_ladder(options.iterations, step);
     if (iterations > (ladder.empty() ? 0 : ladder.back())) ladder.push_back(iterations);
   }
   options.iterations =
       ladder[reconstruct::first_as_good_as_the_best(trials.scores(options, ladder))];
 }
 
+template <HasCutoff Options>
+void choose_cutoff(Options& options, Trials& trials) {
+  std::vector<double> cutoffs;
+  std::vector<HeldOutScore> scores;
+  for (int step = 1; step <= kCutoffs; ++step) {
+    Options other = options;
+    other.filter.cutoff *= std::exp2(0.5 * (step - kCutoffs));
+    cutoffs.push_back(other.filter.cutoff);
+    scores.push_back(trials.trial(other).score);
+  }
+  options.filter.cutoff = cutoffs[reconstruct::first_as_good_as_the_best(scores)];
+}
+
 // Again with more iterations until the trial that is chosen is at its minimum.
 Method tuned(const TvOptions& start, Trials& trials) {
   for (TvOptions tried = start;;) {
+    const int runs = reconstruct::kUsualWeights + (votes_on_penalty(tried) ? 1 : 0);
+    trials.expect(runs, runs * tried.iterations);
     TvOptions chosen = with_better_penalty(tried, trials);
     choose_weight(chosen, trials);
     const double fell = trials.trial(chosen).last_decrease.value_or(0);
@@ -185,9 +214,21 @@ Method tuned(const TvOptions& start, Trials& trials) {
 }
 
 template <typename Options>
+void expect_runs(const Options& options, Trials& trials) {
+  constexpr int kWeights = HasWeight<Options> ? reconstruct::kUsualWeights : 0;
+  if constexpr (StopsEarly<Options>) {
+    trials.expect(kWeights + 1,
+                  kWeights * options.iterations + on_ladder(options.iterations, kLadderSteps));
+  }
+  if constexpr (HasCutoff<Options>) trials.expect(kCutoffs, kCutoffs);
+}
+
+template <typename Options>
 Method tuned(Options options, Trials& trials) {
+  expect_runs(options, trials);
   if constexpr (HasWeight<Options>) choose_weight(options, trials);
   if constexpr (StopsEarly<Options>) choose_iterations(options, trials);
+  if constexpr (HasCutoff<Options>) choose_cutoff(options, trials);
   return options;
 }
 

@@ -21,7 +21,9 @@ concept HasWeight = requires(Options options) {
 template <typename Options>
 concept StopsEarly = std::same_as<Options, SirtOptions> || std::same_as<Options, SartTvOptions>;
 template <typename Options>
-concept Tunable = HasWeight<Options> || StopsEarly<Options>;
+concept HasCutoff = std::same_as<Options, WbpOptions>;
+template <typename Options>
+concept Tunable = HasWeight<Options> || StopsEarly<Options> || HasCutoff<Options>;
 
 /// A method with its settings, and how well it predicts the views held out.
 struct Trial {
@@ -50,9 +52,11 @@ struct TrialData {
 /// (reconstruct/trial_series.h): the penalty, if neither it nor a weight is given, by a vote of the
 /// views on both with their usual weights; the weight by search_weight(); and of methods that stop
 /// early the number of iterations, between a quarter and four times that of `start` in steps of √2,
-/// all of one run, the fewest of those that cannot be told from the best. Methods that are not
-/// Tunable stay as they are. Of `tv` everything is tried anew with more iterations until the trial
-/// that is chosen has converged; what is chosen has the iterations of `start`.
+/// all of one run, the fewest of those that cannot be told from the best; of `wbp` the cutoff, from
+/// that of `start` down to an eighth of it, the smallest of those that cannot be told from the
+/// best. Methods that are not Tunable stay as they are. Of `tv` everything is tried anew with more
+/// iterations until the trial that is chosen has converged; what is chosen has the iterations of
+/// `start`.
 Tuned tune(const Method& start, const TrialData& data, const base::ProgressSink& progress);
 
 /// What was chosen, and every trial.

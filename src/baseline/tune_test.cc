@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -17,8 +18,10 @@ using testing::SphereSeries;
 
 class BaselineTune : public testing::OneThread {
  protected:
-  BaselineTune() {
-    SphereSeries spheres;
+  BaselineTune() { use({}); }
+
+  void use(const SphereSeries::Options& options) {
+    SphereSeries spheres(options);
     series_.geometry = spheres.geometry;
     series_.roi = {0, 0, SphereSeries::kWidth, SphereSeries::kRows};
     series_.noise_sigma = spheres.noise_sigma;
@@ -29,19 +32,21 @@ class BaselineTune : public testing::OneThread {
   Tuned tuned(const Method& start) const {
     const projection::SampleGrid grid =
         projection::make_sample_grid(series_.geometry, 0, SphereSeries::kWidth, 0);
-    return tune(start, {series_, grid, {}, false}, {});
+    return tune(start, {series_, grid, {}, false}, progress_);
   }
 
   // Root mean square distance to the truth of what all views give.
   double error_of(const Method& method) const {
-    VoxelProblem problem = testing::voxel_problem(spheres_);
+    VoxelProblem problem(series_.geometry,
+                         projection::make_sample_grid(series_.geometry, 0, SphereSeries::kWidth, 0),
+                         *series_.rays, series_.noise_sigma);
     return testing::rms_error(
         reconstruct(problem, method, series_.mean_density, [](const IterationReport&, auto&) {
         }).densities);
   }
 
-  SphereSeries spheres_;
   reconstruct::PreparedSeries series_;
+  base::ProgressSink progress_;
 };
 
 TvOptions tv(std::optional<double> weight) {
@@ -117,8 +122,44 @@ TEST_F(BaselineTune, AStopIsTheSameAsARunOfSoManyIterations) {
   EXPECT_EQ(all.trials[4].score.view_error, few.trials.back().score.view_error);
 }
 
+TEST_F(BaselineTune, CutsOffWhereNoiseIsAllThereIs) {
+  SphereSeries::Options noisy;
+  noisy.noise_sigma = 3;
+  use(noisy);
+  const WbpOptions start;
+  const Tuned found = tuned(start);
+  ASSERT_EQ(found.trials.size(), 7u);
+  EXPECT_NEAR(std::get<WbpOptions>(found.trials.front().method).filter.cutoff,
+              start.filter.cutoff / 8, 1e-9);
+  const double chosen = std::get<WbpOptions>(found.method).filter.cutoff;
+  EXPECT_LT(chosen, start.filter.cutoff);
+  EXPECT_GT(chosen, start.filter.cutoff / 8);
+  EXPECT_LT(error_of(found.method), error_of(start));
+}
+
+// The number of weights that a search tries is not known before; here it is what is usual.
+TEST_F(BaselineTune, TellsHowFarItIs) {
+  TvOptions concave = tv(3.0);
+  concave.iterations = 120;
+  const std::vector<std::pair<Method, std::string>> cases{{SirtOptions{.iterations = 20}, "1/1"},
+                                                          {SartTvOptions{.iterations = 8}, "/8"},
+                                                          {concave, "/7"},
+                                                          {WbpOptions{}, "7/7"}};
+  for (const auto& [method, last] : cases) {
+    std::vector<base::ProgressReport> reports;
+    progress_ = [&](const base::ProgressReport& report) { reports.push_back(report); };
+    tuned(method);
+    const char* name = facts_of(method).name;
+    EXPECT_LT(reports.front().fraction_done, 0.2) << name;
+    for (std::size_t i = 1; i < reports.size(); ++i)
+      ASSERT_GE(reports[i].fraction_done, reports[i - 1].fraction_done) << name << i;
+    EXPECT_NEAR(reports.back().fraction_done, 1, 0.1) << name;
+    EXPECT_NE(reports.back().detail.find(last), std::string::npos) << reports.back().detail;
+  }
+}
+
 TEST_F(BaselineTune, LeavesAMethodAloneThatHasNothingToChoose) {
-  EXPECT_TRUE(tuned(WbpOptions{}).trials.empty());
+  EXPECT_TRUE(tuned(IngpOptions{}).trials.empty());
 }
 
 }  // namespace

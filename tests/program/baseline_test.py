@@ -27,7 +27,7 @@ METHODS = {
 }
 ITERATIVE = {method: options for method, options in METHODS.items() if options}
 NETWORKS = ["ingp", "implicit"]
-TUNED = ["sirt", "sart-tv", "tv"]
+TUNED = ["wbp", "sirt", "sart-tv", "tv"]
 ONE_PASS = {method: ["--iterations", 1] for method in NETWORKS}  # where how well they fit is no matter
 WEAK = {"sart-tv": ["--weight", 0.1], "tv": ["--weight", 0.1]}  # not smoothed so much that nothing is negative
 
@@ -178,10 +178,14 @@ def test_concave_penalty_is_another_one():
 
 
 def test_tuned_settings_are_better_than_bad_ones_and_used_for_all_views():
-    bad = {"sart-tv": ["--weight", 30, "--iterations", 3], "tv": ["--weight", 40], "sirt": ["--iterations", 3]}
+    bad = {"sart-tv": ["--weight", 30, "--iterations", 3], "tv": ["--weight", 40], "sirt": ["--iterations", 3],
+           "wbp": ["--window", "ramp"]}
+    noise = np.random.default_rng(1).normal(0, series.views.std(), series.views.shape)
+    sources = {"wbp": series.with_views("noisy", series.views + noise)}
     for method, options in bad.items():
-        worse, _ = baseline(method, "bad", *options)
-        results, run = baseline(method, "tuned", *options, "--tune")
+        source = sources.get(method, series)
+        worse, _ = baseline(method, "bad", *options, source=source)
+        results, run = baseline(method, "tuned", *options, "--tune", source=source)
         figures, used = results.record["figures"], results.record["options"]
         tuning, chosen = figures["tuning"], figures["tuning"]["chosen"]
         assert used["method"] == chosen and used["tune"] and figures["held_out"] is None
@@ -191,9 +195,9 @@ def test_tuned_settings_are_better_than_bad_ones_and_used_for_all_views():
         gain = psnr(results.volume, series.truth) - psnr(worse.volume, series.truth)
         print(f"{method}: tuned {gain:.2f} dB above {options}")
         assert gain > 0.3, (method, chosen)
-        settings = [word for key in ("weight", "iterations") if key in chosen
+        settings = [word for key in ("weight", "iterations", "cutoff") if key in chosen
                     for word in (f"--{key}", repr(chosen[key]))]  # repr: all digits
-        by_hand, _ = baseline(method, "by-hand", *settings)
+        by_hand, _ = baseline(method, "by-hand", *harness.merge(options, settings), source=source)
         assert read_bytes(by_hand.volume_path) == read_bytes(results.volume_path)
 
 
@@ -220,7 +224,7 @@ def test_views_that_score_the_result_have_no_say_in_its_settings():
     broken[scored] = broken[scored, :, ::-1]
     broken = series.with_views("broken", broken)
     for method in TUNED:
-        figures = [baseline(method, "scored", "--tune", "--iterations", 8, "--hold-out", every,
+        figures = [baseline(method, "scored", "--tune", *METHODS[method], "--hold-out", every,
                             source=source)[0].record["figures"] for source in (series, broken)]
         harness.assert_same_tuning(*(f["tuning"] for f in figures))
         assert not set(figures[0]["tuning"]["predicted_views"]) & set(scored)

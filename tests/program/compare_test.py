@@ -89,10 +89,10 @@ def test_every_method_that_can_be_is_tuned():
             record = json.load(file)
         assert record["options"]["fit_view_scale"] is True
         tunings[name] = record["figures"]["tuning"]
-    assert tunings["wbp"] is None and tunings["s"]["chosen"]["iterations"] > 5
+    assert tunings["wbp"]["chosen"]["cutoff"] <= 0.5 and tunings["s"]["chosen"]["iterations"] > 5
     assert tunings["t"]["chosen"]["weight"] < 90
     rows = {row["method"]: row for row in json.loads(read(folder, "comparison.json"))["methods"]}
-    for name in ("s", "t"):
+    for name in ("wbp", "s", "t"):
         with open(os.path.join(folder, name + ".held_out.json")) as file:
             record = json.load(file)
         held_out, tuning = record["figures"]["held_out"], record["figures"]["tuning"]
@@ -100,7 +100,7 @@ def test_every_method_that_can_be_is_tuned():
         assert rows[name]["held_out_error"] == held_out["error"]
         scored = {view["view"] for view in held_out["views"]}
         assert scored and not scored & set(tuning["predicted_views"])
-    assert record["options"]["method"]["weight"] < 90
+    assert tuning["chosen"]["weight"] < 90
     assert "tuned anew" in read(folder, "report.html")
 
 
