@@ -16,9 +16,14 @@ HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
 // Destinations are treated in tiles. What they take from four items (lines, or
 // pairs of pixels of a view) is worked out first, a vector of destinations at a
-// time, and then used. Loads limit the speed of that: so the two taps of an item
-// share an index, and the weights of four items are loaded together and
-// broadcast in registers.
+// time, and then used. So the two taps of an item share an index, and the
+// weights of four items are loaded together and broadcast in registers.
+//
+// Bound with AVX-512: an item of one slab is two loads of samples in two FMAs, one load of its
+// index, half a load of weights and two broadcasts, which take one of the two ports of the FMAs:
+// 1.75 cycles of two load ports and 2 of the two others for 16 rows. Of two slabs together index,
+// weights and broadcasts are shared: 2.75 and 3 cycles for 32 rows, of which loading samples alone
+// would be 2. Making the tables is another fifth (docs/results/speed.md).
 constexpr int kTile = 32;
 constexpr int kItems = 4;
 constexpr int kMaxTables = 4;
