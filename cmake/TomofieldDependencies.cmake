@@ -13,10 +13,12 @@ find_package(tomlplusplus REQUIRED)
 find_package(Eigen3 3.3 REQUIRED NO_MODULE)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(CBC REQUIRED IMPORTED_TARGET cbc)
+find_package(MPI REQUIRED COMPONENTS C)  # its C interface alone
 
 set(TOMOFIELD_LIBRARIES
   OpenMP::OpenMP_CXX Threads::Threads hwy::hwy HDF5::HDF5 PNG::PNG kissfft::kissfft-float fmt::fmt
-  nlohmann_json::nlohmann_json $<BUILD_INTERFACE:Eigen3::Eigen> PkgConfig::CBC)
+  nlohmann_json::nlohmann_json $<BUILD_INTERFACE:Eigen3::Eigen> PkgConfig::CBC
+  MPI::MPI_C)
 set(TOMOFIELD_CLI_LIBRARIES CLI11::CLI11 tomlplusplus::tomlplusplus)
 
 add_library(tomofield_warnings INTERFACE)

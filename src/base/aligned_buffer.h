@@ -16,6 +16,7 @@ namespace tomofield::base {
 /// A zero-initialised array of plain values, aligned for any SIMD vector and,
 /// when it is large, for huge pages, which it asks the kernel for: slab
 /// columns stride over many 4 KiB pages and would otherwise miss the TLB.
+/// Pages of a large one that are never written take no memory.
 template <typename T>
 class AlignedBuffer {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -28,15 +29,18 @@ class AlignedBuffer {
 
   /// Replaces the contents by `size` zeros.
   void reset(std::size_t size) {
-    const std::size_t bytes = size * sizeof(T);
-    const std::size_t alignment = bytes >= 2 * kHugePage ? kHugePage : kCacheLine;
-    const std::size_t rounded = (bytes + alignment - 1) / alignment * alignment;
-    data_.reset(size == 0 ? nullptr : static_cast<T*>(std::aligned_alloc(alignment, rounded)));
+    data_.reset();
     size_ = size;
     if (size == 0) return;
-    if (!data_) throw std::bad_alloc();
-    if (alignment == kHugePage) madvise(data_.get(), rounded, MADV_HUGEPAGE);
-    fill(T{});
+    const std::size_t bytes = size * sizeof(T);
+    if (bytes >= 2 * kHugePage) {
+      data_ = map_zeros((bytes + kHugePage - 1) / kHugePage * kHugePage);
+    } else {
+      const std::size_t rounded = (bytes + kCacheLine - 1) / kCacheLine * kCacheLine;
+      data_.reset(static_cast<T*>(std::aligned_alloc(kCacheLine, rounded)));
+      if (!data_) throw std::bad_alloc();
+      fill(T{});
+    }
   }
 
   /// Grows to at least `size`; the contents are then unspecified.
@@ -63,9 +67,31 @@ class AlignedBuffer {
   static constexpr std::size_t kCacheLine = 64;
   static constexpr std::size_t kHugePage = std::size_t{2} << 20;
   struct Free {
-    void operator()(T* p) const { std::free(p); }
+    std::size_t mapped_bytes = 0;  // 0: from the heap
+    void operator()(T* p) const {
+      if (mapped_bytes > 0)
+        munmap(p, mapped_bytes);
+      else
+        std::free(p);
+    }
   };
-  std::unique_ptr<T[], Free> data_;
+  using Memory = std::unique_ptr<T[], Free>;
+
+  // Whole huge pages of zeros: a stretch that is one too long, without its ends.
+  static Memory map_zeros(std::size_t bytes) {
+    void* mapped = mmap(nullptr, bytes + kHugePage, PROT_READ | PROT_WRITE,
+                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (mapped == MAP_FAILED) throw std::bad_alloc();
+    char* const first = static_cast<char*>(mapped);
+    const std::size_t past = reinterpret_cast<std::uintptr_t>(first) % kHugePage;
+    const std::size_t before = past == 0 ? 0 : kHugePage - past;
+    if (before > 0) munmap(first, before);
+    if (before < kHugePage) munmap(first + before + bytes, kHugePage - before);
+    madvise(first + before, bytes, MADV_HUGEPAGE);
+    return Memory(reinterpret_cast<T*>(first + before), Free{bytes});
+  }
+
+  Memory data_;
   std::size_t size_ = 0;
 };
 

@@ -1,9 +1,11 @@
 #include "base/aligned_buffer.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
+#include <fstream>
 #include <numeric>
 #include <utility>
 
@@ -36,6 +38,22 @@ TEST(AlignedBuffer, LargeOnesAreAlignedForHugePages) {
     EXPECT_EQ(address(buffer) % kHugePage, 0u);
     EXPECT_TRUE(is_zero(buffer));
   }
+}
+
+// Resident pages of the program, in bytes.
+std::size_t resident_bytes() {
+  std::ifstream file("/proc/self/statm");
+  std::size_t size = 0, resident = 0;
+  file >> size >> resident;
+  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+}
+
+TEST(AlignedBuffer, PagesThatAreNotWrittenTakeNoMemory) {
+  constexpr std::size_t kMiB = std::size_t{1} << 20;
+  const std::size_t before = resident_bytes();
+  AlignedBuffer<float> buffer(512 * kMiB / sizeof(float));
+  buffer[buffer.size() / 2] = 1.0f;
+  EXPECT_LT(resident_bytes(), before + 16 * kMiB);
 }
 
 TEST(AlignedBuffer, EmptyHasNoElements) {

@@ -2,6 +2,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "distributed/communicator.h"
+
 namespace tomofield::cli {
 
 // Each adds one subcommand to the program; the subcommand's callback does the
@@ -12,7 +14,8 @@ void add_compare_command(CLI::App& program);
 void add_evaluate_command(CLI::App& program);
 void add_export_command(CLI::App& program);
 void add_info_command(CLI::App& program);
-void add_reconstruct_command(CLI::App& program);
+/// The only one that several processes may share.
+void add_reconstruct_command(CLI::App& program, const distributed::Communicator& processes);
 void add_simulate_command(CLI::App& program);
 
 }  // namespace tomofield::cli

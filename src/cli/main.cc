@@ -1,3 +1,7 @@
 #include "cli/program.h"
+#include "distributed/communicator.h"
 
-int main(int argc, char** argv) { return tomofield::cli::run_program(argc, argv); }
+int main(int argc, char** argv) {
+  const tomofield::distributed::Session session;
+  return tomofield::cli::run_program(argc, argv, session);
+}

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <new>
 #include <string>
@@ -23,8 +24,8 @@ void print_log(base::LogLevel level, std::string_view message) {
   fmt::print(stderr, "{}{}\n", level == base::LogLevel::kWarning ? "warning: " : "", message);
 }
 
-void add_commands(CLI::App& program) {
-  add_reconstruct_command(program);
+void add_commands(CLI::App& program, const distributed::Communicator& processes) {
+  add_reconstruct_command(program, processes);
   add_baseline_command(program);
   add_export_command(program);
   add_evaluate_command(program);
@@ -56,46 +57,87 @@ void require_known_command(const CLI::App& program, const std::vector<std::strin
   }
 }
 
+// Other commands would do all of their work in each process.
+void require_shared_command(const std::vector<std::string>& arguments,
+                            const distributed::Communicator& processes) {
+  if (processes.size() == 1 || arguments.empty() || arguments.front().rfind('-', 0) == 0 ||
+      arguments.front() == "reconstruct")
+    return;
+  throw Error(
+      fmt::format("{} processes were started, and only reconstruct shares its work: start "
+                  "`tomofield {}` without mpirun or srun",
+                  processes.size(), arguments.front()));
+}
+
+// Parses the command line and runs the command; 0, or throws.
+int run_command(CLI::App& program, std::vector<std::string> arguments,
+                const distributed::Communicator& processes) {
+  processes.together([&] {
+    require_known_command(program, arguments);
+    require_shared_command(arguments, processes);
+    expand_config_file(program, arguments);
+  });
+  std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them last first
+  try {
+    program.parse(arguments);
+  } catch (const CLI::ParseError& error) {                       // the same in all processes
+    if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
+    throw distributed::SharedError(
+        fmt::format("{}; `{} --help` lists the options", error.what(), command_name(program)));
+  }
+  return 0;
+}
+
+// What goes wrong in one process alone: the others wait for it, and must be ended.
+int fail_alone(const distributed::Session& session, int status, const std::string& message) {
+  const std::string who = session.communicator().size() == 1
+                              ? ""
+                              : fmt::format(" process {} of {}:", session.communicator().rank() + 1,
+                                            session.communicator().size());
+  fmt::print(stderr, "tomofield:{} {}\n", who, message);
+  std::fflush(nullptr);
+  session.abort(status);
+  return status;
+}
+
 }  // namespace
 
-int run_program(int argc, char** argv) {
+int run_program(int argc, char** argv, const distributed::Session& session) {
+  const distributed::Communicator& processes = session.communicator();
+  // One of several talks.
+  if (!processes.is_first() && std::freopen("/dev/null", "w", stdout) == nullptr) return 1;
+  if (processes.is_first()) base::set_log_sink(print_log);
+  const auto say = [&](const char* message) {
+    if (processes.is_first()) fmt::print(stderr, "tomofield: {}\n", message);
+  };
   CLI::App program{
       "tomofield: clean tomograms from aligned tilt series by continuous density fields",
       "tomofield"};
   program.set_version_flag("--version", "tomofield " TOMOFIELD_VERSION);
   program.require_subcommand(1);
-  base::set_log_sink(print_log);
-  add_commands(program);
+  add_commands(program, processes);
   try {
-    std::vector<std::string> arguments(argv + 1, argv + argc);
-    require_known_command(program, arguments);
-    expand_config_file(program, arguments);
-    std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them last first
-    program.parse(arguments);
-    return 0;
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
-    fmt::print(stderr, "tomofield: {}; `{} --help` lists the options\n", error.what(),
-               command_name(program));
-    return 2;
-  } catch (const Error& error) {
-    fmt::print(stderr, "tomofield: {}\n", error.what());
+    return run_command(program, {argv + 1, argv + argc}, processes);
+  } catch (const distributed::SharedError& error) {
+    say(error.what());
     return 2;
   } catch (const ExitStatus& exit) {
-    fmt::print(stderr, "tomofield: {}\n", exit.what());
+    say(exit.what());
     return exit.status();
+  } catch (const Error& error) {
+    return fail_alone(session, 2, error.what());
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr,
-               "tomofield: the system has no more memory to give: end other programs, or reduce "
-               "the problem (a larger --bin, a smaller --roi or --thickness, fewer --threads)\n");
-    return 2;
+    return fail_alone(
+        session, 2,
+        "the system has no more memory to give: end other programs, or reduce "
+        "the problem (a larger --bin, a smaller --roi or --thickness, fewer --threads)");
   } catch (const std::filesystem::filesystem_error& error) {
-    fmt::print(stderr, "tomofield: '{}' cannot be used: {}\n", error.path1().string(),
-               error.code().message());
-    return 2;
+    return fail_alone(
+        session, 2,
+        fmt::format("'{}' cannot be used: {}", error.path1().string(), error.code().message()));
   } catch (const std::exception& error) {
-    fmt::print(stderr, "tomofield: internal error, please report it: {}\n", error.what());
-    return 1;
+    return fail_alone(session, 1,
+                      fmt::format("internal error, please report it: {}", error.what()));
   }
 }
 

@@ -167,7 +167,7 @@ void set_schedule(Arguments& arguments) {
   fit.learning_rate = arguments.learning_rate.value_or(usual.learning_rate);
 }
 
-void run(Arguments& arguments) {
+void run(Arguments& arguments, const distributed::Communicator& processes) {
   reconstruct::ReconstructOptions& options = arguments.options;
   const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
   options.fit.fit_view_scale = is_on(arguments.view_scale, is_dark);
@@ -182,14 +182,17 @@ void run(Arguments& arguments) {
     options.field.activation = "identity";
   options.field.with_margin = options.specimen.with_margin;
   options.input.resample = options.fit.engine == "slab";
-  reconstruct::check_options(options);
-  const tilt_series::TiltSeries series(options.input);
-  run_reconstruction(series, options, arguments.dry_run);
+  std::optional<tilt_series::TiltSeries> series;
+  processes.together([&] {
+    reconstruct::check_options(options);
+    series.emplace(options.input);
+  });
+  run_reconstruction(*series, options, arguments.dry_run, processes);
 }
 
 }  // namespace
 
-void add_reconstruct_command(CLI::App& program) {
+void add_reconstruct_command(CLI::App& program, const distributed::Communicator& processes) {
   CLI::App& command = *program.add_subcommand(
       "reconstruct", "tilt series in, clean tomogram and compact model out");
   auto arguments = std::make_shared<Arguments>();
@@ -200,7 +203,7 @@ void add_reconstruct_command(CLI::App& program) {
   add_volume_options(command, arguments->options.volume);
   add_run_options(command, arguments->options, arguments->dry_run);
   add_common_options(command);
-  command.callback([arguments] { run(*arguments); });
+  command.callback([arguments, &processes] { run(*arguments, processes); });
 }
 
 }  // namespace tomofield::cli

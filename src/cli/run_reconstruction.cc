@@ -3,9 +3,15 @@
 #include <fmt/core.h>
 
 #include <csignal>
+#include <cstdio>
 #include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
 
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "cli/exit_status.h"
 #include "cli/fit_options.h"
 #include "cli/pictures.h"
@@ -17,16 +23,44 @@ namespace {
 volatile std::sig_atomic_t g_signal = 0;
 void remember_signal(int signal) { g_signal = signal; }
 
-void print_plan(const reconstruct::ReconstructOptions& options, const reconstruct::RunPlan& plan) {
+// Of a job, another process may have got the signal.
+int stop_status() { return 128 + (g_signal != 0 ? g_signal : SIGTERM); }
+
+// A process that dies cannot say so: mpirun then stops the others, which wait for it.
+std::function<void()> tell_if_stuck(const std::filesystem::path& model,
+                                    const distributed::Communicator& processes) {
+  constexpr double kSecondsToAnswer = 0.4;
+  auto since = std::make_shared<std::optional<base::Stopwatch>>();
+  auto is_told = std::make_shared<bool>(!processes.is_first());
+  return [=] {
+    if (g_signal == 0 || *is_told) return;
+    if (!*since) since->emplace();
+    if ((*since)->seconds() < kSecondsToAnswer) return;
+    *is_told = true;
+    fmt::print(stderr,
+               "tomofield: asked to stop, but other processes do not answer yet; if one of them "
+               "died, {}\n",
+               std::filesystem::exists(model)
+                   ? fmt::format("continue from '{}' with --resume", model.string())
+                   : "there is no checkpoint yet");
+    std::fflush(stderr);
+  };
+}
+
+void print_plan(const reconstruct::ReconstructOptions& options, const reconstruct::RunPlan& plan,
+                int num_processes) {
   print_sizes({plan.num_views, plan.view_width, plan.view_height, plan.pixel_size_A, plan.roi,
                plan.thickness});
   if (plan.num_trials > 0)
     fmt::print("about {} short trials first, that choose settings by held-out views\n",
                plan.num_trials);
-  fmt::print("{} field, {} {}, {} parameters; {} steps on {} threads; about {:.2f} GiB of memory\n",
-             options.field.kind, plan.num_leaves, plan.num_leaves == 1 ? "leaf" : "leaves",
-             plan.num_parameters, plan.num_steps, base::thread_count(),
-             static_cast<double>(plan.memory_bytes) / (1 << 30));
+  const std::string processes =
+      num_processes == 1 ? "" : fmt::format(" of each of {} processes", num_processes);
+  fmt::print(
+      "{} field, {} {}, {} parameters; {} steps on {} threads{}; about {:.2f} GiB of memory{}\n",
+      options.field.kind, plan.num_leaves, plan.num_leaves == 1 ? "leaf" : "leaves",
+      plan.num_parameters, plan.num_steps, base::thread_count(), processes,
+      static_cast<double>(plan.memory_bytes) / (1 << 30), num_processes == 1 ? "" : " each");
 }
 
 void print_files(const reconstruct::OutputPaths& paths) {
@@ -37,7 +71,7 @@ void print_files(const reconstruct::OutputPaths& paths) {
 ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
                    const reconstruct::ReconstructOptions& options) {
   return {
-      128 + g_signal,
+      stop_status(),
       fmt::format("stopped; {} '{}': continue with the same command and --resume{}", what_is_there,
                   file.string(), options.overwrite ? " instead of --overwrite" : "")};
 }
@@ -66,24 +100,35 @@ void add_run_options(CLI::App& command, reconstruct::ReconstructOptions& options
 }
 
 void run_reconstruction(const tilt_series::TiltSeries& series,
-                        const reconstruct::ReconstructOptions& options, bool dry_run) {
-  print_plan(options, reconstruct::plan_run(series, options));
+                        const reconstruct::ReconstructOptions& options, bool dry_run,
+                        const distributed::Communicator& processes) {
+  processes.together([&] {
+    print_plan(options, reconstruct::plan_run(series, options, processes), processes.size());
+  });
   if (dry_run) return;
+  const reconstruct::OutputPaths paths = reconstruct::output_paths(options.output);
   std::signal(SIGINT, remember_signal);
   std::signal(SIGTERM, remember_signal);
-  const reconstruct::ReconstructHooks hooks{.progress = make_progress_bar("reconstruct"),
-                                            .tune_progress = make_progress_bar("tune"),
-                                            .stop_requested = [] { return g_signal != 0; }};
-  const reconstruct::OutputPaths paths = reconstruct::output_paths(options.output);
-  switch (reconstruct::reconstruct(series, options, hooks)) {
+  if (processes.size() > 1) {
+    std::signal(SIGUSR1, remember_signal);  // which mpirun passes on, without a time limit
+    processes.while_waiting(tell_if_stuck(paths.model, processes));
+  }
+  reconstruct::ReconstructHooks hooks{
+      .progress = {}, .tune_progress = {}, .stop_requested = [] { return g_signal != 0; }};
+  if (processes.is_first()) {
+    hooks.progress = make_progress_bar("reconstruct");
+    hooks.tune_progress = make_progress_bar("tune");
+  }
+  switch (reconstruct::reconstruct(series, options, hooks, processes)) {
     case reconstruct::Outcome::kFinished:
       break;
     case reconstruct::Outcome::kStopped:
       throw stopped("the checkpoint is", paths.model, options);
     case reconstruct::Outcome::kStoppedTuning:
       if (options.tune) throw stopped("the finished trials are in", paths.trials, options);
-      throw ExitStatus{128 + g_signal, "stopped before the first checkpoint"};
+      throw ExitStatus{stop_status(), "stopped before the first checkpoint"};
   }
+  if (!processes.is_first()) return;
   print_files(paths);
   write_pictures(paths.volume, series, paths.picture_prefix);
   if (options.field.tree == "adaptive") write_tree_picture(paths.model, paths.tree_picture);

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "distributed/communicator.h"
 #include "reconstruct/reconstruct.h"
 #include "tilt_series/tilt_series.h"
 
@@ -12,8 +13,10 @@ void add_run_options(CLI::App& command, reconstruct::ReconstructOptions& options
 
 /// Prints the plan of a fit, runs it, with progress and until it is interrupted, and writes its
 /// pictures. Only the plan if `dry_run`. Call reconstruct::check_options() first. Throws ExitStatus
-/// when it was stopped by a signal, with what there is to go on from.
-void run_reconstruction(const tilt_series::TiltSeries& series,
-                        const reconstruct::ReconstructOptions& options, bool dry_run);
+/// when it was stopped by a signal, with what there is to go on from. Processes that share it all
+/// call it; the first reports and writes pictures.
+void run_reconstruction(
+    const tilt_series::TiltSeries& series, const reconstruct::ReconstructOptions& options,
+    bool dry_run, const distributed::Communicator& processes = distributed::Communicator::alone());
 
 }  // namespace tomofield::cli

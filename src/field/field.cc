@@ -53,6 +53,21 @@ void Field::allocate() {
   parameters_.reset(offsets_.back());
 }
 
+void Field::initialise(base::Random random, double scale) {
+  // What is not kept is drawn too: values do not depend on which leaves are.
+  for (int leaf = 0; leaf < tree_.num_leaves(); ++leaf) {
+    for (std::size_t i = offset(leaf); i < offset(leaf + 1); ++i) {
+      const float value = static_cast<float>(random.uniform(-scale, scale));
+      if (keeps(leaf)) parameters_[i] = value;
+    }
+  }
+}
+
+void Field::keep_only(const std::vector<int>& leaves) {
+  is_kept_.assign(leaves.empty() ? 0 : static_cast<std::size_t>(tree_.num_leaves()), 0);
+  for (const int leaf : leaves) is_kept_[static_cast<std::size_t>(leaf)] = 1;
+}
+
 double Field::vertex_x(int leaf, double x) const {
   const Square& square = tree_.leaf(leaf).square;
   return (x - kPixelCentre - static_cast<double>(square.x0)) / static_cast<double>(square.size) *
@@ -77,6 +92,13 @@ LaneRows Field::lane_rows(int leaf, std::span<const double, kernels::kLanes> y) 
     rows.fraction[l] = static_cast<float>(at.fraction);
   }
   return rows;
+}
+
+std::vector<ParameterRuns> Field::parameters_between(int leaf, double low, double high) const {
+  const int n = shape(leaf).ny;
+  const auto first = AxisPoint(vertex_y(leaf, low), n).lower;
+  const auto last = AxisPoint(vertex_y(leaf, high), n).lower + 1;
+  return runs_of_rows(shape(leaf), static_cast<int>(first), static_cast<int>(last) + 1);
 }
 
 void Field::slab_values(int leaf, const LaneRows& rows, float* values) const {
@@ -180,8 +202,10 @@ std::unique_ptr<Field> Field::resampled(std::vector<LeafShape> shapes) const {
   auto after = make_field(kind(), tree_, thickness_, std::move(shapes));
   after->bias = bias;
   after->activation = activation;
+  after->is_kept_ = is_kept_;
   base::parallel_for(tree_.num_leaves(), [&](std::int64_t i) {
     const int leaf = static_cast<int>(i);
+    if (!keeps(leaf)) return;
     const LeafShape &from = shape(leaf), &to = after->shape(leaf);
     TOMOFIELD_CHECK(
         from.rank_x == to.rank_x && from.rank_y == to.rank_y && from.rank_z == to.rank_z,

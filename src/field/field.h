@@ -48,6 +48,13 @@ struct PointTaps {
   int count() const { return x.count; }
 };
 
+/// Some parameters of a leaf: `repeats` times `count` of them, `stride` apart, from the leaf's
+/// `first` on.
+struct ParameterRuns {
+  std::size_t first = 0, count = 0, stride = 0, repeats = 1;
+  std::size_t size() const { return count * repeats; }
+};
+
 struct MergeTarget;
 
 /// A density field over a quadtree: vertex values a leaf at a time, and the
@@ -87,6 +94,9 @@ class Field {
   double vertex_z(int leaf, double z) const;
   LaneRows lane_rows(int leaf, std::span<const double, kernels::kLanes> y) const;
 
+  /// The parameters of a leaf that its values at positions y from `low` to `high` depend on.
+  std::vector<ParameterRuns> parameters_between(int leaf, double low, double high) const;
+
   /// Vertex values of a leaf at 16 rows: values[x, z, lane], overwritten.
   void slab_values(int leaf, const LaneRows& rows, float* values) const;
   /// Adds dL/d parameters of this leaf, given dL/d values, to gradient[0 … count).
@@ -110,8 +120,16 @@ class Field {
   virtual double parameter_variation(int leaf, const kernels::VariationPenalty& penalty,
                                      double weight, float* gradient) const = 0;
 
-  /// Starting values: every density close to act(bias).
-  virtual void initialise(base::Random random, double scale) = 0;
+  /// Starting values, uniform in ± scale: every density close to act(bias).
+  void initialise(base::Random random, double scale);
+
+  /// Of a field that several processes share: only these leaves, or all if there are none, are
+  /// asked for here. The parameters of others are zeros that are never written, and so take no
+  /// memory.
+  void keep_only(const std::vector<int>& leaves);
+  bool keeps(int leaf) const {
+    return is_kept_.empty() || is_kept_[static_cast<std::size_t>(leaf)];
+  }
 
   /// The same field on the same tree with other vertices: every factor interpolated along
   /// its axes. Nothing is lost where a leaf's vertices contain those that it had, as
@@ -128,6 +146,9 @@ class Field {
 
  protected:
   virtual std::size_t parameter_count(const LeafShape& shape) const = 0;
+  /// The parameters of vertices [first_y, end_y) along y.
+  virtual std::vector<ParameterRuns> runs_of_rows(const LeafShape& shape, int first_y,
+                                                  int end_y) const = 0;
   virtual void add_slab_values(int leaf, const LaneRows& rows, float* values) const = 0;
   virtual void add_row_values(int leaf, int lower, float fraction, float* values) const = 0;
   /// values[point] += vertex values interpolated there, without the bias; and its adjoint.
@@ -158,6 +179,7 @@ class Field {
   double thickness_;
   std::vector<LeafShape> shapes_;
   std::vector<std::size_t> offsets_;
+  std::vector<char> is_kept_;  // of each leaf; empty: all are
   base::AlignedBuffer<float> parameters_;
 };
 

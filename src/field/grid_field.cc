@@ -77,6 +77,13 @@ void for_each_corner(const LeafShape& s, const PointTaps& taps, int point, const
 
 std::size_t GridField::count(const LeafShape& s) { return s.vertices_xz() * s.ny; }
 
+std::vector<ParameterRuns> GridField::runs_of_rows(const LeafShape& s, int first_y,
+                                                   int end_y) const {
+  const auto first = static_cast<std::size_t>(first_y),
+             count = static_cast<std::size_t>(end_y) - first;
+  return {{first, count, static_cast<std::size_t>(s.ny), s.vertices_xz()}};
+}
+
 void GridField::add_slab_values(int leaf, const LaneRows& rows, float* values) const {
   const LeafShape& s = shape(leaf);
   if (are_a_vertex_apart(rows)) {
@@ -144,10 +151,6 @@ double GridField::parameter_variation(int leaf, const kernels::VariationPenalty&
                                       double weight, float* gradient) const {
   const LeafShape& s = shape(leaf);
   return array_variation(leaf_parameters(leaf), s.nx, s.nz, s.ny, 1, penalty, weight, gradient);
-}
-
-void GridField::initialise(base::Random random, double scale) {
-  for (float& value : parameters()) value = static_cast<float>(random.uniform(-scale, scale));
 }
 
 void GridField::sample_quarter(const LeafShape& s, const float* leaf, double x0, double y0,

@@ -31,11 +31,14 @@ void write_column(Hdf5Group& group, const char* name, const Items& items, Get ge
   group.write_array<std::int64_t>(name, column);
 }
 
-void require_finite_parameters(std::span<const float> parameters, const std::string& complaint) {
-  const auto bad =
-      std::find_if(parameters.begin(), parameters.end(), [](float p) { return !std::isfinite(p); });
-  if (bad != parameters.end())
-    throw Error(fmt::format("{}: parameter {} is {}", complaint, bad - parameters.begin(), *bad));
+void require_finite_parameters(const Field& field, const std::string& complaint) {
+  const std::span<const float> parameters = field.parameters();
+  for (int leaf = 0; leaf < field.tree().num_leaves(); ++leaf) {
+    for (std::size_t i = field.offset(leaf); field.keeps(leaf) && i < field.offset(leaf + 1); ++i) {
+      if (!std::isfinite(parameters[i]))
+        throw Error(fmt::format("{}: parameter {} is {}", complaint, i, parameters[i]));
+    }
+  }
 }
 
 void write_geometry(Hdf5Group group, const ModelInfo& info) {
@@ -85,14 +88,38 @@ void write_leaves(Hdf5Group group, const Field& field) {
   group.write_array<std::int64_t>("offset", offsets);
 }
 
-void write_field(Hdf5Group group, const Field& field) {
+// Copies what comes in pieces, one float a parameter, of the leaves that a field keeps.
+class KeptCopy {
+ public:
+  KeptCopy(const Field& field, std::span<float> values) : field_(field), values_(values) {}
+
+  void operator()(std::span<const float> piece) {
+    for (const std::size_t end = at_ + piece.size(); at_ < end;) {
+      while (field_.offset(leaf_ + 1) <= at_) ++leaf_;
+      const std::size_t count = std::min(end, field_.offset(leaf_ + 1)) - at_;
+      if (field_.keeps(leaf_)) std::copy_n(piece.begin(), count, values_.begin() + offset());
+      piece = piece.subspan(count);
+      at_ += count;
+    }
+  }
+
+ private:
+  std::ptrdiff_t offset() const { return static_cast<std::ptrdiff_t>(at_); }
+
+  const Field& field_;
+  std::span<float> values_;
+  std::size_t at_ = 0;
+  int leaf_ = 0;
+};
+
+void write_field(Hdf5Group group, const Field& field, const FloatSource& parameters) {
   group.write_text("kind", field.kind());
   group.write_number("thickness", field.thickness());
   group.write_number("bias", static_cast<double>(field.bias));
   group.write_number("softplus_beta", static_cast<double>(field.activation.beta));
   write_tree(group.create_group("tree"), field.tree());
   write_leaves(group.create_group("leaves"), field);
-  group.write_array<float>("parameters", field.parameters());
+  group.write_floats("parameters", parameters.size, parameters.hand_out);
 }
 
 template <typename T>
@@ -103,7 +130,8 @@ void write_arrays(Hdf5Group group, const std::map<std::string, std::vector<T>>& 
 void write_training(Hdf5Group group, const TrainingState& state, const FloatArrays& more_floats) {
   Hdf5Group floats = group.create_group("floats");
   for (const auto& [name, values] : state.floats) floats.write_array<float>(name, values);
-  for (const auto& [name, values] : more_floats) floats.write_array<float>(name, values);
+  for (const auto& [name, source] : more_floats)
+    floats.write_floats(name, source.size, source.hand_out);
   write_arrays(group.create_group("doubles"), state.doubles);
   write_arrays(group.create_group("integers"), state.integers);
 }
@@ -114,7 +142,8 @@ class ModelReader {
   explicit ModelReader(const std::filesystem::path& path)
       : path_(path.string()), file_(io::Hdf5File::open(path)) {}
 
-  Model read(TrainingState* training) const {
+  // Without `choose`: all leaves, and of the training state the floats too.
+  Model read(TrainingState* training, const ChooseLeaves& choose) const {
     const Hdf5Group root = file_.root();
     require_known_format(root);
     Model model;
@@ -128,9 +157,25 @@ class ModelReader {
                 model.pixel_size_A > 0 && std::isfinite(model.density_unit),
             "its pixel size or density unit is no usable number");
     read_geometry(root.group("geometry"), model);
-    model.field = read_field(root.group("field"));
-    if (training != nullptr) *training = read_training(root);
+    model.field = read_field(root.group("field"), choose);
+    if (training != nullptr) *training = read_training(root, /*with_floats=*/!choose);
     return model;
+  }
+
+  void read_floats(const std::string& name, const Field& field, std::span<float> values) const {
+    const Hdf5Group root = file_.root();
+    const bool is_there = root.has("training") && root.group("training").has("floats") &&
+                          root.group("training").group("floats").has(name);
+    if (!is_there) {
+      throw Error(fmt::format(
+          "'{}' holds no optimiser state ('{}' is missing), so it is no checkpoint", path_, name));
+    }
+    const Hdf5Group floats = root.group("training").group("floats");
+    if (floats.array_size(name) != values.size()) {
+      throw Error(fmt::format("'{}' holds {} of the {} moments of its parameters, so it is damaged",
+                              path_, floats.array_size(name), values.size()));
+    }
+    floats.read_floats(name, KeptCopy(field, values));
   }
 
  private:
@@ -228,7 +273,7 @@ class ModelReader {
     return shapes;
   }
 
-  std::unique_ptr<Field> read_field(const Hdf5Group& group) const {
+  std::unique_ptr<Field> read_field(const Hdf5Group& group, const ChooseLeaves& choose) const {
     std::unique_ptr<Field> field;
     const double thickness = group.number("thickness");
     require(std::isfinite(thickness) && thickness > 0, "its thickness is no usable number");
@@ -252,8 +297,15 @@ class ModelReader {
     require(std::isfinite(field->bias) && std::isfinite(field->activation.beta) &&
                 field->activation.beta >= 0,
             "its decoder is no usable number");
-    group.read_array<float>("parameters", field->parameters());
-    require_finite_parameters(field->parameters(), fmt::format("'{}' is a damaged model", path_));
+    if (choose) {
+      require(group.array_size("parameters") == field->num_parameters(),
+              "its parameters are not those of its leaves");
+      field->keep_only(choose(field->tree()));
+      group.read_floats("parameters", KeptCopy(*field, field->parameters()));
+    } else {
+      group.read_array<float>("parameters", field->parameters());
+    }
+    require_finite_parameters(*field, fmt::format("'{}' is a damaged model", path_));
     return field;
   }
 
@@ -264,10 +316,11 @@ class ModelReader {
     return arrays;
   }
 
-  static TrainingState read_training(const Hdf5Group& root) {
+  static TrainingState read_training(const Hdf5Group& root, bool with_floats) {
     if (!root.has("training")) return {};
     const Hdf5Group group = root.group("training");
-    return {.floats = read_arrays<float>(group.group("floats")),
+    using Floats = std::map<std::string, std::vector<float>>;
+    return {.floats = with_floats ? read_arrays<float>(group.group("floats")) : Floats{},
             .doubles = read_arrays<double>(group.group("doubles")),
             .integers = read_arrays<std::int64_t>(group.group("integers"))};
   }
@@ -278,12 +331,21 @@ class ModelReader {
 
 }  // namespace
 
+void require_finite(const Field& field, const std::filesystem::path& path) {
+  require_finite_parameters(field, fmt::format("the fit diverged, so '{}' is left as it was; a "
+                                               "lower learning rate may help",
+                                               path.string()));
+}
+
 void save_model(const std::filesystem::path& path, const Field& field, const ModelInfo& info,
                 const TrainingState* training, const FloatArrays& more_floats) {
-  require_finite_parameters(field.parameters(),
-                            fmt::format("the fit diverged, so '{}' is left as it was; a lower "
-                                        "learning rate may help",
-                                        path.string()));
+  require_finite(field, path);
+  save_model(path, field, FloatSource(field.parameters()), info, training, more_floats);
+}
+
+void save_model(const std::filesystem::path& path, const Field& field,
+                const FloatSource& parameters, const ModelInfo& info, const TrainingState* training,
+                const FloatArrays& more_floats) {
   io::AtomicFile target(path);
   {
     io::Hdf5File file = io::Hdf5File::create(target.temporary_path());
@@ -298,7 +360,7 @@ void save_model(const std::filesystem::path& path, const Field& field, const Mod
       root.write_text("contrast", info.is_dark ? "dark" : "bright");
       root.write_text("options_json", info.options_json);
       write_geometry(root.create_group("geometry"), info);
-      write_field(root.create_group("field"), field);
+      write_field(root.create_group("field"), field, parameters);
       if (training != nullptr)
         write_training(root.create_group("training"), *training, more_floats);
     }
@@ -313,7 +375,17 @@ void save_model(const std::filesystem::path& path, const Model& model,
 }
 
 Model load_model(const std::filesystem::path& path, TrainingState* training) {
-  return ModelReader(path).read(training);
+  return ModelReader(path).read(training, {});
+}
+
+Model load_part(const std::filesystem::path& path, const ChooseLeaves& choose,
+                TrainingState& training) {
+  return ModelReader(path).read(&training, choose);
+}
+
+void load_floats(const std::filesystem::path& path, const std::string& name, const Field& field,
+                 std::span<float> values) {
+  ModelReader(path).read_floats(name, field, values);
 }
 
 }  // namespace tomofield::field

@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "field/field.h"
@@ -41,8 +43,21 @@ struct TrainingState {
   bool operator==(const TrainingState&) const = default;
 };
 
+/// One float a parameter, in pieces from the first on, for arrays that need not be in one place.
+struct FloatSource {
+  using Sink = std::function<void(std::span<const float>)>;
+  std::size_t size = 0;
+  std::function<void(const Sink&)> hand_out;
+
+  FloatSource(std::size_t all, std::function<void(const Sink&)> pieces)
+      : size(all), hand_out(std::move(pieces)) {}
+  /// An array as it is.
+  FloatSource(std::span<const float> whole)
+      : size(whole.size()), hand_out([whole](const Sink& sink) { sink(whole); }) {}
+};
+
 /// Large arrays of a training state that are written from where they are.
-using FloatArrays = std::map<std::string, std::span<const float>>;
+using FloatArrays = std::map<std::string, FloatSource>;
 
 /// Writes a model (docs/model-format.md): atomically, so that `path` holds the
 /// old file or the whole new one, whatever happens. Parameters are written
@@ -51,6 +66,12 @@ using FloatArrays = std::map<std::string, std::span<const float>>;
 /// `more_floats` join those of `training`, without which they are not written.
 void save_model(const std::filesystem::path& path, const Field& field, const ModelInfo& info,
                 const TrainingState* training = nullptr, const FloatArrays& more_floats = {});
+/// The same for a field whose parameters are not all kept here (Field::keep_only).
+void save_model(const std::filesystem::path& path, const Field& field,
+                const FloatSource& parameters, const ModelInfo& info, const TrainingState* training,
+                const FloatArrays& more_floats);
+/// Throws Error if a parameter that is kept is not finite, naming the file that was to be written.
+void require_finite(const Field& field, const std::filesystem::path& path);
 void save_model(const std::filesystem::path& path, const Model& model,
                 const TrainingState* training = nullptr);
 
@@ -58,5 +79,16 @@ void save_model(const std::filesystem::path& path, const Model& model,
 /// empty where the model was saved without. Throws Error, naming the file and
 /// the reason, for anything but a whole model of a known version.
 Model load_model(const std::filesystem::path& path, TrainingState* training = nullptr);
+
+/// The leaves of a tree whose parameters are asked for; none: all.
+using ChooseLeaves = std::function<std::vector<int>(const Quadtree&)>;
+/// A model of which only some leaves are kept (Field::keep_only), and its training state but
+/// for the floats.
+Model load_part(const std::filesystem::path& path, const ChooseLeaves& choose,
+                TrainingState& training);
+/// One of the floats of a training state, which are one a parameter, into `values`: of the leaves
+/// that `field` keeps alone. Throws Error if there is none or it has another size.
+void load_floats(const std::filesystem::path& path, const std::string& name, const Field& field,
+                 std::span<float> values);
 
 }  // namespace tomofield::field

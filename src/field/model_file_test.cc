@@ -8,6 +8,7 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -96,6 +97,49 @@ TEST(ModelFile, ComesBackBitForBit) {
     EXPECT_TRUE(std::signbit(loaded_state.doubles["loss"].back()));
     EXPECT_EQ(loaded.written_by, std::string("tomofield ") + library_version());
   }
+}
+
+TEST(ModelFile, SomeLeavesComeBackWithTheirMoments) {
+  const ScratchDirectory scratch;
+  const Model model = uneven_model("vm");
+  const Field& field = *model.field;
+  std::vector<float> moments(field.num_parameters());
+  for (std::size_t i = 0; i < moments.size(); ++i) moments[i] = static_cast<float>(i) + 0.5f;
+  // As several processes write it: in pieces that know nothing of leaves.
+  const auto in_pieces = [](std::span<const float> values) {
+    return FloatSource(values.size(), [values](const FloatSource::Sink& sink) {
+      for (std::size_t at = 0; at < values.size(); at += 77)
+        sink(values.subspan(at, std::min<std::size_t>(77, values.size() - at)));
+    });
+  };
+  TrainingState state;
+  state.integers["step"] = {41};
+  save_model(scratch / "whole.h5", field, model, &state, {{"m", FloatSource(moments)}});
+  save_model(scratch / "pieces.h5", field, in_pieces(field.parameters()), model, &state,
+             {{"m", in_pieces(moments)}});
+  EXPECT_TRUE(read_whole_file(scratch / "whole.h5") == read_whole_file(scratch / "pieces.h5"));
+
+  const std::vector<int> kept{1, field.tree().num_leaves() - 1};
+  TrainingState loaded_state;
+  const Model part = load_part(
+      scratch / "pieces.h5", [&](const Quadtree&) { return kept; }, loaded_state);
+  EXPECT_EQ(loaded_state, state);
+  std::vector<float> loaded(moments.size());
+  load_floats(scratch / "pieces.h5", "m", *part.field, loaded);
+  for (int leaf = 0; leaf < field.tree().num_leaves(); ++leaf) {
+    const bool is_kept = std::ranges::find(kept, leaf) != kept.end();
+    for (std::size_t i = field.offset(leaf); i < field.offset(leaf + 1); ++i) {
+      ASSERT_EQ(part.field->parameters()[i], is_kept ? field.parameters()[i] : 0.0f);
+      ASSERT_EQ(loaded[i], is_kept ? moments[i] : 0.0f);
+    }
+  }
+  const auto refused = [&](const char* name, std::size_t size) {
+    std::vector<float> values(size);
+    return message_of<Error>(
+        [&] { load_floats(scratch / "pieces.h5", name, *part.field, values); });
+  };
+  EXPECT_NE(refused("v", loaded.size()).find("'v' is missing"), std::string::npos);
+  EXPECT_NE(refused("m", loaded.size() + 1).find("damaged"), std::string::npos);
 }
 
 TEST(ModelFile, WithoutTrainingStateGivesAnEmptyOne) {

@@ -16,14 +16,16 @@ namespace {
 constexpr std::int64_t kPartValues = std::int64_t{1} << 22;
 
 // A box along the axes: some rows of all sections, then the next rows.
-void sample_aligned(const Field& field, const Box& box, const BoxSink& sink) {
+void sample_aligned(const Field& field, const Box& box, const BoxRows& some, const BoxSink& sink) {
   const AlignedRows rows(field, box);
   const auto [nx, ny, nz] = box.size;
   const std::int64_t block = rows.rows_at_once();
   const std::int64_t part = std::clamp(kPartValues / (block * nx), std::int64_t{1}, nz);
-  base::parallel_for((ny + block - 1) / block, [&, nx = nx, ny = ny, nz = nz](std::int64_t index) {
-    const std::int64_t first_row = index * block;
-    const std::int64_t num_rows = std::min(block, ny - first_row);
+  TOMOFIELD_CHECK(some.first % block == 0 && some.end <= ny, "rows in whole blocks");
+  const std::int64_t num_blocks = (some.end - some.first + block - 1) / block;
+  base::parallel_for(num_blocks, [&, nx = nx, nz = nz](std::int64_t index) {
+    const std::int64_t first_row = some.first + index * block;
+    const std::int64_t num_rows = std::min(block, some.end - first_row);
     const auto leaves = rows.contract(first_row, num_rows);
     std::vector<float> values;
     for (std::int64_t first = 0; first < nz; first += part) {
@@ -55,13 +57,14 @@ double voxel_density(const Field& field, const Box& box, std::int64_t x, std::in
   return sum / static_cast<double>(factor * factor * factor);
 }
 
-void sample_rotated(const Field& field, const Box& box, const BoxSink& sink) {
+void sample_rotated(const Field& field, const Box& box, const BoxRows& some, const BoxSink& sink) {
   constexpr std::int64_t kBlock = 16;
   const auto [nx, ny, nz] = box.size;
-  const std::int64_t blocks = (ny + kBlock - 1) / kBlock;
-  base::parallel_for(nz * blocks, [&, nx = nx, ny = ny](std::int64_t index) {
-    const std::int64_t section = index / blocks, first_row = index % blocks * kBlock;
-    const std::int64_t num_rows = std::min(kBlock, ny - first_row);
+  const std::int64_t blocks = (some.end - some.first + kBlock - 1) / kBlock;
+  base::parallel_for(nz * blocks, [&, nx = nx](std::int64_t index) {
+    const std::int64_t section = index / blocks;
+    const std::int64_t first_row = some.first + index % blocks * kBlock;
+    const std::int64_t num_rows = std::min(kBlock, some.end - first_row);
     std::vector<float> values;
     values.reserve(static_cast<std::size_t>(num_rows * nx));
     for (std::int64_t row = first_row; row < first_row + num_rows; ++row) {
@@ -114,10 +117,15 @@ std::int64_t points_per_voxel(const Box& box) {
 }
 
 void sample_box(const Field& field, const Box& box, const BoxSink& sink) {
+  sample_box(field, box, {0, box.size[1]}, sink);
+}
+
+void sample_box(const Field& field, const Box& box, const BoxRows& rows, const BoxSink& sink) {
   TOMOFIELD_CHECK(box.size[0] > 0 && box.size[1] > 0 && box.size[2] > 0 && box.voxel_px > 0,
                   fmt::format("a box of {} × {} × {} voxels of {} px", box.size[0], box.size[1],
                               box.size[2], box.voxel_px));
-  box.is_aligned() ? sample_aligned(field, box, sink) : sample_rotated(field, box, sink);
+  box.is_aligned() ? sample_aligned(field, box, rows, sink)
+                   : sample_rotated(field, box, rows, sink);
 }
 
 std::vector<float> sample_box(const Field& field, const Box& box) {

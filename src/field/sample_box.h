@@ -57,6 +57,11 @@ struct BoxPart {
 /// vertex values and 16 MiB a thread.
 using BoxSink = std::function<void(const BoxPart&)>;
 void sample_box(const Field& field, const Box& box, const BoxSink& sink);
+/// Some of its rows alone; of a box that is not rotated, `first_row` must be a multiple of 16.
+struct BoxRows {
+  std::int64_t first, end;
+};
+void sample_box(const Field& field, const Box& box, const BoxRows& rows, const BoxSink& sink);
 
 /// The same at once: [z, y, x].
 std::vector<float> sample_box(const Field& field, const Box& box);

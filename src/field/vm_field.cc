@@ -125,6 +125,22 @@ float* scratch(std::size_t size, int which) {
 
 std::size_t VmField::count(const LeafShape& shape) { return Layout(shape).count; }
 
+// VX, MXZ and VZ have no y; of the others, y comes after z or x and before the rank.
+std::vector<ParameterRuns> VmField::runs_of_rows(const LeafShape& s, int first_y, int end_y) const {
+  const Layout at(s);
+  const auto rows = [&](std::size_t factor, int rank, int repeats) {
+    const auto width = static_cast<std::size_t>(rank);
+    return ParameterRuns{factor + static_cast<std::size_t>(first_y) * width,
+                         static_cast<std::size_t>(end_y - first_y) * width,
+                         static_cast<std::size_t>(s.ny) * width, static_cast<std::size_t>(repeats)};
+  };
+  return {{at.vx, at.myz - at.vx},
+          rows(at.myz, s.rank_x, s.nz),
+          rows(at.vy, s.rank_y, 1),
+          {at.mxz, at.mxy - at.mxz},
+          rows(at.mxy, s.rank_z, s.nx)};
+}
+
 void VmField::add_slab_values(int leaf, const LaneRows& rows, float* values) const {
   const LeafShape& s = shape(leaf);
   const Layout at(s);
@@ -364,10 +380,6 @@ double VmField::parameter_variation(int leaf, const kernels::VariationPenalty& p
   return vector(at.vx, s.nx, s.rank_x) + matrix(at.myz, s.nz, s.ny, s.rank_x) +
          vector(at.vy, s.ny, s.rank_y) + matrix(at.mxz, s.nx, s.nz, s.rank_y) +
          vector(at.vz, s.nz, s.rank_z) + matrix(at.mxy, s.nx, s.ny, s.rank_z);
-}
-
-void VmField::initialise(base::Random random, double scale) {
-  for (float& value : parameters()) value = static_cast<float>(random.uniform(-scale, scale));
 }
 
 void VmField::sample_quarter(const LeafShape& s, const float* leaf, double x0, double y0,

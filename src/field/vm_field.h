@@ -33,10 +33,11 @@ class VmField final : public Field {
                      float* gradient) const override;
   double parameter_variation(int leaf, const kernels::VariationPenalty& penalty, double weight,
                              float* gradient) const override;
-  void initialise(base::Random random, double scale) override;
 
  protected:
   std::size_t parameter_count(const LeafShape& shape) const override { return count(shape); }
+  std::vector<ParameterRuns> runs_of_rows(const LeafShape& shape, int first_y,
+                                          int end_y) const override;
   void add_slab_values(int leaf, const LaneRows& rows, float* values) const override;
   void add_row_values(int leaf, int lower, float fraction, float* values) const override;
   void add_point_values(int leaf, const PointTaps& taps, float* values) const override;

@@ -157,8 +157,13 @@ std::string read_text_attribute(hid_t owner, const std::string& name, const std:
   return value;
 }
 
-std::string checksum_of(std::span<const std::byte> bytes) {
-  return fmt::format("{:016x}", base::xxhash64(bytes));
+std::string text_of(std::uint64_t checksum) { return fmt::format("{:016x}", checksum); }
+
+void require_checksum(hid_t dataset, const std::string& found, const std::string& file,
+                      const std::string& item) {
+  const std::string stored = read_text_attribute(dataset, kChecksum, file, item + "." + kChecksum);
+  if (found != stored)
+    fail_reading(file, item, fmt::format("its checksum is {} instead of {}", found, stored));
 }
 
 }  // namespace
@@ -279,8 +284,60 @@ void Hdf5Group::write_array(const std::string& name, std::span<const T> values) 
   if (dataset < 0 ||
       H5Dwrite(dataset, Stored<T>::in_memory(), H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
     fail_writing(file_, path_of(name));
-  write_text_attribute(dataset, kChecksum, checksum_of(std::as_bytes(values)), file_,
+  write_text_attribute(dataset, kChecksum, text_of(base::xxhash64(std::as_bytes(values))), file_,
                        path_of(name));
+}
+
+void Hdf5Group::write_floats(const std::string& name, std::size_t size,
+                             const std::function<void(const FloatSink&)>& source) {
+  const QuietErrors quiet;
+  const hsize_t all = size;
+  const Handle space(H5Screate_simple(1, &all, nullptr), H5Sclose);
+  const Handle layout = creation(H5P_DATASET_CREATE);
+  const hid_t dataset = H5Dcreate2(id_, name.c_str(), H5T_IEEE_F32LE, space.id(), H5P_DEFAULT,
+                                   layout.id(), H5P_DEFAULT);
+  const Handle closing(dataset, H5Dclose);
+  if (dataset < 0) fail_writing(file_, path_of(name));
+  hsize_t at = 0;
+  base::Xxhash64 checksum;
+  source([&](std::span<const float> piece) {
+    TOMOFIELD_CHECK(at + piece.size() <= size, "pieces make the array");
+    const hsize_t count = piece.size();
+    if (count == 0) return;
+    const Handle memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+    H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, &at, nullptr, &count, nullptr);
+    if (H5Dwrite(dataset, H5T_NATIVE_FLOAT, memory.id(), space.id(), H5P_DEFAULT, piece.data()) < 0)
+      fail_writing(file_, path_of(name));
+    checksum.add(std::as_bytes(piece));
+    at += count;
+  });
+  TOMOFIELD_CHECK(at == size, "pieces make the array");
+  write_text_attribute(dataset, kChecksum, text_of(checksum.value()), file_, path_of(name));
+}
+
+void Hdf5Group::read_floats(const std::string& name, const FloatSink& sink) const {
+  constexpr hsize_t kPiece = hsize_t{1} << 20;
+  const hsize_t size = array_size(name);
+  const QuietErrors quiet;
+  const Handle dataset(H5Dopen2(id_, name.c_str(), H5P_DEFAULT), H5Dclose);
+  const Handle type(H5Dget_type(dataset.id()), H5Tclose);
+  if (H5Tequal(type.id(), H5T_IEEE_F32LE) <= 0)
+    fail_reading(file_, path_of(name), "its elements are of another type");
+  const Handle space(H5Dget_space(dataset.id()), H5Sclose);
+  std::vector<float> piece;
+  base::Xxhash64 checksum;
+  for (hsize_t at = 0; at < size; at += piece.size()) {
+    const hsize_t count = std::min(kPiece, size - at);
+    piece.resize(count);
+    const Handle memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+    H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, &at, nullptr, &count, nullptr);
+    if (H5Dread(dataset.id(), H5T_NATIVE_FLOAT, memory.id(), space.id(), H5P_DEFAULT,
+                piece.data()) < 0)
+      fail_reading(file_, path_of(name), last_reason());
+    checksum.add(std::as_bytes(std::span<const float>(piece)));
+    sink(piece);
+  }
+  require_checksum(dataset.id(), text_of(checksum.value()), file_, path_of(name));
 }
 
 std::size_t Hdf5Group::array_size(const std::string& name) const {
@@ -312,12 +369,8 @@ void Hdf5Group::read_array(const std::string& name, std::span<T> values) const {
   if (size > 0 && H5Dread(dataset.id(), Stored<T>::in_memory(), H5S_ALL, H5S_ALL, H5P_DEFAULT,
                           values.data()) < 0)
     fail_reading(file_, path_of(name), last_reason());
-  const std::string stored =
-      read_text_attribute(dataset.id(), kChecksum, file_, path_of(name) + "." + kChecksum);
-  const std::string found = checksum_of(std::as_bytes(values));
-  if (found != stored)
-    fail_reading(file_, path_of(name),
-                 fmt::format("its checksum is {} instead of {}", found, stored));
+  require_checksum(dataset.id(), text_of(base::xxhash64(std::as_bytes(values))), file_,
+                   path_of(name));
 }
 
 template void Hdf5Group::write_array(const std::string&, std::span<const float>);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,7 +15,7 @@ namespace tomofield::io {
 /// checksum: metadata by HDF5's own, an array by its attribute "xxh64" (XXH64 of
 /// its bytes, hexadecimal), so that a file which lost its end, a page or a bit is
 /// found out when it is read. (HDF5's Fletcher-32 filter takes a page of zeros, checksum
-/// included, for sound.) Arrays are written as they are, in one piece. The
+/// included, for sound.) Arrays are written as they are, without chunks. The
 /// same contents make the same bytes.
 ///
 /// Reading throws Error, naming the file and the item, for what is missing, of
@@ -42,6 +43,14 @@ class Hdf5Group {
 
   template <typename T>
   void write_array(const std::string& name, std::span<const T> values);
+  /// An array of floats that comes in pieces, from the first element on: `source` hands each
+  /// of them to what it is called with.
+  using FloatSink = std::function<void(std::span<const float>)>;
+  void write_floats(const std::string& name, std::size_t size,
+                    const std::function<void(const FloatSink&)>& source);
+  /// Hands an array of floats to `sink` in pieces, from the first element on; its checksum is known
+  /// to be wrong, if it is, at the end only.
+  void read_floats(const std::string& name, const FloatSink& sink) const;
   std::size_t array_size(const std::string& name) const;
   /// Fills `values`, which has as many elements as the array.
   template <typename T>

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "distributed/communicator.h"
+
 namespace tomofield::io {
 
 /// Storage modes of MRC2014 that tomofield reads and writes.
@@ -81,9 +83,13 @@ struct MrcSpec {
 /// and removes its temporary file. Rows may come in any order, each once;
 /// rows never written are zero. Writes from several threads are safe.
 /// Integer modes round and saturate; int16/int8/uint16 values outside the range are clamped.
+///
+/// Several processes may write one file, each its rows; all of them make a writer and close it, and
+/// the first puts the file in place.
 class MrcWriter {
  public:
-  MrcWriter(const std::filesystem::path& path, const MrcSpec& spec);
+  MrcWriter(const std::filesystem::path& path, const MrcSpec& spec,
+            const distributed::Communicator& processes = distributed::Communicator::alone());
   ~MrcWriter();
   MrcWriter(MrcWriter&&) noexcept;
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <optional>
+#include <span>
 #include <system_error>
 
 #include "base/check.h"
@@ -68,8 +70,9 @@ void warn_if_disk_is_small(const std::filesystem::path& path, std::int64_t bytes
 
 struct MrcWriter::Impl {
   MrcHeader header;
-  AtomicFile target;
-  PositionedFile file;
+  const distributed::Communicator& processes;
+  std::optional<AtomicFile> target;  // of the first process
+  std::optional<PositionedFile> file;
 
   std::mutex mutex;  // guards what follows
   std::vector<RowMoments> rows;
@@ -77,14 +80,24 @@ struct MrcWriter::Impl {
   float min = std::numeric_limits<float>::infinity();
   float max = -std::numeric_limits<float>::infinity();
 
-  Impl(const std::filesystem::path& path, const MrcSpec& spec)
+  Impl(const std::filesystem::path& path, const MrcSpec& spec, const distributed::Communicator& all)
       : header(header_of(spec, path.string())),
-        target(path),
-        file(target.temporary_path(), PositionedFile::Access::kReadWrite),
+        processes(all),
         rows(static_cast<std::size_t>(spec.ny * spec.nz)) {
-    const std::int64_t bytes = expected_file_bytes(header, path.string());
-    warn_if_disk_is_small(target.temporary_path(), bytes);
-    file.resize(bytes);
+    std::filesystem::path temporary;
+    processes.together([&] {
+      if (!processes.is_first()) return;
+      target.emplace(path);
+      temporary = target->temporary_path();
+      const std::int64_t bytes = expected_file_bytes(header, path.string());
+      warn_if_disk_is_small(temporary, bytes);
+      file.emplace(temporary, PositionedFile::Access::kReadWrite);
+      file->resize(bytes);
+    });
+    temporary = processes.broadcast(temporary.string());
+    processes.together([&] {
+      if (!file) file.emplace(temporary, PositionedFile::Access::kReadWrite);
+    });
   }
 
   void record(std::int64_t first_row, std::int64_t num_rows, std::span<const float> stored) {
@@ -99,6 +112,15 @@ struct MrcWriter::Impl {
     num_rows_written += num_rows;
     min = std::min(min, *low);
     max = std::max(max, *high);
+  }
+
+  // What others know of their rows.
+  void share_statistics() {
+    static_assert(sizeof(RowMoments) == 2 * sizeof(double));
+    processes.combine(std::span(reinterpret_cast<double*>(rows.data()), 2 * rows.size()));
+    processes.combine(std::span(&num_rows_written, 1));
+    min = -static_cast<float>(processes.largest(-static_cast<double>(min)));
+    max = static_cast<float>(processes.largest(static_cast<double>(max)));
   }
 
   void finish_statistics() {
@@ -118,8 +140,9 @@ struct MrcWriter::Impl {
   }
 };
 
-MrcWriter::MrcWriter(const std::filesystem::path& path, const MrcSpec& spec)
-    : impl_(std::make_unique<Impl>(path, spec)) {}
+MrcWriter::MrcWriter(const std::filesystem::path& path, const MrcSpec& spec,
+                     const distributed::Communicator& processes)
+    : impl_(std::make_unique<Impl>(path, spec, processes)) {}
 MrcWriter::~MrcWriter() = default;
 MrcWriter::MrcWriter(MrcWriter&&) noexcept = default;
 
@@ -149,19 +172,26 @@ void MrcWriter::write_rows(std::int64_t section, std::int64_t first_row, std::in
     stored.resize(chunk.size());
     encode_values(header.mode, chunk, raw, stored);
     const std::int64_t file_row = section * header.ny + first_row + row;
-    impl_->file.write_at(static_cast<std::int64_t>(kMrcHeaderBytes) +
-                             file_row * header.nx * static_cast<std::int64_t>(width),
-                         raw.data(), raw.size());
+    impl_->file->write_at(static_cast<std::int64_t>(kMrcHeaderBytes) +
+                              file_row * header.nx * static_cast<std::int64_t>(width),
+                          raw.data(), raw.size());
     impl_->record(file_row, count, stored);
   }
 }
 
 void MrcWriter::close() {
-  impl_->finish_statistics();
-  const MrcHeaderBytes bytes = encode_mrc_header(impl_->header);
-  impl_->file.write_at(0, bytes.data(), bytes.size());
-  impl_->file.close();
-  impl_->target.commit();
+  impl_->processes.together([&] {
+    if (!impl_->processes.is_first()) impl_->file->close();
+  });
+  impl_->share_statistics();
+  impl_->processes.together([&] {
+    if (!impl_->processes.is_first()) return;
+    impl_->finish_statistics();
+    const MrcHeaderBytes bytes = encode_mrc_header(impl_->header);
+    impl_->file->write_at(0, bytes.data(), bytes.size());
+    impl_->file->close();
+    impl_->target->commit();
+  });
 }
 
 }  // namespace tomofield::io

@@ -20,6 +20,11 @@ ViewSums& ViewSums::operator+=(const ViewSums& other) {
   return *this;
 }
 
+void combine(const distributed::Communicator& processes, std::span<ViewSums> sums) {
+  static_assert(sizeof(ViewSums) == 6 * sizeof(double));
+  processes.combine(std::span(reinterpret_cast<double*>(sums.data()), 6 * sums.size()));
+}
+
 double ViewSums::squared_residual(const ViewModel& m) const {
   return m.scale * m.scale * pp + bb + n * m.offset * m.offset + 2 * m.scale * m.offset * p -
          2 * m.scale * pb - 2 * m.offset * b;

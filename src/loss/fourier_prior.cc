@@ -36,7 +36,13 @@ std::vector<double> positions(double first, double spacing, int count) {
 
 FourierPrior::FourierPrior(const field::Field& field, const geometry::Roi& roi,
                            const FourierPriorOptions& options)
-    : field_(field), roi_(roi), options_(options) {
+    : FourierPrior(field, roi, options, distributed::Communicator::alone(),
+                   {0, field.tree().num_leaves()}) {}
+
+FourierPrior::FourierPrior(const field::Field& field, const geometry::Roi& roi,
+                           const FourierPriorOptions& options,
+                           const distributed::Communicator& processes, distributed::Range own)
+    : field_(field), roi_(roi), options_(options), processes_(processes), own_(own) {
   const double width = static_cast<double>(roi.width()), height = static_cast<double>(roi.height());
   spacing_ = std::max(1.0, std::max(width, height) / options.most_samples);
   shape_ = {options.slices, static_cast<int>(height / spacing_),
@@ -98,10 +104,13 @@ FourierPrior::Result FourierPrior::accumulate_gradient(std::int64_t step, float*
   std::vector<float> samples(shape_.size()), grad_samples(shape_.size(), 0.0f);
   base::parallel_for(std::ssize(leaves), [&](std::int64_t l) {
     LeafSamples& own = leaves[static_cast<std::size_t>(l)];
+    const int leaf = leaves_[static_cast<std::size_t>(l)];
+    if (!own_.contains(leaf)) return;
     own.densities.resize(own.x.size());
-    field_.point_densities(leaves_[static_cast<std::size_t>(l)], own.points(), own.densities);
+    field_.point_densities(leaf, own.points(), own.densities);
     for (std::size_t n = 0; n < own.index.size(); ++n) samples[own.index[n]] = own.densities[n];
   });
+  processes_.combine(std::span(samples));
   const double volume =
       static_cast<double>(roi_.width()) * static_cast<double>(roi_.height()) * field_.thickness();
   Result result;
@@ -111,11 +120,13 @@ FourierPrior::Result FourierPrior::accumulate_gradient(std::int64_t step, float*
   base::parallel_for(std::ssize(leaves), [&](std::int64_t l) {
     const LeafSamples& own = leaves[static_cast<std::size_t>(l)];
     const int leaf = leaves_[static_cast<std::size_t>(l)];
+    if (!own_.contains(leaf)) return;
     std::vector<float> grad;
     for (const std::size_t at : own.index) grad.push_back(grad_samples[at]);
     grad_bias[static_cast<std::size_t>(l)] = field_.point_gradient(
         leaf, own.points(), own.densities, grad, gradient + field_.offset(leaf));
   });
+  processes_.combine(std::span(grad_bias));
   for (const double g : grad_bias) result.grad_bias += g;
   return result;
 }

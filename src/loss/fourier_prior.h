@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "distributed/communicator.h"
+#include "distributed/partition.h"
 #include "field/field.h"
 #include "geometry/tilt_geometry.h"
 #include "loss/axis_penalty.h"
@@ -27,12 +29,16 @@ class FourierPrior {
   /// `field` must outlive it and may change its parameters; rebuild it when the tree changes.
   FourierPrior(const field::Field& field, const geometry::Roi& roi,
                const FourierPriorOptions& options);
+  /// Of a field that processes share, of which this one has the leaves `own`.
+  FourierPrior(const field::Field& field, const geometry::Roi& roi,
+               const FourierPriorOptions& options, const distributed::Communicator& processes,
+               distributed::Range own);
 
   struct Result {
     double value = 0.0;
     double grad_bias = 0.0;
   };
-  /// Adds the gradient to `gradient` (all parameters). Runs on all threads, with
+  /// Adds the gradient of the own leaves to `gradient` (all parameters). Runs on all threads, with
   /// the same bits for any number of them.
   Result accumulate_gradient(std::int64_t step, float* gradient) const;
 
@@ -45,6 +51,8 @@ class FourierPrior {
   const field::Field& field_;
   geometry::Roi roi_;
   FourierPriorOptions options_;
+  const distributed::Communicator& processes_;
+  distributed::Range own_;
   double spacing_ = 1.0;
   SliceShape shape_;
   std::vector<int> leaves_;  // that meet the region

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <span>
 #include <utility>
 
+#include "distributed/gathered_arrays.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruct {
@@ -108,13 +110,29 @@ const typename Map::mapped_type& entry(const Map& map, const char* name, const s
   return found->second;
 }
 
-void copy_moments(const std::vector<float>& stored, const std::string& path,
-                  base::AlignedBuffer<float>& moments) {
-  if (stored.size() != moments.size()) {
-    throw Error(fmt::format("'{}' holds {} of the {} moments of its parameters, so it is damaged",
-                            path, stored.size(), moments.size()));
-  }
-  std::ranges::copy(stored, moments.begin());
+// The parameters of the leaves that a process works on, and what goes with them.
+distributed::GatheredArrays own_parts(const Fit& fit) {
+  const distributed::Range leaves = fit.own_leaves();
+  return {fit.processes(), fit.field().offset(leaves.begin), fit.field().offset(leaves.end)};
+}
+
+// A checkpoint if there are moments, else a model.
+void save(const std::filesystem::path& path, const Fit& fit, const field::ModelInfo& info,
+          const field::TrainingState& state,
+          const std::map<std::string, std::span<const float>>& moments) {
+  fit.processes().together([&] { field::require_finite(fit.field(), path); });
+  distributed::GatheredArrays arrays = own_parts(fit);
+  const auto source = [&](std::span<const float> values) {
+    const std::size_t array = arrays.add(values);
+    return field::FloatSource(
+        values.size(),
+        [&arrays, array](const field::FloatSource::Sink& sink) { arrays.hand_out(array, sink); });
+  };
+  const field::FloatSource parameters = source(fit.field().parameters());
+  field::FloatArrays more;
+  for (const auto& [name, values] : moments) more.emplace(name, source(values));
+  arrays.read_on_first(
+      [&] { field::save_model(path, fit.field(), parameters, info, &state, more); });
 }
 
 }  // namespace
@@ -132,19 +150,30 @@ field::TrainingState progress_state(const Fit& fit, const std::string& fingerpri
   return state;
 }
 
+void save_fit(const std::filesystem::path& path, const Fit& fit, const field::ModelInfo& info,
+              const field::TrainingState& state) {
+  save(path, fit, info, state, {});
+}
+
 void save_checkpoint(const std::filesystem::path& path, const Fit& fit,
                      const field::ModelInfo& info, const std::string& fingerprint) {
   field::TrainingState state = progress_state(fit, fingerprint);
   const optimize::Adam::State& adam = fit.optimizer().state();
-  state.integers["leaf_steps"] = adam.leaf_steps;
+  std::vector<std::int64_t> leaf_steps(adam.leaf_steps.size());
+  for (int leaf = fit.own_leaves().begin; leaf < fit.own_leaves().end; ++leaf)
+    leaf_steps[static_cast<std::size_t>(leaf)] = adam.leaf_steps[static_cast<std::size_t>(leaf)];
+  fit.processes().combine(std::span(leaf_steps));
+  state.integers["leaf_steps"] = std::move(leaf_steps);
   state.doubles["bias_moments"] = {adam.bias_m, adam.bias_v};
   state.integers["bias_steps"] = {adam.bias_steps};
-  field::save_model(path, fit.field(), info, &state, {{"adam_m", adam.m}, {"adam_v", adam.v}});
+  save(path, fit, info, state, {{"adam_m", adam.m}, {"adam_v", adam.v}});
 }
 
-void restore_state(const std::string& path, const std::string& fingerprint,
-                   std::unique_ptr<field::Field> stored, const field::TrainingState& state,
-                   Fit& fit) {
+void restore_fit(const std::filesystem::path& file, const std::string& fingerprint, Fit& fit) {
+  const std::string path = file.string();
+  field::TrainingState state;
+  field::Model model = field::load_part(
+      file, [&](const field::Quadtree& tree) { return fit.kept_leaves(tree); }, state);
   const std::string found = as_text(entry(state.integers, "fingerprint", path));
   if (found != fingerprint) {
     throw Error(
@@ -159,11 +188,11 @@ void restore_state(const std::string& path, const std::string& fingerprint,
   progress.tree = unflatten_tree(entry(state.integers, "tree_updates", path),
                                  entry(state.doubles, "tree_errors", path));
   progress.held_out_error = entry(state.doubles, "held_out_error", path);
-  fit.go_on_from(std::move(progress), std::move(stored));
+  fit.go_on_from(std::move(progress), std::move(model.field));
   if (fit.is_done()) return;
   optimize::Adam::State& adam = fit.optimizer().state();
-  copy_moments(entry(state.floats, "adam_m", path), path, adam.m);
-  copy_moments(entry(state.floats, "adam_v", path), path, adam.v);
+  field::load_floats(file, "adam_m", fit.field(), adam.m);
+  field::load_floats(file, "adam_v", fit.field(), adam.v);
   adam.leaf_steps = entry(state.integers, "leaf_steps", path);
   adam.bias_m = entry(state.doubles, "bias_moments", path).at(0);
   adam.bias_v = entry(state.doubles, "bias_moments", path).at(1);

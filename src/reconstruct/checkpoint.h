@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <memory>
 #include <string>
 
 #include "field/model_file.h"
@@ -12,16 +11,19 @@ namespace tomofield::reconstruct {
 /// How far a fit is, as the model file stores it: all that a finished fit leaves.
 field::TrainingState progress_state(const Fit& fit, const std::string& fingerprint);
 
+/// Writes the model of a fit with what progress_state() gave: parameters from wherever they are,
+/// by the first of the processes that share it.
+void save_fit(const std::filesystem::path& path, const Fit& fit, const field::ModelInfo& info,
+              const field::TrainingState& state);
+
 /// Writes the model of a fit between two steps with its optimiser's state, which
-/// triples the file, so that it can be continued bit for bit.
+/// triples the file, so that it can be continued bit for bit, by any number of processes.
 void save_checkpoint(const std::filesystem::path& path, const Fit& fit,
                      const field::ModelInfo& info, const std::string& fingerprint);
 
-/// Puts a stored field and state into a fresh fit of the same options. Throws
-/// Error naming `path` if they belong to another series or other options, and
-/// what differs. A fingerprint is a JSON text.
-void restore_state(const std::string& path, const std::string& fingerprint,
-                   std::unique_ptr<field::Field> stored, const field::TrainingState& state,
-                   Fit& fit);
+/// Puts a stored field and state into a fresh fit of the same options, on each process what it
+/// needs. Throws Error naming `path` if they belong to another series or other options, and what
+/// differs. A fingerprint is a JSON text.
+void restore_fit(const std::filesystem::path& path, const std::string& fingerprint, Fit& fit);
 
 }  // namespace tomofield::reconstruct

@@ -53,8 +53,7 @@ Domain cover(double thickness, const geometry::Roi& roi, geometry::Extent2 reach
     reach.x0 = std::min(reach.x0, s.x0);
     reach.x1 = std::max(reach.x1, s.x1());
   }
-  const field::RootGrid roots =
-      root_grid(roi, reach, static_cast<std::int64_t>(options.leaf_size) << options.depth);
+  const field::RootGrid roots = root_grid(roi, reach, band_rows(options));
   // Slabs start with the cells; below the region there are whole ones or none.
   const auto end_row = static_cast<std::int64_t>(std::ceil(reach.y1));
   reach.y0 = static_cast<double>(roots.y0);
@@ -91,6 +90,10 @@ Domain cover(double thickness, const geometry::Roi& roi, geometry::Extent2 reach
 }
 
 }  // namespace
+
+std::int64_t band_rows(const FieldOptions& options) {
+  return static_cast<std::int64_t>(options.leaf_size) << options.depth;
+}
 
 Domain make_domain(const geometry::TiltGeometry& geometry, const geometry::Roi& roi,
                    const FieldOptions& options) {
@@ -135,11 +138,12 @@ double bias_of_density(double density, double beta) {
 
 std::unique_ptr<field::Field> make_initial_field(const Domain& domain, double thickness,
                                                  double mean_density, const FieldOptions& options,
-                                                 std::uint64_t seed) {
+                                                 std::uint64_t seed, const std::vector<int>& kept) {
   auto field = field::make_field(options.kind, domain.tree, thickness, domain.shapes);
   const double beta = options.activation == "softplus" ? options.sharpness : 0.0;
   field->activation.beta = static_cast<float>(beta);
   field->bias = static_cast<float>(bias_of_density(mean_density, beta));
+  field->keep_only(kept);
   field->initialise(base::Random(seed), options.initial_scale);
   return field;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "field/field.h"
 #include "geometry/ray_geometry.h"
@@ -24,6 +25,9 @@ struct Domain {
   const field::LeafShape& shape_in(field::Region region) const;
 };
 
+/// Rows of a band, which are those of a root cell.
+std::int64_t band_rows(const FieldOptions& options);
+
 Domain make_domain(const geometry::TiltGeometry& geometry, const geometry::Roi& roi,
                    const FieldOptions& options);
 
@@ -39,9 +43,11 @@ projection::SampleGrid sample_grid(const Domain& domain, double thickness, int b
 /// identity). A density of zero or less has none, so a small one stands in.
 double bias_of_density(double density, double beta);
 
-/// A new field on the domain whose density is about `mean_density` everywhere.
+/// A new field on the domain whose density is about `mean_density` everywhere. `kept`: the
+/// leaves that are asked for here (Field::keep_only); none: all.
 std::unique_ptr<field::Field> make_initial_field(const Domain& domain, double thickness,
                                                  double mean_density, const FieldOptions& options,
-                                                 std::uint64_t seed);
+                                                 std::uint64_t seed,
+                                                 const std::vector<int>& kept = {});
 
 }  // namespace tomofield::reconstruct

@@ -87,6 +87,12 @@ Domain domain_of(const Measurement& measurement, const FieldOptions& options) {
                                   : make_domain(measurement.geometry, measurement.roi, options);
 }
 
+// None if that is all of them.
+std::vector<int> leaves_to_keep(const distributed::Communicator& processes,
+                                const field::Quadtree& tree, distributed::Range bands) {
+  return processes.size() == 1 ? std::vector<int>{} : needed_leaves(tree, bands);
+}
+
 // The structure is open for the coarse stage, or for this part of the only one.
 constexpr double kOpenPart = 0.4;
 
@@ -111,8 +117,11 @@ Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
           measurement.num_fitted_views())),
       stages_(make_stages(field_options, options_)),
       domain_(domain_of(measurement, field_options)),
+      bands_(reconstruct::own_bands(domain_.num_rows, domain_.tree.roots().cell_size,
+                                    *measurement.processes)),
       field_(make_initial_field(domain_, measurement.geometry.thickness, measurement.mean_density,
-                                field_options, options.seed)),
+                                field_options, options.seed,
+                                leaves_to_keep(*measurement.processes, domain_.tree, bands_))),
       optimizer_(*field_, optimize::AdamOptions{}),
       fitted_views_(views_but(measurement.geometry.num_views(), measurement.held_out)),
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())) {
@@ -163,6 +172,7 @@ void Fit::refine() {
     progress_.views[v].offset *= static_cast<double>(last_bin) / stage().bin;  // rays are longer
   }
   follow_tree();
+  halo_->refresh(*field_);  // other vertices depend on more of the old ones
 }
 
 // What is made for one tree.
@@ -175,14 +185,22 @@ void Fit::follow_tree() {
   const double noise = typical_noise(binned_->noise_sigma) * bin * bin;
   const auto bands = leaves_of_bands(*sampler_);
   boundary_.emplace(*field_, bands, boundary_options(options_, noise));
-  fourier_.emplace(*field_, measurement_.roi, fourier_options(options_, noise * bin));
+  fourier_.emplace(*field_, measurement_.roi, fourier_options(options_, noise * bin), processes(),
+                   own_leaves());
   if (measurement_.ray_geometry) {
     ray_term_ = std::make_unique<RayTerm>(*measurement_.ray_geometry, *measurement_.rays, *field_,
                                           domain_, options_);
   }
   touched_leaves_.clear();
-  for (const std::vector<int>& leaves : bands)
+  for (int band = bands_.begin; band < bands_.end; ++band) {
+    const std::vector<int>& leaves = bands[static_cast<std::size_t>(band)];
     touched_leaves_.insert(touched_leaves_.end(), leaves.begin(), leaves.end());
+  }
+  halo_.emplace(*field_, bands_, bin, processes());
+}
+
+std::vector<int> Fit::kept_leaves(const field::Quadtree& tree) const {
+  return leaves_to_keep(processes(), tree, bands_);
 }
 
 void Fit::go_on_from(Progress progress, std::unique_ptr<field::Field> field) {
@@ -227,18 +245,23 @@ HeldOutError Fit::held_out_error() const {
   std::vector<double> weights;
   for (const loss::ViewModel& view : progress_.views) weights.push_back(view.weight);
   return reconstruct::held_out_error(*sampler_, *projector_, *binned_->rays, measurement_.held_out,
-                                     weights, options_.fit_view_scale);
+                                     weights, options_.fit_view_scale, processes());
 }
 
 PredictedView Fit::predict_held_out(int view, const loss::ViewModel& model) const {
-  return predicted_view(*sampler_, *projector_, *binned_->rays, view, model);
+  return predicted_view(*sampler_, *projector_, *binned_->rays, view, model, processes());
 }
 
 void Fit::run(const AfterStep& after_step) {
   while (!is_done()) {
+    const auto before = processes().traffic();
     take_step(ray_term_ ? std::vector<int>{} : subset_of_step(progress_.step));
     ++progress_.step;
     if (progress_.step % steps_per_epoch() == 0) end_epoch();
+    const auto after = processes().traffic();
+    traffic_.seconds += after.seconds - before.seconds;
+    traffic_.bytes += after.bytes - before.bytes;
+    ++traffic_.steps;
     if (!after_step(*this)) return;
   }
 }
@@ -266,17 +289,19 @@ double Fit::learning_rate(std::int64_t step) const {
 }
 
 void Fit::take_step(const std::vector<int>& views) {
-  double grad_bias = add_slab_gradient(views);
-  grad_bias += add_boundary_gradient();
+  std::vector<BandResult> bands = band_gradients(views);
+  share(views.size(), bands);
+  double grad_bias = sum_of_bands(views, bands);
   grad_bias += fourier_->accumulate_gradient(progress_.step, gradient_.data()).grad_bias;
   if (ray_term_) grad_bias += add_ray_gradient();
   const double rate = learning_rate(progress_.step);
   optimizer_.step(*field_, touched_leaves_, gradient_, rate);
   optimizer_.step_bias(*field_, grad_bias, kBiasRate * rate);
+  halo_->refresh(*field_);
 }
 
-// The data term of these views and total variation; returns dL/d bias.
-double Fit::add_slab_gradient(const std::vector<int>& views) {
+// The data term of these views, total variation and boundary consistency of the own bands.
+std::vector<BandResult> Fit::band_gradients(const std::vector<int>& views) {
   ObjectiveWeights weights = objective_weights(options_, typical_noise(binned_->noise_sigma),
                                                concavity_of(options_, measurement_.noise_sigma));
   // Each step looks at edges from another corner: forward differences alone treat
@@ -289,29 +314,48 @@ double Fit::add_slab_gradient(const std::vector<int>& views) {
   const double multiplicity =
       static_cast<double>(fitted_views_.size()) / std::max(static_cast<double>(views.size()), 1.0);
   std::vector<BandResult> bands(static_cast<std::size_t>(sampler_->num_bands()));
-  base::parallel_for(sampler_->num_bands(), [&](std::int64_t band) {
-    bands[static_cast<std::size_t>(band)] = objective.accumulate_gradient(
-        static_cast<int>(band), views, progress_.views, multiplicity, gradient_.data());
+  base::parallel_for(bands_.size(), [&](std::int64_t i) {
+    const int band = bands_.begin + static_cast<int>(i);
+    BandResult& result = bands[static_cast<std::size_t>(band)];
+    result =
+        objective.accumulate_gradient(band, views, progress_.views, multiplicity, gradient_.data());
+    result.boundary_grad_bias =
+        boundary_->accumulate_gradient(band, progress_.step, gradient_.data()).grad_bias;
   });
-  double grad_bias = 0.0;
-  for (const BandResult& band : bands) {  // in order: the same sums for any number of threads
+  return bands;
+}
+
+// Every process gets the sums of the others' bands, in one message.
+void Fit::share(std::size_t num_views, std::vector<BandResult>& bands) const {
+  if (processes().size() == 1) return;
+  // Of a band: its views, and after them both gradients of the bias.
+  std::vector<loss::ViewSums> all;
+  for (BandResult& band : bands) {
+    band.views.resize(num_views);
+    all.insert(all.end(), band.views.begin(), band.views.end());
+    all.push_back({.n = band.grad_bias, .p = band.boundary_grad_bias});
+  }
+  loss::combine(processes(), all);
+  for (auto from = all.begin(); BandResult & band : bands) {
+    std::copy_n(from, num_views, band.views.begin());
+    from += static_cast<std::ptrdiff_t>(num_views);
+    band.grad_bias = from->n;
+    band.boundary_grad_bias = from->p;
+    ++from;
+  }
+}
+
+// In order: the same sums for any number of threads and processes. Returns dL/d bias.
+double Fit::sum_of_bands(const std::vector<int>& views, const std::vector<BandResult>& bands) {
+  double grad_bias = 0.0, boundary_grad_bias = 0.0;
+  for (const BandResult& band : bands) {
     for (std::size_t v = 0; v < views.size(); ++v) {
       progress_.epoch_sums[static_cast<std::size_t>(views[v])] += band.views[v];
     }
     grad_bias += band.grad_bias;
+    boundary_grad_bias += band.boundary_grad_bias;
   }
-  return grad_bias;
-}
-
-// Boundary consistency, band by band as they own leaves; returns dL/d bias.
-double Fit::add_boundary_gradient() {
-  std::vector<double> bands(static_cast<std::size_t>(sampler_->num_bands()));
-  base::parallel_for(sampler_->num_bands(), [&](std::int64_t band) {
-    bands[static_cast<std::size_t>(band)] =
-        boundary_->accumulate_gradient(static_cast<int>(band), progress_.step, gradient_.data())
-            .grad_bias;
-  });
-  return std::accumulate(bands.begin(), bands.end(), 0.0);
+  return grad_bias + boundary_grad_bias;
 }
 
 // The data term of this step's rays; returns dL/d bias.

@@ -19,6 +19,8 @@
 #include "reconstruct/measurement.h"
 #include "reconstruct/options.h"
 #include "reconstruct/ray_term.h"
+#include "reconstruct/share.h"
+#include "reconstruct/slab_objective.h"
 #include "reconstruct/stages.h"
 #include "reconstruct/tree_updates.h"
 
@@ -39,6 +41,10 @@ struct Progress {
 /// subset of the views; with the ray engine, a random share of the rays of all
 /// views, while slabs without views carry the regularisers. With a coarse stage, the
 /// field has its vertices and steps until its epochs are over, and is refined then.
+///
+/// Processes that share a fit (Measurement::processes) each work on some bands and keep the
+/// parameters of these and of the leaves next to them; what they share otherwise are sums, of
+/// which each adds its bands', in one order: the same bits for any number of processes.
 class Fit {
  public:
   Fit(const Measurement& measurement, const FieldOptions& field_options, const FitOptions& options);
@@ -67,13 +73,25 @@ class Fit {
   const optimize::Adam& optimizer() const { return optimizer_; }
   optimize::Adam& optimizer() { return optimizer_; }
   const Progress& progress() const { return progress_; }
+  /// The bands that this process works on, and their leaves: all, if it is alone.
+  distributed::Range own_bands() const { return bands_; }
+  distributed::Range own_leaves() const { return leaves_of_bands(field_->tree(), bands_); }
+  /// The leaves of a tree that this process keeps; none: all.
+  std::vector<int> kept_leaves(const field::Quadtree& tree) const;
+  const distributed::Communicator& processes() const { return *measurement_.processes; }
+  /// The steps that run() has taken, and what they had to do with other processes.
+  struct Traffic : distributed::Communicator::Traffic {
+    std::int64_t steps = 0;
+  };
+  const Traffic& traffic() const { return traffic_; }
 
  private:
   std::vector<int> subset_of_step(std::int64_t step) const;
   double learning_rate(std::int64_t step) const;
   void take_step(const std::vector<int>& views);
-  double add_slab_gradient(const std::vector<int>& views);
-  double add_boundary_gradient();
+  std::vector<BandResult> band_gradients(const std::vector<int>& views);
+  void share(std::size_t num_views, std::vector<BandResult>& bands) const;
+  double sum_of_bands(const std::vector<int>& views, const std::vector<BandResult>& bands);
   double add_ray_gradient();
   void score_held_out();
   void end_epoch();
@@ -87,6 +105,7 @@ class Fit {
   FitOptions options_;
   std::vector<Stage> stages_;
   Domain domain_;
+  distributed::Range bands_;
   std::unique_ptr<field::Field> field_;
   optimize::Adam optimizer_;
   Progress progress_;
@@ -98,8 +117,10 @@ class Fit {
   std::optional<loss::BoundaryConsistency> boundary_;
   std::optional<loss::FourierPrior> fourier_;
   std::unique_ptr<RayTerm> ray_term_;  ///< of the ray engine
-  std::vector<int> touched_leaves_;
+  std::vector<int> touched_leaves_;    ///< the own ones
+  std::optional<Halo> halo_;
   TreeUpdates tree_updates_;
+  Traffic traffic_;
 };
 
 }  // namespace tomofield::reconstruct

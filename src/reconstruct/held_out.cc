@@ -35,19 +35,27 @@ using evaluate::SlabSums;
 
 SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
                        const projection::SlabProjector& projector,
-                       const tilt_series::SlabViews& measured, std::span<const int> views) {
+                       const tilt_series::SlabViews& measured, std::span<const int> views,
+                       const distributed::Communicator& processes) {
   const std::int64_t width = projector.geometry().width;
-  SlabSums sums(static_cast<std::size_t>(measured.num_slabs()));
-  base::parallel_for(measured.num_slabs(), [&](std::int64_t s) {
-    const int slab = static_cast<int>(s);
+  const auto num_slabs = static_cast<std::size_t>(measured.num_slabs());
+  std::vector<loss::ViewSums> all(num_slabs * views.size());
+  base::parallel_for(measured.held().size(), [&](std::int64_t s) {
+    const int slab = measured.held().begin + static_cast<int>(s);
     auto rays = predict(sampler, projector, views, slab);
     for (std::size_t v = 0; v < views.size(); ++v) {
-      sums[static_cast<std::size_t>(s)].push_back(
+      all[static_cast<std::size_t>(slab) * views.size() + v] =
           loss::data_term({}, 1.0, measured.rays(slab, views[v]), measured.mask(slab, views[v]),
-                          width, rays.data() + static_cast<std::ptrdiff_t>(v) * width * kLanes));
+                          width, rays.data() + static_cast<std::ptrdiff_t>(v) * width * kLanes);
     }
     measured.release(slab);
   });
+  loss::combine(processes, all);
+  SlabSums sums(num_slabs);
+  for (std::size_t s = 0; s < num_slabs; ++s) {
+    const auto first = all.begin() + static_cast<std::ptrdiff_t>(s * views.size());
+    sums[s].assign(first, first + std::ssize(views));
+  }
   return sums;
 }
 
@@ -75,8 +83,9 @@ std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every) 
 HeldOutError held_out_error(const projection::SlabSampler& sampler,
                             const projection::SlabProjector& projector,
                             const tilt_series::SlabViews& measured, std::vector<int> views,
-                            std::span<const double> noise_weight, bool fit_view_scale) {
-  const SlabSums sums = sums_of_slabs(sampler, projector, measured, views);
+                            std::span<const double> noise_weight, bool fit_view_scale,
+                            const distributed::Communicator& processes) {
+  const SlabSums sums = sums_of_slabs(sampler, projector, measured, views, processes);
   return evaluate::view_errors(std::move(views), sums, noise_weight, fit_view_scale);
 }
 
@@ -96,24 +105,29 @@ nlohmann::json report_held_out(const HeldOutError& error, const std::vector<doub
 PredictedView predicted_view(const projection::SlabSampler& sampler,
                              const projection::SlabProjector& projector,
                              const tilt_series::SlabViews& measured, int view,
-                             const loss::ViewModel& model) {
+                             const loss::ViewModel& model,
+                             const distributed::Communicator& processes) {
   const auto& shape = measured.shape();
-  PredictedView result{
-      .width = shape.width, .height = shape.num_rows, .measured = {}, .predicted = {}};
-  for (std::int64_t y = 0; y < shape.num_rows; ++y)
-    for (std::int64_t x = 0; x < shape.width; ++x)
-      result.measured.push_back(measured.counts(view, x, y)
-                                    ? measured.ray(view, x, y)
-                                    : std::numeric_limits<float>::quiet_NaN());
-  for (int slab = 0; slab < measured.num_slabs(); ++slab) {
+  const auto size = static_cast<std::size_t>(shape.width * shape.num_rows);
+  PredictedView result{.width = shape.width,
+                       .height = shape.num_rows,
+                       .measured = std::vector<float>(size),
+                       .predicted = std::vector<float>(size)};
+  for (int slab = measured.held().begin; slab < measured.held().end; ++slab) {
     const auto rays = predict(sampler, projector, std::span(&view, 1), slab);
     const std::int64_t rows = std::min<std::int64_t>(kLanes, shape.num_rows - slab * kLanes);
     for (std::int64_t lane = 0; lane < rows; ++lane)
       for (std::int64_t x = 0; x < shape.width; ++x) {
+        const std::int64_t y = slab * kLanes + lane;
+        const auto at = static_cast<std::size_t>(y * shape.width + x);
         const double p = static_cast<double>(rays.data()[x * kLanes + lane]);
-        result.predicted.push_back(static_cast<float>(model.scale * p + model.offset));
+        result.predicted[at] = static_cast<float>(model.scale * p + model.offset);
+        result.measured[at] = measured.counts(view, x, y) ? measured.ray(view, x, y)
+                                                          : std::numeric_limits<float>::quiet_NaN();
       }
   }
+  processes.combine(std::span(result.measured));
+  processes.combine(std::span(result.predicted));
   return result;
 }
 

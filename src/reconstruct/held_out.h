@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "distributed/communicator.h"
 #include "evaluate/view_errors.h"
 #include "loss/data_term.h"
 #include "projection/slab_projector.h"
@@ -23,11 +24,12 @@ std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every);
 using HeldOutError = evaluate::ViewErrors;
 
 /// The error of `views` (evaluate/view_errors.h). The sums are the same for any
-/// number of threads.
-HeldOutError held_out_error(const projection::SlabSampler& sampler,
-                            const projection::SlabProjector& projector,
-                            const tilt_series::SlabViews& measured, std::vector<int> views,
-                            std::span<const double> noise_weight, bool fit_view_scale);
+/// number of threads and of processes, of which each holds some slabs of `measured`.
+HeldOutError held_out_error(
+    const projection::SlabSampler& sampler, const projection::SlabProjector& projector,
+    const tilt_series::SlabViews& measured, std::vector<int> views,
+    std::span<const double> noise_weight, bool fit_view_scale,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
 
 /// Logs the error; returns it and that of each view, for the figures of a run. With
 /// `stopped_by_them` the same views decided when the fit stopped, and both say so.
@@ -40,9 +42,9 @@ struct PredictedView {
   std::int64_t width = 0, height = 0;
   std::vector<float> measured, predicted;
 };
-PredictedView predicted_view(const projection::SlabSampler& sampler,
-                             const projection::SlabProjector& projector,
-                             const tilt_series::SlabViews& measured, int view,
-                             const loss::ViewModel& model);
+PredictedView predicted_view(
+    const projection::SlabSampler& sampler, const projection::SlabProjector& projector,
+    const tilt_series::SlabViews& measured, int view, const loss::ViewModel& model,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
 
 }  // namespace tomofield::reconstruct

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "distributed/communicator.h"
 #include "geometry/ray_geometry.h"
 #include "geometry/tilt_geometry.h"
 #include "tilt_series/slab_views.h"
@@ -22,6 +23,8 @@ struct Measurement {
   std::optional<geometry::RayGeometry> ray_geometry = std::nullopt;
   /// Views that carry no loss and only tell how well the others predict them (slab engine).
   std::vector<int> held_out = {};
+  /// Who share the fit. Each holds the slabs of its own_bands() in `rays`.
+  const distributed::Communicator* processes = &distributed::Communicator::alone();
 
   int num_fitted_views() const { return geometry.num_views() - static_cast<int>(held_out.size()); }
 };

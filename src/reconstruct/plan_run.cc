@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
+#include <vector>
 
 #include "base/lanes.h"
 #include "base/memory.h"
@@ -10,6 +10,7 @@
 #include "reconstruct/fit.h"
 #include "reconstruct/held_out.h"
 #include "reconstruct/reconstruct.h"
+#include "reconstruct/share.h"
 #include "reconstruct/stages.h"
 #include "reconstruct/trial_series.h"
 #include "tilt_series/slab_views.h"
@@ -76,22 +77,44 @@ std::size_t most_parameters(const Domain& domain, const FieldOptions& options) {
   return field::count_parameters(options.kind, shapes);
 }
 
-// Peak of a run. Parameters, their gradient and two moments; a checkpoint that is
-// resumed has all but the gradient once more, and so has a tree that is edited.
+// What this process has of the parameters with their gradient and moments, and of its neighbours'.
+double part_of_parameters(const Domain& domain, const ReconstructOptions& options,
+                          const distributed::Communicator& processes) {
+  if (processes.size() == 1) return 1.0;
+  const distributed::Range bands =
+      own_bands(domain.num_rows, domain.tree.roots().cell_size, processes);
+  std::vector<field::LeafShape> needed;
+  for (const int leaf : needed_leaves(domain.tree, bands))
+    needed.push_back(domain.shapes[static_cast<std::size_t>(leaf)]);
+  return static_cast<double>(field::count_parameters(options.field.kind, needed)) /
+         static_cast<double>(field::count_parameters(options.field.kind, domain.shapes));
+}
+
+// The rows of a shape that this process has.
+tilt_series::SlabViews::Shape own_part(tilt_series::SlabViews::Shape shape,
+                                       const distributed::Communicator& processes) {
+  shape.num_rows = (shape.num_rows + processes.size() - 1) / processes.size();
+  return shape;
+}
+
+// Peak of a process. Parameters, their gradient and two moments; a tree that is edited has all but
+// the gradient once more.
 std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, const RunPlan& run,
-                            const ReconstructOptions& options) {
-  const bool resumes =
-      options.resume && std::filesystem::exists(output_paths(options.output).model);
-  const std::size_t copies = resumes || options.field.tree == "adaptive" ? 7 : 4;
-  const std::size_t parameters = copies * sizeof(float) * run.num_parameters;
+                            const ReconstructOptions& options,
+                            const distributed::Communicator& processes) {
+  using tilt_series::SlabViews;
+  const std::size_t copies = options.field.tree == "adaptive" ? 7 : 4;
+  const auto parameters =
+      static_cast<std::size_t>(static_cast<double>(copies * sizeof(float) * run.num_parameters) *
+                               part_of_parameters(domain, options, processes));
+  const SlabViews::Shape own_shape = own_part(plan.rays_shape(), processes);
   const int slabs_in_use = kSlabsOfThread * base::thread_count();
-  const std::size_t rays = tilt_series::SlabViews::resident_memory(plan.rays_shape(), slabs_in_use);
+  const std::size_t rays = SlabViews::resident_memory(own_shape, slabs_in_use);
   const int coarse_bin = make_stages(options.field, options.fit).front().bin;
   const std::size_t coarse_rays =
-      coarse_bin == 1
-          ? 0
-          : tilt_series::SlabViews::resident_memory(
-                tilt_series::SlabViews::binned_shape(plan.rays_shape(), coarse_bin), slabs_in_use);
+      coarse_bin == 1 ? 0
+                      : SlabViews::resident_memory(SlabViews::binned_shape(own_shape, coarse_bin),
+                                                   slabs_in_use);
   const int steps = steps_an_epoch(plan, options.fit);
   const int views_a_step = plan.ray_geometry ? 0 : (run.num_views + steps - 1) / steps;
   const std::size_t fitting = parameters + static_cast<std::size_t>(base::thread_count()) *
@@ -105,7 +128,9 @@ std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, co
 
 }  // namespace
 
-RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options) {
+RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
+                 const distributed::Communicator& processes) {
+  if (processes.size() > 1) require_no_faults(options.faults_of_job());
   const PreparedSeries plan = plan_series(series, options.specimen);
   const Domain domain = plan.ray_geometry ? make_domain(*plan.ray_geometry, plan.roi, options.field)
                                           : make_domain(plan.geometry, plan.roi, options.field);
@@ -123,8 +148,9 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   if (run.num_trials > 0)  // throws if there are too few
     trial_views(plan.geometry.tilt_deg, views_held_out(plan, options.fit));
   run.num_steps = (last.first_epoch + last.epochs) * steps_an_epoch(plan, options.fit);
-  run.memory_bytes = estimate_memory(plan, domain, run, options);
-  base::require_memory(run.memory_bytes, "this reconstruction",
+  run.memory_bytes = estimate_memory(plan, domain, run, options, processes);
+  base::require_memory(run.memory_bytes * static_cast<std::size_t>(processes.size_on_machine()),
+                       "this reconstruction",
                        "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, or "
                        "fewer --threads");
   for (const field::LeafShape& shape : domain.shapes) {

@@ -11,6 +11,7 @@
 
 #include "base/log.h"
 #include "reconstruct/options.h"
+#include "reconstruct/share.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruct {
@@ -117,22 +118,37 @@ ViewBrightness view_brightness(std::span<const float> image, std::span<const std
   return {mean, std::sqrt(std::max(variance - noise * noise, 1e-4 * variance))};
 }
 
-// Sets the density unit and the mean density from the series' brightness.
-void measure_brightness(const tilt_series::TiltSeries& series, PreparedSeries& prepared) {
-  const geometry::TiltGeometry& g = prepared.geometry;
+// Of every view; each process measures some.
+std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& series,
+                                                const PreparedSeries& prepared,
+                                                const distributed::Communicator& processes) {
   const tilt_series::SlabViews::Shape shape = prepared.rays_shape();
   const std::size_t first = static_cast<std::size_t>(shape.first_row * shape.width);
   const std::size_t count = static_cast<std::size_t>(shape.num_rows * shape.width);
   std::vector<float> image(static_cast<std::size_t>(shape.width * shape.height));
   std::vector<std::uint8_t> valid(image.size());
+  const std::size_t num_views = series.views().size();
+  std::vector<ViewBrightness> views(num_views);
+  for (std::size_t view = static_cast<std::size_t>(processes.rank()); view < num_views;
+       view += static_cast<std::size_t>(processes.size())) {
+    series.read_view(view, image, valid);
+    views[view] =
+        view_brightness(std::span(image).subspan(first, count),
+                        std::span(valid).subspan(first, count), series.noise_sigma()[view]);
+  }
+  static_assert(sizeof(ViewBrightness) == 2 * sizeof(double));
+  processes.combine(std::span(reinterpret_cast<double*>(views.data()), 2 * num_views));
+  return views;
+}
+
+// Sets the density unit and the mean density from the series' brightness.
+void measure_brightness(const std::vector<ViewBrightness>& views, PreparedSeries& prepared) {
+  const geometry::TiltGeometry& g = prepared.geometry;
   std::vector<std::pair<double, double>> contrast_by_tilt;
   double mean_density = 0;
   for (int v = 0; v < g.num_views(); ++v) {
     const std::size_t view = static_cast<std::size_t>(v);
-    series.read_view(view, image, valid);
-    const ViewBrightness b =
-        view_brightness(std::span(image).subspan(first, count),
-                        std::span(valid).subspan(first, count), series.noise_sigma()[view]);
+    const ViewBrightness& b = views[view];
     mean_density += b.mean * g.cos_tilt(v) / g.thickness / g.num_views();
     contrast_by_tilt.emplace_back(std::abs(g.tilt_deg[view]), b.contrast);
   }
@@ -145,11 +161,24 @@ void measure_brightness(const tilt_series::TiltSeries& series, PreparedSeries& p
   prepared.mean_density = mean_density / prepared.unit;
 }
 
+std::vector<double> masked_parts(const tilt_series::SlabViews& rays,
+                                 const distributed::Communicator& processes) {
+  std::vector<std::int64_t> valid;
+  for (int view = 0; view < static_cast<int>(rays.shape().num_views); ++view)
+    valid.push_back(rays.num_valid(view));
+  processes.combine(std::span(valid));
+  const auto num_rays = static_cast<double>(rays.shape().width * rays.shape().num_rows);
+  std::vector<double> masked;
+  for (const std::int64_t n : valid) masked.push_back(1.0 - static_cast<double>(n) / num_rays);
+  return masked;
+}
+
 void log_masks(const PreparedSeries& prepared) {
   const tilt_series::MaskFigures& masks = prepared.masks;
   double masked = 0;
   const int num_views = prepared.geometry.num_views();
-  for (int v = 0; v < num_views; ++v) masked += prepared.masked_part(v) / num_views;
+  for (int v = 0; v < num_views; ++v)
+    masked += prepared.masked_part[static_cast<std::size_t>(v)] / num_views;
   const std::string beads =
       masks.num_beads == 0
           ? "no beads"
@@ -208,24 +237,32 @@ PreparedSeries plan_series(const tilt_series::TiltSeries& series, const Specimen
 PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
                               const SpecimenOptions& specimen,
                               const std::filesystem::path& scratch_dir) {
+  // All rows in one band.
+  return prepare_series(series, specimen, scratch_dir, series.height() + series.aligned_height(),
+                        distributed::Communicator::alone());
+}
+
+PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
+                              const SpecimenOptions& specimen,
+                              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
+                              const distributed::Communicator& processes) {
   PreparedSeries prepared = plan_series(series, specimen);
-  measure_brightness(series, prepared);
+  measure_brightness(brightness_of_views(series, prepared, processes), prepared);
   for (const double sigma : series.noise_sigma())
     prepared.noise_sigma.push_back(sigma / prepared.unit);
+  const tilt_series::SlabViews::Shape shape = prepared.rays_shape();
+  const distributed::Range slabs =
+      slabs_of_bands(own_bands(shape.num_rows, band_rows, processes), band_rows, shape.num_rows);
   prepared.rays = std::make_unique<tilt_series::SlabViews>(
-      prepared.rays_shape(), prepared.unit,
+      shape, slabs, prepared.unit,
       [&series](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
         series.read_view(view, image, valid);
       },
       scratch_dir);
   prepared.masks = series.mask_figures();
+  prepared.masked_part = masked_parts(*prepared.rays, processes);
   log_masks(prepared);
   return prepared;
-}
-
-double PreparedSeries::masked_part(int view) const {
-  const auto num_rays = static_cast<double>(rays->shape().width * rays->shape().num_rows);
-  return 1.0 - static_cast<double>(rays->num_valid(view)) / num_rays;
 }
 
 }  // namespace tomofield::reconstruct

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "distributed/communicator.h"
 #include "geometry/ray_geometry.h"
 #include "geometry/tilt_geometry.h"
 #include "tilt_series/slab_views.h"
@@ -42,8 +43,7 @@ struct PreparedSeries {
   double empty_beam = 0.0;          ///< I0 in data units (dark contrast)
   tilt_series::MaskFigures masks;   ///< what was masked, in all of the views
   std::unique_ptr<tilt_series::SlabViews> rays;
-  /// Part of a view's rays in the region of interest that carry no loss; needs `rays`.
-  double masked_part(int view) const;
+  std::vector<double> masked_part;  ///< of each view's `rays`: those that carry no loss
   /// Views, and which of their rows are fitted: those of the region of interest, or all.
   tilt_series::SlabViews::Shape rays_shape() const;
 };
@@ -55,5 +55,12 @@ PreparedSeries plan_series(const tilt_series::TiltSeries& series, const Specimen
 PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
                               const SpecimenOptions& specimen,
                               const std::filesystem::path& scratch_dir);
+
+/// The same on each of the processes that share it, but for `rays`: each holds those of the bands
+/// (own_bands) of `band_rows` rows that are its own.
+PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
+                              const SpecimenOptions& specimen,
+                              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
+                              const distributed::Communicator& processes);
 
 }  // namespace tomofield::reconstruct

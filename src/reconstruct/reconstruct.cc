@@ -3,15 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 #include <system_error>
 
+#include "base/lanes.h"
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
-#include "field/model_file.h"
 #include "io/json.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/fit.h"
@@ -35,7 +37,8 @@ nlohmann::json alignment_json(const geometry::RayGeometry& g) {
 }
 
 // What decides the bits of a fit: the options, the geometry and the rays themselves (JSON).
-std::string fingerprint_of(const ReconstructOptions& options, const PreparedSeries& series) {
+std::string fingerprint_of(const ReconstructOptions& options, const PreparedSeries& series,
+                           const distributed::Communicator& processes) {
   nlohmann::json json = options_json(options);
   json.erase("input");
   json.erase("volume");
@@ -44,7 +47,7 @@ std::string fingerprint_of(const ReconstructOptions& options, const PreparedSeri
   json["bin_factor"] = series.bin_factor;
   json["unit"] = series.unit;
   json["noise_sigma"] = series.noise_sigma;
-  json["rays"] = fmt::format("{:016x}", series.rays->checksum());
+  json["rays"] = fmt::format("{:016x}", series.rays->checksum(processes));
   return json.dump();
 }
 
@@ -60,7 +63,8 @@ field::ModelInfo model_info(const PreparedSeries& series, const ReconstructOptio
   return info;
 }
 
-Measurement measurement_of(const PreparedSeries& series, const FitOptions& options) {
+Measurement measurement_of(const PreparedSeries& series, const FitOptions& options,
+                           const distributed::Communicator& processes) {
   return {.geometry = series.geometry,
           .roi = series.roi,
           .rays = series.rays.get(),
@@ -69,7 +73,8 @@ Measurement measurement_of(const PreparedSeries& series, const FitOptions& optio
           .ray_geometry = series.ray_geometry,
           .held_out = options.hold_out > 0
                           ? held_out_views(series.geometry.tilt_deg, options.hold_out)
-                          : std::vector<int>{}};
+                          : std::vector<int>{},
+          .processes = &processes};
 }
 
 // Loads the checkpoint into `fit`; false if there is none yet.
@@ -80,9 +85,7 @@ bool resume(const OutputPaths& paths, const std::string& fingerprint, Fit& fit) 
     return false;
   }
   try {
-    field::TrainingState state;
-    field::Model model = field::load_model(paths.model, &state);
-    restore_state(paths.model.string(), fingerprint, std::move(model.field), state, fit);
+    restore_fit(paths.model, fingerprint, fit);
   } catch (const Error& error) {
     throw Error(fmt::format(
         "cannot resume: {}; to start over, give --overwrite instead of --resume", error.what()));
@@ -178,10 +181,49 @@ nlohmann::json score_fit(const Fit& fit, const PreparedSeries& series, bool stop
     return std::abs(series.geometry.tilt_deg[static_cast<std::size_t>(view)]);
   });
   const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
-  write_held_out_picture(picture, fit.predict_held_out(*nearest, model));
+  const PredictedView view = fit.predict_held_out(*nearest, model);
+  fit.processes().together([&] {
+    if (fit.processes().is_first()) write_held_out_picture(picture, view);
+  });
   nlohmann::json json = report_held_out(error, series.geometry.tilt_deg, stopped_by_them);
   json["error_by_epoch"] = fit.progress().held_out_error;
   return json;
+}
+
+// What each process did in the steps of this run.
+nlohmann::json processes_json(const Fit& fit, double seconds) {
+  const distributed::Communicator& processes = fit.processes();
+  const Fit::Traffic traffic = fit.traffic();
+  constexpr std::size_t kNumbers = 5;
+  std::vector<double> all(kNumbers * static_cast<std::size_t>(processes.size()));
+  const auto own = all.begin() + static_cast<std::ptrdiff_t>(kNumbers) * processes.rank();
+  const double steps = static_cast<double>(std::max<std::int64_t>(traffic.steps, 1));
+  std::ranges::copy(std::array<double, kNumbers>{static_cast<double>(fit.own_bands().size()),
+                                                 static_cast<double>(fit.own_leaves().size()),
+                                                 seconds - traffic.seconds, traffic.seconds,
+                                                 static_cast<double>(traffic.bytes) / steps},
+                    own);
+  processes.combine(std::span(all));
+  nlohmann::json list = nlohmann::json::array();
+  for (auto p = all.begin(); p != all.end(); p += kNumbers) {
+    list.push_back({{"bands", std::lround(p[0])},
+                    {"leaves", std::lround(p[1])},
+                    {"seconds_computing", p[2]},
+                    {"seconds_communicating", p[3]},
+                    {"bytes_sent_per_step", p[4]}});
+  }
+  return list;
+}
+
+VolumeShare volume_share(const Fit& fit, const PreparedSeries& series) {
+  const distributed::Range slabs = series.rays->held();
+  const auto end_row =
+      std::min<std::int64_t>(std::int64_t{slabs.end} * base::kLanes, series.roi.height());
+  const distributed::Range leaves = fit.own_leaves();
+  return {fit.processes(),
+          {slabs.begin * base::kLanes, end_row},
+          fit.field().offset(leaves.begin),
+          fit.field().offset(leaves.end)};
 }
 
 void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOptions& options,
@@ -190,17 +232,22 @@ void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOpti
   nlohmann::json held_out = nullptr;
   if (options.fit.hold_out > 0)
     held_out = score_fit(fit, series, options.fit.patience > 0, paths.held_out_picture);
-  const field::TrainingState state = progress_state(fit, fingerprint);
+  save_fit(paths.model, fit, model_info(series, options), progress_state(fit, fingerprint));
+  const nlohmann::json processes = processes_json(fit, seconds);
+  const VolumeShare share = volume_share(fit, series);
   field::Model model{model_info(series, options), fit.take_field()};
-  field::save_model(paths.model, model, &state);
-  write_volume(model, options.volume, paths.volume);
+  write_volume(model, options.volume, paths.volume, share);
   nlohmann::json figures = figures_json(model, fit.progress(), series, seconds);
   figures["stages"] = stages_json(fit.stages());
   figures["held_out"] = held_out;
+  figures["processes"] = processes;
   figures["tuning"] = tuned ? tuning_json(*tuned) : nlohmann::json(nullptr);
-  io::write_json(
-      paths.json,
-      {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"figures", figures}});
+  share.processes.together([&] {
+    if (!share.processes.is_first()) return;
+    io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
+                                {"options", options_json(options)},
+                                {"figures", figures}});
+  });
 }
 
 // The settings that predict views held out from trials best. None if a stop was requested.
@@ -210,8 +257,11 @@ std::optional<Tuned> choose_settings(const PreparedSeries& series, const Measure
   const TuneHooks tune_hooks{.progress = hooks.tune_progress,
                              .stop_requested = hooks.stop_requested};
   if (!options.tune) return tune_penalty(measurement, options.field, options.fit, tune_hooks);
-  TrialFile file(paths.trials, fingerprint_of(options, series), options.resume);
-  return tune(measurement, options.field, options.fit, options.choose_penalty, file, tune_hooks);
+  const distributed::Communicator& processes = *measurement.processes;
+  const std::string fingerprint = fingerprint_of(options, series, processes);
+  std::optional<TrialFile> file;
+  processes.together([&] { file.emplace(paths.trials, fingerprint, options.resume); });
+  return tune(measurement, options.field, options.fit, options.choose_penalty, *file, tune_hooks);
 }
 
 void apply(const TrialSettings& settings, ReconstructOptions& options) {
@@ -253,6 +303,17 @@ std::vector<std::string> ReconstructOptions::faults() const {
   return all;
 }
 
+std::vector<std::string> ReconstructOptions::faults_of_job() const {
+  std::vector<std::string> all;
+  const auto refuse = [&](const char* option) {
+    all.push_back(fmt::format(
+        "several processes cannot share {} yet: start one, with more --threads", option));
+  };
+  if (field.tree == "adaptive") refuse("--tree adaptive");
+  if (fit.engine == "ray") refuse("--engine ray");
+  return all;
+}
+
 void check_options(const ReconstructOptions& options) {
   require_no_faults(options.faults());
   const OutputPaths paths = output_paths(options.output);
@@ -272,21 +333,22 @@ void check_options(const ReconstructOptions& options) {
 }
 
 Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& requested,
-                    const ReconstructHooks& hooks) {
+                    const ReconstructHooks& hooks, const distributed::Communicator& processes) {
   ReconstructOptions options = requested;
   const OutputPaths paths = output_paths(options.output);
   const PreparedSeries series =
-      prepare_series(tilt_series, options.specimen, directory_of(paths.volume));
-  const Measurement measurement = measurement_of(series, options.fit);
+      prepare_series(tilt_series, options.specimen, directory_of(paths.volume),
+                     band_rows(options.field), processes);
+  const Measurement measurement = measurement_of(series, options.fit, processes);
   std::optional<Tuned> tuned;
   if (options.num_trials(measurement.num_fitted_views()) > 0) {
     tuned = choose_settings(series, measurement, paths, hooks, options);
     if (!tuned) return Outcome::kStoppedTuning;
     apply(tuned->settings, options);
   }
-  const std::string fingerprint = fingerprint_of(options, series);
+  const std::string fingerprint = fingerprint_of(options, series, processes);
   Fit fit(measurement, options.field, options.fit);
-  if (options.resume) resume(paths, fingerprint, fit);
+  if (options.resume) processes.together([&] { resume(paths, fingerprint, fit); });
 
   const base::Stopwatch running;
   base::Stopwatch since_checkpoint;
@@ -294,8 +356,13 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
   bool stopped = false;
   fit.run([&](const Fit&) {
     if (hooks.progress) hooks.progress(progress_report(fit, first_step, running));
-    stopped = hooks.stop_requested && hooks.stop_requested() && !fit.is_done();
-    if (stopped || since_checkpoint.seconds() > 60 * options.checkpoint_minutes) {
+    const bool stop = hooks.stop_requested && hooks.stop_requested() && !fit.is_done();
+    const bool is_due =
+        processes.is_first() && since_checkpoint.seconds() > 60 * options.checkpoint_minutes;
+    // One that must stop stops all; when it is time for a checkpoint is up to the first.
+    const double wanted = processes.largest(stop ? 2.0 : is_due ? 1.0 : 0.0);
+    stopped = wanted == 2.0;
+    if (wanted > 0.0) {
       save_checkpoint(paths.model, fit, model_info(series, options), fingerprint);
       since_checkpoint.restart();
     }

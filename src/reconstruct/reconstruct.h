@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/progress.h"
+#include "distributed/communicator.h"
 #include "reconstruct/options.h"
 #include "reconstruct/prepare.h"
 #include "reconstruct/write_volume.h"
@@ -31,6 +32,8 @@ struct ReconstructOptions {
   int num_trials(int num_fitted_views) const;
   /// Every fault that these options have by themselves, a sentence each.
   std::vector<std::string> faults() const;
+  /// Those that they have for a job of several processes.
+  std::vector<std::string> faults_of_job() const;
 };
 
 /// The files of a reconstruction, named after its volume.
@@ -57,8 +60,13 @@ enum class Outcome { kFinished, kStopped, kStoppedTuning };
 /// model (HDF5, also the checkpoint while it runs), and the figures and resolved
 /// options (JSON). Call check_options() and
 /// plan_run() first: this starts at once.
-Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& options,
-                    const ReconstructHooks& hooks);
+///
+/// Processes share the work if all of them call it: the results have the same bits as those of
+/// one, which the first puts in place.
+Outcome reconstruct(
+    const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& options,
+    const ReconstructHooks& hooks,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
 
 /// What a run will do; nothing is allocated or written for it.
 struct RunPlan {
@@ -71,12 +79,13 @@ struct RunPlan {
   std::size_t num_parameters = 0;
   int num_trials = 0;  ///< short fits before it, about, that choose settings
   std::int64_t num_steps = 0;
-  std::size_t memory_bytes = 0;  ///< estimated peak
+  std::size_t memory_bytes = 0;  ///< estimated peak, of each process
 };
 
-/// Throws Error for options that do not fit the series, and when the memory
-/// needed is beyond what the machine has.
-RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options);
+/// Throws Error for options that do not fit the series or the number of processes, and when the
+/// memory needed is beyond what the machine has.
+RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
+                 const distributed::Communicator& processes = distributed::Communicator::alone());
 
 /// Throws Error for faulty options, and if results would replace an input, would
 /// replace existing files without --overwrite or --resume, or cannot be written

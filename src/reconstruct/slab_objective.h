@@ -27,6 +27,7 @@ struct BandResult {
   std::vector<loss::ViewSums> views;  ///< one each of the step's views
   double variation = 0.0;             ///< both total variations, weighted
   double grad_bias = 0.0;
+  double boundary_grad_bias = 0.0;  ///< of boundary consistency, which is another pass
 };
 
 /// The loss of a band of slabs (one row of root cells) for some of the views,

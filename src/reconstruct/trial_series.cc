@@ -45,7 +45,7 @@ TrialViews trial_views(const std::vector<double>& tilt_deg, const std::vector<in
 TrialSeries make_trial_series(const geometry::TiltGeometry& geometry,
                               const std::vector<double>& noise_sigma,
                               const tilt_series::SlabViews& rays, const std::vector<int>& scored,
-                              std::int64_t most_rows) {
+                              std::int64_t most_rows, const distributed::Communicator& processes) {
   TrialSeries trial{.views = trial_views(geometry.tilt_deg, scored),
                     .held_out = {},
                     .geometry = geometry,
@@ -58,7 +58,7 @@ TrialSeries make_trial_series(const geometry::TiltGeometry& geometry,
   }
   trial.geometry.tilt_deg = chosen(geometry.tilt_deg, views);
   trial.noise_sigma = chosen(noise_sigma, views);
-  trial.rays = rays.middle_rows(most_rows, views);
+  trial.rays = rays.middle_rows(most_rows, views, processes);
   return trial;
 }
 

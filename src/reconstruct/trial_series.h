@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "distributed/communicator.h"
 #include "geometry/tilt_geometry.h"
 #include "tilt_series/slab_views.h"
 
@@ -29,9 +30,9 @@ struct TrialSeries {
   std::vector<double> noise_sigma;
   std::unique_ptr<tilt_series::SlabViews> rays;
 };
-TrialSeries make_trial_series(const geometry::TiltGeometry& geometry,
-                              const std::vector<double>& noise_sigma,
-                              const tilt_series::SlabViews& rays, const std::vector<int>& scored,
-                              std::int64_t most_rows);
+TrialSeries make_trial_series(
+    const geometry::TiltGeometry& geometry, const std::vector<double>& noise_sigma,
+    const tilt_series::SlabViews& rays, const std::vector<int>& scored, std::int64_t most_rows,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
 
 }  // namespace tomofield::reconstruct

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -23,11 +24,19 @@ using nlohmann::json;
 constexpr std::int64_t kPenaltyRows = 32;
 constexpr double kPenaltyPart = 0.5;  // of the epochs that plain vertices need
 
+json settings_json(const TrialSettings& s) {
+  return {{"tv_penalty", s.penalty}, {"tv", s.variation}, {"rank", s.rank}, {"epochs", s.epochs}};
+}
+
+TrialSettings settings_from(const json& entry) {
+  return {.penalty = entry.at("tv_penalty"),
+          .variation = entry.at("tv"),
+          .rank = entry.at("rank"),
+          .epochs = entry.at("epochs")};
+}
+
 Trial trial_from(const json& entry) {
-  return {.settings = {.penalty = entry.at("tv_penalty"),
-                       .variation = entry.at("tv"),
-                       .rank = entry.at("rank"),
-                       .epochs = entry.at("epochs")},
+  return {.settings = settings_from(entry),
           .score = {entry.at("held_out_error"), entry.at("held_out_error_by_view")},
           .seconds = entry.at("seconds")};
 }
@@ -41,8 +50,8 @@ struct Strip {
 
 Strip middle_strip(const Measurement& whole, std::int64_t most_rows) {
   const std::int64_t all_rows = whole.rays->shape().num_rows;
-  TrialSeries series =
-      make_trial_series(whole.geometry, whole.noise_sigma, *whole.rays, whole.held_out, most_rows);
+  TrialSeries series = make_trial_series(whole.geometry, whole.noise_sigma, *whole.rays,
+                                         whole.held_out, most_rows, *whole.processes);
   const std::int64_t rows = series.rays->shape().num_rows;
   geometry::Roi roi = whole.roi;
   roi.y0 += (all_rows - rows) / 2;
@@ -142,6 +151,31 @@ FitOptions penalty_trial_options(const std::string& field_kind, const FitOptions
   return shorter;
 }
 
+// What the first process finds, on all of them: trials are too small to share. None if a stop was
+// requested.
+std::optional<Tuned> found_by_first(const distributed::Communicator& processes,
+                                    const std::function<Tuned()>& search) {
+  std::optional<Tuned> tuned;
+  json found = nullptr;
+  processes.together([&] {
+    if (!processes.is_first()) return;
+    try {
+      tuned = search();
+    } catch (const StopRequested&) {
+      return;
+    }
+    found = {{"settings", settings_json(tuned->settings)},
+             {"trials", trials_json(tuned->trials)},
+             {"predicted_views", tuned->predicted_views}};
+  });
+  found = json::parse(processes.broadcast(found.dump()));
+  if (processes.is_first() || found.is_null()) return tuned;
+  tuned.emplace(Tuned{settings_from(found["settings"]), {}, {}});
+  for (const json& trial : found["trials"]) tuned->trials.push_back(trial_from(trial));
+  tuned->predicted_views = found["predicted_views"].get<std::vector<int>>();
+  return tuned;
+}
+
 void log_trials(const std::vector<Trial>& trials) {
   for (const Trial& t : trials) {
     base::log_info(fmt::format("tried {} tv {:8.3f}  rank {:3}  epochs {:4}: held-out error {:.5f}",
@@ -184,13 +218,10 @@ void TrialFile::add(const Trial& trial) {
 json trials_json(const std::vector<Trial>& trials) {
   json table = json::array();
   for (const Trial& t : trials) {
-    table.push_back({{"tv_penalty", t.settings.penalty},
-                     {"tv", t.settings.variation},
-                     {"rank", t.settings.rank},
-                     {"epochs", t.settings.epochs},
-                     {"held_out_error", t.score.error},
-                     {"held_out_error_by_view", t.score.view_error},
-                     {"seconds", t.seconds}});
+    table.push_back(settings_json(t.settings));
+    table.back().update({{"held_out_error", t.score.error},
+                         {"held_out_error_by_view", t.score.view_error},
+                         {"seconds", t.seconds}});
   }
   return table;
 }
@@ -203,21 +234,22 @@ std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& fi
   // A run without total variation still needs a weight to search from.
   const double first =
       fit.density_variation > 0 ? fit.density_variation : usual_variation(fit.penalty);
-  Tuned tuned;
-  tuned.predicted_views = fits.predicted_views();
-  try {
+  const auto search = [&] {
+    Tuned tuned;
+    tuned.predicted_views = fits.predicted_views();
     tuned.settings = search_settings(
         {fit.penalty, first, field.rank, fit.epochs}, space,
         [&](const TrialSettings& settings) { return fits.run(settings, file); }, tuned.trials);
-  } catch (const StopRequested&) {
-    return std::nullopt;
-  }
-  log_trials(tuned.trials);
+    return tuned;
+  };
+  const std::optional<Tuned> tuned = found_by_first(*measurement.processes, search);
+  if (!tuned) return std::nullopt;
+  log_trials(tuned->trials);
   base::log_info(
       fmt::format("tuned: --tv-penalty {} --tv {:.3f} --rank {} --epochs {} "
                   "--coarse-epochs {}",
-                  tuned.settings.penalty, tuned.settings.variation, tuned.settings.rank,
-                  tuned.settings.epochs, fit.coarse_epochs));
+                  tuned->settings.penalty, tuned->settings.variation, tuned->settings.rank,
+                  tuned->settings.epochs, fit.coarse_epochs));
   return tuned;
 }
 
@@ -227,20 +259,21 @@ std::optional<Tuned> tune_penalty(const Measurement& measurement, const FieldOpt
   plain.kind = "grid";
   const FitOptions shorter = penalty_trial_options(field.kind, fit);
   TrialFits fits(measurement, kPenaltyRows, plain, shorter, hooks, 2);
-  Tuned tuned;
-  tuned.predicted_views = fits.predicted_views();
-  try {
+  const auto search = [&] {
+    Tuned tuned;
+    tuned.predicted_views = fits.predicted_views();
     tuned.settings =
         choose_penalty({fit.penalty, fit.density_variation, field.rank, shorter.epochs},
                        [&](const TrialSettings& settings) {
                          tuned.trials.push_back(fits.run(settings));
                          return tuned.trials.back();
                        });
-  } catch (const StopRequested&) {
-    return std::nullopt;
-  }
-  log_trials(tuned.trials);
-  tuned.settings.epochs = fit.epochs;
+    return tuned;
+  };
+  std::optional<Tuned> tuned = found_by_first(*measurement.processes, search);
+  if (!tuned) return std::nullopt;
+  log_trials(tuned->trials);
+  tuned->settings.epochs = fit.epochs;
   return tuned;
 }
 

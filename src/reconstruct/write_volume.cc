@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <mutex>
 #include <numbers>
+#include <span>
 #include <vector>
 
+#include "distributed/gathered_arrays.h"
 #include "tomofield/error.h"
 #include "tomofield/version.h"
 
@@ -18,6 +21,22 @@ namespace {
 using field::Box;
 using field::BoxPart;
 using field::Point;
+
+constexpr const char* kMadeBy = "density field";
+
+// To the first process.
+void gather_parameters(const VolumeShare& share, field::Field& field) {
+  distributed::GatheredArrays arrays(share.processes, share.first_parameter, share.end_parameter);
+  const std::size_t parameters = arrays.add(field.parameters());
+  arrays.read_on_first([&] {
+    field.keep_only({});
+    auto into = field.parameters().begin();
+    arrays.hand_out(parameters, [&](std::span<const float> piece) {
+      if (piece.data() != std::to_address(into)) std::ranges::copy(piece, into);
+      into += std::ssize(piece);
+    });
+  });
+}
 
 // Refuses a box that cannot meet the field: all of it would be zero.
 void require_inside(const field::Field& field, const Box& box) {
@@ -60,7 +79,7 @@ std::array<double, 3> origin_A(const field::ModelInfo& info, const Box& box, Vol
   return corner;
 }
 
-float largest_density(const VoxelSource& source) {
+float largest_density(const VoxelSource& source, const distributed::Communicator& processes) {
   std::mutex mutex;
   float largest = 0.0f;
   source([&](const BoxPart& part) {
@@ -69,7 +88,7 @@ float largest_density(const VoxelSource& source) {
     const std::lock_guard lock(mutex);
     largest = std::max(largest, here);
   });
-  return largest;
+  return static_cast<float>(processes.largest(static_cast<double>(largest)));
 }
 
 // Densities times `scale`, in the file's axes.
@@ -139,12 +158,28 @@ void write_volume(const field::Model& model, const VolumeOptions& options,
   const Box box = options.box.value_or(region_box(model, 1.0));
   require_inside(*model.field, box);
   write_voxels([&](const field::BoxSink& sink) { sample_box(*model.field, box, sink); }, box, model,
-               "density field", options, path);
+               kMadeBy, options, path);
+}
+
+void write_volume(field::Model& model, const VolumeOptions& options,
+                  const std::filesystem::path& path, const VolumeShare& share) {
+  const Box box = region_box(model, 1.0);
+  if (share.processes.size() == 1) return write_volume(model, options, path);
+  if (box.is_aligned()) {
+    const auto source = [&](const field::BoxSink& sink) {
+      sample_box(*model.field, box, share.rows, sink);
+    };
+    return write_voxels(source, box, model, kMadeBy, options, path, share.processes);
+  }
+  gather_parameters(share, *model.field);
+  share.processes.together([&] {
+    if (share.processes.is_first()) write_volume(model, options, path);
+  });
 }
 
 void write_voxels(const VoxelSource& source, const Box& box, const field::ModelInfo& info,
                   const std::string& made_by, const VolumeOptions& options,
-                  const std::filesystem::path& path) {
+                  const std::filesystem::path& path, const distributed::Communicator& processes) {
   io::MrcSpec spec;
   spec.nx = box.size[0];
   spec.ny = box.size[1];
@@ -157,15 +192,16 @@ void write_voxels(const VoxelSource& source, const Box& box, const field::ModelI
 
   double scale = options.invert ? -info.output_scale() : info.output_scale();
   if (options.mode == io::MrcMode::kInt16) {
-    { const io::MrcWriter probe(path, spec); }  // refuses before the pass, not after it
+    { const io::MrcWriter probe(path, spec, processes); }  // refuses before the pass, not after it
     constexpr double kLargestStored = 32000.0;
-    const double largest = std::abs(scale) * static_cast<double>(largest_density(source));
+    const double largest =
+        std::abs(scale) * static_cast<double>(largest_density(source, processes));
     const double factor = largest > 0 ? kLargestStored / largest : 1.0;
     spec.label += fmt::format(", stored = {:.6g} x value", factor);
     scale *= factor;
   }
-  io::MrcWriter file(path, spec);
-  source(PartWriter(file, box, options.axes, scale));
+  io::MrcWriter file(path, spec, processes);
+  processes.together([&] { source(PartWriter(file, box, options.axes, scale)); });
   file.close();
 }
 

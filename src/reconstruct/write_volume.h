@@ -4,7 +4,9 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "distributed/communicator.h"
 #include "field/model_file.h"
 #include "field/sample_box.h"
 #include "io/mrc.h"
@@ -36,13 +38,25 @@ field::Box region_box(const field::ModelInfo& model, double voxel_px);
 void write_volume(const field::Model& model, const VolumeOptions& options,
                   const std::filesystem::path& path);
 
+/// The same for the region of interest of a model that processes share: each writes `rows` of it,
+/// in parallel. A box that an x-axis tilt rotates is sampled by the first process alone, which for
+/// that takes the leaves of the others, [first, end) of whose parameters this process has.
+struct VolumeShare {
+  const distributed::Communicator& processes;
+  field::BoxRows rows;
+  std::size_t first_parameter, end_parameter;
+};
+void write_volume(field::Model& model, const VolumeOptions& options,
+                  const std::filesystem::path& path, const VolumeShare& share);
+
 /// Passes every voxel of a box to a sink once, part by part, on any threads; called
-/// twice for kInt16.
+/// twice for kInt16. Each of several processes passes voxels of its own.
 using VoxelSource = std::function<void(const field::BoxSink&)>;
 
 /// The same for densities from anywhere; `made_by` goes into the header's label.
 void write_voxels(const VoxelSource& source, const field::Box& box, const field::ModelInfo& info,
                   const std::string& made_by, const VolumeOptions& options,
-                  const std::filesystem::path& path);
+                  const std::filesystem::path& path,
+                  const distributed::Communicator& processes = distributed::Communicator::alone());
 
 }  // namespace tomofield::reconstruct

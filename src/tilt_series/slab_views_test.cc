@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -27,7 +28,7 @@ bool is_valid(std::size_t view, std::int64_t x, std::int64_t y) {
   return base::Random(11 + view, static_cast<std::uint64_t>(y * kShape.width + x)).below(4) > 0;
 }
 
-std::unique_ptr<SlabViews> make_views() {
+std::unique_ptr<SlabViews> make_views(SlabViews::Slabs held = SlabViews::all_slabs(kShape)) {
   const auto read = [](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
     for (std::int64_t y = 0; y < kShape.height; ++y) {
       for (std::int64_t x = 0; x < kShape.width; ++x) {
@@ -37,7 +38,29 @@ std::unique_ptr<SlabViews> make_views() {
       }
     }
   };
-  return std::make_unique<SlabViews>(kShape, kUnit, read, "/tmp");
+  return std::make_unique<SlabViews>(kShape, held, kUnit, read, "/tmp");
+}
+
+TEST(SlabViews, SomeSlabsAreThoseOfTheWhole) {
+  const auto all = make_views();
+  std::int64_t num_valid = 0;
+  for (const SlabViews::Slabs held : {SlabViews::Slabs{0, 2}, {2, 3}}) {
+    const auto some = make_views(held);
+    EXPECT_EQ(some->held(), held);
+    EXPECT_EQ(some->num_slabs(), all->num_slabs());
+    num_valid += some->num_valid(1);
+    for (std::int64_t y = held.begin * 16; y < std::min<std::int64_t>(held.end * 16, 39); ++y) {
+      for (std::int64_t x = 0; x < kShape.width; ++x) {
+        ASSERT_EQ(some->counts(1, x, y), all->counts(1, x, y));
+        ASSERT_EQ(some->ray(1, x, y), all->ray(1, x, y));
+      }
+    }
+    const auto coarse = some->binned(2), all_coarse = all->binned(2);
+    EXPECT_EQ(coarse->held(), (SlabViews::Slabs{held.begin / 2, (held.end + 1) / 2}));
+    for (std::int64_t y = held.begin * 8; y < std::min<std::int64_t>(held.end * 8, 20); ++y)
+      ASSERT_EQ(coarse->ray(2, 7, y), all_coarse->ray(2, 7, y));
+  }
+  EXPECT_EQ(num_valid, all->num_valid(1));
 }
 
 TEST(SlabViews, MiddleRowsAreCopied) {

@@ -394,10 +394,8 @@ TEST_P(CoarseToFine, GoesOnFromACheckpointOfEitherStageToTheSameBits) {
     info.geometry = measurement_.geometry;
     info.roi = measurement_.roi;
     save_checkpoint(scratch / "fit.h5", *first, info, "{}");
-    field::TrainingState state;
-    field::Model model = field::load_model(scratch / "fit.h5", &state);
     const auto second = make_fit();
-    restore_state("fit.h5", "{}", std::move(model.field), state, *second);
+    restore_fit(scratch / "fit.h5", "{}", *second);
     EXPECT_EQ(second->progress().step, pause_at);
     second->run([](const Fit&) { return true; });
     EXPECT_TRUE(std::ranges::equal(second->field().parameters(), whole->field().parameters()))

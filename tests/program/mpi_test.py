@@ -1,0 +1,214 @@
+"""Reconstruct on several processes that mpirun starts: the bytes of one process, checkpoints for any
+number of them, and what is said when something goes wrong.
+
+usage: mpi_test.py TOMOFIELD SCRATCH_DIR"""
+
+import glob
+import json
+import os
+import signal
+import subprocess
+import time
+
+import h5py
+import numpy as np
+
+import harness
+from harness import read_bytes
+
+# On one machine, whose cores the processes share, and in containers, which may forbid the rest.
+os.environ.update(OMP_NUM_THREADS="1", OMPI_ALLOW_RUN_AS_ROOT="1",
+                  OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1",
+                  OMPI_MCA_btl_vader_single_copy_mechanism="none")
+ROWS, COLUMNS, THICKNESS = 120, 40, 16  # rows end in the middle of a slab and of a root cell
+PRIORS = ["--tv-factors", 0.5, "--bcc", 5, "--ifp", 0.2]
+NUM_STEPS = 4 * 7
+FIT = harness.merge(harness.QUICK, ["--thickness", THICKNESS, "--rank", 3, "--epochs", 4, *PRIORS])
+
+
+def make_series():
+    directory = harness.fresh_directory("series")
+    cell = os.path.join(directory, "cell")
+    harness.succeed("simulate", cell, "--size", 128, "--thickness", THICKNESS, "--seed", 3,
+                    "--tilts=-60:60:6", "--noise", 0.03)
+    views = harness.read_volume(os.path.join(cell, "tilt_series.mrc"))[:, :ROWS, 44:44 + COLUMNS]
+    stack, tlt = os.path.join(directory, "series.mrc"), os.path.join(directory, "series.tlt")
+    harness.write_stack(stack, views.astype(np.float32))
+    np.savetxt(tlt, harness.TILTS, fmt="%.1f")
+    return [stack, "--tlt", tlt]
+
+
+series = make_series()
+
+
+def command(results, *options, input=series, fit=FIT):
+    return ["reconstruct", *input, "-o", results.volume_path, *harness.merge(fit, options)]
+
+
+def fresh_results(name):
+    return harness.Results(os.path.join(harness.fresh_directory(name), "out.mrc"))
+
+
+def start(processes, *arguments):
+    return subprocess.Popen(["mpirun", "-np", str(processes), harness.PROGRAM,
+                             *map(str, arguments)],
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def mpirun(processes, *arguments):
+    run = start(processes, *arguments)
+    output, errors = run.communicate(timeout=120)
+    return subprocess.CompletedProcess(arguments, run.returncode, output, errors)
+
+
+def succeed(processes, *arguments):
+    result = mpirun(processes, *arguments)
+    assert result.returncode == 0, (arguments, result.returncode, result.stderr)
+    return result
+
+
+def figures(results):
+    with open(results.json_path) as file:
+        found = json.load(file)["figures"]
+    for key in ("seconds", "processes", "threads"):  # of the run, not of the result
+        found.pop(key)
+    if found["tuning"]:
+        for trial in found["tuning"]["trials"]:
+            trial.pop("seconds")
+    return found
+
+
+# Every sum over the bands is made in their order, whoever computed them, so the bytes are the same,
+# not just the values.
+def test_results_have_the_bytes_of_one_process():
+    cases = {"vm": ([], (1, 2, 4)),
+             "coarse": (["--field", "grid", "--leaf-size", 32, "--coarse-epochs", 3,
+                         "--tv-penalty", "auto", "--mode", 1], (2,)),
+             "margin": (["--contrast", "dark", "--hold-out", 5, "--axes", "xzy", "--mode", 12],
+                        (3,))}
+    for name, (options, numbers) in cases.items():
+        fit = [word for word in FIT if word != "--no-margin"] if name == "margin" else FIT
+        alone = fresh_results(name)
+        harness.succeed(*command(alone, *options, fit=fit))
+        for processes in numbers:
+            shared = fresh_results(f"{name}{processes}")
+            result = succeed(processes, *command(shared, *options, fit=fit))
+            assert shared.same_as(alone), (name, processes)
+            assert figures(shared) == figures(alone), (name, processes)
+            assert result.stdout.count("tomogram  ") == 1, result.stdout
+            assert set(map(os.path.basename, glob.glob(os.path.dirname(shared.volume_path) + "/*"))) \
+                == set(map(os.path.basename, glob.glob(os.path.dirname(alone.volume_path) + "/*")))
+
+
+def test_each_process_has_its_part():
+    results = fresh_results("parts")
+    succeed(3, *command(results))
+    with open(results.json_path) as file:
+        processes = json.load(file)["figures"]["processes"]
+    assert [p["bands"] for p in processes] == [1, 2, 1], processes
+    assert all(p["bytes_sent_per_step"] > 0 and p["seconds_computing"] > 0 for p in processes)
+    # All send the same sums, and the one in the middle has two neighbours.
+    first, middle, last = (p["bytes_sent_per_step"] for p in processes)
+    assert first == last < middle, processes
+
+
+def test_a_turned_volume_is_the_same():
+    xtilt = os.path.join(os.path.dirname(series[0]), "x.xtilt")
+    np.savetxt(xtilt, np.full(len(harness.TILTS), 4.0), fmt="%.1f")
+    alone, shared = fresh_results("turned"), fresh_results("turned2")
+    harness.succeed(*command(alone, "--xtilt", xtilt, "--epochs", 1))
+    succeed(2, *command(shared, "--xtilt", xtilt, "--epochs", 1))
+    assert shared.same_as(alone)
+
+
+def stop_after_a_step(run, number):
+    """What a run says that is stopped by a signal."""
+    for line in run.stderr:
+        if line.startswith("reconstruct "):
+            break
+    run.send_signal(number)
+    _, errors = run.communicate(timeout=60)
+    assert errors.count("tomofield: stopped") == 1 and "--resume" in errors, errors
+    return errors
+
+
+def step_of(results):
+    with h5py.File(results.model_path) as model:
+        return int(model["training/integers/step"][0])
+
+
+def test_checkpoints_go_on_with_any_number_of_processes():
+    undisturbed, results = fresh_results("undisturbed"), fresh_results("resumed")
+    long = ["--epochs", 12]
+    harness.succeed(*command(undisturbed, *long))
+    steps = []
+    # mpirun passes SIGUSR1 on; SIGTERM it answers itself, and ends the processes with it.
+    for processes, number, status in ((4, signal.SIGUSR1, 128 + signal.SIGUSR1),
+                                      (1, signal.SIGTERM, 128 + signal.SIGTERM),
+                                      (2, signal.SIGTERM, 1)):
+        words = command(results, "--resume", *long)
+        run = start(processes, *words) if processes > 1 else harness.start(*words)
+        errors = stop_after_a_step(run, number)
+        assert run.returncode == status, (run.returncode, errors)
+        steps.append(step_of(results))
+    assert 0 < steps[0] < steps[1] < steps[2] < 12 * 7, steps
+    succeed(3, *command(results, "--resume", *long))
+    assert results.same_as(undisturbed)
+
+
+def processes_of(run):
+    """Process numbers of the program that an mpirun started."""
+    with open(f"/proc/{run.pid}/task/{run.pid}/children") as file:
+        return [int(pid) for pid in file.read().split()]
+
+
+def test_a_process_that_dies_ends_the_job_and_leaves_a_checkpoint():
+    undisturbed, results = fresh_results("alive"), fresh_results("killed")
+    long = ["--epochs", 12, "--checkpoint-minutes", 0]
+    harness.succeed(*command(undisturbed, *long))
+    run = start(2, *command(results, *long))
+    while not os.path.exists(results.model_path):
+        assert run.poll() is None
+        time.sleep(0.001)
+    os.kill(processes_of(run)[1], signal.SIGKILL)
+    _, errors = run.communicate(timeout=60)
+    assert run.returncode != 0 and "signal 9 (Killed)" in errors, (run.returncode, errors)
+    assert not os.path.exists(results.volume_path)
+    resumed = succeed(2, *command(results, "--resume", *long))
+    assert "resuming" in resumed.stderr, resumed.stderr
+    assert results.same_as(undisturbed)
+
+
+def refuse(words, processes, *arguments):
+    result = mpirun(processes, *arguments)
+    complaints = [line for line in result.stderr.splitlines() if line.startswith("tomofield: ")]
+    assert result.returncode == 2, (words, result)
+    assert len(complaints) == 1 and all(word in complaints[0] for word in words), result.stderr
+
+
+def test_faults_are_told_once():
+    results = fresh_results("faults")
+    refuse(["nowhere.mrc", "No such file"], 3, *command(results, input=["nowhere.mrc", *series[1:]]))
+    refuse(["--no-such-option"], 2, *command(results, "--no-such-option", 3))
+    refuse(["--epochs"], 2, *command(results, "--epochs", -2))
+    refuse(["5 processes", "at most 4"], 5, *command(results))
+    refuse(["--tree adaptive", "--engine ray"], 2,
+           *command(results, "--tree", "adaptive", "--engine", "ray"))
+    refuse(["2 processes", "simulate"], 2, "simulate", os.path.join(harness.SCRATCH, "phantom"))
+    assert not os.listdir(os.path.dirname(results.volume_path))
+    succeed(2, *command(results))
+    refuse([results.volume_path, "--overwrite"], 2, *command(results))
+    refuse([results.model_path, "fit seed"], 2, *command(results, "--resume", "--seed", 9))
+
+
+def test_a_fault_of_one_process_is_told_by_the_first():
+    results = fresh_results("fault_of_one")
+    other = command(results, input=["not_here.mrc", *series[1:]])
+    refuse(["not_here.mrc", "No such file"], 2, *command(results), ":", "-np", 1,
+           harness.PROGRAM, *other)
+    assert not os.listdir(os.path.dirname(results.volume_path))
+
+
+if subprocess.run(["mpirun", "--version"], capture_output=True).returncode != 0:
+    raise SystemExit(77)
+harness.run_tests(globals())
