@@ -6,15 +6,19 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 #include "report/plot_surface.h"
 
 namespace tomofield::report {
 namespace {
 
-// The drawing area in a picture of kWidth × kHeight; the legend is at its right.
-constexpr int kWidth = 900, kHeight = 360;
-constexpr double kLeft = 70, kRight = 660, kTop = 30, kBottom = 305;
+// The drawing area in a picture of kWidth pixels; the legend is at its right.
+constexpr int kWidth = 900, kLeastHeight = 360;
+constexpr double kLeft = 70, kRight = 660, kTop = 30, kBelow = 55;
+constexpr double kLine = 20;            // of the legend, from one to the next
+constexpr double kNames = kRight + 48;  // where they begin
+constexpr double kNameWidth = kWidth - 4 - kNames;
 
 // The first eight are told apart by people who see colours differently (Okabe and Ito 2008).
 constexpr std::array<Colour, 12> kColours = {{{0x00, 0x72, 0xb2},
@@ -57,21 +61,56 @@ std::vector<Tick> ticks_of(const std::vector<Tick>& wanted, const Range& range) 
   return ticks;
 }
 
+using Legend = std::vector<std::vector<std::string>>;  // lines of every name
+
+// A name in lines that fit into the legend, as far as its words do.
+template <typename Surface>
+std::vector<std::string> lines_of(const std::string& name) {
+  std::vector<std::string> lines(1);
+  std::istringstream words(name);
+  for (std::string word; words >> word;) {
+    std::string& line = lines.back();
+    if (line.empty())
+      line = word;
+    else if (Surface::text_width(line + " " + word) <= kNameWidth)
+      line += " " + word;
+    else
+      lines.push_back(word);
+  }
+  return lines;
+}
+
+// Of the picture, in pixels.
+int height_for(const Legend& legend) {
+  std::size_t lines = 0;
+  for (const auto& name : legend) lines += name.size();
+  return std::max(kLeastHeight, static_cast<int>(kTop + kLine * static_cast<double>(lines)));
+}
+
 class Plot {
  public:
-  Plot(const PlotAxes& axes, const std::vector<Curve>& curves, PlotSurface& surface)
+  Plot(const PlotAxes& axes, const std::vector<Curve>& curves, const Legend& legend,
+       PlotSurface& surface)
       : axes_(axes),
         curves_(curves),
+        legend_(legend),
         surface_(surface),
+        height_(height_for(legend)),
+        bottom_(height_ - kBelow),
         x_(range_of(axes.x_range, curves, &Range::first)),
         y_(range_of(axes.y_range, curves, &Range::second)) {}
 
   void draw() const {
     draw_axes();
+    double y = kTop + 12;
     for (std::size_t i = 0; i < curves_.size(); ++i) {
       const Colour& colour = kColours[i % kColours.size()];
       draw_curve(curves_[i], colour);
-      draw_name(i, colour);
+      surface_.draw_line({{kRight + 15, y - 5}, {kRight + 40, y - 5}}, 3, colour);
+      for (const std::string& line : legend_[i]) {
+        surface_.draw_text({kNames, y}, Anchor::kStart, line);
+        y += kLine;
+      }
     }
   }
 
@@ -79,15 +118,15 @@ class Plot {
   void draw_axes() const {
     for (const Tick& tick : ticks_of(axes_.x_ticks, x_)) {
       const double x = at_x(tick.at);
-      surface_.draw_line({{x, kTop}, {x, kBottom}}, 1, kGrid);
-      surface_.draw_text({x, kBottom + 20}, Anchor::kMiddle, tick.label);
+      surface_.draw_line({{x, kTop}, {x, bottom_}}, 1, kGrid);
+      surface_.draw_text({x, bottom_ + 20}, Anchor::kMiddle, tick.label);
     }
     for (const Tick& tick : ticks_of(axes_.y_ticks, y_)) {
       const double y = at_y(tick.at);
       surface_.draw_line({{kLeft, y}, {kRight, y}}, 1, kGrid);
       surface_.draw_text({kLeft - 6, y + 5}, Anchor::kEnd, tick.label);
     }
-    surface_.draw_text({(kLeft + kRight) / 2, kHeight - 10}, Anchor::kMiddle, axes_.x_title);
+    surface_.draw_text({(kLeft + kRight) / 2, height_ - 10.0}, Anchor::kMiddle, axes_.x_title);
     surface_.draw_text({kLeft, kTop - 10}, Anchor::kStart, axes_.y_title);
   }
 
@@ -100,31 +139,37 @@ class Plot {
     };
     for (const auto& [x, y] : curve.points) {
       if (std::isfinite(x) && std::isfinite(y))
-        piece.push_back({at_x(x), std::clamp(at_y(y), kTop, kBottom)});
+        piece.push_back({at_x(x), std::clamp(at_y(y), kTop, bottom_)});
       else
         end_piece();
     }
     end_piece();
   }
 
-  void draw_name(std::size_t index, const Colour& colour) const {
-    const double y = kTop + 12 + 20 * static_cast<double>(index);
-    surface_.draw_line({{kRight + 15, y - 5}, {kRight + 40, y - 5}}, 3, colour);
-    surface_.draw_text({kRight + 48, y}, Anchor::kStart, curves_[index].name);
-  }
-
   double at_x(double x) const {
     return kLeft + (x - x_.first) / (x_.second - x_.first) * (kRight - kLeft);
   }
   double at_y(double y) const {
-    return kBottom - (y - y_.first) / (y_.second - y_.first) * (kBottom - kTop);
+    return bottom_ - (y - y_.first) / (y_.second - y_.first) * (bottom_ - kTop);
   }
 
   const PlotAxes& axes_;
   const std::vector<Curve>& curves_;
+  const Legend& legend_;
   PlotSurface& surface_;
+  int height_;
+  double bottom_;
   Range x_, y_;
 };
+
+template <typename Surface>
+Surface drawn_on(const PlotAxes& axes, const std::vector<Curve>& curves) {
+  Legend legend;
+  for (const Curve& curve : curves) legend.push_back(lines_of<Surface>(curve.name));
+  Surface surface(kWidth, height_for(legend));
+  Plot(axes, curves, legend, surface).draw();
+  return surface;
+}
 
 }  // namespace
 
@@ -146,16 +191,12 @@ std::vector<double> round_ticks(double low, double high) {
 }
 
 std::string curve_plot_svg(const PlotAxes& axes, const std::vector<Curve>& curves) {
-  SvgSurface surface(kWidth, kHeight);
-  Plot(axes, curves, surface).draw();
-  return surface.element();
+  return drawn_on<SvgSurface>(axes, curves).element();
 }
 
 void write_curve_plot(const PlotAxes& axes, const std::vector<Curve>& curves,
                       const std::filesystem::path& path) {
-  PngSurface surface(kWidth, kHeight);
-  Plot(axes, curves, surface).draw();
-  surface.write(path);
+  drawn_on<PngSurface>(axes, curves).write(path);
 }
 
 }  // namespace tomofield::report

@@ -29,10 +29,11 @@ struct PlotAxes {
 
 /// The curves over common axes, with a grid line at every tick and a legend. Points that are not
 /// finite interrupt a curve; those beyond the ends of the y axis are drawn there. At most twelve
-/// curves have colours of their own. As an SVG element that needs nothing else:
+/// curves have colours of their own. The legend has long names on several lines, and a picture
+/// whose legend is long is as high as it takes. As an SVG element that needs nothing else:
 std::string curve_plot_svg(const PlotAxes& axes, const std::vector<Curve>& curves);
-/// The same as a PNG of 900 × 360 pixels, with letters as in report/text.h. Replaces `path`.
-/// Throws Error.
+/// The same as a PNG of 900 × 360 pixels (or higher), with letters as in report/text.h. Replaces
+/// `path`. Throws Error.
 void write_curve_plot(const PlotAxes& axes, const std::vector<Curve>& curves,
                       const std::filesystem::path& path);
 

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <limits>
 #include <set>
+#include <string>
+#include <utility>
 
 #include "png_picture.h"
 #include "scratch_directory.h"
@@ -43,6 +45,31 @@ TEST(CurvePlot, TwelveCurvesHaveColoursOfTheirOwn) {
   for (std::size_t at = svg.find(key); at != std::string::npos; at = svg.find(key, at + 1))
     colours.insert(svg.substr(at + key.size(), 7));
   EXPECT_EQ(colours.size(), 12u + 1u);  // and the grid's
+}
+
+// Where the texts of the legend stand, and the height of the picture.
+std::pair<std::vector<double>, double> legend_of(const std::vector<Curve>& curves) {
+  const std::string svg = curve_plot_svg({.x_title = "x", .y_title = "y"}, curves);
+  std::vector<double> heights;
+  const std::string key = "<text x=\"708.0\" y=\"";
+  for (std::size_t at = svg.find(key); at != std::string::npos; at = svg.find(key, at + 1))
+    heights.push_back(std::stod(svg.substr(at + key.size())));
+  return {heights, std::stod(svg.substr(svg.find(" height=\"") + 9))};
+}
+
+TEST(CurvePlot, HasALegendThatIsAllThereHoweverLong) {
+  for (const std::size_t count : {2u, 15u, 16u, 17u, 40u}) {
+    const auto [heights, height] =
+        legend_of(std::vector<Curve>(count, Curve{"curve", {{0, 0}, {1, 1}}}));
+    ASSERT_EQ(heights.size(), count);
+    EXPECT_LT(heights.back() + 4, height) << count << ", descenders too";
+    EXPECT_EQ(height > 360, count > 16) << count;
+    for (std::size_t i = 1; i < count; ++i) EXPECT_GE(heights[i], heights[i - 1] + 16);
+  }
+  const auto [heights, height] =
+      legend_of({{"a name of so many words that they do not fit into the width of the legend", {}},
+                 {"second", {}}});
+  EXPECT_EQ(heights.size(), 3u + 1u);
 }
 
 TEST(CurvePlot, HasTheTicksThatAreGiven) {

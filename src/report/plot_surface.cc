@@ -12,6 +12,7 @@
 namespace tomofield::report {
 namespace {
 
+constexpr int kFontSize = 13;  // of SVG
 constexpr Colour kWhite{255, 255, 255}, kBlack{0, 0, 0};
 
 std::int64_t nearest(double value) { return std::lround(value); }
@@ -21,8 +22,8 @@ std::int64_t nearest(double value) { return std::lround(value); }
 SvgSurface::SvgSurface(int width, int height)
     : svg_(fmt::format(
           "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
-          "height=\"{1}\" font-family=\"system-ui, sans-serif\" font-size=\"13\">\n",
-          width, height)) {}
+          "height=\"{1}\" font-family=\"system-ui, sans-serif\" font-size=\"{2}\">\n",
+          width, height, kFontSize)) {}
 
 void SvgSurface::draw_line(const std::vector<Point>& points, double width, const Colour& colour) {
   std::string path;
@@ -41,6 +42,11 @@ void SvgSurface::draw_text(Point at, Anchor anchor, std::string_view text) {
                       name, html_text(text));
 }
 
+// The letters are the browser's: on average a little over half as wide as they are high.
+double SvgSurface::text_width(std::string_view text) {
+  return 0.56 * kFontSize * static_cast<double>(text.size());
+}
+
 PngSurface::PngSurface(int width, int height) : canvas_(width, height, kWhite) {}
 
 void PngSurface::draw_line(const std::vector<Point>& points, double width, const Colour& colour) {
@@ -57,6 +63,10 @@ void PngSurface::draw_text(Point at, Anchor anchor, std::string_view text) {
                               : anchor == Anchor::kMiddle ? width / 2
                                                           : width;
   report::draw_text(canvas_, nearest(at.x) - before, nearest(up(at.y)), text, kBlack);
+}
+
+double PngSurface::text_width(std::string_view text) {
+  return static_cast<double>(report::text_width(text));
 }
 
 }  // namespace tomofield::report

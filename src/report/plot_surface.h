@@ -30,6 +30,8 @@ class SvgSurface : public PlotSurface {
   SvgSurface(int width, int height);
   void draw_line(const std::vector<Point>& points, double width, const Colour& colour) override;
   void draw_text(Point at, Anchor anchor, std::string_view text) override;
+  /// How wide a text becomes, about.
+  static double text_width(std::string_view text);
   /// The SVG element.
   std::string element() const { return svg_ + "</svg>\n"; }
 
@@ -42,6 +44,8 @@ class PngSurface : public PlotSurface {
   PngSurface(int width, int height);
   void draw_line(const std::vector<Point>& points, double width, const Colour& colour) override;
   void draw_text(Point at, Anchor anchor, std::string_view text) override;
+  /// How wide a text becomes.
+  static double text_width(std::string_view text);
   /// Replaces `path`. Throws Error.
   void write(const std::filesystem::path& path) const { canvas_.write(path); }
 
