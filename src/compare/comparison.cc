@@ -62,9 +62,13 @@ void add_pictures(const CompareOptions& options, const std::vector<Row>& rows,
   const double voxel_A = io::MrcReader(rows.front().volume).header().voxel_size_A[0];
   page.add_heading("Profile");
   page.add_paragraph("Density along x through the middle of the detail, in the file's units.");
+  std::vector<report::Curve> profiles = detail_profiles(shown, detail, voxel_A);
+  // The truth last, so that methods have the colours of the plots in which it is not.
+  std::ranges::rotate(profiles,
+                      profiles.begin() + static_cast<std::ptrdiff_t>(shown.size() - rows.size()));
   page.add_svg(report::curve_plot_svg(
       {.x_title = voxel_A > 0 ? "distance, Å" : "distance, voxels", .y_title = "density"},
-      detail_profiles(shown, detail, voxel_A)));
+      profiles));
 }
 
 void add_commands(const std::vector<Row>& rows, report::HtmlPage& page) {

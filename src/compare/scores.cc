@@ -58,6 +58,15 @@ std::string add_contrast(std::span<const Row> rows, Table& table) {
                      boxes_text(regions.foreground), boxes_text(regions.background));
 }
 
+// Where the correlation falls to `threshold`; if it never does, the finest shell's resolution: a
+// method without a figure would seem to be worse than those that have one.
+std::optional<double> resolution_A(const evaluate::Fsc& fsc, double threshold) {
+  const auto crossing = evaluate::crossing_A(fsc.frequency_per_A, fsc.all, threshold);
+  const bool falls =
+      std::ranges::any_of(fsc.all.correlation, [&](double value) { return value < threshold; });
+  return falls ? crossing : std::optional(1 / fsc.frequency_per_A.back());
+}
+
 // Correlates pairs of volumes, a pair a method; the resolution at `threshold` becomes a column.
 std::vector<report::Curve> add_correlation(std::span<const Row> rows,
                                            const std::vector<fs::path>& others, double threshold,
@@ -66,7 +75,7 @@ std::vector<report::Curve> add_correlation(std::span<const Row> rows,
   std::vector<report::Curve> curves;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const evaluate::Fsc fsc = evaluate::correlate_files({rows[i].volume, others[i], {}, {}, {}});
-    crossings.push_back(evaluate::crossing_A(fsc.frequency_per_A, fsc.all, threshold));
+    crossings.push_back(resolution_A(fsc, threshold));
     curves.push_back(
         report::fsc_curve(rows[i].run.method.title, fsc.frequency_per_A, fsc.all.correlation));
   }
@@ -116,6 +125,8 @@ Scores add_scores(const CompareOptions& options, const std::vector<Purpose>& pur
                         {"fsc_halves_0.143_A", "FSC 0.143 of halves, Å", Better::kLower, 1},
                         table));
   }
+  if (!scores.correlations.empty())
+    scores.remark += " A shell correlation that never falls so low counts as the finest shell's.";
   if (options.hold_out > 0) add_held_out_errors(rows_for(Purpose::kHeldOutViews), table);
   if (options.hold_out > 0 && options.tune)
     scores.remark +=

@@ -55,10 +55,10 @@ Table table_of_costs(const std::vector<Row>& rows) {
     const auto count = number(row.figures, "parameters");
     parameters.push_back(count ? std::optional(*count / 1e6) : std::nullopt);
   }
-  table.add({"core_seconds", "core-s", Column::Better::kLower, 1}, core);
+  table.add({"core_seconds", "core‑s", Column::Better::kLower, 1}, core);
   table.add({"wall_seconds", "wall, s", Column::Better::kLower, 1}, wall);
   table.add({"peak_MiB", "memory, MiB", Column::Better::kLower, 0}, memory);
-  table.add({"parameters_M", "parameters, M", Column::Better::kNeither, 2}, parameters);
+  table.add({"parameters_M", "parameters, M", Column::Better::kNeither, 3}, parameters);
   return table;
 }
 

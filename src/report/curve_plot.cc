@@ -186,7 +186,7 @@ std::vector<double> round_ticks(double low, double high) {
   std::vector<double> ticks;
   const double slack = 1e-9 * step;  // of ticks at the very ends
   for (double k = std::ceil((low - slack) / step); k * step <= high + slack; ++k)
-    ticks.push_back(k * step);
+    ticks.push_back(k * step + 0.0);  // no minus before a zero
   return ticks;
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <set>
@@ -22,6 +23,7 @@ TEST(RoundTicks, AreOneTwoOrFiveTimesAPowerOfTenApart) {
   near(round_ticks(0, 1), {0, 0.2, 0.4, 0.6, 0.8, 1});
   near(round_ticks(-3, 17), {0, 5, 10, 15});
   near(round_ticks(120, 480), {200, 300, 400});
+  EXPECT_FALSE(std::signbit(round_ticks(0, 1).front()));
 }
 
 TEST(CurvePlot, DrawsEveryCurveAndItsName) {

@@ -15,8 +15,8 @@ constexpr const char* kStyle = R"(
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2em auto; max-width: 1400px; padding: 0 1em; color: #1a1a1a; }
 h1 { font-size: 1.6em; } h2 { font-size: 1.2em; margin-top: 2em; }
 table { border-collapse: collapse; } th, td { padding: .25em .8em; text-align: right; border-bottom: 1px solid #ddd; }
-th:first-child, td:first-child { text-align: left; } th { font-weight: 600; }
-td.best { font-weight: 700; } td.better { background: #fde9c8; } tr.main td { background: #eef4fb; }
+th:first-child, td:first-child { text-align: left; min-width: 11em; } th { font-weight: 600; }
+td.best { font-weight: 700; } td.better { background: #fde9c8; }
 figure { display: inline-block; margin: 0 .6em .6em 0; vertical-align: top; }
 figure img { display: block; image-rendering: pixelated; max-width: 100%; width: 320px; }
 figcaption { font-size: .9em; } pre { background: #f5f5f5; padding: .8em; overflow-x: auto; }
