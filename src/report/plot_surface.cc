@@ -58,7 +58,7 @@ void PngSurface::draw_line(const std::vector<Point>& points, double width, const
 }
 
 void PngSurface::draw_text(Point at, Anchor anchor, std::string_view text) {
-  const std::int64_t width = text_width(text);
+  const std::int64_t width = report::text_width(text);
   const std::int64_t before = anchor == Anchor::kStart    ? 0
                               : anchor == Anchor::kMiddle ? width / 2
                                                           : width;
