@@ -182,12 +182,9 @@ void run(Arguments& arguments, const distributed::Communicator& processes) {
     options.field.activation = "identity";
   options.field.with_margin = options.specimen.with_margin;
   options.input.resample = options.fit.engine == "slab";
-  std::optional<tilt_series::TiltSeries> series;
-  processes.together([&] {
-    reconstruct::check_options(options);
-    series.emplace(options.input);
-  });
-  run_reconstruction(*series, options, arguments.dry_run, processes);
+  processes.together([&] { reconstruct::check_options(options); });
+  const tilt_series::TiltSeries series(options.input, processes);
+  run_reconstruction(series, options, arguments.dry_run, processes);
 }
 
 }  // namespace

@@ -115,14 +115,19 @@ std::string Communicator::broadcast(std::string text, int owner) const {
   if (size_ == 1) return text;
   std::int64_t length = rank_ == owner ? std::ssize(text) : 0;
   combine(std::span(&length, 1));
-  const Waiting waiting(traffic_.seconds);
   text.resize(static_cast<std::size_t>(length));
-  for_each_piece(std::span(text), [&](std::span<char> piece) {
+  broadcast(std::as_writable_bytes(std::span(text)), owner);
+  return text;
+}
+
+void Communicator::broadcast(std::span<std::byte> bytes, int owner) const {
+  if (size_ == 1) return;
+  const Waiting waiting(traffic_.seconds);
+  for_each_piece(bytes, [&](std::span<std::byte> piece) {
     Requests request;
-    MPI_Ibcast(piece.data(), static_cast<int>(piece.size()), MPI_CHAR, owner, kAll, request.next());
+    MPI_Ibcast(piece.data(), static_cast<int>(piece.size()), MPI_BYTE, owner, kAll, request.next());
     finish(request);
   });
-  return text;
 }
 
 void Communicator::exchange(const Halo& halo) const {

@@ -42,7 +42,8 @@ class Communicator {
   void combine(std::span<T> values) const;
   double largest(double value) const;
   bool any(bool value) const;
-  /// The text that `owner` has.
+  /// What `owner` has, to all.
+  void broadcast(std::span<std::byte> bytes, int owner) const;
   std::string broadcast(std::string text, int owner = 0) const;
 
   /// Hands an array to the process before this one (in order of ranks) and takes one from it,

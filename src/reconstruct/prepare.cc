@@ -118,6 +118,40 @@ ViewBrightness view_brightness(std::span<const float> image, std::span<const std
   return {mean, std::sqrt(std::max(variance - noise * noise, 1e-4 * variance))};
 }
 
+// Reads views one after another, on all processes alike: each opens every so-manieth and hands it
+// to the others.
+class SharedViews {
+ public:
+  SharedViews(const tilt_series::TiltSeries& series, const distributed::Communicator& processes)
+      : series_(series), processes_(processes) {}
+
+  void read(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
+    if (processes_.size() == 1) return series_.read_view(view, image, valid);
+    const int owner = static_cast<int>(view) % processes_.size();
+    if (owner == 0) read_own(view + static_cast<std::size_t>(processes_.rank()), image.size());
+    if (owner == processes_.rank()) {
+      std::ranges::copy(own_image_, image.begin());
+      std::ranges::copy(own_valid_, valid.begin());
+    }
+    processes_.broadcast(std::as_writable_bytes(image), owner);
+    processes_.broadcast(std::as_writable_bytes(valid), owner);
+  }
+
+ private:
+  void read_own(std::size_t view, std::size_t size) {
+    own_image_.resize(size);
+    own_valid_.resize(size);
+    processes_.together([&] {
+      if (view < series_.views().size()) series_.read_view(view, own_image_, own_valid_);
+    });
+  }
+
+  const tilt_series::TiltSeries& series_;
+  const distributed::Communicator& processes_;
+  std::vector<float> own_image_;
+  std::vector<std::uint8_t> own_valid_;
+};
+
 // Of every view; each process measures some.
 std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& series,
                                                 const PreparedSeries& prepared,
@@ -253,10 +287,11 @@ PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
   const tilt_series::SlabViews::Shape shape = prepared.rays_shape();
   const distributed::Range slabs =
       slabs_of_bands(own_bands(shape.num_rows, band_rows, processes), band_rows, shape.num_rows);
+  SharedViews views(series, processes);
   prepared.rays = std::make_unique<tilt_series::SlabViews>(
       shape, slabs, prepared.unit,
-      [&series](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
-        series.read_view(view, image, valid);
+      [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
+        views.read(view, image, valid);
       },
       scratch_dir);
   prepared.masks = series.mask_figures();

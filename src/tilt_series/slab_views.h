@@ -14,7 +14,8 @@
 
 namespace tomofield::tilt_series {
 
-/// Reads a view as height × width floats and which pixels are measurements.
+/// Reads a view as height × width floats and which pixels are measurements. Called for the views
+/// in order.
 using ReadView =
     std::function<void(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid)>;
 

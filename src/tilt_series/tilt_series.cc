@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <span>
+#include <utility>
 
 #include "base/check.h"
 #include "base/log.h"
@@ -23,8 +26,9 @@ namespace {
 /// What is wrong with the raw pixels of a section.
 struct PixelCensus {
   std::int64_t num_not_finite = 0;
-  std::int64_t num_bad = 0;  // hot or dead
-  bool is_constant = true;
+  std::int64_t num_bad = 0;           // hot or dead
+  std::int64_t is_constant = 1;       // 0 or 1: all numbers, to be sent
+  std::int64_t has_measurements = 0;  // pixels that are left
 };
 
 /// Marks pixels that are NaN or infinite as no measurements.
@@ -39,7 +43,7 @@ PixelCensus mask_not_finite(MaskedImage* image) {
       continue;
     }
     if (first_finite == nullptr) first_finite = &image->values[i];
-    census.is_constant = census.is_constant && image->values[i] == *first_finite;
+    if (image->values[i] != *first_finite) census.is_constant = 0;
   }
   return census;
 }
@@ -55,6 +59,21 @@ void append_block_means(const MaskedImage& image, std::vector<float>* means) {
   for (std::size_t i = 0; i < blocks.values.size(); ++i) {
     if (blocks.valid[i]) means->push_back(blocks.values[i]);
   }
+}
+
+/// Values of every view, of which each process has some, one view after another on all.
+std::vector<float> gather(const std::vector<std::vector<float>>& views,
+                          const distributed::Communicator& processes) {
+  std::vector<std::int64_t> sizes;
+  for (const auto& values : views) sizes.push_back(std::ssize(values));
+  processes.combine(std::span(sizes));
+  std::vector<float> all(
+      static_cast<std::size_t>(std::accumulate(sizes.begin(), sizes.end(), std::int64_t{0})));
+  auto at = all.begin();
+  for (std::size_t view = 0; view < views.size(); at += sizes[view++])
+    std::ranges::copy(views[view], at);
+  processes.combine(std::span(all));
+  return all;
 }
 
 double percentile_in_place(std::vector<float>& values, double fraction) {
@@ -96,8 +115,12 @@ struct TiltSeries::Impl {
     const io::MrcHeader& header = stack.header();
     width = reduced_size(options.resample ? plan.aligned_width : header.nx, plan.bin_factor);
     height = reduced_size(options.resample ? plan.aligned_height : header.ny, plan.bin_factor);
-    survey();
-    find_beads();
+  }
+
+  /// Reads every view and says what was found.
+  void look_over(const distributed::Communicator& processes) {
+    survey(processes);
+    processes.together([&] { find_beads(); });
     base::log_info(fmt::format(
         "'{}': {} of {} sections, tilts {:.1f}° to {:.1f}° from {}, views of {} × {} pixels of {} "
         "Å",
@@ -155,8 +178,7 @@ struct TiltSeries::Impl {
     return num_raised;
   }
 
-  void require_measurements(std::size_t view, const PixelCensus& census,
-                            const MaskedImage& image) const {
+  void require_measurements(std::size_t view, const PixelCensus& census) const {
     const auto num_pixels = static_cast<double>(stack.header().nx * stack.header().ny);
     const double part = static_cast<double>(census.num_not_finite) / num_pixels;
     if (part > kMostNotFinite) {
@@ -171,7 +193,7 @@ struct TiltSeries::Impl {
                       "--exclude {}",
                       describe(view), views[view].section + 1));
     }
-    if (std::find(image.valid.begin(), image.valid.end(), 1) == image.valid.end()) {
+    if (!census.has_measurements) {
       throw Error(
           fmt::format("{} has no pixel left: its alignment moves it out of the view, it is all "
                       "flat fill, or --mask is zero all over it; leave it out with --exclude {}",
@@ -185,21 +207,50 @@ struct TiltSeries::Impl {
 
   /// Reads every view once: refuses what cannot be used, finds I0 and the
   /// noise. The noise of I0 − I is that of I; only a logarithm needs I0 first.
-  void survey() {
-    std::vector<float> block_means;
-    std::int64_t num_bad_pixels = 0;
-    for (std::size_t view = 0; view < views.size(); ++view) {
-      PixelCensus census;
-      const MaskedImage image = load(view, &census);
-      require_measurements(view, census, image);
-      num_bad_pixels += census.num_bad;
-      if (options.contrast == Contrast::kDark) append_block_means(image, &block_means);
-      if (!options.take_log) noise_sigma.push_back(estimate_noise_sigma(image));
-    }
-    beads.figures.num_bad_pixels = num_bad_pixels;
+  void survey(const distributed::Communicator& processes) {
+    std::vector<PixelCensus> found(views.size());
+    std::vector<std::vector<float>> means(views.size());
+    noise_sigma.assign(views.size(), 0.0);
+    for_own_views(processes, [&](std::size_t view) {
+      const MaskedImage image = load(view, &found[view]);
+      found[view].has_measurements =
+          std::find(image.valid.begin(), image.valid.end(), 1) != image.valid.end();
+      if (options.contrast == Contrast::kDark) append_block_means(image, &means[view]);
+      if (!options.take_log && found[view].has_measurements)
+        noise_sigma[view] = estimate_noise_sigma(image);
+    });
+    check(std::move(found), processes);
+    processes.combine(std::span(noise_sigma));
     if (options.contrast == Contrast::kBright) return;
+    std::vector<float> block_means = gather(means, processes);
     if (!block_means.empty()) empty_beam = percentile_in_place(block_means, kEmptyBeamFraction);
-    if (options.take_log) survey_logarithms();
+    if (options.take_log) survey_logarithms(processes);
+  }
+
+  /// Calls body(view) on one of the processes for each view.
+  template <typename Body>
+  void for_own_views(const distributed::Communicator& processes, const Body& body) const {
+    processes.together([&] {
+      for (std::size_t view = static_cast<std::size_t>(processes.rank()); view < views.size();
+           view += static_cast<std::size_t>(processes.size()))
+        body(view);
+    });
+  }
+
+  /// What every process found in its views: of others, `is_constant` is as it begins.
+  void check(std::vector<PixelCensus> found, const distributed::Communicator& processes) {
+    for (std::size_t view = 0; view < views.size(); ++view) {
+      if (static_cast<int>(view) % processes.size() != processes.rank())
+        found[view].is_constant = 0;
+    }
+    static_assert(sizeof(PixelCensus) == 4 * sizeof(std::int64_t));
+    processes.combine(std::span(reinterpret_cast<std::int64_t*>(found.data()), 4 * found.size()));
+    processes.together([&] {
+      for (std::size_t view = 0; view < views.size(); ++view) {
+        require_measurements(view, found[view]);
+        beads.figures.num_bad_pixels += found[view].num_bad;
+      }
+    });
   }
 
   /// Finds what hides beads and fiducials, in aligned images that have no such masks yet.
@@ -234,21 +285,23 @@ struct TiltSeries::Impl {
             disc.radius_px * std::sqrt(std::abs(m.m11 * m.m22 - m.m12 * m.m21))};
   }
 
-  void survey_logarithms() {
+  void survey_logarithms(const distributed::Communicator& processes) {
     if (!(empty_beam > 0.0)) {
-      throw Error(
+      throw distributed::SharedError(
           fmt::format("--log needs positive intensities, but the empty beam of '{}' is "
                       "found at {}; the data may be normalised or line integrals already: "
                       "leave --log out",
                       options.stack.string(), empty_beam));
     }
     std::int64_t num_raised = 0;
-    for (std::size_t view = 0; view < views.size(); ++view) {
+    for_own_views(processes, [&](std::size_t view) {
       PixelCensus census;
       MaskedImage image = load(view, &census);
       num_raised += convert(&image);
-      noise_sigma.push_back(estimate_noise_sigma(image));
-    }
+      noise_sigma[view] = estimate_noise_sigma(image);
+    });
+    processes.combine(std::span(noise_sigma));
+    processes.combine(std::span(&num_raised, 1));
     if (num_raised == 0) return;
     base::log_warning(fmt::format(
         "{} pixels of '{}' ({:.3g} %) are zero, negative or below a thousandth of the empty beam "
@@ -260,7 +313,11 @@ struct TiltSeries::Impl {
   }
 };
 
-TiltSeries::TiltSeries(const TiltSeriesOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+TiltSeries::TiltSeries(const TiltSeriesOptions& options,
+                       const distributed::Communicator& processes) {
+  processes.together([&] { impl_ = std::make_unique<Impl>(options); });
+  impl_->look_over(processes);
+}
 TiltSeries::~TiltSeries() = default;
 TiltSeries::TiltSeries(TiltSeries&&) noexcept = default;
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "distributed/communicator.h"
 #include "geometry/raw_from_aligned.h"
 
 namespace tomofield::tilt_series {
@@ -61,7 +62,10 @@ class TiltSeries {
  public:
   /// Opens and checks everything: counts, angles, sizes, every pixel of every
   /// view once. Throws Error as docs/errors.md lists; warnings go to base/log.h.
-  explicit TiltSeries(const TiltSeriesOptions& options);
+  explicit TiltSeries(const TiltSeriesOptions& options)
+      : TiltSeries(options, distributed::Communicator::alone()) {}
+  /// The same by several processes, of which each checks some of the views.
+  TiltSeries(const TiltSeriesOptions& options, const distributed::Communicator& processes);
   ~TiltSeries();
   TiltSeries(TiltSeries&&) noexcept;
 
