@@ -20,6 +20,7 @@ namespace tomofield::reconstruct {
 namespace {
 
 constexpr std::size_t kProgram = std::size_t{20} << 20;  // with its libraries
+constexpr std::size_t kMpi = std::size_t{40} << 20;      // OpenMPI's own, and what is packed for it
 
 // Reading a view: its raw pixels, aligned and as they are, with their masks, and what
 // becomes of them.
@@ -123,7 +124,8 @@ std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, co
       plan.ray_geometry
           ? RayTerm::working_memory(*plan.ray_geometry, domain, options.fit, plan.rays_shape())
           : 0;
-  return kProgram + rays + coarse_rays + std::max(fitting + tracing, reading_memory(plan));
+  const std::size_t program = kProgram + (processes.size() > 1 ? kMpi : 0);
+  return program + rays + coarse_rays + std::max(fitting + tracing, reading_memory(plan));
 }
 
 }  // namespace
