@@ -48,7 +48,7 @@ std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
                             const projection::SampleGrid& grid, const MethodFacts& method,
                             const MethodSize& size, bool tunes) {
   constexpr std::size_t kTrialSlabs = reconstruct::kTrialRows / kLanes;
-  constexpr std::size_t kFixed = std::size_t{48} << 20;  // program and libraries
+  constexpr std::size_t kFixed = std::size_t{24} << 20;  // program and libraries
   const std::size_t slabs = static_cast<std::size_t>((plan.roi.height() + kLanes - 1) / kLanes);
   const std::size_t rays = static_cast<std::size_t>(plan.geometry.num_views()) *
                            static_cast<std::size_t>(plan.geometry.width) * kLanes;
