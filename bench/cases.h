@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "bench/measure.h"
+#include "projection/slab_projector.h"
 
 namespace tomofield::bench {
 
@@ -20,7 +21,7 @@ inline constexpr const char* kStepForward = "step: projection forward";
 inline constexpr const char* kStepAdjoint = "step: projection adjoint";
 
 /// Slabs that a fit projects together.
-inline constexpr int kSlabsTogether = 2;
+inline constexpr int kSlabsTogether = projection::SlabProjector::kSlabsTogether;
 
 /// The projection of slabs of 256 × 16 × 64 voxels, 94 views, −70 … 69.5°: two together, and one.
 std::vector<Case> projection_cases();

@@ -42,8 +42,8 @@ std::vector<int> views_held_out(const reconstruct::PreparedSeries& series,
   return reconstruct::held_out_views(series.geometry.tilt_deg, options.hold_out);
 }
 
-// What the method holds of each slab, and a pair of slabs and its rays for each thread; a tuning has
-// copies of the rays of its rows.
+// What the method holds of each slab, and a pair of slabs and its rays for each thread; a tuning
+// has copies of the rays of its rows.
 std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
                             const projection::SampleGrid& grid, const MethodFacts& method,
                             const MethodSize& size, bool tunes) {
@@ -54,7 +54,7 @@ std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
                            static_cast<std::size_t>(plan.geometry.width) * kLanes;
   const std::size_t values_of_slab = static_cast<std::size_t>(method.volumes) * grid.size() +
                                      static_cast<std::size_t>(method.detectors) * rays;
-  const std::size_t values_of_thread = 2 * (grid.size() + rays);
+  const std::size_t values_of_thread = SlabPair::kMost * (grid.size() + rays);
   const std::size_t copied_slabs = tunes ? std::min<std::size_t>(slabs, kTrialSlabs) : 0;
   return kFixed + size.bytes +
          sizeof(float) * (slabs * values_of_slab + copied_slabs * rays +

@@ -122,7 +122,7 @@ ChambollePock::ChambollePock(VoxelProblem& problem, const TvOptions& options, do
       py_(problem.grid(), problem.num_rows()),
       pz_(problem.grid(), problem.num_rows()) {
   for (std::size_t pair = 0; pair < problem.num_pairs(); ++pair)
-    q_.emplace_back(2 * problem.detector_size());
+    q_.emplace_back(SlabPair::kMost * problem.detector_size());
   measure_steps();
   x_.fill(static_cast<float>(options.non_negative ? std::max(0.0, start) : start));
   if (options.penalty == "concave") begin_concave_penalty();
@@ -267,7 +267,7 @@ Solution reconstruct_tv(VoxelProblem& problem, const TvOptions& options, double 
     if (iteration == options.iterations) break;
     solver.step_densities(iteration + 1 == options.iterations);
     if (takes_weights_after(iteration + 1, options)) solver.take_weights();
-    if ((iteration + 1) % kViewFitInterval == 0) {
+    if (problem.fits_view_models() && (iteration + 1) % kViewFitInterval == 0) {
       problem.fit_view_models(data);
       solver.measure_steps();
     }

@@ -98,7 +98,7 @@ std::vector<loss::ViewSums> view_sums(const VoxelProblem& problem, std::span<con
                                       VoxelVolume& densities) {
   std::vector<std::vector<loss::ViewSums>> sums(problem.num_pairs());
   for_each_pair(problem.num_slabs(), [&](const SlabPair& pair) {
-    base::AlignedBuffer<float> detector(2 * problem.detector_size(views));
+    base::AlignedBuffer<float> detector(SlabPair::kMost * problem.detector_size(views));
     sums[pair.index()] =
         problem.residuals(pair, views, densities.slab(pair.first), detector.data());
   });

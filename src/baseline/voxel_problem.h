@@ -37,7 +37,7 @@ class VoxelProblem {
   const tilt_series::SlabViews& rays() const { return rays_; }
   std::int64_t num_rows() const { return rays_.shape().num_rows; }
   int num_slabs() const { return rays_.num_slabs(); }
-  std::size_t num_pairs() const { return static_cast<std::size_t>(num_slabs() + 1) / 2; }
+  std::size_t num_pairs() const { return static_cast<std::size_t>(SlabPair::number(num_slabs())); }
   /// The views that are fitted, ascending.
   const std::vector<int>& views() const { return views_; }
   const loss::ViewModel& view_model(int view) const {
@@ -87,6 +87,7 @@ class VoxelProblem {
     projector_.backward(detector, views, samples, num_slabs);
   }
 
+  bool fits_view_models() const { return fits_scale_; }
   /// Fits scale and offset of each view to the sums of all slabs (loss/data_term.h),
   /// if the problem is to.
   void fit_view_models(const std::vector<loss::ViewSums>& sums);

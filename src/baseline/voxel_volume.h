@@ -11,15 +11,18 @@
 #include "base/parallel.h"
 #include "kernels/lanes.h"
 #include "projection/sample_grid.h"
+#include "projection/slab_projector.h"
 
 namespace tomofield::baseline {
 
 /// Slabs that are projected together, which takes less time: an even one and, but for the end, the
 /// one after it.
 struct SlabPair {
+  static constexpr int kMost = projection::SlabProjector::kSlabsTogether;
   int first = 0, count = 1;
   int end() const { return first + count; }
-  std::size_t index() const { return static_cast<std::size_t>(first / 2); }
+  std::size_t index() const { return static_cast<std::size_t>(first / kMost); }
+  static int number(int num_slabs) { return (num_slabs + kMost - 1) / kMost; }
 };
 
 /// A volume whose voxels are the samples of the projector, slab after slab: each
@@ -90,16 +93,16 @@ inline std::size_t num_voxels(const projection::SampleGrid& grid, std::int64_t n
 /// Calls body(pair) for every SlabPair, in any order and on any thread.
 template <typename Body>
 void for_each_pair(int num_slabs, Body&& body) {
-  base::parallel_for((num_slabs + 1) / 2, [&](std::int64_t index) {
-    const int first = 2 * static_cast<int>(index);
-    body(SlabPair{first, std::min(2, num_slabs - first)});
+  base::parallel_for(SlabPair::number(num_slabs), [&](std::int64_t index) {
+    const int first = SlabPair::kMost * static_cast<int>(index);
+    body(SlabPair{first, std::min(SlabPair::kMost, num_slabs - first)});
   });
 }
 
 /// Sum of body(pair) over all pairs, in their order whatever the thread count.
 template <typename Body>
 double sum_over_pairs(int num_slabs, Body&& body) {
-  std::vector<double> parts(static_cast<std::size_t>((num_slabs + 1) / 2));
+  std::vector<double> parts(static_cast<std::size_t>(SlabPair::number(num_slabs)));
   for_each_pair(num_slabs, [&](const SlabPair& pair) { parts[pair.index()] = body(pair); });
   return std::accumulate(parts.begin(), parts.end(), 0.0);
 }

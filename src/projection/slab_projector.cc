@@ -285,12 +285,13 @@ std::size_t SlabProjector::detector_size(std::size_t num_views) const {
   return (num_views * static_cast<std::size_t>(geometry_.width) + 1) * kLanes;
 }
 
-// Slabs are projected in pairs, the last of an odd number alone.
+// The last of an odd number is projected alone.
 template <typename ProjectSlabs>
 void for_each_pair(int num_slabs, std::ptrdiff_t samples, std::ptrdiff_t detector,
                    const ProjectSlabs& project) {
-  for (int slab = 0; slab < num_slabs; slab += 2)
-    project(Slabs{std::min(2, num_slabs - slab), samples, detector}, slab * samples,
+  constexpr int kTogether = SlabProjector::kSlabsTogether;
+  for (int slab = 0; slab < num_slabs; slab += kTogether)
+    project(Slabs{std::min(kTogether, num_slabs - slab), samples, detector}, slab * samples,
             slab * detector);
 }
 

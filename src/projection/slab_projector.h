@@ -16,6 +16,8 @@ namespace tomofield::projection {
 /// transposes. Thread-safe.
 class SlabProjector {
  public:
+  /// Slabs that share the work of a crossing; of more, so many at a time do.
+  static constexpr int kSlabsTogether = 2;
   /// How the rays of a view cross the lines of a segment, which are rows of z
   /// for flat views and columns of x for steep ones: pixel u crosses line l at
   /// sample offset + l offset_per_line + u step.

@@ -6,6 +6,7 @@
 #include "base/lanes.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "projection/slab_projector.h"
 #include "reconstruct/domain.h"
 #include "reconstruct/fit.h"
 #include "reconstruct/held_out.h"
@@ -32,7 +33,7 @@ std::size_t reading_memory(const PreparedSeries& plan) {
   return static_cast<std::size_t>(kCopies * kBytesPerPixel * (raw + binned));
 }
 
-constexpr int kSlabsOfThread = 2;  // a pair
+constexpr int kSlabsOfThread = projection::SlabProjector::kSlabsTogether;
 
 // What each thread works on: a pair of slabs with their gradient and the views of a step, rows for
 // the total variation, a leaf's vertices; and then a part of the volume.

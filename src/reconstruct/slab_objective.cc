@@ -11,8 +11,7 @@ namespace tomofield::reconstruct {
 using kernels::kLanes;
 using projection::SampleSegment;
 
-// Slabs that are projected together (projection/slab_projector.h).
-constexpr int kPair = 2;
+constexpr int kPair = projection::SlabProjector::kSlabsTogether;
 
 // What a thread needs for a band; kept between calls. Slabs and detectors of a pair follow each
 // other.

@@ -187,6 +187,23 @@ def assert_same_tuning(one, other):
     np.testing.assert_allclose(*errors, rtol=1e-6)
 
 
+def with_broken_views(source, every):
+    """Which views --hold-out EVERY scores, and the series with these turned upside down."""
+    scored = list(range(every // 2, len(source.views) - 1, every))
+    views = source.views.copy()
+    views[scored] = views[scored, :, ::-1]
+    return scored, source.with_views("broken", views)
+
+
+def assert_scored_views_have_no_say(figures, scored):
+    """`figures` of a series and of one whose scored views are broken: the same tuning, which did not
+    use them, and a score that they spoil."""
+    assert_same_tuning(*(f["tuning"] for f in figures))
+    assert not set(figures[0]["tuning"]["predicted_views"]) & set(scored)
+    assert [view["view"] for view in figures[0]["held_out"]["views"]] == scored
+    assert figures[1]["held_out"]["error"] > 2 * figures[0]["held_out"]["error"]
+
+
 def run_tests(tests):
     """Runs every test_ function of a script and removes what they wrote."""
     for name, test in list(tests.items()):
