@@ -45,9 +45,9 @@ void compare_with_reference(const Arrangement& t) {
 
 TEST(SmallGemm, AgreesWithTheReferenceAtOddSizes) {
   for_each_simd_target([] {
-    for (const std::ptrdiff_t rows : {1, 3, 7, 17}) {
+    for (const std::ptrdiff_t rows : {1, 3, 7, 17, 33}) {
       for (const std::ptrdiff_t depth : {1, 5, 16, 33}) {
-        for (const std::ptrdiff_t width : {1, 3, 7, 8, 15, 16, 17, 31, 33, 50}) {
+        for (const std::ptrdiff_t width : {1, 3, 7, 8, 12, 15, 16, 17, 24, 31, 33, 50}) {
           SCOPED_TRACE(::testing::Message() << rows << " x " << depth << " x " << width);
           compare_with_reference({rows, depth, width});
           compare_with_reference({rows, depth, width, true, 3});

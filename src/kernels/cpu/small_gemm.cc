@@ -10,68 +10,126 @@ HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// A block of kRows rows by kVecs vectors of C lives in registers: with 6 × 2
-// there are 12 accumulators, 2 vectors of B and one broadcast, all that SSE
-// and AVX2 have, and 12 independent FMAs cover their latency on two ports.
-template <int kRows, int kVecs, class D>
+// Columns of C that are worked on together: kFull vectors and, with kHalf, half a vector beside
+// them (24 ranks are one and a half vectors of AVX-512, and one pass over A and C in place of two).
+//
+// A block of kMostRows rows of a panel lives in registers. Bound: kRows · kVecs FMAs, two a cycle,
+// against kRows broadcasts of A and kVecs loads of B, two a cycle as well; a row of one vector has
+// its broadcast inside the FMA. Eight FMAs at least cover their latency.
+template <int kFullVecs, bool kHalfVec>
+struct Panel {
+  static constexpr int kFull = kFullVecs;
+  static constexpr bool kHalf = kHalfVec;
+  static constexpr int kVecs = kFull + (kHalf ? 1 : 0);
+#if HWY_TARGET <= HWY_AVX3
+  static constexpr int kMostRows = kVecs == 3 ? 8 : 12;  // of 32 registers
+#else
+  static constexpr int kMostRows = kVecs == 1 ? 8 : 12 / kVecs;  // of 16
+#endif
+};
+
+// Rows of A, four by four: a pointer and the stride address all four.
+template <int kRows>
+class RowsOfA {
+ public:
+  RowsOfA(const float* a, std::ptrdiff_t stride) : stride_(stride) {
+    for (int g = 0; g < kGroups; ++g) group_[g] = a + 4 * g * stride;
+  }
+  HWY_INLINE float operator[](int m) const { return group_[m / 4][(m % 4) * stride_]; }
+  HWY_INLINE void advance(std::ptrdiff_t step) {
+    for (int g = 0; g < kGroups; ++g) group_[g] += step;
+  }
+
+ private:
+  static constexpr int kGroups = (kRows + 3) / 4;
+  const float* group_[kGroups];
+  std::ptrdiff_t stride_;
+};
+
+template <class P, int kRows, class D>
 HWY_INLINE void block(D d, const SmallGemm& g, std::ptrdiff_t row, std::ptrdiff_t col) {
+  const hn::Half<D> half;
   using Vec = hn::Vec<D>;
+  using HalfVec = hn::Vec<hn::Half<D>>;
   const std::ptrdiff_t lanes = static_cast<std::ptrdiff_t>(hn::Lanes(d));
-  const float* a = g.a + row * g.a_row;
+  RowsOfA<kRows> a(g.a + row * g.a_row, g.a_row);
   const float* b = g.b + col;
   float* const c = g.c + row * g.c_row + col;
-  Vec acc[kRows][kVecs];
-  for (int m = 0; m < kRows; ++m)
-    for (int v = 0; v < kVecs; ++v) acc[m][v] = hn::LoadU(d, c + m * g.c_row + v * lanes);
+  Vec acc[kRows][P::kFull];
+  HalfVec side[kRows];
+  for (int m = 0; m < kRows; ++m) {
+    for (int v = 0; v < P::kFull; ++v) acc[m][v] = hn::LoadU(d, c + m * g.c_row + v * lanes);
+    if constexpr (P::kHalf) side[m] = hn::LoadU(half, c + m * g.c_row + P::kFull * lanes);
+  }
   for (std::ptrdiff_t n = 0; n < g.depth; ++n) {
-    Vec bv[kVecs];
-    for (int v = 0; v < kVecs; ++v) bv[v] = hn::LoadU(d, b + v * lanes);
+    Vec bv[P::kFull];
+    HalfVec b_side;
+    for (int v = 0; v < P::kFull; ++v) bv[v] = hn::LoadU(d, b + v * lanes);
+    if constexpr (P::kHalf) b_side = hn::LoadU(half, b + P::kFull * lanes);
     for (int m = 0; m < kRows; ++m) {
-      const Vec am = hn::Set(d, a[m * g.a_row]);
-      for (int v = 0; v < kVecs; ++v) acc[m][v] = hn::MulAdd(am, bv[v], acc[m][v]);
+      const Vec am = hn::Set(d, a[m]);
+      for (int v = 0; v < P::kFull; ++v) acc[m][v] = hn::MulAdd(am, bv[v], acc[m][v]);
+      if constexpr (P::kHalf) side[m] = hn::MulAdd(hn::LowerHalf(half, am), b_side, side[m]);
     }
-    a += g.a_col;
+    a.advance(g.a_col);
     b += g.b_row;
   }
-  for (int m = 0; m < kRows; ++m)
-    for (int v = 0; v < kVecs; ++v) hn::StoreU(acc[m][v], d, c + m * g.c_row + v * lanes);
+  for (int m = 0; m < kRows; ++m) {
+    for (int v = 0; v < P::kFull; ++v) hn::StoreU(acc[m][v], d, c + m * g.c_row + v * lanes);
+    if constexpr (P::kHalf) hn::StoreU(side[m], half, c + m * g.c_row + P::kFull * lanes);
+  }
 }
 
-// The last rows of a panel, fewer than kRows.
-template <int kRows, int kVecs, class D>
-HWY_INLINE void rest(D d, const SmallGemm& g, std::ptrdiff_t row, std::ptrdiff_t col) {
-  if constexpr (kRows > 1) {
-    if (g.rows - row == kRows - 1) {
-      block<kRows - 1, kVecs>(d, g, row, col);
+template <class P, int kRows, class D>
+HWY_INLINE void block_of_rows(std::ptrdiff_t rows, D d, const SmallGemm& g, std::ptrdiff_t row,
+                              std::ptrdiff_t col) {
+  if constexpr (kRows > 0) {
+    if (rows == kRows) {
+      block<P, kRows>(d, g, row, col);
     } else {
-      rest<kRows - 1, kVecs>(d, g, row, col);
+      block_of_rows<P, kRows - 1>(rows, d, g, row, col);
     }
   }
 }
 
-// Columns from `col` on, as many panels of kVecs vectors as fit; returns the
-// first column that is left.
-template <int kVecs, class D>
-HWY_INLINE std::ptrdiff_t panels(D d, const SmallGemm& g, std::ptrdiff_t col) {
-  constexpr int kRows = kVecs == 1 ? 8 : 6;
-  const std::ptrdiff_t width = kVecs * static_cast<std::ptrdiff_t>(hn::Lanes(d));
-  for (; col + width <= g.width; col += width) {
-    std::ptrdiff_t row = 0;
-    for (; row + kRows <= g.rows; row += kRows) block<kRows, kVecs>(d, g, row, col);
-    rest<kRows, kVecs>(d, g, row, col);
+// All rows of a panel in as few blocks as there can be, which differ by a row at most: a short
+// one would wait for its few FMAs. Returns the column after the panel.
+template <class P, class D>
+HWY_INLINE std::ptrdiff_t panel(D d, const SmallGemm& g, std::ptrdiff_t col) {
+  const std::ptrdiff_t blocks = (g.rows + P::kMostRows - 1) / P::kMostRows;
+  const std::ptrdiff_t lower = blocks == 0 ? 0 : g.rows / blocks, higher = g.rows - lower * blocks;
+  for (std::ptrdiff_t i = 0, row = 0; i < blocks; ++i) {
+    const std::ptrdiff_t rows = lower + (i < higher ? 1 : 0);
+    block_of_rows<P, P::kMostRows>(rows, d, g, row, col);
+    row += rows;
   }
+  const auto lanes = static_cast<std::ptrdiff_t>(hn::Lanes(d));
+  return col + P::kFull * lanes + (P::kHalf ? lanes / 2 : 0);
+}
+
+template <class D>
+HWY_INLINE std::ptrdiff_t single_vectors(D d, const SmallGemm& g, std::ptrdiff_t col) {
+  while (col + static_cast<std::ptrdiff_t>(hn::Lanes(d)) <= g.width)
+    col = panel<Panel<1, false>>(d, g, col);
   return col;
 }
 
-// Narrower vectors take what is left over at the right: masked loads and
-// stores may touch memory beside the row on targets without true masks.
 void small_gemm(const SmallGemm& g) {
-  const hn::ScalableTag<float> full;
-  std::ptrdiff_t col = panels<2>(full, g, 0);
-  col = panels<1>(full, g, col);
-  col = panels<1>(hn::CappedTag<float, 8>(), g, col);
-  col = panels<1>(hn::CappedTag<float, 4>(), g, col);
-  panels<1>(hn::CappedTag<float, 1>(), g, col);
+  const hn::ScalableTag<float> d;
+  std::ptrdiff_t col = 0;
+  const auto half_vectors_left = [&] {
+    return 2 * (g.width - col) / static_cast<std::ptrdiff_t>(hn::Lanes(d));
+  };
+  while (half_vectors_left() >= 8 || half_vectors_left() / 2 == 2)
+    col = panel<Panel<2, false>>(d, g, col);
+  if (half_vectors_left() >= 6) col = panel<Panel<3, false>>(d, g, col);
+  if (half_vectors_left() == 3) col = panel<Panel<1, true>>(d, g, col);
+  // Narrower vectors take what is left over at the right: masked loads and
+  // stores may touch memory beside the row on targets without true masks.
+  col = single_vectors(d, g, col);
+  col = single_vectors(hn::CappedTag<float, 8>(), g, col);
+  col = single_vectors(hn::CappedTag<float, 4>(), g, col);
+  single_vectors(hn::CappedTag<float, 1>(), g, col);
 }
 
 }  // namespace tomofield::kernels::HWY_NAMESPACE
