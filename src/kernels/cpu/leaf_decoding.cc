@@ -72,6 +72,9 @@ HWY_INLINE void move_to(const LeafPiece& p, const float* values, int z, RowPair&
   rows.index = z;
 }
 
+// Bound for 16 samples: two loads from L1 and a store to L3, where a slab lies, and about 25
+// operations of softplus, 13 cycles of two ports. The rows' interpolation in x is shared by all
+// samples between two vertices in z: at a vertex a sample another two loads and two operations.
 template <class Act>
 HWY_INLINE void decode(const LeafPiece& p, const Act& act, const float* values, float* scratch,
                        float* samples) {
@@ -123,6 +126,7 @@ HWY_INLINE void spread_row(const LeafPiece& p, float* row, int z, float* grad_va
   }
 }
 
+// Bound for 16 samples: two loads from L3, four of L1 with two stores, and about 16 operations.
 template <class Act>
 HWY_INLINE double decode_adjoint(const LeafPiece& p, const Act& act, const float* samples,
                                  const float* grad_samples, float* scratch, float* grad_values) {
