@@ -145,7 +145,7 @@ Case variation_case(const std::shared_ptr<StepSetup>& s) {
                 v.nz = segment.nz;
                 v.stride_z = segment.stride_z();
                 v.num_rows = kLanes;
-                v.above = s->above.data();
+                v.above = {s->above.data(), segment.nz, 1};
                 v.flux = s->flux.data();
                 v.weight = 1e-6f;
                 v.penalty = {static_cast<float>(options.gradient_floor),

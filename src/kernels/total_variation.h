@@ -14,10 +14,16 @@ struct VariationPenalty {
   float concavity = 0.0f;
 };
 
+/// A row of densities: that of sample (x, z) at data[x step_x + z step_z].
+struct DensityRow {
+  const float* data = nullptr;
+  std::ptrdiff_t step_x = 0, step_z = 1;
+};
+
 /// Total variation of a decoded slab: weight · Σ φ over its voxels, with forward
 /// differences (D_x / h_x, D_y, D_z / h_z) that are zero past the last x and z, or backward
 /// ones in x or z.
-/// Rows couple slabs: `above` is the first row of the next slab and flux_below
+/// Rows couple slabs: `above` is the first row of the next slab and `flux`
 /// carries the y-flux of the last row of the one before, so that no slab
 /// writes another's gradient and rows 15 | 16 are penalised like any others.
 struct SlabVariation {
@@ -28,8 +34,7 @@ struct SlabVariation {
   std::ptrdiff_t stride_z = 0;
   int num_rows =
       0;  ///< lanes that are rows of the volume; below kLanes only at its end (above null)
-  const float* above =
-      nullptr;  ///< [x, z] densities of the row past the last, or null at the volume's end
+  DensityRow above;   ///< past the last row; without data at the volume's end
   float* flux = nullptr;  ///< [x, z]; in: y-flux of the row before the first (0 at the volume's
                           ///< start); out: of the last
   float per_hx = 1.0f, per_hz = 1.0f;  ///< 1 / sample spacing
@@ -38,32 +43,30 @@ struct SlabVariation {
   bool backward_x = false, backward_z = false;  ///< differences to the sample before instead
 };
 
-/// Where sample (x, z) of a slab's variation lies, both counted in the direction
-/// in which the differences run, in slab buffers and in [x, z] rows.
+/// Where sample (x, z) lies in an array of these steps, x and z counted in the direction in which
+/// the differences run.
 struct SampleOrder {
-  std::ptrdiff_t first = 0, step_x = kLanes, step_z;
-  std::ptrdiff_t row_first = 0, row_step_x, row_step_z = 1;
-  explicit SampleOrder(const SlabVariation& s) : step_z(s.stride_z), row_step_x(s.nz) {
+  std::ptrdiff_t first = 0, step_x, step_z;
+  SampleOrder(const SlabVariation& s, std::ptrdiff_t along_x, std::ptrdiff_t along_z)
+      : step_x(along_x), step_z(along_z) {
     if (s.backward_x) {
-      first += (s.nx - 1) * step_x, row_first += (s.nx - 1) * row_step_x;
-      step_x = -step_x, row_step_x = -row_step_x;
+      first += (s.nx - 1) * step_x;
+      step_x = -step_x;
     }
     if (s.backward_z) {
-      first += (s.nz - 1) * step_z, row_first += (s.nz - 1) * row_step_z;
-      step_z = -step_z, row_step_z = -row_step_z;
+      first += (s.nz - 1) * step_z;
+      step_z = -step_z;
     }
   }
-  std::ptrdiff_t sample(int x, int z) const { return first + x * step_x + z * step_z; }
-  std::ptrdiff_t row_sample(int x, int z) const {
-    return row_first + x * row_step_x + z * row_step_z;
-  }
+  std::ptrdiff_t operator()(int x, int z) const { return first + x * step_x + z * step_z; }
 };
 
 /// Adds the gradient and returns the value (terms anchored at this slab's rows).
 double slab_variation(const SlabVariation& slab);
 
 /// The y-flux weight · φ′(m)/m · D_y of a single row, for the start of a band:
-/// `row` and `next` are the densities [x, z] of this row and of the one after.
-void row_flux(const SlabVariation& slab, const float* row, const float* next, float* flux);
+/// `row` and `next` are the densities of this row and of the one after; flux is [x, z].
+void row_flux(const SlabVariation& slab, const DensityRow& row, const DensityRow& next,
+              float* flux);
 
 }  // namespace tomofield::kernels

@@ -58,7 +58,7 @@ class Slabs {
       v.samples = samples_[s].data() + 1;
       v.gradient = gradient.data() + 1;
       v.num_rows = std::min(kLanes, shape_.ny - static_cast<int>(s) * kLanes);
-      v.above = is_last ? nullptr : above.data();
+      if (!is_last) v.above = {above.data(), shape_.nz, 1};
       v.flux = flux_.data();
       r.value += slab_variation(v);
       for_each_sample(static_cast<int>(s) * kLanes, [&](std::size_t in_slab, std::size_t at) {
@@ -75,7 +75,7 @@ class Slabs {
     std::vector<float> row(flux_.size()), next(flux_.size());
     copy_row(slab - 1, kLanes - 1, row);
     copy_row(slab, 0, next);
-    row_flux(settings(), row.data(), next.data(), flux_.data());
+    row_flux(settings(), {row.data(), shape_.nz, 1}, {next.data(), shape_.nz, 1}, flux_.data());
   }
 
  private:

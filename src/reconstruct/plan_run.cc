@@ -49,7 +49,7 @@ std::size_t thread_memory(const PreparedSeries& plan, const Domain& domain, int 
       std::size_t{16} << 20,
       static_cast<std::size_t>(static_cast<double>(plan.roi.width()) * plan.geometry.thickness) *
           kRow);
-  return kSlabsOfThread * (2 * slab + views) + 3 * slab / base::kLanes + leaf + written;
+  return kSlabsOfThread * (2 * slab + views) + 2 * slab / base::kLanes + leaf + written;
 }
 
 std::vector<int> views_held_out(const PreparedSeries& plan, const FitOptions& options) {

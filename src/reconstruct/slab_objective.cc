@@ -17,7 +17,7 @@ constexpr int kPair = projection::SlabProjector::kSlabsTogether;
 // other.
 struct SlabObjective::Workspace {
   base::AlignedBuffer<float> samples, grad_samples, detector;
-  base::AlignedBuffer<float> flux, row, next_row;
+  base::AlignedBuffer<float> flux, row;
 
   void fit(std::size_t slab_size, std::size_t detector_size, std::size_t row_size) {
     // Padding has to start as zeros and stays so: a new layout needs new buffers.
@@ -29,7 +29,6 @@ struct SlabObjective::Workspace {
     if (row.size() != row_size) {
       flux.reset(row_size);
       row.reset(row_size);
-      next_row.reset(row_size);
     }
   }
 };
@@ -58,8 +57,10 @@ BandResult SlabObjective::accumulate_gradient(int band_index, std::span<const in
     for_each_slab(pair, w, [&](int at, float* samples, float*) { sampler_.decode(at, samples); });
     if (slab == band.first) start_flux(slab, w);
     add_data_term(pair, views, models, multiplicity, w, result);
+    if (pair.end < sampler_.num_slabs() && weights_.density_variation > 0)
+      sampler_.decode_row(static_cast<std::int64_t>(pair.end) * kLanes, w.row.data());
     for_each_slab(pair, w, [&](int at, float* samples, float* grad_samples) {
-      add_variation(at, samples, density_above(at, pair, samples, w), grad_samples, w, result);
+      add_variation(at, pair, samples, grad_samples, w, result);
       result.grad_bias += sampler_.decode_adjoint(at, samples, grad_samples, gradient);
     });
   }
@@ -120,8 +121,9 @@ kernels::SlabVariation SlabObjective::variation_of(std::size_t index) const {
   return variation;
 }
 
-void SlabObjective::add_variation(int slab, const float* samples, const float* above,
-                                  float* grad_samples, Workspace& w, BandResult& result) const {
+void SlabObjective::add_variation(int slab, const projection::SlabSampler::Range& pair,
+                                  const float* samples, float* grad_samples, Workspace& w,
+                                  BandResult& result) const {
   if (weights_.density_variation <= 0) return;
   for (std::size_t s = 0; s < projector_.grid().segments().size(); ++s) {
     const std::ptrdiff_t origin = projector_.grid().segments()[s].origin;
@@ -129,7 +131,7 @@ void SlabObjective::add_variation(int slab, const float* samples, const float* a
     variation.samples = samples + origin;
     variation.gradient = grad_samples + origin;
     variation.num_rows = sampler_.rows_in_slab(slab);
-    variation.above = above == nullptr ? nullptr : above + sampler_.row_origin(s);
+    variation.above = row_above(slab, pair, s, w);
     variation.flux = w.flux.data() + sampler_.row_origin(s);
     result.variation += kernels::slab_variation(variation);
   }
@@ -139,36 +141,31 @@ void SlabObjective::add_variation(int slab, const float* samples, const float* a
 void SlabObjective::start_flux(int slab, Workspace& w) const {
   w.flux.fill(0.0f);
   if (slab == 0 || weights_.density_variation <= 0) return;
-  sampler_.decode_row(slab * kLanes - 1, w.row.data());
-  copy_first_row(w.samples.data(), w.next_row.data());
+  sampler_.decode_row(static_cast<std::int64_t>(slab) * kLanes - 1, w.row.data());
   for (std::size_t s = 0; s < projector_.grid().segments().size(); ++s) {
-    const std::size_t at = sampler_.row_origin(s);
-    kernels::row_flux(variation_of(s), w.row.data() + at, w.next_row.data() + at,
-                      w.flux.data() + at);
+    kernels::row_flux(variation_of(s), decoded_row(w, s), first_row(w.samples.data(), s),
+                      w.flux.data() + sampler_.row_origin(s));
   }
 }
 
 // The first row past a slab of a pair; none past the last slab of all.
-const float* SlabObjective::density_above(int slab, const projection::SlabSampler::Range& pair,
-                                          const float* samples, Workspace& w) const {
-  if (slab + 1 == sampler_.num_slabs()) return nullptr;
-  if (slab + 1 < pair.end) {
-    copy_first_row(samples + projector_.grid().size(), w.next_row.data());
-  } else if (weights_.density_variation > 0) {
-    sampler_.decode_row((slab + 1) * kLanes, w.next_row.data());
-  }
-  return w.next_row.data();
+kernels::DensityRow SlabObjective::row_above(int slab, const projection::SlabSampler::Range& pair,
+                                             std::size_t segment, const Workspace& w) const {
+  if (slab + 1 == sampler_.num_slabs()) return {};
+  if (slab + 1 == pair.end) return decoded_row(w, segment);
+  const auto next = static_cast<std::size_t>(slab + 1 - pair.first);
+  return first_row(w.samples.data() + next * projector_.grid().size(), segment);
 }
 
-void SlabObjective::copy_first_row(const float* samples, float* row) const {
-  const auto& segments = projector_.grid().segments();
-  for (std::size_t s = 0; s < segments.size(); ++s) {
-    float* out = row + sampler_.row_origin(s);
-    for (int i = 0; i < segments[s].nx; ++i) {
-      const float* column = samples + segments[s].origin + static_cast<std::ptrdiff_t>(i) * kLanes;
-      for (int k = 0; k < segments[s].nz; ++k) *out++ = column[k * segments[s].stride_z()];
-    }
-  }
+// The first row of a slab, where it lies among the others.
+kernels::DensityRow SlabObjective::first_row(const float* samples, std::size_t segment) const {
+  const SampleSegment& s = projector_.grid().segments()[segment];
+  return {samples + s.origin, kLanes, s.stride_z()};
+}
+
+// The row that was decoded by itself.
+kernels::DensityRow SlabObjective::decoded_row(const Workspace& w, std::size_t segment) const {
+  return {w.row.data() + sampler_.row_origin(segment), projector_.grid().segments()[segment].nz, 1};
 }
 
 }  // namespace tomofield::reconstruct

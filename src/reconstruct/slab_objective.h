@@ -53,12 +53,13 @@ class SlabObjective {
   void add_data_term(const projection::SlabSampler::Range& pair, std::span<const int> views,
                      std::span<const loss::ViewModel> models, double multiplicity, Workspace& w,
                      BandResult& result) const;
-  void add_variation(int slab, const float* samples, const float* above, float* grad_samples,
-                     Workspace& w, BandResult& result) const;
+  void add_variation(int slab, const projection::SlabSampler::Range& pair, const float* samples,
+                     float* grad_samples, Workspace& w, BandResult& result) const;
   void start_flux(int slab, Workspace& w) const;
-  const float* density_above(int slab, const projection::SlabSampler::Range& pair,
-                             const float* samples, Workspace& w) const;
-  void copy_first_row(const float* samples, float* row) const;
+  kernels::DensityRow row_above(int slab, const projection::SlabSampler::Range& pair,
+                                std::size_t segment, const Workspace& w) const;
+  kernels::DensityRow first_row(const float* samples, std::size_t segment) const;
+  kernels::DensityRow decoded_row(const Workspace& w, std::size_t segment) const;
   kernels::SlabVariation variation_of(std::size_t segment) const;
 
   const projection::SlabSampler& sampler_;

@@ -40,11 +40,12 @@ struct TapTable {
   HWY_ALIGN int index[kTile][kItems];
   HWY_ALIGN float weight0[kTile][kItems], weight1[kTile][kItems];
 
-  // `taps_of(item, t)` gives the taps of destinations t, t + 1, … for items [0, count).
+  // `taps_of(item, t)` gives the taps of destinations t, t + 1, … for items [0, count); as many
+  // destinations are filled as there are, or a few more.
   template <typename TapsOf>
-  HWY_INLINE void fill(int count, const TapsOf& taps_of) {
+  HWY_INLINE void fill(int count, int num_destinations, const TapsOf& taps_of) {
     const Taps none{hn::Zero(IntTag()), hn::Zero(Tag()), hn::Zero(Tag())};
-    for (int t = 0; t < kTile; t += kVecLanes) {
+    for (int t = 0; t < num_destinations; t += kVecLanes) {
       const Taps a = taps_of(0, t), b = count > 1 ? taps_of(1, t) : none;
       const Taps c = count > 2 ? taps_of(2, t) : none, d = count > 3 ? taps_of(3, t) : none;
       hn::StoreInterleaved4(a.index, b.index, c.index, d.index, IntTag(), index[t]);
@@ -202,11 +203,13 @@ HWY_INLINE void fill_forward(const LineCrossing* lines, int count, const float* 
                                      {lines[std::min(2, last)], source, stride},
                                      {lines[last], source, stride}};
   if (seen) {
-    table.fill(count, [&](int k, int t)
-                          HWY_ATTR { return items[k].template taps<true>(iota_from(tile + t)); });
+    table.fill(count, end - tile, [&](int k, int t) HWY_ATTR {
+      return items[k].template taps<true>(iota_from(tile + t));
+    });
   } else {
-    table.fill(count, [&](int k, int t)
-                          HWY_ATTR { return items[k].template taps<false>(iota_from(tile + t)); });
+    table.fill(count, end - tile, [&](int k, int t) HWY_ATTR {
+      return items[k].template taps<false>(iota_from(tile + t));
+    });
   }
 }
 
@@ -313,7 +316,7 @@ struct AdjointItem {
 };
 
 HWY_INLINE void fill_adjoint(const PixelPair* pairs, int count, const float* source, int tile,
-                             TapTable& table) {
+                             int end, TapTable& table) {
   bool only = true;
   for (int k = 0; k < count; ++k) only = only && pairs[k].is_only;
   const int last = count - 1;
@@ -322,11 +325,13 @@ HWY_INLINE void fill_adjoint(const PixelPair* pairs, int count, const float* sou
                                      {pairs[std::min(2, last)], source},
                                      {pairs[last], source}};
   if (only) {
-    table.fill(count, [&](int k, int t)
-                          HWY_ATTR { return items[k].template taps<true>(iota_from(tile + t)); });
+    table.fill(count, end - tile, [&](int k, int t) HWY_ATTR {
+      return items[k].template taps<true>(iota_from(tile + t));
+    });
   } else {
-    table.fill(count, [&](int k, int t)
-                          HWY_ATTR { return items[k].template taps<false>(iota_from(tile + t)); });
+    table.fill(count, end - tile, [&](int k, int t) HWY_ATTR {
+      return items[k].template taps<false>(iota_from(tile + t));
+    });
   }
 }
 
@@ -344,7 +349,7 @@ HWY_INLINE void backproject_slabs(const LineCrossing* views, int num_views, std:
       num_tables = 0;
     };
     const auto fill_table = [&]() HWY_ATTR {
-      fill_adjoint(items, count, views->detector, tile, tables[num_tables++]);
+      fill_adjoint(items, count, views->detector, tile, tile_end, tables[num_tables++]);
       count = 0;
       if (num_tables == kMaxTables) use_tables();
     };

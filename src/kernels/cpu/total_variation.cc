@@ -22,7 +22,7 @@ struct RowMasks {
   explicit RowMasks(const SlabVariation& s) {
     for (int l = 0; l < kLanes; ++l) {
       is_row[l] = l < s.num_rows ? 1.0f : 0.0f;
-      has_next[l] = l + 1 < s.num_rows || (l + 1 == s.num_rows && s.above != nullptr) ? 1.0f : 0.0f;
+      has_next[l] = l + 1 < s.num_rows || (l + 1 == s.num_rows && s.above.data != nullptr) ? 1.0f : 0.0f;
     }
   }
 };
@@ -150,16 +150,17 @@ HWY_INLINE void add_row(const SlabVariation& s, const RowMasks& masks, const Lan
                         Penalty<kConcave>& penalty, int z, int first, int end, float* flux_x,
                         float* flux_z) {
   const Tag d;
-  const SampleOrder order(s);
+  const SampleOrder order(s, kLanes, s.stride_z), flux_order(s, s.nz, 1);
+  const SampleOrder above_order(s, s.above.step_x, s.above.step_z);
   const std::ptrdiff_t up = z + 1 < s.nz ? order.step_z : 0;
   const Vec per_hx2 = hn::Set(d, s.per_hx * s.per_hx), per_hz2 = hn::Set(d, s.per_hz * s.per_hz);
   Vec from_left[kVecs];
   for (int v = 0; v < kVecs; ++v) from_left[v] = hn::Load(d, flux_x + v * kVecLanes);
   for (int x = first; x < end; ++x, flux_z += kLanes) {
-    const std::ptrdiff_t offset = order.sample(x, z), at = order.row_sample(x, z);
+    const std::ptrdiff_t offset = order(x, z);
     const float* const sample = s.samples + offset;
     const float* const right = sample + (x + 1 < s.nx ? order.step_x : 0);
-    const float above = s.above != nullptr ? s.above[at] : 0.0f;
+    const float above = s.above.data != nullptr ? s.above.data[above_order(x, z)] : 0.0f;
     Vec flux_y[kVecs], sum[kVecs];
     for (int v = 0; v < kVecs; ++v) {
       const std::ptrdiff_t lane = static_cast<std::ptrdiff_t>(v) * kVecLanes;
@@ -180,7 +181,8 @@ HWY_INLINE void add_row(const SlabVariation& s, const RowMasks& masks, const Lan
       hn::Store(to_top, d, flux_z + lane);
     }
     Vec from_below[kVecs];
-    s.flux[at] = shift.apply(flux_y, s.flux[at], from_below);
+    float& flux = s.flux[flux_order(x, z)];
+    flux = shift.apply(flux_y, flux, from_below);
     for (int v = 0; v < kVecs; ++v) {
       float* const g = s.gradient + offset + static_cast<std::ptrdiff_t>(v) * kVecLanes;
       hn::StoreU(hn::Add(hn::LoadU(d, g), hn::Add(sum[v], from_below[v])), d, g);
@@ -234,20 +236,22 @@ double slab_variation(const SlabVariation& slab) {
                                               scratch.data() + kTile * kLanes);
 }
 
-void row_flux(const SlabVariation& s, const float* row, const float* next, float* flux) {
+void row_flux(const SlabVariation& s, const DensityRow& row, const DensityRow& next,
+              float* flux) {
   const float tau = s.penalty.concavity;
-  const SampleOrder order(s);
+  const SampleOrder order(s, row.step_x, row.step_z), next_order(s, next.step_x, next.step_z),
+      flux_order(s, s.nz, 1);
   for (int x = 0; x < s.nx; ++x) {
-    const std::ptrdiff_t right = x + 1 < s.nx ? order.row_step_x : 0;
+    const std::ptrdiff_t right = x + 1 < s.nx ? order.step_x : 0;
     for (int z = 0; z < s.nz; ++z) {
-      const std::ptrdiff_t at = order.row_sample(x, z);
-      const float f = row[at];
-      const float dx = s.per_hx * (row[at + right] - f);
-      const float dz = s.per_hz * (row[at + (z + 1 < s.nz ? order.row_step_z : 0)] - f);
-      const float dy = next[at] - f;
+      const float* const at = row.data + order(x, z);
+      const float f = *at;
+      const float dx = s.per_hx * (at[right] - f);
+      const float dz = s.per_hz * (at[z + 1 < s.nz ? order.step_z : 0] - f);
+      const float dy = next.data[next_order(x, z)] - f;
       const float m =
           std::sqrt(dx * dx + dy * dy + dz * dz + s.penalty.epsilon * s.penalty.epsilon);
-      flux[at] = s.weight * dy / (m * (tau > 0 ? 1.0f + m / tau : 1.0f));
+      flux[flux_order(x, z)] = s.weight * dy / (m * (tau > 0 ? 1.0f + m / tau : 1.0f));
     }
   }
 }
