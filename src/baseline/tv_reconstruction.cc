@@ -170,9 +170,9 @@ double ChambollePock::step_duals(std::vector<std::vector<loss::ViewSums>>& data_
 
 void ChambollePock::step_ray_duals(const float* residuals, float* q_of_slab) {
   problem_.for_each_ray(problem_.views(), [&](const auto& model, float length, std::size_t at) {
-    // A of this view is scaled, so its row sums are too, and residuals carry the scale once.
+    // A of this view is scaled, so its row sums are too; so are residuals and q.
     const double per_sigma = std::sqrt(model.weight);
-    const double step = kBalance / (model.scale * model.scale) / static_cast<double>(length);
+    const double step = kBalance / (model.scale * static_cast<double>(length));
     const float rate = static_cast<float>(step * per_sigma);
     const float shrink = static_cast<float>(1.0 / (1.0 + step / per_sigma));
     for (std::size_t i = at; i < at + kLanes; ++i) {

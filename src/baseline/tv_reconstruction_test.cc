@@ -181,6 +181,20 @@ TEST_F(Tv, FittedScalesUndoTheGainsOfViews) {
               0.2);  // the prior draws to 1
 }
 
+// Steps of the rays' duals follow the scales: too long ones would let the objective explode.
+TEST_F(Tv, GreatGainsOfViewsStayFinite) {
+  SphereSeries::Options gains;
+  for (int view = 0; view < 31; ++view) gains.scale_of_view.push_back(view % 2 ? 0.2 : 5.0);
+  SphereSeries series(gains);
+  for (std::size_t view = 0; view < 31; ++view)
+    series.noise_sigma[view] *= gains.scale_of_view[view];
+  VoxelProblem problem = testing::voxel_problem(series, {.fit_scale = true});
+  const Solution solution =
+      reconstruct_tv(problem, options(120, 1), 0.1, [](const auto&, const auto&) {});
+  EXPECT_EQ(*std::max_element(solution.objective.begin(), solution.objective.end()),
+            solution.objective.front());
+}
+
 TEST_F(Tv, PixelsThatAreNoMeasurementsDoNotCount) {
   SphereSeries::Options hostile;
   hostile.masked_value = 1e6f;
