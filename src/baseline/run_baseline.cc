@@ -36,12 +36,6 @@ projection::SampleGrid grid_of(const reconstruct::PreparedSeries& series,
                                       options.specimen.with_margin ? options.margin_spacing : 0.0);
 }
 
-std::vector<int> views_held_out(const reconstruct::PreparedSeries& series,
-                                const BaselineOptions& options) {
-  if (options.hold_out == 0) return {};
-  return reconstruct::held_out_views(series.geometry.tilt_deg, options.hold_out);
-}
-
 // What the method holds of each slab, and a pair of slabs and its rays for each thread; a tuning
 // has copies of the rays of its rows.
 std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
@@ -54,11 +48,13 @@ std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
                            static_cast<std::size_t>(plan.geometry.width) * kLanes;
   const std::size_t values_of_slab = static_cast<std::size_t>(method.volumes) * grid.size() +
                                      static_cast<std::size_t>(method.detectors) * rays;
-  const std::size_t values_of_thread = SlabPair::kMost * (grid.size() + rays);
+  const std::size_t values_of_thread =
+      SlabPair::kMost * (static_cast<std::size_t>(method.buffers) * grid.size() + rays);
   const std::size_t copied_slabs = tunes ? std::min<std::size_t>(slabs, kTrialSlabs) : 0;
-  return kFixed + size.bytes +
-         sizeof(float) * (slabs * values_of_slab + copied_slabs * rays +
-                          static_cast<std::size_t>(base::thread_count()) * values_of_thread);
+  const std::size_t running =
+      size.bytes + sizeof(float) * (slabs * values_of_slab + copied_slabs * rays +
+                                    static_cast<std::size_t>(base::thread_count()) * values_of_thread);
+  return kFixed + std::max(running, reading_memory(plan) + sizeof(float) * slabs * rays);
 }
 
 base::ProgressReport progress_report(const IterationReport& report, int num_iterations,
@@ -196,7 +192,8 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
         "--xtilt out (the volume is then turned by it), or use reconstruct or baseline tensorf",
         planned.x_tilt_deg));
   }
-  const std::vector<int> held_out = views_held_out(planned, options);  // throws if there are none
+  const std::vector<int> held_out =  // throws if there are none
+      reconstruct::held_out_views(planned.geometry.tilt_deg, options.hold_out);
   if (options.tune) reconstruct::trial_views(planned.geometry.tilt_deg, held_out);  // or too few
   const projection::SampleGrid grid = grid_of(planned, options);
   BaselinePlan plan;
@@ -223,7 +220,8 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   const reconstruct::PreparedSeries series =
       prepare_series(tilt_series, options.specimen,
                      paths.volume.has_parent_path() ? paths.volume.parent_path() : ".");
-  const std::vector<int> held_out = views_held_out(series, options);
+  const std::vector<int> held_out = 
+      reconstruct::held_out_views(series.geometry.tilt_deg, options.hold_out);
   nlohmann::json tuning = nullptr;
   if (options.tune) {
     const Tuned tuned =

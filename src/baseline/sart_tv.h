@@ -15,7 +15,7 @@ struct SartTvOptions {
   double weight = 1.0;      ///< their length altogether, over the change that the pass made
   bool non_negative = true;
 
-  MethodFacts facts() const { return {"sart-tv", iterations, 5, 1}; }
+  MethodFacts facts() const { return {"sart-tv", iterations, 5, 1, 3}; }
   nlohmann::json json() const;
 };
 

@@ -18,6 +18,7 @@ struct MethodFacts {
   int iterations;  ///< passes over the views
   int volumes;     ///< held at once, the densities among them
   int detectors;   ///< held at once, of all views of a slab, the measured rays among them
+  int buffers = 1; ///< of a pair of slabs, that each thread has
   const char* memory_advice = "";  ///< what of its own options takes less, as the end of a sentence
 };
 

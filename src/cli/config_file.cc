@@ -70,10 +70,13 @@ class Entry {
     if (flag) return *flag ? std::vector{"--" + name_} : std::vector<std::string>{};
     const toml::array* array = node_.as_array();
     if (array == nullptr) return {"--" + name_ + "=" + text_of(node_)};  // also of "-60:60:2"
-    if (array->size() > static_cast<std::size_t>(most_values))
-      fail(fmt::format("takes at most {} values, not {}", most_values, array->size()));
-    std::vector<std::string> words{"--" + name_};
+    std::vector<std::string> words;
     for (const toml::node& element : *array) words.push_back(text_of(element));
+    // A list in one word, like --roi's; other options say that it is not what they take.
+    if (most_values == 1) return {fmt::format("--{}={}", name_, fmt::join(words, ","))};
+    if (words.size() > static_cast<std::size_t>(most_values))
+      fail(fmt::format("takes at most {} values, not {}", most_values, words.size()));
+    words.insert(words.begin(), "--" + name_);
     return words;
   }
 

@@ -11,6 +11,7 @@
 #include "cli/specimen_options.h"
 #include "io/output_files.h"
 #include "io/text_lines.h"
+#include "reconstruct/result_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
@@ -177,7 +178,8 @@ void EvaluateArguments::check() const {
         fmt::format("--tilt-range must be from a lower to a higher tilt, not from {:g}° to "
                     "{:g}°",
                     tilts->low_deg, tilts->high_deg));
-  std::vector<std::filesystem::path> inputs{volume}, outputs;
+  std::vector<std::filesystem::path> inputs = reconstruct::input_files(input), outputs;
+  inputs.push_back(volume);
   for (const auto& file : {truth, fsc_with, fsc_mask, series})
     if (file) inputs.push_back(*file);
   for (const auto& file : {json, fsc_csv, fsc_picture, profile_csv})

@@ -1,12 +1,43 @@
 #include "cli/specimen_options.h"
 
+#include <fmt/format.h>
+
+#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
+
+#include "io/text_lines.h"
 
 namespace tomofield::cli {
 
 namespace {
 
 const char* const kGroup = "Specimen (unbinned pixels of the aligned view)";
+
+// What stands between commas, each parsed; none if one cannot be. A list is one word of the command
+// line: as several it would take the words after it.
+template <typename Parse>
+auto list_of(const std::string& text, const Parse& parse) {
+  using Value = typename decltype(parse(text))::value_type;
+  std::vector<Value> values;
+  for (const std::string& word : CLI::detail::split(text, ',')) {
+    const auto value = parse(word);
+    if (!value) return std::optional<std::vector<Value>>();
+    values.push_back(*value);
+  }
+  return std::optional(std::move(values));
+}
+auto whole_numbers(const std::string& text) { return list_of(text, io::parse_integer); }
+auto numbers(const std::string& text) { return list_of(text, io::parse_number); }
+
+CLI::Validator words_check(const char* wanted, bool (*is_one)(const std::string&)) {
+  return {[wanted, is_one](std::string& text) -> std::string {
+            if (is_one(text)) return {};
+            return fmt::format("must be {}; not '{}'", wanted, text);
+          },
+          ""};
+}
 
 }  // namespace
 
@@ -19,14 +50,18 @@ void add_specimen_options(CLI::App& command, reconstruct::SpecimenOptions& optio
 
 void add_place_options(CLI::App& command, reconstruct::SpecimenOptions& options) {
   command
-      .add_option_function<std::vector<long>>(
+      .add_option_function<std::string>(
           "--roi",
-          [&options](const std::vector<long>& v) {
+          [&options](const std::string& text) {
+            const auto v = *whole_numbers(text);
             options.roi = {v[0], v[1], v[2], v[3]};
           },
           "x0,y0,x1,y1: region of interest at zero tilt; default: the whole field of view")
-      ->delimiter(',')
-      ->expected(4)
+      ->check(words_check("four whole numbers, x0,y0,x1,y1",
+                          [](const std::string& text) {
+                            const auto v = whole_numbers(text);
+                            return v && v->size() == 4;
+                          }))
       ->type_name("INT,INT,INT,INT")
       ->group(kGroup);
   command.add_option("--hand", options.hand, "1: x = X cos + Z sin; -1: mirrored in Z")
@@ -34,16 +69,20 @@ void add_place_options(CLI::App& command, reconstruct::SpecimenOptions& options)
       ->capture_default_str()
       ->group(kGroup);
   command
-      .add_option_function<std::vector<double>>(
+      .add_option_function<std::string>(
           "--center",
-          [&options](const std::vector<double>& v) {
+          [&options](const std::string& text) {
+            const auto v = *numbers(text);
             options.axis_x = v[0];
             if (v.size() > 1) options.axis_z = v[1];
           },
           "x[,z] of the tilt axis on the view and in the volume, pixel i covering [i, i+1); "
           "default: the centres")
-      ->delimiter(',')
-      ->expected(1, 2)
+      ->check(words_check("one or two numbers, x or x,z",
+                          [](const std::string& text) {
+                            const auto v = numbers(text);
+                            return v && (v->size() == 1 || v->size() == 2);
+                          }))
       ->type_name("FLOAT[,FLOAT]")
       ->group(kGroup);
   command

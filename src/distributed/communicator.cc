@@ -109,8 +109,6 @@ double Communicator::largest(double value) const {
   return value;
 }
 
-bool Communicator::any(bool value) const { return largest(value ? 1.0 : 0.0) > 0.0; }
-
 std::string Communicator::broadcast(std::string text, int owner) const {
   if (size_ == 1) return text;
   std::int64_t length = rank_ == owner ? std::ssize(text) : 0;
@@ -217,6 +215,13 @@ Session::Session() {
   TOMOFIELD_CHECK(provided >= MPI_THREAD_FUNNELED, "this MPI does not allow for threads");
   MPI_Comm_rank(kAll, &communicator_.rank_);
   MPI_Comm_size(kAll, &communicator_.size_);
+  if (communicator_.size_ == 1) {
+    MPI_Finalize();
+    throw Error(
+        "this process was started as one of several, but MPI sees it alone: each would do all the "
+        "work and write the same files. Start it with the mpirun of the MPI that tomofield was "
+        "built with, or with the srun --mpi option that this MPI speaks (srun --mpi=list)");
+  }
   MPI_Comm machine = MPI_COMM_NULL;
   MPI_Comm_split_type(kAll, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine);
   MPI_Comm_size(machine, &communicator_.size_on_machine_);

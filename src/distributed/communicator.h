@@ -41,7 +41,6 @@ class Communicator {
   template <typename T>
   void combine(std::span<T> values) const;
   double largest(double value) const;
-  bool any(bool value) const;
   /// What `owner` has, to all.
   void broadcast(std::span<std::byte> bytes, int owner) const;
   std::string broadcast(std::string text, int owner = 0) const;

@@ -21,8 +21,6 @@ TEST(Communicator, AloneNothingChanges) {
   alone.combine(std::span(values));
   EXPECT_EQ(values, (std::vector<double>{1.5, -2.0}));
   EXPECT_EQ(alone.largest(-3.0), -3.0);
-  EXPECT_FALSE(alone.any(false));
-  EXPECT_TRUE(alone.any(true));
   EXPECT_EQ(alone.broadcast("text"), "text");
   alone.exchange({});
   EXPECT_EQ(alone.traffic().bytes, 0);

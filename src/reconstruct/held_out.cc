@@ -62,6 +62,7 @@ SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
 }  // namespace
 
 std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every) {
+  if (every == 0) return {};
   std::vector<int> by_tilt(tilt_deg.size());
   std::iota(by_tilt.begin(), by_tilt.end(), 0);
   std::ranges::stable_sort(by_tilt, [&](int a, int b) {

@@ -16,8 +16,8 @@ namespace tomofield::reconstruct {
 
 /// Views kept from the fit: in order of tilt every `every`-th one (at least 2),
 /// first the one in the middle of the first `every`, and neither the first nor
-/// the last of all, whose tilts nothing else covers. Indices, ascending. Throws
-/// Error if the series is too short to hold any out.
+/// the last of all, whose tilts nothing else covers; none if `every` is 0.
+/// Indices, ascending. Throws Error if the series is too short to hold any out.
 std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every);
 
 /// How well a field predicts views that it was not fitted to.

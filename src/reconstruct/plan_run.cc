@@ -23,16 +23,6 @@ namespace {
 constexpr std::size_t kProgram = std::size_t{20} << 20;  // with its libraries
 constexpr std::size_t kMpi = std::size_t{40} << 20;      // OpenMPI's own, and what is packed for it
 
-// Reading a view: its raw pixels, aligned and as they are, with their masks, and what
-// becomes of them.
-std::size_t reading_memory(const PreparedSeries& plan) {
-  constexpr double kBytesPerPixel = 5;
-  constexpr double kCopies = 3;
-  const double binned = static_cast<double>(plan.geometry.width * plan.geometry.height);
-  const double raw = binned * plan.bin_factor * plan.bin_factor;
-  return static_cast<std::size_t>(kCopies * kBytesPerPixel * (raw + binned));
-}
-
 constexpr int kSlabsOfThread = projection::SlabProjector::kSlabsTogether;
 
 // What each thread works on: a pair of slabs with their gradient and the views of a step, rows for
@@ -52,13 +42,9 @@ std::size_t thread_memory(const PreparedSeries& plan, const Domain& domain, int 
   return kSlabsOfThread * (2 * slab + views) + 2 * slab / base::kLanes + leaf + written;
 }
 
-std::vector<int> views_held_out(const PreparedSeries& plan, const FitOptions& options) {
-  return options.hold_out > 0 ? held_out_views(plan.geometry.tilt_deg, options.hold_out)
-                              : std::vector<int>{};
-}
-
 int num_fitted_views(const PreparedSeries& plan, const FitOptions& options) {
-  return plan.geometry.num_views() - static_cast<int>(views_held_out(plan, options).size());
+  const auto held_out = held_out_views(plan.geometry.tilt_deg, options.hold_out);
+  return plan.geometry.num_views() - static_cast<int>(held_out.size());
 }
 
 int steps_an_epoch(const PreparedSeries& plan, const FitOptions& options) {
@@ -92,10 +78,13 @@ double part_of_parameters(const Domain& domain, const ReconstructOptions& option
          static_cast<double>(field::count_parameters(options.field.kind, domain.shapes));
 }
 
-// The rows of a shape that this process has.
-tilt_series::SlabViews::Shape own_part(tilt_series::SlabViews::Shape shape,
+// The rows of a shape that the process with most of them has.
+tilt_series::SlabViews::Shape own_part(tilt_series::SlabViews::Shape shape, const Domain& domain,
                                        const distributed::Communicator& processes) {
-  shape.num_rows = (shape.num_rows + processes.size() - 1) / processes.size();
+  const std::int64_t band_rows = domain.tree.roots().cell_size;
+  const std::int64_t bands = (shape.num_rows + band_rows - 1) / band_rows;
+  const std::int64_t most_bands = (bands + processes.size() - 1) / processes.size();
+  shape.num_rows = std::min(shape.num_rows, most_bands * band_rows);
   return shape;
 }
 
@@ -109,7 +98,7 @@ std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, co
   const auto parameters =
       static_cast<std::size_t>(static_cast<double>(copies * sizeof(float) * run.num_parameters) *
                                part_of_parameters(domain, options, processes));
-  const SlabViews::Shape own_shape = own_part(plan.rays_shape(), processes);
+  const SlabViews::Shape own_shape = own_part(plan.rays_shape(), domain, processes);
   const int slabs_in_use = kSlabsOfThread * base::thread_count();
   const std::size_t rays = SlabViews::resident_memory(own_shape, slabs_in_use);
   const int coarse_bin = make_stages(options.field, options.fit).front().bin;
@@ -149,7 +138,8 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   const Stage last = make_stages(options.field, options.fit).back();
   run.num_trials = options.num_trials(num_fitted_views(plan, options.fit));
   if (run.num_trials > 0)  // throws if there are too few
-    trial_views(plan.geometry.tilt_deg, views_held_out(plan, options.fit));
+    trial_views(plan.geometry.tilt_deg,
+                held_out_views(plan.geometry.tilt_deg, options.fit.hold_out));
   run.num_steps = (last.first_epoch + last.epochs) * steps_an_epoch(plan, options.fit);
   run.memory_bytes = estimate_memory(plan, domain, run, options, processes);
   base::require_memory(run.memory_bytes * static_cast<std::size_t>(processes.size_on_machine()),

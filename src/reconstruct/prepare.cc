@@ -242,6 +242,14 @@ tilt_series::SlabViews::Shape PreparedSeries::rays_shape() const {
   return {num_views, geometry.width, geometry.height, roi.y0, roi.height()};
 }
 
+std::size_t reading_memory(const PreparedSeries& plan) {
+  constexpr double kBytesPerPixel = 5;
+  constexpr double kCopies = 3;
+  const double binned = static_cast<double>(plan.geometry.width * plan.geometry.height);
+  const double raw = binned * plan.bin_factor * plan.bin_factor;
+  return static_cast<std::size_t>(kCopies * kBytesPerPixel * (raw + binned));
+}
+
 PreparedSeries plan_series(const tilt_series::TiltSeries& series, const SpecimenOptions& specimen) {
   require_no_faults(specimen.faults());
   PreparedSeries plan;

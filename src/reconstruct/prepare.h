@@ -51,6 +51,10 @@ struct PreparedSeries {
 /// Geometry alone: no pixel is read. Throws Error for options that do not fit the series.
 PreparedSeries plan_series(const tilt_series::TiltSeries& series, const SpecimenOptions& specimen);
 
+/// Bytes that reading a view takes, besides the rays that are kept: its raw pixels, aligned and as
+/// they are, with their masks, and what becomes of them.
+std::size_t reading_memory(const PreparedSeries& plan);
+
 /// Everything. `scratch_dir` takes the rays of series that do not fit in memory.
 PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
                               const SpecimenOptions& specimen,

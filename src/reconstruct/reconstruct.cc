@@ -71,9 +71,7 @@ Measurement measurement_of(const PreparedSeries& series, const FitOptions& optio
           .noise_sigma = series.noise_sigma,
           .mean_density = series.mean_density,
           .ray_geometry = series.ray_geometry,
-          .held_out = options.hold_out > 0
-                          ? held_out_views(series.geometry.tilt_deg, options.hold_out)
-                          : std::vector<int>{},
+          .held_out = held_out_views(series.geometry.tilt_deg, options.hold_out),
           .processes = &processes};
 }
 

@@ -3,7 +3,6 @@
 #include "io/output_files.h"
 
 namespace tomofield::reconstruct {
-namespace {
 
 namespace fs = std::filesystem;
 
@@ -15,8 +14,6 @@ std::vector<fs::path> input_files(const tilt_series::TiltSeriesOptions& input) {
   }
   return files;
 }
-
-}  // namespace
 
 void check_result_files(std::vector<fs::path> results, const fs::path& picture_prefix,
                         const tilt_series::TiltSeriesOptions& input, bool may_replace,

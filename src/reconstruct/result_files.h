@@ -8,6 +8,9 @@
 
 namespace tomofield::reconstruct {
 
+/// Every file that a series is read from.
+std::vector<std::filesystem::path> input_files(const tilt_series::TiltSeriesOptions& input);
+
 /// What stands in the way of writing the results of a series (io/output_files.h): none
 /// may replace a file that the series is read from. Pictures of slices (report/slices.h) are
 /// results too.
