@@ -35,7 +35,58 @@ void check_voxel_sizes(const io::MrcReader& first, const io::MrcReader& second) 
                   a, b));
 }
 
-void check_sizes(const io::MrcReader& first, const io::MrcReader& second, const Sizes& common) {
+// Where the first voxel of `a` lies in voxels of `b`.
+using Offset = std::array<std::int64_t, 3>;
+
+bool is_ours(const io::MrcReader& volume) {
+  return std::ranges::any_of(volume.header().labels, [](const std::string& label) {
+    return label.starts_with("tomofield");
+  });
+}
+
+// What ORIGIN says, in IMOD's sign, where it makes one volume a part of the other: many programs
+// write other things there, and most nothing.
+std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcReader& b) {
+  const Sizes size_a = whole_box(a).last, size_b = whole_box(b).last;
+  Offset offset{};
+  bool lies_in_b = true, lies_in_a = true;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double voxel_A = b.header().voxel_size_A[axis];
+    const double voxels =
+        (b.header().origin_A[axis] - a.header().origin_A[axis]) / (voxel_A > 0 ? voxel_A : 1.0);
+    if (!(std::abs(voxels) < 1e6) || std::abs(voxels - std::round(voxels)) > 0.01) return {};
+    offset[axis] = std::llround(voxels);
+    lies_in_b = lies_in_b && offset[axis] >= 0 && offset[axis] + size_a[axis] <= size_b[axis];
+    lies_in_a = lies_in_a && offset[axis] <= 0 && offset[axis] + size_a[axis] >= size_b[axis];
+  }
+  const bool says_something = offset != Offset{} || (is_ours(a) && is_ours(b));
+  if (!says_something || !(lies_in_a || lies_in_b)) return {};
+  return offset;
+}
+
+Offset offset_by_centres(const io::MrcReader& a, const io::MrcReader& b) {
+  const Sizes size_a = whole_box(a).last, size_b = whole_box(b).last;
+  Offset offset;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::int64_t common = std::min(size_a[axis], size_b[axis]);
+    offset[axis] = (size_b[axis] - common) / 2 - (size_a[axis] - common) / 2;
+  }
+  return offset;
+}
+
+// What both have, in voxels of `b`.
+Box common_box(const io::MrcReader& a, const io::MrcReader& b, const Offset& offset) {
+  const Sizes size_a = whole_box(a).last, size_b = whole_box(b).last;
+  Box common;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    common.first[axis] = std::max<std::int64_t>(0, offset[axis]);
+    common.last[axis] = std::min(size_b[axis], offset[axis] + size_a[axis]);
+  }
+  return common;
+}
+
+// Of volumes that are laid centre on centre.
+void check_sizes(const io::MrcReader& first, const io::MrcReader& second, const Box& common) {
   const Sizes a = whole_box(first).last, b = whole_box(second).last;
   if (a == b) return;
   Sizes sorted_a = a, sorted_b = b;
@@ -48,9 +99,10 @@ void check_sizes(const io::MrcReader& first, const io::MrcReader& second, const 
   if (sorted_a == sorted_b)
     throw mismatch("the axes are in another order; write both volumes with the same --axes");
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (2 * common[axis] < b[axis])
+    if (2 * (common.last[axis] - common.first[axis]) < std::max(a[axis], b[axis]))
       throw mismatch(
-          "less than half of the second is there; are they of the same specimen and scale?");
+          "less than half of one is in the other, and their ORIGINs do not say that one is a part "
+          "of the other; are they of the same specimen and scale?");
   }
   base::log_warning(
       fmt::format("'{}' has {} voxels and '{}' {}: the common centred box is compared",
@@ -70,23 +122,24 @@ void check_box(const Box& box, const Box& common, const io::MrcReader& second) {
 VolumePair read_pair(const std::filesystem::path& first, const std::filesystem::path& second,
                      const std::optional<Box>& box) {
   const io::MrcReader a(first), b(second);
-  const Sizes size_a = whole_box(a).last, size_b = whole_box(b).last;
-  Sizes common_sizes;
-  Box common;  // in voxels of the second
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    common_sizes[axis] = std::min(size_a[axis], size_b[axis]);
-    common.first[axis] = (size_b[axis] - common_sizes[axis]) / 2;
-    common.last[axis] = common.first[axis] + common_sizes[axis];
+  const std::optional<Offset> part = offset_by_origin(a, b);
+  const Offset offset = part.value_or(offset_by_centres(a, b));
+  const Box common = common_box(a, b, offset);
+  if (part) {
+    if (whole_box(a).last != whole_box(b).last) {
+      base::log_info(fmt::format("placed by their ORIGINs: what both have is {} of '{}'",
+                                 evaluate::to_text(common), second.string()));
+    }
+  } else {
+    check_sizes(a, b, common);
   }
-  check_sizes(a, b, common_sizes);
   check_voxel_sizes(a, b);
   if (box) check_box(*box, common, b);
   const Box in_second = box.value_or(common);
   Box in_first = in_second;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::int64_t shift = (size_a[axis] - common_sizes[axis]) / 2 - common.first[axis];
-    in_first.first[axis] += shift;
-    in_first.last[axis] += shift;
+    in_first.first[axis] -= offset[axis];
+    in_first.last[axis] -= offset[axis];
   }
   return {read_box(a, in_first), read_box(b, in_second), in_second};
 }

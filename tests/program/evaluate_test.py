@@ -23,11 +23,14 @@ def path(name):
     return os.path.join(SCRATCH, name)
 
 
-def save(name, volume, voxel_size=10.0):
+def save(name, volume, voxel_size=10.0, origin=(0, 0, 0), label=None):
     with mrcfile.new(path(name), overwrite=True) as file:
         file.set_data(volume.astype(np.float32))
         file.set_volume()
         file.voxel_size = voxel_size
+        file.header.origin = origin
+        if label:
+            file.header.label[0], file.header.nlabl = label, 1
     return path(name)
 
 
@@ -141,6 +144,28 @@ def test_equal_volumes_are_infinitely_alike():
     assert score["psnr_raw_dB"] is None and score["ssim_raw"] == 1 and "inf" in result.stdout
 
 
+def test_origins_say_where_a_part_lies():
+    reconstruction, truth = random_pair((24, 60, 51), 8)
+    whole = save("whole.mrc", truth, label="tomofield 1")
+    expected = evaluate(save("all.mrc", reconstruction), whole, "--box", "7,5,3,20,15,13")[0]
+    part = reconstruction[3:13, 5:15, 7:20]
+    found, _ = evaluate(save("part.mrc", part, origin=(-70, -50, -30)), whole)
+    assert found["box_first"] == [7, 5, 3] and found["box_last"] == [20, 15, 13], found
+    assert found["psnr_raw_dB"] == expected["psnr_raw_dB"]
+    # The whole against the part.
+    found, _ = evaluate(whole, save("part.mrc", part, origin=(-70, -50, -30)))
+    assert found["box_first"] == [0, 0, 0] and found["box_last"] == [13, 10, 10], found
+    # At the corner, where tomofield wrote both; else on the centre, with a warning.
+    corner = reconstruction[:, :40, :]
+    found, _ = evaluate(save("corner.mrc", corner, label="tomofield 1"), whole)
+    assert found["box_last"] == [51, 40, 24], found
+    found, result = evaluate(save("corner.mrc", corner), whole)
+    assert found["box_first"] == [0, 10, 0] and "centred" in result.stdout + result.stderr, found
+    # Nonsense in ORIGIN is no place.
+    found, _ = evaluate(save("corner.mrc", corner, origin=(3, 4, 1e30)), whole)
+    assert found["box_first"] == [0, 10, 0], found
+
+
 def test_hopeless_pairs_are_refused():
     reconstruction, truth = random_pair((24, 60, 51), 8)
     good = save("good.mrc", truth)
@@ -156,6 +181,8 @@ def test_hopeless_pairs_are_refused():
         result = run(file, good, "--json", path("none.json"))
         assert result.returncode == 2 and words in result.stderr, (words, result)
         assert not os.path.exists(path("none.json"))
+    result = run(good, save("small.mrc", reconstruction[:, ::3, ::3]))
+    assert result.returncode == 2 and "half" in result.stderr, result
     flat = save("flat.mrc", np.zeros((24, 60, 51)))
     assert run(good, flat).returncode == 2
     thin = save("thin.mrc", truth[:5])
@@ -445,6 +472,7 @@ def test_reprojection_of_a_specimen_that_goes_on_outside():
         (path("part.mrc"), series, "--roi"),
         (truth, [*series[:4], "--tlt", path("absent.tlt")], "absent.tlt"),
         (truth, [*series, "--json", series[1], "--overwrite"], "replace the input"),
+        (truth, [*series, "--json", series[5], "--overwrite"], "replace the input"),
         (truth, ["--hold-out", "5"], "--series"),
     ):
         result = run(file, *options)
