@@ -52,8 +52,9 @@ std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
       SlabPair::kMost * (static_cast<std::size_t>(method.buffers) * grid.size() + rays);
   const std::size_t copied_slabs = tunes ? std::min<std::size_t>(slabs, kTrialSlabs) : 0;
   const std::size_t running =
-      size.bytes + sizeof(float) * (slabs * values_of_slab + copied_slabs * rays +
-                                    static_cast<std::size_t>(base::thread_count()) * values_of_thread);
+      size.bytes +
+      sizeof(float) * (slabs * values_of_slab + copied_slabs * rays +
+                       static_cast<std::size_t>(base::thread_count()) * values_of_thread);
   return kFixed + std::max(running, reading_memory(plan) + sizeof(float) * slabs * rays);
 }
 
@@ -220,7 +221,7 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   const reconstruct::PreparedSeries series =
       prepare_series(tilt_series, options.specimen,
                      paths.volume.has_parent_path() ? paths.volume.parent_path() : ".");
-  const std::vector<int> held_out = 
+  const std::vector<int> held_out =
       reconstruct::held_out_views(series.geometry.tilt_deg, options.hold_out);
   nlohmann::json tuning = nullptr;
   if (options.tune) {

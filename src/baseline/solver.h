@@ -15,10 +15,10 @@ namespace tomofield::baseline {
 /// What a method is called and what it needs besides its own scratch space.
 struct MethodFacts {
   const char* name;
-  int iterations;  ///< passes over the views
-  int volumes;     ///< held at once, the densities among them
-  int detectors;   ///< held at once, of all views of a slab, the measured rays among them
-  int buffers = 1; ///< of a pair of slabs, that each thread has
+  int iterations;   ///< passes over the views
+  int volumes;      ///< held at once, the densities among them
+  int detectors;    ///< held at once, of all views of a slab, the measured rays among them
+  int buffers = 1;  ///< of a pair of slabs, that each thread has
   const char* memory_advice = "";  ///< what of its own options takes less, as the end of a sentence
 };
 

@@ -1,4 +1,5 @@
 #include <fmt/core.h>
+#include <cstdio>
 
 #include <memory>
 #include <string>
@@ -63,6 +64,7 @@ void run(Arguments<Method>& arguments) {
   const tilt_series::TiltSeries series(options.input);
   print_plan(baseline::plan_baseline(series, options), method.facts());
   if (options.tune) fmt::print("short trials first, that choose settings by held-out views\n");
+  std::fflush(stdout);  // before what comes of the run, in a file too
   if (arguments.dry_run) return;
   print_summary(baseline::run_baseline(series, options,
                                        {make_progress_bar("tune"), make_progress_bar("baseline")}));

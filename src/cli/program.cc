@@ -47,12 +47,15 @@ std::string command_name(const CLI::App& program) {
 // CLI11 would say that a command is missing where it is misspelt.
 void require_known_command(const CLI::App& program, const std::vector<std::string>& arguments) {
   const CLI::App* app = &program;
+  std::string command = program.get_name();
   for (const std::string& word : arguments) {
     if (app->get_require_subcommand_min() == 0 || word.rfind('-', 0) == 0) return;
     const auto named =
         app->get_subcommands([&](const CLI::App* sub) { return sub->get_name() == word; });
     if (named.empty())
-      throw Error(fmt::format("there is no command '{}': `tomofield --help` lists them", word));
+      throw Error(fmt::format("there is no {} '{}': `{} --help` lists them",
+                              app == &program ? "command" : "method", word, command));
+    command += " " + word;
     app = named.front();
   }
 }
@@ -127,10 +130,10 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
   } catch (const Error& error) {
     return fail_alone(session, 2, error.what());
   } catch (const std::bad_alloc&) {
-    return fail_alone(
-        session, 2,
-        "the system has no more memory to give: end other programs, or reduce "
-        "the problem (a larger --bin, a smaller --roi or --thickness, fewer --threads)");
+    return fail_alone(session, 2,
+                      "the system has no more memory to give: end other programs, or reduce "
+                      "the problem (a larger --bin or --voxel-size, a smaller --roi, --box or "
+                      "--thickness, fewer --threads)");
   } catch (const std::filesystem::filesystem_error& error) {
     return fail_alone(
         session, 2,

@@ -61,6 +61,7 @@ void print_plan(const reconstruct::ReconstructOptions& options, const reconstruc
       options.field.kind, plan.num_leaves, plan.num_leaves == 1 ? "leaf" : "leaves",
       plan.num_parameters, plan.num_steps, base::thread_count(), processes,
       static_cast<double>(plan.memory_bytes) / (1 << 30), num_processes == 1 ? "" : " each");
+  std::fflush(stdout);  // before what comes of the run, in a file too
 }
 
 void print_files(const reconstruct::OutputPaths& paths) {

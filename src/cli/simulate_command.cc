@@ -55,6 +55,20 @@ tilt_series::Contrast resolve_contrast(const SimulateArguments& arguments) {
                                                   : tilt_series::Contrast::kBright;
 }
 
+// What reconstruct has to be told of the series.
+std::string how_to_reconstruct(const std::filesystem::path& directory,
+                               const simulate::SimulationOptions& options) {
+  const auto file = [&](const char* name) { return (directory / name).string(); };
+  return fmt::format(
+      "reconstruct it with: tomofield reconstruct {} --tlt {}{} --thickness {} --contrast {}{} -o "
+      "{}",
+      file("tilt_series.mrc"), file("tilt_series.tlt"),
+      options.shift_spread_px > 0 ? " --xf " + file("tilt_series.xf") : "",
+      options.cell.thickness_px,
+      options.contrast == tilt_series::Contrast::kDark ? "dark" : "bright",
+      options.cell.is_extended ? "" : " --no-margin", file("tomogram.mrc"));
+}
+
 void run_simulate(SimulateArguments& arguments) {
   simulate::SimulationOptions& options = arguments.options;
   if (arguments.noise && options.dose)
@@ -73,7 +87,7 @@ void run_simulate(SimulateArguments& arguments) {
   if (options.dose) line += fmt::format(", {} electrons per pixel and view", *options.dose);
   if (summary.truth)
     line += fmt::format(", truth max {:.3f} mean {:.3f}", summary.truth->max, summary.truth->mean);
-  fmt::print("{}\n", line);
+  fmt::print("{}\n{}\n", line, how_to_reconstruct(arguments.directory, options));
 }
 
 }  // namespace

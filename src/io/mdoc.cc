@@ -78,6 +78,10 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
       mdoc.sections.back().line = line.number;
     }
   }
+  if (mdoc.sections.empty()) {
+    throw Error(fmt::format("'{}' has no sections, [ZValue = 0] and so on: is it an .mdoc file?",
+                            path.string()));
+  }
   sort_and_require_unique(path, &mdoc);
   return mdoc;
 }

@@ -175,6 +175,11 @@ std::string describe(MrcMode mode) {
 
 MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name,
                             SeriLayout* seri) {
+  if (std::memcmp(bytes.data(), "\x89HDF", 4) == 0) {
+    throw Error(fmt::format(
+        "'{}' is an HDF5 file, not MRC: if it is a model, `tomofield export` writes a volume of it",
+        name));
+  }
   MrcHeader header;
   header.is_byte_swapped = detect_byte_swap(bytes);
   const Fields fields(bytes, header.is_byte_swapped);

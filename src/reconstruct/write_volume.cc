@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "base/log.h"
 #include "distributed/gathered_arrays.h"
 #include "tomofield/error.h"
 #include "tomofield/version.h"
@@ -38,30 +39,53 @@ void gather_parameters(const VolumeShare& share, field::Field& field) {
   });
 }
 
-// Refuses a box that cannot meet the field: all of it would be zero.
-void require_inside(const field::Field& field, const Box& box) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  Point low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
-  for (int corner = 0; corner < 8; ++corner) {
-    Point voxel{};
-    for (std::size_t a = 0; a < 3; ++a)
-      voxel[a] = (corner >> a & 1) ? static_cast<double>(box.size[a]) : 0.0;
-    const Point at = box.position(voxel);
-    for (std::size_t a = 0; a < 3; ++a) {
-      low[a] = std::min(low[a], at[a]);
-      high[a] = std::max(high[a], at[a]);
+// Where a box lies, turned or not.
+struct Bounds {
+  Point low, high;
+  explicit Bounds(const Box& box) {
+    low.fill(std::numeric_limits<double>::infinity());
+    high.fill(-std::numeric_limits<double>::infinity());
+    for (int corner = 0; corner < 8; ++corner) {
+      Point voxel{};
+      for (std::size_t a = 0; a < 3; ++a)
+        voxel[a] = (corner >> a & 1) ? static_cast<double>(box.size[a]) : 0.0;
+      const Point at = box.position(voxel);
+      for (std::size_t a = 0; a < 3; ++a) {
+        low[a] = std::min(low[a], at[a]);
+        high[a] = std::max(high[a], at[a]);
+      }
     }
   }
+};
+
+// Refuses a box that cannot meet the field: all of it would be zero.
+void require_inside(const field::Field& field, const Bounds& box) {
   const field::RootGrid& roots = field.tree().roots();
   const Point first{static_cast<double>(roots.x0), static_cast<double>(roots.y0), 0.0};
   const Point last{first[0] + static_cast<double>(roots.columns * roots.cell_size),
                    first[1] + static_cast<double>(roots.rows * roots.cell_size), field.thickness()};
   for (std::size_t a = 0; a < 3; ++a) {
-    if (low[a] < last[a] && high[a] > first[a]) continue;
+    if (box.low[a] < last[a] && box.high[a] > first[a]) continue;
     throw Error(
         fmt::format("the box lies outside of the model: its {} runs from {:.6g} to {:.6g} px, the "
                     "model's from {:.6g} to {:.6g}",
-                    "xyz"[a], low[a], high[a], first[a], last[a]));
+                    "xyz"[a], box.low[a], box.high[a], first[a], last[a]));
+  }
+}
+
+// Beside the region of interest the field is a margin, which only some views see.
+void warn_of_margin(const field::ModelInfo& info, const Bounds& box, double tolerance) {
+  const geometry::Roi& roi = info.roi;
+  const Point first{static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0};
+  const Point last{static_cast<double>(roi.x1), static_cast<double>(roi.y1),
+                   info.geometry.thickness};
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (box.low[a] >= first[a] - tolerance && box.high[a] <= last[a] + tolerance) continue;
+    base::log_warning(fmt::format(
+        "the box reaches outside the region that was reconstructed: its {} runs from {:.6g} to "
+        "{:.6g} px, the region's from {:.6g} to {:.6g}; what lies there is a guess or nothing",
+        "xyz"[a], box.low[a], box.high[a], first[a], last[a]));
+    return;
   }
 }
 
@@ -156,7 +180,9 @@ Box region_box(const field::ModelInfo& model, double voxel_px) {
 void write_volume(const field::Model& model, const VolumeOptions& options,
                   const std::filesystem::path& path) {
   const Box box = options.box.value_or(region_box(model, 1.0));
-  require_inside(*model.field, box);
+  const Bounds bounds(box);
+  require_inside(*model.field, bounds);
+  if (options.box) warn_of_margin(model, bounds, 0.5 * box.voxel_px);
   write_voxels([&](const field::BoxSink& sink) { sample_box(*model.field, box, sink); }, box, model,
                kMadeBy, options, path);
 }

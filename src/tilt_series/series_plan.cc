@@ -160,6 +160,11 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::MrcReader& st
   const auto aretomo =
       options.aln ? std::optional(read_aretomo(*options.aln, stack)) : std::nullopt;
   const TiltAngles angles = find_tilt_angles(options, stack, aretomo, mdoc);
+  if (mdoc && std::ssize(mdoc->sections) != header.nz) {
+    base::log_warning(fmt::format("'{}' has {} sections and '{}' {}: are they of one series?",
+                                  options.mdoc->string(), mdoc->sections.size(),
+                                  options.stack.string(), header.nz));
+  }
   const std::vector<io::NumberLine> x_tilts = read_x_tilts(options, stack);
   const auto excluded = io::parse_section_list(options.exclude, header.nz);
 

@@ -121,13 +121,14 @@ struct TiltSeries::Impl {
   void look_over(const distributed::Communicator& processes) {
     survey(processes);
     processes.together([&] { find_beads(); });
-    base::log_info(fmt::format(
-        "'{}': {} of {} sections, tilts {:.1f}° to {:.1f}° from {}, views of {} × {} pixels of {} "
-        "Å",
-        options.stack.string(), views.size(), stack.header().nz,
-        std::min_element(views.begin(), views.end(), by_tilt)->tilt_deg,
-        std::max_element(views.begin(), views.end(), by_tilt)->tilt_deg, plan.angle_source, width,
-        height, plan.pixel_size_A * plan.bin_factor));
+    base::log_info(
+        fmt::format("'{}': {} of {} sections, tilts {:.1f}° to {:.1f}° from {}, views of {} × {} "
+                    "pixels of {:.6g} "
+                    "Å",
+                    options.stack.string(), views.size(), stack.header().nz,
+                    std::min_element(views.begin(), views.end(), by_tilt)->tilt_deg,
+                    std::max_element(views.begin(), views.end(), by_tilt)->tilt_deg,
+                    plan.angle_source, width, height, plan.pixel_size_A * plan.bin_factor));
   }
 
   static bool by_tilt(const View& a, const View& b) { return a.tilt_deg < b.tilt_deg; }

@@ -219,6 +219,17 @@ TEST(TiltSeries, PixelSizeOfTheMdocWhereTheHeaderHasNone) {
   expect_parts(warnings.text(), {"no pixel size", "--pixel-size"});
 }
 
+TEST(TiltSeries, AnMdocOfAnotherSeriesIsSaid) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 2);
+  options.mdoc = scratch.write("two.mdoc", "[ZValue = 0]\nTiltAngle = 1\n");
+  const WarningCatcher warnings;
+  TiltSeries{options};
+  expect_parts(warnings.text(), {"two.mdoc", "1 sections", "2"});
+  options.mdoc = scratch.write("no.mdoc", "-60.0\n-58.0\n");
+  expect_parts(refusal(options), {"no.mdoc", "ZValue"});
+}
+
 TEST(TiltSeries, FewPixelsThatAreNoNumbersAreMasked) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = small_series(scratch);

@@ -77,6 +77,12 @@ for box in (["--box", f"{X0 + 3},{Y0 + 8},5,{X0 + 33},{Y0 + 28},16"],
     np.testing.assert_allclose(origin, np.array([X0 + 3, Y0 + 8, 5]) * -PIXEL_A, atol=1e-4)
     np.testing.assert_allclose(voxel_size.tolist(), PIXEL_A, rtol=1e-7)
 
+# Beside the region of interest: a warning, and none where the box ends at its face.
+for x1, words in ((X0 + WIDTH, False), (X0 + WIDTH + 3, True)):
+    result = run("export", "model.h5", "-o", "box.mrc", "--overwrite", "--box",
+                 f"{X0 + 3},{Y0 + 8},0,{x1},{Y0 + 10},5")
+    assert ("reaches outside" in result.stderr) == words, result.stderr
+
 # Two pixels a voxel: means, with the exact size; the odd last column and row stay out,
 # half a pixel on either side.
 values, voxel_size, origin = export("--bin", 2, "--box", f"{X0 + 3},{Y0 + 8},5,{X0 + 33},{Y0 + 28},15")
