@@ -1,6 +1,6 @@
 #include <fmt/core.h>
-#include <cstdio>
 
+#include <cstdio>
 #include <memory>
 #include <string>
 
