@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <span>
@@ -82,7 +83,31 @@ std::string as_text(const std::vector<std::int64_t>& numbers) {
   return text;
 }
 
-// Names of what differs between two fingerprints, as "fit seed, tilt_deg".
+// What a user calls an entry of a fingerprint: the option, whose name its own is but for some.
+std::string name_of(const std::string& entry) {
+  static const std::map<std::string, std::string> others{{"choose_penalty", "--tv-penalty"},
+                                                         {"fit penalty", "--tv-penalty"},
+                                                         {"fit density_variation", "--tv"},
+                                                         {"fit factor_variation", "--tv-factors"},
+                                                         {"fit boundary", "--bcc"},
+                                                         {"fit fourier", "--ifp"},
+                                                         {"fit fourier_ring", "--ifp-ring"},
+                                                         {"fit fit_view_scale", "--view-scale"},
+                                                         {"fit patience", "--early-stop"},
+                                                         {"field kind", "--field"},
+                                                         {"field with_margin", "--no-margin"},
+                                                         {"specimen axis_x", "--center"},
+                                                         {"specimen axis_z", "--center"},
+                                                         {"bin_factor", "--bin"}};
+  if (const auto other = others.find(entry); other != others.end()) return other->second;
+  for (const char* of_series : {"rays", "noise_sigma", "unit", "tilt_deg", "alignment"})
+    if (entry.starts_with(of_series)) return "the tilt series or how it is read";
+  std::string name = entry.substr(entry.find(' ') + 1);
+  std::ranges::replace(name, '_', '-');
+  return "--" + name;
+}
+
+// What differs between two fingerprints, as "--seed, the tilt series or how it is read".
 std::string differences(const std::string& found, const std::string& wanted) {
   const auto parse = [](const std::string& text) {
     return nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
@@ -95,7 +120,7 @@ std::string differences(const std::string& found, const std::string& wanted) {
     std::ranges::replace(name, '/', ' ');
     const std::size_t first = name.find_first_not_of(' ');
     if (first == std::string::npos) return "everything";
-    names.insert(name.substr(first, name.find_last_not_of(' ') + 1 - first));
+    names.insert(name_of(name.substr(first, name.find_last_not_of(' ') + 1 - first)));
   }
   return fmt::format("{}", fmt::join(names, ", "));
 }

@@ -198,7 +198,7 @@ def test_faults_are_told_once():
     assert not os.listdir(os.path.dirname(results.volume_path))
     succeed(2, *command(results))
     refuse([results.volume_path, "--overwrite"], 2, *command(results))
-    refuse([results.model_path, "fit seed"], 2, *command(results, "--resume", "--seed", 9))
+    refuse([results.model_path, "--seed"], 2, *command(results, "--resume", "--seed", 9))
 
 
 def test_a_fault_of_one_process_is_told_by_the_first():

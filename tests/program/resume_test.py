@@ -174,17 +174,17 @@ def test_torn_checkpoints_are_refused():
 
 def test_foreign_checkpoints_are_refused():
     results, _, _ = stopped_run("foreign")
-    refuse(results, ["fit seed"], "--seed", 2)
-    refuse(results, ["specimen thickness"], "--thickness", 22)
-    refuse(results, ["field rank"], "--rank", 4)
-    refuse(results, ["field kind"], "--field", "grid")
-    refuse(results, ["fit epochs"], "--epochs", 6)
-    refuse(results, ["rays"], "--exclude", 3)
-    refuse(results, ["tilt_deg"], input=series.with_views("tilted", series.views,
+    refuse(results, ["--seed"], "--seed", 2)
+    refuse(results, ["--thickness"], "--thickness", 22)
+    refuse(results, ["--rank"], "--rank", 4)
+    refuse(results, ["--field"], "--field", "grid")
+    refuse(results, ["--epochs"], "--epochs", 6)
+    refuse(results, ["the tilt series"], "--exclude", 3)
+    refuse(results, ["the tilt series"], input=series.with_views("tilted", series.views,
                                                           harness.TILTS + 1).input)
     views = series.views.copy()
     views[5, 7, 9] += 0.01
-    refuse(results, ["rays"], input=series.with_views("changed", views).input)
+    refuse(results, ["the tilt series"], input=series.with_views("changed", views).input)
     # How the volume is written changes nothing of the fit; nor does another place for the series.
     moved = series.with_views("moved", series.views)
     arguments = command(results, "--resume", "--mode", 12)
