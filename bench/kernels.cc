@@ -2,12 +2,14 @@
 #include <fmt/core.h>
 #include <hwy/targets.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "base/commit.h"
 #include "bench/cases.h"
 #include "bench/machine.h"
 #include "bench/measure.h"
@@ -114,12 +116,12 @@ int run(const std::string& output, int rounds, const std::string& only_target) {
   }
   const std::vector<Case> cases = all_cases();
   const std::vector<Timing> timings = measure(cases, targets, rounds);
-  nlohmann::json report = {{"commit", source_commit()},
+  nlohmann::json report = {{"commit", base::source_commit()},
                            {"compiler", __VERSION__},
                            {"cpu", cpu_model()},
                            {"rounds", rounds},
                            {"targets", nlohmann::json::array()}};
-  fmt::print("{} · commit {} · {} rounds\n", cpu_model(), source_commit(), rounds);
+  fmt::print("{} · commit {} · {} rounds\n", cpu_model(), base::source_commit(), rounds);
   for (const std::int64_t target : targets) {
     const TargetReport target_report(cases, timings, target);
     target_report.print();
@@ -134,7 +136,11 @@ int run(const std::string& output, int rounds, const std::string& only_target) {
 }  // namespace tomofield::bench
 
 int main(int argc, char** argv) {
-  if (argc < 2 || argc > 4) {
+  const std::vector<std::string> arguments(argv + 1, argv + argc);
+  const bool has_option =
+      std::any_of(arguments.begin(), arguments.end(),
+                  [](const std::string& word) { return word.starts_with("-"); });
+  if (arguments.empty() || arguments.size() > 3 || has_option) {
     fmt::print(stderr, "usage: bench_kernels OUTPUT.json [ROUNDS [TARGET]]\n");
     return 2;
   }

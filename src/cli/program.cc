@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/commit.h"
 #include "base/log.h"
 #include "cli/commands.h"
 #include "cli/config_file.h"
@@ -116,7 +117,8 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
   CLI::App program{
       "tomofield: clean tomograms from aligned tilt series by continuous density fields",
       "tomofield"};
-  program.set_version_flag("--version", "tomofield " TOMOFIELD_VERSION);
+  program.set_version_flag(
+      "--version", fmt::format("tomofield " TOMOFIELD_VERSION " ({})", base::source_commit()));
   program.require_subcommand(1);
   add_commands(program, processes);
   try {

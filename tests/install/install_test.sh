@@ -14,8 +14,8 @@ rm -rf "$scratch"
 mkdir -p "$scratch"
 cmake --install "$build" --prefix "$scratch/prefix" >"$scratch/install.log"
 
-[ "$("$scratch/prefix/bin/tomofield" --version)" = "tomofield $version" ] ||
-  fail "the installed program does not say that it is version $version"
+"$scratch/prefix/bin/tomofield" --version | grep -qx "tomofield $version ([^()]\+)" ||
+  fail "the installed program does not say that it is version $version and of which commit"
 
 # Nothing in the package may point back into the source or build tree.
 source_dir=$(cd "$consumer/../.." && pwd)
