@@ -118,8 +118,8 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
       ->group(group);
   command
       .add_option("--hold-out", arguments.hold_out,
-                  "run every method without every so-manieth view too, and report how well it "
-                  "predicts them")
+                  "run every method without every Nth view too, and report how well it predicts "
+                  "them")
       ->check(number_between(2, kMostViews))
       ->group(group);
   command.add_option("-o,--output", arguments.folder, "folder of everything that it makes")

@@ -31,7 +31,7 @@ void add_shared_fit_options(CLI::App& command, const SharedFitOptions& options) 
       ->group(kGroup);
   command
       .add_option("--hold-out", options.hold_out,
-                  "keep every so-manieth view from the fit and report how well it is predicted")
+                  "leave every Nth view out of the fit and report how well it is predicted")
       ->check(number_between(2, kMostViews))
       ->group(kGroup);
 }
