@@ -46,16 +46,23 @@ def succeed(*arguments, **keywords):
     return result
 
 
+def stop_after_first_step(command, number=signal.SIGTERM):
+    """The ended run, which got a signal after its first step (and may have been quicker), and what
+    it said after that step."""
+    run = start(*command)
+    for line in run.stderr:
+        if line.startswith("reconstruct "):  # a step is done
+            break
+    run.send_signal(number)
+    _, errors = run.communicate()
+    return run, errors
+
+
 def finish_with_stops(command, after_stop, most):
     """Runs a resumable command to its end, stopped by SIGTERM after its first step each time, as
     long as `most` allows; after_stop() is called after every stop."""
     for _ in range(most):
-        run = start(*command)
-        for line in run.stderr:
-            if line.startswith("reconstruct "):  # a step is done
-                break
-        run.send_signal(signal.SIGTERM)
-        _, errors = run.communicate()
+        run, errors = stop_after_first_step(command)
         if run.returncode == 0:
             return
         assert run.returncode == 143, errors

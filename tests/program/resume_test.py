@@ -114,12 +114,7 @@ def stopped_run(name, number=signal.SIGTERM, *options):
     No checkpoint falls due before the signal."""
     for _ in range(10):
         results = fresh_results(name)
-        run = harness.start(*command(results, *options))
-        for line in run.stderr:
-            if line.startswith("reconstruct "):  # the first step is done
-                break
-        run.send_signal(number)
-        _, errors = run.communicate()
+        run, errors = harness.stop_after_first_step(command(results, *options), number)
         if run.returncode != 0:  # else it was too quick for us
             return results, run, errors
     raise AssertionError("every run ended before its signal")
