@@ -1,5 +1,5 @@
 """Rows of a quality benchmark: a row is one way to reconstruct, run on one yardstick phantom
-(DESIGN §8) with one seed, scored against the truth and kept as one JSON file, so that a bench
+(docs/index.md) with one seed, scored against the truth and kept as one JSON file, so that a bench
 that was interrupted goes on with the row after. Seeds are not those of the tests."""
 
 import collections
@@ -77,14 +77,15 @@ def run_measured(command):
     return Usage(usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024, time.monotonic() - start)
 
 
-def estimated_MiB(command):
-    """The memory that a command of tomofield says it needs, to 0.01 GiB; to 0.1 GiB where it fails
-    because this machine has less."""
+def dry_run(command):
+    """What a command of tomofield says that it would take: MiB, to 0.01 GiB (to 0.1 GiB where it
+    fails because this machine has less), and, where it has any, steps."""
     done = subprocess.run([*command, "--dry-run"], capture_output=True, text=True)
-    said = re.search(r"about ([\d.]+) GiB\s+of memory", done.stdout + done.stderr)
-    if not said:
+    said = done.stdout + done.stderr
+    memory, steps = re.search(r"about ([\d.]+) GiB\s+of memory", said), re.search(r"(\d+) steps", said)
+    if not memory:
         sys.exit(f"{' '.join(command)} --dry-run\n{done.stderr}{done.stdout}")
-    return 1024 * float(said.group(1))
+    return {"MiB": 1024 * float(memory.group(1)), **({"steps": int(steps.group(1))} if steps else {})}
 
 
 def measure(options, arguments, kind, noise, seed, scratch):

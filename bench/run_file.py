@@ -1,4 +1,4 @@
-"""run.json, what bench/run gathers and bench/regression compares: the machine, the commits and dates
+"""run.json, what bench/run gathers and bench/regression compares: the machines, the commits and dates
 of what was measured, and rows {group, name, arguments, figures: {figure: [a value a repeat]}}."""
 
 import json

@@ -41,8 +41,7 @@ def of_group(run, group):
 
 
 def print_tables(run):
-    print(f"{run['machine']['cpu']}, {run['machine']['threads']} threads, "
-          f"{run['machine']['memory_GiB']} GiB; commit {', '.join(run['commits'])}; {run['date']}. "
+    print(f"{'; '.join(run['machines'])}; commit {', '.join(run['commits'])}; {run['date']}. "
           "Medians over repeats ± median absolute deviation.")
     for group, print_group in (("kernels", print_kernels),
                                ("reconstructions", print_reconstructions),
@@ -54,7 +53,7 @@ def print_tables(run):
 
 def print_kernels(rows):
     totals = [row for row in rows if ": " not in row["name"]]
-    print("\n## Kernels, one core")
+    print("\n## Kernels, one core\n\nTargets by Highway's names: AVX3 is AVX-512.")
     names = list(totals[0]["figures"])
     table(["", *(row["name"].removeprefix("kernels ") for row in totals)],
           [[name, *(cell(figure(row, name)) for row in totals)] for name in names])

@@ -15,6 +15,7 @@ from quality_rows import run_measured
 
 SEED = 101
 NOISE = 0.05
+KERNELS_FILE = "kernels.json"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,6 +24,7 @@ class Row:
     name: str
     arguments: str  # a kept row of the same name and other arguments is measured again
     measure: typing.Callable
+    commit: typing.Callable = None  # (scratch folder) of what was measured, if not options.program
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,14 +35,10 @@ class WideSeries:
     width: int = 4096
     thickness: int = 1024
     tilt_step: float = 2  # -60 to 60: 61 views
-    rows: int = 128
-    field: str = "--leaf-size 128 --vertex-spacing 2.5 --rank 6 --margin-spacing 8"
+    rows: int = 256
+    field: str = "--leaf-size 256 --vertex-spacing 2.5 --rank 16 --margin-spacing 8"
     timed_epochs: int = 2  # of full resolution; of the coarse stage
     timed_coarse_epochs: int = 4
-
-    def epochs(self):
-        """The defaults of reconstruct: (at full resolution, coarse)."""
-        return (10, 80) if "--field grid" in self.field else (30, 80)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,7 +70,7 @@ QUICK = Plan(shapes=((64, 38),),
 def all_rows(options, plan, programs):
     """programs: {name: command with placeholders}, of other programs."""
     return [Row("kernels", "kernels", f"{plan.kernel_rounds} rounds",
-                functools.partial(measure_kernels, options, plan.kernel_rounds)),
+                functools.partial(measure_kernels, options, plan.kernel_rounds), kernels_commit),
             *reconstruction_rows(options, plan, programs),
             wide_row(options, plan.wide), *size_rows(options, plan)]
 
@@ -82,10 +80,8 @@ def measure_kernels(options, rounds, scratch):
     if not os.path.exists(options.bench_kernels):
         sys.exit(f"there is no '{options.bench_kernels}': build the target bench_kernels, or choose "
                  "other rows with --only")
-    output = os.path.join(scratch, "kernels.json")
-    run_measured([options.bench_kernels, output, str(rounds)])
-    with open(output) as file:
-        report = json.load(file)
+    run_measured([options.bench_kernels, os.path.join(scratch, KERNELS_FILE), str(rounds)])
+    report = read_kernels(scratch)
     rows = {}
     for target in report["targets"]:
         name = f"kernels {target['target']}"
@@ -95,6 +91,15 @@ def measure_kernels(options, rounds, scratch):
                 "seconds_a_call": case["seconds"], "flops": [case["flops"]],
                 "bytes": [case["bytes"]], "nominal_updates": [case["nominal_updates"]]}
     return rows
+
+
+def read_kernels(scratch):
+    with open(os.path.join(scratch, KERNELS_FILE)) as file:
+        return json.load(file)
+
+
+def kernels_commit(scratch):
+    return read_kernels(scratch)["commit"]
 
 
 def reconstruction_rows(options, plan, programs):
@@ -123,7 +128,7 @@ def measure_ours(options, shape, name, arguments, scratch):
     command = [options.program, *arguments.split(),
                *quality_rows.series_arguments(folder, shape[1]), "--no-margin", "-o", volume,
                "--overwrite"]
-    figures = {"estimated_MiB": [quality_rows.estimated_MiB(command)],
+    figures = {"estimated_MiB": [quality_rows.dry_run(command)["MiB"]],
                **figures_of(run_measured(command))}
     scores = quality_rows.score(options, volume, os.path.join(folder, "truth.mrc"), scratch)
     with open(os.path.join(scratch, "volume.json")) as file:
@@ -155,6 +160,15 @@ def wide_row(options, wide):
                functools.partial(measure_wide, options, wide, name))
 
 
+def default_epochs(command):
+    """(at full resolution, coarse): of a command of reconstruct without either option, by what dry
+    runs say of steps."""
+    coarse = ["--coarse-epochs", "0"]
+    both, full, one = (quality_rows.dry_run(words)["steps"]
+                       for words in (command, command + coarse, [*command, *coarse, "--epochs", "1"]))
+    return full // one, (both - full) // one
+
+
 def measure_wide(options, wide, name, scratch):
     """Core-hours of the whole series from the band: a run is a start, so many epochs of full
     resolution and so many coarse ones, each as long as the band is high."""
@@ -167,16 +181,16 @@ def measure_wide(options, wide, name, scratch):
         return run_measured([*command, "--epochs", str(epochs), "--coarse-epochs",
                              str(coarse_epochs)])
 
+    epochs, coarse_epochs = default_epochs(command)
     start, longer = run(1, 0), run(1 + wide.timed_epochs, 0)
     coarse = run(1, wide.timed_coarse_epochs)
     figures = {"peak_of_band_MiB": [longer.peak_MiB],
-               "estimated_of_band_MiB": [quality_rows.estimated_MiB(command)],
+               "estimated_of_band_MiB": [quality_rows.dry_run(command)["MiB"]],
                "estimated_of_whole_MiB": [wide_band.estimate_of_whole(options, wide, folder)]}
     for kind, clock in (("core", "core_seconds"), ("wall", "wall_seconds")):
         first, second, third = (getattr(usage, clock) for usage in (start, longer, coarse))
         epoch = (second - first) / wide.timed_epochs
         coarse_epoch = (third - first) / wide.timed_coarse_epochs
-        epochs, coarse_epochs = wide.epochs()
         whole = first - epoch + epochs * epoch + coarse_epochs * coarse_epoch
         figures[f"epoch_of_band_{kind}_s"] = [epoch]
         figures[f"coarse_epoch_of_band_{kind}_s"] = [coarse_epoch]

@@ -76,6 +76,6 @@ def estimate_of_whole(options, wide, folder):
     """MiB that a dry run of the whole series asks for."""
     series = quality_rows.series_arguments(folder, wide.thickness)
     series[0] = os.path.join(folder, "full.mrc")
-    return quality_rows.estimated_MiB([options.program, "reconstruct", *wide.field.split(),
-                                       "--tv-penalty", "concave", *series, "-o",
-                                       os.path.join(folder, "dry.mrc")])
+    return quality_rows.dry_run([options.program, "reconstruct", *wide.field.split(),
+                                 "--tv-penalty", "concave", *series, "-o",
+                                 os.path.join(folder, "dry.mrc")])["MiB"]
