@@ -31,9 +31,10 @@ struct Arguments {
   bool dry_run = false;
 };
 
-void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts& method) {
+void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts& method,
+                reconstruct::VolumeAxes axes) {
   print_sizes({plan.num_views, plan.geometry.width, plan.geometry.height, plan.pixel_size_A,
-               plan.roi, plan.geometry.thickness});
+               plan.roi, plan.geometry.thickness, axes});
   fmt::print(
       "{} voxels with the margins, {} parameters; {} iteration{} on {} threads; about {:.2f} GiB "
       "of memory\n",
@@ -62,7 +63,7 @@ void run(Arguments<Method>& arguments) {
   reconstruct::require_no_faults(options.specimen.faults());
   baseline::check_outputs(options);
   const tilt_series::TiltSeries series(options.input);
-  print_plan(baseline::plan_baseline(series, options), method.facts());
+  print_plan(baseline::plan_baseline(series, options), method.facts(), options.volume.axes);
   if (options.tune) fmt::print("short trials first, that choose settings by held-out views\n");
   std::fflush(stdout);  // before what comes of the run, in a file too
   if (arguments.dry_run) return;

@@ -2,6 +2,9 @@
 
 #include <fmt/core.h>
 
+#include <cmath>
+#include <utility>
+
 #include "cli/number_checks.h"
 
 namespace tomofield::cli {
@@ -58,9 +61,12 @@ bool is_on(const std::string& value, bool automatic) {
 }
 
 void print_sizes(const Sizes& sizes) {
-  fmt::print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {:.0f} voxels\n",
+  std::int64_t ny = sizes.roi.height(), nz = std::llround(sizes.thickness);
+  const bool swaps = sizes.axes == reconstruct::VolumeAxes::kXzy;
+  if (swaps) std::swap(ny, nz);
+  fmt::print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {} voxels{}\n",
              sizes.num_views, sizes.view_width, sizes.view_height, sizes.pixel_size_A,
-             sizes.roi.width(), sizes.roi.height(), sizes.thickness);
+             sizes.roi.width(), ny, nz, swaps ? " (x, z, y)" : "");
 }
 
 }  // namespace tomofield::cli

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "geometry/tilt_geometry.h"
+#include "reconstruct/write_volume.h"
 
 namespace tomofield::cli {
 
@@ -36,8 +37,10 @@ struct Sizes {
   double pixel_size_A;
   geometry::Roi roi;
   double thickness;
+  reconstruct::VolumeAxes axes;
 };
-/// The first line of what a command says before it starts.
+/// The first line of what a command says before it starts: the tomogram's sizes in the order of its
+/// file. compare::planned_grid() reads it.
 void print_sizes(const Sizes& sizes);
 
 }  // namespace tomofield::cli

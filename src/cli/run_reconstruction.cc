@@ -50,7 +50,7 @@ std::function<void()> tell_if_stuck(const std::filesystem::path& model,
 void print_plan(const reconstruct::ReconstructOptions& options, const reconstruct::RunPlan& plan,
                 int num_processes) {
   print_sizes({plan.num_views, plan.view_width, plan.view_height, plan.pixel_size_A, plan.roi,
-               plan.thickness});
+               plan.thickness, options.volume.axes});
   if (plan.num_trials > 0)
     fmt::print("about {} short trials first, that choose settings by held-out views\n",
                plan.num_trials);
