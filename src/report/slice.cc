@@ -4,6 +4,7 @@
 #include <span>
 #include <utility>
 
+#include "base/check.h"
 #include "io/mrc.h"
 #include "io/png.h"
 
@@ -16,6 +17,7 @@ constexpr std::size_t kMaxSample = std::size_t{1} << 20;
 }  // namespace
 
 Slice Slice::cut(std::int64_t x0, std::int64_t y0, std::int64_t x1, std::int64_t y1) const {
+  TOMOFIELD_CHECK(x0 >= 0 && y0 >= 0 && x1 <= width && y1 <= height, "a part beyond a slice");
   Slice part(name, x1 - x0, y1 - y0);
   for (std::int64_t y = y0; y < y1; ++y) std::copy(row(y) + x0, row(y) + x1, part.row(y - y0));
   return part;
