@@ -4,20 +4,33 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <sstream>
+#include <string_view>
 
 #include "tomofield/error.h"
 
 namespace tomofield::compare {
 namespace {
 
-// As the known method with the same first words, such as "baseline tv".
-bool can_tune(const std::vector<std::string>& arguments) {
+// Whether a known method with the same first words, such as "baseline tv", can.
+bool can_do(bool Method::*what, const std::vector<std::string>& arguments) {
   return std::ranges::any_of(known_methods(), [&](const Method& known) {
     const auto& words = known.arguments;
-    return known.tunes && std::ranges::mismatch(words, arguments).in1 == words.end();
+    return known.*what && std::ranges::mismatch(words, arguments).in1 == words.end();
   });
+}
+
+// A method's files must not be those of the comparison or of another method.
+void require_free_name(const std::string& name) {
+  constexpr std::array kTaken{"comparison", "report", "pictures", "truth"};
+  constexpr std::string_view kTrials = "_tune";  // NAME_tune.json: trials of the method NAME
+  if (std::ranges::count(kTaken, name) == 0 && !name.ends_with(kTrials)) return;
+  throw Error(
+      fmt::format("--also: '{}' would have files that the comparison needs itself ({}, and names "
+                  "that end in {}): give another name",
+                  name, fmt::join(kTaken, ", "), kTrials));
 }
 
 Method parse_method(const std::string& text) {
@@ -32,6 +45,7 @@ Method parse_method(const std::string& text) {
                     "'smooth=reconstruct --tv-penalty smooth'",
                     text));
   }
+  require_free_name(name);
   Method method{.name = name, .title = name, .arguments = {}};
   std::istringstream words(text.substr(equals + 1));
   for (std::string word; words >> word;) method.arguments.push_back(word);
@@ -40,8 +54,8 @@ Method parse_method(const std::string& text) {
     throw Error(fmt::format("--also '{}': the command must be reconstruct or baseline, not '{}'",
                             text, command));
   }
-  method.resumes = command == "reconstruct";
-  method.tunes = can_tune(method.arguments);
+  method.resumes = can_do(&Method::resumes, method.arguments);
+  method.tunes = can_do(&Method::tunes, method.arguments);
   return method;
 }
 

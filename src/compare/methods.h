@@ -24,7 +24,8 @@ std::vector<std::string> names_of(const std::vector<Method>& methods);
 /// The methods of a comparison, in order: `names` of known ones, then `others`, each
 /// NAME=COMMAND with the words of a tomofield command, as in
 /// "smooth=reconstruct --tv-penalty smooth". Throws Error for unknown names, for names that
-/// are there twice or cannot name a file, and for commands that make no tomogram.
+/// are there twice, cannot name a file or are those of the comparison's own files, and for commands
+/// that make no tomogram.
 std::vector<Method> choose_methods(const std::vector<std::string>& names,
                                    const std::vector<std::string>& others);
 
