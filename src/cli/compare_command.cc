@@ -57,6 +57,14 @@ std::vector<std::string> series_words(const CLI::App& command,
   return words;
 }
 
+ExitStatus stopped(compare::Outcome outcome, const Arguments& arguments) {
+  if (outcome == compare::Outcome::kStoppedBeforeRuns)
+    return {128 + g_signal, "stopped before the first run; nothing has been made or removed"};
+  return {128 + g_signal,
+          fmt::format("stopped; what is finished is in '{}': continue with the same command{}",
+                      arguments.folder, arguments.overwrite ? " without --overwrite" : "")};
+}
+
 void run(const CLI::App& command, const Arguments& arguments,
          const std::vector<std::string>& own_options) {
   compare::CompareOptions options;
@@ -80,11 +88,8 @@ void run(const CLI::App& command, const Arguments& arguments,
                                        is_there ? "there already" : "running, its log beside it"));
           },
       .stop_requested = [] { return g_signal != 0; }};
-  if (compare::compare_methods(options, hooks) == compare::RowsOutcome::kStopped) {
-    throw ExitStatus(128 + g_signal,
-                     fmt::format("stopped; what is finished is in '{}': the same command goes on",
-                                 arguments.folder));
-  }
+  const compare::Outcome outcome = compare::compare_methods(options, hooks);
+  if (outcome != compare::Outcome::kFinished) throw stopped(outcome, arguments);
   fmt::print(
       "report    {}\nfigures   {}\ntable     {}\n", (options.folder / "report.html").string(),
       (options.folder / "comparison.json").string(), (options.folder / "comparison.csv").string());

@@ -11,6 +11,8 @@
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
+#include <string_view>
 #include <thread>
 
 #include "base/stopwatch.h"
@@ -71,6 +73,17 @@ ChildResult run_child(const std::vector<std::string>& command, const std::filesy
           .core_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime),
           .wall_seconds = running.seconds(),
           .peak_bytes = std::int64_t{usage.ru_maxrss} * 1024};
+}
+
+std::string reason_of_failure(const std::filesystem::path& log) {
+  constexpr std::string_view kSpeaker = "tomofield: ";
+  std::ifstream file(log);
+  std::string last, sentence;  // what was printed before may come after it in the file
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with(kSpeaker)) sentence = line.substr(kSpeaker.size());
+    if (!line.empty()) last = line;
+  }
+  return sentence.empty() ? last : sentence;
 }
 
 }  // namespace tomofield::compare

@@ -24,4 +24,8 @@ struct ChildResult {
 ChildResult run_child(const std::vector<std::string>& command, const std::filesystem::path& log,
                       const std::function<bool()>& stop_requested);
 
+/// Why tomofield failed, by the file `log` of all that it said: its own sentence, without its name
+/// in front, or else the last line.
+std::string reason_of_failure(const std::filesystem::path& log);
+
 }  // namespace tomofield::compare

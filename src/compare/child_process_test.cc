@@ -50,6 +50,13 @@ TEST_F(ChildProcess, IsStoppedOnRequest) {
   EXPECT_EQ(run("exec sleep 100", [] { return true; }).exit_status, 128 + SIGTERM);
 }
 
+TEST_F(ChildProcess, HasFailedForWhatItSaysInItsOwnName) {
+  run("echo 'tomofield: no such file' >&2; echo plan");
+  EXPECT_EQ(reason_of_failure(log_), "no such file");
+  run("echo first; echo Killed; echo");
+  EXPECT_EQ(reason_of_failure(log_), "Killed");
+}
+
 TEST_F(ChildProcess, ThatDoesNotExistIsAnError) {
   EXPECT_THROW(run_child({"/nowhere/program"}, log_, {}), Error);
 }

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <array>
-#include <system_error>
 
 #include "compare/pictures.h"
+#include "compare/rehearsal.h"
 #include "compare/runs.h"
 #include "compare/scores.h"
 #include "compare/table.h"
@@ -118,6 +118,13 @@ nlohmann::json comparison_json(const CompareOptions& options, const std::vector<
           {"methods", methods}};
 }
 
+// No old report stands beside new volumes, and what stops before it is finished leaves no old ones.
+void remove_all_results(const fs::path& folder, const std::vector<Row>& rows) {
+  for (const char* file : {"report.html", "comparison.json", "comparison.csv"})
+    fs::remove(folder / file);
+  remove_results(rows);
+}
+
 }  // namespace
 
 void check_comparison(const CompareOptions& options) {
@@ -125,21 +132,17 @@ void check_comparison(const CompareOptions& options) {
   if (!fs::exists(options.input.stack))
     throw Error(fmt::format("the series '{}' does not exist", options.input.stack.string()));
   if (options.truth) io::MrcReader{*options.truth};
-  std::error_code fault;
-  fs::create_directories(options.folder, fault);
-  if (fault || !fs::is_directory(options.folder)) {
-    throw Error(fmt::format("the folder '{}' cannot be made{}", options.folder.string(),
-                            fault ? ": " + fault.message() : ""));
-  }
 }
 
-RowsOutcome compare_methods(const CompareOptions& options, const RunHooks& hooks) {
+Outcome compare_methods(const CompareOptions& options, const RunHooks& hooks) {
   const tilt_series::TiltSeries series(options.input);
   const PlannedRuns plan = plan_runs(options, series);
-  std::vector<Row> rows;
-  if (run_rows(options.program, options.input.stack, plan.runs, options.folder, options.overwrite,
-               hooks, rows) == RowsOutcome::kStopped)
-    return RowsOutcome::kStopped;
+  std::vector<Row> rows = options.overwrite ? new_rows(plan.runs, options.folder)
+                                            : stored_rows(plan.runs, options.folder);
+  if (!rehearse(options, hooks, rows)) return Outcome::kStoppedBeforeRuns;
+  fs::create_directories(options.folder);
+  if (options.overwrite) remove_all_results(options.folder, rows);
+  if (!run_rows(options.program, hooks, rows)) return Outcome::kStopped;
   const std::vector<Row> volumes(
       rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(options.methods.size()));
   Table table = table_of_costs(volumes);
@@ -147,7 +150,7 @@ RowsOutcome compare_methods(const CompareOptions& options, const RunHooks& hooks
   io::write_json(options.folder / "comparison.json", comparison_json(options, volumes, table));
   io::write_text_file(options.folder / "comparison.csv", table_csv(table));
   io::write_text_file(options.folder / "report.html", report_page(options, volumes, table, scores));
-  return RowsOutcome::kFinished;
+  return Outcome::kFinished;
 }
 
 }  // namespace tomofield::compare

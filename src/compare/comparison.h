@@ -24,13 +24,15 @@ struct CompareOptions {
   bool overwrite = false;
 };
 
-/// Throws Error for what would stop a comparison later: no method, no such series or truth, a
-/// folder that cannot be made.
+/// Throws Error if there is no method, no such series or no such truth.
 void check_comparison(const CompareOptions& options);
 
-/// Runs what has not been run yet (run_rows), scores every volume and writes into the folder
-/// comparison.json, comparison.csv, report.html (report/html.h: one file, no network) and the
-/// pictures that are in it.
-RowsOutcome compare_methods(const CompareOptions& options, const RunHooks& hooks);
+enum class Outcome { kFinished, kStopped, kStoppedBeforeRuns };
+
+/// Checks what would stop it later (rehearse), makes the folder, runs what has not been run yet
+/// (run_rows), scores every volume and writes into the folder comparison.json, comparison.csv,
+/// report.html (report/html.h: one file, no network) and the pictures that are in it. Throws Error
+/// before anything is made or removed for what can be found out before.
+Outcome compare_methods(const CompareOptions& options, const RunHooks& hooks);
 
 }  // namespace tomofield::compare

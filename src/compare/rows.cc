@@ -2,113 +2,113 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-
+#include "base/log.h"
 #include "compare/child_process.h"
-#include "io/json.h"
+#include "compare/grid.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {
 namespace {
 
-using nlohmann::json;
 namespace fs = std::filesystem;
 
-// Tells a series from what it was before, without reading it.
-json state_of(const fs::path& stack) {
-  return {{"path", fs::absolute(stack).string()},
-          {"bytes", fs::file_size(stack)},
-          {"written", fs::last_write_time(stack).time_since_epoch().count()}};
+// FOLDER/NAME with what follows it.
+fs::path file_of(const Row& row, const char* suffix) {
+  return row.volume.parent_path() / (row.run.name + suffix);
 }
 
-json read_json(const fs::path& path) {
-  std::ifstream file(path);
-  const json document = json::parse(file, nullptr, /*allow_exceptions=*/false);
-  if (document.is_discarded()) {
-    throw Error(fmt::format("'{}' is not what a comparison wrote: remove it, or give --overwrite",
-                            path.string()));
-  }
-  return document;
+// Whether there is a checkpoint, or trials of a tuning that was stopped.
+bool can_resume(const Row& row) {
+  if (!row.run.method.resumes) return false;
+  return fs::exists(file_of(row, ".h5")) ||
+         (row.state.progress != Progress::kFinished && fs::exists(file_of(row, "_tune.json")));
 }
 
-std::string last_line(const fs::path& log) {
-  std::ifstream file(log);
-  std::string last;
-  for (std::string line; std::getline(file, line);) {
-    if (!line.empty()) last = line;
+// What a run took until now that is part of what it takes in all.
+Costs costs_until_now(const Row& row) {
+  if (!can_resume(row)) return {};
+  if (row.state.progress != Progress::kStopped) {
+    base::log_warning(fmt::format(
+        "{} goes on from a run that was killed: what that had taken since it was started is not "
+        "known, and is missing in its core-seconds and time",
+        row.run.name));
   }
-  return last;
+  return row.state.costs;
 }
 
 // Runs one method; false if it was stopped.
-bool run(const fs::path& program, const fs::path& log, const RunHooks& hooks, Row& row) {
-  std::vector<std::string> command{program.string()};
-  command.insert(command.end(), row.run.command.begin(), row.run.command.end());
-  command.insert(command.end(), {"-o", row.volume.string()});
-  const bool has_checkpoint = fs::exists(fs::path(row.volume).replace_extension(".h5"));
-  command.push_back(row.run.method.resumes && has_checkpoint ? "--resume" : "--overwrite");
+bool run(const fs::path& program, const RunHooks& hooks, Row& row) {
+  const fs::path log = file_of(row, ".log");
+  const std::vector<std::string> command = full_command(program, row, row.volume);
+  // Its fit is finished, and the volume alone is written again.
+  const bool is_paid = can_resume(row) && row.state.progress == Progress::kFinished;
+  const auto keep = [&](Progress progress, const Costs& costs) {
+    if (is_paid) return;
+    row.state = {progress, costs};
+    write_row(file_of(row, ".row.json"), row.origin, row.state);
+  };
+  const Costs before = is_paid ? row.state.costs : costs_until_now(row);
+  keep(Progress::kRunning, before);
   const ChildResult result = run_child(command, log, hooks.stop_requested);
-  if (hooks.stop_requested && hooks.stop_requested()) return false;
-  if (result.exit_status != 0) {
-    throw Error(fmt::format("{} failed with status {}: {} (all that it said is in '{}')",
-                            row.run.name, result.exit_status, last_line(log), log.string()));
-  }
-  row.core_seconds = result.core_seconds;
-  row.wall_seconds = result.wall_seconds;
-  row.peak_bytes = result.peak_bytes;
-  return true;
-}
-
-json row_json(const Row& row, const json& state) {
-  return {{"command", row.run.command},
-          {"series", state},
-          {"core_seconds", row.core_seconds},
-          {"wall_seconds", row.wall_seconds},
-          {"peak_bytes", row.peak_bytes}};
-}
-
-// Whether the row is in its file; what it took is then in `row`.
-bool is_done(const fs::path& file, const json& state, Row& row) {
-  if (!fs::exists(file) || !fs::exists(row.volume)) return false;
-  const json stored = read_json(file);
-  if (stored.value("command", json()) != row.run.command ||
-      stored.value("series", json()) != state) {
-    throw Error(fmt::format(
-        "'{}' is of another series or of other options: give another folder with -o, or "
-        "--overwrite to make everything in this one anew",
-        file.string()));
-  }
-  row.core_seconds = stored.at("core_seconds");
-  row.wall_seconds = stored.at("wall_seconds");
-  row.peak_bytes = stored.at("peak_bytes");
-  return true;
-}
-
-void remove_results(const fs::path& folder, const std::string& name) {
-  for (const char* extension : {".mrc", ".h5", ".json", ".row.json", ".log"})
-    fs::remove(folder / (name + extension));
+  const bool has_ended = result.exit_status == 0;
+  keep(has_ended ? Progress::kFinished : Progress::kStopped,
+       before + Costs{result.core_seconds, result.wall_seconds, result.peak_bytes});
+  if (has_ended || hooks.must_stop()) return has_ended;
+  throw Error(fmt::format("{} failed with status {}: {} (all that it said is in '{}')",
+                          row.run.name, result.exit_status, reason_of_failure(log), log.string()));
 }
 
 }  // namespace
 
-RowsOutcome run_rows(const fs::path& program, const fs::path& stack, const std::vector<Run>& runs,
-                     const fs::path& folder, bool overwrite, const RunHooks& hooks,
-                     std::vector<Row>& rows) {
-  const json state = state_of(stack);
-  for (const Run& wanted : runs) {
-    if (overwrite) remove_results(folder, wanted.name);
-    Row row{.run = wanted, .volume = folder / (wanted.name + ".mrc"), .figures = {}};
-    const fs::path file = folder / (wanted.name + ".row.json");
-    const bool is_there = is_done(file, state, row);
-    if (hooks.run_starts) hooks.run_starts(wanted, is_there);
-    if (!is_there) {
-      if (!run(program, folder / (wanted.name + ".log"), hooks, row)) return RowsOutcome::kStopped;
-      io::write_json(file, row_json(row, state));
-    }
-    row.figures = read_json(folder / (wanted.name + ".json")).at("figures");
-    rows.push_back(std::move(row));
+std::vector<Row> new_rows(const std::vector<Run>& runs, const fs::path& folder) {
+  std::vector<Row> rows;
+  for (const Run& run : runs) {
+    rows.push_back({.run = run,
+                    .volume = folder / (run.name + ".mrc"),
+                    .origin = origin_of(run.command, run.inputs),
+                    .state = {}});
   }
-  return RowsOutcome::kFinished;
+  return rows;
+}
+
+std::vector<Row> stored_rows(const std::vector<Run>& runs, const fs::path& folder) {
+  std::vector<Row> rows = new_rows(runs, folder);
+  for (Row& row : rows) row.state = read_row(file_of(row, ".row.json"), row.origin);
+  return rows;
+}
+
+bool is_done(const Row& row) {
+  return row.state.progress == Progress::kFinished && fs::exists(row.volume) &&
+         fs::exists(file_of(row, ".json"));
+}
+
+std::vector<std::string> full_command(const fs::path& program, const Row& row,
+                                      const fs::path& volume) {
+  std::vector<std::string> command{program.string()};
+  command.insert(command.end(), row.run.command.begin(), row.run.command.end());
+  command.insert(command.end(),
+                 {"-o", volume.string(), can_resume(row) ? "--resume" : "--overwrite"});
+  return command;
+}
+
+void remove_results(const std::vector<Row>& rows) {
+  for (const Row& row : rows) {
+    for (const char* suffix : {".row.json", ".mrc", ".h5", ".json", "_tune.json", ".log"})
+      fs::remove(file_of(row, suffix));
+  }
+}
+
+bool run_rows(const fs::path& program, const RunHooks& hooks, std::vector<Row>& rows) {
+  for (Row& row : rows) {
+    const bool is_there = is_done(row);
+    if (!is_there && hooks.must_stop()) return false;
+    if (hooks.run_starts) hooks.run_starts(row.run, is_there);
+    if (!is_there && !run(program, hooks, row)) return false;
+    row.figures = read_figures(file_of(row, ".json"));
+    require_one_grid({rows.front().run.name, read_grid(rows.front().volume)},
+                     {row.run.name, read_grid(row.volume)});
+  }
+  return true;
 }
 
 }  // namespace tomofield::compare

@@ -2,7 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <iterator>
 #include <string>
+
+#include "reconstruct/result_files.h"
 
 namespace tomofield::compare {
 namespace {
@@ -32,6 +37,42 @@ std::string excluded(Purpose purpose, const CompareOptions& options,
   return sections;
 }
 
+// The words that name the command, such as "baseline tv"; its options follow.
+std::ptrdiff_t num_command_words(const Method& method) {
+  const auto option = std::ranges::find_if(
+      method.arguments, [](const std::string& word) { return word.starts_with('-'); });
+  return option - method.arguments.begin();
+}
+
+// Files among a method's own words: `--mask FILE`, `--config=FILE`.
+std::vector<std::filesystem::path> named_files(const std::vector<std::string>& words) {
+  std::vector<std::filesystem::path> files;
+  for (const std::string& word : words) {
+    const std::filesystem::path value =
+        word.starts_with('-') ? word.substr(word.find('=') + 1) : word;
+    if (std::filesystem::is_regular_file(value)) files.push_back(value);
+  }
+  return files;
+}
+
+Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
+             const CompareOptions& options) {
+  Run run{.name = method.name + suffix_of(purpose), .method = method, .command = {}, .inputs = {}};
+  // The series before the method's own options, of which the last may take several values.
+  const auto own = method.arguments.begin() + num_command_words(method);
+  run.command.assign(method.arguments.begin(), own);
+  std::ranges::copy(options.series_words, std::back_inserter(run.command));
+  std::copy(own, method.arguments.end(), std::back_inserter(run.command));
+  if (!exclude.empty()) run.command.insert(run.command.end(), {"--exclude", exclude});
+  if (purpose == Purpose::kHeldOutViews)
+    run.command.insert(run.command.end(), {"--hold-out", std::to_string(options.hold_out)});
+  // Anew for every purpose: settings that were chosen on all views have seen those held out.
+  if (options.tune && method.tunes) run.command.push_back("--tune");
+  run.inputs = reconstruct::input_files(options.input);
+  std::ranges::copy(named_files({own, method.arguments.end()}), std::back_inserter(run.inputs));
+  return run;
+}
+
 }  // namespace
 
 PlannedRuns plan_runs(const CompareOptions& options, const tilt_series::TiltSeries& series) {
@@ -41,17 +82,8 @@ PlannedRuns plan_runs(const CompareOptions& options, const tilt_series::TiltSeri
   if (options.hold_out > 0) plan.purposes.push_back(Purpose::kHeldOutViews);
   for (const Purpose purpose : plan.purposes) {
     const std::string exclude = excluded(purpose, options, series);
-    for (const Method& method : options.methods) {
-      Run run{method.name + suffix_of(purpose), method, method.arguments};
-      run.command.insert(run.command.end(), options.series_words.begin(),
-                         options.series_words.end());
-      if (!exclude.empty()) run.command.insert(run.command.end(), {"--exclude", exclude});
-      if (purpose == Purpose::kHeldOutViews)
-        run.command.insert(run.command.end(), {"--hold-out", std::to_string(options.hold_out)});
-      // Anew for every purpose: settings that were chosen on all views have seen those held out.
-      if (options.tune && method.tunes) run.command.push_back("--tune");
-      plan.runs.push_back(std::move(run));
-    }
+    for (const Method& method : options.methods)
+      plan.runs.push_back(plan_run(purpose, method, exclude, options));
   }
   return plan;
 }

@@ -49,9 +49,9 @@ Table table_of_costs(const std::vector<Row>& rows) {
   std::vector<std::optional<double>> core, wall, memory, parameters;
   for (const Row& row : rows) {
     table.methods.push_back(row.run.method);
-    core.push_back(row.core_seconds);
-    wall.push_back(row.wall_seconds);
-    memory.push_back(static_cast<double>(row.peak_bytes) / (1 << 20));
+    core.push_back(row.state.costs.core_seconds);
+    wall.push_back(row.state.costs.wall_seconds);
+    memory.push_back(static_cast<double>(row.state.costs.peak_bytes) / (1 << 20));
     const auto count = number(row.figures, "parameters");
     parameters.push_back(count ? std::optional(*count / 1e6) : std::nullopt);
   }

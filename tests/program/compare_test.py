@@ -9,7 +9,9 @@ import re
 import shutil
 import signal
 import subprocess
+import time
 
+import numpy as np
 import skimage.io
 
 import harness
@@ -108,41 +110,214 @@ def test_every_method_that_can_be_is_tuned():
     assert "tuned anew" in read(folder, "report.html")
 
 
-def test_it_goes_on_where_it_stopped():
-    folder = harness.fresh_directory("resumed")
-    run = compare(folder, epochs=20000, run=harness.start)
+def wait_for_line(run, start):
     for line in run.stderr:
-        if line.startswith("ours: running"):
-            break
+        if line.startswith(start):
+            return
+    raise AssertionError(run.communicate())
+
+
+def wait_until(is_so):
+    deadline = time.monotonic() + 120
+    while not is_so():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def stop(run):
     run.send_signal(signal.SIGTERM)
     _, errors = run.communicate()
-    assert run.returncode == 143 and folder in errors, errors
+    assert run.returncode == 143, errors
+    return errors
+
+
+def row_of(folder, name):
+    return json.loads(read(folder, name + ".row.json"))
+
+
+def remove(folder, *names):
+    for name in names:
+        os.remove(os.path.join(folder, name))
+
+
+def test_it_goes_on_where_it_stopped():
+    folder = harness.fresh_directory("resumed")
+    often = ["--also", OURS.format(4000) + " --checkpoint-minutes 0"]
+    command = ["compare", *series.input, *QUICK, "-o", folder, "--methods", "sirt", *often]
+    run = harness.start(*command)
+    wait_until(lambda: os.path.exists(os.path.join(folder, "ours.h5")))
+    errors = stop(run)
+    assert folder in errors and "--overwrite" not in errors, errors
     assert not os.path.exists(os.path.join(folder, "report.html"))
     first = harness.read_bytes(os.path.join(folder, "sirt.row.json"))
-    for file in ("ours.mrc", "ours.h5", "ours.json"):
-        if os.path.exists(os.path.join(folder, file)):
-            os.remove(os.path.join(folder, file))
-    said = compare(folder).stderr
-    assert "sirt: there already" in said and "ours: running" in said, said
+    stopped = row_of(folder, "ours")
+    assert stopped["progress"] == "stopped" and stopped["core_seconds"] > 0, stopped
+    run = harness.start(*command)
+    wait_for_line(run, "ours: running")
+    wait_until(lambda: "resuming" in read(folder, "ours.log"))
+    assert "killed" not in stop(run)
     assert harness.read_bytes(os.path.join(folder, "sirt.row.json")) == first
-    other = compare(folder, epochs=5, run=harness.tomofield)
-    assert other.returncode == 2 and "--overwrite" in other.stderr, other.stderr
-    compare(folder, "--overwrite", epochs=5)
+    later = row_of(folder, "ours")
+    for cost in ("core_seconds", "wall_seconds"):
+        assert later[cost] > stopped[cost] + 0.01, (stopped, later)
 
 
-def test_mistakes_are_named():
-    folder = harness.fresh_directory("mistakes")
+def test_what_a_run_has_cost_stays_with_it():
+    folder = harness.fresh_directory("costs")
+    compare(folder)
+    rows = {name: row_of(folder, name) for name in ("sirt", "ours")}
+    remove(folder, "ours.mrc", "sirt.mrc", "sirt.json")
+    said = compare(folder).stderr
+    assert "sirt: running" in said and "ours: running" in said, said
+    assert "resuming" in read(folder, "ours.log")
+    assert row_of(folder, "ours") == rows["ours"], "the fit was not made again"
+    assert row_of(folder, "sirt")["wall_seconds"] != rows["sirt"]["wall_seconds"]
+    table = {row["method"]: row for row in json.loads(read(folder, "comparison.json"))["methods"]}
+    assert table["ours"]["core_seconds"] == rows["ours"]["core_seconds"]
+
+    killed = dict(rows["ours"], progress="running")
+    with open(os.path.join(folder, "ours.row.json"), "w") as file:
+        json.dump(killed, file)
+    assert "ours goes on from a run that was killed" in compare(folder).stderr
+    both = row_of(folder, "ours")
+    assert both["core_seconds"] > killed["core_seconds"] and both["progress"] == "finished"
+
+
+def test_a_stopped_tuning_keeps_its_trials():
+    folder = harness.fresh_directory("stopped_tuning")
+    trials = os.path.join(folder, "ours_tune.json")
+    run = compare(folder, "--tune", epochs=60, run=harness.start)
+    wait_until(lambda: os.path.exists(trials))
+    stop(run)
+    assert not os.path.exists(os.path.join(folder, "ours.h5"))
+    before, costs = harness.read_bytes(trials), row_of(folder, "ours")
+    run = compare(folder, "--tune", epochs=60, run=harness.start)
+    wait_until(lambda: harness.read_bytes(trials) != before)
+    stop(run)
+    assert len(json.loads(harness.read_bytes(trials))["trials"]) > len(json.loads(before)["trials"])
+    assert row_of(folder, "ours")["core_seconds"] > costs["core_seconds"] > 0
+
+
+def test_overwrite_leaves_nothing_old():
+    folder = harness.fresh_directory("overwritten")
+    compare(folder)
+    run = compare(folder, "--overwrite", run=harness.start)
+    wait_for_line(run, "sirt: running")
+    assert "without --overwrite" in stop(run)
+    old = {"report.html", "comparison.json", "comparison.csv", "ours.mrc", "ours.row.json",
+           "ours.h5"}
+    assert not old & set(os.listdir(folder)), os.listdir(folder)
+    said = compare(folder).stderr
+    assert "sirt: running" in said and "ours: running" in said, said
+
+
+def test_what_a_row_was_made_from_is_watched():
+    folder, files = harness.fresh_directory("changed"), harness.fresh_directory("changed_files")
+    tlt, config = os.path.join(files, "copy.tlt"), os.path.join(files, "sirt.toml")
+    shutil.copyfile(series.tlt, tlt)
+    with open(config, "w") as file:
+        file.write("iterations = 3\n")
+    command = ["compare", series.stack, "--tlt", tlt, *QUICK, "-o", folder, "--methods", "wbp",
+               "--also", "few=baseline sirt --config " + config]
+    harness.succeed(*command)
+    before = {name: row_of(folder, name) for name in ("wbp", "few")}
+
+    def refused(*facts, command=command):
+        result = harness.tomofield(*command)
+        assert result.returncode == 2, result.stderr
+        for fact in (*facts, "--overwrite"):
+            assert fact in result.stderr, (fact, result.stderr)
+
+    for path, name in ((tlt, "wbp.row.json"), (config, "few.row.json")):
+        times = os.stat(path)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns + 1000))
+        refused(f"'{path}' has changed since", name)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+    refused("--hand", "-1", command=[*command, "--hand=-1"])
+    row = json.loads(json.dumps(before["few"]))
+    row["origin"]["tomofield"] = "0.0.1"
+    with open(os.path.join(folder, "few.row.json"), "w") as file:
+        json.dump(row, file)
+    refused("0.0.1", "few.row.json")
+    del row["origin"], row["wall_seconds"]
+    for text in (json.dumps(row), "{", "[]"):
+        with open(os.path.join(folder, "few.row.json"), "w") as file:
+            file.write(text)
+        refused("few.row.json")
+    assert row_of(folder, "wbp") == before["wbp"]
+    assert os.path.exists(os.path.join(folder, "few.mrc"))
+
+
+def test_a_run_that_fails_is_named_and_its_costs_are_kept():
+    folder = harness.fresh_directory("failing")
+    run = compare(folder, epochs=20000, run=harness.start)
+    wait_until(lambda: os.path.exists(os.path.join(folder, "ours.log")))
+    with open(f"/proc/{run.pid}/task/{run.pid}/children", encoding="ascii") as file:
+        os.kill(int(file.read()), signal.SIGKILL)
+    _, errors = run.communicate()
+    assert run.returncode == 2, errors
+    assert "ours failed with status 137" in errors and "ours.log" in errors, errors
+    assert row_of(folder, "ours")["progress"] == "stopped"
+    assert row_of(folder, "sirt")["progress"] == "finished", "what is finished stays"
+
+
+def refuse(folder, facts, *options):
+    """A mistake that is found before anything is made."""
+    words = harness.merge(["--methods", "sirt", "--truth", TRUTH], options)
+    result = harness.tomofield("compare", *series.input, *QUICK, "-o", folder, *words)
+    assert result.returncode == 2, (options, result.stderr)
+    for fact in facts:
+        assert fact in result.stderr, (fact, options, result.stderr)
+    assert not os.listdir(os.path.dirname(folder)), (options, os.listdir(os.path.dirname(folder)))
+
+
+def test_mistakes_are_named_before_anything_is_made():
+    parent = harness.fresh_directory("mistakes")
+    folder = os.path.join(parent, "new", "folder")
+    os.makedirs(os.path.dirname(folder))
     for options, fact in ((["--methods", "magic"], "'magic'"), (["--also", "x"], "NAME=COMMAND"),
                           (["--also", "x=export y"], "'export'"),
                           (["--also", "sirt=baseline sirt"], "twice"),
+                          (["--also", "truth=baseline sirt"], "'truth'"),
+                          (["--also", "comparison=baseline sirt"], "'comparison'"),
+                          (["--also", "sirt.even=baseline sirt"], "sirt.even"),
                           (["--truth", "nowhere.mrc"], "nowhere.mrc")):
-        words = harness.merge(["--methods", "sirt", "--truth", TRUTH], options)
-        result = harness.tomofield("compare", *series.input, *QUICK, "-o", folder, *words)
-        assert result.returncode == 2 and fact in result.stderr, (options, result.stderr)
-    failing = harness.tomofield("compare", *series.input, *QUICK, "-o", folder, "--methods", "sirt",
-                                "--also", "bad=baseline tv --weight -1")
-    assert failing.returncode == 2, failing.stderr
-    assert "bad failed with status 2" in failing.stderr and "bad.log" in failing.stderr
+        refuse(folder, [fact], *options)
+    refuse(folder, ["bad: ", "--weight"], "--also", "bad=baseline tv --weight -1")
+    refuse(folder, ["bad: ", "--magic"], "--also", "bad=reconstruct --magic")
+    refuse(folder, ["part", "24 × 24 × 24", "sirt", "48 × 36 × 24"],
+           "--also", "part=baseline sirt --roi 0,0,24,24")
+    refuse(folder, ["turned", "48 × 24 × 36", "sirt", "48 × 36 × 24"],
+           "--also", "turned=baseline sirt --axes xzy")
+    truth = os.path.join(series.directory, "other_truth.mrc")
+    for values, voxel in ((series.truth, 2 * harness.PIXEL_SIZE),
+                          (np.repeat(series.truth, 3, axis=1), harness.PIXEL_SIZE)):
+        harness.write_stack(truth, values.astype("f4"), voxel)
+        refuse(folder, ["other_truth.mrc", "sirt", "48 × 36 × 24"], "--truth", truth)
+    file = os.path.join(parent, "file")
+    open(file, "w").close()
+    result = compare(os.path.join(file, "folder"), run=harness.tomofield)
+    assert result.returncode == 2 and "cannot be made" in result.stderr, result.stderr
+
+
+def test_own_options_may_have_several_values():
+    folder = harness.fresh_directory("several_values")
+    harness.succeed("compare", *series.input, *QUICK, "-o", folder, "--methods", "wbp", "--also",
+                    "whole=baseline wbp --roi 0,0,48,36")
+    assert harness.read_bytes(os.path.join(folder, "whole.mrc")) == harness.read_bytes(
+        os.path.join(folder, "wbp.mrc"))
+
+
+def test_no_volume_of_another_size_is_compared():
+    folder = harness.fresh_directory("sizes")
+    compare(folder)
+    report = read(folder, "report.html")
+    harness.write_stack(os.path.join(folder, "ours.mrc"), np.zeros((24, 24, 24), "f4"))
+    result = compare(folder, run=harness.tomofield)
+    assert result.returncode == 2, result.stderr
+    for fact in ("ours", "24 × 24 × 24", "sirt", "48 × 36 × 24"):
+        assert fact in result.stderr, result.stderr
+    assert read(folder, "report.html") == report
 
 
 def test_chromium_shows_every_picture_without_errors():
