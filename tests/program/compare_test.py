@@ -315,7 +315,7 @@ def test_no_volume_of_another_size_is_compared():
     harness.write_stack(os.path.join(folder, "ours.mrc"), np.zeros((24, 24, 24), "f4"))
     result = compare(folder, run=harness.tomofield)
     assert result.returncode == 2, result.stderr
-    for fact in ("ours", "24 × 24 × 24", "sirt", "48 × 36 × 24"):
+    for fact in ("ours gives 24 × 24 × 24", "sirt gives 48 × 36 × 24"):
         assert fact in result.stderr, result.stderr
     assert read(folder, "report.html") == report
 
