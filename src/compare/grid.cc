@@ -60,11 +60,12 @@ void require_one_grid(const NamedGrid& main, const NamedGrid& other) {
                   other.name, to_text(other.grid), main.name, to_text(main.grid)));
 }
 
-void require_truth_fits(const std::filesystem::path& truth, const NamedGrid& main) {
+void require_truth_fits(const std::filesystem::path& truth, const NamedGrid& main, bool is_a_part) {
   constexpr double kLargestDifference = 0.05;
   const Grid grid = read_grid(truth);
   if (!voxels_differ(main.grid, grid, kLargestDifference) &&
-      !has_axes_in_another_order(main.grid, grid) && !covers_less_than_half(main.grid, grid))
+      !has_axes_in_another_order(main.grid, grid) &&
+      (is_a_part || !covers_less_than_half(main.grid, grid)))
     return;
   throw Error(
       fmt::format("the truth '{}' has {} and {} gives {}: give a truth of the same region, voxels "

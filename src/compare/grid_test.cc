@@ -38,12 +38,15 @@ TEST(OneGrid, IsRequiredOfAllVolumes) {
 
 class TruthOf : public ::testing::Test {
  protected:
-  bool fits(const std::array<std::int64_t, 3>& size, double voxel_A) const {
+  bool fits(const std::array<std::int64_t, 3>& size, double voxel_A, bool is_a_part = false) const {
     const auto path = directory_ / "truth.mrc";
     io::MrcSpec spec{.nx = size[0], .ny = size[1], .nz = size[2], .label = ""};
     spec.voxel_size_A.fill(voxel_A);
     io::MrcWriter(path, spec).close();
-    return message_of<Error>([&] { require_truth_fits(path, {"vm", {{48, 36, 24}, 10}}); }).empty();
+    return message_of<Error>([&] {
+             require_truth_fits(path, {"vm", {{48, 36, 24}, 10}}, is_a_part);
+           })
+        .empty();
   }
   ScratchDirectory directory_;
 };
@@ -55,6 +58,7 @@ TEST_F(TruthOf, AnotherSpecimenIsRefused) {
   EXPECT_FALSE(fits({48, 24, 36}, 10)) << "another order of the axes";
   EXPECT_FALSE(fits({48, 36, 24}, 11));
   EXPECT_FALSE(fits({97, 36, 24}, 10));
+  EXPECT_TRUE(fits({97, 36, 24}, 10, true)) << "its ORIGIN says where it lies";
 }
 
 }  // namespace

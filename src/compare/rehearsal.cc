@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <stdlib.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -88,7 +89,9 @@ bool rehearse(const CompareOptions& options, const RunHooks& hooks, const std::v
     if (!grid) return false;
     if (!main) {
       main = {row.run.name, *grid};
-      if (options.truth) require_truth_fits(*options.truth, *main);
+      const bool is_a_part =
+          std::ranges::find(options.series_words, "--roi") != options.series_words.end();
+      if (options.truth) require_truth_fits(*options.truth, *main, is_a_part);
     }
     require_one_grid(*main, {row.run.name, *grid});
   }
