@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "kernels/lanes.h"
 #include "reconstruct/domain.h"
+#include "reconstruct/options.h"
 
 namespace tomofield::baseline {
 namespace {
@@ -17,8 +18,8 @@ using kernels::kLanes;
 // Columns that go through the network at once: few enough for the L2 cache.
 constexpr int kChunk = 128;
 
-// β of softplus, per density unit (reconstruct::FieldOptions).
-constexpr float kSharpness = 5;
+// β of softplus, per density unit: the main method's.
+constexpr float kSharpness = static_cast<float>(reconstruct::FieldOptions{}.sharpness);
 
 // Parts of a slab whose gradients are summed apart: their order, not the threads', decides the
 // bits.

@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <csignal>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -16,15 +15,13 @@
 #include "cli/input_options.h"
 #include "cli/number_checks.h"
 #include "cli/specimen_options.h"
+#include "cli/stop_signal.h"
 #include "compare/comparison.h"
 
 namespace tomofield::cli {
 namespace {
 
 constexpr double kMostViews = 1e9;
-
-volatile std::sig_atomic_t g_signal = 0;
-void remember_signal(int signal) { g_signal = signal; }
 
 struct Arguments {
   tilt_series::TiltSeriesOptions input;  // checked here, read by the methods
@@ -59,8 +56,8 @@ std::vector<std::string> series_words(const CLI::App& command,
 
 ExitStatus stopped(compare::Outcome outcome, const Arguments& arguments) {
   if (outcome == compare::Outcome::kStoppedBeforeRuns)
-    return {128 + g_signal, "stopped before the first run; nothing has been made or removed"};
-  return {128 + g_signal,
+    return {stop_status(), "stopped before the first run; nothing has been made or removed"};
+  return {stop_status(),
           fmt::format("stopped; what is finished is in '{}': continue with the same command{}",
                       arguments.folder, arguments.overwrite ? " without --overwrite" : "")};
 }
@@ -79,15 +76,14 @@ void run(const CLI::App& command, const Arguments& arguments,
   options.folder = arguments.folder;
   options.overwrite = arguments.overwrite;
   compare::check_comparison(options);
-  std::signal(SIGINT, remember_signal);
-  std::signal(SIGTERM, remember_signal);
+  stop_on_signals();
   const compare::RunHooks hooks{
       .run_starts =
           [](const compare::Run& run, bool is_there) {
             base::log_info(fmt::format("{}: {}", run.name,
                                        is_there ? "there already" : "running, its log beside it"));
           },
-      .stop_requested = [] { return g_signal != 0; }};
+      .stop_requested = stop_was_requested};
   const compare::Outcome outcome = compare::compare_methods(options, hooks);
   if (outcome != compare::Outcome::kFinished) throw stopped(outcome, arguments);
   fmt::print(

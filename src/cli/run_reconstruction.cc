@@ -2,7 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
@@ -16,15 +15,10 @@
 #include "cli/fit_options.h"
 #include "cli/pictures.h"
 #include "cli/progress_bar.h"
+#include "cli/stop_signal.h"
 
 namespace tomofield::cli {
 namespace {
-
-volatile std::sig_atomic_t g_signal = 0;
-void remember_signal(int signal) { g_signal = signal; }
-
-// Of a job, another process may have got the signal.
-int stop_status() { return 128 + (g_signal != 0 ? g_signal : SIGTERM); }
 
 // A process that dies cannot say so: mpirun then stops the others, which wait for it.
 std::function<void()> tell_if_stuck(const std::filesystem::path& model,
@@ -33,7 +27,7 @@ std::function<void()> tell_if_stuck(const std::filesystem::path& model,
   auto since = std::make_shared<std::optional<base::Stopwatch>>();
   auto is_told = std::make_shared<bool>(!processes.is_first());
   return [=] {
-    if (g_signal == 0 || *is_told) return;
+    if (!stop_was_requested() || *is_told) return;
     if (!*since) since->emplace();
     if ((*since)->seconds() < kSecondsToAnswer) return;
     *is_told = true;
@@ -108,14 +102,11 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   });
   if (dry_run) return;
   const reconstruct::OutputPaths paths = reconstruct::output_paths(options.output);
-  std::signal(SIGINT, remember_signal);
-  std::signal(SIGTERM, remember_signal);
-  if (processes.size() > 1) {
-    std::signal(SIGUSR1, remember_signal);  // which mpirun passes on, without a time limit
-    processes.while_waiting(tell_if_stuck(paths.model, processes));
-  }
+  const bool is_job = processes.size() > 1;
+  stop_on_signals(is_job);
+  if (is_job) processes.while_waiting(tell_if_stuck(paths.model, processes));
   reconstruct::ReconstructHooks hooks{
-      .progress = {}, .tune_progress = {}, .stop_requested = [] { return g_signal != 0; }};
+      .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};
   if (processes.is_first()) {
     hooks.progress = make_progress_bar("reconstruct");
     hooks.tune_progress = make_progress_bar("tune");

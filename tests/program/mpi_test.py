@@ -139,7 +139,7 @@ def step_of(results):
 
 def test_checkpoints_go_on_with_any_number_of_processes():
     undisturbed, results = fresh_results("undisturbed"), fresh_results("resumed")
-    long = ["--epochs", 12]
+    long = ["--epochs", 48]  # to be stopped in, three times
     harness.succeed(*command(undisturbed, *long))
     steps = []
     # mpirun passes SIGUSR1 on; SIGTERM it answers itself, and ends the processes with it.
@@ -151,7 +151,7 @@ def test_checkpoints_go_on_with_any_number_of_processes():
         errors = stop_after_a_step(run, number)
         assert run.returncode == status, (run.returncode, errors)
         steps.append(step_of(results))
-    assert 0 < steps[0] < steps[1] < steps[2] < 12 * 7, steps
+    assert 0 < steps[0] < steps[1] < steps[2] < 48 * 7, steps
     succeed(3, *command(results, "--resume", *long))
     assert results.same_as(undisturbed)
 
