@@ -9,8 +9,8 @@ void stop_on_signals(bool is_job = false);
 /// Whether one of them has come.
 bool stop_was_requested();
 
-/// The exit status of what was stopped by it: 128 and the signal; SIGTERM's if none came here, since
-/// of a job another process may have got it.
+/// The exit status of what was stopped by it: 128 and the signal; SIGTERM's if none came here,
+/// since of a job another process may have got it.
 int stop_status();
 
 }  // namespace tomofield::cli

@@ -34,7 +34,7 @@ struct SlabVariation {
   std::ptrdiff_t stride_z = 0;
   int num_rows =
       0;  ///< lanes that are rows of the volume; below kLanes only at its end (above null)
-  DensityRow above;   ///< past the last row; without data at the volume's end
+  DensityRow above;       ///< past the last row; without data at the volume's end
   float* flux = nullptr;  ///< [x, z]; in: y-flux of the row before the first (0 at the volume's
                           ///< start); out: of the last
   float per_hx = 1.0f, per_hz = 1.0f;  ///< 1 / sample spacing

@@ -27,9 +27,9 @@ HWY_INLINE void for_each_vector(int width, const Body& body) {
   with(hn::CappedTag<float, 1>());
 }
 
-// Bound of all three: bytes. A lane is two loads, two operations and a store a vector in L1, but rows
-// are used for one product each and stream from L2 or, where the factors of a slab's leaves do not
-// fit there, from L3 (14 GB/s measured: as long as a third of the products that they serve).
+// Bound of all three: bytes. A lane is two loads, two operations and a store a vector in L1, but
+// rows are used for one product each and stream from L2 or, where the factors of a slab's leaves do
+// not fit there, from L3 (14 GB/s measured: as long as a third of the products that they serve).
 template <class D>
 HWY_INLINE hn::Vec<D> interpolated(D d, const LaneTaps& taps, int lane, int width,
                                    const float* column) {

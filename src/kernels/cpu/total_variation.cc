@@ -22,7 +22,8 @@ struct RowMasks {
   explicit RowMasks(const SlabVariation& s) {
     for (int l = 0; l < kLanes; ++l) {
       is_row[l] = l < s.num_rows ? 1.0f : 0.0f;
-      has_next[l] = l + 1 < s.num_rows || (l + 1 == s.num_rows && s.above.data != nullptr) ? 1.0f : 0.0f;
+      has_next[l] =
+          l + 1 < s.num_rows || (l + 1 == s.num_rows && s.above.data != nullptr) ? 1.0f : 0.0f;
     }
   }
 };
@@ -137,10 +138,10 @@ HWY_INLINE Vec next_row(const float* sample, int v, float above) {
   return hn::IfThenElse(hn::FirstN(d, kVecLanes - 1), next, hn::Set(d, above));
 }
 
-// Bound for 16 samples with AVX-512: eight loads and two stores; about 25 operations, of which square
-// root and division keep their one port busy for some 36 cycles; and 16 bytes a sample from L3, where
-// a slab lies, which take as long: with estimates and a step of Newton's method for the two
-// the whole took no less.
+// Bound for 16 samples with AVX-512: eight loads and two stores; about 25 operations, of which
+// square root and division keep their one port busy for some 36 cycles; and 16 bytes a sample from
+// L3, where a slab lies, which take as long: with estimates and a step of Newton's method for the
+// two the whole took no less.
 //
 // Samples [first, end) of row z: gradient += −div(flux). flux_x is the flux into
 // the first sample from the one before, and out of the last when done; flux_z,
@@ -236,8 +237,7 @@ double slab_variation(const SlabVariation& slab) {
                                               scratch.data() + kTile * kLanes);
 }
 
-void row_flux(const SlabVariation& s, const DensityRow& row, const DensityRow& next,
-              float* flux) {
+void row_flux(const SlabVariation& s, const DensityRow& row, const DensityRow& next, float* flux) {
   const float tau = s.penalty.concavity;
   const SampleOrder order(s, row.step_x, row.step_z), next_order(s, next.step_x, next.step_z),
       flux_order(s, s.nz, 1);
