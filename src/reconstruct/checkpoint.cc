@@ -100,7 +100,8 @@ std::string name_of(const std::string& entry) {
                                                          {"specimen axis_z", "--center"},
                                                          {"bin_factor", "--bin"}};
   if (const auto other = others.find(entry); other != others.end()) return other->second;
-  for (const char* of_series : {"rays", "noise_sigma", "unit", "tilt_deg", "alignment"})
+  if (entry.starts_with("alignment")) return "the alignment of the views";
+  for (const char* of_series : {"rays", "noise_sigma", "unit", "tilt_deg"})
     if (entry.starts_with(of_series)) return "the tilt series or how it is read";
   std::string name = entry.substr(entry.find(' ') + 1);
   std::ranges::replace(name, '_', '-');
