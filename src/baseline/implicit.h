@@ -16,7 +16,11 @@ struct ImplicitOptions : NetworkOptions {
   double shortest = 20.0;  ///< wavelength of them, pixels
 
   MethodFacts facts() const {
-    return {"implicit", iterations, 1, 1, 1, "; or a smaller --width, or fewer --features"};
+    return {.name = "implicit",
+            .iterations = iterations,
+            .volumes = 1,
+            .detectors = 1,
+            .memory_advice = "; or a smaller --width, or fewer --features"};
   }
   nlohmann::json json() const;
   MethodSize size(const projection::SampleGrid& samples, std::int64_t num_rows) const;

@@ -10,8 +10,11 @@ struct IngpOptions : NetworkOptions {
   HashGridOptions grid;
 
   MethodFacts facts() const {
-    return {"ingp", iterations, 1,
-            1,      1,          "; or fewer --table-bits or --levels, or a smaller --width"};
+    return {.name = "ingp",
+            .iterations = iterations,
+            .volumes = 1,
+            .detectors = 1,
+            .memory_advice = "; or fewer --table-bits or --levels, or a smaller --width"};
   }
   nlohmann::json json() const;
   MethodSize size(const projection::SampleGrid& samples, std::int64_t num_rows) const;

@@ -10,7 +10,6 @@
 #include "cli/number_checks.h"
 #include "cli/specimen_options.h"
 #include "io/output_files.h"
-#include "io/text_lines.h"
 #include "reconstruct/result_files.h"
 #include "tomofield/error.h"
 
@@ -21,14 +20,10 @@ constexpr const char* kBoxType = "X0,Y0,Z0,X1,Y1,Z1";
 
 /// A box of whole numbers; nothing for any other text.
 std::optional<evaluate::Box> parse_box(const std::string& text) {
-  const std::vector<std::string> words = CLI::detail::split(text, ',');
-  if (words.size() != 6) return std::nullopt;
+  const auto numbers = parse_whole_numbers(text);
+  if (!numbers || numbers->size() != 6) return std::nullopt;
   evaluate::Box box;
-  for (std::size_t i = 0; i < 6; ++i) {
-    const auto number = io::parse_integer(words[i]);
-    if (!number) return std::nullopt;
-    (i < 3 ? box.first : box.last)[i % 3] = *number;
-  }
+  for (std::size_t i = 0; i < 6; ++i) (i < 3 ? box.first : box.last)[i % 3] = (*numbers)[i];
   return box;
 }
 

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <string>
+#include <string_view>
+
+#include "io/text_lines.h"
 
 namespace tomofield::cli {
 namespace {
@@ -22,7 +25,27 @@ CLI::Validator number_that(std::string wanted, Holds holds) {
           ""};
 }
 
+template <typename Value>
+std::optional<std::vector<Value>> list_of(const std::string& text,
+                                          std::optional<Value> (*parse)(std::string_view)) {
+  std::vector<Value> values;
+  for (const std::string& word : CLI::detail::split(text, ',')) {
+    const std::optional<Value> value = parse(word);
+    if (!value) return std::nullopt;
+    values.push_back(*value);
+  }
+  return values;
+}
+
 }  // namespace
+
+std::optional<std::vector<double>> parse_numbers(const std::string& text) {
+  return list_of(text, io::parse_number);
+}
+
+std::optional<std::vector<long long>> parse_whole_numbers(const std::string& text) {
+  return list_of(text, io::parse_integer);
+}
 
 CLI::Validator number_above(double low) {
   return number_that(fmt::format("above {:g}", low), [low](double value) { return value > low; });

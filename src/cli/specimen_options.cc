@@ -2,34 +2,15 @@
 
 #include <fmt/format.h>
 
-#include <optional>
 #include <string>
-#include <utility>
-#include <vector>
 
-#include "io/text_lines.h"
+#include "cli/number_checks.h"
 
 namespace tomofield::cli {
 
 namespace {
 
 const char* const kGroup = "Specimen (unbinned pixels of the aligned view)";
-
-// What stands between commas, each parsed; none if one cannot be. A list is one word of the command
-// line: as several it would take the words after it.
-template <typename Parse>
-auto list_of(const std::string& text, const Parse& parse) {
-  using Value = typename decltype(parse(text))::value_type;
-  std::vector<Value> values;
-  for (const std::string& word : CLI::detail::split(text, ',')) {
-    const auto value = parse(word);
-    if (!value) return std::optional<std::vector<Value>>();
-    values.push_back(*value);
-  }
-  return std::optional(std::move(values));
-}
-auto whole_numbers(const std::string& text) { return list_of(text, io::parse_integer); }
-auto numbers(const std::string& text) { return list_of(text, io::parse_number); }
 
 CLI::Validator words_check(const char* wanted, bool (*is_one)(const std::string&)) {
   return {[wanted, is_one](std::string& text) -> std::string {
@@ -53,13 +34,13 @@ void add_place_options(CLI::App& command, reconstruct::SpecimenOptions& options)
       .add_option_function<std::string>(
           "--roi",
           [&options](const std::string& text) {
-            const auto v = *whole_numbers(text);
+            const auto v = *parse_whole_numbers(text);
             options.roi = {v[0], v[1], v[2], v[3]};
           },
           "x0,y0,x1,y1: region of interest at zero tilt; default: the whole field of view")
       ->check(words_check("four whole numbers, x0,y0,x1,y1",
                           [](const std::string& text) {
-                            const auto v = whole_numbers(text);
+                            const auto v = parse_whole_numbers(text);
                             return v && v->size() == 4;
                           }))
       ->type_name("INT,INT,INT,INT")
@@ -72,7 +53,7 @@ void add_place_options(CLI::App& command, reconstruct::SpecimenOptions& options)
       .add_option_function<std::string>(
           "--center",
           [&options](const std::string& text) {
-            const auto v = *numbers(text);
+            const auto v = *parse_numbers(text);
             options.axis_x = v[0];
             if (v.size() > 1) options.axis_z = v[1];
           },
@@ -80,7 +61,7 @@ void add_place_options(CLI::App& command, reconstruct::SpecimenOptions& options)
           "default: the centres")
       ->check(words_check("one or two numbers, x or x,z",
                           [](const std::string& text) {
-                            const auto v = numbers(text);
+                            const auto v = parse_numbers(text);
                             return v && (v->size() == 1 || v->size() == 2);
                           }))
       ->type_name("FLOAT[,FLOAT]")

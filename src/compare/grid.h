@@ -30,8 +30,8 @@ struct NamedGrid {
 void require_one_grid(const NamedGrid& main, const NamedGrid& other);
 
 /// Throws Error if a volume could not be scored against the truth: voxels of another size, axes in
-/// another order, or less than half of the truth there along an axis, unless the volume `is_a_part`
-/// that its ORIGIN places (evaluate::read_pair).
+/// another order, or less than half of one in the other along an axis, unless the volume
+/// `is_a_part` that its ORIGIN places (evaluate::read_pair).
 void require_truth_fits(const std::filesystem::path& truth, const NamedGrid& main, bool is_a_part);
 
 }  // namespace tomofield::compare

@@ -58,6 +58,7 @@ TEST_F(TruthOf, AnotherSpecimenIsRefused) {
   EXPECT_FALSE(fits({48, 24, 36}, 10)) << "another order of the axes";
   EXPECT_FALSE(fits({48, 36, 24}, 11));
   EXPECT_FALSE(fits({97, 36, 24}, 10));
+  EXPECT_FALSE(fits({23, 36, 24}, 10));
   EXPECT_TRUE(fits({97, 36, 24}, 10, true)) << "its ORIGIN says where it lies";
 }
 

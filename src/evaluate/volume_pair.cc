@@ -13,19 +13,14 @@
 namespace tomofield::evaluate {
 namespace {
 
-using Sizes = std::array<std::int64_t, 3>;
-
-std::string to_text(const Sizes& sizes) {
+std::string to_text(const VolumeSizes& sizes) {
   return fmt::format("{} × {} × {}", sizes[0], sizes[1], sizes[2]);
 }
-
-/// 0 and 1 Å are what programs write that do not know.
-bool is_known(double voxel_size_A) { return voxel_size_A > 0.0 && voxel_size_A != 1.0; }
 
 void check_voxel_sizes(const io::MrcReader& first, const io::MrcReader& second) {
   const double a = first.header().voxel_size_A[0], b = second.header().voxel_size_A[0];
   if (std::abs(a - b) <= 1e-4 * std::abs(b)) return;
-  if (is_known(a) && is_known(b) && std::abs(a - b) > 0.05 * b)
+  if (voxel_sizes_differ(a, b, kMostScaleDifference))
     throw Error(fmt::format(
         "'{}' has voxels of {:.4g} Å and '{}' of {:.4g} Å: bring them to one voxel size first",
         first.path().string(), a, second.path().string(), b));
@@ -47,7 +42,7 @@ bool is_ours(const io::MrcReader& volume) {
 // What ORIGIN says, in IMOD's sign, where it makes one volume a part of the other: many programs
 // write other things there, and most nothing.
 std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcReader& b) {
-  const Sizes size_a = whole_box(a).last, size_b = whole_box(b).last;
+  const VolumeSizes size_a = whole_box(a).last, size_b = whole_box(b).last;
   Offset offset{};
   bool lies_in_b = true, lies_in_a = true;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -65,7 +60,7 @@ std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcRead
 }
 
 Offset offset_by_centres(const io::MrcReader& a, const io::MrcReader& b) {
-  const Sizes size_a = whole_box(a).last, size_b = whole_box(b).last;
+  const VolumeSizes size_a = whole_box(a).last, size_b = whole_box(b).last;
   Offset offset;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::int64_t common = std::min(size_a[axis], size_b[axis]);
@@ -76,7 +71,7 @@ Offset offset_by_centres(const io::MrcReader& a, const io::MrcReader& b) {
 
 // What both have, in voxels of `b`.
 Box common_box(const io::MrcReader& a, const io::MrcReader& b, const Offset& offset) {
-  const Sizes size_a = whole_box(a).last, size_b = whole_box(b).last;
+  const VolumeSizes size_a = whole_box(a).last, size_b = whole_box(b).last;
   Box common;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     common.first[axis] = std::max<std::int64_t>(0, offset[axis]);
@@ -86,24 +81,19 @@ Box common_box(const io::MrcReader& a, const io::MrcReader& b, const Offset& off
 }
 
 // Of volumes that are laid centre on centre.
-void check_sizes(const io::MrcReader& first, const io::MrcReader& second, const Box& common) {
-  const Sizes a = whole_box(first).last, b = whole_box(second).last;
+void check_sizes(const io::MrcReader& first, const io::MrcReader& second) {
+  const VolumeSizes a = whole_box(first).last, b = whole_box(second).last;
   if (a == b) return;
-  Sizes sorted_a = a, sorted_b = b;
-  std::sort(sorted_a.begin(), sorted_a.end());
-  std::sort(sorted_b.begin(), sorted_b.end());
   const auto mismatch = [&](const char* advice) {
     return Error(fmt::format("'{}' has {} voxels and '{}' {}: {}", first.path().string(),
                              to_text(a), second.path().string(), to_text(b), advice));
   };
-  if (sorted_a == sorted_b)
+  if (have_axes_in_another_order(a, b))
     throw mismatch("the axes are in another order; write both volumes with the same --axes");
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (2 * (common.last[axis] - common.first[axis]) < std::max(a[axis], b[axis]))
-      throw mismatch(
-          "less than half of one is in the other, and their ORIGINs do not say that one is a part "
-          "of the other; are they of the same specimen and scale?");
-  }
+  if (!share_half(a, b))
+    throw mismatch(
+        "less than half of one is in the other, and their ORIGINs do not say that one is a part "
+        "of the other; are they of the same specimen and scale?");
   base::log_warning(
       fmt::format("'{}' has {} voxels and '{}' {}: the common centred box is compared",
                   first.path().string(), to_text(a), second.path().string(), to_text(b)));
@@ -119,6 +109,23 @@ void check_box(const Box& box, const Box& common, const io::MrcReader& second) {
 
 }  // namespace
 
+bool is_known_voxel_size(double voxel_A) { return voxel_A > 0.0 && voxel_A != 1.0; }
+
+bool voxel_sizes_differ(double first_A, double second_A, double tolerance) {
+  return is_known_voxel_size(first_A) && is_known_voxel_size(second_A) &&
+         std::abs(first_A - second_A) > tolerance * second_A;
+}
+
+bool have_axes_in_another_order(const VolumeSizes& first, const VolumeSizes& second) {
+  return first != second && std::ranges::is_permutation(first, second);
+}
+
+bool share_half(const VolumeSizes& first, const VolumeSizes& second) {
+  return std::ranges::equal(first, second, [](std::int64_t a, std::int64_t b) {
+    return 2 * std::min(a, b) >= std::max(a, b);
+  });
+}
+
 VolumePair read_pair(const std::filesystem::path& first, const std::filesystem::path& second,
                      const std::optional<Box>& box) {
   const io::MrcReader a(first), b(second);
@@ -131,7 +138,7 @@ VolumePair read_pair(const std::filesystem::path& first, const std::filesystem::
                                  evaluate::to_text(common), second.string()));
     }
   } else {
-    check_sizes(a, b, common);
+    check_sizes(a, b);
   }
   check_voxel_sizes(a, b);
   if (box) check_box(*box, common, b);

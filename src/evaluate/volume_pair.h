@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 
@@ -7,6 +9,20 @@
 #include "evaluate/box.h"
 
 namespace tomofield::evaluate {
+
+/// Voxels along x, y and z.
+using VolumeSizes = std::array<std::int64_t, 3>;
+
+/// 0 and 1 Å are what programs write that do not know.
+bool is_known_voxel_size(double voxel_A);
+/// Whether both voxel sizes (Å) are known and further apart than this part of the second.
+bool voxel_sizes_differ(double first_A, double second_A, double tolerance);
+constexpr double kMostScaleDifference = 0.05;  ///< of volumes that are read as a pair
+
+/// Of volumes of these sizes, which read_pair() would lay centre on centre: whether the axes of one
+/// are in another order, and whether at least half of each is in the other along every axis.
+bool have_axes_in_another_order(const VolumeSizes& first, const VolumeSizes& second);
+bool share_half(const VolumeSizes& first, const VolumeSizes& second);
 
 /// Two volumes of one shape, voxel on voxel.
 struct VolumePair {

@@ -123,8 +123,7 @@ struct TiltSeries::Impl {
     processes.together([&] { find_beads(); });
     base::log_info(
         fmt::format("'{}': {} of {} sections, tilts {:.1f}° to {:.1f}° from {}, views of {} × {} "
-                    "pixels of {:.6g} "
-                    "Å",
+                    "pixels of {:.6g} Å",
                     options.stack.string(), views.size(), stack.header().nz,
                     std::min_element(views.begin(), views.end(), by_tilt)->tilt_deg,
                     std::max_element(views.begin(), views.end(), by_tilt)->tilt_deg,

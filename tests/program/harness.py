@@ -46,16 +46,20 @@ def succeed(*arguments, **keywords):
     return result
 
 
-def stop_after_first_step(command, number=signal.SIGTERM):
-    """The ended run, which got a signal after its first step (and may have been quicker), and what
-    it said after that step."""
-    run = start(*command)
+def stop_after_a_step(run, number=signal.SIGTERM, timeout=None):
+    """What a run says after its first step, when it gets a signal (it may have been quicker)."""
     for line in run.stderr:
         if line.startswith("reconstruct "):  # a step is done
             break
     run.send_signal(number)
-    _, errors = run.communicate()
-    return run, errors
+    _, errors = run.communicate(timeout=timeout)
+    return errors
+
+
+def stop_after_first_step(command, number=signal.SIGTERM):
+    """The ended run of a command, and what it said after its first step."""
+    run = start(*command)
+    return run, stop_after_a_step(run, number)
 
 
 def finish_with_stops(command, after_stop, most):

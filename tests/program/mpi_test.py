@@ -123,11 +123,7 @@ def test_a_turned_volume_is_the_same():
 
 def stop_after_a_step(run, number):
     """What a run says that is stopped by a signal."""
-    for line in run.stderr:
-        if line.startswith("reconstruct "):
-            break
-    run.send_signal(number)
-    _, errors = run.communicate(timeout=60)
+    errors = harness.stop_after_a_step(run, number, timeout=60)
     assert errors.count("tomofield: stopped") == 1 and "--resume" in errors, errors
     return errors
 
