@@ -83,6 +83,13 @@ std::string as_text(const std::vector<std::int64_t>& numbers) {
   return text;
 }
 
+// The same bytes whenever a fit is made.
+nlohmann::json without_times(const Tuned& tuned) {
+  nlohmann::json json = tuning_json(tuned);
+  for (nlohmann::json& trial : json["trials"]) trial.erase("seconds");
+  return json;
+}
+
 // What a user calls an entry of a fingerprint: the option, whose name its own is but for some.
 std::string name_of(const std::string& entry) {
   static const std::map<std::string, std::string> others{{"choose_penalty", "--tv-penalty"},
@@ -163,10 +170,11 @@ void save(const std::filesystem::path& path, const Fit& fit, const field::ModelI
 
 }  // namespace
 
-field::TrainingState progress_state(const Fit& fit, const std::string& fingerprint) {
+field::TrainingState progress_state(const Fit& fit, const FitOrigin& origin) {
   field::TrainingState state;
   const Progress& progress = fit.progress();
-  state.integers["fingerprint"] = as_numbers(fingerprint);
+  state.integers["fingerprint"] = as_numbers(origin.fingerprint);
+  if (origin.tuned) state.integers["tuning"] = as_numbers(without_times(*origin.tuned).dump());
   state.integers["step"] = {progress.step};
   state.doubles["views"] = flatten(progress.views);
   state.doubles["epoch_sums"] = flatten(progress.epoch_sums);
@@ -182,8 +190,8 @@ void save_fit(const std::filesystem::path& path, const Fit& fit, const field::Mo
 }
 
 void save_checkpoint(const std::filesystem::path& path, const Fit& fit,
-                     const field::ModelInfo& info, const std::string& fingerprint) {
-  field::TrainingState state = progress_state(fit, fingerprint);
+                     const field::ModelInfo& info, const FitOrigin& origin) {
+  field::TrainingState state = progress_state(fit, origin);
   const optimize::Adam::State& adam = fit.optimizer().state();
   std::vector<std::int64_t> leaf_steps(adam.leaf_steps.size());
   for (int leaf = fit.own_leaves().begin; leaf < fit.own_leaves().end; ++leaf)
@@ -193,6 +201,19 @@ void save_checkpoint(const std::filesystem::path& path, const Fit& fit,
   state.doubles["bias_moments"] = {adam.bias_m, adam.bias_v};
   state.integers["bias_steps"] = {adam.bias_steps};
   save(path, fit, info, state, {{"adam_m", adam.m}, {"adam_v", adam.v}});
+}
+
+std::optional<Tuned> stored_choice(const std::filesystem::path& path) {
+  field::TrainingState state;
+  field::load_part(
+      path, [](const field::Quadtree&) { return std::vector<int>(); }, state);
+  const auto tuning = state.integers.find("tuning");
+  if (tuning == state.integers.end()) return std::nullopt;
+  try {
+    return tuned_from(nlohmann::json::parse(as_text(tuning->second)));
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(fmt::format("'{}' is damaged: its tuning ({})", path.string(), error.what()));
+  }
 }
 
 void restore_fit(const std::filesystem::path& file, const std::string& fingerprint, Fit& fit) {

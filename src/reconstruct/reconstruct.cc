@@ -75,22 +75,26 @@ Measurement measurement_of(const PreparedSeries& series, const FitOptions& optio
           .processes = &processes};
 }
 
-// Loads the checkpoint into `fit`; false if there is none yet.
-bool resume(const OutputPaths& paths, const std::string& fingerprint, Fit& fit) {
-  if (!std::filesystem::exists(paths.model)) {
-    base::log_info(
-        fmt::format("no checkpoint {} yet: starting from the beginning", paths.model.string()));
-    return false;
-  }
+// Calls what reads the checkpoint.
+void resuming(const std::function<void()>& read) {
   try {
-    restore_fit(paths.model, fingerprint, fit);
+    read();
   } catch (const Error& error) {
     throw Error(fmt::format(
         "cannot resume: {}; to start over, give --overwrite instead of --resume", error.what()));
   }
+}
+
+// Loads the checkpoint, if there is one yet, into `fit`.
+void resume(const OutputPaths& paths, const std::string& fingerprint, Fit& fit) {
+  if (!std::filesystem::exists(paths.model)) {
+    base::log_info(
+        fmt::format("no checkpoint {} yet: starting from the beginning", paths.model.string()));
+    return;
+  }
+  resuming([&] { restore_fit(paths.model, fingerprint, fit); });
   base::log_info(fmt::format("resuming {} at step {} of {}", paths.model.string(),
                              fit.progress().step, fit.num_steps()));
-  return true;
 }
 
 std::filesystem::path directory_of(const std::filesystem::path& file) {
@@ -160,17 +164,6 @@ nlohmann::json figures_json(const field::Model& model, const Progress& progress,
           {"views", views}};
 }
 
-// What a tuning chose, and everything that it tried.
-nlohmann::json tuning_json(const Tuned& tuned) {
-  return {{"predicted_views", tuned.predicted_views},
-          {"chosen",
-           {{"tv_penalty", tuned.settings.penalty},
-            {"tv", tuned.settings.variation},
-            {"rank", tuned.settings.rank},
-            {"epochs", tuned.settings.epochs}}},
-          {"trials", trials_json(tuned.trials)}};
-}
-
 // The error of the views held out, and a picture of the one nearest to zero tilt.
 nlohmann::json score_fit(const Fit& fit, const PreparedSeries& series, bool stopped_by_them,
                          const std::filesystem::path& picture) {
@@ -225,12 +218,11 @@ VolumeShare volume_share(const Fit& fit, const PreparedSeries& series) {
 }
 
 void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOptions& options,
-                   const std::optional<Tuned>& tuned, const OutputPaths& paths,
-                   const std::string& fingerprint, double seconds) {
+                   const FitOrigin& origin, const OutputPaths& paths, double seconds) {
   nlohmann::json held_out = nullptr;
   if (options.fit.hold_out > 0)
     held_out = score_fit(fit, series, options.fit.patience > 0, paths.held_out_picture);
-  save_fit(paths.model, fit, model_info(series, options), progress_state(fit, fingerprint));
+  save_fit(paths.model, fit, model_info(series, options), progress_state(fit, origin));
   const nlohmann::json processes = processes_json(fit, seconds);
   const VolumeShare share = volume_share(fit, series);
   field::Model model{model_info(series, options), fit.take_field()};
@@ -239,7 +231,7 @@ void write_results(Fit& fit, const PreparedSeries& series, const ReconstructOpti
   figures["stages"] = stages_json(fit.stages());
   figures["held_out"] = held_out;
   figures["processes"] = processes;
-  figures["tuning"] = tuned ? tuning_json(*tuned) : nlohmann::json(nullptr);
+  figures["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
   share.processes.together([&] {
     if (!share.processes.is_first()) return;
     io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
@@ -338,15 +330,20 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
       prepare_series(tilt_series, options.specimen, directory_of(paths.volume),
                      band_rows(options.field), processes);
   const Measurement measurement = measurement_of(series, options.fit, processes);
-  std::optional<Tuned> tuned;
+  FitOrigin origin;
   if (options.num_trials(measurement.num_fitted_views()) > 0) {
-    tuned = choose_settings(series, measurement, paths, hooks, options);
-    if (!tuned) return Outcome::kStoppedTuning;
-    apply(tuned->settings, options);
+    const bool has_checkpoint = options.resume && std::filesystem::exists(paths.model);
+    if (has_checkpoint) {
+      processes.together([&] { resuming([&] { origin.tuned = stored_choice(paths.model); }); });
+    } else {
+      origin.tuned = choose_settings(series, measurement, paths, hooks, options);
+      if (!origin.tuned) return Outcome::kStoppedTuning;
+    }
+    if (origin.tuned) apply(origin.tuned->settings, options);
   }
-  const std::string fingerprint = fingerprint_of(options, series, processes);
+  origin.fingerprint = fingerprint_of(options, series, processes);
   Fit fit(measurement, options.field, options.fit);
-  if (options.resume) processes.together([&] { resume(paths, fingerprint, fit); });
+  if (options.resume) processes.together([&] { resume(paths, origin.fingerprint, fit); });
 
   const base::Stopwatch running;
   base::Stopwatch since_checkpoint;
@@ -361,13 +358,13 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
     const double wanted = processes.largest(stop ? 2.0 : is_due ? 1.0 : 0.0);
     stopped = wanted == 2.0;
     if (wanted > 0.0) {
-      save_checkpoint(paths.model, fit, model_info(series, options), fingerprint);
+      save_checkpoint(paths.model, fit, model_info(series, options), origin);
       since_checkpoint.restart();
     }
     return !stopped;
   });
   if (stopped) return Outcome::kStopped;
-  write_results(fit, series, options, tuned, paths, fingerprint, running.seconds());
+  write_results(fit, series, options, origin, paths, running.seconds());
   return Outcome::kFinished;
 }
 

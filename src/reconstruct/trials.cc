@@ -38,7 +38,18 @@ TrialSettings settings_from(const json& entry) {
 Trial trial_from(const json& entry) {
   return {.settings = settings_from(entry),
           .score = {entry.at("held_out_error"), entry.at("held_out_error_by_view")},
-          .seconds = entry.at("seconds")};
+          .seconds = entry.value("seconds", 0.0)};
+}
+
+json trials_json(const std::vector<Trial>& trials) {
+  json table = json::array();
+  for (const Trial& t : trials) {
+    table.push_back(settings_json(t.settings));
+    table.back().update({{"held_out_error", t.score.error},
+                         {"held_out_error_by_view", t.score.view_error},
+                         {"seconds", t.seconds}});
+  }
+  return table;
 }
 
 // What trials are made on.
@@ -164,16 +175,11 @@ std::optional<Tuned> found_by_first(const distributed::Communicator& processes,
     } catch (const StopRequested&) {
       return;
     }
-    found = {{"settings", settings_json(tuned->settings)},
-             {"trials", trials_json(tuned->trials)},
-             {"predicted_views", tuned->predicted_views}};
+    found = tuning_json(*tuned);
   });
   found = json::parse(processes.broadcast(found.dump()));
   if (processes.is_first() || found.is_null()) return tuned;
-  tuned.emplace(Tuned{settings_from(found["settings"]), {}, {}});
-  for (const json& trial : found["trials"]) tuned->trials.push_back(trial_from(trial));
-  tuned->predicted_views = found["predicted_views"].get<std::vector<int>>();
-  return tuned;
+  return tuned_from(found);
 }
 
 void log_trials(const std::vector<Trial>& trials) {
@@ -215,15 +221,18 @@ void TrialFile::add(const Trial& trial) {
   io::write_json(path_, {{"fingerprint", fingerprint_}, {"trials", trials_json(trials_)}});
 }
 
-json trials_json(const std::vector<Trial>& trials) {
-  json table = json::array();
-  for (const Trial& t : trials) {
-    table.push_back(settings_json(t.settings));
-    table.back().update({{"held_out_error", t.score.error},
-                         {"held_out_error_by_view", t.score.view_error},
-                         {"seconds", t.seconds}});
-  }
-  return table;
+json tuning_json(const Tuned& tuned) {
+  return {{"predicted_views", tuned.predicted_views},
+          {"chosen", settings_json(tuned.settings)},
+          {"trials", trials_json(tuned.trials)}};
+}
+
+Tuned tuned_from(const json& tuning) {
+  Tuned tuned{.settings = settings_from(tuning.at("chosen")),
+              .trials = {},
+              .predicted_views = tuning.at("predicted_views")};
+  for (const json& trial : tuning.at("trials")) tuned.trials.push_back(trial_from(trial));
+  return tuned;
 }
 
 std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& field,

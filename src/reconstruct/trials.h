@@ -32,9 +32,6 @@ class TrialFile {
   std::vector<Trial> trials_;
 };
 
-/// The table of what was tried.
-nlohmann::json trials_json(const std::vector<Trial>& trials);
-
 /// Rows of a trial, in the middle: enough for edges in every direction, few enough for a dozen
 /// fits.
 constexpr std::int64_t kTrialRows = 64;
@@ -49,6 +46,11 @@ struct Tuned {
   std::vector<Trial> trials;
   std::vector<int> predicted_views;  ///< by which they were chosen
 };
+
+/// What a tuning chose, and everything that it tried; tuned_from() reads it, with or without the
+/// seconds of the trials.
+nlohmann::json tuning_json(const Tuned& tuned);
+Tuned tuned_from(const nlohmann::json& tuning);
 
 /// Chooses settings by search_settings(), the penalty too if `tunes_penalty`. Trials are made on
 /// a strip of rows in the middle and without the views that `measurement` holds out to score the

@@ -33,6 +33,10 @@ TEST(Noise, WhiteNoiseOnASmoothImageIsRight) {
   }
 }
 
+TEST(Noise, RowsOfALargeViewAreEnough) {
+  EXPECT_NEAR(estimate_noise_sigma(noisy_view(2.0, 6, 1800)), 2.0, 0.01);
+}
+
 TEST(Noise, BeadsAndEdgesDoNotCount) {
   MaskedImage image = noisy_view(2.0, 4);
   for (std::int64_t y = 0; y < image.height; ++y) {

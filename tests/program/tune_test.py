@@ -89,6 +89,31 @@ def test_the_penalty_is_what_predicts_held_out_views_better():
     assert read_bytes(by_hand) == read_bytes(output)
 
 
+def test_what_trials_chose_is_in_the_checkpoint():
+    """A run that goes on makes no trials, and is refused at once if it is another one."""
+    auto = [option for option in harness.QUICK if option not in ("--tv-penalty", "concave")]
+    for options in (auto, harness.merge(auto, ["--tune", "--epochs", 2])):
+        folder = harness.fresh_directory("checkpoint")
+        whole, stopped = (harness.Results(os.path.join(folder, name))
+                          for name in ("whole.mrc", "stopped.mrc"))
+
+        def command(results, *more):
+            return ["reconstruct", *series.input, "-o", results.volume_path,
+                    *harness.merge(options, ["--epochs", 40, *more])]
+
+        harness.succeed(*command(whole))
+        run, errors = harness.stop_after_first_step(command(stopped))
+        assert run.returncode == 143, errors
+        other = harness.tomofield(*command(stopped, "--resume", "--tv-penalty", "smooth"))
+        assert other.returncode == 2 and "--tv-penalty" in other.stderr, other.stderr
+        resumed = harness.succeed(*command(stopped, "--resume"))
+        for said in (other.stderr, resumed.stderr):
+            assert "tried" not in said and "tune " not in said, said
+        assert read_bytes(stopped.volume_path) == read_bytes(whole.volume_path)
+        harness.assert_same_tuning(*(record(results)["figures"]["tuning"]
+                                     for results in (whole, stopped)))
+
+
 def test_views_that_score_the_result_have_no_say_in_its_settings():
     every = 4
     scored, broken = harness.with_broken_views(series, every)
@@ -139,6 +164,7 @@ def test_tune_chooses_what_predicts_best_then_fits_all_views():
     assert repeated[:5] == trials[:5], "seconds show which trials were made anew"
     assert [t["held_out_error"] for t in repeated] == [t["held_out_error"] for t in trials]
 
+    os.remove(results.model_path)
     other = harness.tomofield(*again, "--seed", 2)
     assert other.returncode == 2 and "_tune.json" in other.stderr, other.stderr
     open(path, "w").write("{")

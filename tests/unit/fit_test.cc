@@ -393,7 +393,7 @@ TEST_P(CoarseToFine, GoesOnFromACheckpointOfEitherStageToTheSameBits) {
     field::ModelInfo info;
     info.geometry = measurement_.geometry;
     info.roi = measurement_.roi;
-    save_checkpoint(scratch / "fit.h5", *first, info, "{}");
+    save_checkpoint(scratch / "fit.h5", *first, info, {.fingerprint = "{}", .tuned = {}});
     const auto second = make_fit();
     restore_fit(scratch / "fit.h5", "{}", *second);
     EXPECT_EQ(second->progress().step, pause_at);
