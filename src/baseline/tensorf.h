@@ -1,7 +1,7 @@
 #pragma once
 
 #include "geometry/tilt_geometry.h"
-#include "reconstruct/reconstruct.h"
+#include "reconstruct/run_options.h"
 
 namespace tomofield::baseline {
 

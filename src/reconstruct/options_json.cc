@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "reconstruct/reconstruct.h"
+#include "reconstruct/run_options.h"
 
 namespace tomofield::reconstruct {
 namespace {

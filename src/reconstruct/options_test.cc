@@ -5,7 +5,7 @@
 #include <limits>
 #include <string>
 
-#include "reconstruct/reconstruct.h"
+#include "reconstruct/run_options.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 
