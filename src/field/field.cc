@@ -94,6 +94,14 @@ LaneRows Field::lane_rows(int leaf, std::span<const double, kernels::kLanes> y) 
   return rows;
 }
 
+bool LaneRows::are_at_neighbouring_vertices() const {
+  for (int l = 0; l < kernels::kLanes; ++l) {
+    const auto lane = static_cast<std::size_t>(l);
+    if (lower[lane] != lower[0] + l || fraction[lane] != 0.0f) return false;
+  }
+  return true;
+}
+
 std::vector<ParameterRuns> Field::parameters_between(int leaf, double low, double high) const {
   const int n = shape(leaf).ny;
   const auto first = AxisPoint(vertex_y(leaf, low), n).lower;

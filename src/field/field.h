@@ -34,6 +34,9 @@ struct LeafShape {
 struct LaneRows {
   std::array<int, kernels::kLanes> lower{};
   std::array<float, kernels::kLanes> fraction{};
+
+  /// Whether lane l is at vertex lower[0] + l.
+  bool are_at_neighbouring_vertices() const;
 };
 
 /// Points in the field's coordinates (pixels): spans of one length.

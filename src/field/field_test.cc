@@ -29,10 +29,11 @@ constexpr LeafShape kFine{.nx = 5, .ny = 4, .nz = 7, .rank_x = 3, .rank_y = 1, .
 constexpr LeafShape kCoarse{.nx = 3, .ny = 2, .nz = 4, .rank_x = 1, .rank_y = 2, .rank_z = 1};
 
 // A fine cell beside a coarse one, every parameter random.
-std::unique_ptr<Field> two_cells(const std::string& kind, float beta) {
+std::unique_ptr<Field> two_cells(const std::string& kind, float beta,
+                                 const LeafShape& fine = kFine) {
   const RootGrid roots{.x0 = -16, .y0 = 8, .cell_size = 64, .columns = 2, .rows = 1};
   auto field = make_field(kind, Quadtree(roots, {Region::kInterest, Region::kMargin}), kThickness,
-                          {kFine, kCoarse});
+                          {fine, kCoarse});
   field->initialise(base::Random(3), 1.0);
   field->bias = 0.25f;
   field->activation = {beta};
@@ -113,6 +114,16 @@ std::array<double, kLanes> rows_of(const Square& square) {
            static_cast<double>(square.size) * static_cast<double>(l) / 15.0;
   return y;
 }
+
+// The rows of 16 pixels in it.
+std::array<double, kLanes> pixels_of(const Square& square) {
+  std::array<double, kLanes> y{};
+  for (std::size_t l = 0; l < kLanes; ++l)
+    y[l] = static_cast<double>(square.y0) + 20.5 + static_cast<double>(l);
+  return y;
+}
+
+using RowsOfLeaf = std::function<std::array<double, kLanes>(const Square&)>;
 
 class EachField : public ::testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, EachField, ::testing::Values("vm", "grid"),
@@ -220,11 +231,10 @@ TEST_P(EachField, DensityOutsideTheDomainIsZero) {
 
 // Values are linear in each single parameter, so that central differences of
 // any step are its derivative to rounding.
-TEST_P(EachField, SlabGradientIsTheDerivative) {
-  const auto field = two_cells(GetParam(), 0.0f);
+void expect_slab_gradient_is_the_derivative(Field* field, const RowsOfLeaf& rows_of_leaf) {
   for (int leaf = 0; leaf < 2; ++leaf) {
     const std::size_t size = field->shape(leaf).vertices_xz() * kLanes;
-    const auto rows = field->lane_rows(leaf, rows_of(field->tree().leaf(leaf).square));
+    const auto rows = field->lane_rows(leaf, rows_of_leaf(field->tree().leaf(leaf).square));
     const auto weights = random_floats(size, 7);
     const auto objective = [&] {
       std::vector<float> values(size);
@@ -243,6 +253,16 @@ TEST_P(EachField, SlabGradientIsTheDerivative) {
     }
     expect_near(gradient, expected, 2e-5);
   }
+}
+
+TEST_P(EachField, SlabGradientIsTheDerivative) {
+  expect_slab_gradient_is_the_derivative(two_cells(GetParam(), 0.0f).get(), rows_of);
+}
+
+TEST_P(EachField, SlabGradientAtVerticesIsTheDerivative) {
+  LeafShape fine = kFine;
+  fine.ny = 64 + 1;
+  expect_slab_gradient_is_the_derivative(two_cells(GetParam(), 0.0f, fine).get(), pixels_of);
 }
 
 // Random points of a leaf, its corners among them.

@@ -1,17 +1,22 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 namespace tomofield::field {
 
 /// A point between vertices of one axis: lower vertex and weight of the upper.
-/// Points outside are moved to the end: export may ask for the domain's last face.
+/// Points outside are moved to the end: export may ask for the domain's last face. What is
+/// within rounding of a vertex is at it, since kernels need not interpolate there.
 struct AxisPoint {
   std::ptrdiff_t lower;
   double fraction;
   AxisPoint(double vertex, int n) {
-    const double clamped = std::clamp(vertex, 0.0, static_cast<double>(n - 1));
+    constexpr double kRounding = 1e-9;
+    const double nearest = std::round(vertex);
+    const double exact = std::abs(vertex - nearest) < kRounding * n ? nearest : vertex;
+    const double clamped = std::clamp(exact, 0.0, static_cast<double>(n - 1));
     lower = std::min(static_cast<std::ptrdiff_t>(clamped), static_cast<std::ptrdiff_t>(n - 2));
     fraction = clamped - static_cast<double>(lower);
   }

@@ -114,6 +114,38 @@ class FactorMaps {
   const MergeTarget& target_;
 };
 
+// A matrix product at the rows of a slab: values[first_value + row · value_row + lane] is a sum
+// over ranks of factor[row, rank] and plane[y, rank] at the lane's y.
+struct SlabProduct {
+  std::ptrdiff_t rows, first_value, value_row;
+  int rank;
+  std::size_t factor, plane;
+};
+
+// Those of VY ⊗ MXZ, of VX ⊗ MYZ a vertex in z, and of VZ ⊗ MXY a vertex in x.
+template <typename Body>
+void for_each_slab_product(const LeafShape& s, const Body& body) {
+  const Layout at(s);
+  const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(s.nz) * kLanes;
+  const auto plane = [&s](int index, int rank) {
+    return static_cast<std::size_t>(index) * static_cast<std::size_t>(s.ny) *
+           static_cast<std::size_t>(rank);
+  };
+  body(SlabProduct{static_cast<std::ptrdiff_t>(s.vertices_xz()), 0, kLanes, s.rank_y, at.mxz,
+                   at.vy});
+  for (int k = 0; k < s.nz; ++k)
+    body(SlabProduct{s.nx, k * kLanes, column, s.rank_x, at.vx, at.myz + plane(k, s.rank_x)});
+  for (int i = 0; i < s.nx; ++i)
+    body(SlabProduct{s.nz, i * column, kLanes, s.rank_z, at.vz, at.mxy + plane(i, s.rank_z)});
+}
+
+kernels::LaneTaps taps(const LaneRows& rows) { return {rows.lower.data(), rows.fraction.data()}; }
+
+// Of a plane's rows at the lanes.
+std::size_t lane_size(const LeafShape& s) {
+  return static_cast<std::size_t>(std::max({s.rank_x, s.rank_y, s.rank_z})) * kLanes;
+}
+
 // Scratch that a thread keeps between calls.
 float* scratch(std::size_t size, int which) {
   thread_local base::AlignedBuffer<float> buffers[3];
@@ -143,52 +175,21 @@ std::vector<ParameterRuns> VmField::runs_of_rows(const LeafShape& s, int first_y
 
 void VmField::add_slab_values(int leaf, const LaneRows& rows, float* values) const {
   const LeafShape& s = shape(leaf);
-  const Layout at(s);
-  const kernels::LaneTaps taps{rows.lower.data(), rows.fraction.data()};
   const float* p = leaf_parameters(leaf);
-  const int max_rank = std::max({s.rank_x, s.rank_y, s.rank_z});
-  float* lanes = scratch(static_cast<std::size_t>(max_rank) * kLanes, 0);
-  const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(s.nz) * kLanes;
-
-  interpolate_rows_transposed(taps, s.rank_y, p + at.vy, lanes);
-  small_gemm({.rows = static_cast<std::ptrdiff_t>(s.vertices_xz()),
-              .depth = s.rank_y,
-              .width = kLanes,
-              .a = p + at.mxz,
-              .a_row = s.rank_y,
-              .a_col = 1,
-              .b = lanes,
-              .b_row = kLanes,
-              .c = values,
-              .c_row = kLanes});
-  for (int k = 0; k < s.nz; ++k) {
-    interpolate_rows_transposed(taps, s.rank_x,
-                                p + at.myz + static_cast<std::size_t>(k) * s.ny * s.rank_x, lanes);
-    small_gemm({.rows = s.nx,
-                .depth = s.rank_x,
+  float* lanes = scratch(lane_size(s), 0);
+  for_each_slab_product(s, [&](const SlabProduct& f) {
+    interpolate_rows_transposed(taps(rows), f.rank, p + f.plane, lanes);
+    small_gemm({.rows = f.rows,
+                .depth = f.rank,
                 .width = kLanes,
-                .a = p + at.vx,
-                .a_row = s.rank_x,
+                .a = p + f.factor,
+                .a_row = f.rank,
                 .a_col = 1,
                 .b = lanes,
                 .b_row = kLanes,
-                .c = values + k * kLanes,
-                .c_row = column});
-  }
-  for (int i = 0; i < s.nx; ++i) {
-    interpolate_rows_transposed(taps, s.rank_z,
-                                p + at.mxy + static_cast<std::size_t>(i) * s.ny * s.rank_z, lanes);
-    small_gemm({.rows = s.nz,
-                .depth = s.rank_z,
-                .width = kLanes,
-                .a = p + at.vz,
-                .a_row = s.rank_z,
-                .a_col = 1,
-                .b = lanes,
-                .b_row = kLanes,
-                .c = values + i * column,
-                .c_row = kLanes});
-  }
+                .c = values + f.first_value,
+                .c_row = f.value_row});
+  });
 }
 
 // Every gradient is a matrix product whose columns are ranks: the sums over
@@ -196,98 +197,45 @@ void VmField::add_slab_values(int leaf, const LaneRows& rows, float* values) con
 void VmField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
                             float* gradient) const {
   const LeafShape& s = shape(leaf);
-  const Layout at(s);
-  const kernels::LaneTaps taps{rows.lower.data(), rows.fraction.data()};
   const float* p = leaf_parameters(leaf);
-  const int max_rank = std::max({s.rank_x, s.rank_y, s.rank_z});
-  const std::size_t lane_size = static_cast<std::size_t>(max_rank) * kLanes;
-  float* lanes = scratch(lane_size, 0);
-  float* grad_lanes = scratch(lane_size, 1);
-  const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(s.nz) * kLanes;
-  const std::ptrdiff_t num_xz = static_cast<std::ptrdiff_t>(s.vertices_xz());
-
-  // VY ⊗ MXZ
-  interpolate_rows(taps, s.rank_y, p + at.vy, lanes);
-  std::fill_n(grad_lanes, lane_size, 0.0f);
-  small_gemm({.rows = num_xz,
-              .depth = kLanes,
-              .width = s.rank_y,
-              .a = grad_values,
-              .a_row = kLanes,
-              .a_col = 1,
-              .b = lanes,
-              .b_row = s.rank_y,
-              .c = gradient + at.mxz,
-              .c_row = s.rank_y});
-  small_gemm({.rows = kLanes,
-              .depth = num_xz,
-              .width = s.rank_y,
-              .a = grad_values,
-              .a_row = 1,
-              .a_col = kLanes,
-              .b = p + at.mxz,
-              .b_row = s.rank_y,
-              .c = grad_lanes,
-              .c_row = s.rank_y});
-  spread_rows(taps, s.rank_y, grad_lanes, gradient + at.vy);
-
-  // VX ⊗ MYZ
-  for (int k = 0; k < s.nz; ++k) {
-    const std::size_t plane = at.myz + static_cast<std::size_t>(k) * s.ny * s.rank_x;
-    const float* g = grad_values + k * kLanes;
-    interpolate_rows(taps, s.rank_x, p + plane, lanes);
-    std::fill_n(grad_lanes, lane_size, 0.0f);
-    small_gemm({.rows = s.nx,
+  const bool at_vertices = rows.are_at_neighbouring_vertices();
+  const auto first_vertex = static_cast<std::size_t>(rows.lower[0]);
+  float* lanes = scratch(lane_size(s), 0);
+  float* grad_lanes = scratch(lane_size(s), 1);
+  for_each_slab_product(s, [&](const SlabProduct& f) {
+    // The plane's rows at the lanes, and where their gradient goes: those of the plane itself if
+    // nothing lies between them.
+    const float* of_lanes = p + f.plane + first_vertex * static_cast<std::size_t>(f.rank);
+    float* to_lanes = gradient + f.plane + first_vertex * static_cast<std::size_t>(f.rank);
+    if (!at_vertices) {
+      interpolate_rows(taps(rows), f.rank, p + f.plane, lanes);
+      std::fill_n(grad_lanes, f.rank * kLanes, 0.0f);
+      of_lanes = lanes;
+      to_lanes = grad_lanes;
+    }
+    const float* grad = grad_values + f.first_value;
+    small_gemm({.rows = f.rows,
                 .depth = kLanes,
-                .width = s.rank_x,
-                .a = g,
-                .a_row = column,
+                .width = f.rank,
+                .a = grad,
+                .a_row = f.value_row,
                 .a_col = 1,
-                .b = lanes,
-                .b_row = s.rank_x,
-                .c = gradient + at.vx,
-                .c_row = s.rank_x});
+                .b = of_lanes,
+                .b_row = f.rank,
+                .c = gradient + f.factor,
+                .c_row = f.rank});
     small_gemm({.rows = kLanes,
-                .depth = s.nx,
-                .width = s.rank_x,
-                .a = g,
+                .depth = f.rows,
+                .width = f.rank,
+                .a = grad,
                 .a_row = 1,
-                .a_col = column,
-                .b = p + at.vx,
-                .b_row = s.rank_x,
-                .c = grad_lanes,
-                .c_row = s.rank_x});
-    spread_rows(taps, s.rank_x, grad_lanes, gradient + plane);
-  }
-
-  // VZ ⊗ MXY
-  for (int i = 0; i < s.nx; ++i) {
-    const std::size_t plane = at.mxy + static_cast<std::size_t>(i) * s.ny * s.rank_z;
-    const float* g = grad_values + i * column;
-    interpolate_rows(taps, s.rank_z, p + plane, lanes);
-    std::fill_n(grad_lanes, lane_size, 0.0f);
-    small_gemm({.rows = s.nz,
-                .depth = kLanes,
-                .width = s.rank_z,
-                .a = g,
-                .a_row = kLanes,
-                .a_col = 1,
-                .b = lanes,
-                .b_row = s.rank_z,
-                .c = gradient + at.vz,
-                .c_row = s.rank_z});
-    small_gemm({.rows = kLanes,
-                .depth = s.nz,
-                .width = s.rank_z,
-                .a = g,
-                .a_row = 1,
-                .a_col = kLanes,
-                .b = p + at.vz,
-                .b_row = s.rank_z,
-                .c = grad_lanes,
-                .c_row = s.rank_z});
-    spread_rows(taps, s.rank_z, grad_lanes, gradient + plane);
-  }
+                .a_col = f.value_row,
+                .b = p + f.factor,
+                .b_row = f.rank,
+                .c = to_lanes,
+                .c_row = f.rank});
+    if (!at_vertices) spread_rows(taps(rows), f.rank, grad_lanes, gradient + f.plane);
+  });
 }
 
 void VmField::add_row_values(int leaf, int lower, float fraction, float* values) const {

@@ -28,9 +28,9 @@ std::vector<std::string> ReconstructOptions::faults() const {
   for (const auto& faults : {field.faults(), fit.faults()})
     all.insert(all.end(), faults.begin(), faults.end());
   if (tune && fit.engine == "ray")
-    all.push_back("--tune predicts aligned views: it needs --engine slab");
+    all.emplace_back("--tune predicts aligned views: it needs --engine slab");
   if (tune && fit.patience > 0)
-    all.push_back("--tune chooses the number of epochs: leave --early-stop out");
+    all.emplace_back("--tune chooses the number of epochs: leave --early-stop out");
   if (!(checkpoint_minutes >= 0))
     all.push_back(
         fmt::format("--checkpoint-minutes must be 0 or more, not {:g}", checkpoint_minutes));
