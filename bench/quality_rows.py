@@ -105,7 +105,7 @@ def measure(options, arguments, kind, noise, seed, scratch):
     row.update({key: figures[key] for key in ("parameters", "leaves") if key in figures})
     model = os.path.splitext(volume)[0] + ".h5"
     if os.path.exists(model):
-        if row.get("leaves", 1) > 1:  # else there are no faces
+        if arguments.startswith("reconstruct") and row["leaves"] > 1:  # else there are no faces
             row["seam"] = script_json("seam.py", volume, "--truth", truth)["over_truth"]
         row["streaks"] = (script_json("axis_streaks.py", volume)["ratio"]
                           / script_json("axis_streaks.py", truth)["ratio"])
