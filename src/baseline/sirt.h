@@ -8,7 +8,7 @@
 namespace tomofield::baseline {
 
 struct SirtOptions {
-  int iterations = 40;      ///< best for noisy phantoms, docs/results/quality.md
+  int iterations = 40;      ///< best on phantoms with noise 0.05, docs/results/noise.md
   double relaxation = 1.0;  ///< converges for 0 < relaxation < 2
   bool non_negative = true;
 

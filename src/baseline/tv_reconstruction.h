@@ -10,7 +10,7 @@
 namespace tomofield::baseline {
 
 struct TvOptions {
-  int iterations = 200;                ///< docs/results/quality.md
+  int iterations = 200;                ///< passes over all views
   std::optional<double> weight;        ///< λ, see reconstruct_tv; none: usual_weight()
   std::optional<std::string> penalty;  ///< smooth, also if none is given, or concave
   double concavity = 1.6;              ///< τ of the concave penalty, in units of a voxel's noise
