@@ -37,7 +37,8 @@ class AlignedBuffer {
       data_ = map_zeros((bytes + kHugePage - 1) / kHugePage * kHugePage);
     } else {
       const std::size_t rounded = (bytes + kCacheLine - 1) / kCacheLine * kCacheLine;
-      data_.reset(static_cast<T*>(std::aligned_alloc(kCacheLine, rounded)));
+      // With a deleter of its own: what was there before may have been mapped.
+      data_ = Memory(static_cast<T*>(std::aligned_alloc(kCacheLine, rounded)), Free{});
       if (!data_) throw std::bad_alloc();
       fill(T{});
     }

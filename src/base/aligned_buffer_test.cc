@@ -1,6 +1,7 @@
 #include "base/aligned_buffer.h"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -54,6 +55,17 @@ TEST(AlignedBuffer, PagesThatAreNotWrittenTakeNoMemory) {
   AlignedBuffer<float> buffer(512 * kMiB / sizeof(float));
   buffer[buffer.size() / 2] = 1.0f;
   EXPECT_LT(resident_bytes(), before + 16 * kMiB);
+}
+
+// Memory of the heap must not go back as if it were mapped, which it may lie in the middle of.
+TEST(AlignedBuffer, ASmallOneInPlaceOfALargeOneIsFreed) {
+  constexpr std::size_t kLarge = std::size_t{2} << 20, kSmall = 20000;
+  const std::size_t before = mallinfo2().uordblks;
+  for (int i = 0; i < 100; ++i) {
+    AlignedBuffer<float> buffer(kLarge);
+    buffer.reset(kSmall);
+  }
+  EXPECT_LT(mallinfo2().uordblks, before + 10 * kSmall * sizeof(float));
 }
 
 TEST(AlignedBuffer, EmptyHasNoElements) {
