@@ -94,12 +94,14 @@ LaneRows Field::lane_rows(int leaf, std::span<const double, kernels::kLanes> y) 
   return rows;
 }
 
-bool LaneRows::are_at_neighbouring_vertices() const {
-  for (int l = 0; l < kernels::kLanes; ++l) {
-    const auto lane = static_cast<std::size_t>(l);
-    if (lower[lane] != lower[0] + l || fraction[lane] != 0.0f) return false;
-  }
+bool LaneRows::are_a_vertex_apart() const {
+  for (int l = 1; l < kernels::kLanes; ++l)
+    if (lower[static_cast<std::size_t>(l)] != lower[0] + l) return false;
   return true;
+}
+
+bool LaneRows::are_at_neighbouring_vertices() const {
+  return are_a_vertex_apart() && std::ranges::count(fraction, 0.0f) == kernels::kLanes;
 }
 
 std::vector<ParameterRuns> Field::parameters_between(int leaf, double low, double high) const {

@@ -35,7 +35,9 @@ struct LaneRows {
   std::array<int, kernels::kLanes> lower{};
   std::array<float, kernels::kLanes> fraction{};
 
-  /// Whether lane l is at vertex lower[0] + l.
+  /// Whether the lanes lie between neighbouring vertices, each a vertex further than the one
+  /// before; and whether, of such lanes, lane l is at vertex lower[0] + l.
+  bool are_a_vertex_apart() const;
   bool are_at_neighbouring_vertices() const;
 };
 

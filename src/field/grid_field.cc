@@ -41,13 +41,6 @@ struct RowMatrix {
   }
 };
 
-// Whether the rows lie between neighbouring vertices, each a vertex further than the one before.
-bool are_a_vertex_apart(const LaneRows& rows) {
-  for (int l = 1; l < kLanes; ++l)
-    if (rows.lower[l] != rows.lower[0] + l) return false;
-  return true;
-}
-
 kernels::Columns columns(const LeafShape& s, const LaneRows& rows) {
   return {.count = static_cast<std::ptrdiff_t>(s.vertices_xz()),
           .stride = s.ny,
@@ -86,7 +79,7 @@ std::vector<ParameterRuns> GridField::runs_of_rows(const LeafShape& s, int first
 
 void GridField::add_slab_values(int leaf, const LaneRows& rows, float* values) const {
   const LeafShape& s = shape(leaf);
-  if (are_a_vertex_apart(rows)) {
+  if (rows.are_a_vertex_apart()) {
     kernels::interpolate_columns(columns(s, rows), leaf_parameters(leaf) + rows.lower[0], values);
     return;
   }
@@ -106,7 +99,7 @@ void GridField::add_slab_values(int leaf, const LaneRows& rows, float* values) c
 void GridField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
                               float* gradient) const {
   const LeafShape& s = shape(leaf);
-  if (are_a_vertex_apart(rows)) {
+  if (rows.are_a_vertex_apart()) {
     kernels::spread_columns(columns(s, rows), grad_values, gradient + rows.lower[0]);
     return;
   }
