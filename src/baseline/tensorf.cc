@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/lanes.h"
+#include "reconstruct/stages.h"
 #include "tomofield/error.h"
 
 namespace tomofield::baseline {
@@ -14,7 +15,7 @@ reconstruct::ReconstructOptions tensorf_options() {
   options.field.depth = 0;
   options.field.rank = 48;
   options.fit.coarse_epochs =
-      reconstruct::usual_coarse_epochs(options.field.kind, options.fit.epochs);
+      reconstruct::usual_schedule(options.field, options.fit).coarse_epochs_of(options.fit.epochs);
   options.fit.coarse_bin = 8;
   options.fit.coarse_stages = 3;
   options.fit.penalty = "smooth";

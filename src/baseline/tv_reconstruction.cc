@@ -9,7 +9,7 @@
 
 #include "baseline/slab_gradient.h"
 #include "kernels/lanes.h"
-#include "reconstruct/concavity.h"
+#include "reconstruct/noise_scale.h"
 
 namespace tomofield::baseline {
 namespace {

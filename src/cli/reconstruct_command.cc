@@ -10,6 +10,7 @@
 #include "cli/specimen_options.h"
 #include "cli/volume_options.h"
 #include "reconstruct/reconstruct.h"
+#include "reconstruct/stages.h"
 
 namespace tomofield::cli {
 namespace {
@@ -69,14 +70,16 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
   const char* group = "Fit";
   reconstruct::FitOptions& fit = arguments.options.fit;
   command
-      .add_option("--epochs", arguments.epochs,
-                  "passes over all views at full resolution; default: 30, 10 of a grid")
+      .add_option(
+          "--epochs", arguments.epochs,
+          "passes over all views at full resolution; default: 30, 10 of a grid, 5 of vertices "
+          "as far apart as coarse pixels")
       ->group(group);
   command
       .add_option(
           "--coarse-epochs", arguments.coarse_epochs,
-          "passes before them over binned views, with fewer vertices; 0: none; default: 8/3 "
-          "of --epochs, of a grid 8 times as many")
+          "passes before them over binned views, with fewer vertices; 0: none; default: 80, or as "
+          "many times fewer as --epochs are than usual")
       ->group(group);
   command
       .add_option("--coarse-bin", fit.coarse_bin,
@@ -158,12 +161,11 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
 }
 
 void set_schedule(Arguments& arguments) {
-  const std::string& kind = arguments.options.field.kind;
-  const reconstruct::Schedule usual = reconstruct::usual_schedule(kind);
   reconstruct::FitOptions& fit = arguments.options.fit;
+  fit.coarse_epochs = arguments.coarse_epochs.value_or(1);  // any but 0: there is a coarse stage
+  const reconstruct::Schedule usual = reconstruct::usual_schedule(arguments.options.field, fit);
   fit.epochs = arguments.epochs.value_or(usual.epochs);
-  fit.coarse_epochs =
-      arguments.coarse_epochs.value_or(reconstruct::usual_coarse_epochs(kind, fit.epochs));
+  if (!arguments.coarse_epochs) fit.coarse_epochs = usual.coarse_epochs_of(fit.epochs);
   fit.learning_rate = arguments.learning_rate.value_or(usual.learning_rate);
 }
 

@@ -72,12 +72,11 @@ Domain cover(double thickness, const geometry::Roi& roi, geometry::Extent2 reach
   tree.split_to_level(field::Region::kInterest, options.depth);
   std::vector<field::LeafShape> shapes;
   // Along z all leaves are as fine as the finest ones are in the plane.
-  const double spacing_z = options.vertex_spacing / (options.tree == "adaptive" ? 2 : 1);
   for (int leaf = 0; leaf < tree.num_leaves(); ++leaf) {
     const bool inside = tree.leaf(leaf).region == field::Region::kInterest;
     shapes.push_back(leaf_shape(static_cast<double>(tree.leaf(leaf).square.size), thickness,
                                 inside ? options.vertex_spacing : options.margin_spacing,
-                                inside ? spacing_z : options.margin_spacing,
+                                inside ? options.finest_spacing() : options.margin_spacing,
                                 inside ? options.rank : options.margin_rank));
   }
   return {.roi = roi,
@@ -86,7 +85,9 @@ Domain cover(double thickness, const geometry::Roi& roi, geometry::Extent2 reach
           .num_rows = end_row - roots.y0,
           .grid = std::move(grid),
           .tree = std::move(tree),
-          .shapes = std::move(shapes)};
+          .shapes = std::move(shapes),
+          .spacing = options.finest_spacing(),
+          .margin_spacing = options.margin_spacing};
 }
 
 }  // namespace
@@ -108,10 +109,22 @@ Domain make_domain(const geometry::RayGeometry& geometry, const geometry::Roi& r
   return cover(geometry.aligned.thickness, roi, reach_of_rays(geometry, roi), options);
 }
 
-const field::LeafShape& Domain::shape_in(field::Region region) const {
+double Domain::coarsening(field::Region region, int bin) const {
+  const FieldOptions usual;
+  const double of_usual = region == field::Region::kInterest
+                              ? usual.vertex_spacing / spacing
+                              : usual.margin_spacing / margin_spacing;
+  return std::max(1.0, bin * std::min(1.0, of_usual));
+}
+
+field::LeafShape Domain::shape_in(field::Region region, int bin) const {
   int leaf = 0;
   while (tree.leaf(leaf).region != region) ++leaf;
-  return shapes[static_cast<std::size_t>(leaf)];
+  field::LeafShape shape = shapes[static_cast<std::size_t>(leaf)];
+  const double ratio = coarsening(region, bin);
+  for (int* n : {&shape.nx, &shape.ny, &shape.nz})
+    *n = std::max(2, static_cast<int>(std::lround((*n - 1) / ratio)) + 1);
+  return shape;
 }
 
 projection::SampleGrid sample_grid(const Domain& domain, double thickness, int bin) {
@@ -120,7 +133,7 @@ projection::SampleGrid sample_grid(const Domain& domain, double thickness, int b
   const double x0 = fine.front().x0 / bin;
   const double x1 = x0 + (fine.front().nx + bin - 1) / bin;
   if (fine.size() == 1) return projection::make_sample_grid({x0, x1}, thickness / bin, x0, x1, 0);
-  const double spacing = fine.back().hx;
+  const double spacing = fine.back().hx * domain.coarsening(field::Region::kMargin, bin) / bin;
   // Whole samples inside the field; half a one less, as the grid is rounded up.
   const auto length = [spacing](double reach) {
     return (std::floor(reach / spacing) - 0.5) * spacing;

@@ -20,9 +20,14 @@ struct Domain {
   projection::SampleGrid grid;
   field::Quadtree tree;
   std::vector<field::LeafShape> shapes;
+  double spacing = 1.0, margin_spacing = 1.0;  ///< of the smallest leaves' vertices, in pixels
 
-  /// Of the leaves in a region, whatever becomes of the tree; it has some.
-  const field::LeafShape& shape_in(field::Region region) const;
+  /// How many times as far apart as at full resolution vertices (and a margin's samples) are in a
+  /// stage of pixels `bin` times as wide: once, but no closer in the stage's pixels than usual.
+  double coarsening(field::Region region, int bin) const;
+  /// Of the leaves in a region, whatever becomes of the tree, which has some, in such a stage: to
+  /// the next whole number of vertices.
+  field::LeafShape shape_in(field::Region region, int bin) const;
 };
 
 /// Rows of a band, which are those of a root cell.

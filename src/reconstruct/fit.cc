@@ -11,7 +11,7 @@
 #include "base/random.h"
 #include "base/shuffle.h"
 #include "kernels/lanes.h"
-#include "reconstruct/concavity.h"
+#include "reconstruct/noise_scale.h"
 #include "reconstruct/slab_objective.h"
 
 namespace tomofield::reconstruct {
@@ -29,20 +29,22 @@ constexpr std::uint64_t kDirectionStream = std::uint64_t{1} << 40;
 // every series would have one weight there. Total variation is not such a
 // prior: what it must suppress is noise, and its best weight grows with the
 // noise's deviation rather than its variance (as in denoising, Rudin, Osher and
-// Fatemi 1992). Dividing by the noise makes one setting serve every size.
-ObjectiveWeights objective_weights(const FitOptions& options, double noise, double concavity) {
+// Fatemi 1992). Dividing by the noise makes one setting serve every size. `noise` is that of the
+// stage's pixels.
+ObjectiveWeights objective_weights(const FitOptions& options, const Measurement& measurement,
+                                   double noise) {
+  const bool is_concave = options.penalty == "concave";
+  const double gain = is_concave ? gain_of_little_noise(typical_noise(measurement.noise_sigma),
+                                                        measurement.contrast())
+                                 : 1.0;
+  const double tau = is_concave ? concavity(options.concavity, measurement.noise_sigma) : 0.0;
   ObjectiveWeights weights;
-  weights.density_variation = options.density_variation / noise;
+  weights.density_variation = gain * options.density_variation / noise;
   weights.factor_variation = options.factor_variation / noise;
   weights.density_penalty.epsilon = static_cast<float>(options.gradient_floor);
-  weights.density_penalty.concavity = static_cast<float>(concavity);
+  weights.density_penalty.concavity = static_cast<float>(tau);
   weights.factor_penalty = weights.density_penalty;
   return weights;
-}
-
-// τ in density units, 0 for a smooth penalty.
-double concavity_of(const FitOptions& options, const std::vector<double>& sigmas) {
-  return options.penalty == "smooth" ? 0.0 : concavity(options.concavity, sigmas);
 }
 
 // A jump at a face counts in total variation's units, density times area, and what
@@ -112,9 +114,7 @@ TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
 Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
          const FitOptions& options)
     : measurement_(measurement),
-      options_(with_at_most_one_subset_a_view(
-          options,
-          measurement.num_fitted_views())),
+      options_(with_at_most_one_subset_a_view(options, measurement.num_fitted_views())),
       stages_(make_stages(field_options, options_)),
       domain_(domain_of(measurement, field_options)),
       bands_(reconstruct::own_bands(domain_.num_rows, domain_.tree.roots().cell_size,
@@ -155,7 +155,7 @@ void Fit::resample_field() {
   std::vector<field::LeafShape> shapes;
   const field::Quadtree& tree = field_->tree();
   for (int leaf = 0; leaf < tree.num_leaves(); ++leaf)
-    shapes.push_back(coarser_shape(domain_.shape_in(tree.leaf(leaf).region), stage().bin));
+    shapes.push_back(domain_.shape_in(tree.leaf(leaf).region, stage().bin));
   field_ = field_->resampled(std::move(shapes));
   optimizer_ = optimize::Adam(*field_, optimize::AdamOptions{});
 }
@@ -302,8 +302,8 @@ void Fit::take_step(const std::vector<int>& views) {
 
 // The data term of these views, total variation and boundary consistency of the own bands.
 std::vector<BandResult> Fit::band_gradients(const std::vector<int>& views) {
-  ObjectiveWeights weights = objective_weights(options_, typical_noise(binned_->noise_sigma),
-                                               concavity_of(options_, measurement_.noise_sigma));
+  ObjectiveWeights weights =
+      objective_weights(options_, measurement_, typical_noise(binned_->noise_sigma));
   // Each step looks at edges from another corner: forward differences alone treat
   // their two sides differently.
   base::Random directions(options_.seed,

@@ -11,6 +11,11 @@
 
 namespace tomofield::reconstruct {
 
+/// The contrast of an untilted view (standard deviation over its pixels) that one density unit
+/// stands for, per pixel of thickness: the yardstick phantoms, with densities between 0 and 1, have
+/// 0.07 to 0.08.
+constexpr double kContrastPerThickness = 0.075;
+
 /// What is fitted: the geometry, the measured rays (divided by the density
 /// unit) and the noise of each view in the same units.
 struct Measurement {
@@ -26,6 +31,9 @@ struct Measurement {
   /// Who share the fit. Each holds the slabs of its own_bands() in `rays`.
   const distributed::Communicator* processes = &distributed::Communicator::alone();
 
+  /// Of the views near zero tilt (standard deviation over their pixels), in density units times
+  /// pixels: what defines the unit.
+  double contrast() const { return kContrastPerThickness * geometry.thickness; }
   int num_fitted_views() const { return geometry.num_views() - static_cast<int>(held_out.size()); }
 };
 

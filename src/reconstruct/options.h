@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -23,6 +21,8 @@ struct FieldOptions {
   std::string activation = "softplus";  ///< or identity, for densities of either sign
   double sharpness = 5.0;               ///< β of softplus, per density unit
   double initial_scale = 0.1;           ///< factors start uniform in ± this
+  /// Between vertices of the smallest leaves.
+  double finest_spacing() const { return vertex_spacing / (tree == "adaptive" ? 2 : 1); }
   /// Every fault of these options, a sentence each.
   std::vector<std::string> faults() const;
 };
@@ -57,25 +57,6 @@ struct FitOptions {
   int patience = 0;  ///< epochs without a better held-out error before it stops; 0: never
   std::vector<std::string> faults() const;
 };
-
-/// Where the optimisation starts from and how long it takes, by the kind of field.
-struct Schedule {
-  int epochs;            ///< at full resolution
-  double coarse_epochs;  ///< for each of these; a coarse one costs an eighth
-  double learning_rate;  ///< of the first step
-};
-
-/// Plain vertices converge in a third of the epochs that factors need, and in smaller steps
-/// (docs/results/ablation.md).
-inline Schedule usual_schedule(const std::string& field_kind) {
-  return field_kind == "grid" ? Schedule{10, 8.0, 0.035} : Schedule{30, 8.0 / 3.0, 0.05};
-}
-
-/// Coarse epochs that go with `epochs` fine ones.
-inline int usual_coarse_epochs(const std::string& field_kind, int epochs) {
-  return static_cast<int>(
-      std::clamp(std::round(usual_schedule(field_kind).coarse_epochs * epochs), 0.0, 1e9));
-}
 
 /// The weight of the density's variation that goes with a penalty: a concave one counts
 /// large steps less, and so needs more (docs/results/ablation.md).

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "reconstruct/measurement.h"
 #include "reconstruct/options.h"
 #include "reconstruct/share.h"
 #include "tomofield/error.h"
@@ -23,11 +24,6 @@ constexpr double kMaxRowShift = 0.5;
 
 // Far beyond any specimen, and small enough to be counted in ints.
 constexpr double kLargestThickness = 1e6;
-
-// The contrast of an untilted view (standard deviation over its pixels) that
-// one density unit stands for, per pixel of thickness: the yardstick phantoms,
-// with densities between 0 and 1, have 0.07 to 0.08.
-constexpr double kContrastPerThickness = 0.075;
 
 // The views nearest to zero tilt that contrast is measured in: tilted ones of a
 // specimen that ends in the field of view mostly show its faces.

@@ -20,6 +20,19 @@ int coarse_bin(const FieldOptions& field, const FitOptions& fit) {
 
 }  // namespace
 
+int Schedule::coarse_epochs_of(int fine) const {
+  constexpr double kCoarseEpochs = 80;  // before the usual ones
+  return static_cast<int>(std::clamp(std::round(kCoarseEpochs / epochs * fine), 0.0, 1e9));
+}
+
+Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit) {
+  Schedule schedule{30, 0.05};
+  if (field.kind == "grid") schedule = {10, 0.035};
+  const int bin = coarse_bin(field, fit);
+  if (bin > 1 && field.finest_spacing() >= bin) schedule.epochs = 5;
+  return schedule;
+}
+
 std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit) {
   std::vector<int> bins;
   for (int bin = coarse_bin(field, fit); bin > 1 && std::ssize(bins) < fit.coarse_stages; bin /= 2)
@@ -36,12 +49,6 @@ std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit)
   }
   stages.push_back({1, first_epoch, fit.epochs, first_rate, fit.learning_rate * fit.final_rate});
   return stages;
-}
-
-field::LeafShape coarser_shape(field::LeafShape shape, int bin) {
-  for (int* n : {&shape.nx, &shape.ny, &shape.nz})
-    *n = std::max(2, static_cast<int>(std::lround(static_cast<double>(*n - 1) / bin)) + 1);
-  return shape;
 }
 
 }  // namespace tomofield::reconstruct

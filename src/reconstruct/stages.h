@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "field/field.h"
 #include "reconstruct/options.h"
 
 namespace tomofield::reconstruct {
@@ -17,11 +16,23 @@ struct Stage {
   double first_rate = 0, last_rate = 0;  ///< learning rates; they fall exponentially
 };
 
+/// How long an optimisation takes, by what the field can express.
+struct Schedule {
+  int epochs;            ///< at full resolution
+  double learning_rate;  ///< of the first step
+
+  /// Coarse epochs that go with so many fine ones: the same share of the usual ones.
+  int coarse_epochs_of(int fine) const;
+};
+
+/// Plain vertices converge in a third of the epochs that factors need, and in smaller steps. Where
+/// vertices are as far apart as coarse pixels or further, the coarse stage learns all that the
+/// field can express, and full resolution has little left to do (docs/results/ablation.md). Of
+/// `fit` only what says whether there is a coarse stage counts.
+Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit);
+
 /// Coarse stages, which share the coarse epochs, unless they are off or leaves are too small for
 /// slabs of coarse pixels, and the fine one. The ray engine has none but that.
 std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit);
-
-/// A leaf's vertices `bin` times as far apart, to the next whole number of them.
-field::LeafShape coarser_shape(field::LeafShape shape, int bin);
 
 }  // namespace tomofield::reconstruct

@@ -70,12 +70,29 @@ TEST(Stages, SeveralCoarseOnesShareTheirEpochs) {
   EXPECT_EQ(make_stages(field, fit).size(), 2u);
 }
 
-TEST(Stages, CoarserShapesContainEveryOtherVertex) {
-  const field::LeafShape coarse =
-      coarser_shape({.nx = 33, .ny = 33, .nz = 76, .rank_x = 4, .rank_y = 5, .rank_z = 6}, 2);
-  EXPECT_EQ(coarse, (field::LeafShape{
-                        .nx = 17, .ny = 17, .nz = 39, .rank_x = 4, .rank_y = 5, .rank_z = 6}));
-  EXPECT_EQ(coarser_shape({.nx = 2, .ny = 3, .nz = 2}, 8).nx, 2);
+Schedule usual(const std::string& kind, double spacing, int coarse_epochs = 1,
+               const std::string& tree = "uniform") {
+  FieldOptions field;
+  field.leaf_size = 128;
+  field.kind = kind;
+  field.tree = tree;
+  field.vertex_spacing = spacing;
+  FitOptions fit;
+  fit.coarse_epochs = coarse_epochs;
+  return usual_schedule(field, fit);
+}
+
+TEST(Stages, FullResolutionIsShortIfTheCoarseOneHasAllVertices) {
+  for (const std::string kind : {"vm", "grid"}) {
+    EXPECT_EQ(usual(kind, 1.9).epochs, usual(kind, 1.0).epochs) << kind;
+    EXPECT_LT(usual(kind, 2.0).epochs, usual(kind, 1.0).epochs) << kind;
+    EXPECT_EQ(usual(kind, 2.0, 0).epochs, usual(kind, 1.0).epochs) << kind << ", no coarse stage";
+  }
+  EXPECT_EQ(usual("vm", 2.0, 1, "adaptive").epochs, usual("vm", 1.0).epochs);
+  EXPECT_LT(usual("vm", 4.0, 1, "adaptive").epochs, usual("vm", 1.0).epochs);
+  EXPECT_LT(usual("grid", 1.0).epochs, usual("vm", 1.0).epochs);
+  EXPECT_EQ(usual("vm", 1.0).coarse_epochs_of(30), 80);
+  EXPECT_EQ(usual("vm", 2.0).coarse_epochs_of(5), 80);
 }
 
 }  // namespace

@@ -150,14 +150,15 @@ class TrialFits {
   int num_done_ = 0;
 };
 
-// Half the schedule of plain vertices; as much less as `fit` is less than usual for its field.
-FitOptions penalty_trial_options(const std::string& field_kind, const FitOptions& fit) {
-  const Schedule usual = usual_schedule("grid");
+// Half the schedule of the field `plain`; as much less as `fit` is less than usual for `field`.
+FitOptions penalty_trial_options(const FieldOptions& plain, const FieldOptions& field,
+                                 const FitOptions& fit) {
+  const Schedule usual = usual_schedule(plain, fit);
   const double part =
-      std::min(1.0, static_cast<double>(fit.epochs) / usual_schedule(field_kind).epochs);
+      std::min(1.0, static_cast<double>(fit.epochs) / usual_schedule(field, fit).epochs);
   FitOptions shorter = fit;
   shorter.epochs = std::max(1, static_cast<int>(std::lround(kPenaltyPart * part * usual.epochs)));
-  if (fit.coarse_epochs > 0) shorter.coarse_epochs = usual_coarse_epochs("grid", shorter.epochs);
+  if (fit.coarse_epochs > 0) shorter.coarse_epochs = usual.coarse_epochs_of(shorter.epochs);
   shorter.learning_rate = usual.learning_rate;
   return shorter;
 }
@@ -266,7 +267,7 @@ std::optional<Tuned> tune_penalty(const Measurement& measurement, const FieldOpt
                                   const FitOptions& fit, const TuneHooks& hooks) {
   FieldOptions plain = field;
   plain.kind = "grid";
-  const FitOptions shorter = penalty_trial_options(field.kind, fit);
+  const FitOptions shorter = penalty_trial_options(plain, field, fit);
   TrialFits fits(measurement, kPenaltyRows, plain, shorter, hooks, 2);
   const auto search = [&] {
     Tuned tuned;

@@ -1,4 +1,4 @@
-#include "reconstruct/concavity.h"
+#include "reconstruct/noise_scale.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,6 +16,11 @@ double concavity(double in_voxel_noise, std::span<const double> sigma_of_view) {
   const double noise =
       typical_noise(sigma_of_view) / std::sqrt(static_cast<double>(sigma_of_view.size()));
   return std::max(in_voxel_noise * noise, kLeast);
+}
+
+double gain_of_little_noise(double noise, double contrast) {
+  constexpr double kLittle = 0.15;
+  return std::max(1.0, kLittle * contrast / noise);
 }
 
 }  // namespace tomofield::reconstruct

@@ -14,4 +14,11 @@ double typical_noise(std::span<const double> sigma_of_view);
 /// least value.
 double concavity(double in_voxel_noise, std::span<const double> sigma_of_view);
 
+/// How many times its weight in units of the noise a concave penalty has: more than once where
+/// there is little noise beside the views' contrast (both in density units times pixels). What few
+/// views and the missing wedge leave open does not become less with the noise, so that below some
+/// noise the weight no longer depends on it, in units of the squared residual
+/// (docs/results/ablation.md, "The weight and the noise").
+double gain_of_little_noise(double noise, double contrast);
+
 }  // namespace tomofield::reconstruct
