@@ -162,11 +162,13 @@ def wide_row(options, wide):
 
 def default_epochs(command):
     """(at full resolution, coarse): of a command of reconstruct without either option, by what dry
-    runs say of steps."""
-    coarse = ["--coarse-epochs", "0"]
-    both, full, one = (quality_rows.dry_run(words)["steps"]
-                       for words in (command, command + coarse, [*command, *coarse, "--epochs", "1"]))
-    return full // one, (both - full) // one
+    runs say of steps. The former depend on whether there are any of the latter."""
+    def steps(*options):
+        return quality_rows.dry_run([*command, *options])["steps"]
+
+    an_epoch = steps("--epochs", "1", "--coarse-epochs", "0")
+    full = steps("--coarse-epochs", "1") // an_epoch - 1
+    return full, steps() // an_epoch - full
 
 
 def measure_wide(options, wide, name, scratch):

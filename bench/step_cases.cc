@@ -27,6 +27,8 @@ constexpr int kBand = 2;  // somewhere in the middle
 reconstruct::FieldOptions field_options(const std::string& kind) {
   reconstruct::FieldOptions options;
   options.kind = kind;
+  options.leaf_size = reconstruct::usual_leaf_size(options);
+  options.depth = reconstruct::usual_depth(options);
   options.with_margin = false;
   return options;
 }

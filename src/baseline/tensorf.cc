@@ -17,7 +17,6 @@ reconstruct::ReconstructOptions tensorf_options() {
   options.fit.coarse_epochs =
       reconstruct::usual_schedule(options.field, options.fit).coarse_epochs_of(options.fit.epochs);
   options.fit.coarse_bin = 8;
-  options.fit.coarse_stages = 3;
   options.fit.penalty = "smooth";
   options.fit.density_variation = reconstruct::usual_variation(options.fit.penalty);
   options.fit.boundary = 0;

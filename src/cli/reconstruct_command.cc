@@ -19,7 +19,7 @@ struct Arguments {
   reconstruct::ReconstructOptions options;
   std::string view_scale = "auto";
   std::string activation = "auto";
-  std::optional<int> epochs, coarse_epochs;
+  std::optional<int> leaf_size, epochs, coarse_epochs;
   std::optional<double> learning_rate;
   std::optional<double> variation;
   std::string penalty = "auto";
@@ -34,9 +34,9 @@ void add_field_options(CLI::App& command, Arguments& arguments) {
       ->capture_default_str()
       ->group(group);
   command
-      .add_option("--leaf-size", field.leaf_size,
-                  "side of a leaf in binned pixels, a multiple of 16")
-      ->capture_default_str()
+      .add_option("--leaf-size", arguments.leaf_size,
+                  "side of a leaf in binned pixels, a multiple of 16; default: 32, 64 of a "
+                  "uniform grid")
       ->group(group);
   command
       .add_option("--tree", field.tree,
@@ -83,8 +83,8 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->group(group);
   command
       .add_option("--coarse-bin", fit.coarse_bin,
-                  "pixels of a coarse one on each axis, at most: a power of two that divides a "
-                  "sixteenth of a leaf's side")
+                  "pixels of the coarsest on each axis, at most: a power of two that divides a "
+                  "sixteenth of a leaf's side; passes of half as many follow, down to 2")
       ->capture_default_str()
       ->group(group);
   command
@@ -160,6 +160,12 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
   add_seed(command, fit.seed, group);
 }
 
+void set_leaves(Arguments& arguments) {
+  reconstruct::FieldOptions& field = arguments.options.field;
+  field.leaf_size = arguments.leaf_size.value_or(reconstruct::usual_leaf_size(field));
+  field.depth = reconstruct::usual_depth(field);
+}
+
 void set_schedule(Arguments& arguments) {
   reconstruct::FitOptions& fit = arguments.options.fit;
   fit.coarse_epochs = arguments.coarse_epochs.value_or(1);  // any but 0: there is a coarse stage
@@ -173,6 +179,7 @@ void run(Arguments& arguments, const distributed::Communicator& processes) {
   reconstruct::ReconstructOptions& options = arguments.options;
   const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
   options.fit.fit_view_scale = is_on(arguments.view_scale, is_dark);
+  set_leaves(arguments);
   set_schedule(arguments);
   options.choose_penalty = arguments.penalty == "auto" && !arguments.variation;
   if (arguments.penalty != "auto") options.fit.penalty = arguments.penalty;

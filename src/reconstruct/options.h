@@ -33,8 +33,7 @@ struct FieldOptions {
 struct FitOptions {
   int epochs = 30;                 ///< at full resolution
   int coarse_epochs = 0;           ///< before them, with fewer pixels and vertices; 0: none
-  int coarse_bin = 2;              ///< how many times fewer on each axis, at most; a power of two
-  int coarse_stages = 1;           ///< each of half the pixel of the one before
+  int coarse_bin = 4;              ///< how many times fewer on each axis, at most; a power of two
   int subsets = 16;                ///< interleaved tilt subsets: steps an epoch; at most one a view
   std::string engine = "slab";     ///< or ray: any view geometry, views as they were recorded
   int ray_samples = 0;             ///< N_max of eq. 10; 0: one a pixel of a leaf's diagonal
@@ -57,6 +56,18 @@ struct FitOptions {
   int patience = 0;  ///< epochs without a better held-out error before it stops; 0: never
   std::vector<std::string> faults() const;
 };
+
+/// Side of a leaf, by the kind of field: plain vertices express as much in larger leaves, which
+/// have fewer faces and can be fitted with coarser pixels first.
+inline int usual_leaf_size(const FieldOptions& field) {
+  return field.kind == "grid" && field.tree == "uniform" ? 64 : 32;
+}
+
+/// Levels from a root cell down to a leaf. A root cell is also a band of rows, which one thread
+/// works at, and a leaf of the margin: large leaves of a uniform tree are root cells themselves.
+inline int usual_depth(const FieldOptions& field) {
+  return field.tree == "uniform" && field.leaf_size >= 64 ? 0 : 1;
+}
 
 /// The weight of the density's variation that goes with a penalty: a concave one counts
 /// large steps less, and so needs more (docs/results/ablation.md).

@@ -71,7 +71,6 @@ json fit_json(const FitOptions& o) {
   return {{"epochs", o.epochs},
           {"coarse_epochs", o.coarse_epochs},
           {"coarse_bin", o.coarse_bin},
-          {"coarse_stages", o.coarse_stages},
           {"subsets", o.subsets},
           {"engine", o.engine},
           {"ray_samples", o.ray_samples},

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <vector>
 
 #include "base/lanes.h"
@@ -101,11 +102,13 @@ std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, co
   const SlabViews::Shape own_shape = own_part(plan.rays_shape(), domain, processes);
   const int slabs_in_use = kSlabsOfThread * base::thread_count();
   const std::size_t rays = SlabViews::resident_memory(own_shape, slabs_in_use);
-  const int coarse_bin = make_stages(options.field, options.fit).front().bin;
+  const std::vector<Stage> stages = make_stages(options.field, options.fit);
+  // The last coarse stage has the most of them.
   const std::size_t coarse_rays =
-      coarse_bin == 1 ? 0
-                      : SlabViews::resident_memory(SlabViews::binned_shape(own_shape, coarse_bin),
-                                                   slabs_in_use);
+      stages.size() == 1
+          ? 0
+          : SlabViews::resident_memory(
+                SlabViews::binned_shape(own_shape, std::prev(stages.end(), 2)->bin), slabs_in_use);
   const int steps = steps_an_epoch(plan, options.fit);
   const int views_a_step = plan.ray_geometry ? 0 : (run.num_views + steps - 1) / steps;
   const std::size_t fitting = parameters + static_cast<std::size_t>(base::thread_count()) *

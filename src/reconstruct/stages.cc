@@ -8,14 +8,16 @@
 namespace tomofield::reconstruct {
 namespace {
 
-// The largest power of two up to coarse_bin at which no slab straddles two leaves.
-int coarse_bin(const FieldOptions& field, const FitOptions& fit) {
-  if (fit.coarse_epochs == 0 || fit.engine != "slab") return 1;
+// Powers of two up to coarse_bin at which no slab straddles two leaves, at most one an epoch.
+std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
+  std::vector<int> bins;
+  if (fit.engine != "slab") return bins;
   const bool may_halve = field.tree == "adaptive" && field.leaf_size % (2 * base::kLanes) == 0;
   const int smallest_leaf = may_halve ? field.leaf_size / 2 : field.leaf_size;
-  int bin = 1;
-  while (2 * bin <= fit.coarse_bin && smallest_leaf % (2 * bin * base::kLanes) == 0) bin *= 2;
-  return bin;
+  for (int bin = 2; bin <= fit.coarse_bin && smallest_leaf % (bin * base::kLanes) == 0; bin *= 2) {
+    if (std::ssize(bins) < fit.coarse_epochs) bins.push_back(bin);
+  }
+  return bins;
 }
 
 }  // namespace
@@ -28,22 +30,20 @@ int Schedule::coarse_epochs_of(int fine) const {
 Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit) {
   Schedule schedule{30, 0.05};
   if (field.kind == "grid") schedule = {10, 0.035};
-  const int bin = coarse_bin(field, fit);
-  if (bin > 1 && field.finest_spacing() >= bin) schedule.epochs = 5;
+  const std::vector<int> bins = coarse_bins(field, fit);
+  if (!bins.empty() && field.finest_spacing() >= bins.front()) schedule.epochs = 5;
   return schedule;
 }
 
 std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit) {
-  std::vector<int> bins;
-  for (int bin = coarse_bin(field, fit); bin > 1 && std::ssize(bins) < fit.coarse_stages; bin /= 2)
-    bins.push_back(bin);
+  const std::vector<int> bins = coarse_bins(field, fit);
   std::vector<Stage> stages;
   std::int64_t first_epoch = 0;
   double first_rate = fit.learning_rate;
-  for (int left = static_cast<int>(bins.size()); left > 0; --left) {
-    const int epochs = static_cast<int>((fit.coarse_epochs - first_epoch) / left);
-    stages.push_back({bins[bins.size() - static_cast<std::size_t>(left)], first_epoch, epochs,
-                      first_rate, fit.learning_rate * fit.coarse_final_rate});
+  for (std::size_t left = bins.size(); left > 0; --left) {
+    const int epochs = static_cast<int>((fit.coarse_epochs - first_epoch) / static_cast<int>(left));
+    stages.push_back({bins[left - 1], first_epoch, epochs, first_rate,
+                      fit.learning_rate * fit.coarse_final_rate});
     first_epoch += epochs;
     first_rate = fit.learning_rate * fit.refined_rate;
   }

@@ -31,8 +31,9 @@ struct Schedule {
 /// `fit` only what says whether there is a coarse stage counts.
 Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit);
 
-/// Coarse stages, which share the coarse epochs, unless they are off or leaves are too small for
-/// slabs of coarse pixels, and the fine one. The ray engine has none but that.
+/// Coarse stages, each of half the pixel of the one before, which share the coarse epochs, unless
+/// they are off or leaves are too small for slabs of coarse pixels, and the fine one. The ray engine
+/// has none but that.
 std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit);
 
 }  // namespace tomofield::reconstruct

@@ -54,7 +54,6 @@ TEST(Stages, SeveralCoarseOnesShareTheirEpochs) {
   FitOptions fit;
   fit.coarse_epochs = 8;
   fit.coarse_bin = 8;
-  fit.coarse_stages = 3;
   fit.epochs = 5;
   const auto stages = make_stages(field, fit);
   ASSERT_EQ(stages.size(), 4u);
@@ -68,6 +67,18 @@ TEST(Stages, SeveralCoarseOnesShareTheirEpochs) {
   }
   fit.coarse_bin = 2;
   EXPECT_EQ(make_stages(field, fit).size(), 2u);
+}
+
+TEST(Stages, NoneIsWithoutEpochs) {
+  FieldOptions field;
+  field.leaf_size = 128;
+  FitOptions fit;
+  fit.coarse_epochs = 1;
+  fit.coarse_bin = 8;
+  const auto stages = make_stages(field, fit);
+  ASSERT_EQ(stages.size(), 2u);
+  EXPECT_EQ(stages[0].bin, 2);
+  EXPECT_EQ(stages[0].epochs, 1);
 }
 
 Schedule usual(const std::string& kind, double spacing, int coarse_epochs = 1,

@@ -37,7 +37,7 @@ def test_plan_and_figures_count_both_stages():
     with open(whole.json_path) as file:
         document = json.load(file)
     assert document["options"]["fit"]["coarse_epochs"] == COARSE
-    assert document["options"]["fit"]["coarse_bin"] == 2
+    assert document["options"]["fit"]["coarse_bin"] == 4
     assert document["figures"]["steps"] == (COARSE + FINE) * SUBSETS
     assert len(document["figures"]["mean_squared_residual_per_noise_variance"]) == COARSE + FINE
 
