@@ -167,8 +167,9 @@ def default_epochs(command):
         return quality_rows.dry_run([*command, *options])["steps"]
 
     an_epoch = steps("--epochs", "1", "--coarse-epochs", "0")
-    full = steps("--coarse-epochs", "1") // an_epoch - 1
-    return full, steps() // an_epoch - full
+    usual, after_one = steps() // an_epoch, steps("--coarse-epochs", "1") // an_epoch
+    full = after_one if after_one == usual else after_one - 1  # no coarse stage, whatever is asked
+    return full, usual - full
 
 
 def measure_wide(options, wide, name, scratch):

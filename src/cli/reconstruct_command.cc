@@ -73,13 +73,13 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       .add_option(
           "--epochs", arguments.epochs,
           "passes over all views at full resolution; default: 30, 10 of a grid, 5 of vertices "
-          "as far apart as coarse pixels")
+          "2 pixels apart or further (4 of an adaptive tree)")
       ->group(group);
   command
       .add_option(
           "--coarse-epochs", arguments.coarse_epochs,
-          "passes before them over binned views, with fewer vertices; 0: none; default: 80, or as "
-          "many times fewer as --epochs are than usual")
+          "passes before them over binned views; 0: none; default: 80, or as many times fewer as "
+          "--epochs are than usual")
       ->group(group);
   command
       .add_option("--coarse-bin", fit.coarse_bin,

@@ -1,6 +1,6 @@
 #include "cli/run_reconstruction.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <cstdio>
 #include <filesystem>
@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/parallel.h"
 #include "base/stopwatch.h"
@@ -41,6 +42,16 @@ std::function<void()> tell_if_stuck(const std::filesystem::path& model,
   };
 }
 
+std::string epochs_text(const std::vector<reconstruct::Stage>& stages) {
+  std::vector<std::string> texts;
+  for (const reconstruct::Stage& stage : stages) {
+    texts.push_back(stage.bin == 1
+                        ? fmt::format("{} at full resolution", stage.epochs)
+                        : fmt::format("{} of pixels {} x {}", stage.epochs, stage.bin, stage.bin));
+  }
+  return fmt::format("{}", fmt::join(texts, ", "));
+}
+
 void print_plan(const reconstruct::ReconstructOptions& options, const reconstruct::RunPlan& plan,
                 int num_processes) {
   print_sizes({plan.num_views, plan.view_width, plan.view_height, plan.pixel_size_A, plan.roi,
@@ -55,6 +66,7 @@ void print_plan(const reconstruct::ReconstructOptions& options, const reconstruc
       options.field.kind, plan.num_leaves, plan.num_leaves == 1 ? "leaf" : "leaves",
       plan.num_parameters, plan.num_steps, base::thread_count(), processes,
       static_cast<double>(plan.memory_bytes) / (1 << 30), num_processes == 1 ? "" : " each");
+  fmt::print("epochs: {}\n", epochs_text(plan.stages));
   std::fflush(stdout);  // before what comes of the run, in a file too
 }
 

@@ -103,6 +103,7 @@ std::string name_of(const std::string& entry) {
                                                          {"fit patience", "--early-stop"},
                                                          {"field kind", "--field"},
                                                          {"field with_margin", "--no-margin"},
+                                                         {"field depth", "--leaf-size"},
                                                          {"specimen axis_x", "--center"},
                                                          {"specimen axis_z", "--center"},
                                                          {"bin_factor", "--bin"}};

@@ -25,6 +25,11 @@ constexpr double kBiasRate = 0.02;
 constexpr std::uint64_t kOrderStream = 1000;
 constexpr std::uint64_t kDirectionStream = std::uint64_t{1} << 40;
 
+double variation_gain_of(const FitOptions& options, const Measurement& measurement) {
+  if (options.penalty != "concave") return 1.0;
+  return gain_of_little_noise(typical_noise(measurement.noise_sigma), measurement.contrast());
+}
+
 // The residuals are in units of the noise, so a prior that were the same for
 // every series would have one weight there. Total variation is not such a
 // prior: what it must suppress is noise, and its best weight grows with the
@@ -33,11 +38,9 @@ constexpr std::uint64_t kDirectionStream = std::uint64_t{1} << 40;
 // stage's pixels.
 ObjectiveWeights objective_weights(const FitOptions& options, const Measurement& measurement,
                                    double noise) {
-  const bool is_concave = options.penalty == "concave";
-  const double gain = is_concave ? gain_of_little_noise(typical_noise(measurement.noise_sigma),
-                                                        measurement.contrast())
-                                 : 1.0;
-  const double tau = is_concave ? concavity(options.concavity, measurement.noise_sigma) : 0.0;
+  const double gain = variation_gain_of(options, measurement);
+  const double tau =
+      options.penalty == "concave" ? concavity(options.concavity, measurement.noise_sigma) : 0.0;
   ObjectiveWeights weights;
   weights.density_variation = gain * options.density_variation / noise;
   weights.factor_variation = options.factor_variation / noise;
@@ -95,7 +98,7 @@ std::vector<int> leaves_to_keep(const distributed::Communicator& processes,
   return processes.size() == 1 ? std::vector<int>{} : needed_leaves(tree, bands);
 }
 
-// The structure is open for the coarse stage, or for this part of the only one.
+// The structure is open for the first stage, or for this part of the only one.
 constexpr double kOpenPart = 0.4;
 
 TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
@@ -127,7 +130,7 @@ Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())) {
   if (options_.coarse_epochs > 0 && stages_.size() == 1 && options_.engine == "slab")
     base::log_info(
-        "no coarse stage: leaves are too small (--leaf-size) for slabs of coarse pixels");
+        "no coarse stage: leaves of this --leaf-size do not end with slabs of coarse pixels");
   enter_stage();
   if (stage().bin > 1) resample_field();
   for (const double sigma : binned_->noise_sigma)
@@ -156,6 +159,8 @@ void Fit::resample_field() {
   const field::Quadtree& tree = field_->tree();
   for (int leaf = 0; leaf < tree.num_leaves(); ++leaf)
     shapes.push_back(domain_.shape_in(tree.leaf(leaf).region, stage().bin));
+  gradient_.reset(0);  // and the moments go before the other field needs memory
+  optimizer_.state() = {};
   field_ = field_->resampled(std::move(shapes));
   optimizer_ = optimize::Adam(*field_, optimize::AdamOptions{});
 }
@@ -210,6 +215,8 @@ void Fit::go_on_from(Progress progress, std::unique_ptr<field::Field> field) {
   optimizer_ = optimize::Adam(*field_, optimize::AdamOptions{});
   follow_tree();
 }
+
+double Fit::variation_gain() const { return variation_gain_of(options_, measurement_); }
 
 int Fit::steps_per_epoch() const {
   return ray_term_ ? ray_term_->steps_per_epoch() : options_.subsets;

@@ -62,6 +62,8 @@ class Fit {
   int steps_per_epoch() const;
   std::int64_t num_epochs() const;  ///< of all stages
   const std::vector<Stage>& stages() const { return stages_; }
+  /// By how much the density's variation weighs more than its weight over the noise.
+  double variation_gain() const;
   /// Of the first `steps` steps, in steps at full resolution: a coarse one costs 1 / bin³.
   double work(std::int64_t steps) const;
   const field::Field& field() const { return *field_; }

@@ -11,7 +11,7 @@ struct FieldOptions {
   std::string kind = "vm";       ///< vm or grid
   int leaf_size = 32;            ///< side of a leaf, a multiple of 16
   std::string tree = "uniform";  ///< or adaptive: leaves half and twice as wide where that pays
-  int depth = 1;                 ///< of a uniform tree's leaves; those of the margin have 0
+  int depth = 1;                 ///< of leaves as they are first; those of the margin have 0
   int leaf_budget = 0;  ///< most leaves of an adaptive tree; 0: as many as the uniform one has
   double vertex_spacing = 1.0;  ///< between vertices, all axes; of leaves of that size
   int rank = 24;                ///< of each mode, vm only
@@ -29,10 +29,11 @@ struct FieldOptions {
 
 /// The optimisation. The data term is ½ Σ (residual / σ)²; weights of
 /// variations are relative to it and to the noise: weight / σ is used, with σ
-/// the typical noise of a ray in density units times pixels.
+/// the typical noise of a ray in density units times pixels (and a gain where σ is small,
+/// noise_scale.h).
 struct FitOptions {
   int epochs = 30;                 ///< at full resolution
-  int coarse_epochs = 0;           ///< before them, with fewer pixels and vertices; 0: none
+  int coarse_epochs = 0;           ///< before them, with fewer pixels; 0: none
   int coarse_bin = 4;              ///< how many times fewer on each axis, at most; a power of two
   int subsets = 16;                ///< interleaved tilt subsets: steps an epoch; at most one a view
   std::string engine = "slab";     ///< or ray: any view geometry, views as they were recorded
@@ -40,8 +41,8 @@ struct FitOptions {
   std::int64_t rays_per_step = 0;  ///< about; 0: all rays of an epoch over `subsets`
   double learning_rate = 0.05;     ///< falls exponentially to learning_rate · final_rate
   double final_rate = 0.1;
-  double coarse_final_rate = 0.3;   ///< of the coarse stage
-  double refined_rate = 0.5;        ///< where the fine stage starts after a coarse one
+  double coarse_final_rate = 0.3;   ///< of a coarse stage
+  double refined_rate = 0.5;        ///< where a stage starts after a coarse one
   double density_variation = 14.0;  ///< see usual_variation
   double factor_variation = 0.0;
   double boundary = 4.0;              ///< boundary consistency of leaves (eq. 6)
@@ -57,8 +58,8 @@ struct FitOptions {
   std::vector<std::string> faults() const;
 };
 
-/// Side of a leaf, by the kind of field: plain vertices express as much in larger leaves, which
-/// have fewer faces and can be fitted with coarser pixels first.
+/// Side of a leaf, by the kind of field and its tree: plain vertices express as much in larger
+/// leaves, which have fewer faces and can be fitted with coarser pixels first.
 inline int usual_leaf_size(const FieldOptions& field) {
   return field.kind == "grid" && field.tree == "uniform" ? 64 : 32;
 }

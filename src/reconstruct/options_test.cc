@@ -53,6 +53,19 @@ TEST(ReconstructOptions, EveryFaultIsNamedAtOnce) {
     EXPECT_NE(message.find(word), std::string::npos) << word << " in " << message;
 }
 
+TEST(ReconstructOptions, LargeLeavesOfAUniformTreeAreRootCells) {
+  FieldOptions field;
+  EXPECT_EQ(usual_leaf_size(field), field.leaf_size);
+  EXPECT_EQ(usual_depth(field), field.depth);
+  field.kind = "grid";
+  field.leaf_size = usual_leaf_size(field);
+  EXPECT_GT(field.leaf_size, FieldOptions{}.leaf_size);
+  EXPECT_EQ(usual_depth(field), 0);
+  field.tree = "adaptive";  // whose leaves may become twice as wide
+  EXPECT_EQ(usual_leaf_size(field), FieldOptions{}.leaf_size);
+  EXPECT_EQ(usual_depth(field), 1);
+}
+
 TEST(ReconstructOptions, ABudgetIsForAdaptiveTrees) {
   FieldOptions options;
   options.leaf_budget = 12;

@@ -102,13 +102,13 @@ std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, co
   const SlabViews::Shape own_shape = own_part(plan.rays_shape(), domain, processes);
   const int slabs_in_use = kSlabsOfThread * base::thread_count();
   const std::size_t rays = SlabViews::resident_memory(own_shape, slabs_in_use);
-  const std::vector<Stage> stages = make_stages(options.field, options.fit);
   // The last coarse stage has the most of them.
   const std::size_t coarse_rays =
-      stages.size() == 1
+      run.stages.size() == 1
           ? 0
           : SlabViews::resident_memory(
-                SlabViews::binned_shape(own_shape, std::prev(stages.end(), 2)->bin), slabs_in_use);
+                SlabViews::binned_shape(own_shape, std::prev(run.stages.end(), 2)->bin),
+                slabs_in_use);
   const int steps = steps_an_epoch(plan, options.fit);
   const int views_a_step = plan.ray_geometry ? 0 : (run.num_views + steps - 1) / steps;
   const std::size_t fitting = parameters + static_cast<std::size_t>(base::thread_count()) *
@@ -138,7 +138,8 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.thickness = plan.geometry.thickness;
   run.num_leaves = domain.tree.num_leaves();
   run.num_parameters = most_parameters(domain, options.field);
-  const Stage last = make_stages(options.field, options.fit).back();
+  run.stages = make_stages(options.field, options.fit);
+  const Stage& last = run.stages.back();
   run.num_trials = options.num_trials(num_fitted_views(plan, options.fit));
   if (run.num_trials > 0)  // throws if there are too few
     trial_views(plan.geometry.tilt_deg,

@@ -3,10 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <vector>
 
 #include "base/progress.h"
 #include "distributed/communicator.h"
 #include "reconstruct/run_options.h"
+#include "reconstruct/stages.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::reconstruct {
@@ -43,7 +45,8 @@ struct RunPlan {
   int num_leaves = 0;
   std::size_t num_parameters = 0;
   int num_trials = 0;  ///< short fits before it, about, that choose settings
-  std::int64_t num_steps = 0;
+  std::vector<Stage> stages;
+  std::int64_t num_steps = 0;    ///< of all of them
   std::size_t memory_bytes = 0;  ///< estimated peak, of each process
 };
 

@@ -50,6 +50,7 @@ nlohmann::json figures_json(const Fit& fit, const PreparedSeries& series, double
           {"steps", progress.step},
           {"mean_squared_residual_per_noise_variance", progress.data_loss},
           {"density_unit", series.unit},
+          {"tv_gain", fit.variation_gain()},
           {"pixel_size_A", series.pixel_size_A},
           {"size_px", {series.roi.width(), series.roi.height(), series.geometry.thickness}},
           {"stages", stages_json(fit.stages())},

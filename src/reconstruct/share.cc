@@ -31,8 +31,8 @@ Range own_bands(std::int64_t num_rows, std::int64_t band_rows,
     work.push_back(static_cast<double>(std::min(band_rows, num_rows - row)));
   if (std::ssize(work) < processes.size()) {
     throw Error(fmt::format(
-        "{} processes cannot share {} rows of root cells ({} rows of pixels each, twice "
-        "--leaf-size): start at most {}, or give a smaller --leaf-size",
+        "{} processes cannot share {} rows of root cells ({} rows of pixels each): start at most "
+        "{}, or give --leaf-size 16, whose root cells have 32 rows",
         processes.size(), work.size(), band_rows, work.size()));
   }
   return distributed::part_of(work, processes.rank(), processes.size());

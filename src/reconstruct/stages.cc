@@ -8,13 +8,16 @@
 namespace tomofield::reconstruct {
 namespace {
 
-// Powers of two up to coarse_bin at which no slab straddles two leaves, at most one an epoch.
+// Powers of two up to coarse_bin at which no slab straddles two leaves, at most one an epoch. An
+// adaptive tree has one: its structure is open in the first stage, where that should see most.
 std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
   std::vector<int> bins;
   if (fit.engine != "slab") return bins;
-  const bool may_halve = field.tree == "adaptive" && field.leaf_size % (2 * base::kLanes) == 0;
+  const bool is_adaptive = field.tree == "adaptive";
+  const bool may_halve = is_adaptive && field.leaf_size % (2 * base::kLanes) == 0;
   const int smallest_leaf = may_halve ? field.leaf_size / 2 : field.leaf_size;
-  for (int bin = 2; bin <= fit.coarse_bin && smallest_leaf % (bin * base::kLanes) == 0; bin *= 2) {
+  const int most = is_adaptive ? std::min(fit.coarse_bin, 2) : fit.coarse_bin;
+  for (int bin = 2; bin <= most && smallest_leaf % (bin * base::kLanes) == 0; bin *= 2) {
     if (std::ssize(bins) < fit.coarse_epochs) bins.push_back(bin);
   }
   return bins;
@@ -23,8 +26,9 @@ std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
 }  // namespace
 
 int Schedule::coarse_epochs_of(int fine) const {
-  constexpr double kCoarseEpochs = 80;  // before the usual ones
-  return static_cast<int>(std::clamp(std::round(kCoarseEpochs / epochs * fine), 0.0, 1e9));
+  constexpr double kCoarseEpochs = 80;
+  const double part = std::clamp(static_cast<double>(fine) / epochs, 0.0, 1.0);
+  return static_cast<int>(std::round(kCoarseEpochs * part));
 }
 
 Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit) {

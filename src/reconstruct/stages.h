@@ -7,8 +7,8 @@
 
 namespace tomofield::reconstruct {
 
-/// One resolution of a fit (DESIGN §5): projections of pixels `bin` times as wide, a
-/// field of vertices as far apart. The last stage has bin 1.
+/// One resolution of a fit (DESIGN §5): projections of pixels `bin` times as wide, and
+/// as many of the field's vertices as they resolve (Domain::shape_in). The last stage has bin 1.
 struct Stage {
   int bin = 1;
   std::int64_t first_epoch = 0;
@@ -21,18 +21,18 @@ struct Schedule {
   int epochs;            ///< at full resolution
   double learning_rate;  ///< of the first step
 
-  /// Coarse epochs that go with so many fine ones: the same share of the usual ones.
+  /// Coarse epochs that go with so many fine ones: the same share of the usual ones, at most all.
   int coarse_epochs_of(int fine) const;
 };
 
 /// Plain vertices converge in a third of the epochs that factors need, and in smaller steps. Where
-/// vertices are as far apart as coarse pixels or further, the coarse stage learns all that the
-/// field can express, and full resolution has little left to do (docs/results/ablation.md). Of
-/// `fit` only what says whether there is a coarse stage counts.
+/// vertices are as far apart as the pixels of the last coarse stage, it learns all that the field
+/// can express, and full resolution has little left to do (docs/results/ablation.md). Of `fit` only
+/// what says whether there is a coarse stage counts.
 Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit);
 
 /// Coarse stages, each of half the pixel of the one before, which share the coarse epochs, unless
-/// they are off or leaves are too small for slabs of coarse pixels, and the fine one. The ray engine
+/// they are off or leaves do not end with slabs of coarse pixels, and the fine one. The ray engine
 /// has none but that.
 std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit);
 

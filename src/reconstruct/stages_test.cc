@@ -27,6 +27,7 @@ TEST(Stages, NoSlabOfCoarsePixelsStraddlesLeaves) {
   EXPECT_EQ(coarsest_bin(48, "uniform", 8), 1);
   EXPECT_EQ(coarsest_bin(16, "uniform", 8), 1);
   EXPECT_EQ(coarsest_bin(64, "adaptive", 8), 2);  // a leaf may become one of 32 px
+  EXPECT_EQ(coarsest_bin(256, "adaptive", 8), 2);
   EXPECT_EQ(coarsest_bin(32, "adaptive", 8), 1);
   EXPECT_EQ(coarsest_bin(128, "uniform", 8, "ray"), 1);
 }
@@ -103,7 +104,9 @@ TEST(Stages, FullResolutionIsShortIfTheCoarseOneHasAllVertices) {
   EXPECT_LT(usual("vm", 4.0, 1, "adaptive").epochs, usual("vm", 1.0).epochs);
   EXPECT_LT(usual("grid", 1.0).epochs, usual("vm", 1.0).epochs);
   EXPECT_EQ(usual("vm", 1.0).coarse_epochs_of(30), 80);
+  EXPECT_EQ(usual("vm", 1.0).coarse_epochs_of(15), 40);
   EXPECT_EQ(usual("vm", 2.0).coarse_epochs_of(5), 80);
+  EXPECT_EQ(usual("vm", 2.0).coarse_epochs_of(30), 80);
 }
 
 }  // namespace

@@ -34,10 +34,11 @@ harness.succeed(*command(whole))
 def test_plan_and_figures_count_both_stages():
     plan = harness.succeed(*command(fresh_results("plan"), "--dry-run")).stdout
     assert f"{(COARSE + FINE) * SUBSETS} steps" in plan, plan
+    assert f"epochs: {COARSE} of pixels 2 x 2, {FINE} at full resolution\n" in plan, plan
     with open(whole.json_path) as file:
         document = json.load(file)
     assert document["options"]["fit"]["coarse_epochs"] == COARSE
-    assert document["options"]["fit"]["coarse_bin"] == 4
+    assert [stage["bin"] for stage in document["figures"]["stages"]] == [2, 1]
     assert document["figures"]["steps"] == (COARSE + FINE) * SUBSETS
     assert len(document["figures"]["mean_squared_residual_per_noise_variance"]) == COARSE + FINE
 
@@ -62,17 +63,41 @@ def test_faulty_options_are_refused():
         assert result.returncode == 2 and option in result.stderr, result
 
 
-def test_runs_stopped_in_either_stage_end_alike():
-    results = fresh_results("resumed")
-    parameters = set()
+def vertices_when_stopped(results, *options):
+    """Of a leaf's side, as often as a run was stopped and resumed until it was done."""
+    vertices = set()
 
     def remember_stage():
         with h5py.File(results.model_path) as model:
-            parameters.add(int(model["field/leaves/nx"][0]))
+            vertices.add(int(model["field/leaves/nx"][0]))
 
-    harness.finish_with_stops(command(results, "--resume", "--threads", 1), remember_stage, most=60)
-    assert 17 in parameters, f"no run was caught in the coarse stage: {parameters}"
+    harness.finish_with_stops(command(results, "--resume", "--threads", 1, *options),
+                              remember_stage, most=60)
+    return vertices
+
+
+def test_runs_stopped_in_either_stage_end_alike():
+    results = fresh_results("resumed")
+    vertices = vertices_when_stopped(results)
+    assert 17 in vertices, f"no run was caught in the coarse stage: {vertices}"
     assert results.same_as(whole)
+
+
+def test_leaves_of_a_grid_are_fitted_at_a_quarter_of_the_width_first():
+    grid = ["--field", "grid", "--coarse-epochs", 2 * COARSE]
+    options = [word for word in harness.merge(OPTIONS, grid) if word not in ("--leaf-size", 32)]
+    undisturbed = fresh_results("grid")
+    harness.succeed("reconstruct", *series.input, "-o", undisturbed.volume_path, *options)
+    with open(undisturbed.json_path) as file:
+        document = json.load(file)
+    assert document["options"]["field"]["leaf_size"] == 64
+    assert document["options"]["field"]["depth"] == 0
+    assert [(stage["bin"], stage["epochs"]) for stage in document["figures"]["stages"]] \
+        == [(4, COARSE), (2, COARSE), (1, FINE)]
+    results = fresh_results("grid_resumed")
+    vertices = vertices_when_stopped(results, *grid, "--leaf-size", 64)
+    assert vertices & {17, 33}, f"no run was caught in a coarse stage: {vertices}"
+    assert results.same_as(undisturbed)
 
 
 harness.run_tests(globals())

@@ -82,7 +82,7 @@ def figures(results):
 # not just the values.
 def test_results_have_the_bytes_of_one_process():
     cases = {"vm": ([], (1, 2, 4)),
-             "coarse": (["--field", "grid", "--leaf-size", 32, "--coarse-epochs", 3,
+             "coarse": (["--field", "grid", "--leaf-size", 64, "--coarse-epochs", 4,
                          "--tv-penalty", "auto", "--mode", 1], (2,)),
              "margin": (["--contrast", "dark", "--hold-out", 5, "--axes", "xzy", "--mode", 12],
                         (3,))}
