@@ -46,7 +46,7 @@ void add_field_options(CLI::App& command, Arguments& arguments) {
       ->group(group);
   command
       .add_option("--leaf-budget", field.leaf_budget,
-                  "most leaves of an adaptive tree; 0: as many as a uniform one has")
+                  "most leaves of an adaptive tree; 0: as many as it begins with")
       ->capture_default_str()
       ->group(group);
   command

@@ -12,7 +12,7 @@ struct FieldOptions {
   int leaf_size = 32;            ///< side of a leaf, a multiple of 16
   std::string tree = "uniform";  ///< or adaptive: leaves half and twice as wide where that pays
   int depth = 1;                 ///< of leaves as they are first; those of the margin have 0
-  int leaf_budget = 0;  ///< most leaves of an adaptive tree; 0: as many as the uniform one has
+  int leaf_budget = 0;  ///< most leaves of an adaptive tree; 0: as many as it begins with
   double vertex_spacing = 1.0;  ///< between vertices, all axes; of leaves of that size
   int rank = 24;                ///< of each mode, vm only
   bool with_margin = true;      ///< model what rays cross outside the region of interest
