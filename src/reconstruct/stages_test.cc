@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 namespace tomofield::reconstruct {
 namespace {
@@ -49,14 +50,19 @@ TEST(Stages, FollowOneAnother) {
   EXPECT_EQ(make_stages({}, fit)[0].first_rate, fit.learning_rate);
 }
 
-TEST(Stages, SeveralCoarseOnesShareTheirEpochs) {
+// Of leaves that three coarse stages suit.
+std::vector<Stage> stages_of_large_leaves(int coarse_epochs, int coarse_bin) {
   FieldOptions field;
   field.leaf_size = 128;
   FitOptions fit;
-  fit.coarse_epochs = 8;
-  fit.coarse_bin = 8;
+  fit.coarse_epochs = coarse_epochs;
+  fit.coarse_bin = coarse_bin;
   fit.epochs = 5;
-  const auto stages = make_stages(field, fit);
+  return make_stages(field, fit);
+}
+
+TEST(Stages, SeveralCoarseOnesShareTheirEpochs) {
+  const auto stages = stages_of_large_leaves(8, 8);
   ASSERT_EQ(stages.size(), 4u);
   std::int64_t first_epoch = 0;
   for (std::size_t s = 0; s < 4; ++s) {
@@ -66,17 +72,11 @@ TEST(Stages, SeveralCoarseOnesShareTheirEpochs) {
     EXPECT_LT(stages[s].last_rate, stages[s].first_rate);
     first_epoch += stages[s].epochs;
   }
-  fit.coarse_bin = 2;
-  EXPECT_EQ(make_stages(field, fit).size(), 2u);
+  EXPECT_EQ(stages_of_large_leaves(8, 2).size(), 2u);
 }
 
 TEST(Stages, NoneIsWithoutEpochs) {
-  FieldOptions field;
-  field.leaf_size = 128;
-  FitOptions fit;
-  fit.coarse_epochs = 1;
-  fit.coarse_bin = 8;
-  const auto stages = make_stages(field, fit);
+  const auto stages = stages_of_large_leaves(1, 8);
   ASSERT_EQ(stages.size(), 2u);
   EXPECT_EQ(stages[0].bin, 2);
   EXPECT_EQ(stages[0].epochs, 1);

@@ -82,8 +82,9 @@ def figures(results):
 # not just the values.
 def test_results_have_the_bytes_of_one_process():
     cases = {"vm": ([], (1, 2, 4)),
-             "coarse": (["--field", "grid", "--leaf-size", 64, "--coarse-epochs", 4,
+             "coarse": (["--field", "grid", "--leaf-size", 32, "--coarse-epochs", 3,
                          "--tv-penalty", "auto", "--mode", 1], (2,)),
+             "coarser": (["--field", "grid", "--leaf-size", 64, "--coarse-epochs", 4], (2,)),
              "margin": (["--contrast", "dark", "--hold-out", 5, "--axes", "xzy", "--mode", 12],
                         (3,))}
     for name, (options, numbers) in cases.items():
