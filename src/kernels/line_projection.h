@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <span>
+#include <vector>
 
 namespace tomofield::kernels {
 
@@ -28,6 +31,37 @@ struct LineCrossing {
   float weight = 0;
 };
 
+/// Up to four crossings side by side, numbers by kind, arranged once for all tiles in which they
+/// are used: lines that one view sees, or views that see one line.
+struct CrossingGroup {
+  static constexpr int kMost = 4;
+  template <typename T>
+  using Numbers = std::array<T, kMost>;
+  struct Range {
+    int first = 0, end = 0;
+    bool contains(int from, int to) const { return from >= first && to <= end; }
+    bool overlaps(int from, int to) const { return from < end && to > first; }
+  };
+
+  alignas(16) Numbers<float> offset, step, low, high, first_pixel, last_pixel, weight;
+  /// Of views, for sample j: the pair of pixels floor(inverse · j + bias) + skipped, and the next.
+  /// One pair reaches a sample if |step| >= 1, else more, which are crossings of their own.
+  alignas(16) Numbers<float> inverse, bias, skipped;
+  /// Sample 0 or pixel 0, in floats from where all sources are counted from.
+  alignas(16) Numbers<int> origin;
+  /// Pixels (lines) or samples (views) for which no crossing of the group has to be tested for
+  /// its ends, and those outside of which none weighs anything.
+  Range whole, reached;
+};
+
+/// Appends `lines` of one view to groups. Samples are counted from `source`.
+void group_lines(std::span<const LineCrossing> lines, const float* source,
+                 std::vector<CrossingGroup>& groups);
+
+/// Appends views of one line. Pixels are counted from `source`.
+void group_views(std::span<const LineCrossing> views, const float* source,
+                 std::vector<CrossingGroup>& groups);
+
 /// Slabs that are treated together, one or two: they are crossed alike, so what a crossing's
 /// indices and weights cost is paid once. Those of the second lie so many floats after the first's.
 struct Slabs {
@@ -36,17 +70,19 @@ struct Slabs {
 };
 
 /// detector[u, lane] += Σ_lines weight Σ_j hat(position(u) − j) samples_j[lane],
-/// for pixels [first, end). All lines belong to one view: same detector, same step.
-/// `stride` is the distance between samples in floats; the samples of all lines lie within 2³¹.
+/// for pixels [first, end). All lines belong to one view: same detector, same step; their samples
+/// are counted from `samples` and `stride` floats apart, and all lie within 2³¹.
 /// Traffic a pixel and line: two cache lines of samples; the detector once for all lines.
-void project_lines(const LineCrossing* lines, int num_lines, std::ptrdiff_t stride, int first,
-                   int end, float* detector, const Slabs& slabs = {});
+void project_lines(const CrossingGroup* lines, int num_groups, const float* samples,
+                   std::ptrdiff_t stride, int first, int end, float* detector,
+                   const Slabs& slabs = {});
 
 /// The adjoint: samples[j, lane] += Σ_views weight Σ_u hat(position_view(u) − j) detector_view[u,
-/// lane] for samples j in [first, end), padding included. All crossings belong to one line; all
-/// detectors lie within 2³¹ floats. Traffic a sample and view: two cache lines of the detector
-/// (more for |step| < 1); the sample once for all views.
-void backproject_lines(const LineCrossing* views, int num_views, std::ptrdiff_t stride, int first,
-                       int end, float* samples, const Slabs& slabs = {});
+/// lane] for samples j in [first, end), padding included. All views see one line; their pixels
+/// are counted from `detector` and lie within 2³¹ floats. Traffic a sample and view: two cache
+/// lines of the detector (more for |step| < 1); the sample once for all views.
+void backproject_lines(const CrossingGroup* views, int num_groups, const float* detector,
+                       std::ptrdiff_t stride, int first, int end, float* samples,
+                       const Slabs& slabs = {});
 
 }  // namespace tomofield::kernels

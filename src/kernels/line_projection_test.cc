@@ -87,6 +87,23 @@ LineCrossing dyadic_crossing(const Case& c, int variant) {
 }
 constexpr int kVariants = 5;
 
+// Lines that lie in `source`, projected together.
+void project(const std::vector<LineCrossing>& lines, const float* source, std::ptrdiff_t stride,
+             int first, int end, float* detector) {
+  std::vector<CrossingGroup> groups;
+  group_lines(lines, source, groups);
+  project_lines(groups.data(), static_cast<int>(groups.size()), source, stride, first, end,
+                detector);
+}
+
+void backproject(const std::vector<LineCrossing>& views, const float* source, std::ptrdiff_t stride,
+                 int first, int end, float* samples) {
+  std::vector<CrossingGroup> groups;
+  group_views(views, source, groups);
+  backproject_lines(groups.data(), static_cast<int>(groups.size()), source, stride, first, end,
+                    samples);
+}
+
 void compare_projection(const Case& c, int num_lines, int first, int end) {
   Lines lines(num_lines, c.num_samples, c.is_column, 3);
   Detectors detector(1, c.num_pixels, 77);
@@ -99,7 +116,7 @@ void compare_projection(const Case& c, int num_lines, int first, int end) {
     reference::project_line(crossings[l], c.num_samples, lines.stride, first, end,
                             samples.data() + lines.origin(l), expected.data() + 1);
   }
-  project_lines(crossings.data(), num_lines, lines.stride, first, end, detector.pixel0(0));
+  project(crossings, lines.values.data(), lines.stride, first, end, detector.pixel0(0));
   expect_near(detector.values, expected, 4e-7 * (num_lines + 1));
 }
 
@@ -139,8 +156,7 @@ class Backprojection {
                                   detectors.data() + detectors_.origin(i),
                                   expected.data() + line_.origin(0));
     }
-    backproject_lines(crossings_.data(), static_cast<int>(crossings_.size()), line_.stride, first,
-                      end, line_.sample0(0));
+    backproject(crossings_, detectors_.values.data(), line_.stride, first, end, line_.sample0(0));
     expect_near(line_.values, expected, 2e-5);
   }
 
@@ -191,11 +207,11 @@ void check_adjoint(bool are_columns, int num_lines, int num_samples, int num_pix
       view.push_back(c);
       by_line[l].push_back(c);
     }
-    project_lines(view.data(), num_lines, image.stride, 0, num_pixels, projected.pixel0(v));
+    project(view, image.values.data(), image.stride, 0, num_pixels, projected.pixel0(v));
   }
   for (std::size_t l = 0; l < by_line.size(); ++l) {
-    backproject_lines(by_line[l].data(), num_views, image.stride, -1, num_samples + 1,
-                      gradient.sample0(l));
+    backproject(by_line[l], residual.values.data(), image.stride, -1, num_samples + 1,
+                gradient.sample0(l));
   }
   const double size = std::sqrt(testing::dot(projected.values, projected.values));
   EXPECT_GT(size, 0.0);

@@ -12,6 +12,7 @@
 namespace tomofield::projection {
 namespace {
 
+using kernels::CrossingGroup;
 using kernels::kLanes;
 using kernels::LineCrossing;
 using kernels::Slabs;
@@ -21,7 +22,7 @@ using Beam = SlabProjector::Beam;
 // Lines and views are treated in blocks, over tiles of samples, that fit in L1:
 // each sample or pixel then comes from further away once for several uses.
 constexpr int kLinesAtOnce = 8;
-constexpr int kViewsAtOnce = 8;
+constexpr int kGroupsAtOnce = 2;  // of views
 constexpr int kSamplesAtOnce = 32;
 
 Beam row_beam(const geometry::TiltGeometry& g, const SampleSegment& s, int view) {
@@ -179,30 +180,37 @@ void backproject_parts(const Crossing& c, std::ptrdiff_t stride, const Slabs& sl
   });
 }
 
-// The pixels that cross the middle of a block of lines within a tile of
-// samples; the first and last tile take all that lie beyond them.
-struct PixelRange {
-  int first, end;
-};
-
-PixelRange pixels_of_tile(const Beam& beam, const Family& family, double middle_line,
-                          int first_sample, int width) {
-  const auto pixel_at = [&](double sample) {
-    const double pixel = (sample - beam.offset - middle_line * beam.offset_per_line) / beam.step;
-    return static_cast<int>(std::clamp(pixel + 1.0, 0.0, static_cast<double>(width)));
+// The pixels that cross the middle of a block of lines within a tile of samples, of those that
+// cross the block at all; the first and last tile take all that lie beyond them.
+CrossingGroup::Range pixels_of_tile(const Beam& beam, const Family& family, double middle_line,
+                                    int tile, CrossingGroup::Range crossing) {
+  const double inverse = 1.0 / beam.step;
+  const bool falls = beam.step < 0;
+  const auto pixel_at = [&](int sample) {
+    const double pixel =
+        (sample - beam.offset - middle_line * beam.offset_per_line) * inverse + 1.0;
+    return static_cast<int>(std::clamp<double>(pixel, crossing.first, crossing.end));
   };
-  const double beyond = 2.0 + 0.5 * kLinesAtOnce * std::abs(beam.offset_per_line);
-  const int end_sample = first_sample + kSamplesAtOnce;
-  const int a = pixel_at(first_sample == 0 ? -beyond : first_sample);
-  const int b =
-      pixel_at(end_sample < family.num_samples ? end_sample : family.num_samples + beyond);
-  return {std::min(a, b), std::max(a, b)};
+  const int end = tile + kSamplesAtOnce;
+  const int low = tile > 0 ? pixel_at(tile) : falls ? crossing.end : crossing.first;
+  const int high = end < family.num_samples ? pixel_at(end) : falls ? crossing.first : crossing.end;
+  return {std::min(low, high), std::max(low, high)};
+}
+
+CrossingGroup::Range reached_by_any(std::span<const CrossingGroup> groups) {
+  CrossingGroup::Range all = groups.front().reached;
+  for (const CrossingGroup& g : groups) {
+    all.first = std::min(all.first, g.reached.first);
+    all.end = std::max(all.end, g.reached.end);
+  }
+  return all;
 }
 
 void project_family(const Family& family, const std::vector<Beam>& beams, int width,
                     const Slabs& slabs, const float* samples, std::span<const int> views,
                     float* detector) {
-  std::vector<std::array<LineCrossing, kLinesAtOnce>> lines(views.size());
+  std::vector<std::vector<CrossingGroup>> groups(views.size());
+  std::vector<LineCrossing> lines;
   const auto beam_of = [&](std::size_t v) -> const Beam& {
     return beams[static_cast<std::size_t>(views[v])];
   };
@@ -213,20 +221,23 @@ void project_family(const Family& family, const std::vector<Beam>& beams, int wi
     const int count = std::min(kLinesAtOnce, family.num_lines - first);
     for (std::size_t v = 0; v < views.size(); ++v) {
       if (beam_of(v).flat != family.flat) continue;
+      lines.clear();
       for (int l = 0; l < count; ++l) {
         Crossing c = crossing(beam_of(v), family, first + l, width);
         c.line.samples = samples + family.origin + (first + l) * family.line_stride;
         project_parts(c, family.sample_stride, slabs, rays_of(v));
-        lines[v][static_cast<std::size_t>(l)] = c.line;
+        lines.push_back(c.line);
       }
+      groups[v].clear();
+      kernels::group_lines(lines, samples, groups[v]);
     }
     for (int tile = 0; tile < family.num_samples; tile += kSamplesAtOnce) {
       for (std::size_t v = 0; v < views.size(); ++v) {
         if (beam_of(v).flat != family.flat) continue;
-        const PixelRange pixels =
-            pixels_of_tile(beam_of(v), family, first + 0.5 * (count - 1), tile, width);
-        kernels::project_lines(lines[v].data(), count, family.sample_stride, pixels.first,
-                               pixels.end, rays_of(v), slabs);
+        const CrossingGroup::Range pixels = pixels_of_tile(
+            beam_of(v), family, first + 0.5 * (count - 1), tile, reached_by_any(groups[v]));
+        kernels::project_lines(groups[v].data(), static_cast<int>(groups[v].size()), samples,
+                               family.sample_stride, pixels.first, pixels.end, rays_of(v), slabs);
       }
     }
   }
@@ -235,33 +246,41 @@ void project_family(const Family& family, const std::vector<Beam>& beams, int wi
 void backproject_family(const Family& family, const std::vector<Beam>& beams, int width,
                         const Slabs& slabs, const float* detector, std::span<const int> views,
                         float* samples) {
-  std::array<std::vector<LineCrossing>, kLinesAtOnce> crossings;
+  std::array<std::vector<CrossingGroup>, kLinesAtOnce> groups;
+  std::vector<LineCrossing> crossings;
   const int first_sample = family.cut_low ? -1 : 0;
   const int end_sample = family.num_samples + (family.cut_high ? 1 : 0);
+  const auto line_at = [&](int line) {
+    return samples + family.origin + line * family.line_stride;
+  };
   for (int first = 0; first < family.num_lines; first += kLinesAtOnce) {
     const int count = std::min(kLinesAtOnce, family.num_lines - first);
     for (int l = 0; l < count; ++l) {
-      std::vector<LineCrossing>& of_line = crossings[static_cast<std::size_t>(l)];
-      of_line.clear();
+      crossings.clear();
       for (std::size_t v = 0; v < views.size(); ++v) {
         const Beam& beam = beams[static_cast<std::size_t>(views[v])];
         if (beam.flat != family.flat) continue;
         Crossing c = crossing(beam, family, first + l, width);
         c.line.detector = detector + static_cast<std::ptrdiff_t>(v) * width * kLanes;
-        backproject_parts(c, family.sample_stride, slabs,
-                          samples + family.origin + (first + l) * family.line_stride);
-        of_line.push_back(c.line);
+        backproject_parts(c, family.sample_stride, slabs, line_at(first + l));
+        crossings.push_back(c.line);
       }
+      groups[static_cast<std::size_t>(l)].clear();
+      kernels::group_views(crossings, detector, groups[static_cast<std::size_t>(l)]);
     }
-    const int num_views = static_cast<int>(crossings[0].size());
+    const auto is_shorter = [](const auto& a, const auto& b) { return a.size() < b.size(); };
+    const std::size_t most =
+        std::max_element(groups.begin(), groups.begin() + count, is_shorter)->size();
     for (int tile = first_sample; tile < end_sample; tile += kSamplesAtOnce) {
       const int tile_end = std::min(end_sample, tile + kSamplesAtOnce);
-      for (int v = 0; v < num_views; v += kViewsAtOnce) {
+      for (std::size_t g = 0; g < most; g += kGroupsAtOnce) {
         for (int l = 0; l < count; ++l) {
-          kernels::backproject_lines(
-              crossings[static_cast<std::size_t>(l)].data() + v,
-              std::min(kViewsAtOnce, num_views - v), family.sample_stride, tile, tile_end,
-              samples + family.origin + (first + l) * family.line_stride, slabs);
+          const std::span<const CrossingGroup> all = groups[static_cast<std::size_t>(l)];
+          if (g >= all.size()) continue;
+          const auto some = all.subspan(g, std::min<std::size_t>(kGroupsAtOnce, all.size() - g));
+          kernels::backproject_lines(some.data(), static_cast<int>(some.size()), detector,
+                                     family.sample_stride, tile, tile_end, line_at(first + l),
+                                     slabs);
         }
       }
     }

@@ -1,0 +1,156 @@
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/line_projection.h"
+
+namespace tomofield::kernels {
+namespace {
+
+using Range = CrossingGroup::Range;
+constexpr std::size_t kMost = CrossingGroup::kMost;
+
+// Wider than positions can differ by rounding.
+constexpr double kRounding = 0.01;
+
+int rounded_up(double at) {
+  const double within = std::clamp(at, -1e9, 1e9);
+  const int truncated = static_cast<int>(within);
+  return truncated + (within > truncated ? 1 : 0);
+}
+Range integers_within(double first, double end) {
+  return {rounded_up(first), std::max(rounded_up(first), rounded_up(end))};
+}
+
+Range both(Range a, Range b) {
+  const int first = std::max(a.first, b.first);
+  return {first, std::max(first, std::min(a.end, b.end))};
+}
+Range around(Range a, Range b) { return {std::min(a.first, b.first), std::max(a.end, b.end)}; }
+
+double position(const LineCrossing& c, int pixel) {
+  return c.offset + static_cast<double>(c.step) * pixel;
+}
+
+// Of a group's lines: pixels of all windows whose positions lie within [low, high) of every line
+// by more than rounding, and those of any that may lie within one.
+void set_pixels(std::span<const LineCrossing> lines, CrossingGroup& group) {
+  constexpr double kFar = 1e30;
+  double low_of_all = -kFar, low_of_any = kFar, high_of_all = kFar, high_of_any = -kFar;
+  Range in_all{lines[0].first_pixel, lines[0].end_pixel}, in_any = in_all;
+  for (const LineCrossing& c : lines) {
+    const double low = static_cast<double>(c.low) - c.offset;
+    const double high = static_cast<double>(c.high) - c.offset;
+    low_of_all = std::max(low_of_all, low);
+    low_of_any = std::min(low_of_any, low);
+    high_of_all = std::min(high_of_all, high);
+    high_of_any = std::max(high_of_any, high);
+    in_all = both(in_all, {c.first_pixel, c.end_pixel});
+    in_any = around(in_any, {c.first_pixel, c.end_pixel});
+  }
+  const double inverse = 1.0 / lines[0].step;
+  const auto pixels = [&](double low, double high) {
+    const double a = low * inverse, b = high * inverse;
+    return integers_within(std::min(a, b), std::max(a, b));
+  };
+  group.whole = both(pixels(low_of_all + kRounding, high_of_all - kRounding), in_all);
+  group.reached = both(pixels(low_of_any - kRounding, high_of_any + kRounding), in_any);
+}
+
+// Samples that a pixel that sees the line may reach.
+Range samples_reached(const LineCrossing& c) {
+  const auto [low, high] = std::minmax({position(c, c.first_pixel), position(c, c.end_pixel - 1)});
+  return integers_within(low - 1.0 - kRounding, high + 1.0 + kRounding);
+}
+
+// Samples with a whole hat around them that no pixel that does not see the line could reach.
+Range samples_not_cut_off(const LineCrossing& c) {
+  const auto [before, after] =
+      std::minmax({position(c, c.first_pixel - 1), position(c, c.end_pixel)});
+  const double first = std::max<double>(c.low, before + kRounding) + 1.0;
+  const double end = std::min<double>(c.high, after - kRounding);
+  return {rounded_up(first), std::max(rounded_up(first), -rounded_up(-end))};
+}
+
+// How many pairs of pixels reach a sample. Rounding can only lose a weight that is itself of the
+// size of the rounding.
+int pairs_a_sample(const LineCrossing& c) {
+  return static_cast<int>(std::ceil((1.0f - 1e-6f) / std::abs(c.step)));
+}
+
+void put(const LineCrossing& c, std::size_t k, std::ptrdiff_t origin, CrossingGroup& group) {
+  group.offset[k] = c.offset;
+  group.step[k] = c.step;
+  group.low[k] = c.low;
+  group.high[k] = c.high;
+  group.first_pixel[k] = static_cast<float>(c.first_pixel);
+  group.last_pixel[k] = static_cast<float>(c.end_pixel - 1);
+  group.weight[k] = c.weight;
+  group.origin[k] = static_cast<int>(origin);
+}
+
+void put_pair(const LineCrossing& c, int pair, std::size_t k, CrossingGroup& group) {
+  group.inverse[k] = 1.0f / c.step;
+  group.bias[k] = -c.offset * group.inverse[k] - std::abs(group.inverse[k]);
+  group.skipped[k] = static_cast<float>(2 * pair + 1);
+}
+
+// The group of item `count`, a new one for every four.
+CrossingGroup& group_of(std::size_t count, std::vector<CrossingGroup>& groups) {
+  if (count % kMost == 0) groups.emplace_back();
+  return groups.back();
+}
+
+void include(Range whole, Range reached, std::size_t k, CrossingGroup& group) {
+  group.whole = k == 0 ? whole : both(group.whole, whole);
+  group.reached = k == 0 ? reached : around(group.reached, reached);
+}
+
+// The items after the last of `count` repeat it, without weight: what they read is there.
+void fill_up(std::size_t count, std::vector<CrossingGroup>& groups) {
+  if (count % kMost == 0) return;
+  CrossingGroup& g = groups.back();
+  for (std::size_t last = count % kMost - 1, k = last + 1; k < kMost; ++k) {
+    for (auto numbers :
+         {&CrossingGroup::offset, &CrossingGroup::step, &CrossingGroup::low, &CrossingGroup::high,
+          &CrossingGroup::first_pixel, &CrossingGroup::last_pixel, &CrossingGroup::inverse,
+          &CrossingGroup::bias, &CrossingGroup::skipped})
+      (g.*numbers)[k] = (g.*numbers)[last];
+    g.origin[k] = g.origin[last];
+    g.weight[k] = 0.0f;
+  }
+}
+
+}  // namespace
+
+void group_lines(std::span<const LineCrossing> lines, const float* source,
+                 std::vector<CrossingGroup>& groups) {
+  std::size_t count = 0;
+  for (const LineCrossing& line : lines) {
+    CrossingGroup& group = group_of(count, groups);
+    if (count % kMost == 0)
+      set_pixels(lines.subspan(count, std::min(kMost, lines.size() - count)), group);
+    put(line, count++ % kMost, line.samples - source, group);
+  }
+  fill_up(count, groups);
+}
+
+void group_views(std::span<const LineCrossing> views, const float* source,
+                 std::vector<CrossingGroup>& groups) {
+  std::size_t count = 0;
+  for (const LineCrossing& view : views) {
+    if (view.first_pixel >= view.end_pixel) continue;
+    const int pairs = pairs_a_sample(view);
+    const Range whole = pairs == 1 ? samples_not_cut_off(view) : Range{};
+    const Range reached = samples_reached(view);
+    for (int pair = 0; pair < pairs; ++pair) {
+      CrossingGroup& group = group_of(count, groups);
+      const std::size_t k = count++ % kMost;
+      put(view, k, view.detector - source, group);
+      put_pair(view, pair, k, group);
+      include(whole, reached, k, group);
+    }
+  }
+  fill_up(count, groups);
+}
+
+}  // namespace tomofield::kernels
