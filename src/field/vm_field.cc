@@ -16,11 +16,12 @@
 namespace tomofield::field {
 namespace {
 
+using kernels::add_transposed;
 using kernels::interpolate_rows;
-using kernels::interpolate_rows_transposed;
 using kernels::kLanes;
 using kernels::small_gemm;
 using kernels::spread_rows;
+using kernels::transpose_lanes;
 
 // Positions of the six factors inside a leaf's parameters.
 struct Layout {
@@ -139,8 +140,6 @@ void for_each_slab_product(const LeafShape& s, const Body& body) {
     body(SlabProduct{s.nz, i * column, kLanes, s.rank_z, at.vz, at.mxy + plane(i, s.rank_z)});
 }
 
-kernels::LaneTaps taps(const LaneRows& rows) { return {rows.lower.data(), rows.fraction.data()}; }
-
 // Of a plane's rows at the lanes.
 std::size_t lane_size(const LeafShape& s) {
   return static_cast<std::size_t>(std::max({s.rank_x, s.rank_y, s.rank_z})) * kLanes;
@@ -152,6 +151,38 @@ float* scratch(std::size_t size, int which) {
   buffers[which].reserve(size);
   return buffers[which].data();
 }
+
+// A plane's rows at the lanes of a slab, [lane, rank]: those of the plane itself if nothing lies
+// between them.
+struct PlaneRows {
+  PlaneRows(const LeafShape& s, const LaneRows& rows)
+      : taps{rows.lower.data(), rows.fraction.data()},
+        at_vertices(rows.are_at_neighbouring_vertices()),
+        scratch_size(lane_size(s)) {}
+
+  const float* at_lanes(const float* plane, int rank) const {
+    if (at_vertices) return plane + first(rank);
+    float* lanes = scratch(scratch_size, 0);
+    interpolate_rows(taps, rank, plane, lanes);
+    return lanes;
+  }
+  // Adds a gradient [rank, lane] to that of the plane.
+  void add(const float* by_rank, int rank, float* plane) const {
+    if (at_vertices) return add_transposed(rank, by_rank, plane + first(rank));
+    float* lanes = scratch(scratch_size, 0);
+    std::fill_n(lanes, rank * kLanes, 0.0f);
+    add_transposed(rank, by_rank, lanes);
+    spread_rows(taps, rank, lanes, plane);
+  }
+
+ private:
+  std::size_t first(int rank) const {
+    return static_cast<std::size_t>(taps.lower[0]) * static_cast<std::size_t>(rank);
+  }
+  kernels::LaneTaps taps;
+  bool at_vertices;
+  std::size_t scratch_size;
+};
 
 }  // namespace
 
@@ -176,43 +207,32 @@ std::vector<ParameterRuns> VmField::runs_of_rows(const LeafShape& s, int first_y
 void VmField::add_slab_values(int leaf, const LaneRows& rows, float* values) const {
   const LeafShape& s = shape(leaf);
   const float* p = leaf_parameters(leaf);
-  float* lanes = scratch(lane_size(s), 0);
+  const PlaneRows plane_rows(s, rows);
+  float* by_rank = scratch(lane_size(s), 1);
   for_each_slab_product(s, [&](const SlabProduct& f) {
-    interpolate_rows_transposed(taps(rows), f.rank, p + f.plane, lanes);
+    transpose_lanes(f.rank, plane_rows.at_lanes(p + f.plane, f.rank), by_rank);
     small_gemm({.rows = f.rows,
                 .depth = f.rank,
                 .width = kLanes,
                 .a = p + f.factor,
                 .a_row = f.rank,
                 .a_col = 1,
-                .b = lanes,
+                .b = by_rank,
                 .b_row = kLanes,
                 .c = values + f.first_value,
                 .c_row = f.value_row});
   });
 }
 
-// Every gradient is a matrix product whose columns are ranks: the sums over
-// lanes are part of the product's depth, so no register is ever summed across.
+// Every gradient is a matrix product whose columns are ranks or lanes: the sums over the others are
+// part of the product's depth, so no register is ever summed across.
 void VmField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
                             float* gradient) const {
   const LeafShape& s = shape(leaf);
   const float* p = leaf_parameters(leaf);
-  const bool at_vertices = rows.are_at_neighbouring_vertices();
-  const auto first_vertex = static_cast<std::size_t>(rows.lower[0]);
-  float* lanes = scratch(lane_size(s), 0);
-  float* grad_lanes = scratch(lane_size(s), 1);
+  const PlaneRows plane_rows(s, rows);
+  float* by_rank = scratch(lane_size(s), 1);
   for_each_slab_product(s, [&](const SlabProduct& f) {
-    // The plane's rows at the lanes, and where their gradient goes: those of the plane itself if
-    // nothing lies between them.
-    const float* of_lanes = p + f.plane + first_vertex * static_cast<std::size_t>(f.rank);
-    float* to_lanes = gradient + f.plane + first_vertex * static_cast<std::size_t>(f.rank);
-    if (!at_vertices) {
-      interpolate_rows(taps(rows), f.rank, p + f.plane, lanes);
-      std::fill_n(grad_lanes, f.rank * kLanes, 0.0f);
-      of_lanes = lanes;
-      to_lanes = grad_lanes;
-    }
     const float* grad = grad_values + f.first_value;
     small_gemm({.rows = f.rows,
                 .depth = kLanes,
@@ -220,21 +240,22 @@ void VmField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_va
                 .a = grad,
                 .a_row = f.value_row,
                 .a_col = 1,
-                .b = of_lanes,
+                .b = plane_rows.at_lanes(p + f.plane, f.rank),
                 .b_row = f.rank,
                 .c = gradient + f.factor,
                 .c_row = f.rank});
-    small_gemm({.rows = kLanes,
+    std::fill_n(by_rank, f.rank * kLanes, 0.0f);
+    small_gemm({.rows = f.rank,
                 .depth = f.rows,
-                .width = f.rank,
-                .a = grad,
+                .width = kLanes,
+                .a = p + f.factor,
                 .a_row = 1,
-                .a_col = f.value_row,
-                .b = p + f.factor,
-                .b_row = f.rank,
-                .c = to_lanes,
-                .c_row = f.rank});
-    if (!at_vertices) spread_rows(taps(rows), f.rank, grad_lanes, gradient + f.plane);
+                .a_col = f.rank,
+                .b = grad,
+                .b_row = f.value_row,
+                .c = by_rank,
+                .c_row = kLanes});
+    plane_rows.add(by_rank, f.rank, gradient + f.plane);
   });
 }
 

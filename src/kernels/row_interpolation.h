@@ -13,10 +13,13 @@ struct LaneTaps {
 /// out[lane, c] = the rows of matrix [row, c], c < width, interpolated.
 void interpolate_rows(const LaneTaps& taps, int width, const float* matrix, float* out);
 
-/// The same with the lane innermost: out[c, lane].
-void interpolate_rows_transposed(const LaneTaps& taps, int width, const float* matrix, float* out);
-
 /// Adjoint of interpolate_rows: grad_matrix [row, c] += interpolationᵀ grad [lane, c].
 void spread_rows(const LaneTaps& taps, int width, const float* grad, float* grad_matrix);
+
+/// columns[c, lane] = lanes[lane, c], c < width.
+void transpose_lanes(int width, const float* lanes, float* columns);
+
+/// Its adjoint: lanes[lane, c] += columns[c, lane].
+void add_transposed(int width, const float* columns, float* lanes);
 
 }  // namespace tomofield::kernels

@@ -27,9 +27,10 @@ HWY_INLINE void for_each_vector(int width, const Body& body) {
   with(hn::CappedTag<float, 1>());
 }
 
-// Bound of all three: bytes. A lane is two loads, two operations and a store a vector in L1, but
-// rows are used for one product each and stream from L2 or, where the factors of a slab's leaves do
-// not fit there, from L3 (14 GB/s measured: as long as a third of the products that they serve).
+// Bound of interpolating and spreading: bytes. A lane is two loads, two operations and a store a
+// vector in L1, but rows are used for one product each and stream from L2 or, where the factors of
+// a slab's leaves do not fit there, from L3 (14 GB/s measured: as long as a third of the products
+// that they serve).
 template <class D>
 HWY_INLINE hn::Vec<D> interpolated(D d, const LaneTaps& taps, int lane, int width,
                                    const float* column) {
@@ -46,21 +47,74 @@ void interpolate_rows(const LaneTaps& taps, int width, const float* matrix, floa
   });
 }
 
-// Four lanes at a time: their columns are interleaved, which makes four
-// neighbouring lanes of each column.
-void interpolate_rows_transposed(const LaneTaps& taps, int width, const float* matrix, float* out) {
-  for_each_vector(width, [&](auto d, int c) HWY_ATTR {
-    constexpr int kColumns = static_cast<int>(hn::MaxLanes(decltype(d)()));
-    HWY_ALIGN float four[kColumns * 4];
-    for (int l = 0; l < kLanes; l += 4) {
-      hn::StoreInterleaved4(interpolated(d, taps, l, width, matrix + c),
-                            interpolated(d, taps, l + 1, width, matrix + c),
-                            interpolated(d, taps, l + 2, width, matrix + c),
-                            interpolated(d, taps, l + 3, width, matrix + c), d, four);
-      for (int i = 0; i < kColumns; ++i)
-        for (int k = 0; k < 4; ++k) out[(c + i) * kLanes + l + k] = four[4 * i + k];
+#if HWY_TARGET != HWY_SCALAR
+// Calls body(vector of four, first lane) for each block of four lanes.
+template <class D, class Body>
+HWY_INLINE void for_each_block(D d, hn::Vec<D> v, int first, const Body& body) {
+  if constexpr (hn::MaxLanes(D()) <= 4) {
+    body(v, first);
+  } else {
+    const hn::Half<D> half;
+    for_each_block(half, hn::LowerHalf(half, v), first, body);
+    for_each_block(half, hn::UpperHalf(half, v), first + static_cast<int>(hn::Lanes(half)), body);
+  }
+}
+
+// Of four rows `from_row` apart, as many columns as a vector has lanes: calls body(column's four,
+// column) for all of them. Bound: eight shuffles for four vectors, one a cycle, and a store or
+// addition to memory for every four numbers.
+template <class D, class Body>
+HWY_INLINE void transpose_four_rows(D d, const float* from, std::ptrdiff_t from_row,
+                                    const Body& body) {
+  const auto row0 = hn::LoadU(d, from), row1 = hn::LoadU(d, from + from_row);
+  const auto row2 = hn::LoadU(d, from + 2 * from_row), row3 = hn::LoadU(d, from + 3 * from_row);
+  const auto low02 = hn::InterleaveLower(d, row0, row2), low13 = hn::InterleaveLower(d, row1, row3);
+  const auto up02 = hn::InterleaveUpper(d, row0, row2), up13 = hn::InterleaveUpper(d, row1, row3);
+  for_each_block(d, hn::InterleaveLower(d, low02, low13), 0, body);
+  for_each_block(d, hn::InterleaveUpper(d, low02, low13), 1, body);
+  for_each_block(d, hn::InterleaveLower(d, up02, up13), 2, body);
+  for_each_block(d, hn::InterleaveUpper(d, up02, up13), 3, body);
+}
+#endif
+
+void transpose_lanes(int width, const float* lanes, float* columns) {
+  int c = 0;
+#if HWY_TARGET != HWY_SCALAR
+  const hn::FixedTag<float, 4> four;
+  const auto with = [&](auto d) HWY_ATTR {
+    const int count = static_cast<int>(hn::Lanes(d));
+    for (; c + count <= width; c += count) {
+      for (int l = 0; l < kLanes; l += 4) {
+        transpose_four_rows(d, lanes + l * width + c, width, [&](auto v, int i) HWY_ATTR {
+          hn::StoreU(v, four, columns + (c + i) * kLanes + l);
+        });
+      }
     }
-  });
+  };
+  with(hn::CappedTag<float, 16>());
+  with(hn::CappedTag<float, 8>());
+  with(four);
+#endif
+  for (; c < width; ++c)
+    for (int l = 0; l < kLanes; ++l) columns[c * kLanes + l] = lanes[l * width + c];
+}
+
+void add_transposed(int width, const float* columns, float* lanes) {
+  int c = 0;
+#if HWY_TARGET != HWY_SCALAR
+  const hn::FixedTag<float, 4> four;
+  const hn::CappedTag<float, kLanes> d;
+  for (; c + 4 <= width; c += 4) {
+    for (int l = 0; l < kLanes; l += static_cast<int>(hn::Lanes(d))) {
+      transpose_four_rows(d, columns + c * kLanes + l, kLanes, [&](auto v, int i) HWY_ATTR {
+        float* const to = lanes + (l + i) * width + c;
+        hn::StoreU(hn::Add(hn::LoadU(four, to), v), four, to);
+      });
+    }
+  }
+#endif
+  for (; c < width; ++c)
+    for (int l = 0; l < kLanes; ++l) lanes[l * width + c] += columns[c * kLanes + l];
 }
 
 // What neighbouring lanes give a row is summed in registers.
@@ -100,14 +154,18 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace tomofield::kernels {
 HWY_EXPORT(interpolate_rows);
-HWY_EXPORT(interpolate_rows_transposed);
+HWY_EXPORT(transpose_lanes);
+HWY_EXPORT(add_transposed);
 HWY_EXPORT(spread_rows);
 
 void interpolate_rows(const LaneTaps& taps, int width, const float* matrix, float* out) {
   HWY_DYNAMIC_DISPATCH(interpolate_rows)(taps, width, matrix, out);
 }
-void interpolate_rows_transposed(const LaneTaps& taps, int width, const float* matrix, float* out) {
-  HWY_DYNAMIC_DISPATCH(interpolate_rows_transposed)(taps, width, matrix, out);
+void transpose_lanes(int width, const float* lanes, float* columns) {
+  HWY_DYNAMIC_DISPATCH(transpose_lanes)(width, lanes, columns);
+}
+void add_transposed(int width, const float* columns, float* lanes) {
+  HWY_DYNAMIC_DISPATCH(add_transposed)(width, columns, lanes);
 }
 void spread_rows(const LaneTaps& taps, int width, const float* grad, float* grad_matrix) {
   HWY_DYNAMIC_DISPATCH(spread_rows)(taps, width, grad, grad_matrix);
