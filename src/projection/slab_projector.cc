@@ -66,7 +66,7 @@ Family columns_of(const SampleSegment& s) {
 // length, add up. Such pixels [part_first, part_end) around those of `line` are
 // few and dealt with here.
 struct Crossing {
-  LineCrossing line;
+  LineCrossing& line;
   double offset = 0, step = 1;  // position(pixel), as in LineCrossing
   int part_first = 0, part_end = 0;
   double low_face = 0, high_face = 0, spread = 0;  // in samples
@@ -85,15 +85,15 @@ int first_pixel_from(const Crossing& c, double position, int width) {
   return static_cast<int>(std::clamp(pixel, 0.0, static_cast<double>(width)));
 }
 
-Crossing crossing(const Beam& beam, const Family& family, int line, int width) {
-  Crossing c;
-  c.offset = beam.offset + line * beam.offset_per_line;
-  c.step = beam.step;
+// Writes what the view sees of a line, but for where its samples or pixels are.
+Crossing crossing(const Beam& beam, const Family& family, int line, int width, LineCrossing& seen) {
+  Crossing c{seen, beam.offset + line * beam.offset_per_line, beam.step};
   c.line.offset = static_cast<float>(c.offset);
   c.line.step = static_cast<float>(c.step);
   c.line.low = -1.0f;
   c.line.high = static_cast<float>(family.num_samples);
   c.line.weight = beam.weight;
+  c.line.first_pixel = 0;
   c.line.end_pixel = c.part_end = width;
   if (!family.cut_low && !family.cut_high) return c;
 
@@ -210,7 +210,7 @@ void project_family(const Family& family, const std::vector<Beam>& beams, int wi
                     const Slabs& slabs, const float* samples, std::span<const int> views,
                     float* detector) {
   std::vector<std::vector<CrossingGroup>> groups(views.size());
-  std::vector<LineCrossing> lines;
+  std::array<LineCrossing, kLinesAtOnce> lines;
   const auto beam_of = [&](std::size_t v) -> const Beam& {
     return beams[static_cast<std::size_t>(views[v])];
   };
@@ -221,15 +221,15 @@ void project_family(const Family& family, const std::vector<Beam>& beams, int wi
     const int count = std::min(kLinesAtOnce, family.num_lines - first);
     for (std::size_t v = 0; v < views.size(); ++v) {
       if (beam_of(v).flat != family.flat) continue;
-      lines.clear();
       for (int l = 0; l < count; ++l) {
-        Crossing c = crossing(beam_of(v), family, first + l, width);
-        c.line.samples = samples + family.origin + (first + l) * family.line_stride;
-        project_parts(c, family.sample_stride, slabs, rays_of(v));
-        lines.push_back(c.line);
+        LineCrossing& line = lines[static_cast<std::size_t>(l)];
+        line.samples = samples + family.origin + (first + l) * family.line_stride;
+        project_parts(crossing(beam_of(v), family, first + l, width, line), family.sample_stride,
+                      slabs, rays_of(v));
       }
       groups[v].clear();
-      kernels::group_lines(lines, samples, groups[v]);
+      kernels::group_lines(std::span(lines).first(static_cast<std::size_t>(count)), samples,
+                           groups[v]);
     }
     for (int tile = 0; tile < family.num_samples; tile += kSamplesAtOnce) {
       for (std::size_t v = 0; v < views.size(); ++v) {
@@ -260,10 +260,10 @@ void backproject_family(const Family& family, const std::vector<Beam>& beams, in
       for (std::size_t v = 0; v < views.size(); ++v) {
         const Beam& beam = beams[static_cast<std::size_t>(views[v])];
         if (beam.flat != family.flat) continue;
-        Crossing c = crossing(beam, family, first + l, width);
-        c.line.detector = detector + static_cast<std::ptrdiff_t>(v) * width * kLanes;
-        backproject_parts(c, family.sample_stride, slabs, line_at(first + l));
-        crossings.push_back(c.line);
+        LineCrossing& view = crossings.emplace_back();
+        view.detector = detector + static_cast<std::ptrdiff_t>(v) * width * kLanes;
+        backproject_parts(crossing(beam, family, first + l, width, view), family.sample_stride,
+                          slabs, line_at(first + l));
       }
       groups[static_cast<std::size_t>(l)].clear();
       kernels::group_views(crossings, detector, groups[static_cast<std::size_t>(l)]);
