@@ -83,7 +83,6 @@ Case ProjectionSetup::adjoint_case(const std::string& name,
                                    std::shared_ptr<ProjectionSetup> self) const {
   Case c = work(name);
   c.run = [self] {
-    self->gradient_.fill(0.0f);
     self->projector_.backward(self->detector_.data(), self->views_, self->gradient_.data(),
                               self->num_slabs_);
   };

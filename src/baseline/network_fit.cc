@@ -96,7 +96,6 @@ class NetworkFit {
       const float weight = static_cast<float>(1 / (sigma * sigma));
       for (std::int64_t i = 0; i < rays_of_view; ++i) *rays++ *= weight;
     }
-    gradient_.fill(0.0f);
     problem_.backproject(problem_.views(), detector_.data(), gradient_.data());
     density_.accumulate(row_sets_[set], gradient_.data(), adam_.gradient());
     const double all_steps =

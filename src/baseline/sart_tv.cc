@@ -39,7 +39,7 @@ class Sart {
   // the densities moved.
   double pass(double relaxation, VoxelVolume& densities) {
     return std::sqrt(sum_over_pairs(problem_.num_slabs(), [&](const SlabPair& pair) {
-      float *x = densities.slab(pair.first), *before = scratch_.cleared_samples(0);
+      float *x = densities.slab(pair.first), *before = scratch_.samples(0);
       const std::size_t size = problem_.grid().size();
       std::copy_n(x, static_cast<std::size_t>(pair.count) * size, before);
       for (const std::vector<int>& views : subsets_) step(pair, views, relaxation, x);
@@ -53,7 +53,7 @@ class Sart {
  private:
   void step(const SlabPair& pair, const std::vector<int>& views, double relaxation, float* x) {
     float* detector = scratch_.detector();
-    float *inverse_columns = scratch_.cleared_samples(1), *gradient = scratch_.cleared_samples(2);
+    float *inverse_columns = scratch_.samples(1), *gradient = scratch_.samples(2);
     inverse_column_sums(problem_, pair, views, detector, inverse_columns);
     problem_.residuals(pair, views, x, detector);
     weigh_rays(problem_, pair, views, detector);

@@ -29,7 +29,7 @@ Solution reconstruct_sirt(VoxelProblem& problem, const SirtOptions& options,
       sums[pair.index()] = problem.residuals(pair, problem.views(), x, residuals);
       const double objective = weigh_rays(problem, pair, problem.views(), residuals) / 2;
       if (is_last) return objective;
-      float* gradient = scratch.cleared_samples();
+      float* gradient = scratch.samples();
       problem.backproject(problem.views(), residuals, gradient, pair.count);
       take_step(problem.grid(), pair, options.relaxation, options.non_negative,
                 inverse_columns.slab(pair.first), gradient, x);

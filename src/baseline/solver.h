@@ -70,11 +70,8 @@ class ThreadScratch {
       samples_.emplace_back(SlabPair::kMost * problem.grid().size());
   }
   float* detector() { return detectors_[thread()].data(); }
-  /// Zeros.
-  float* cleared_samples(std::size_t buffer = 0) {
-    base::AlignedBuffer<float>& samples = samples_[thread() * num_buffers_ + buffer];
-    samples.fill(0.0f);
-    return samples.data();
+  float* samples(std::size_t buffer = 0) {
+    return samples_[thread() * num_buffers_ + buffer].data();
   }
 
  private:

@@ -142,7 +142,7 @@ void ChambollePock::measure_steps() {
     std::fill_n(detector + at, kLanes,
                 static_cast<float>(kBalance * model.scale * std::sqrt(model.weight)));
   });
-  float* sums = scratch_.cleared_samples();
+  float* sums = scratch_.samples();
   problem_.backproject(problem_.views(), detector, sums);
   tau_.resize(problem_.grid().size() / kLanes);
   for_each_sample_row(problem_.grid(), [&](const SampleSegment& segment, std::ptrdiff_t row) {
@@ -220,7 +220,7 @@ void ChambollePock::take_weights() {
 
 void ChambollePock::step_densities(bool is_last) {
   for_each_pair(problem_.num_slabs(), [&](const SlabPair& pair) {
-    float* adjoint = scratch_.cleared_samples();
+    float* adjoint = scratch_.samples();
     problem_.backproject(problem_.views(), q_[pair.index()].data(), adjoint, pair.count);
     for (int slab = pair.first; slab < pair.end(); ++slab, adjoint += problem_.grid().size()) {
       add_gradient_adjoint(px_, py_, pz_, slab, factors_of_, adjoint);

@@ -81,7 +81,7 @@ class VoxelProblem {
   /// ½ Σ (residual / σ)² of one slab or, with added sums, of all; sums of the fitted views.
   double data_loss(const std::vector<loss::ViewSums>& sums) const;
 
-  /// samples += Aᵀ detector, of so many slabs.
+  /// samples ← Aᵀ detector, of so many slabs.
   void backproject(std::span<const int> views, const float* detector, float* samples,
                    int num_slabs = 1) const {
     projector_.backward(detector, views, samples, num_slabs);

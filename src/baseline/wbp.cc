@@ -67,7 +67,7 @@ Solution reconstruct_wbp(const VoxelProblem& problem, const WbpOptions& options,
       bridge_gaps(problem.rays().mask(slab, views[v]), problem.width(), rays);
       filter.apply(rays);
     }
-    float* samples = scratch.cleared_samples();
+    float* samples = scratch.samples();
     problem.backproject(views, detector, samples);
     add_backprojection(problem.grid(), samples, densities.slab(slab));
   });

@@ -243,6 +243,16 @@ void project_family(const Family& family, const std::vector<Beam>& beams, int wi
   }
 }
 
+// Of rows, with the padding at both ends of them and of the first and last: a block before it is
+// added to, so that it lies in a cache by then.
+void clear_rows(const Family& rows, int first, int count, const Slabs& slabs, float* samples) {
+  const int from = first == 0 ? -1 : first;
+  const int end = first + count == rows.num_lines ? first + count + 1 : first + count;
+  for (int s = 0; s < slabs.count; ++s, samples += slabs.samples_apart)
+    std::fill_n(samples + rows.origin - kLanes + from * rows.line_stride,
+                (end - from) * rows.line_stride, 0.0f);
+}
+
 void backproject_family(const Family& family, const std::vector<Beam>& beams, int width,
                         const Slabs& slabs, const float* detector, std::span<const int> views,
                         float* samples) {
@@ -255,6 +265,7 @@ void backproject_family(const Family& family, const std::vector<Beam>& beams, in
   };
   for (int first = 0; first < family.num_lines; first += kLinesAtOnce) {
     const int count = std::min(kLinesAtOnce, family.num_lines - first);
+    if (family.flat) clear_rows(family, first, count, slabs, samples);
     for (int l = 0; l < count; ++l) {
       crossings.clear();
       for (std::size_t v = 0; v < views.size(); ++v) {

@@ -102,7 +102,6 @@ void SlabObjective::add_data_term(const projection::SlabSampler::Range& pair,
     }
     measured_.release(slab);
   }
-  w.grad_samples.fill(0.0f);
   projector_.backward(w.detector.data(), views, w.grad_samples.data(), count);
 }
 
