@@ -62,13 +62,13 @@ Range samples_reached(const LineCrossing& c) {
   return integers_within(low - 1.0 - kRounding, high + 1.0 + kRounding);
 }
 
-// Samples with a whole hat around them that no pixel that does not see the line could reach.
+// Samples between two pixels of the window, for |step| >= 1, so that no others can reach them, and
+// with all of a pixel's hat within [low, high).
 Range samples_not_cut_off(const LineCrossing& c) {
-  const auto [before, after] =
-      std::minmax({position(c, c.first_pixel - 1), position(c, c.end_pixel)});
-  const double first = std::max<double>(c.low, before + kRounding) + 1.0;
-  const double end = std::min<double>(c.high, after - kRounding);
-  return {rounded_up(first), std::max(rounded_up(first), -rounded_up(-end))};
+  const auto [low, high] = std::minmax({position(c, c.first_pixel), position(c, c.end_pixel - 1)});
+  const double first = std::max(c.low + 1.0, low + kRounding);
+  const double last = std::min(c.high - 1.0, high - kRounding);
+  return {rounded_up(first), std::max(rounded_up(first), 1 - rounded_up(-last))};
 }
 
 // How many pairs of pixels reach a sample. Rounding can only lose a weight that is itself of the

@@ -248,16 +248,20 @@ struct AdjointItems {
     return hn::Max(hn::Zero(Tag()), hn::NegMulAdd(lines.weight, distance, lines.weight));
   }
 
+  HWY_INLINE Taps pair_of(Vec pixel, Vec sample) const {
+    static_assert(kLanes == 16);
+    return {hn::Add(hn::ShiftLeft<4>(integer_bits(pixel)), origin), hat(pixel, sample),
+            hat(hn::Add(pixel, hn::Set(Tag(), 1.0f)), sample)};
+  }
+
   template <bool kIsOnly>
   HWY_INLINE Taps taps(Vec sample) const {
-    static_assert(kLanes == 16);
     const Vec one = hn::Set(Tag(), 1.0f);
+    if (kIsOnly) return pair_of(hn::Floor(hn::MulAdd(sample, inverse, hn::Add(bias, one))), sample);
     const Vec pair = hn::Add(hn::Floor(hn::MulAdd(sample, inverse, bias)), skipped);
     const Vec pixel = hn::Min(hn::Max(pair, lines.first_pixel), lines.last_pixel);
     const Vec next = hn::Add(pixel, one);
-    Taps taps{hn::Add(hn::ShiftLeft<4>(integer_bits(pixel)), origin), hat(pixel, sample),
-              hat(next, sample)};
-    if (kIsOnly) return taps;
+    Taps taps = pair_of(pixel, sample);
     const auto counts = [&](Vec at) HWY_ATTR {
       const Vec from_pair = hn::Sub(at, pair);
       const auto is_ours = hn::And(hn::Ge(from_pair, hn::Zero(Tag())), hn::Le(from_pair, one));
