@@ -56,19 +56,14 @@ void set_pixels(std::span<const LineCrossing> lines, CrossingGroup& group) {
   group.reached = both(pixels(low_of_any - kRounding, high_of_any + kRounding), in_any);
 }
 
-// Samples that a pixel that sees the line may reach.
-Range samples_reached(const LineCrossing& c) {
-  const auto [low, high] = std::minmax({position(c, c.first_pixel), position(c, c.end_pixel - 1)});
-  return integers_within(low - 1.0 - kRounding, high + 1.0 + kRounding);
-}
-
 // Samples between two pixels of the window, for |step| >= 1, so that no others can reach them, and
-// with all of a pixel's hat within [low, high).
+// with all of a pixel's hat within [low, high). No pixel that sees the line reaches further than
+// two samples beyond them. An end before the first says that there are none.
 Range samples_not_cut_off(const LineCrossing& c) {
   const auto [low, high] = std::minmax({position(c, c.first_pixel), position(c, c.end_pixel - 1)});
   const double first = std::max(c.low + 1.0, low + kRounding);
   const double last = std::min(c.high - 1.0, high - kRounding);
-  return {rounded_up(first), std::max(rounded_up(first), 1 - rounded_up(-last))};
+  return {rounded_up(first), 1 - rounded_up(-last)};
 }
 
 // How many pairs of pixels reach a sample. Rounding can only lose a weight that is itself of the
@@ -140,8 +135,8 @@ void group_views(std::span<const LineCrossing> views, const float* source,
   for (const LineCrossing& view : views) {
     if (view.first_pixel >= view.end_pixel) continue;
     const int pairs = pairs_a_sample(view);
-    const Range whole = pairs == 1 ? samples_not_cut_off(view) : Range{};
-    const Range reached = samples_reached(view);
+    const Range inner = samples_not_cut_off(view), reached{inner.first - 2, inner.end + 2};
+    const Range whole = pairs == 1 ? inner : Range{};
     for (int pair = 0; pair < pairs; ++pair) {
       CrossingGroup& group = group_of(count, groups);
       const std::size_t k = count++ % kMost;
