@@ -59,13 +59,14 @@ struct Case {
 };
 
 // Steps of rows (1 / cos), of columns (1 / sin) and of coarse samples (a
-// margin's), either sign; the last but one is just below 1.
+// margin's), either sign; 0.99993896 is just below 1.
 const std::vector<Case> kCases = {
     {1, 1, 1.0f, false},          {1, 7, 0.5f, true},       {3, 1, -1.0f, false},
     {7, 17, 0.25f, false},        {17, 33, -0.75f, true},   {33, 40, 1.0f, false},
     {33, 31, -1.25f, true},       {40, 17, 2.0f, false},    {40, 7, -3.5f, true},
     {17, 80, 0.1875f, true},      {50, 17, 1.4375f, false}, {100, 90, -1.125f, true},
-    {33, 33, 0.99993896f, false}, {70, 120, 0.625f, false},
+    {33, 33, 0.99993896f, false}, {70, 120, 0.625f, false}, {2, 40, 1.0f, false},
+    {3, 60, -1.25f, true},
 };
 
 // The line as the view sees it, centred more or less. All numbers are small
@@ -104,7 +105,8 @@ void backproject(const std::vector<LineCrossing>& views, const float* source, st
                     samples);
 }
 
-void compare_projection(const Case& c, int num_lines, int first, int end) {
+// Each line's samples lie `slant` further along it than those of the line before.
+void compare_projection(const Case& c, int num_lines, int first, int end, float slant = 0) {
   Lines lines(num_lines, c.num_samples, c.is_column, 3);
   Detectors detector(1, c.num_pixels, 77);
   const auto samples = to_double(lines.values);
@@ -112,6 +114,7 @@ void compare_projection(const Case& c, int num_lines, int first, int end) {
   std::vector<LineCrossing> crossings;
   for (std::size_t l = 0; l < static_cast<std::size_t>(num_lines); ++l) {
     crossings.push_back(dyadic_crossing(c, static_cast<int>(l % kVariants)));
+    crossings[l].offset += slant * static_cast<float>(l);
     crossings[l].samples = lines.sample0(l);
     reference::project_line(crossings[l], c.num_samples, lines.stride, first, end,
                             samples.data() + lines.origin(l), expected.data() + 1);
@@ -127,6 +130,11 @@ TEST(LineProjection, AgreesWithTheReference) {
                    << c.num_samples << " samples, " << c.num_pixels << " pixels, step " << c.step);
       for (const int num_lines : {1, 3, 8, 9, 33}) {
         compare_projection(c, num_lines, 0, c.num_pixels);
+      }
+      // Few or no pixels see all lines of a group.
+      for (const float slant : {1.25f, -4.0f}) {
+        for (int pixel = 0; pixel < c.num_pixels; ++pixel)
+          compare_projection(c, 8, pixel, pixel + 1, slant);
       }
       compare_projection(c, 3, c.num_pixels / 3, c.num_pixels / 2);
     }

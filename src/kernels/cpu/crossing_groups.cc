@@ -21,11 +21,16 @@ Range integers_within(double first, double end) {
   return {rounded_up(first), std::max(rounded_up(first), rounded_up(end))};
 }
 
+bool is_empty(Range a) { return a.first >= a.end; }
 Range both(Range a, Range b) {
-  const int first = std::max(a.first, b.first);
-  return {first, std::max(first, std::min(a.end, b.end))};
+  const Range common{std::max(a.first, b.first), std::min(a.end, b.end)};
+  return is_empty(common) ? Range{} : common;
 }
-Range around(Range a, Range b) { return {std::min(a.first, b.first), std::max(a.end, b.end)}; }
+Range around(Range a, Range b) {
+  if (is_empty(a)) return b;
+  if (is_empty(b)) return a;
+  return {std::min(a.first, b.first), std::max(a.end, b.end)};
+}
 
 double position(const LineCrossing& c, int pixel) {
   return c.offset + static_cast<double>(c.step) * pixel;
@@ -49,6 +54,7 @@ void set_pixels(std::span<const LineCrossing> lines, CrossingGroup& group) {
   }
   const double inverse = 1.0 / lines[0].step;
   const auto pixels = [&](double low, double high) {
+    if (low >= high) return Range{};  // no pixel is within all of them
     const double a = low * inverse, b = high * inverse;
     return integers_within(std::min(a, b), std::max(a, b));
   };
