@@ -225,7 +225,7 @@ void VmField::add_slab_values(int leaf, const LaneRows& rows, float* values) con
 }
 
 // Every gradient is a matrix product whose columns are ranks or lanes: the sums over the others are
-// part of the product's depth, so no register is ever summed across.
+// part of the product's depth.
 void VmField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
                             float* gradient) const {
   const LeafShape& s = shape(leaf);

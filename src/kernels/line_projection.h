@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <span>
@@ -20,10 +21,10 @@ namespace tomofield::kernels {
 
 /// One line as one view sees it.
 struct LineCrossing {
-  /// Source of project_lines: sample 0. Samples −1 and num_samples must be readable (padding).
+  /// For group_lines: sample 0. Samples −1 and num_samples must be readable (padding).
   const float* samples = nullptr;
-  /// Source of backproject_lines: pixel 0 of the view, [pixel, lane]. Pixel end_pixel must be
-  /// readable: it is multiplied by 0.
+  /// For group_views: pixel 0 of the view, [pixel, lane]. Pixel end_pixel must be readable: it is
+  /// multiplied by 0.
   const float* detector = nullptr;
   float offset = 0, step = 1;
   float low = 0, high = 0;  ///< within [−1, num_samples]
@@ -37,14 +38,26 @@ struct CrossingGroup {
   static constexpr int kMost = 4;
   template <typename T>
   using Numbers = std::array<T, kMost>;
+  /// [first, end), empty if the end is not after the first.
   struct Range {
     int first = 0, end = 0;
+    bool is_empty() const { return end <= first; }
     bool contains(int from, int to) const { return from >= first && to <= end; }
-    bool overlaps(int from, int to) const { return from < end && to > first; }
+    bool overlaps(int from, int to) const { return !is_empty() && from < end && to > first; }
+    Range common_with(Range other) const {
+      const Range common{std::max(first, other.first), std::min(end, other.end)};
+      return common.is_empty() ? Range{} : common;
+    }
+    /// The least that has both.
+    Range joined_with(Range other) const {
+      if (is_empty()) return other;
+      if (other.is_empty()) return *this;
+      return {std::min(first, other.first), std::max(end, other.end)};
+    }
   };
 
   alignas(16) Numbers<float> offset, step, low, high, first_pixel, last_pixel, weight;
-  /// Of views, for sample j: the pair of pixels floor(inverse · j + bias) + skipped, and the next.
+  /// Of views, for sample j: the pair of pixel p = floor(inverse · j + bias) + skipped and p + 1.
   /// One pair reaches a sample if |step| >= 1, else more, which are crossings of their own.
   alignas(16) Numbers<float> inverse, bias, skipped;
   /// Sample 0 or pixel 0, in floats from where all sources are counted from.
@@ -54,11 +67,14 @@ struct CrossingGroup {
   Range whole, reached;
 };
 
-/// Appends `lines` of one view to groups. Samples are counted from `source`.
+/// Appends `lines` of one view, all of the same step and with a sample at least, to groups. Samples
+/// are counted from `source` and begin within 2³¹ floats of it.
 void group_lines(std::span<const LineCrossing> lines, const float* source,
                  std::vector<CrossingGroup>& groups);
 
-/// Appends views of one line. Pixels are counted from `source`.
+/// Appends views of one line. Pixels are counted from `source`, likewise. Views with an empty
+/// window are left out, and those with |step| < 1 become several items: how many groups there are
+/// differs from line to line.
 void group_views(std::span<const LineCrossing> views, const float* source,
                  std::vector<CrossingGroup>& groups);
 

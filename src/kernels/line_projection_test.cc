@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -186,34 +187,34 @@ TEST(LineBackprojection, AgreesWithTheReference) {
   });
 }
 
-// Views of a pair of pixels a sample, alone in their groups, so that tiles inside of the window
-// are treated without tests; the window's ends pass every sample of the tiles.
+// A view alone in its group, so that tiles inside of the window are treated without tests; the
+// window's ends pass every sample of the tiles.
 TEST(LineBackprojection, AgreesWhereTheWindowEnds) {
   constexpr int kSamples = 100, kTile = 32;
-  for_each_simd_target([] {
-    for (int shift = 0; shift < kTile; ++shift) {
-      SCOPED_TRACE(shift);
-      Lines line(1, kSamples, false, 5);
-      Detectors detectors(4, 120, 6);
-      auto expected = to_double(line.values);
-      const auto pixels = to_double(detectors.values);
-      std::vector<LineCrossing> views;
-      for (const float step : {1.0f, -1.25f, 1.4375f, 2.0f}) {
-        LineCrossing view = dyadic_crossing({kSamples, 120, step, false}, shift % 2);
-        view.first_pixel = 45 - shift;
-        view.end_pixel = 75 + shift;
-        view.detector = detectors.pixel0(views.size());
-        reference::backproject_line(view, line.stride, -1, kSamples + 1,
-                                    pixels.data() + detectors.origin(views.size()),
-                                    expected.data() + line.origin(0));
-        views.push_back(view);
-      }
-      for (int first = -1; first < kSamples + 1; first += kTile) {
-        backproject(views, detectors.values.data(), line.stride, first,
-                    std::min(first + kTile, kSamples + 1), line.sample0(0));
-      }
-      expect_near(line.values, expected, 2e-6);
+  const auto compare = [](float step, int variant, int shift) {
+    SCOPED_TRACE(::testing::Message()
+                 << "step " << step << ", variant " << variant << ", shift " << shift);
+    Lines line(1, kSamples, false, 5);
+    Detectors detectors(1, 120, 6);
+    auto expected = to_double(line.values);
+    const auto pixels = to_double(detectors.values);
+    LineCrossing view = dyadic_crossing({kSamples, 120, step, false}, variant);
+    view.first_pixel = 45 - shift;
+    view.end_pixel = 75 + shift;
+    view.detector = detectors.pixel0(0);
+    reference::backproject_line(view, line.stride, -1, kSamples + 1,
+                                pixels.data() + detectors.origin(0),
+                                expected.data() + line.origin(0));
+    for (int first = -1; first < kSamples + 1; first += kTile) {
+      backproject({view}, detectors.values.data(), line.stride, first,
+                  std::min(first + kTile, kSamples + 1), line.sample0(0));
     }
+    expect_near(line.values, expected, 2e-6);
+  };
+  for_each_simd_target([&] {
+    for (const float step : {1.0f, -1.0f, -1.25f, 1.4375f, 2.0f})
+      for (const int variant : {0, 1, 3})
+        for (int shift = 0; shift < kTile; ++shift) compare(step, variant, shift);
   });
 }
 

@@ -16,7 +16,7 @@ void interpolate_rows(const LaneTaps& taps, int width, const float* matrix, floa
 /// Adjoint of interpolate_rows: grad_matrix [row, c] += interpolationᵀ grad [lane, c].
 void spread_rows(const LaneTaps& taps, int width, const float* grad, float* grad_matrix);
 
-/// columns[c, lane] = lanes[lane, c], c < width.
+/// columns[c, lane] = lanes[lane, c], c < width. They must not overlap.
 void transpose_lanes(int width, const float* lanes, float* columns);
 
 /// Its adjoint: lanes[lane, c] += columns[c, lane].

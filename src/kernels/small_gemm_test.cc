@@ -57,6 +57,22 @@ TEST(SmallGemm, AgreesWithTheReferenceAtOddSizes) {
   });
 }
 
+// Depths and widths of whole and half vectors, as the ranks of factors are; 24 neighbouring rows.
+TEST(SmallGemm, AgreesWithTheReferenceAtRanks) {
+  for_each_simd_target([] {
+    for (const std::ptrdiff_t rows : {1, 2, 6, 18, 24, 33}) {
+      for (const std::ptrdiff_t depth : {8, 16, 24, 32, 40, 48, 56}) {
+        for (const std::ptrdiff_t width : {8, 16, 24, 40, 56}) {
+          SCOPED_TRACE(::testing::Message() << rows << " x " << depth << " x " << width);
+          compare_with_reference({rows, depth, width});
+          compare_with_reference({rows, depth, width, false, 3});
+          compare_with_reference({rows, depth, width, true, 3});
+        }
+      }
+    }
+  });
+}
+
 TEST(SmallGemm, EmptyProductsChangeNothing) {
   for_each_simd_target([] {
     compare_with_reference({4, 0, 9});

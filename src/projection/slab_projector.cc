@@ -180,29 +180,26 @@ void backproject_parts(const Crossing& c, std::ptrdiff_t stride, const Slabs& sl
   });
 }
 
-// The pixels that cross the middle of a block of lines within a tile of samples, of those that
-// cross the block at all; the first and last tile take all that lie beyond them.
+// The pixels that cross the middle of a block of lines within a tile of samples, of those `reached`
+// at all; the first and last tile take all that lie beyond them.
 CrossingGroup::Range pixels_of_tile(const Beam& beam, const Family& family, double middle_line,
-                                    int tile, CrossingGroup::Range crossing) {
+                                    int tile, CrossingGroup::Range reached) {
   const double inverse = 1.0 / beam.step;
   const bool falls = beam.step < 0;
   const auto pixel_at = [&](int sample) {
     const double pixel =
         (sample - beam.offset - middle_line * beam.offset_per_line) * inverse + 1.0;
-    return static_cast<int>(std::clamp<double>(pixel, crossing.first, crossing.end));
+    return static_cast<int>(std::clamp<double>(pixel, reached.first, reached.end));
   };
   const int end = tile + kSamplesAtOnce;
-  const int low = tile > 0 ? pixel_at(tile) : falls ? crossing.end : crossing.first;
-  const int high = end < family.num_samples ? pixel_at(end) : falls ? crossing.first : crossing.end;
+  const int low = tile > 0 ? pixel_at(tile) : falls ? reached.end : reached.first;
+  const int high = end < family.num_samples ? pixel_at(end) : falls ? reached.first : reached.end;
   return {std::min(low, high), std::max(low, high)};
 }
 
 CrossingGroup::Range reached_by_any(std::span<const CrossingGroup> groups) {
-  CrossingGroup::Range all = groups.front().reached;
-  for (const CrossingGroup& g : groups) {
-    all.first = std::min(all.first, g.reached.first);
-    all.end = std::max(all.end, g.reached.end);
-  }
+  CrossingGroup::Range all;
+  for (const CrossingGroup& group : groups) all = all.joined_with(group.reached);
   return all;
 }
 
@@ -243,8 +240,8 @@ void project_family(const Family& family, const std::vector<Beam>& beams, int wi
   }
 }
 
-// Of rows, with the padding at both ends of them and of the first and last: a block before it is
-// added to, so that it lies in a cache by then.
+// Clears rows [first, first + count) with their padding, and the rows of padding before the first
+// and after the last: right before they are added to, so that they lie in a cache by then.
 void clear_rows(const Family& rows, int first, int count, const Slabs& slabs, float* samples) {
   const int from = first == 0 ? -1 : first;
   const int end = first + count == rows.num_lines ? first + count + 1 : first + count;
@@ -351,6 +348,7 @@ void SlabProjector::backward(const float* detector, std::span<const int> views, 
     const SampleSegment& s = grid_.segments()[i];
     for_each_pair(num_slabs, samples_apart, detectors_apart,
                   [&](const Slabs& slabs, auto at, auto rays) {
+                    // Rows first: they clear what columns add to.
                     backproject_family(rows_of(s), beams_[i], width, slabs, detector + rays, views,
                                        samples + at);
                     backproject_family(columns_of(s), beams_[i], width, slabs, detector + rays,

@@ -41,7 +41,7 @@ class SlabProjector {
   /// (detector_size(views.size())); two together take less time than one after the other.
   void forward(float* samples, std::span<const int> views, float* detector,
                int num_slabs = 1) const;
-  /// samples ← Aᵀ detector, and 0 in their padding.
+  /// samples ← Aᵀ detector, and 0 in the padding of the segments.
   void backward(const float* detector, std::span<const int> views, float* samples,
                 int num_slabs = 1) const;
 

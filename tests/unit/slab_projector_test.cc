@@ -172,6 +172,19 @@ std::vector<float> constant_slab(const SampleGrid& grid, float density) {
   return samples;
 }
 
+// Lines beside the views, and the steepest view not the last: nothing past the rays may be touched.
+// Adding nothing to −0 would make it 0.
+TEST(SlabProjector, ForwardKeepsToTheRays) {
+  const TiltGeometry g = centred_geometry(65, kLanes, 40, {0, 60, 46});
+  const SampleGrid grid = make_sample_grid(g, 10, 30, 4);
+  const SlabProjector projector(g, grid);
+  std::vector<float> samples = constant_slab(grid, 1.0f);
+  std::vector<float> rays(projector.detector_size(3) + 4096, -0.0f);
+  projector.forward(samples.data(), all_views(g), rays.data());
+  for (std::size_t i = 3 * 65 * kLanes; i < rays.size(); ++i)
+    ASSERT_TRUE(std::signbit(rays[i])) << i;
+}
+
 // Worst deviation of a view from `expected(pixel)`, lane by lane, over pixels [first, end).
 template <typename Expected>
 double worst_error(const std::vector<float>& detector, const TiltGeometry& g, int view,

@@ -9,7 +9,8 @@ namespace {
 using Range = CrossingGroup::Range;
 constexpr std::size_t kMost = CrossingGroup::kMost;
 
-// Wider than positions can differ by rounding.
+// More than positions and the pixels of samples differ by rounding, for up to 10⁵ pixels: what is
+// called whole is used without tests, so this keeps it within its memory.
 constexpr double kRounding = 0.01;
 
 int rounded_up(double at) {
@@ -19,17 +20,6 @@ int rounded_up(double at) {
 }
 Range integers_within(double first, double end) {
   return {rounded_up(first), std::max(rounded_up(first), rounded_up(end))};
-}
-
-bool is_empty(Range a) { return a.first >= a.end; }
-Range both(Range a, Range b) {
-  const Range common{std::max(a.first, b.first), std::min(a.end, b.end)};
-  return is_empty(common) ? Range{} : common;
-}
-Range around(Range a, Range b) {
-  if (is_empty(a)) return b;
-  if (is_empty(b)) return a;
-  return {std::min(a.first, b.first), std::max(a.end, b.end)};
 }
 
 double position(const LineCrossing& c, int pixel) {
@@ -49,8 +39,8 @@ void set_pixels(std::span<const LineCrossing> lines, CrossingGroup& group) {
     low_of_any = std::min(low_of_any, low);
     high_of_all = std::min(high_of_all, high);
     high_of_any = std::max(high_of_any, high);
-    in_all = both(in_all, {c.first_pixel, c.end_pixel});
-    in_any = around(in_any, {c.first_pixel, c.end_pixel});
+    in_all = in_all.common_with({c.first_pixel, c.end_pixel});
+    in_any = in_any.joined_with({c.first_pixel, c.end_pixel});
   }
   const double inverse = 1.0 / lines[0].step;
   const auto pixels = [&](double low, double high) {
@@ -58,14 +48,14 @@ void set_pixels(std::span<const LineCrossing> lines, CrossingGroup& group) {
     const double a = low * inverse, b = high * inverse;
     return integers_within(std::min(a, b), std::max(a, b));
   };
-  group.whole = both(pixels(low_of_all + kRounding, high_of_all - kRounding), in_all);
-  group.reached = both(pixels(low_of_any - kRounding, high_of_any + kRounding), in_any);
+  group.whole = pixels(low_of_all + kRounding, high_of_all - kRounding).common_with(in_all);
+  group.reached = pixels(low_of_any - kRounding, high_of_any + kRounding).common_with(in_any);
 }
 
-// Samples between two pixels of the window, for |step| >= 1, so that no others can reach them, and
-// with all of a pixel's hat within [low, high). No pixel that sees the line reaches further than
-// two samples beyond them. An end before the first says that there are none.
-Range samples_not_cut_off(const LineCrossing& c) {
+// Samples between two pixels of the window, with all of a pixel's hat within [low, high). For
+// |step| >= 1 no other pixel reaches them; for any step, none that sees the line reaches further
+// than two samples beyond them.
+Range samples_within(const LineCrossing& c) {
   const auto [low, high] = std::minmax({position(c, c.first_pixel), position(c, c.end_pixel - 1)});
   const double first = std::max(c.low + 1.0, low + kRounding);
   const double last = std::min(c.high - 1.0, high - kRounding);
@@ -102,8 +92,8 @@ CrossingGroup& group_of(std::size_t count, std::vector<CrossingGroup>& groups) {
 }
 
 void include(Range whole, Range reached, std::size_t k, CrossingGroup& group) {
-  group.whole = k == 0 ? whole : both(group.whole, whole);
-  group.reached = k == 0 ? reached : around(group.reached, reached);
+  group.whole = k == 0 ? whole : group.whole.common_with(whole);
+  group.reached = k == 0 ? reached : group.reached.joined_with(reached);
 }
 
 // The items after the last of `count` repeat it, without weight: what they read is there.
@@ -141,7 +131,7 @@ void group_views(std::span<const LineCrossing> views, const float* source,
   for (const LineCrossing& view : views) {
     if (view.first_pixel >= view.end_pixel) continue;
     const int pairs = pairs_a_sample(view);
-    const Range inner = samples_not_cut_off(view), reached{inner.first - 2, inner.end + 2};
+    const Range inner = samples_within(view), reached{inner.first - 2, inner.end + 2};
     const Range whole = pairs == 1 ? inner : Range{};
     for (int pair = 0; pair < pairs; ++pair) {
       CrossingGroup& group = group_of(count, groups);

@@ -1,8 +1,9 @@
 #include "kernels/line_projection.h"
 
 #include <algorithm>
-#include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "kernels/lanes.h"
 
@@ -36,6 +37,7 @@ using Numbers = CrossingGroup::Numbers<T>;
 // A vector has numbers of so many items, for so many destinations.
 constexpr int kItemsAVector = std::min(kItems, kVecLanes);
 constexpr int kDestinations = kVecLanes / kItemsAVector;
+static_assert(kItemsAVector == 4 || kItemsAVector == 1);
 
 // Two taps of items: the source at `index` floats and the one after it.
 struct Taps {
@@ -150,6 +152,7 @@ void take_from_groups(const CrossingGroup* groups, int num_groups, const float* 
     const int tile_end = std::min(end, tile + kTile);
     int num_tables = 0;
     const auto use_tables = [&]() HWY_ATTR {
+      static_assert(kMaxTables == 2);
       const auto gather_tables =
           num_tables == 2 ? gather<kSlabs, 2, Next> : gather<kSlabs, 1, Next>;
       gather_tables(tables, source, next, apart, tile_end - tile, stride, out + tile * stride);

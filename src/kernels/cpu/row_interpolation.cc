@@ -50,7 +50,7 @@ void interpolate_rows(const LaneTaps& taps, int width, const float* matrix, floa
 #if HWY_TARGET != HWY_SCALAR
 // Calls body(vector of four, first lane) for each block of four lanes.
 template <class D, class Body>
-HWY_INLINE void for_each_block(D d, hn::Vec<D> v, int first, const Body& body) {
+HWY_INLINE void for_each_block(D, hn::Vec<D> v, int first, const Body& body) {
   if constexpr (hn::MaxLanes(D()) <= 4) {
     body(v, first);
   } else {

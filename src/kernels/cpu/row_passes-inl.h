@@ -23,7 +23,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 // Adds the product of kDepth numbers of each row of A and a vector of columns of B. The two halves
 // of a row are summed apart, which for four rows covers the latency of their FMAs. Bound: kDepth
 // FMAs a row, two a cycle, each with its broadcast inside; with a pointer of its own for every row
-// that is one instruction of one part.
+// that is a single micro-operation.
 template <int kDepth, int kRows, class D>
 HWY_INLINE void pass_rows(D d, const hn::Vec<D> (&b)[kDepth], const float* const (&a)[kRows],
                           float* c, std::ptrdiff_t c_row) {
@@ -137,7 +137,7 @@ HWY_INLINE void pass_all_columns(const SmallGemm& g, std::ptrdiff_t first) {
 }
 
 // Whether the product was one that suits, and is done.
-HWY_INLINE bool rows_pass(const SmallGemm& g) {
+HWY_INLINE bool multiplied_by_passes(const SmallGemm& g) {
   if (g.a_col != 1 || g.depth > 48 || g.depth % 8 != 0 || g.width % 8 != 0) return false;
   std::ptrdiff_t first = 0;
   for (; g.depth - first >= 24; first += 24) pass_all_columns<24>(g, first);
@@ -146,7 +146,7 @@ HWY_INLINE bool rows_pass(const SmallGemm& g) {
   return true;
 }
 #else
-HWY_INLINE bool rows_pass(const SmallGemm&) { return false; }
+HWY_INLINE bool multiplied_by_passes(const SmallGemm&) { return false; }
 #endif
 
 }  // namespace tomofield::kernels::HWY_NAMESPACE

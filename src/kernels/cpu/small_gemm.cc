@@ -19,8 +19,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 // its broadcast inside the FMA. Eight FMAs at least cover their latency.
 //
 // Where the rows of A are neighbours (a transposed matrix), they are addressed without the stride,
-// and with AVX-512 an FMA that has its broadcast inside is one instruction of one part: 24 ranks
-// times 16 lanes are then 25 instructions a step of the depth.
+// and with AVX-512 an FMA that has its broadcast inside is a single micro-operation: 24 ranks times
+// 16 lanes are then 25 of them a step of the depth.
 template <int kVectors, bool kAreNeighbours = false>
 struct Panel {
   static constexpr int kVecs = kVectors;
@@ -122,7 +122,7 @@ HWY_INLINE std::ptrdiff_t single_vectors(D d, const SmallGemm& g, std::ptrdiff_t
 }
 
 void small_gemm(const SmallGemm& g) {
-  if (rows_pass(g)) return;
+  if (multiplied_by_passes(g)) return;
   const hn::ScalableTag<float> d;
   std::ptrdiff_t col = 0;
   const auto vectors_left = [&] {
