@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "base/aligned_buffer.h"
-#include "field/merge_factors.h"
-#include "field/merge_target.h"
+#include "field/factor_maps.h"
 #include "field/resample.h"
 #include "field/variation_planes.h"
+#include "field/vm_layout.h"
 #include "kernels/point_products.h"
 #include "kernels/row_interpolation.h"
 #include "kernels/small_gemm.h"
@@ -23,98 +23,17 @@ using kernels::small_gemm;
 using kernels::spread_rows;
 using kernels::transpose_lanes;
 
-// Positions of the six factors inside a leaf's parameters.
-struct Layout {
-  std::size_t vx, myz, vy, mxz, vz, mxy, count;
-  explicit Layout(const LeafShape& s) {
-    const auto size = [](int a, int b, int c) { return static_cast<std::size_t>(a) * b * c; };
-    vx = 0;
-    myz = vx + size(s.nx, 1, s.rank_x);
-    vy = myz + size(s.nz, s.ny, s.rank_x);
-    mxz = vy + size(s.ny, 1, s.rank_y);
-    vz = mxz + size(s.nx, s.nz, s.rank_y);
-    mxy = vz + size(s.nz, 1, s.rank_z);
-    count = mxy + size(s.nx, s.ny, s.rank_z);
-  }
-};
-
 // The three products of eq. 4 at points, and where their factors lie.
 struct Product {
   kernels::PointProducts points;
   std::size_t vector, matrix;
 };
 std::array<Product, 3> products(const LeafShape& s, const PointTaps& t) {
-  const Layout at(s);
+  const VmLayout at(s);
   return {Product{{t.x, t.z, t.y, s.ny, s.rank_x}, at.vx, at.myz},
           Product{{t.y, t.x, t.z, s.nz, s.rank_y}, at.vy, at.mxz},
           Product{{t.z, t.x, t.y, s.ny, s.rank_z}, at.vz, at.mxy}};
 }
-// Factors between a leaf's parameters and the coordinates of a merge.
-class FactorMaps {
- public:
-  FactorMaps(const LeafShape& shape, const MergeTarget& target)
-      : s_(shape), at_(shape), target_(target) {}
-
-  LeafFactors read(const float* p) const {
-    LeafFactors f;
-    f.vx = factor(p + at_.vx, s_.nx, s_.rank_x);
-    f.myz = factor(p + at_.myz, s_.nz * s_.ny, s_.rank_x);
-    f.vy = factor(p + at_.vy, s_.ny, s_.rank_y);
-    f.mxz = factor(p + at_.mxz, s_.nx * s_.nz, s_.rank_y);
-    f.vz = factor(p + at_.vz, s_.nz, s_.rank_z);
-    f.mxy = factor(p + at_.mxy, s_.nx * s_.ny, s_.rank_z);
-    const auto times = [](const Eigen::MatrixXd& chol) {
-      return [&chol](auto&& block) { block = (chol.transpose() * block).eval(); };
-    };
-    apply(f, times(target_.chol_x), times(target_.chol_y));
-    return f;
-  }
-
-  void write(LeafFactors f, float* p) const {
-    const auto solve = [](const Eigen::MatrixXd& chol) {
-      return [&chol](auto&& block) {
-        block = chol.transpose().triangularView<Eigen::Upper>().solve(block.eval()).eval();
-      };
-    };
-    apply(f, solve(target_.chol_x), solve(target_.chol_y));
-    const auto copy = [p](const RowMajorMatrix& from, std::size_t to) {
-      std::copy_n(from.data(), from.size(), p + to);
-    };
-    copy(f.vx, at_.vx);
-    copy(f.myz, at_.myz);
-    copy(f.vy, at_.vy);
-    copy(f.mxz, at_.mxz);
-    copy(f.vz, at_.vz);
-    copy(f.mxy, at_.mxy);
-  }
-
- private:
-  static RowMajorMatrix factor(const float* p, Eigen::Index rows, Eigen::Index rank) {
-    using Floats = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    return Eigen::Map<const Floats>(p, rows, rank).cast<double>();
-  }
-
-  // Along x of three factors and along y of three.
-  template <typename AlongX, typename AlongY>
-  void apply(LeafFactors& f, const AlongX& along_x, const AlongY& along_y) const {
-    const auto flat = [](RowMajorMatrix& m, Eigen::Index rows) {
-      return Eigen::Map<RowMajorMatrix>(m.data(), rows, m.size() / rows);
-    };
-    along_x(flat(f.vx, s_.nx));
-    along_x(flat(f.mxz, s_.nx));
-    along_x(flat(f.mxy, s_.nx));
-    along_y(flat(f.vy, s_.ny));
-    for (int k = 0; k < s_.nz; ++k)
-      along_y(f.myz.middleRows(static_cast<Eigen::Index>(k) * s_.ny, s_.ny));
-    for (int i = 0; i < s_.nx; ++i)
-      along_y(f.mxy.middleRows(static_cast<Eigen::Index>(i) * s_.ny, s_.ny));
-  }
-
-  const LeafShape& s_;
-  Layout at_;
-  const MergeTarget& target_;
-};
-
 // A matrix product at the rows of a slab: values[first_value + row · value_row + lane] is a sum
 // over ranks of factor[row, rank] and plane[y, rank] at the lane's y.
 struct SlabProduct {
@@ -126,7 +45,7 @@ struct SlabProduct {
 // Those of VY ⊗ MXZ, of VX ⊗ MYZ a vertex in z, and of VZ ⊗ MXY a vertex in x.
 template <typename Body>
 void for_each_slab_product(const LeafShape& s, const Body& body) {
-  const Layout at(s);
+  const VmLayout at(s);
   const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(s.nz) * kLanes;
   const auto plane = [&s](int index, int rank) {
     return static_cast<std::size_t>(index) * static_cast<std::size_t>(s.ny) *
@@ -186,11 +105,11 @@ struct PlaneRows {
 
 }  // namespace
 
-std::size_t VmField::count(const LeafShape& shape) { return Layout(shape).count; }
+std::size_t VmField::count(const LeafShape& shape) { return VmLayout(shape).count; }
 
 // VX, MXZ and VZ have no y; of the others, y comes after z or x and before the rank.
 std::vector<ParameterRuns> VmField::runs_of_rows(const LeafShape& s, int first_y, int end_y) const {
-  const Layout at(s);
+  const VmLayout at(s);
   const auto rows = [&](std::size_t factor, int rank, int repeats) {
     const auto width = static_cast<std::size_t>(rank);
     return ParameterRuns{factor + static_cast<std::size_t>(first_y) * width,
@@ -261,7 +180,7 @@ void VmField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_va
 
 void VmField::add_row_values(int leaf, int lower, float fraction, float* values) const {
   const LeafShape& s = shape(leaf);
-  const Layout at(s);
+  const VmLayout at(s);
   const float* p = leaf_parameters(leaf);
   const auto row_of = [&](const float* factor, int rank, int r) {
     const float* a = factor + static_cast<std::ptrdiff_t>(lower) * rank + r;
@@ -337,7 +256,7 @@ double VmField::parameter_variation(int leaf, const kernels::VariationPenalty& p
                                     double weight, float* gradient) const {
   constexpr double kVectorShare = 0.1;  // α of eq. 5
   const LeafShape& s = shape(leaf);
-  const Layout at(s);
+  const VmLayout at(s);
   const float* p = leaf_parameters(leaf);
   const auto vector = [&](std::size_t where, int n, int rank) {
     return array_variation(p + where, 1, 1, n, rank, penalty, kVectorShare * weight,
@@ -353,7 +272,7 @@ double VmField::parameter_variation(int leaf, const kernels::VariationPenalty& p
 
 void VmField::sample_quarter(const LeafShape& s, const float* leaf, double x0, double y0,
                              float* quarter) const {
-  const Layout at(s);
+  const VmLayout at(s);
   const double x_first = x0 * (s.nx - 1), y_first = y0 * (s.ny - 1);
   const auto copy = [&](std::size_t from, std::size_t to) {
     std::copy(leaf + from, leaf + to, quarter + from);
@@ -370,7 +289,7 @@ void VmField::sample_quarter(const LeafShape& s, const float* leaf, double x0, d
 
 void VmField::resample_leaf(const LeafShape& f, const float* from, const LeafShape& t,
                             float* to) const {
-  const Layout at(f), into(t);
+  const VmLayout at(f), into(t);
   // [slow, fast, rank], the slow axis first.
   const auto matrix = [&](std::size_t where, int slow, int fast, int rank, std::size_t target,
                           int new_slow, int new_fast) {
@@ -387,7 +306,7 @@ void VmField::resample_leaf(const LeafShape& f, const float* from, const LeafSha
 }
 
 void VmField::join_leaves(const LeafShape& s, const Quarters& leaves, float* joined) const {
-  const Layout at(s);
+  const VmLayout at(s);
   const auto join = [&](std::size_t where, const ArrayExtents& extents) {
     Quarters factor = leaves;
     for (const float*& quarter : factor) quarter += where;
