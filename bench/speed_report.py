@@ -163,7 +163,7 @@ def draw_roofline(pyplot, rows):
             panel.plot(intensity, speed, "o", label=name,
                        color=pyplot.get_cmap("tab20")(position % 20))
     panel.set(xscale="log", yscale="log", xlabel="FLOPs a byte", ylabel="GFLOP/s", title=target)
-    panel.legend(fontsize=7)
+    panel.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.01, 1))
     return drawing
 
 
@@ -182,6 +182,7 @@ def draw_reconstructions(pyplot, rows):
     panel.set(xscale="log", xlabel="core-seconds", ylabel="PSNR at best scale, dB")
     panel.grid(alpha=0.3)
     panel.legend(fontsize=8)
+    panel.margins(x=0.1)  # room for the names of the last
     return drawing
 
 
