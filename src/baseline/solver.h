@@ -70,6 +70,7 @@ class ThreadScratch {
       samples_.emplace_back(SlabPair::kMost * problem.grid().size());
   }
   float* detector() { return detectors_[thread()].data(); }
+  /// As they were left.
   float* samples(std::size_t buffer = 0) {
     return samples_[thread() * num_buffers_ + buffer].data();
   }

@@ -66,7 +66,7 @@ std::size_t lane_size(const LeafShape& s) {
 
 // Scratch that a thread keeps between calls.
 float* scratch(std::size_t size, int which) {
-  thread_local base::AlignedBuffer<float> buffers[3];
+  thread_local base::AlignedBuffer<float> buffers[2];
   buffers[which].reserve(size);
   return buffers[which].data();
 }

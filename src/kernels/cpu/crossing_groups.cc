@@ -18,9 +18,6 @@ int rounded_up(double at) {
   const int truncated = static_cast<int>(within);
   return truncated + (within > truncated ? 1 : 0);
 }
-Range integers_within(double first, double end) {
-  return {rounded_up(first), std::max(rounded_up(first), rounded_up(end))};
-}
 
 double position(const LineCrossing& c, int pixel) {
   return c.offset + static_cast<double>(c.step) * pixel;
@@ -46,7 +43,7 @@ void set_pixels(std::span<const LineCrossing> lines, CrossingGroup& group) {
   const auto pixels = [&](double low, double high) {
     if (low >= high) return Range{};  // no pixel is within all of them
     const double a = low * inverse, b = high * inverse;
-    return integers_within(std::min(a, b), std::max(a, b));
+    return Range{rounded_up(std::min(a, b)), rounded_up(std::max(a, b))};
   };
   group.whole = pixels(low_of_all + kRounding, high_of_all - kRounding).common_with(in_all);
   group.reached = pixels(low_of_any - kRounding, high_of_any + kRounding).common_with(in_any);
