@@ -176,7 +176,8 @@ def measure_wide(options, wide, name, scratch):
     """Core-hours of the whole series from the band: a run is a start, so many epochs of full
     resolution and so many coarse ones, each as long as the band is high."""
     folder = wide_band.band_series(options, wide)
-    command = [options.program, "reconstruct", *wide.field.split(), "--tv-penalty", "concave",
+    command = [options.program, "reconstruct", *wide.field.split(), "--vertex-epochs", "0",
+               "--tv-penalty", "concave",
                *quality_rows.series_arguments(folder, wide.thickness), "--mode", "12", "-o",
                os.path.join(scratch, "band.mrc"), "--overwrite"]
 
@@ -211,7 +212,7 @@ def size_rows(options, plan):
             if name not in seen:
                 seen.add(name)
                 arguments = (f"reconstruct --tv-penalty concave --epochs {plan.size_epochs} "
-                             f"--coarse-epochs 0 --rank {size['rank']}")
+                             f"--vertex-epochs 0 --coarse-epochs 0 --rank {size['rank']}")
                 yield Row("sizes", name, arguments,
                           functools.partial(measure_size, options, size, name, arguments))
 

@@ -19,7 +19,7 @@ struct Arguments {
   reconstruct::ReconstructOptions options;
   std::string view_scale = "auto";
   std::string activation = "auto";
-  std::optional<int> leaf_size, epochs, coarse_epochs;
+  std::optional<int> leaf_size, epochs, vertex_epochs, coarse_epochs;
   std::optional<double> learning_rate;
   std::optional<double> variation;
   std::string penalty = "auto";
@@ -72,14 +72,21 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
   command
       .add_option(
           "--epochs", arguments.epochs,
-          "passes over all views at full resolution; default: 30, 10 of a grid, 5 of vertices "
-          "2 pixels apart or further (4 of an adaptive tree)")
+          "passes over all views at full resolution; default: 10, 30 of factors that do not "
+          "begin with vertices, 5 of vertices 2 pixels apart or further (4 of an adaptive tree)")
       ->group(group);
   command
       .add_option(
-          "--coarse-epochs", arguments.coarse_epochs,
-          "passes before them over binned views; 0: none; default: 80, or as many times fewer as "
-          "--epochs are than usual")
+          "--vertex-epochs", arguments.vertex_epochs,
+          "passes before them that fit plain vertices, which the factors begin with, as in the "
+          "coarse ones; 0: factors from the start; default: as many as --epochs, up to 10, where "
+          "a leaf has at most twice as many vertices along its side as ranks")
+      ->group(group);
+  command
+      .add_option("--coarse-epochs", arguments.coarse_epochs,
+                  "passes before all of these over binned views; 0: none; default: 80, or as many "
+                  "times fewer as "
+                  "--epochs are than usual")
       ->group(group);
   command
       .add_option("--coarse-bin", fit.coarse_bin,
@@ -168,9 +175,14 @@ void set_leaves(Arguments& arguments) {
 
 void set_schedule(Arguments& arguments) {
   reconstruct::FitOptions& fit = arguments.options.fit;
-  fit.coarse_epochs = arguments.coarse_epochs.value_or(1);  // any but 0: there is a coarse stage
+  // Any but 0: there is such a stage.
+  fit.coarse_epochs = arguments.coarse_epochs.value_or(1);
+  const bool has_vertices = reconstruct::begins_with_vertices(arguments.options.field, fit);
+  fit.vertex_epochs = arguments.vertex_epochs.value_or(has_vertices ? 1 : 0);
   const reconstruct::Schedule usual = reconstruct::usual_schedule(arguments.options.field, fit);
   fit.epochs = arguments.epochs.value_or(usual.epochs);
+  if (!arguments.vertex_epochs && has_vertices)
+    fit.vertex_epochs = usual.vertex_epochs_of(fit.epochs);
   if (!arguments.coarse_epochs) fit.coarse_epochs = usual.coarse_epochs_of(fit.epochs);
   fit.learning_rate = arguments.learning_rate.value_or(usual.learning_rate);
 }

@@ -45,9 +45,12 @@ std::function<void()> tell_if_stuck(const std::filesystem::path& model,
 std::string epochs_text(const std::vector<reconstruct::Stage>& stages) {
   std::vector<std::string> texts;
   for (const reconstruct::Stage& stage : stages) {
+    const char* of_vertices =
+        stage.field_kind == stages.back().field_kind ? "" : " with plain vertices";
     texts.push_back(stage.bin == 1
-                        ? fmt::format("{} at full resolution", stage.epochs)
-                        : fmt::format("{} of pixels {} x {}", stage.epochs, stage.bin, stage.bin));
+                        ? fmt::format("{} at full resolution{}", stage.epochs, of_vertices)
+                        : fmt::format("{} of pixels {} x {}{}", stage.epochs, stage.bin, stage.bin,
+                                      of_vertices));
   }
   return fmt::format("{}", fmt::join(texts, ", "));
 }

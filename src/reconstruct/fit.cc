@@ -10,6 +10,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "base/shuffle.h"
+#include "field/factorise.h"
 #include "kernels/lanes.h"
 #include "reconstruct/noise_scale.h"
 #include "reconstruct/slab_objective.h"
@@ -87,6 +88,11 @@ FitOptions with_at_most_one_subset_a_view(FitOptions options, int num_views) {
   return options;
 }
 
+FieldOptions of_kind(FieldOptions options, const std::string& kind) {
+  options.kind = kind;
+  return options;
+}
+
 Domain domain_of(const Measurement& measurement, const FieldOptions& options) {
   return measurement.ray_geometry ? make_domain(*measurement.ray_geometry, measurement.roi, options)
                                   : make_domain(measurement.geometry, measurement.roi, options);
@@ -123,12 +129,12 @@ Fit::Fit(const Measurement& measurement, const FieldOptions& field_options,
       bands_(reconstruct::own_bands(domain_.num_rows, domain_.tree.roots().cell_size,
                                     *measurement.processes)),
       field_(make_initial_field(domain_, measurement.geometry.thickness, measurement.mean_density,
-                                field_options, options.seed,
+                                of_kind(field_options, stages_.front().field_kind), options.seed,
                                 leaves_to_keep(*measurement.processes, domain_.tree, bands_))),
       optimizer_(*field_, optimize::AdamOptions{}),
       fitted_views_(views_but(measurement.geometry.num_views(), measurement.held_out)),
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())) {
-  if (options_.coarse_epochs > 0 && stages_.size() == 1 && options_.engine == "slab")
+  if (options_.coarse_epochs > 0 && stages_.front().bin == 1 && options_.engine == "slab")
     base::log_info(
         "no coarse stage: leaves of this --leaf-size do not end with slabs of coarse pixels");
   enter_stage();
@@ -153,7 +159,7 @@ void Fit::enter_stage() {
                      sample_grid(domain_, measurement_.geometry.thickness, stage().bin));
 }
 
-// To the vertices of the stage; the optimiser starts anew.
+// To the vertices of the stage, or from them to factors; the optimiser starts anew.
 void Fit::resample_field() {
   std::vector<field::LeafShape> shapes;
   const field::Quadtree& tree = field_->tree();
@@ -161,7 +167,8 @@ void Fit::resample_field() {
     shapes.push_back(domain_.shape_in(tree.leaf(leaf).region, stage().bin));
   gradient_.reset(0);  // and the moments go before the other field needs memory
   optimizer_.state() = {};
-  field_ = field_->resampled(std::move(shapes));
+  field_ = field_->kind() == stage().field_kind ? field_->resampled(std::move(shapes))
+                                                : field::factorised(*field_, std::move(shapes));
   optimizer_ = optimize::Adam(*field_, optimize::AdamOptions{});
 }
 
@@ -231,8 +238,7 @@ double Fit::work(std::int64_t steps) const {
   for (const Stage& s : stages_) {
     const std::int64_t first = s.first_epoch * steps_per_epoch();
     const std::int64_t own = std::int64_t{s.epochs} * steps_per_epoch();
-    work += static_cast<double>(std::clamp<std::int64_t>(steps - first, 0, own)) /
-            (s.bin * s.bin * s.bin);
+    work += static_cast<double>(std::clamp<std::int64_t>(steps - first, 0, own)) * s.step_cost;
   }
   return work;
 }
@@ -311,6 +317,8 @@ void Fit::take_step(const std::vector<int>& views) {
 std::vector<BandResult> Fit::band_gradients(const std::vector<int>& views) {
   ObjectiveWeights weights =
       objective_weights(options_, measurement_, typical_noise(binned_->noise_sigma));
+  if (stage().field_kind != stages_.back().field_kind)
+    weights.factor_variation = 0;  // there are no factors yet
   // Each step looks at edges from another corner: forward differences alone treat
   // their two sides differently.
   base::Random directions(options_.seed,

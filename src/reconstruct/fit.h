@@ -40,7 +40,8 @@ struct Progress {
 /// The loop of DESIGN §5. With the slab engine, a step uses every slab and one
 /// subset of the views; with the ray engine, a random share of the rays of all
 /// views, while slabs without views carry the regularisers. With a coarse stage, the
-/// field has its vertices and steps until its epochs are over, and is refined then.
+/// field has its vertices and steps until its epochs are over, and is refined then. Factors may be
+/// plain vertices until the last stage.
 ///
 /// Processes that share a fit (Measurement::processes) each work on some bands and keep the
 /// parameters of these and of the leaves next to them; what they share otherwise are sums, of
@@ -64,7 +65,7 @@ class Fit {
   const std::vector<Stage>& stages() const { return stages_; }
   /// By how much the density's variation weighs more than its weight over the noise.
   double variation_gain() const;
-  /// Of the first `steps` steps, in steps at full resolution: a coarse one costs 1 / bin³.
+  /// Of the first `steps` steps, in steps of the last stage (Stage::step_cost).
   double work(std::int64_t steps) const;
   const field::Field& field() const { return *field_; }
   field::Field& field() { return *field_; }

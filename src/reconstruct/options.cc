@@ -66,6 +66,9 @@ std::vector<std::string> FieldOptions::faults() const {
 std::vector<std::string> FitOptions::faults() const {
   Faults faults;
   faults.require_between("--epochs", epochs, 1, kMost);
+  faults.require_between("--vertex-epochs", vertex_epochs, 0, kMost);
+  if (vertex_epochs > 0 && engine == "ray")
+    faults.add("--vertex-epochs needs --engine slab: with rays factors are fitted from the start");
   faults.require_between("--coarse-epochs", coarse_epochs, 0, kMost);
   faults.require_between("--coarse-bin", coarse_bin, 2, 64);
   faults.require_between("--subsets", subsets, 1, kMost);

@@ -12,11 +12,11 @@ struct FieldOptions {
   int leaf_size = 32;            ///< side of a leaf, a multiple of 16
   std::string tree = "uniform";  ///< or adaptive: leaves half and twice as wide where that pays
   int depth = 1;                 ///< of leaves as they are first; those of the margin have 0
-  int leaf_budget = 0;  ///< most leaves of an adaptive tree; 0: as many as it begins with
-  double vertex_spacing = 1.0;  ///< between vertices, all axes; of leaves of that size
-  int rank = 24;                ///< of each mode, vm only
-  bool with_margin = true;      ///< model what rays cross outside the region of interest
-  double margin_spacing = 2.0;  ///< of samples and vertices there
+  int leaf_budget = 0;           ///< most leaves of an adaptive tree; 0: as many as it begins with
+  double vertex_spacing = 1.0;   ///< between vertices, all axes; of leaves of that size
+  int rank = 24;                 ///< of each mode, vm only
+  bool with_margin = true;       ///< model what rays cross outside the region of interest
+  double margin_spacing = 2.0;   ///< of samples and vertices there
   int margin_rank = 8;
   std::string activation = "softplus";  ///< or identity, for densities of either sign
   double sharpness = 5.0;               ///< β of softplus, per density unit
@@ -32,8 +32,9 @@ struct FieldOptions {
 /// the typical noise of a ray in density units times pixels (and a gain where σ is small,
 /// noise_scale.h).
 struct FitOptions {
-  int epochs = 30;                 ///< at full resolution
-  int coarse_epochs = 0;           ///< before them, with fewer pixels; 0: none
+  int epochs = 30;                 ///< at full resolution, of the field as it will be
+  int vertex_epochs = 0;           ///< before them, of plain vertices that factors begin with
+  int coarse_epochs = 0;           ///< before all, with fewer pixels; 0: none
   int coarse_bin = 4;              ///< how many times fewer on each axis, at most; a power of two
   int subsets = 16;                ///< interleaved tilt subsets: steps an epoch; at most one a view
   std::string engine = "slab";     ///< or ray: any view geometry, views as they were recorded
@@ -43,6 +44,8 @@ struct FitOptions {
   double final_rate = 0.1;
   double coarse_final_rate = 0.3;   ///< of a coarse stage
   double refined_rate = 0.5;        ///< where a stage starts after a coarse one
+  double vertex_rate = 0.7;         ///< of plain vertices that factors begin with
+  double factorised_rate = 0.3;     ///< where these factors start
   double density_variation = 14.0;  ///< see usual_variation
   double factor_variation = 0.0;
   double boundary = 4.0;              ///< boundary consistency of leaves (eq. 6)

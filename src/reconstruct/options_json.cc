@@ -69,6 +69,7 @@ json field_json(const FieldOptions& o) {
 
 json fit_json(const FitOptions& o) {
   return {{"epochs", o.epochs},
+          {"vertex_epochs", o.vertex_epochs},
           {"coarse_epochs", o.coarse_epochs},
           {"coarse_bin", o.coarse_bin},
           {"subsets", o.subsets},
@@ -79,6 +80,8 @@ json fit_json(const FitOptions& o) {
           {"final_rate", o.final_rate},
           {"coarse_final_rate", o.coarse_final_rate},
           {"refined_rate", o.refined_rate},
+          {"vertex_rate", o.vertex_rate},
+          {"factorised_rate", o.factorised_rate},
           {"density_variation", o.density_variation},
           {"factor_variation", o.factor_variation},
           {"boundary", o.boundary},

@@ -66,6 +66,22 @@ TEST(ReconstructOptions, LargeLeavesOfAUniformTreeAreRootCells) {
   EXPECT_EQ(usual_depth(field), 1);
 }
 
+TEST(ReconstructOptions, OnlyFactorsOfAUniformTreeBeginAsVertices) {
+  const auto num_faults = [](const std::string& kind, const std::string& tree,
+                             const std::string& engine) {
+    ReconstructOptions options = good_options();
+    options.fit.vertex_epochs = 3;
+    options.field.kind = kind;
+    options.field.tree = tree;
+    options.fit.engine = engine;
+    return options.faults().size();
+  };
+  EXPECT_EQ(num_faults("vm", "uniform", "slab"), 0u);
+  EXPECT_EQ(num_faults("grid", "uniform", "slab"), 1u);
+  EXPECT_EQ(num_faults("vm", "adaptive", "slab"), 1u);
+  EXPECT_EQ(num_faults("vm", "uniform", "ray"), 1u);
+}
+
 TEST(ReconstructOptions, ABudgetIsForAdaptiveTrees) {
   FieldOptions options;
   options.leaf_budget = 12;

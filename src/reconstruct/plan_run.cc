@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <iterator>
+#include <string>
 #include <vector>
 
 #include "base/lanes.h"
@@ -53,8 +53,9 @@ int steps_an_epoch(const PreparedSeries& plan, const FitOptions& options) {
   return std::min(options.subsets, num_fitted_views(plan, options));
 }
 
-// Of the first tree, or of an adaptive one whose budget is used up.
-std::size_t most_parameters(const Domain& domain, const FieldOptions& options) {
+// Of the first tree, or of an adaptive one whose budget is used up, as a field of this kind.
+std::size_t most_parameters(const Domain& domain, const FieldOptions& options,
+                            const std::string& kind) {
   std::vector<field::LeafShape> shapes = domain.shapes, inside;
   for (int i = 0; i < domain.tree.num_leaves(); ++i) {
     if (domain.tree.leaf(i).region == field::Region::kInterest)
@@ -63,11 +64,11 @@ std::size_t most_parameters(const Domain& domain, const FieldOptions& options) {
   const auto more = options.leaf_budget - static_cast<std::ptrdiff_t>(inside.size());
   if (options.tree == "adaptive" && more > 0)
     shapes.insert(shapes.end(), static_cast<std::size_t>(more), inside.front());
-  return field::count_parameters(options.kind, shapes);
+  return field::count_parameters(kind, shapes);
 }
 
 // What this process has of the parameters with their gradient and moments, and of its neighbours'.
-double part_of_parameters(const Domain& domain, const ReconstructOptions& options,
+double part_of_parameters(const Domain& domain, const std::string& kind,
                           const distributed::Communicator& processes) {
   if (processes.size() == 1) return 1.0;
   const distributed::Range bands =
@@ -75,8 +76,19 @@ double part_of_parameters(const Domain& domain, const ReconstructOptions& option
   std::vector<field::LeafShape> needed;
   for (const int leaf : needed_leaves(domain.tree, bands))
     needed.push_back(domain.shapes[static_cast<std::size_t>(leaf)]);
-  return static_cast<double>(field::count_parameters(options.field.kind, needed)) /
-         static_cast<double>(field::count_parameters(options.field.kind, domain.shapes));
+  return static_cast<double>(field::count_parameters(kind, needed)) /
+         static_cast<double>(field::count_parameters(kind, domain.shapes));
+}
+
+// Of the stage in which a process has most.
+double most_own_parameters(const Domain& domain, const RunPlan& run, const FieldOptions& options,
+                           const distributed::Communicator& processes) {
+  double most = 0;
+  for (const Stage& s : run.stages) {
+    most = std::max(most, static_cast<double>(most_parameters(domain, options, s.field_kind)) *
+                              part_of_parameters(domain, s.field_kind, processes));
+  }
+  return most;
 }
 
 // The rows of a shape that the process with most of them has.
@@ -97,18 +109,17 @@ std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, co
   using tilt_series::SlabViews;
   const std::size_t copies = options.field.tree == "adaptive" ? 7 : 4;
   const auto parameters =
-      static_cast<std::size_t>(static_cast<double>(copies * sizeof(float) * run.num_parameters) *
-                               part_of_parameters(domain, options, processes));
+      static_cast<std::size_t>(static_cast<double>(copies * sizeof(float)) *
+                               most_own_parameters(domain, run, options.field, processes));
   const SlabViews::Shape own_shape = own_part(plan.rays_shape(), domain, processes);
   const int slabs_in_use = kSlabsOfThread * base::thread_count();
   const std::size_t rays = SlabViews::resident_memory(own_shape, slabs_in_use);
-  // The last coarse stage has the most of them.
-  const std::size_t coarse_rays =
-      run.stages.size() == 1
-          ? 0
-          : SlabViews::resident_memory(
-                SlabViews::binned_shape(own_shape, std::prev(run.stages.end(), 2)->bin),
-                slabs_in_use);
+  std::size_t coarse_rays = 0;  // the last coarse stage has the most of them
+  for (const Stage& s : run.stages) {
+    if (s.bin == 1) continue;
+    coarse_rays =
+        SlabViews::resident_memory(SlabViews::binned_shape(own_shape, s.bin), slabs_in_use);
+  }
   const int steps = steps_an_epoch(plan, options.fit);
   const int views_a_step = plan.ray_geometry ? 0 : (run.num_views + steps - 1) / steps;
   const std::size_t fitting = parameters + static_cast<std::size_t>(base::thread_count()) *
@@ -137,7 +148,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.roi = plan.roi;
   run.thickness = plan.geometry.thickness;
   run.num_leaves = domain.tree.num_leaves();
-  run.num_parameters = most_parameters(domain, options.field);
+  run.num_parameters = most_parameters(domain, options.field, options.field.kind);
   run.stages = make_stages(options.field, options.fit);
   const Stage& last = run.stages.back();
   run.num_trials = options.num_trials(num_fitted_views(plan, options.fit));

@@ -29,7 +29,10 @@ nlohmann::json tree_json(const TreeProgress& tree) {
 nlohmann::json stages_json(const std::vector<Stage>& stages) {
   nlohmann::json list = nlohmann::json::array();
   for (const Stage& s : stages)
-    list.push_back({{"bin", s.bin}, {"first_epoch", s.first_epoch}, {"epochs", s.epochs}});
+    list.push_back({{"field", s.field_kind},
+                    {"bin", s.bin},
+                    {"first_epoch", s.first_epoch},
+                    {"epochs", s.epochs}});
   return list;
 }
 

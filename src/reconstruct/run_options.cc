@@ -27,6 +27,10 @@ std::vector<std::string> ReconstructOptions::faults() const {
   std::vector<std::string> all = specimen.faults();
   for (const auto& faults : {field.faults(), fit.faults()})
     all.insert(all.end(), faults.begin(), faults.end());
+  if (fit.vertex_epochs > 0 && (field.kind != "vm" || field.tree != "uniform"))
+    all.emplace_back(
+        "--vertex-epochs is for the factors of a uniform tree: leave it out, or give --field vm "
+        "and --tree uniform");
   if (tune && fit.engine == "ray")
     all.emplace_back("--tune predicts aligned views: it needs --engine slab");
   if (tune && fit.patience > 0)

@@ -82,6 +82,76 @@ TEST(Stages, NoneIsWithoutEpochs) {
   EXPECT_EQ(stages[0].epochs, 1);
 }
 
+FieldOptions factors(int leaf_size, int rank, double spacing = 1.0) {
+  FieldOptions field;
+  field.leaf_size = leaf_size;
+  field.rank = rank;
+  field.vertex_spacing = spacing;
+  return field;
+}
+
+TEST(Stages, FactorsMayBeginAsPlainVertices) {
+  FitOptions fit;
+  fit.coarse_epochs = 6;
+  fit.vertex_epochs = 4;
+  fit.epochs = 3;
+  const auto stages = make_stages(factors(64, 40), fit);
+  ASSERT_EQ(stages.size(), 4u);
+  const std::vector<std::string> kinds{"grid", "grid", "grid", "vm"};
+  const std::vector<int> bins{4, 2, 1, 1}, epochs{3, 3, 4, 3};
+  std::int64_t first_epoch = 0;
+  for (std::size_t s = 0; s < 4; ++s) {
+    EXPECT_EQ(stages[s].field_kind, kinds[s]);
+    EXPECT_EQ(stages[s].bin, bins[s]);
+    EXPECT_EQ(stages[s].epochs, epochs[s]);
+    EXPECT_EQ(stages[s].first_epoch, first_epoch);
+    EXPECT_LT(stages[s].last_rate, stages[s].first_rate);
+    first_epoch += epochs[s];
+  }
+  // Vertices take smaller steps than factors, and these go on with small ones.
+  EXPECT_DOUBLE_EQ(stages[0].first_rate, 0.7 * fit.learning_rate);
+  EXPECT_DOUBLE_EQ(stages[2].first_rate, 0.35 * fit.learning_rate);
+  EXPECT_DOUBLE_EQ(stages[3].first_rate, 0.3 * fit.learning_rate);
+  EXPECT_DOUBLE_EQ(stages[3].last_rate, 0.1 * fit.learning_rate);
+  // A step of vertices costs less than one of factors, and a coarse one an eighth of it.
+  EXPECT_LT(stages[2].step_cost, stages[3].step_cost);
+  EXPECT_DOUBLE_EQ(8 * stages[1].step_cost, stages[2].step_cost);
+  fit.vertex_epochs = 0;
+  for (const Stage& stage : make_stages(factors(64, 40), fit)) EXPECT_EQ(stage.field_kind, "vm");
+}
+
+TEST(Stages, FactorsBeginAsVerticesWhereTheseAreNoMore) {
+  const FitOptions slabs;
+  EXPECT_TRUE(begins_with_vertices(factors(32, 24), slabs));
+  EXPECT_TRUE(begins_with_vertices(factors(32, 16), slabs));
+  EXPECT_TRUE(begins_with_vertices(factors(64, 16, 2), slabs));
+  EXPECT_FALSE(begins_with_vertices(factors(32, 15), slabs));
+  EXPECT_FALSE(begins_with_vertices(factors(256, 16, 2.5), slabs));
+  EXPECT_TRUE(begins_with_vertices(factors(32, 32), slabs));
+  EXPECT_FALSE(begins_with_vertices(factors(32, 33), slabs));  // a rank would hold nothing
+  FieldOptions other = factors(32, 24);
+  other.tree = "adaptive";
+  EXPECT_FALSE(begins_with_vertices(other, slabs));
+  other = factors(32, 24);
+  other.kind = "grid";
+  EXPECT_FALSE(begins_with_vertices(other, slabs));
+  FitOptions rays;
+  rays.engine = "ray";
+  EXPECT_FALSE(begins_with_vertices(factors(32, 24), rays));
+}
+
+TEST(Stages, FactorsThatBeginAsVerticesTakeAThirdOfTheEpochs) {
+  FitOptions fit;
+  const Schedule alone = usual_schedule(factors(32, 24), fit);
+  fit.vertex_epochs = 1;
+  const Schedule usual = usual_schedule(factors(32, 24), fit);
+  EXPECT_EQ(3 * usual.epochs, alone.epochs);
+  EXPECT_EQ(usual.learning_rate, alone.learning_rate);
+  EXPECT_EQ(usual.vertex_epochs_of(usual.epochs), usual.epochs);
+  EXPECT_EQ(usual.vertex_epochs_of(3), 3);
+  EXPECT_EQ(usual.vertex_epochs_of(50), usual.epochs);
+}
+
 Schedule usual(const std::string& kind, double spacing, int coarse_epochs = 1,
                const std::string& tree = "uniform") {
   FieldOptions field;

@@ -159,6 +159,7 @@ FitOptions penalty_trial_options(const FieldOptions& plain, const FieldOptions& 
   FitOptions shorter = fit;
   shorter.epochs = std::max(1, static_cast<int>(std::lround(kPenaltyPart * part * usual.epochs)));
   if (fit.coarse_epochs > 0) shorter.coarse_epochs = usual.coarse_epochs_of(shorter.epochs);
+  shorter.vertex_epochs = 0;
   shorter.learning_rate = usual.learning_rate;
   return shorter;
 }
@@ -257,9 +258,9 @@ std::optional<Tuned> tune(const Measurement& measurement, const FieldOptions& fi
   log_trials(tuned->trials);
   base::log_info(
       fmt::format("tuned: --tv-penalty {} --tv {:.3f} --rank {} --epochs {} "
-                  "--coarse-epochs {}",
+                  "--vertex-epochs {} --coarse-epochs {}",
                   tuned->settings.penalty, tuned->settings.variation, tuned->settings.rank,
-                  tuned->settings.epochs, fit.coarse_epochs));
+                  tuned->settings.epochs, fit.vertex_epochs, fit.coarse_epochs));
   return tuned;
 }
 

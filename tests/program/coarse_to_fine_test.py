@@ -1,4 +1,5 @@
-"""reconstruct's coarse stage: its options, its plan, and --resume in and after it.
+"""reconstruct's stages, coarse pixels and plain vertices before factors: their options, the plan,
+and --resume in and after them.
 
 usage: coarse_to_fine_test.py TOMOFIELD SCRATCH_DIR"""
 
@@ -63,24 +64,90 @@ def test_faulty_options_are_refused():
         assert result.returncode == 2 and option in result.stderr, result
 
 
-def vertices_when_stopped(results, *options):
-    """Of a leaf's side, as often as a run was stopped and resumed until it was done."""
-    vertices = set()
+def stages_when_stopped(results, *options):
+    """(kind of field, vertices of a leaf's side) as often as a run was stopped and resumed until it
+    was done."""
+    stages = set()
 
     def remember_stage():
         with h5py.File(results.model_path) as model:
-            vertices.add(int(model["field/leaves/nx"][0]))
+            field = model["field"]
+            stages.add((field.attrs["kind"].decode(), int(field["leaves/nx"][0])))
 
     harness.finish_with_stops(command(results, "--resume", "--threads", 1, *options),
                               remember_stage, most=60)
-    return vertices
+    return stages
 
 
 def test_runs_stopped_in_either_stage_end_alike():
     results = fresh_results("resumed")
-    vertices = vertices_when_stopped(results)
-    assert 17 in vertices, f"no run was caught in the coarse stage: {vertices}"
+    stages = stages_when_stopped(results)
+    assert ("vm", 17) in stages, f"no run was caught in the coarse stage: {stages}"
     assert results.same_as(whole)
+
+
+VERTICES_FIRST = ["--rank", 20, "--vertex-epochs", 8, "--coarse-epochs", 10, "--epochs", 6]
+with_vertices = fresh_results("vertices")
+harness.succeed(*command(with_vertices, *VERTICES_FIRST))
+
+
+def residuals(results):
+    with open(results.json_path) as file:
+        return json.load(file)["figures"]["mean_squared_residual_per_noise_variance"]
+
+
+def test_factors_begin_as_plain_vertices():
+    plan = harness.succeed(*command(fresh_results("plan"), *VERTICES_FIRST, "--dry-run")).stdout
+    assert "epochs: 10 of pixels 2 x 2 with plain vertices, 8 at full resolution with plain " \
+        "vertices, 6 at full resolution\n" in plan, plan
+    with open(with_vertices.json_path) as file:
+        stages = json.load(file)["figures"]["stages"]
+    assert [(stage["field"], stage["bin"], stage["epochs"]) for stage in stages] \
+        == [("grid", 2, 10), ("grid", 1, 8), ("vm", 1, 6)]
+    with h5py.File(with_vertices.model_path) as model:
+        assert model["field"].attrs["kind"] == b"vm"
+    of_factors = fresh_results("factors")
+    harness.succeed(*command(of_factors, "--rank", 20, "--vertex-epochs", 0, "--coarse-epochs", 10,
+                             "--epochs", 14))
+    print(f"PSNR {psnr(with_vertices):.2f} dB, {psnr(of_factors):.2f} dB of factors alone")
+    assert psnr(with_vertices) > psnr(of_factors)
+
+
+def test_factors_go_on_where_vertices_were():
+    found = residuals(with_vertices)
+    last_of_vertices, first_of_factors = found[10 + 8 - 1], found[10 + 8]
+    assert first_of_factors < 1.3 * last_of_vertices, found
+
+
+def test_the_usual_factors_begin_as_vertices():
+    def epochs(*options):
+        plan = harness.succeed("reconstruct", *series.input, "-o",
+                               fresh_results("plan").volume_path, "--thickness", harness.THICKNESS,
+                               "--contrast", "bright", "--dry-run", *options).stdout
+        return next(line for line in plan.splitlines() if line.startswith("epochs: "))
+
+    vertices, factors = " with plain vertices", " at full resolution"
+    assert epochs() == f"epochs: 80 of pixels 2 x 2{vertices}, 10{factors}{vertices}, 10{factors}"
+    assert epochs("--epochs", 4) \
+        == f"epochs: 32 of pixels 2 x 2{vertices}, 4{factors}{vertices}, 4{factors}"
+    assert epochs("--vertex-epochs", 0) == f"epochs: 80 of pixels 2 x 2, 30{factors}"
+    assert epochs("--rank", 8) == f"epochs: 80 of pixels 2 x 2, 30{factors}"
+    assert epochs("--rank", 8, "--vertex-epochs", 3) \
+        == f"epochs: 80 of pixels 2 x 2{vertices}, 3{factors}{vertices}, 10{factors}"
+
+
+def test_vertices_have_no_variation_of_factors():
+    results = fresh_results("factor_variation")
+    harness.succeed(*command(results, *VERTICES_FIRST, "--tv-factors", 5))
+    assert residuals(results)[:18] == residuals(with_vertices)[:18]
+    assert residuals(results)[18:] != residuals(with_vertices)[18:]
+
+
+def test_runs_stopped_before_there_are_factors_end_alike():
+    results = fresh_results("vertices_resumed")
+    stages = stages_when_stopped(results, *VERTICES_FIRST)
+    assert stages & {("grid", 17), ("grid", 33)}, f"no run was caught with vertices: {stages}"
+    assert results.same_as(with_vertices)
 
 
 def test_leaves_of_a_grid_are_fitted_at_a_quarter_of_the_width_first():
@@ -95,8 +162,8 @@ def test_leaves_of_a_grid_are_fitted_at_a_quarter_of_the_width_first():
     assert [(stage["bin"], stage["epochs"]) for stage in document["figures"]["stages"]] \
         == [(4, COARSE), (2, COARSE), (1, FINE)]
     results = fresh_results("grid_resumed")
-    vertices = vertices_when_stopped(results, *grid, "--leaf-size", 64)
-    assert vertices & {17, 33}, f"no run was caught in a coarse stage: {vertices}"
+    stages = stages_when_stopped(results, *grid, "--leaf-size", 64)
+    assert stages & {("grid", 17), ("grid", 33)}, f"no run was caught in a coarse stage: {stages}"
     assert results.same_as(undisturbed)
 
 

@@ -84,6 +84,7 @@ def test_results_have_the_bytes_of_one_process():
     cases = {"vm": ([], (1, 2, 4)),
              "coarse": (["--field", "grid", "--leaf-size", 32, "--coarse-epochs", 3,
                          "--tv-penalty", "auto", "--mode", 1], (2,)),
+             "vertices": (["--leaf-size", 32, "--vertex-epochs", 3, "--coarse-epochs", 2], (2,)),
              "coarser": (["--field", "grid", "--leaf-size", 64, "--coarse-epochs", 4], (2,)),
              "margin": (["--contrast", "dark", "--hold-out", 5, "--axes", "xzy", "--mode", 12],
                         (3,))}
@@ -136,7 +137,7 @@ def step_of(results):
 
 def test_checkpoints_go_on_with_any_number_of_processes():
     undisturbed, results = fresh_results("undisturbed"), fresh_results("resumed")
-    long = ["--epochs", 48]  # to be stopped in, three times
+    long = ["--epochs", 120]  # to be stopped in, three times
     harness.succeed(*command(undisturbed, *long))
     steps = []
     # mpirun passes SIGUSR1 on; SIGTERM it answers itself, and ends the processes with it.
@@ -148,7 +149,7 @@ def test_checkpoints_go_on_with_any_number_of_processes():
         errors = stop_after_a_step(run, number)
         assert run.returncode == status, (run.returncode, errors)
         steps.append(step_of(results))
-    assert 0 < steps[0] < steps[1] < steps[2] < 48 * 7, steps
+    assert 0 < steps[0] < steps[1] < steps[2] < 120 * 7, steps
     succeed(3, *command(results, "--resume", *long))
     assert results.same_as(undisturbed)
 
