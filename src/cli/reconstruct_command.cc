@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -78,9 +79,10 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
   command
       .add_option(
           "--vertex-epochs", arguments.vertex_epochs,
-          "passes before them that fit plain vertices, which the factors begin with, as in the "
-          "coarse ones; 0: factors from the start; default: as many as --epochs, up to 10, where "
-          "a leaf has at most twice as many vertices along its side as ranks")
+          "passes at full resolution before them: in these and the coarse ones plain vertices are "
+          "fitted, which are factorised then; 0: factors from the start; default: as many as "
+          "--epochs, up to 10, of uniform trees whose leaves have some more vertices along their "
+          "side than ranks, at most twice as many")
       ->group(group);
   command
       .add_option("--coarse-epochs", arguments.coarse_epochs,
@@ -117,7 +119,8 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
       ->group(group);
   command
       .add_option("--learning-rate", arguments.learning_rate,
-                  "of the first step; it falls exponentially; default: 0.05, 0.035 of a grid")
+                  "of the first step; it falls exponentially; default: 0.05, 0.035 of a grid; "
+                  "vertices that are to be factorised take 0.7 of it, factors made of them 0.3")
       ->group(group);
   command
       .add_option("--tv", arguments.variation,
@@ -183,7 +186,8 @@ void set_schedule(Arguments& arguments) {
   fit.epochs = arguments.epochs.value_or(usual.epochs);
   if (!arguments.vertex_epochs && has_vertices)
     fit.vertex_epochs = usual.vertex_epochs_of(fit.epochs);
-  if (!arguments.coarse_epochs) fit.coarse_epochs = usual.coarse_epochs_of(fit.epochs);
+  if (!arguments.coarse_epochs)
+    fit.coarse_epochs = usual.coarse_epochs_of(std::max(fit.epochs, fit.vertex_epochs));
   fit.learning_rate = arguments.learning_rate.value_or(usual.learning_rate);
 }
 
@@ -191,6 +195,7 @@ void run(Arguments& arguments, const distributed::Communicator& processes) {
   reconstruct::ReconstructOptions& options = arguments.options;
   const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
   options.fit.fit_view_scale = is_on(arguments.view_scale, is_dark);
+  options.field.with_margin = options.specimen.with_margin;
   set_leaves(arguments);
   set_schedule(arguments);
   options.choose_penalty = arguments.penalty == "auto" && !arguments.variation;
@@ -201,7 +206,6 @@ void run(Arguments& arguments, const distributed::Communicator& processes) {
     options.field.activation = arguments.activation;
   else if (is_dark)
     options.field.activation = "identity";
-  options.field.with_margin = options.specimen.with_margin;
   options.input.resample = options.fit.engine == "slab";
   processes.together([&] { reconstruct::check_options(options); });
   const tilt_series::TiltSeries series(options.input, processes);

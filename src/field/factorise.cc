@@ -136,6 +136,12 @@ void factorise(const LeafShape& s, const float* values, float* p) {
 
 }  // namespace
 
+// The values, what is left of them for an axis, and products of that size.
+std::size_t factorising_memory(const LeafShape& shape) {
+  constexpr std::size_t kCopies = 6;
+  return kCopies * sizeof(double) * shape.vertices_xz() * static_cast<std::size_t>(shape.ny);
+}
+
 std::unique_ptr<Field> factorised(const Field& vertices, std::vector<LeafShape> shapes) {
   TOMOFIELD_CHECK(vertices.kind() == "grid", "plain vertices, which are their own values");
   auto factors = make_field("vm", vertices.tree(), vertices.thickness(), std::move(shapes));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -15,5 +16,8 @@ namespace tomofield::field {
 /// with nothing left to hold are zero for good. A vector and its matrix have the same root mean
 /// square, so that one learning rate suits both.
 std::unique_ptr<Field> factorised(const Field& vertices, std::vector<LeafShape> shapes);
+
+/// Bytes that a thread works in while it factorises a leaf.
+std::size_t factorising_memory(const LeafShape& shape);
 
 }  // namespace tomofield::field

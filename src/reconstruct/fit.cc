@@ -151,7 +151,7 @@ const Stage& Fit::stage() const {
                        [&](const Stage& s) { return epoch >= s.first_epoch; });
 }
 
-// What is made for one resolution.
+// What is made for one stage.
 void Fit::enter_stage() {
   binned_.reset();  // before its successor needs memory
   binned_.emplace(measurement_, stage().bin);

@@ -39,9 +39,8 @@ struct Progress {
 
 /// The loop of DESIGN §5. With the slab engine, a step uses every slab and one
 /// subset of the views; with the ray engine, a random share of the rays of all
-/// views, while slabs without views carry the regularisers. With a coarse stage, the
-/// field has its vertices and steps until its epochs are over, and is refined then. Factors may be
-/// plain vertices until the last stage.
+/// views, while slabs without views carry the regularisers. With several stages, the field has the
+/// vertices, the kind and the steps of one until its epochs are over, and those of the next then.
 ///
 /// Processes that share a fit (Measurement::processes) each work on some bands and keep the
 /// parameters of these and of the leaves next to them; what they share otherwise are sums, of

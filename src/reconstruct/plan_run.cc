@@ -7,6 +7,7 @@
 #include "base/lanes.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "field/factorise.h"
 #include "projection/slab_projector.h"
 #include "reconstruct/domain.h"
 #include "reconstruct/fit.h"
@@ -80,15 +81,34 @@ double part_of_parameters(const Domain& domain, const std::string& kind,
          static_cast<double>(field::count_parameters(kind, domain.shapes));
 }
 
-// Of the stage in which a process has most.
-double most_own_parameters(const Domain& domain, const RunPlan& run, const FieldOptions& options,
-                           const distributed::Communicator& processes) {
+// Those of a process as a field of this kind, in bytes.
+double parameter_bytes(const Domain& domain, const FieldOptions& options, const std::string& kind,
+                       const distributed::Communicator& processes) {
+  return static_cast<double>(sizeof(float) * most_parameters(domain, options, kind)) *
+         part_of_parameters(domain, kind, processes);
+}
+
+// Parameters, their gradient and two moments, of the stage with the most; a tree that is edited has
+// all but the gradient once more.
+double fitted_bytes(const Domain& domain, const RunPlan& run, const FieldOptions& options,
+                    const distributed::Communicator& processes) {
+  const double copies = options.tree == "adaptive" ? 7 : 4;
   double most = 0;
-  for (const Stage& s : run.stages) {
-    most = std::max(most, static_cast<double>(most_parameters(domain, options, s.field_kind)) *
-                              part_of_parameters(domain, s.field_kind, processes));
-  }
+  for (const Stage& s : run.stages)
+    most = std::max(most, copies * parameter_bytes(domain, options, s.field_kind, processes));
   return most;
+}
+
+// While plain vertices become factors.
+double factorising_bytes(const Domain& domain, const RunPlan& run, const FieldOptions& options,
+                         const distributed::Communicator& processes) {
+  if (run.stages.front().field_kind == options.kind) return 0;
+  std::size_t largest = 0;
+  for (const field::LeafShape& shape : domain.shapes)
+    largest = std::max(largest, field::factorising_memory(shape));
+  return parameter_bytes(domain, options, "grid", processes) +
+         parameter_bytes(domain, options, options.kind, processes) +
+         static_cast<double>(largest) * base::thread_count();
 }
 
 // The rows of a shape that the process with most of them has.
@@ -101,16 +121,15 @@ tilt_series::SlabViews::Shape own_part(tilt_series::SlabViews::Shape shape, cons
   return shape;
 }
 
-// Peak of a process. Parameters, their gradient and two moments; a tree that is edited has all but
-// the gradient once more.
+// Peak of a process.
 std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, const RunPlan& run,
                             const ReconstructOptions& options,
                             const distributed::Communicator& processes) {
   using tilt_series::SlabViews;
-  const std::size_t copies = options.field.tree == "adaptive" ? 7 : 4;
   const auto parameters =
-      static_cast<std::size_t>(static_cast<double>(copies * sizeof(float)) *
-                               most_own_parameters(domain, run, options.field, processes));
+      static_cast<std::size_t>(fitted_bytes(domain, run, options.field, processes));
+  const auto factorising =
+      static_cast<std::size_t>(factorising_bytes(domain, run, options.field, processes));
   const SlabViews::Shape own_shape = own_part(plan.rays_shape(), domain, processes);
   const int slabs_in_use = kSlabsOfThread * base::thread_count();
   const std::size_t rays = SlabViews::resident_memory(own_shape, slabs_in_use);
@@ -129,7 +148,8 @@ std::size_t estimate_memory(const PreparedSeries& plan, const Domain& domain, co
           ? RayTerm::working_memory(*plan.ray_geometry, domain, options.fit, plan.rays_shape())
           : 0;
   const std::size_t program = kProgram + (processes.size() > 1 ? kMpi : 0);
-  return program + rays + coarse_rays + std::max(fitting + tracing, reading_memory(plan));
+  return program + rays + coarse_rays +
+         std::max({fitting + tracing, factorising, reading_memory(plan)});
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace tomofield::reconstruct {
 namespace {
 
-// A step of plain vertices in steps of the usual factors, about (0.43 at 128 pixels).
+// A step of plain vertices in steps of the usual factors, about, for the time that is left.
 constexpr double kVertexCost = 0.4;
 
 // Powers of two up to coarse_bin at which no slab straddles two leaves, at most one an epoch. An
@@ -37,9 +37,12 @@ int Schedule::coarse_epochs_of(int fine) const {
 }
 
 bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit) {
+  if (field.kind != "vm" || field.tree != "uniform" || fit.engine != "slab") return false;
   const double side = field.leaf_size / field.vertex_spacing;
-  return field.kind == "vm" && field.tree == "uniform" && fit.engine == "slab" &&
-         side >= field.rank && side <= 2 * field.rank;
+  const double left = side + 1 - field.rank;  // of x and y each, for vectors along z
+  const double margin_side = (field.leaf_size << field.depth) / field.margin_spacing;
+  return side <= 2 * field.rank && left > 0 && left * left >= field.rank &&
+         (!field.with_margin || margin_side <= 4 * field.margin_rank);
 }
 
 Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit) {

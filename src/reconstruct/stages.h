@@ -8,9 +8,10 @@
 
 namespace tomofield::reconstruct {
 
-/// One resolution of a fit (DESIGN §5): projections of pixels `bin` times as wide, and
-/// as many of the field's vertices as they resolve (Domain::shape_in). The last stage has bin 1 and
-/// the kind of field that was asked for; those before it may have plain vertices for factors.
+/// One resolution of a fit and one kind of field (DESIGN §5): projections of pixels `bin` times as
+/// wide, and as many of the field's vertices as they resolve (Domain::shape_in). The last stage has
+/// bin 1 and the kind of field that was asked for; those before it may have plain vertices for
+/// factors.
 struct Stage {
   std::string field_kind = {};
   int bin = 1;
@@ -23,7 +24,7 @@ struct Stage {
 /// How long an optimisation takes, by what the field can express.
 struct Schedule {
   int epochs;            ///< at full resolution
-  double learning_rate;  ///< of the first step
+  double learning_rate;  ///< of the first step, but for FitOptions::vertex_rate
 
   /// Epochs of plain vertices, and coarse ones, that go with so many fine ones: the same share of
   /// the usual ones, at most all.
@@ -33,8 +34,8 @@ struct Schedule {
 
 /// Whether factors usually begin as plain vertices, whose steps are cheaper and of which a third
 /// does (docs/results/ablation.md): where these take no more memory than the factors, that is, a
-/// leaf has at most twice as many along its side as the factors have ranks, and no fewer than
-/// ranks, of which the others would hold nothing.
+/// leaf has at most twice as many along its side as the factors have ranks (of a margin, which is
+/// small, four times), and more than ranks, so that each of these has something to hold.
 bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit);
 
 /// Plain vertices, and factors that begin with them, converge in a third of the epochs that factors

@@ -124,11 +124,20 @@ TEST(Stages, FactorsBeginAsVerticesWhereTheseAreNoMore) {
   const FitOptions slabs;
   EXPECT_TRUE(begins_with_vertices(factors(32, 24), slabs));
   EXPECT_TRUE(begins_with_vertices(factors(32, 16), slabs));
-  EXPECT_TRUE(begins_with_vertices(factors(64, 16, 2), slabs));
+  FieldOptions wide = factors(64, 16, 2);
+  wide.depth = 0;
+  EXPECT_TRUE(begins_with_vertices(wide, slabs));
   EXPECT_FALSE(begins_with_vertices(factors(32, 15), slabs));
   EXPECT_FALSE(begins_with_vertices(factors(256, 16, 2.5), slabs));
-  EXPECT_TRUE(begins_with_vertices(factors(32, 32), slabs));
-  EXPECT_FALSE(begins_with_vertices(factors(32, 33), slabs));  // a rank would hold nothing
+  EXPECT_TRUE(begins_with_vertices(factors(32, 27), slabs));
+  EXPECT_FALSE(begins_with_vertices(factors(32, 28), slabs));  // 5 x 5 are left for 28 along z
+  EXPECT_FALSE(begins_with_vertices(factors(32, 33), slabs));
+  EXPECT_FALSE(begins_with_vertices(factors(32, 40), slabs));
+  FieldOptions dense_margin = factors(32, 24);
+  dense_margin.margin_spacing = 1;
+  EXPECT_FALSE(begins_with_vertices(dense_margin, slabs));
+  dense_margin.with_margin = false;
+  EXPECT_TRUE(begins_with_vertices(dense_margin, slabs));
   FieldOptions other = factors(32, 24);
   other.tree = "adaptive";
   EXPECT_FALSE(begins_with_vertices(other, slabs));

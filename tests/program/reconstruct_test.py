@@ -241,8 +241,14 @@ def test_config_file():
 
 
 def test_dry_run_writes_nothing_and_knows_the_memory():
+    check_memory("--rank", 256)
+    # Plain vertices have most, in the first two stages.
+    check_memory("--rank", 2, "--vertex-spacing", 0.25, "--vertex-epochs", 1)
+
+
+def check_memory(*field):
     directory = harness.fresh_directory("dry")
-    options = harness.merge(harness.QUICK, ["--epochs", 1, "--subsets", 1, "--rank", 256,
+    options = harness.merge(harness.QUICK, ["--epochs", 1, "--subsets", 1, *field,
                                             "--checkpoint-minutes", 0])
     arguments = ["reconstruct", *series.input, "-o", os.path.join(directory, "out.mrc"), *options]
     plan = harness.succeed(*arguments, "--dry-run").stdout
