@@ -81,8 +81,7 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
           "--vertex-epochs", arguments.vertex_epochs,
           "passes at full resolution before them: in these and the coarse ones plain vertices are "
           "fitted, which are factorised then; 0: factors from the start; default: as many as "
-          "--epochs, up to 10, of uniform trees whose leaves have some more vertices along their "
-          "side than ranks, at most twice as many")
+          "--epochs, at most 10, where vertices take no more memory than factors")
       ->group(group);
   command
       .add_option("--coarse-epochs", arguments.coarse_epochs,
