@@ -86,8 +86,7 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
   command
       .add_option("--coarse-epochs", arguments.coarse_epochs,
                   "passes before all of these over binned views; 0: none; default: 80, or as many "
-                  "times fewer as "
-                  "--epochs are than usual")
+                  "times fewer as --epochs are than usual")
       ->group(group);
   command
       .add_option("--coarse-bin", fit.coarse_bin,

@@ -6,16 +6,14 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "field/merge_target.h"
 #include "field/vm_layout.h"
-#include "random_arrays.h"
 
 namespace tomofield::field {
 namespace {
-
-using testing::random_floats;
 
 constexpr double kThickness = 20.0;
 // Unequal counts, so that no axis can be taken for another.

@@ -245,7 +245,7 @@ double Fit::work(std::int64_t steps) const {
 
 bool Fit::is_done() const {
   if (progress_.step == num_steps()) return true;
-  // Errors of a coarse stage are those of other pixels.
+  // Errors of stages before the last are those of other pixels or of plain vertices.
   const auto first = static_cast<std::size_t>(stages_.back().first_epoch);
   const std::vector<double>& errors = progress_.held_out_error;
   if (options_.patience == 0 || errors.size() <= first) return false;

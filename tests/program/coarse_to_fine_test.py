@@ -92,18 +92,21 @@ with_vertices = fresh_results("vertices")
 harness.succeed(*command(with_vertices, *VERTICES_FIRST))
 
 
-def residuals(results):
+def figures(results):
     with open(results.json_path) as file:
-        return json.load(file)["figures"]["mean_squared_residual_per_noise_variance"]
+        return json.load(file)["figures"]
+
+
+def residuals(results):
+    return figures(results)["mean_squared_residual_per_noise_variance"]
 
 
 def test_factors_begin_as_plain_vertices():
     plan = harness.succeed(*command(fresh_results("plan"), *VERTICES_FIRST, "--dry-run")).stdout
     assert "epochs: 10 of pixels 2 x 2 with plain vertices, 8 at full resolution with plain " \
         "vertices, 6 at full resolution\n" in plan, plan
-    with open(with_vertices.json_path) as file:
-        stages = json.load(file)["figures"]["stages"]
-    assert [(stage["field"], stage["bin"], stage["epochs"]) for stage in stages] \
+    assert [(stage["field"], stage["bin"], stage["epochs"])
+            for stage in figures(with_vertices)["stages"]] \
         == [("grid", 2, 10), ("grid", 1, 8), ("vm", 1, 6)]
     with h5py.File(with_vertices.model_path) as model:
         assert model["field"].attrs["kind"] == b"vm"
@@ -124,8 +127,7 @@ def test_factors_go_on_where_vertices_were():
 def test_held_out_views_are_predicted_in_every_stage():
     results = fresh_results("held")
     harness.succeed(*command(results, *VERTICES_FIRST, "--hold-out", 4))
-    with open(results.json_path) as file:
-        curve = json.load(file)["figures"]["held_out"]["error_by_epoch"]
+    curve = figures(results)["held_out"]["error_by_epoch"]
     assert len(curve) == 24 and curve[-1] == min(curve), curve
 
 
@@ -133,8 +135,7 @@ def test_an_early_stop_is_one_of_factors():
     results = fresh_results("early")
     stopping = ["--hold-out", 4, "--tv", 0, "--epochs", 90, "--early-stop", 2]
     harness.succeed(*command(results, *harness.merge(VERTICES_FIRST, stopping)))
-    with open(results.json_path) as file:
-        curve = json.load(file)["figures"]["held_out"]["error_by_epoch"]
+    curve = figures(results)["held_out"]["error_by_epoch"]
     of_factors = curve[18:]
     assert min(curve) < min(of_factors), f"nothing before would have stopped it: {curve}"
     assert 3 <= len(of_factors) == 3 + of_factors.index(min(of_factors)) < 90, curve
@@ -144,9 +145,8 @@ def test_trials_of_the_penalty_are_the_same_whatever_factors_begin_with():
     def trials(name, *options):
         results = fresh_results(name)
         harness.succeed(*command(results, "--rank", 20, "--tv-penalty", "auto", *options))
-        with open(results.json_path) as file:
-            tried = json.load(file)["figures"]["tuning"]["trials"]
-        return [(trial["tv_penalty"], trial["held_out_error"]) for trial in tried]
+        return [(trial["tv_penalty"], trial["held_out_error"])
+                for trial in figures(results)["tuning"]["trials"]]
 
     vertices = ["--coarse-epochs", 8, "--vertex-epochs", 1, "--epochs", 1]  # of 10
     factors = ["--coarse-epochs", 8, "--vertex-epochs", 0, "--epochs", 3]  # of 30
