@@ -6,15 +6,15 @@
 #include "bench/cases.h"
 #include "bench/projection_setup.h"
 #include "field/field.h"
-#include "field/resample.h"
+#include "field/sampling/resample.h"
+#include "fit/domain.h"
+#include "fit/options.h"
 #include "kernels/adam.h"
 #include "kernels/lanes.h"
 #include "kernels/leaf_decoding.h"
 #include "kernels/total_variation.h"
-#include "loss/data_term.h"
+#include "measurement/view_residuals.h"
 #include "projection/slab_sampler.h"
-#include "reconstruct/domain.h"
-#include "reconstruct/options.h"
 
 namespace tomofield::bench {
 namespace {
@@ -24,11 +24,11 @@ using kernels::kLanes;
 constexpr int kThickness = 150;
 constexpr int kBand = 2;  // somewhere in the middle
 
-reconstruct::FieldOptions field_options(const std::string& kind) {
-  reconstruct::FieldOptions options;
+fit::FieldOptions field_options(const std::string& kind) {
+  fit::FieldOptions options;
   options.kind = kind;
-  options.leaf_size = reconstruct::usual_leaf_size(options);
-  options.depth = reconstruct::usual_depth(options);
+  options.leaf_size = fit::usual_leaf_size(options);
+  options.depth = fit::usual_depth(options);
   options.with_margin = false;
   return options;
 }
@@ -36,7 +36,7 @@ reconstruct::FieldOptions field_options(const std::string& kind) {
 // Everything that a step works on, with the buffers of one slab.
 struct StepSetup {
   geometry::TiltGeometry geometry = yardstick_geometry(kThickness);
-  reconstruct::Domain domain;
+  fit::Domain domain;
   std::unique_ptr<field::Field> field;
   projection::SlabSampler sampler;
   int slab;
@@ -44,9 +44,9 @@ struct StepSetup {
   base::AlignedBuffer<float> values, samples, gradient, grad_samples, m, v, flux, above;
 
   explicit StepSetup(const std::string& kind)
-      : domain(reconstruct::make_domain(geometry, {0, 0, geometry.width, geometry.height},
-                                        field_options(kind))),
-        field(reconstruct::make_initial_field(domain, kThickness, 0.3, field_options(kind), 1)),
+      : domain(fit::make_domain(geometry, {0, 0, geometry.width, geometry.height},
+                                field_options(kind))),
+        field(fit::make_initial_field(domain, kThickness, 0.3, field_options(kind), 1)),
         sampler(*field, domain.grid, 0, geometry.height),
         slab(sampler.band(kBand).first),
         values(domain.shapes[0].vertices_xz() * kLanes),
@@ -138,7 +138,7 @@ Case variation_case(const std::shared_ptr<StepSetup>& s) {
   return {.name = "step: total variation",
           .run =
               [s] {
-                const reconstruct::FitOptions options;
+                const fit::FitOptions options;
                 const projection::SampleSegment& segment = s->domain.grid.segments()[0];
                 kernels::SlabVariation v;
                 v.samples = s->samples.data() + segment.origin;
@@ -174,9 +174,9 @@ Case data_case(const std::shared_ptr<ProjectionSetup>& p) {
               [p, rays, width] {
                 for (std::size_t v = 0; v < p->views().size(); ++v) {
                   const std::size_t at = v * static_cast<std::size_t>(width);
-                  loss::data_term({}, 8.0, rays->measured.data() + at * kLanes,
-                                  rays->mask.data() + at, width,
-                                  rays->predicted.data() + at * kLanes);
+                  measurement::data_term({}, 8.0, rays->measured.data() + at * kLanes,
+                                         rays->mask.data() + at, width,
+                                         rays->predicted.data() + at * kLanes);
                 }
               },
           .flops = 12.0 * static_cast<double>(size),
@@ -186,8 +186,8 @@ Case data_case(const std::shared_ptr<ProjectionSetup>& p) {
 }  // namespace
 
 std::vector<Case> step_cases() {
-  const auto projection = std::make_shared<ProjectionSetup>(
-      kThickness, reconstruct::FitOptions{}.subsets, kSlabsTogether);
+  const auto projection =
+      std::make_shared<ProjectionSetup>(kThickness, fit::FitOptions{}.subsets, kSlabsTogether);
   const auto step = std::make_shared<StepSetup>("grid");
   step->values.fill(0.1f);
   const auto decoding = std::make_shared<LeafDecoding>(*step);

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/random.h"
-#include "tilt_series/beads.h"
+#include "tilt_series/masks/beads.h"
 
 namespace tomofield::testing {
 

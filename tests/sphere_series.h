@@ -7,8 +7,8 @@
 
 #include "base/random.h"
 #include "geometry/tilt_geometry.h"
+#include "measurement/slab_views.h"
 #include "simulate/project_phantom.h"
-#include "tilt_series/slab_views.h"
 
 namespace tomofield::testing {
 
@@ -31,8 +31,8 @@ class SphereSeries {
     for (double tilt = -60; tilt <= 60; tilt += 4) tilts.push_back(tilt);
     geometry = geometry::centred_geometry(kWidth, kRows, kThickness, tilts);
     noise_sigma.assign(tilts.size(), options_.noise_sigma);
-    rays = std::make_unique<tilt_series::SlabViews>(
-        tilt_series::SlabViews::Shape{.num_views = tilts.size(),
+    rays = std::make_unique<measurement::SlabViews>(
+        measurement::SlabViews::Shape{.num_views = tilts.size(),
                                       .width = kWidth,
                                       .height = kRows,
                                       .first_row = 0,
@@ -57,7 +57,7 @@ class SphereSeries {
 
   geometry::TiltGeometry geometry;
   std::vector<double> noise_sigma;
-  std::unique_ptr<tilt_series::SlabViews> rays;
+  std::unique_ptr<measurement::SlabViews> rays;
 
  private:
   static std::vector<simulate::Ellipsoid> spheres() {

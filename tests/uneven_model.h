@@ -5,14 +5,14 @@
 #include <utility>
 #include <vector>
 
-#include "field/model_file.h"
+#include "output/model_file.h"
 
 namespace tomofield::testing {
 
 /// A model with leaves of 64, 32 and 16 px beside each other, margin cells on
 /// both sides, unequal vertex counts and ranks, a thickness that is no whole
 /// number, a region of interest inside, and random densities of about 0 … 1.
-inline field::Model uneven_model(const std::string& kind) {
+inline output::Model uneven_model(const std::string& kind) {
   using enum field::Region;
   const field::RootGrid roots{.x0 = -60, .y0 = 4, .cell_size = 64, .columns = 4, .rows = 2};
   field::Quadtree tree(roots, {kMargin, kInterest, kInterest, kMargin,  //
@@ -29,7 +29,7 @@ inline field::Model uneven_model(const std::string& kind) {
     }
   }
   constexpr double kThickness = 21.5;
-  field::Model model;
+  output::Model model;
   model.field = make_field(kind, std::move(tree), kThickness, std::move(shapes));
   model.field->initialise(base::Random(3), 0.8);
   model.field->bias = 0.1f;

@@ -2,12 +2,12 @@
 
 namespace tomofield::baseline {
 
-evaluate::ViewErrors held_out_errors(const VoxelProblem& problem, const std::vector<int>& views,
-                                     bool fit_view_scale, VoxelVolume& densities) {
+measurement::ViewErrors held_out_errors(const VoxelProblem& problem, const std::vector<int>& views,
+                                        bool fit_view_scale, VoxelVolume& densities) {
   std::vector<double> weights;
   for (const double sigma : problem.noise_sigma()) weights.push_back(1 / (sigma * sigma));
-  return evaluate::view_errors(views, {view_sums(problem, views, densities)}, weights,
-                               fit_view_scale);
+  return measurement::view_errors(views, {view_sums(problem, views, densities)}, weights,
+                                  fit_view_scale);
 }
 
 }  // namespace tomofield::baseline

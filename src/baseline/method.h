@@ -3,14 +3,14 @@
 #include <nlohmann/json_fwd.hpp>
 #include <variant>
 
-#include "baseline/implicit.h"
-#include "baseline/ingp.h"
-#include "baseline/sart_tv.h"
-#include "baseline/sirt.h"
+#include "baseline/classical/sart_tv.h"
+#include "baseline/classical/sirt.h"
+#include "baseline/classical/tv_reconstruction.h"
+#include "baseline/classical/wbp.h"
+#include "baseline/neural/implicit.h"
+#include "baseline/neural/ingp.h"
 #include "baseline/solver.h"
-#include "baseline/tv_reconstruction.h"
 #include "baseline/voxel_problem.h"
-#include "baseline/wbp.h"
 
 namespace tomofield::baseline {
 

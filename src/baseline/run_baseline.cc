@@ -15,13 +15,13 @@
 #include "baseline/voxel_problem.h"
 #include "io/json.h"
 #include "kernels/lanes.h"
+#include "measurement/held_out.h"
+#include "output/mask_metrics.h"
+#include "output/result_files.h"
 #include "projection/sample_grid.h"
-#include "reconstruct/held_out.h"
-#include "reconstruct/mask_json.h"
 #include "reconstruct/options_json.h"
-#include "reconstruct/result_files.h"
-#include "reconstruct/trial_series.h"
-#include "reconstruct/trials.h"
+#include "selection/trial_series.h"
+#include "selection/trials.h"
 #include "tomofield/error.h"
 
 namespace tomofield::baseline {
@@ -29,7 +29,7 @@ namespace {
 
 using kernels::kLanes;
 
-projection::SampleGrid grid_of(const reconstruct::PreparedSeries& series,
+projection::SampleGrid grid_of(const measurement::PreparedSeries& series,
                                const BaselineOptions& options) {
   return projection::make_sample_grid(series.geometry, static_cast<double>(series.roi.x0),
                                       static_cast<double>(series.roi.x1),
@@ -38,10 +38,10 @@ projection::SampleGrid grid_of(const reconstruct::PreparedSeries& series,
 
 // What the method holds of each slab, and a pair of slabs and its rays for each thread; a tuning
 // has copies of the rays of its rows.
-std::size_t estimate_memory(const reconstruct::PreparedSeries& plan,
+std::size_t estimate_memory(const measurement::PreparedSeries& plan,
                             const projection::SampleGrid& grid, const MethodFacts& method,
                             const MethodSize& size, bool tunes) {
-  constexpr std::size_t kTrialSlabs = reconstruct::kTrialRows / kLanes;
+  constexpr std::size_t kTrialSlabs = selection::kTrialRows / kLanes;
   constexpr std::size_t kFixed = std::size_t{24} << 20;  // program and libraries
   const std::size_t slabs = static_cast<std::size_t>((plan.roi.height() + kLanes - 1) / kLanes);
   const std::size_t rays = static_cast<std::size_t>(plan.geometry.num_views()) *
@@ -66,7 +66,7 @@ base::ProgressReport progress_report(const IterationReport& report, int num_iter
 }
 
 // Voxels of the region of interest, slab by slab.
-reconstruct::VoxelSource voxels_of(const VoxelVolume& densities) {
+output::VoxelSource voxels_of(const VoxelVolume& densities) {
   return [&densities](const field::BoxSink& sink) {
     const projection::SampleSegment& segment = densities.grid().segments().front();
     base::parallel_for(densities.num_slabs(), [&](std::int64_t index) {
@@ -87,9 +87,9 @@ reconstruct::VoxelSource voxels_of(const VoxelVolume& densities) {
   };
 }
 
-field::ModelInfo volume_info(const reconstruct::PreparedSeries& series,
-                             const BaselineOptions& options) {
-  field::ModelInfo info;
+output::ModelInfo volume_info(const measurement::PreparedSeries& series,
+                              const BaselineOptions& options) {
+  output::ModelInfo info;
   info.geometry = series.geometry;
   info.roi = series.roi;
   info.pixel_size_A = series.pixel_size_A;
@@ -99,8 +99,8 @@ field::ModelInfo volume_info(const reconstruct::PreparedSeries& series,
 }
 
 nlohmann::json options_json(const BaselineOptions& options) {
-  return {{"input", reconstruct::input_json(options.input)},
-          {"specimen", reconstruct::specimen_json(options.specimen)},
+  return {{"input", reconstruction::input_json(options.input)},
+          {"specimen", reconstruction::specimen_json(options.specimen)},
           {"with_margin", options.specimen.with_margin},
           {"margin_spacing", options.margin_spacing},
           {"fit_view_scale", options.fit_view_scale},
@@ -113,12 +113,12 @@ nlohmann::json options_json(const BaselineOptions& options) {
 nlohmann::json held_out_json(const VoxelProblem& problem, const std::vector<int>& views,
                              bool fit_view_scale, VoxelVolume& densities) {
   if (views.empty()) return nullptr;
-  return reconstruct::report_held_out(held_out_errors(problem, views, fit_view_scale, densities),
+  return measurement::report_held_out(held_out_errors(problem, views, fit_view_scale, densities),
                                       problem.projector().geometry().tilt_deg);
 }
 
 nlohmann::json figures_json(const Solution& solution, const VoxelProblem& problem,
-                            const reconstruct::PreparedSeries& series, std::size_t num_parameters,
+                            const measurement::PreparedSeries& series, std::size_t num_parameters,
                             double seconds) {
   nlohmann::json views = nlohmann::json::array();
   for (const int view : problem.views()) {
@@ -141,7 +141,7 @@ nlohmann::json figures_json(const Solution& solution, const VoxelProblem& proble
           {"size_px", {series.roi.width(), series.roi.height(), series.geometry.thickness}},
           {"seconds", seconds},
           {"threads", base::thread_count()},
-          {"mask", reconstruct::mask_json(series)},
+          {"mask", output::mask_json(series)},
           {"views", views}};
 }
 
@@ -154,11 +154,11 @@ AfterIteration report_to(const base::ProgressSink& progress, const MethodFacts& 
   };
 }
 
-void write_results(const Solution& solution, const reconstruct::PreparedSeries& series,
+void write_results(const Solution& solution, const measurement::PreparedSeries& series,
                    const BaselineOptions& options, const nlohmann::json& figures,
                    const BaselinePaths& paths) {
-  const field::ModelInfo info = volume_info(series, options);
-  write_voxels(voxels_of(solution.densities), reconstruct::region_box(info, 1.0), info,
+  const output::ModelInfo info = volume_info(series, options);
+  write_voxels(voxels_of(solution.densities), output::region_box(info, 1.0), info,
                fmt::format("baseline {}", facts_of(options.method).name), options.volume,
                paths.volume);
   io::write_json(
@@ -180,13 +180,13 @@ BaselinePaths baseline_paths(const std::filesystem::path& volume) {
 
 void check_outputs(const BaselineOptions& options) {
   const BaselinePaths paths = baseline_paths(options.output);
-  reconstruct::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.input,
-                                  options.overwrite,
-                                  "give --overwrite to replace it, or another name with -o");
+  output::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.input,
+                             options.overwrite,
+                             "give --overwrite to replace it, or another name with -o");
 }
 
 BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {
-  const reconstruct::PreparedSeries planned = plan_series(series, options.specimen);
+  const measurement::PreparedSeries planned = plan_series(series, options.specimen);
   if (planned.x_tilt_deg != 0.0) {
     throw Error(fmt::format(
         "the series has an x-axis tilt of {}°, which this baseline does not turn back: leave "
@@ -194,8 +194,8 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
         planned.x_tilt_deg));
   }
   const std::vector<int> held_out =  // throws if there are none
-      reconstruct::held_out_views(planned.geometry.tilt_deg, options.hold_out);
-  if (options.tune) reconstruct::trial_views(planned.geometry.tilt_deg, held_out);  // or too few
+      measurement::held_out_views(planned.geometry.tilt_deg, options.hold_out);
+  if (options.tune) selection::trial_views(planned.geometry.tilt_deg, held_out);  // or too few
   const projection::SampleGrid grid = grid_of(planned, options);
   BaselinePlan plan;
   plan.num_views = planned.geometry.num_views();
@@ -218,11 +218,11 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
                              const BaselineOptions& requested, const BaselineProgress& progress) {
   BaselineOptions options = requested;
   const BaselinePaths paths = baseline_paths(options.output);
-  const reconstruct::PreparedSeries series =
+  const measurement::PreparedSeries series =
       prepare_series(tilt_series, options.specimen,
                      paths.volume.has_parent_path() ? paths.volume.parent_path() : ".");
   const std::vector<int> held_out =
-      reconstruct::held_out_views(series.geometry.tilt_deg, options.hold_out);
+      measurement::held_out_views(series.geometry.tilt_deg, options.hold_out);
   nlohmann::json tuning = nullptr;
   if (options.tune) {
     const Tuned tuned =

@@ -5,8 +5,8 @@
 
 #include "base/progress.h"
 #include "baseline/method.h"
-#include "reconstruct/prepare.h"
-#include "reconstruct/write_volume.h"
+#include "measurement/prepare.h"
+#include "output/volume.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::baseline {
@@ -14,14 +14,14 @@ namespace tomofield::baseline {
 /// Everything that a baseline reconstruction is made from.
 struct BaselineOptions {
   tilt_series::TiltSeriesOptions input;
-  reconstruct::SpecimenOptions specimen;
+  measurement::SpecimenOptions specimen;
   double margin_spacing = 2.0;  ///< binned pixels between samples of the margins
   Method method;
-  bool fit_view_scale = false;        ///< per-view scale and offset as nuisances
-  int hold_out = 0;                   ///< keep every so-manieth view from the fit; 0: none
-  bool tune = false;                  ///< choose settings by other views than these (tune.h)
-  reconstruct::VolumeOptions volume;  ///< `box` stays empty: voxels are where they were fitted
-  std::filesystem::path output;       ///< the volume; JSON and pictures lie beside it
+  bool fit_view_scale = false;   ///< per-view scale and offset as nuisances
+  int hold_out = 0;              ///< keep every so-manieth view from the fit; 0: none
+  bool tune = false;             ///< choose settings by other views than these (tune.h)
+  output::VolumeOptions volume;  ///< `box` stays empty: voxels are where they were fitted
+  std::filesystem::path output;  ///< the volume; JSON and pictures lie beside it
   bool overwrite = false;
 };
 

@@ -12,13 +12,13 @@
 #include "base/log.h"
 #include "base/stopwatch.h"
 #include "baseline/held_out.h"
-#include "reconstruct/trial_series.h"
-#include "reconstruct/trials.h"
+#include "selection/trial_series.h"
+#include "selection/trials.h"
 
 namespace tomofield::baseline {
 namespace {
 
-using reconstruct::HeldOutScore;
+using selection::HeldOutScore;
 
 constexpr int kLadderSteps = 4;  // of numbers of iterations, of √2, to either side of the first
 constexpr int kCutoffs = 7;      // a √2 apart
@@ -49,9 +49,9 @@ class Trials {
   Trials(const TrialData& data, const base::ProgressSink& progress)
       : data_(data),
         progress_(progress),
-        series_(reconstruct::make_trial_series(data.series.geometry, data.series.noise_sigma,
-                                               *data.series.rays, data.scored,
-                                               reconstruct::kTrialRows)) {}
+        series_(selection::make_trial_series(data.series.geometry, data.series.noise_sigma,
+                                             *data.series.rays, data.scored,
+                                             selection::kTrialRows)) {}
 
   const Trial& trial(const Method& method) {
     const nlohmann::json settings = json_of(method);
@@ -103,7 +103,7 @@ class Trials {
       report_progress(method, report.iteration);
       const std::optional<Method> tried = trial_after(report.iteration);
       if (!tried) return;
-      const evaluate::ViewErrors errors =
+      const measurement::ViewErrors errors =
           held_out_errors(problem, series_.held_out, data_.fit_view_scale, densities);
       trials_.push_back({*tried, {errors.total, errors.view_error}, running.seconds(), {}});
       base::log_info(
@@ -128,7 +128,7 @@ class Trials {
 
   const TrialData& data_;
   const base::ProgressSink& progress_;
-  reconstruct::TrialSeries series_;
+  selection::TrialSeries series_;
   base::Stopwatch running_;
   std::vector<Trial> trials_;
   int num_runs_ = 0, expected_runs_ = 0;
@@ -144,7 +144,7 @@ TvOptions with_better_penalty(const TvOptions& options, Trials& trials) {
   smooth.penalty = "smooth";
   const HeldOutScore with_concave = trials.trial(concave).score,
                      with_smooth = trials.trial(smooth).score;
-  return reconstruct::most_views_prefer(with_smooth, with_concave) ? smooth : concave;
+  return selection::most_views_prefer(with_smooth, with_concave) ? smooth : concave;
 }
 
 double first_weight(const TvOptions& options) {
@@ -157,7 +157,7 @@ double first_weight(const Options& options) {
 
 template <HasWeight Options>
 void choose_weight(Options& options, Trials& trials) {
-  options.weight = reconstruct::search_weight(first_weight(options), [&](double weight) {
+  options.weight = selection::search_weight(first_weight(options), [&](double weight) {
     Options other = options;
     other.weight = weight;
     return trials.trial(other).score;
@@ -175,8 +175,7 @@ void choose_iterations(Options& options, Trials& trials) {
     const int iterations = on_ladder(options.iterations, step);
     if (iterations > (ladder.empty() ? 0 : ladder.back())) ladder.push_back(iterations);
   }
-  options.iterations =
-      ladder[reconstruct::first_as_good_as_the_best(trials.scores(options, ladder))];
+  options.iterations = ladder[selection::first_as_good_as_the_best(trials.scores(options, ladder))];
 }
 
 template <HasCutoff Options>
@@ -189,13 +188,13 @@ void choose_cutoff(Options& options, Trials& trials) {
     cutoffs.push_back(other.filter.cutoff);
     scores.push_back(trials.trial(other).score);
   }
-  options.filter.cutoff = cutoffs[reconstruct::first_as_good_as_the_best(scores)];
+  options.filter.cutoff = cutoffs[selection::first_as_good_as_the_best(scores)];
 }
 
 // Again with more iterations until the trial that is chosen is at its minimum.
 Method tuned(const TvOptions& start, Trials& trials) {
   for (TvOptions tried = start;;) {
-    const int runs = reconstruct::kUsualWeights + (votes_on_penalty(tried) ? 1 : 0);
+    const int runs = selection::kUsualWeights + (votes_on_penalty(tried) ? 1 : 0);
     trials.expect(runs, runs * tried.iterations);
     TvOptions chosen = with_better_penalty(tried, trials);
     choose_weight(chosen, trials);
@@ -215,7 +214,7 @@ Method tuned(const TvOptions& start, Trials& trials) {
 
 template <typename Options>
 void expect_runs(const Options& options, Trials& trials) {
-  constexpr int kWeights = HasWeight<Options> ? reconstruct::kUsualWeights : 0;
+  constexpr int kWeights = HasWeight<Options> ? selection::kUsualWeights : 0;
   if constexpr (StopsEarly<Options>) {
     trials.expect(kWeights + 1,
                   kWeights * options.iterations + on_ladder(options.iterations, kLadderSteps));

@@ -7,9 +7,9 @@
 
 #include "base/progress.h"
 #include "baseline/method.h"
+#include "measurement/prepare.h"
 #include "projection/sample_grid.h"
-#include "reconstruct/prepare.h"
-#include "reconstruct/weight_search.h"
+#include "selection/weight_search.h"
 
 namespace tomofield::baseline {
 
@@ -28,7 +28,7 @@ concept Tunable = HasWeight<Options> || StopsEarly<Options> || HasCutoff<Options
 /// A method with its settings, and how well it predicts the views held out.
 struct Trial {
   Method method;
-  reconstruct::HeldOutScore score = {};
+  selection::HeldOutScore score = {};
   double seconds = 0;
   std::optional<double> last_decrease = {};  ///< of its own run: see last_decrease()
 };
@@ -41,7 +41,7 @@ struct Tuned {
 
 /// What trials are made on.
 struct TrialData {
-  const reconstruct::PreparedSeries& series;
+  const measurement::PreparedSeries& series;
   projection::SampleGrid grid;
   std::vector<int> scored;  ///< views that score the result: no trial sees them; ascending
   bool fit_view_scale = false;

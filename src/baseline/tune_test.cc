@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "reconstruct/held_out.h"
+#include "measurement/held_out.h"
 #include "voxel_comparison.h"
 
 namespace tomofield::baseline {
@@ -45,7 +45,7 @@ class BaselineTune : public testing::OneThread {
         }).densities);
   }
 
-  reconstruct::PreparedSeries series_;
+  measurement::PreparedSeries series_;
   base::ProgressSink progress_;
 };
 
@@ -79,7 +79,7 @@ TEST_F(BaselineTune, TriesBothPenaltiesIfNothingIsSaid) {
   EXPECT_EQ(std::get<TvOptions>(found.trials[0].method).penalty, "concave");
   EXPECT_EQ(std::get<TvOptions>(found.trials[1].method).penalty, "smooth");
   const bool votes_smooth =
-      reconstruct::most_views_prefer(found.trials[1].score, found.trials[0].score);
+      selection::most_views_prefer(found.trials[1].score, found.trials[0].score);
   EXPECT_EQ(std::get<TvOptions>(found.method).penalty, votes_smooth ? "smooth" : "concave");
   TvOptions concave = tv({});
   concave.penalty = "concave";

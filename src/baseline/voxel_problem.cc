@@ -12,7 +12,7 @@ namespace tomofield::baseline {
 using kernels::kLanes;
 
 VoxelProblem::VoxelProblem(const geometry::TiltGeometry& geometry, projection::SampleGrid grid,
-                           const tilt_series::SlabViews& rays,
+                           const measurement::SlabViews& rays,
                            const std::vector<double>& noise_sigma, const ViewHandling& handling)
     : projector_(geometry, std::move(grid)),
       rays_(rays),
@@ -44,42 +44,43 @@ std::int64_t VoxelProblem::num_rays() const {
   return count;
 }
 
-std::vector<loss::ViewSums> VoxelProblem::residuals(const SlabPair& slabs,
-                                                    std::span<const int> views, float* samples,
-                                                    float* detector, std::uint16_t lanes) const {
+std::vector<measurement::ViewSums> VoxelProblem::residuals(const SlabPair& slabs,
+                                                           std::span<const int> views,
+                                                           float* samples, float* detector,
+                                                           std::uint16_t lanes) const {
   const std::size_t size = detector_size(views);
   std::fill_n(detector, static_cast<std::size_t>(slabs.count) * size, 0.0f);
   projector_.forward(samples, views, detector, slabs.count);
-  std::vector<loss::ViewSums> sums(views.size());
+  std::vector<measurement::ViewSums> sums(views.size());
   std::vector<std::uint16_t> mask(row_size());
   for (int slab = slabs.first; slab < slabs.end(); ++slab, detector += size) {
     float* rays = detector;
     for (std::size_t v = 0; v < views.size(); ++v, rays += width() * kLanes) {
       for (std::size_t x = 0; x < mask.size(); ++x)
         mask[x] = static_cast<std::uint16_t>(rays_.mask(slab, views[v])[x] & lanes);
-      loss::ViewModel model = view_model(views[v]);
+      measurement::ViewModel model = view_model(views[v]);
       model.weight = 1.0;
-      sums[v] +=
-          loss::data_term(model, 1.0, rays_.rays(slab, views[v]), mask.data(), width(), rays);
+      sums[v] += measurement::data_term(model, 1.0, rays_.rays(slab, views[v]), mask.data(),
+                                        width(), rays);
     }
   }
   return sums;
 }
 
-double VoxelProblem::data_loss(const std::vector<loss::ViewSums>& sums) const {
+double VoxelProblem::data_loss(const std::vector<measurement::ViewSums>& sums) const {
   double twice = 0.0;
   for (std::size_t v = 0; v < sums.size(); ++v) {
-    const loss::ViewModel& model = view_model(views_[v]);
+    const measurement::ViewModel& model = view_model(views_[v]);
     twice += model.weight * sums[v].squared_residual(model);
   }
   return twice / 2;
 }
 
-void VoxelProblem::fit_view_models(const std::vector<loss::ViewSums>& sums) {
+void VoxelProblem::fit_view_models(const std::vector<measurement::ViewSums>& sums) {
   if (!fits_scale_) return;
-  std::vector<loss::ViewModel> fitted;
+  std::vector<measurement::ViewModel> fitted;
   for (const int view : views_) fitted.push_back(view_model(view));
-  loss::fit_nuisances(loss::NuisancePrior{}, sums, fitted);
+  measurement::fit_nuisances(measurement::NuisancePrior{}, sums, fitted);
   for (std::size_t v = 0; v < views_.size(); ++v)
     models_[static_cast<std::size_t>(views_[v])] = fitted[v];
 }
@@ -94,9 +95,9 @@ void VoxelProblem::fill_weights(int slab, std::span<const int> views, float* det
   }
 }
 
-std::vector<loss::ViewSums> view_sums(const VoxelProblem& problem, std::span<const int> views,
-                                      VoxelVolume& densities) {
-  std::vector<std::vector<loss::ViewSums>> sums(problem.num_pairs());
+std::vector<measurement::ViewSums> view_sums(const VoxelProblem& problem,
+                                             std::span<const int> views, VoxelVolume& densities) {
+  std::vector<std::vector<measurement::ViewSums>> sums(problem.num_pairs());
   for_each_pair(problem.num_slabs(), [&](const SlabPair& pair) {
     base::AlignedBuffer<float> detector(SlabPair::kMost * problem.detector_size(views));
     sums[pair.index()] =
@@ -105,8 +106,9 @@ std::vector<loss::ViewSums> view_sums(const VoxelProblem& problem, std::span<con
   return total(sums);
 }
 
-std::vector<loss::ViewSums> total(const std::vector<std::vector<loss::ViewSums>>& sums_of_part) {
-  std::vector<loss::ViewSums> all = sums_of_part.front();
+std::vector<measurement::ViewSums> total(
+    const std::vector<std::vector<measurement::ViewSums>>& sums_of_part) {
+  std::vector<measurement::ViewSums> all = sums_of_part.front();
   for (std::size_t part = 1; part < sums_of_part.size(); ++part) {
     for (std::size_t v = 0; v < all.size(); ++v) all[v] += sums_of_part[part][v];
   }

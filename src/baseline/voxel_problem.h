@@ -8,9 +8,9 @@
 #include "baseline/voxel_volume.h"
 #include "geometry/tilt_geometry.h"
 #include "kernels/lanes.h"
-#include "loss/data_term.h"
+#include "measurement/slab_views.h"
+#include "measurement/view_residuals.h"
 #include "projection/slab_projector.h"
-#include "tilt_series/slab_views.h"
 
 namespace tomofield::baseline {
 
@@ -29,18 +29,18 @@ struct ViewHandling {
 class VoxelProblem {
  public:
   VoxelProblem(const geometry::TiltGeometry& geometry, projection::SampleGrid grid,
-               const tilt_series::SlabViews& rays, const std::vector<double>& noise_sigma,
+               const measurement::SlabViews& rays, const std::vector<double>& noise_sigma,
                const ViewHandling& handling = {});
 
   const projection::SlabProjector& projector() const { return projector_; }
   const projection::SampleGrid& grid() const { return projector_.grid(); }
-  const tilt_series::SlabViews& rays() const { return rays_; }
+  const measurement::SlabViews& rays() const { return rays_; }
   std::int64_t num_rows() const { return rays_.shape().num_rows; }
   int num_slabs() const { return rays_.num_slabs(); }
   std::size_t num_pairs() const { return static_cast<std::size_t>(SlabPair::number(num_slabs())); }
   /// The views that are fitted, ascending.
   const std::vector<int>& views() const { return views_; }
-  const loss::ViewModel& view_model(int view) const {
+  const measurement::ViewModel& view_model(int view) const {
     return models_[static_cast<std::size_t>(view)];
   }
   /// Of all views.
@@ -75,11 +75,11 @@ class VoxelProblem {
   /// detector ← scale (scale A x + offset − b) for the rays of some slabs of these views, 0 for
   /// those that do not count. Writes the padding of `samples`. Returns sums, one each view.
   /// Only rays of these `lanes`, a bit each, count.
-  std::vector<loss::ViewSums> residuals(const SlabPair& slabs, std::span<const int> views,
-                                        float* samples, float* detector,
-                                        std::uint16_t lanes = kAllLanes) const;
+  std::vector<measurement::ViewSums> residuals(const SlabPair& slabs, std::span<const int> views,
+                                               float* samples, float* detector,
+                                               std::uint16_t lanes = kAllLanes) const;
   /// ½ Σ (residual / σ)² of one slab or, with added sums, of all; sums of the fitted views.
-  double data_loss(const std::vector<loss::ViewSums>& sums) const;
+  double data_loss(const std::vector<measurement::ViewSums>& sums) const;
 
   /// samples ← Aᵀ detector, of so many slabs.
   void backproject(std::span<const int> views, const float* detector, float* samples,
@@ -90,7 +90,7 @@ class VoxelProblem {
   bool fits_view_models() const { return fits_scale_; }
   /// Fits scale and offset of each view to the sums of all slabs (loss/data_term.h),
   /// if the problem is to.
-  void fit_view_models(const std::vector<loss::ViewSums>& sums);
+  void fit_view_models(const std::vector<measurement::ViewSums>& sums);
 
   /// detector ← 1 / σ² of the view for the rays of a slab that count, 0 for the others.
   void fill_weights(int slab, std::span<const int> views, float* detector) const;
@@ -101,19 +101,20 @@ class VoxelProblem {
   void measure_ray_lengths();
 
   projection::SlabProjector projector_;
-  const tilt_series::SlabViews& rays_;
+  const measurement::SlabViews& rays_;
   std::vector<double> noise_sigma_;
   bool fits_scale_;
   std::vector<int> views_;
-  std::vector<loss::ViewModel> models_;  // of all views
-  std::vector<float> ray_lengths_;       // [view, x], of all views
+  std::vector<measurement::ViewModel> models_;  // of all views
+  std::vector<float> ray_lengths_;              // [view, x], of all views
 };
 
 /// The sums of these views over all slabs, for the densities of a volume, whose padding it writes.
-std::vector<loss::ViewSums> view_sums(const VoxelProblem& problem, std::span<const int> views,
-                                      VoxelVolume& densities);
+std::vector<measurement::ViewSums> view_sums(const VoxelProblem& problem,
+                                             std::span<const int> views, VoxelVolume& densities);
 
 /// The sums of all parts, added in their order: the same for any thread count.
-std::vector<loss::ViewSums> total(const std::vector<std::vector<loss::ViewSums>>& sums_of_part);
+std::vector<measurement::ViewSums> total(
+    const std::vector<std::vector<measurement::ViewSums>>& sums_of_part);
 
 }  // namespace tomofield::baseline

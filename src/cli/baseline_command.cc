@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "base/faults.h"
 #include "base/parallel.h"
 #include "baseline/run_baseline.h"
 #include "baseline/tune.h"
@@ -17,7 +18,7 @@
 #include "cli/specimen_options.h"
 #include "cli/tensorf_command.h"
 #include "cli/volume_options.h"
-#include "reconstruct/options.h"
+#include "fit/options.h"
 
 namespace tomofield::cli {
 namespace {
@@ -32,7 +33,7 @@ struct Arguments {
 };
 
 void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts& method,
-                reconstruct::VolumeAxes axes) {
+                output::VolumeAxes axes) {
   print_sizes({plan.num_views, plan.geometry.width, plan.geometry.height, plan.pixel_size_A,
                plan.roi, plan.geometry.thickness, axes});
   fmt::print(
@@ -60,7 +61,7 @@ void run(Arguments<Method>& arguments) {
   if constexpr (requires { method.non_negative; })
     method.non_negative = is_on(arguments.non_negative, !is_dark);
   options.method = method;
-  reconstruct::require_no_faults(options.specimen.faults());
+  base::require_no_faults(options.specimen.faults());
   baseline::check_outputs(options);
   const tilt_series::TiltSeries series(options.input);
   print_plan(baseline::plan_baseline(series, options), method.facts(), options.volume.axes);

@@ -25,7 +25,7 @@ constexpr double kMostViews = 1e9;
 
 struct Arguments {
   tilt_series::TiltSeriesOptions input;  // checked here, read by the methods
-  reconstruct::SpecimenOptions specimen;
+  measurement::SpecimenOptions specimen;
   std::string view_scale = "auto";  // likewise
   std::vector<std::string> names{"vm", "tv", "sirt", "wbp"};
   std::vector<std::string> others;

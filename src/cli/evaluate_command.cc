@@ -10,9 +10,9 @@
 #include "cli/evaluate_options.h"
 #include "evaluate/compare.h"
 #include "evaluate/fsc_files.h"
+#include "evaluate/volume_score.h"
 #include "io/atomic_file.h"
 #include "io/json.h"
-#include "reconstruct/volume_score.h"
 #include "report/fsc_picture.h"
 
 namespace tomofield::cli {
@@ -92,11 +92,11 @@ void correlate(const EvaluateArguments& arguments, Findings& findings) {
 }
 
 void reproject(const EvaluateArguments& arguments, Findings& findings) {
-  reconstruct::VolumeScoreOptions options{arguments.volume, arguments.input, arguments.specimen,
-                                          arguments.hold_out};
+  evaluate::VolumeScoreOptions options{arguments.volume, arguments.input, arguments.specimen,
+                                       arguments.hold_out};
   options.input.stack = *arguments.series;
-  const reconstruct::VolumeScore score = reconstruct::score_volume(options);
-  findings.figures["reprojection"] = reconstruct::volume_score_json(score, options);
+  const evaluate::VolumeScore score = evaluate::score_volume(options);
+  findings.figures["reprojection"] = evaluate::volume_score_json(score, options);
   fmt::print("reprojection error {:.4f} of the noise's variance in {} views\n", score.errors.total,
              score.errors.views.size());
   for (std::size_t v = 0; v < score.tilt_deg.size(); ++v)

@@ -10,7 +10,7 @@
 #include "cli/number_checks.h"
 #include "cli/specimen_options.h"
 #include "io/output_files.h"
-#include "reconstruct/result_files.h"
+#include "output/result_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
@@ -173,7 +173,7 @@ void EvaluateArguments::check() const {
         fmt::format("--tilt-range must be from a lower to a higher tilt, not from {:g}° to "
                     "{:g}°",
                     tilts->low_deg, tilts->high_deg));
-  std::vector<std::filesystem::path> inputs = reconstruct::input_files(input), outputs;
+  std::vector<std::filesystem::path> inputs = output::input_files(input), outputs;
   inputs.push_back(volume);
   for (const auto& file : {truth, fsc_with, fsc_mask, series})
     if (file) inputs.push_back(*file);

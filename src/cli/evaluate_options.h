@@ -8,7 +8,7 @@
 #include "evaluate/contrast.h"
 #include "evaluate/fsc.h"
 #include "evaluate/profile.h"
-#include "reconstruct/prepare.h"
+#include "measurement/prepare.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::cli {
@@ -30,7 +30,7 @@ struct EvaluateArguments {
 
   std::optional<std::filesystem::path> series;
   tilt_series::TiltSeriesOptions input;  ///< how the series is read
-  reconstruct::SpecimenOptions specimen;
+  measurement::SpecimenOptions specimen;
   int hold_out = 0;
 
   std::optional<std::filesystem::path> json;

@@ -12,16 +12,16 @@
 #include "cli/common_options.h"
 #include "cli/number_checks.h"
 #include "cli/volume_options.h"
-#include "field/model_file.h"
 #include "io/atomic_file.h"
-#include "reconstruct/write_volume.h"
+#include "output/model_file.h"
+#include "output/volume.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
 namespace {
 
 using field::Box;
-using field::Model;
+using output::Model;
 
 struct ExportArguments {
   std::filesystem::path model;
@@ -30,7 +30,7 @@ struct ExportArguments {
   std::vector<std::int64_t> size;
   std::optional<double> voxel_size_A;
   double bin = 1.0;
-  reconstruct::VolumeOptions volume;
+  output::VolumeOptions volume;
   bool overwrite = false;
 };
 
@@ -54,7 +54,7 @@ Box unrotated_box(const ExportArguments& arguments, const Model& model) {
     return {.centre_px = point(arguments.centre.data()),
             .size = {arguments.size[0], arguments.size[1], arguments.size[2]},
             .voxel_px = voxel_px};
-  if (arguments.box.empty()) return reconstruct::region_box(model, voxel_px);
+  if (arguments.box.empty()) return output::region_box(model, voxel_px);
   const field::Point low = point(arguments.box.data()), high = point(arguments.box.data() + 3);
   for (std::size_t a = 0; a < 3; ++a) {
     const double voxels = (high[a] - low[a]) / voxel_px;
@@ -69,13 +69,13 @@ Box unrotated_box(const ExportArguments& arguments, const Model& model) {
 
 void run_export(ExportArguments& arguments) {
   check_output(arguments);
-  const Model model = field::load_model(arguments.model);
+  const Model model = output::load_model(arguments.model);
   Box box = unrotated_box(arguments, model);
   const auto& angles = arguments.rotation;
   if (!angles.empty())
     box.field_from_box = field::rotation_from_euler(angles[0], angles[1], angles[2]);
   arguments.volume.box = box;
-  reconstruct::write_volume(model, arguments.volume, arguments.output);
+  output::write_volume(model, arguments.volume, arguments.output);
   fmt::print("{}: {} × {} × {} voxels (x, y, z) of {:.6g} Å about {:.6g}, {:.6g}, {:.6g} px\n",
              arguments.output.string(), box.size[0], box.size[1], box.size[2],
              box.voxel_px * model.pixel_size_A, box.centre_px[0], box.centre_px[1],

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "geometry/tilt_geometry.h"
-#include "reconstruct/write_volume.h"
+#include "output/volume.h"
 
 namespace tomofield::cli {
 
@@ -37,7 +37,7 @@ struct Sizes {
   double pixel_size_A;
   geometry::Roi roi;
   double thickness;
-  reconstruct::VolumeAxes axes;
+  output::VolumeAxes axes;
 };
 /// The first line of what a command says before it starts: the tomogram's sizes in the order of its
 /// file. compare::planned_grid() reads it.

@@ -7,7 +7,7 @@
 #include <string>
 #include <tuple>
 
-#include "field/model_file.h"
+#include "output/model_file.h"
 
 namespace tomofield::cli {
 namespace {
@@ -15,7 +15,7 @@ namespace {
 using field::Field;
 using field::LeafShape;
 
-void print_geometry(const field::ModelInfo& model) {
+void print_geometry(const output::ModelInfo& model) {
   const geometry::TiltGeometry& g = model.geometry;
   const geometry::Roi& roi = model.roi;
   fmt::print("  pixel size       {:.7g} Å\n", model.pixel_size_A);
@@ -67,7 +67,7 @@ void print_field(const Field& field) {
   print_leaves(field);
 }
 
-void print_training(const field::TrainingState& state) {
+void print_training(const output::TrainingState& state) {
   std::string names;
   const auto append = [&names](const auto& arrays) {
     for (const auto& [name, values] : arrays)
@@ -82,8 +82,8 @@ void print_training(const field::TrainingState& state) {
 }  // namespace
 
 void print_model(const std::filesystem::path& path) {
-  field::TrainingState training;
-  const field::Model model = field::load_model(path, &training);
+  output::TrainingState training;
+  const output::Model model = output::load_model(path, &training);
   fmt::print("{}: model, written by {}\n", path.string(), model.written_by);
   print_geometry(model);
   print_field(*model.field);

@@ -2,7 +2,7 @@
 
 #include <fmt/core.h>
 
-#include "field/model_file.h"
+#include "output/model_file.h"
 #include "report/mask_picture.h"
 #include "report/slices.h"
 #include "report/tree_picture.h"
@@ -21,7 +21,7 @@ void write_pictures(const std::filesystem::path& volume, const tilt_series::Tilt
 }
 
 void write_tree_picture(const std::filesystem::path& model, const std::filesystem::path& picture) {
-  report::write_tree_picture(field::load_model(model), picture);
+  report::write_tree_picture(output::load_model(model), picture);
   fmt::print("tree      {}\n", picture.string());
 }
 

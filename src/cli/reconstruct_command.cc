@@ -10,14 +10,14 @@
 #include "cli/run_reconstruction.h"
 #include "cli/specimen_options.h"
 #include "cli/volume_options.h"
+#include "fit/stages.h"
 #include "reconstruct/reconstruct.h"
-#include "reconstruct/stages.h"
 
 namespace tomofield::cli {
 namespace {
 
 struct Arguments {
-  reconstruct::ReconstructOptions options;
+  reconstruction::ReconstructOptions options;
   std::string view_scale = "auto";
   std::string activation = "auto";
   std::optional<int> leaf_size, epochs, vertex_epochs, coarse_epochs;
@@ -29,7 +29,7 @@ struct Arguments {
 
 void add_field_options(CLI::App& command, Arguments& arguments) {
   const char* group = "Field";
-  reconstruct::FieldOptions& field = arguments.options.field;
+  fit::FieldOptions& field = arguments.options.field;
   command.add_option("--field", field.kind, "vm: vector-matrix factors; grid: plain vertices")
       ->check(CLI::IsMember({"vm", "grid"}))
       ->capture_default_str()
@@ -69,7 +69,7 @@ void add_field_options(CLI::App& command, Arguments& arguments) {
 
 void add_fit_options(CLI::App& command, Arguments& arguments) {
   const char* group = "Fit";
-  reconstruct::FitOptions& fit = arguments.options.fit;
+  fit::FitOptions& fit = arguments.options.fit;
   command
       .add_option(
           "--epochs", arguments.epochs,
@@ -169,18 +169,18 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
 }
 
 void set_leaves(Arguments& arguments) {
-  reconstruct::FieldOptions& field = arguments.options.field;
-  field.leaf_size = arguments.leaf_size.value_or(reconstruct::usual_leaf_size(field));
-  field.depth = reconstruct::usual_depth(field);
+  fit::FieldOptions& field = arguments.options.field;
+  field.leaf_size = arguments.leaf_size.value_or(fit::usual_leaf_size(field));
+  field.depth = fit::usual_depth(field);
 }
 
 void set_schedule(Arguments& arguments) {
-  reconstruct::FitOptions& fit = arguments.options.fit;
+  fit::FitOptions& fit = arguments.options.fit;
   // Any but 0: there is such a stage.
   fit.coarse_epochs = arguments.coarse_epochs.value_or(1);
-  const bool has_vertices = reconstruct::begins_with_vertices(arguments.options.field, fit);
+  const bool has_vertices = fit::begins_with_vertices(arguments.options.field, fit);
   fit.vertex_epochs = arguments.vertex_epochs.value_or(has_vertices ? 1 : 0);
-  const reconstruct::Schedule usual = reconstruct::usual_schedule(arguments.options.field, fit);
+  const fit::Schedule usual = fit::usual_schedule(arguments.options.field, fit);
   fit.epochs = arguments.epochs.value_or(usual.epochs);
   if (!arguments.vertex_epochs && has_vertices)
     fit.vertex_epochs = usual.vertex_epochs_of(fit.epochs);
@@ -190,7 +190,7 @@ void set_schedule(Arguments& arguments) {
 }
 
 void run(Arguments& arguments, const distributed::Communicator& processes) {
-  reconstruct::ReconstructOptions& options = arguments.options;
+  reconstruction::ReconstructOptions& options = arguments.options;
   const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
   options.fit.fit_view_scale = is_on(arguments.view_scale, is_dark);
   options.field.with_margin = options.specimen.with_margin;
@@ -199,13 +199,13 @@ void run(Arguments& arguments, const distributed::Communicator& processes) {
   options.choose_penalty = arguments.penalty == "auto" && !arguments.variation;
   if (arguments.penalty != "auto") options.fit.penalty = arguments.penalty;
   options.fit.density_variation =
-      arguments.variation.value_or(reconstruct::usual_variation(options.fit.penalty));
+      arguments.variation.value_or(fit::usual_variation(options.fit.penalty));
   if (arguments.activation != "auto")
     options.field.activation = arguments.activation;
   else if (is_dark)
     options.field.activation = "identity";
   options.input.resample = options.fit.engine == "slab";
-  processes.together([&] { reconstruct::check_options(options); });
+  processes.together([&] { reconstruction::check_options(options); });
   const tilt_series::TiltSeries series(options.input, processes);
   run_reconstruction(series, options, arguments.dry_run, processes);
 }

@@ -42,9 +42,9 @@ std::function<void()> tell_if_stuck(const std::filesystem::path& model,
   };
 }
 
-std::string epochs_text(const std::vector<reconstruct::Stage>& stages) {
+std::string epochs_text(const std::vector<fit::Stage>& stages) {
   std::vector<std::string> texts;
-  for (const reconstruct::Stage& stage : stages) {
+  for (const fit::Stage& stage : stages) {
     const char* of_vertices =
         stage.field_kind == stages.back().field_kind ? "" : " with plain vertices";
     texts.push_back(stage.bin == 1
@@ -55,8 +55,8 @@ std::string epochs_text(const std::vector<reconstruct::Stage>& stages) {
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
-void print_plan(const reconstruct::ReconstructOptions& options, const reconstruct::RunPlan& plan,
-                int num_processes) {
+void print_plan(const reconstruction::ReconstructOptions& options,
+                const reconstruction::RunPlan& plan, int num_processes) {
   print_sizes({plan.num_views, plan.view_width, plan.view_height, plan.pixel_size_A, plan.roi,
                plan.thickness, options.volume.axes});
   if (plan.num_trials > 0)
@@ -73,13 +73,13 @@ void print_plan(const reconstruct::ReconstructOptions& options, const reconstruc
   std::fflush(stdout);  // before what comes of the run, in a file too
 }
 
-void print_files(const reconstruct::OutputPaths& paths) {
+void print_files(const reconstruction::OutputPaths& paths) {
   fmt::print("tomogram  {}\nmodel     {}\nfigures   {}\n", paths.volume.string(),
              paths.model.string(), paths.json.string());
 }
 
 ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
-                   const reconstruct::ReconstructOptions& options) {
+                   const reconstruction::ReconstructOptions& options) {
   return {
       stop_status(),
       fmt::format("stopped; {} '{}': continue with the same command and --resume{}", what_is_there,
@@ -88,7 +88,8 @@ ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
 
 }  // namespace
 
-void add_run_options(CLI::App& command, reconstruct::ReconstructOptions& options, bool& dry_run) {
+void add_run_options(CLI::App& command, reconstruction::ReconstructOptions& options,
+                     bool& dry_run) {
   const char* group = "Running";
   command
       .add_option("-o,--output", options.output,
@@ -110,28 +111,28 @@ void add_run_options(CLI::App& command, reconstruct::ReconstructOptions& options
 }
 
 void run_reconstruction(const tilt_series::TiltSeries& series,
-                        const reconstruct::ReconstructOptions& options, bool dry_run,
+                        const reconstruction::ReconstructOptions& options, bool dry_run,
                         const distributed::Communicator& processes) {
   processes.together([&] {
-    print_plan(options, reconstruct::plan_run(series, options, processes), processes.size());
+    print_plan(options, reconstruction::plan_run(series, options, processes), processes.size());
   });
   if (dry_run) return;
-  const reconstruct::OutputPaths paths = reconstruct::output_paths(options.output);
+  const reconstruction::OutputPaths paths = reconstruction::output_paths(options.output);
   const bool is_job = processes.size() > 1;
   stop_on_signals(is_job);
   if (is_job) processes.while_waiting(tell_if_stuck(paths.model, processes));
-  reconstruct::ReconstructHooks hooks{
+  reconstruction::ReconstructHooks hooks{
       .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};
   if (processes.is_first()) {
     hooks.progress = make_progress_bar("reconstruct");
     hooks.tune_progress = make_progress_bar("tune");
   }
-  switch (reconstruct::reconstruct(series, options, hooks, processes)) {
-    case reconstruct::Outcome::kFinished:
+  switch (reconstruction::reconstruct(series, options, hooks, processes)) {
+    case reconstruction::Outcome::kFinished:
       break;
-    case reconstruct::Outcome::kStopped:
+    case reconstruction::Outcome::kStopped:
       throw stopped("the checkpoint is", paths.model, options);
-    case reconstruct::Outcome::kStoppedTuning:
+    case reconstruction::Outcome::kStoppedTuning:
       if (options.tune) throw stopped("the finished trials are in", paths.trials, options);
       throw ExitStatus{stop_status(), "stopped before the first checkpoint"};
   }

@@ -9,14 +9,14 @@
 namespace tomofield::cli {
 
 /// Registers -o, --overwrite, --resume, --checkpoint-minutes and --dry-run.
-void add_run_options(CLI::App& command, reconstruct::ReconstructOptions& options, bool& dry_run);
+void add_run_options(CLI::App& command, reconstruction::ReconstructOptions& options, bool& dry_run);
 
 /// Prints the plan of a fit, runs it, with progress and until it is interrupted, and writes its
 /// pictures. Only the plan if `dry_run`. Call reconstruct::check_options() first. Throws ExitStatus
 /// when it was stopped by a signal, with what there is to go on from. Processes that share it all
 /// call it; the first reports and writes pictures.
 void run_reconstruction(
-    const tilt_series::TiltSeries& series, const reconstruct::ReconstructOptions& options,
+    const tilt_series::TiltSeries& series, const reconstruction::ReconstructOptions& options,
     bool dry_run, const distributed::Communicator& processes = distributed::Communicator::alone());
 
 }  // namespace tomofield::cli

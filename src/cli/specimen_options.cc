@@ -22,14 +22,14 @@ CLI::Validator words_check(const char* wanted, bool (*is_one)(const std::string&
 
 }  // namespace
 
-void add_specimen_options(CLI::App& command, reconstruct::SpecimenOptions& options) {
+void add_specimen_options(CLI::App& command, measurement::SpecimenOptions& options) {
   command.add_option("--thickness", options.thickness, "thickness of the tomogram along Z")
       ->required()
       ->group(kGroup);
   add_place_options(command, options);
 }
 
-void add_place_options(CLI::App& command, reconstruct::SpecimenOptions& options) {
+void add_place_options(CLI::App& command, measurement::SpecimenOptions& options) {
   command
       .add_option_function<std::string>(
           "--roi",

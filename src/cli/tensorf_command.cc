@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "baseline/tensorf.h"
+#include "baseline/neural/tensorf.h"
 #include "cli/common_options.h"
 #include "cli/fit_options.h"
 #include "cli/input_options.h"
@@ -16,7 +16,7 @@ namespace tomofield::cli {
 namespace {
 
 struct Arguments {
-  reconstruct::ReconstructOptions options = baseline::tensorf_options();
+  reconstruction::ReconstructOptions options = baseline::tensorf_options();
   std::string view_scale = "auto";
   std::string non_negative = "auto";
   bool dry_run = false;
@@ -25,7 +25,7 @@ struct Arguments {
 void add_method_options(CLI::App& command, Arguments& arguments) {
   const char* group = "Method";
   constexpr double kMost = 1e9;
-  reconstruct::FitOptions& fit = arguments.options.fit;
+  fit::FitOptions& fit = arguments.options.fit;
   command.add_option("--rank", arguments.options.field.rank, "components of each mode")
       ->check(number_between(1, 256))
       ->capture_default_str()
@@ -64,12 +64,12 @@ void add_method_options(CLI::App& command, Arguments& arguments) {
 }
 
 void run(Arguments& arguments) {
-  reconstruct::ReconstructOptions& options = arguments.options;
+  reconstruction::ReconstructOptions& options = arguments.options;
   const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
   options.fit.fit_view_scale = is_on(arguments.view_scale, is_dark);
   options.field.activation = is_on(arguments.non_negative, !is_dark) ? "softplus" : "identity";
   options.field.with_margin = options.specimen.with_margin;
-  reconstruct::check_options(options);
+  reconstruction::check_options(options);
   const tilt_series::TiltSeries series(options.input);
   baseline::cover_with_one_node(plan_series(series, options.specimen).roi, options);
   run_reconstruction(series, options, arguments.dry_run);
@@ -81,7 +81,7 @@ void add_tensorf(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
       "tensorf", "one factorised tensor for all, coarse to fine, as in TensoRF");
   const auto arguments = std::make_shared<Arguments>();
-  reconstruct::ReconstructOptions& options = arguments->options;
+  reconstruction::ReconstructOptions& options = arguments->options;
   add_input_options(command, options.input);
   add_specimen_options(command, options.specimen);
   add_method_options(command, *arguments);

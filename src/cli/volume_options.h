@@ -2,11 +2,11 @@
 
 #include <CLI/CLI.hpp>
 
-#include "reconstruct/write_volume.h"
+#include "output/volume.h"
 
 namespace tomofield::cli {
 
 /// Registers --mode, --axes and --invert: how a volume is written.
-void add_volume_options(CLI::App& command, reconstruct::VolumeOptions& options);
+void add_volume_options(CLI::App& command, output::VolumeOptions& options);
 
 }  // namespace tomofield::cli

@@ -7,7 +7,7 @@
 #include <iterator>
 #include <string>
 
-#include "reconstruct/result_files.h"
+#include "output/result_files.h"
 
 namespace tomofield::compare {
 namespace {
@@ -68,7 +68,7 @@ Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
     run.command.insert(run.command.end(), {"--hold-out", std::to_string(options.hold_out)});
   // Anew for every purpose: settings that were chosen on all views have seen those held out.
   if (options.tune && method.tunes) run.command.push_back("--tune");
-  run.inputs = reconstruct::input_files(options.input);
+  run.inputs = output::input_files(options.input);
   std::ranges::copy(named_files({own, method.arguments.end()}), std::back_inserter(run.inputs));
   return run;
 }

@@ -53,31 +53,32 @@ std::vector<char> scored_pixels(const VolumePlace& place, int view) {
 }
 
 // Sums in double, ray by ray: volumes may have offsets that are large against their contrast.
-loss::ViewSums ray_sums(const float* measured, const std::uint16_t* mask,
-                        const std::vector<char>& scored, const float* predicted) {
-  loss::ViewSums sums;
+measurement::ViewSums ray_sums(const float* measured, const std::uint16_t* mask,
+                               const std::vector<char>& scored, const float* predicted) {
+  measurement::ViewSums sums;
   for (std::size_t x = 0; x < scored.size(); ++x) {
     for (std::size_t lane = 0; scored[x] && lane < kLanes; ++lane) {
       if ((mask[x] >> lane & 1) == 0) continue;
       const std::size_t ray = x * kLanes + lane;
-      loss::ray_data_term({}, 1.0, static_cast<double>(measured[ray]),
-                          static_cast<double>(predicted[ray]), sums);
+      measurement::ray_data_term({}, 1.0, static_cast<double>(measured[ray]),
+                                 static_cast<double>(predicted[ray]), sums);
     }
   }
   return sums;
 }
 
-std::vector<loss::ViewSums> slab_sums(const projection::SlabProjector& projector,
-                                      const base::Volume& volume,
-                                      const tilt_series::SlabViews& measured,
-                                      std::span<const int> views,
-                                      const std::vector<std::vector<char>>& scored, int slab) {
+std::vector<measurement::ViewSums> slab_sums(const projection::SlabProjector& projector,
+                                             const base::Volume& volume,
+                                             const measurement::SlabViews& measured,
+                                             std::span<const int> views,
+                                             const std::vector<std::vector<char>>& scored,
+                                             int slab) {
   const std::int64_t width = projector.geometry().width;
   base::AlignedBuffer<float> samples(projector.grid().size());
   base::AlignedBuffer<float> rays(projector.detector_size(views.size()));
   copy_slab(volume, slab, projector.grid().segments().front(), samples.data());
   projector.forward(samples.data(), views, rays.data());
-  std::vector<loss::ViewSums> sums;
+  std::vector<measurement::ViewSums> sums;
   for (std::size_t v = 0; v < views.size(); ++v) {
     const float* predicted = rays.data() + static_cast<std::ptrdiff_t>(v) * width * kLanes;
     sums.push_back(ray_sums(measured.rays(slab, views[v]), measured.mask(slab, views[v]), scored[v],
@@ -86,7 +87,8 @@ std::vector<loss::ViewSums> slab_sums(const projection::SlabProjector& projector
   return sums;
 }
 
-void require_rays(const SlabSums& sums, std::span<const int> views, const VolumePlace& place) {
+void require_rays(const measurement::SlabSums& sums, std::span<const int> views,
+                  const VolumePlace& place) {
   for (std::size_t v = 0; v < views.size(); ++v) {
     if (std::ranges::any_of(sums, [v](const auto& slab) { return slab[v].n > 0; })) continue;
     throw Error(fmt::format(
@@ -98,9 +100,10 @@ void require_rays(const SlabSums& sums, std::span<const int> views, const Volume
 
 }  // namespace
 
-ViewErrors reprojection_errors(const base::Volume& volume, const VolumePlace& place,
-                               const tilt_series::SlabViews& measured, std::vector<int> views,
-                               std::span<const double> noise_weight) {
+measurement::ViewErrors reprojection_errors(const base::Volume& volume, const VolumePlace& place,
+                                            const measurement::SlabViews& measured,
+                                            std::vector<int> views,
+                                            std::span<const double> noise_weight) {
   const projection::SlabProjector projector(
       place.geometry,
       projection::make_sample_grid(place.geometry, static_cast<double>(place.roi.x0),
@@ -111,13 +114,13 @@ ViewErrors reprojection_errors(const base::Volume& volume, const VolumePlace& pl
                   "one voxel a sample");
   std::vector<std::vector<char>> scored;
   for (const int view : views) scored.push_back(scored_pixels(place, view));
-  SlabSums sums(static_cast<std::size_t>(measured.num_slabs()));
+  measurement::SlabSums sums(static_cast<std::size_t>(measured.num_slabs()));
   base::parallel_for(measured.num_slabs(), [&](std::int64_t slab) {
     sums[static_cast<std::size_t>(slab)] =
         slab_sums(projector, volume, measured, views, scored, static_cast<int>(slab));
   });
   require_rays(sums, views, place);
-  return view_errors(std::move(views), sums, noise_weight, true);
+  return measurement::view_errors(std::move(views), sums, noise_weight, true);
 }
 
 }  // namespace tomofield::evaluate

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "base/volume.h"
-#include "evaluate/view_errors.h"
 #include "geometry/tilt_geometry.h"
-#include "tilt_series/slab_views.h"
+#include "measurement/slab_views.h"
+#include "measurement/view_errors.h"
 
 namespace tomofield::evaluate {
 
@@ -24,8 +24,9 @@ struct VolumePlace {
 /// view: of any volume, whatever its units and contrast. `measured` has the rows of the region,
 /// `noise_weight` 1 / variance of the noise of every view of the series. The
 /// sums are the same for any number of threads. Throws Error for a view of which no ray counts.
-ViewErrors reprojection_errors(const base::Volume& volume, const VolumePlace& place,
-                               const tilt_series::SlabViews& measured, std::vector<int> views,
-                               std::span<const double> noise_weight);
+measurement::ViewErrors reprojection_errors(const base::Volume& volume, const VolumePlace& place,
+                                            const measurement::SlabViews& measured,
+                                            std::vector<int> views,
+                                            std::span<const double> noise_weight);
 
 }  // namespace tomofield::evaluate

@@ -33,9 +33,9 @@ class ReprojectionTest : public ::testing::Test {
 
   // 3 · line integral − 7 where the ray is in the volume all the way, and not
   // within a voxel of its faces; `elsewhere` on the other side.
-  ViewErrors errors(const VolumePlace& place, float elsewhere) const {
+  measurement::ViewErrors errors(const VolumePlace& place, float elsewhere) const {
     const std::size_t views = place.geometry.tilt_deg.size();
-    const tilt_series::SlabViews measured(
+    const measurement::SlabViews measured(
         {views, kWidth, kHeight, roi_.y0, roi_.height()}, 1.0,
         [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
           const double angle = place.geometry.tilt_deg[view] * std::numbers::pi / 180.0;
@@ -69,14 +69,14 @@ class ReprojectionTest : public ::testing::Test {
 };
 
 TEST_F(ReprojectionTest, FindsScaleAndOffsetFromRaysThatStayInside) {
-  const ViewErrors flat = errors(place({-44.0, -20.0, 0.0, 35.0}), 1e4f);
+  const measurement::ViewErrors flat = errors(place({-44.0, -20.0, 0.0, 35.0}), 1e4f);
   for (std::size_t v = 0; v < flat.views.size(); ++v) {
     EXPECT_NEAR(flat.models[v].scale, 3.0, 1e-3) << v;
     EXPECT_NEAR(flat.models[v].offset, -7.0, 2e-2) << v;
     EXPECT_LT(flat.view_error[v], 1e-5) << v;
   }
   // Steep rays step along x, and meet the faces across z between samples: a ripple of 1 %.
-  const ViewErrors steep = errors(place({-60.0, 50.0}), 1e4f);
+  const measurement::ViewErrors steep = errors(place({-60.0, 50.0}), 1e4f);
   for (std::size_t v = 0; v < steep.views.size(); ++v) {
     EXPECT_NEAR(steep.models[v].scale, 3.0, 0.03) << v;
     EXPECT_LT(steep.view_error[v], 4.0 * 0.01 * 0.01 * 96.0 * 96.0) << v;

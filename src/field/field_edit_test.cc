@@ -8,7 +8,7 @@
 
 #include "central_difference.h"
 #include "field/field.h"
-#include "field/merge_factors.h"
+#include "field/vm/merge_factors.h"
 #include "random_arrays.h"
 
 namespace tomofield::field {

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "field/quadtree.h"
+#include "field/tree/quadtree.h"
 #include "geometry/ray_geometry.h"
 
 namespace tomofield::projection {

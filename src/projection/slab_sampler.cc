@@ -8,7 +8,7 @@
 
 #include "base/aligned_buffer.h"
 #include "base/check.h"
-#include "field/resample.h"
+#include "field/sampling/resample.h"
 #include "kernels/lanes.h"
 
 namespace tomofield::projection {

@@ -12,43 +12,45 @@
 #include "distributed/gathered_arrays.h"
 #include "tomofield/error.h"
 
-namespace tomofield::reconstruct {
+namespace tomofield::reconstruction {
 namespace {
 
 // Six numbers a view, in the order of the members.
-std::vector<double> flatten(const std::vector<loss::ViewSums>& sums) {
+std::vector<double> flatten(const std::vector<measurement::ViewSums>& sums) {
   std::vector<double> flat;
-  for (const loss::ViewSums& s : sums) flat.insert(flat.end(), {s.n, s.p, s.b, s.pp, s.pb, s.bb});
+  for (const measurement::ViewSums& s : sums)
+    flat.insert(flat.end(), {s.n, s.p, s.b, s.pp, s.pb, s.bb});
   return flat;
 }
 
-std::vector<loss::ViewSums> unflatten_sums(const std::vector<double>& flat) {
-  std::vector<loss::ViewSums> sums;
+std::vector<measurement::ViewSums> unflatten_sums(const std::vector<double>& flat) {
+  std::vector<measurement::ViewSums> sums;
   for (std::size_t i = 0; i + 6 <= flat.size(); i += 6) {
     sums.push_back({flat[i], flat[i + 1], flat[i + 2], flat[i + 3], flat[i + 4], flat[i + 5]});
   }
   return sums;
 }
 
-std::vector<double> flatten(const std::vector<loss::ViewModel>& views) {
+std::vector<double> flatten(const std::vector<measurement::ViewModel>& views) {
   std::vector<double> flat;
-  for (const loss::ViewModel& v : views) flat.insert(flat.end(), {v.scale, v.offset, v.weight});
+  for (const measurement::ViewModel& v : views)
+    flat.insert(flat.end(), {v.scale, v.offset, v.weight});
   return flat;
 }
 
-std::vector<loss::ViewModel> unflatten_views(const std::vector<double>& flat) {
-  std::vector<loss::ViewModel> views;
+std::vector<measurement::ViewModel> unflatten_views(const std::vector<double>& flat) {
+  std::vector<measurement::ViewModel> views;
   for (std::size_t i = 0; i + 3 <= flat.size(); i += 3)
     views.push_back({flat[i], flat[i + 1], flat[i + 2]});
   return views;
 }
 
 // Whether it is frozen; then four numbers an update, the last that of the levels, and its levels.
-void store(const TreeProgress& tree, field::TrainingState& state) {
+void store(const fit::TreeProgress& tree, output::TrainingState& state) {
   auto& numbers = state.integers["tree_updates"];
   auto& errors = state.doubles["tree_errors"];
   numbers.push_back(tree.is_frozen ? 1 : 0);
-  for (const TreeUpdate& u : tree.updates) {
+  for (const fit::TreeUpdate& u : tree.updates) {
     numbers.insert(numbers.end(), {u.epoch, u.splits, u.merges,
                                    static_cast<std::int64_t>(u.leaves_by_level.size())});
     numbers.insert(numbers.end(), u.leaves_by_level.begin(), u.leaves_by_level.end());
@@ -56,18 +58,18 @@ void store(const TreeProgress& tree, field::TrainingState& state) {
   }
 }
 
-TreeProgress unflatten_tree(const std::vector<std::int64_t>& numbers,
-                            const std::vector<double>& errors) {
-  TreeProgress tree;
+fit::TreeProgress unflatten_tree(const std::vector<std::int64_t>& numbers,
+                                 const std::vector<double>& errors) {
+  fit::TreeProgress tree;
   tree.is_frozen = numbers.at(0) != 0;
   for (std::size_t i = 1, e = 0; i < numbers.size(); e += 2) {
     const std::size_t num_levels = static_cast<std::size_t>(numbers.at(i + 3));
-    TreeUpdate update{.epoch = numbers.at(i),
-                      .splits = numbers.at(i + 1),
-                      .merges = numbers.at(i + 2),
-                      .error = errors.at(e),
-                      .predicted_error = errors.at(e + 1),
-                      .leaves_by_level = {}};
+    fit::TreeUpdate update{.epoch = numbers.at(i),
+                           .splits = numbers.at(i + 1),
+                           .merges = numbers.at(i + 2),
+                           .error = errors.at(e),
+                           .predicted_error = errors.at(e + 1),
+                           .leaves_by_level = {}};
     for (std::size_t level = 0; level < num_levels; ++level)
       update.leaves_by_level.push_back(numbers.at(i + 4 + level));
     i += 4 + num_levels;
@@ -84,8 +86,8 @@ std::string as_text(const std::vector<std::int64_t>& numbers) {
 }
 
 // The same bytes whenever a fit is made.
-nlohmann::json without_times(const Tuned& tuned) {
-  nlohmann::json json = tuning_json(tuned);
+nlohmann::json without_times(const selection::Tuned& tuned) {
+  nlohmann::json json = selection::tuning_json(tuned);
   for (nlohmann::json& trial : json["trials"]) trial.erase("seconds");
   return json;
 }
@@ -145,35 +147,35 @@ const typename Map::mapped_type& entry(const Map& map, const char* name, const s
 }
 
 // The parameters of the leaves that a process works on, and what goes with them.
-distributed::GatheredArrays own_parts(const Fit& fit) {
+distributed::GatheredArrays own_parts(const fit::Fit& fit) {
   const distributed::Range leaves = fit.own_leaves();
   return {fit.processes(), fit.field().offset(leaves.begin), fit.field().offset(leaves.end)};
 }
 
 // A checkpoint if there are moments, else a model.
-void save(const std::filesystem::path& path, const Fit& fit, const field::ModelInfo& info,
-          const field::TrainingState& state,
+void save(const std::filesystem::path& path, const fit::Fit& fit, const output::ModelInfo& info,
+          const output::TrainingState& state,
           const std::map<std::string, std::span<const float>>& moments) {
-  fit.processes().together([&] { field::require_finite(fit.field(), path); });
+  fit.processes().together([&] { output::require_finite(fit.field(), path); });
   distributed::GatheredArrays arrays = own_parts(fit);
   const auto source = [&](std::span<const float> values) {
     const std::size_t array = arrays.add(values);
-    return field::FloatSource(
+    return output::FloatSource(
         values.size(),
-        [&arrays, array](const field::FloatSource::Sink& sink) { arrays.hand_out(array, sink); });
+        [&arrays, array](const output::FloatSource::Sink& sink) { arrays.hand_out(array, sink); });
   };
-  const field::FloatSource parameters = source(fit.field().parameters());
-  field::FloatArrays more;
+  const output::FloatSource parameters = source(fit.field().parameters());
+  output::FloatArrays more;
   for (const auto& [name, values] : moments) more.emplace(name, source(values));
   arrays.read_on_first(
-      [&] { field::save_model(path, fit.field(), parameters, info, &state, more); });
+      [&] { output::save_model(path, fit.field(), parameters, info, &state, more); });
 }
 
 }  // namespace
 
-field::TrainingState progress_state(const Fit& fit, const FitOrigin& origin) {
-  field::TrainingState state;
-  const Progress& progress = fit.progress();
+output::TrainingState progress_state(const fit::Fit& fit, const FitOrigin& origin) {
+  output::TrainingState state;
+  const fit::Progress& progress = fit.progress();
   state.integers["fingerprint"] = as_numbers(origin.fingerprint);
   if (origin.tuned) state.integers["tuning"] = as_numbers(without_times(*origin.tuned).dump());
   state.integers["step"] = {progress.step};
@@ -185,15 +187,15 @@ field::TrainingState progress_state(const Fit& fit, const FitOrigin& origin) {
   return state;
 }
 
-void save_fit(const std::filesystem::path& path, const Fit& fit, const field::ModelInfo& info,
-              const field::TrainingState& state) {
+void save_fit(const std::filesystem::path& path, const fit::Fit& fit, const output::ModelInfo& info,
+              const output::TrainingState& state) {
   save(path, fit, info, state, {});
 }
 
-void save_checkpoint(const std::filesystem::path& path, const Fit& fit,
-                     const field::ModelInfo& info, const FitOrigin& origin) {
-  field::TrainingState state = progress_state(fit, origin);
-  const optimize::Adam::State& adam = fit.optimizer().state();
+void save_checkpoint(const std::filesystem::path& path, const fit::Fit& fit,
+                     const output::ModelInfo& info, const FitOrigin& origin) {
+  output::TrainingState state = progress_state(fit, origin);
+  const fit::Adam::State& adam = fit.optimizer().state();
   std::vector<std::int64_t> leaf_steps(adam.leaf_steps.size());
   for (int leaf = fit.own_leaves().begin; leaf < fit.own_leaves().end; ++leaf)
     leaf_steps[static_cast<std::size_t>(leaf)] = adam.leaf_steps[static_cast<std::size_t>(leaf)];
@@ -204,23 +206,23 @@ void save_checkpoint(const std::filesystem::path& path, const Fit& fit,
   save(path, fit, info, state, {{"adam_m", adam.m}, {"adam_v", adam.v}});
 }
 
-std::optional<Tuned> stored_choice(const std::filesystem::path& path) {
-  field::TrainingState state;
-  field::load_part(
+std::optional<selection::Tuned> stored_choice(const std::filesystem::path& path) {
+  output::TrainingState state;
+  output::load_part(
       path, [](const field::Quadtree&) { return std::vector<int>(); }, state);
   const auto tuning = state.integers.find("tuning");
   if (tuning == state.integers.end()) return std::nullopt;
   try {
-    return tuned_from(nlohmann::json::parse(as_text(tuning->second)));
+    return selection::tuned_from(nlohmann::json::parse(as_text(tuning->second)));
   } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("'{}' is damaged: its tuning ({})", path.string(), error.what()));
   }
 }
 
-void restore_fit(const std::filesystem::path& file, const std::string& fingerprint, Fit& fit) {
+void restore_fit(const std::filesystem::path& file, const std::string& fingerprint, fit::Fit& fit) {
   const std::string path = file.string();
-  field::TrainingState state;
-  field::Model model = field::load_part(
+  output::TrainingState state;
+  output::Model model = output::load_part(
       file, [&](const field::Quadtree& tree) { return fit.kept_leaves(tree); }, state);
   const std::string found = as_text(entry(state.integers, "fingerprint", path));
   if (found != fingerprint) {
@@ -228,7 +230,7 @@ void restore_fit(const std::filesystem::path& file, const std::string& fingerpri
         fmt::format("'{}' was made from another series or with other options (these differ: {})",
                     path, differences(found, fingerprint)));
   }
-  Progress progress;
+  fit::Progress progress;
   progress.step = entry(state.integers, "step", path).at(0);
   progress.views = unflatten_views(entry(state.doubles, "views", path));
   progress.epoch_sums = unflatten_sums(entry(state.doubles, "epoch_sums", path));
@@ -238,13 +240,13 @@ void restore_fit(const std::filesystem::path& file, const std::string& fingerpri
   progress.held_out_error = entry(state.doubles, "held_out_error", path);
   fit.go_on_from(std::move(progress), std::move(model.field));
   if (fit.is_done()) return;
-  optimize::Adam::State& adam = fit.optimizer().state();
-  field::load_floats(file, "adam_m", fit.field(), adam.m);
-  field::load_floats(file, "adam_v", fit.field(), adam.v);
+  fit::Adam::State& adam = fit.optimizer().state();
+  output::load_floats(file, "adam_m", fit.field(), adam.m);
+  output::load_floats(file, "adam_v", fit.field(), adam.v);
   adam.leaf_steps = entry(state.integers, "leaf_steps", path);
   adam.bias_m = entry(state.doubles, "bias_moments", path).at(0);
   adam.bias_v = entry(state.doubles, "bias_moments", path).at(1);
   adam.bias_steps = entry(state.integers, "bias_steps", path).at(0);
 }
 
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::reconstruction

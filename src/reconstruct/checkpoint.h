@@ -4,38 +4,38 @@
 #include <optional>
 #include <string>
 
-#include "field/model_file.h"
-#include "reconstruct/fit.h"
-#include "reconstruct/trials.h"
+#include "fit/fit.h"
+#include "output/model_file.h"
+#include "selection/trials.h"
 
-namespace tomofield::reconstruct {
+namespace tomofield::reconstruction {
 
 /// What a fit was made from.
 struct FitOrigin {
-  std::string fingerprint;     ///< of the series and the options (JSON)
-  std::optional<Tuned> tuned;  ///< by which some of the options were chosen
+  std::string fingerprint;                ///< of the series and the options (JSON)
+  std::optional<selection::Tuned> tuned;  ///< by which some of the options were chosen
 };
 
 /// How far a fit is, as the model file stores it: all that a finished fit leaves.
-field::TrainingState progress_state(const Fit& fit, const FitOrigin& origin);
+output::TrainingState progress_state(const fit::Fit& fit, const FitOrigin& origin);
 
 /// Writes the model of a fit with what progress_state() gave: parameters from wherever they are,
 /// by the first of the processes that share it.
-void save_fit(const std::filesystem::path& path, const Fit& fit, const field::ModelInfo& info,
-              const field::TrainingState& state);
+void save_fit(const std::filesystem::path& path, const fit::Fit& fit, const output::ModelInfo& info,
+              const output::TrainingState& state);
 
 /// Writes the model of a fit between two steps with its optimiser's state, which
 /// triples the file, so that it can be continued bit for bit, by any number of processes.
-void save_checkpoint(const std::filesystem::path& path, const Fit& fit,
-                     const field::ModelInfo& info, const FitOrigin& origin);
+void save_checkpoint(const std::filesystem::path& path, const fit::Fit& fit,
+                     const output::ModelInfo& info, const FitOrigin& origin);
 
 /// What the options of the fit in a checkpoint or model were chosen by. Throws Error if `path` is
 /// none.
-std::optional<Tuned> stored_choice(const std::filesystem::path& path);
+std::optional<selection::Tuned> stored_choice(const std::filesystem::path& path);
 
 /// Puts a stored field and state into a fresh fit of the same options, on each process what it
 /// needs. Throws Error naming `path` if they belong to another series or other options, and what
 /// differs.
-void restore_fit(const std::filesystem::path& path, const std::string& fingerprint, Fit& fit);
+void restore_fit(const std::filesystem::path& path, const std::string& fingerprint, fit::Fit& fit);
 
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::reconstruction

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-namespace tomofield::reconstruct {
+namespace tomofield::reconstruction {
 namespace {
 
 // Each view's x-axis tilt, 2 × 2 matrix and shift.
@@ -17,7 +17,8 @@ nlohmann::json alignment_json(const geometry::RayGeometry& g) {
 
 }  // namespace
 
-std::string fingerprint_of(const ReconstructOptions& options, const PreparedSeries& series,
+std::string fingerprint_of(const ReconstructOptions& options,
+                           const measurement::PreparedSeries& series,
                            const distributed::Communicator& processes) {
   nlohmann::json json = options_json(options);
   json.erase("input");
@@ -31,4 +32,4 @@ std::string fingerprint_of(const ReconstructOptions& options, const PreparedSeri
   return json.dump();
 }
 
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::reconstruction

@@ -3,14 +3,15 @@
 #include <string>
 
 #include "distributed/communicator.h"
-#include "reconstruct/prepare.h"
-#include "reconstruct/run_options.h"
+#include "measurement/prepare.h"
+#include "reconstruct/options.h"
 
-namespace tomofield::reconstruct {
+namespace tomofield::reconstruction {
 
 /// What decides the bits of a fit: the options, the geometry and the rays themselves (JSON). The
 /// same on all processes that share the rays.
-std::string fingerprint_of(const ReconstructOptions& options, const PreparedSeries& series,
+std::string fingerprint_of(const ReconstructOptions& options,
+                           const measurement::PreparedSeries& series,
                            const distributed::Communicator& processes);
 
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::reconstruction

@@ -2,100 +2,74 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include "base/faults.h"
+#include "output/result_files.h"
+#include "selection/search.h"
 
-#include "base/lanes.h"
-#include "tomofield/error.h"
+namespace tomofield::reconstruction {
 
-namespace tomofield::reconstruct {
-namespace {
-
-// Collects sentences about options; written so that NaN is a fault.
-class Faults {
- public:
-  void require_between(const char* option, double value, double low, double high) {
-    if (value >= low && value <= high) return;
-    found_.push_back(fmt::format("{} must be from {} to {}, not {}", option, low, high, value));
-  }
-  void require_not_negative(const char* option, double value) {
-    if (value >= 0 && std::isfinite(value)) return;
-    found_.push_back(fmt::format("{} must be 0 or more, not {:g}", option, value));
-  }
-  void require_positive(const char* option, double value) {
-    if (value > 0 && std::isfinite(value)) return;
-    found_.push_back(fmt::format("{} must be above 0, not {:g}", option, value));
-  }
-  void require_one_of(const char* option, const std::string& value, const char* first,
-                      const char* second) {
-    if (value == first || value == second) return;
-    found_.push_back(fmt::format("{} must be {} or {}, not '{}'", option, first, second, value));
-  }
-  void add(std::string_view fault) { found_.emplace_back(fault); }
-  std::vector<std::string> take() { return std::move(found_); }
-
- private:
-  std::vector<std::string> found_;
-};
-
-constexpr double kMost = 1e9;  // of a count
-
-}  // namespace
-
-std::vector<std::string> FieldOptions::faults() const {
-  constexpr int kLargestLeaf = 4096;
-  Faults faults;
-  faults.require_one_of("--field", kind, "vm", "grid");
-  faults.require_one_of("--activation", activation, "softplus", "identity");
-  faults.require_one_of("--tree", tree, "uniform", "adaptive");
-  faults.require_between("--leaf-budget", leaf_budget, 0, kMost);
-  if (leaf_budget > 0 && tree == "uniform")
-    faults.add("--leaf-budget is for --tree adaptive alone");
-  if (leaf_size < base::kLanes || leaf_size > kLargestLeaf || leaf_size % base::kLanes != 0) {
-    faults.add(fmt::format("--leaf-size must be a multiple of {} up to {}, not {}", base::kLanes,
-                           kLargestLeaf, leaf_size));
-  }
-  faults.require_between("--vertex-spacing", vertex_spacing, 0.25, 64);
-  faults.require_between("--margin-spacing", margin_spacing, 1, 64);
-  faults.require_between("--rank", rank, 1, 256);
-  faults.require_between("the margin's rank", margin_rank, 1, 256);
-  faults.require_positive("the sharpness of softplus", sharpness);
-  faults.require_positive("the initial scale", initial_scale);
-  return faults.take();
+OutputPaths output_paths(const std::filesystem::path& volume) {
+  std::filesystem::path stem = volume;
+  stem.replace_extension();
+  const auto with = [&](const char* extension) {
+    return std::filesystem::path(stem.string() + extension);
+  };
+  return {volume, with(".h5"),           with(".json"),     with("_tree.png"),
+          stem,   with("_held_out.png"), with("_tune.json")};
 }
 
-std::vector<std::string> FitOptions::faults() const {
-  Faults faults;
-  faults.require_between("--epochs", epochs, 1, kMost);
-  faults.require_between("--vertex-epochs", vertex_epochs, 0, kMost);
-  if (vertex_epochs > 0 && engine == "ray")
-    faults.add("--vertex-epochs needs --engine slab: with rays factors are fitted from the start");
-  faults.require_between("--coarse-epochs", coarse_epochs, 0, kMost);
-  faults.require_between("--coarse-bin", coarse_bin, 2, 64);
-  faults.require_between("--subsets", subsets, 1, kMost);
-  faults.require_one_of("--engine", engine, "slab", "ray");
-  faults.require_between("--ray-samples", ray_samples, 0, 1 << 20);
-  faults.require_between("--rays-per-step", static_cast<double>(rays_per_step), 0, kMost);
-  faults.require_positive("--learning-rate", learning_rate);
-  faults.require_between("the final learning rate's part of the first", final_rate, 1e-6, 1);
-  faults.require_not_negative("--tv", density_variation);
-  if (hold_out != 0) faults.require_between("--hold-out", hold_out, 2, kMost);
-  faults.require_between("--early-stop", patience, 0, kMost);
-  if (patience > 0 && hold_out == 0)
-    faults.add("--early-stop watches views that --hold-out keeps from the fit: give that as well");
-  if (hold_out > 0 && engine == "ray")
-    faults.add("--hold-out predicts aligned views: it needs --engine slab");
-  faults.require_not_negative("--tv-factors", factor_variation);
-  faults.require_not_negative("--bcc", boundary);
-  faults.require_not_negative("--ifp", fourier);
-  faults.require_one_of("--ifp-ring", fourier_ring, "mean", "max");
-  faults.require_one_of("--tv-penalty", penalty, "concave", "smooth");
-  faults.require_positive("the concavity", concavity);
-  faults.require_positive("the gradient floor", gradient_floor);
-  return faults.take();
+int ReconstructOptions::num_trials(int num_fitted_views) const {
+  constexpr int kFewestViews = 14;
+  if (tune)
+    return selection::expected_trials({.penalty = choose_penalty, .rank = field.kind == "vm"});
+  return choose_penalty && fit.engine == "slab" && num_fitted_views >= kFewestViews ? 2 : 0;
 }
 
-void require_no_faults(const std::vector<std::string>& faults) {
-  if (!faults.empty()) throw Error(fmt::format("{}", fmt::join(faults, "; ")));
+std::vector<std::string> ReconstructOptions::faults() const {
+  std::vector<std::string> all = specimen.faults();
+  for (const auto& faults : {field.faults(), fit.faults()})
+    all.insert(all.end(), faults.begin(), faults.end());
+  if (fit.vertex_epochs > 0 && (field.kind != "vm" || field.tree != "uniform"))
+    all.emplace_back(
+        "--vertex-epochs is for the factors of a uniform tree: leave it out, or give --field vm "
+        "and --tree uniform");
+  if (tune && fit.engine == "ray")
+    all.emplace_back("--tune predicts aligned views: it needs --engine slab");
+  if (tune && fit.patience > 0)
+    all.emplace_back("--tune chooses the number of epochs: leave --early-stop out");
+  if (!(checkpoint_minutes >= 0))
+    all.push_back(
+        fmt::format("--checkpoint-minutes must be 0 or more, not {:g}", checkpoint_minutes));
+  return all;
 }
 
-}  // namespace tomofield::reconstruct
+std::vector<std::string> ReconstructOptions::faults_of_job() const {
+  std::vector<std::string> all;
+  const auto refuse = [&](const char* option) {
+    all.push_back(fmt::format(
+        "several processes cannot share {} yet: start one, with more --threads", option));
+  };
+  if (field.tree == "adaptive") refuse("--tree adaptive");
+  if (fit.engine == "ray") refuse("--engine ray");
+  return all;
+}
+
+void check_options(const ReconstructOptions& options) {
+  base::require_no_faults(options.faults());
+  const OutputPaths paths = output_paths(options.output);
+  // Without a checkpoint there is nothing to resume, and what else is there is not this run's.
+  const bool resumes = options.resume && (std::filesystem::exists(paths.model) ||
+                                          (options.tune && std::filesystem::exists(paths.trials)));
+  std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json};
+  if (options.field.tree == "adaptive") results.push_back(paths.tree_picture);
+  if (options.tune) results.push_back(paths.trials);
+  if (options.fit.hold_out > 0) results.push_back(paths.held_out_picture);
+  output::check_result_files(
+      std::move(results), paths.picture_prefix, options.input, options.overwrite || resumes,
+      options.resume ? "there is no checkpoint to resume, so give --overwrite to start over and "
+                       "replace it, or another name with -o"
+                     : "give --overwrite to replace it, --resume to continue the run that made "
+                       "it, or another name with -o");
+}
+
+}  // namespace tomofield::reconstruction

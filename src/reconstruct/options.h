@@ -1,85 +1,55 @@
 #pragma once
 
-#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-namespace tomofield::reconstruct {
+#include "fit/options.h"
+#include "measurement/prepare.h"
+#include "output/volume.h"
+#include "tilt_series/tilt_series.h"
 
-/// The field: how finely leaves resolve the specimen. Lengths in pixels of the binned view.
-struct FieldOptions {
-  std::string kind = "vm";       ///< vm or grid
-  int leaf_size = 32;            ///< side of a leaf, a multiple of 16
-  std::string tree = "uniform";  ///< or adaptive: leaves half and twice as wide where that pays
-  int depth = 1;                 ///< of leaves as they are first; those of the margin have 0
-  int leaf_budget = 0;           ///< most leaves of an adaptive tree; 0: as many as it begins with
-  double vertex_spacing = 1.0;   ///< between vertices, all axes; of leaves of that size
-  int rank = 24;                 ///< of each mode, vm only
-  bool with_margin = true;       ///< model what rays cross outside the region of interest
-  double margin_spacing = 2.0;   ///< of samples and vertices there
-  int margin_rank = 8;
-  std::string activation = "softplus";  ///< or identity, for densities of either sign
-  double sharpness = 5.0;               ///< β of softplus, per density unit
-  double initial_scale = 0.1;           ///< factors start uniform in ± this
-  /// Between vertices of the smallest leaves.
-  double finest_spacing() const { return vertex_spacing / (tree == "adaptive" ? 2 : 1); }
-  /// Every fault of these options, a sentence each.
+namespace tomofield::reconstruction {
+
+/// Everything that a reconstruction is made from.
+struct ReconstructOptions {
+  tilt_series::TiltSeriesOptions input;
+  measurement::SpecimenOptions specimen;
+  fit::FieldOptions field;
+  fit::FitOptions fit;
+  bool choose_penalty = false;  ///< of total variation, by held-out error, in place of fit.penalty
+  bool tune = false;  ///< choose the weight, rank and epochs by held-out error too (tune.h)
+  output::VolumeOptions volume;
+  std::filesystem::path output;  ///< the volume; model, JSON and pictures lie beside it
+  bool overwrite = false;
+  bool resume = false;  ///< continue from the model file, if there is one
+  double checkpoint_minutes = 5;
+  /// Trials of settings before the fit, about; 0: none are to be chosen. A fit of few
+  /// views cannot spare any for the penalty alone, and rays of raw views are not predicted.
+  int num_trials(int num_fitted_views) const;
+  /// Every fault that these options have by themselves, a sentence each.
   std::vector<std::string> faults() const;
+  /// Those that they have for a job of several processes.
+  std::vector<std::string> faults_of_job() const;
 };
 
-/// The optimisation. The data term is ½ Σ (residual / σ)²; weights of
-/// variations are relative to it and to the noise: weight / σ is used, with σ
-/// the typical noise of a ray in density units times pixels (and a gain where σ is small,
-/// noise_scale.h).
-struct FitOptions {
-  int epochs = 30;                 ///< at full resolution, of the field as it will be
-  int vertex_epochs = 0;           ///< before them, of plain vertices that factors begin with
-  int coarse_epochs = 0;           ///< before all, with fewer pixels; 0: none
-  int coarse_bin = 4;              ///< how many times fewer on each axis, at most; a power of two
-  int subsets = 16;                ///< interleaved tilt subsets: steps an epoch; at most one a view
-  std::string engine = "slab";     ///< or ray: any view geometry, views as they were recorded
-  int ray_samples = 0;             ///< N_max of eq. 10; 0: one a pixel of a leaf's diagonal
-  std::int64_t rays_per_step = 0;  ///< about; 0: all rays of an epoch over `subsets`
-  double learning_rate = 0.05;     ///< falls exponentially to learning_rate · final_rate
-  double final_rate = 0.1;
-  double coarse_final_rate = 0.3;   ///< of a coarse stage
-  double refined_rate = 0.5;        ///< where a stage starts after a coarse one
-  double vertex_rate = 0.7;         ///< of plain vertices that factors begin with
-  double factorised_rate = 0.3;     ///< where these factors start
-  double density_variation = 14.0;  ///< see usual_variation
-  double factor_variation = 0.0;
-  double boundary = 4.0;              ///< boundary consistency of leaves (eq. 6)
-  double fourier = 0.0;               ///< isotropic Fourier prior (eq. 7)
-  std::string fourier_ring = "mean";  ///< or max: what an axis may not exceed
-  std::string penalty = "concave";    ///< or smooth, for both variations
-  double concavity = 0.4;             ///< τ of the concave penalty, in units of a voxel's noise
-  double gradient_floor = 1e-3;       ///< ε of both penalties, in density units a pixel
-  bool fit_view_scale = false;        ///< per-view scale and offset as nuisances
-  std::uint64_t seed = 1;
-  int hold_out = 0;  ///< keep every so-manieth view from the fit; 0: none
-  int patience = 0;  ///< epochs without a better held-out error before it stops; 0: never
-  std::vector<std::string> faults() const;
+/// The files of a reconstruction, named after its volume.
+struct OutputPaths {
+  std::filesystem::path volume, model, json;
+  std::filesystem::path tree_picture;  ///< of adaptive trees alone
+  std::filesystem::path picture_prefix;
+  std::filesystem::path held_out_picture;  ///< with views held out
+  std::filesystem::path trials;            ///< of a tuning (JSON)
 };
+OutputPaths output_paths(const std::filesystem::path& volume);
 
-/// Side of a leaf, by the kind of field and its tree: plain vertices express as much in larger
-/// leaves, which have fewer faces and can be fitted with coarser pixels first.
-inline int usual_leaf_size(const FieldOptions& field) {
-  return field.kind == "grid" && field.tree == "uniform" ? 64 : 32;
-}
+/// Throws Error for faulty options, and if results would replace an input, would
+/// replace existing files without --overwrite or --resume, or cannot be written
+/// where they shall go. Nothing is read.
+void check_options(const ReconstructOptions& options);
 
-/// Levels from a root cell down to a leaf. A root cell is also a band of rows, which one thread
-/// works at, and a leaf of the margin: large leaves of a uniform tree are root cells themselves.
-inline int usual_depth(const FieldOptions& field) {
-  return field.tree == "uniform" && field.leaf_size >= 64 ? 0 : 1;
-}
+/// Every option as it was resolved, for the JSON and the model file.
+nlohmann::json options_json(const ReconstructOptions& options);
 
-/// The weight of the density's variation that goes with a penalty: a concave one counts
-/// large steps less, and so needs more (docs/results/ablation.md).
-inline double usual_variation(const std::string& penalty) {
-  return penalty == "smooth" ? 5.0 : FitOptions{}.density_variation;
-}
-
-/// Throws Error with all the faults, if there are any.
-void require_no_faults(const std::vector<std::string>& faults);
-
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::reconstruction

@@ -3,9 +3,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "reconstruct/run_options.h"
+#include "reconstruct/options.h"
 
-namespace tomofield::reconstruct {
+namespace tomofield::reconstruction {
 namespace {
 
 using nlohmann::json;
@@ -39,7 +39,7 @@ json input_json(const tilt_series::TiltSeriesOptions& o) {
           {"mask", or_null(o.mask)}};
 }
 
-json specimen_json(const SpecimenOptions& o) {
+json specimen_json(const measurement::SpecimenOptions& o) {
   json roi = nullptr;
   if (o.roi) roi = {o.roi->x0, o.roi->y0, o.roi->x1, o.roi->y1};
   return {{"thickness", o.thickness},
@@ -51,7 +51,7 @@ json specimen_json(const SpecimenOptions& o) {
 
 namespace {
 
-json field_json(const FieldOptions& o) {
+json field_json(const fit::FieldOptions& o) {
   return {{"kind", o.kind},
           {"leaf_size", o.leaf_size},
           {"tree", o.tree},
@@ -67,7 +67,7 @@ json field_json(const FieldOptions& o) {
           {"initial_scale", o.initial_scale}};
 }
 
-json fit_json(const FitOptions& o) {
+json fit_json(const fit::FitOptions& o) {
   return {{"epochs", o.epochs},
           {"vertex_epochs", o.vertex_epochs},
           {"coarse_epochs", o.coarse_epochs},
@@ -96,9 +96,9 @@ json fit_json(const FitOptions& o) {
           {"seed", o.seed}};
 }
 
-json volume_json(const VolumeOptions& o) {
+json volume_json(const output::VolumeOptions& o) {
   return {{"mode", static_cast<int>(o.mode)},
-          {"axes", o.axes == VolumeAxes::kXyz ? "xyz" : "xzy"},
+          {"axes", o.axes == output::VolumeAxes::kXyz ? "xyz" : "xzy"},
           {"invert", o.invert}};
 }
 
@@ -111,4 +111,4 @@ json options_json(const ReconstructOptions& options) {
           {"volume", volume_json(options.volume)}};
 }
 
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::reconstruction

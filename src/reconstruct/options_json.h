@@ -2,13 +2,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "reconstruct/prepare.h"
+#include "measurement/prepare.h"
 #include "tilt_series/tilt_series.h"
 
-namespace tomofield::reconstruct {
+namespace tomofield::reconstruction {
 
 /// What every command that reconstructs records of its options.
 nlohmann::json input_json(const tilt_series::TiltSeriesOptions& options);
-nlohmann::json specimen_json(const SpecimenOptions& options);
+nlohmann::json specimen_json(const measurement::SpecimenOptions& options);
 
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::reconstruction

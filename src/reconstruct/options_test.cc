@@ -5,11 +5,12 @@
 #include <limits>
 #include <string>
 
-#include "reconstruct/run_options.h"
+#include "base/faults.h"
+#include "fit/options.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 
-namespace tomofield::reconstruct {
+namespace tomofield::reconstruction {
 namespace {
 
 ReconstructOptions good_options() {
@@ -22,17 +23,19 @@ TEST(ReconstructOptions, DefaultsAreSound) { EXPECT_TRUE(good_options().faults()
 
 TEST(ReconstructOptions, NoNumberMayBeNaN) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (double FieldOptions::*number : {&FieldOptions::vertex_spacing, &FieldOptions::margin_spacing,
-                                       &FieldOptions::sharpness, &FieldOptions::initial_scale}) {
-    FieldOptions options;
+  for (double fit::FieldOptions::*number :
+       {&fit::FieldOptions::vertex_spacing, &fit::FieldOptions::margin_spacing,
+        &fit::FieldOptions::sharpness, &fit::FieldOptions::initial_scale}) {
+    fit::FieldOptions options;
     options.*number = nan;
     EXPECT_EQ(options.faults().size(), 1u);
   }
-  for (double FitOptions::*number :
-       {&FitOptions::learning_rate, &FitOptions::final_rate, &FitOptions::density_variation,
-        &FitOptions::factor_variation, &FitOptions::boundary, &FitOptions::fourier,
-        &FitOptions::concavity, &FitOptions::gradient_floor}) {
-    FitOptions options;
+  for (double fit::FitOptions::*number :
+       {&fit::FitOptions::learning_rate, &fit::FitOptions::final_rate,
+        &fit::FitOptions::density_variation, &fit::FitOptions::factor_variation,
+        &fit::FitOptions::boundary, &fit::FitOptions::fourier, &fit::FitOptions::concavity,
+        &fit::FitOptions::gradient_floor}) {
+    fit::FitOptions options;
     options.*number = nan;
     EXPECT_EQ(options.faults().size(), 1u);
   }
@@ -47,23 +50,23 @@ TEST(ReconstructOptions, EveryFaultIsNamedAtOnce) {
   options.checkpoint_minutes = -1;
   EXPECT_EQ(options.faults().size(), 5u);
   const std::string message =
-      testing::message_of<Error>([&] { require_no_faults(options.faults()); });
+      testing::message_of<Error>([&] { base::require_no_faults(options.faults()); });
   for (const char* word :
        {"--thickness", "--leaf-size", "24", "mesh", "--subsets", "--checkpoint-minutes"})
     EXPECT_NE(message.find(word), std::string::npos) << word << " in " << message;
 }
 
 TEST(ReconstructOptions, LargeLeavesOfAUniformTreeAreRootCells) {
-  FieldOptions field;
-  EXPECT_EQ(usual_leaf_size(field), field.leaf_size);
-  EXPECT_EQ(usual_depth(field), field.depth);
+  fit::FieldOptions field;
+  EXPECT_EQ(fit::usual_leaf_size(field), field.leaf_size);
+  EXPECT_EQ(fit::usual_depth(field), field.depth);
   field.kind = "grid";
-  field.leaf_size = usual_leaf_size(field);
-  EXPECT_GT(field.leaf_size, FieldOptions{}.leaf_size);
-  EXPECT_EQ(usual_depth(field), 0);
+  field.leaf_size = fit::usual_leaf_size(field);
+  EXPECT_GT(field.leaf_size, fit::FieldOptions{}.leaf_size);
+  EXPECT_EQ(fit::usual_depth(field), 0);
   field.tree = "adaptive";  // whose leaves may become twice as wide
-  EXPECT_EQ(usual_leaf_size(field), FieldOptions{}.leaf_size);
-  EXPECT_EQ(usual_depth(field), 1);
+  EXPECT_EQ(fit::usual_leaf_size(field), fit::FieldOptions{}.leaf_size);
+  EXPECT_EQ(fit::usual_depth(field), 1);
 }
 
 TEST(ReconstructOptions, OnlyFactorsOfAUniformTreeBeginAsVertices) {
@@ -83,7 +86,7 @@ TEST(ReconstructOptions, OnlyFactorsOfAUniformTreeBeginAsVertices) {
 }
 
 TEST(ReconstructOptions, ABudgetIsForAdaptiveTrees) {
-  FieldOptions options;
+  fit::FieldOptions options;
   options.leaf_budget = 12;
   EXPECT_EQ(options.faults().size(), 1u);
   options.tree = "adaptive";
@@ -95,4 +98,4 @@ TEST(ReconstructOptions, ABudgetIsForAdaptiveTrees) {
 }
 
 }  // namespace
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::reconstruction

@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include "field/model_file.h"
-#include "field/sample_box.h"
-#include "reconstruct/write_volume.h"
+#include "field/sampling/sample_box.h"
+#include "output/model_file.h"
+#include "output/volume.h"
 #include "tomofield/error.h"
 #include "tomofield/model.h"
 
@@ -27,16 +27,16 @@ void require_usable(const SampleBox& box) {
 }  // namespace
 
 struct Model::Impl {
-  field::Model model;
+  output::Model model;
 };
 
 Model::Model(const std::filesystem::path& path)
-    : impl_(std::make_shared<Impl>(Impl{field::load_model(path)})) {}
+    : impl_(std::make_shared<Impl>(Impl{output::load_model(path)})) {}
 
 double Model::pixel_size_A() const { return impl_->model.pixel_size_A; }
 
 SampleBox Model::region(double voxel_px) const {
-  const field::Box box = reconstruct::region_box(impl_->model, voxel_px);
+  const field::Box box = output::region_box(impl_->model, voxel_px);
   return {.centre_px = box.centre_px, .size = box.size, .voxel_px = box.voxel_px};
 }
 

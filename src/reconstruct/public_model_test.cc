@@ -3,9 +3,9 @@
 #include <cmath>
 #include <vector>
 
-#include "field/model_file.h"
 #include "io/mrc.h"
-#include "reconstruct/write_volume.h"
+#include "output/model_file.h"
+#include "output/volume.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 #include "tomofield/model.h"
@@ -18,8 +18,8 @@ TEST(PublicModel, SamplesWhatExportWrites) {
   const testing::ScratchDirectory scratch;
   auto inner = testing::uneven_model("vm");
   inner.is_dark = true;
-  field::save_model(scratch / "model.h5", inner);
-  reconstruct::write_volume(inner, {}, scratch / "volume.mrc");
+  output::save_model(scratch / "model.h5", inner);
+  output::write_volume(inner, {}, scratch / "volume.mrc");
 
   const Model model(scratch / "model.h5");
   EXPECT_EQ(model.pixel_size_A(), inner.pixel_size_A);
@@ -37,7 +37,7 @@ TEST(PublicModel, SamplesWhatExportWrites) {
 TEST(PublicModel, TurnsBoxesByEulerAngles) {
   const testing::ScratchDirectory scratch;
   const auto inner = testing::uneven_model("grid");
-  field::save_model(scratch / "model.h5", inner);
+  output::save_model(scratch / "model.h5", inner);
   const Model model(scratch / "model.h5");
   // rot 90: the box's x lies along the field's −y.
   const auto values = model.sample(
@@ -48,7 +48,7 @@ TEST(PublicModel, TurnsBoxesByEulerAngles) {
 
 TEST(PublicModel, RefusesBoxesThatCannotBeSampled) {
   const testing::ScratchDirectory scratch;
-  field::save_model(scratch / "model.h5", testing::uneven_model("grid"));
+  output::save_model(scratch / "model.h5", testing::uneven_model("grid"));
   const Model model(scratch / "model.h5");
   EXPECT_THROW(model.sample({}), Error);
   EXPECT_THROW(model.sample({.centre_px = {0, std::nan(""), 0}, .size = {1, 1, 1}}), Error);

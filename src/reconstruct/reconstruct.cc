@@ -9,25 +9,26 @@
 
 #include "base/log.h"
 #include "base/stopwatch.h"
+#include "fit/fit.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/fingerprint.h"
-#include "reconstruct/fit.h"
-#include "reconstruct/fit_results.h"
-#include "reconstruct/trials.h"
+#include "reconstruct/results.h"
+#include "selection/trials.h"
 #include "tomofield/error.h"
 
-namespace tomofield::reconstruct {
+namespace tomofield::reconstruction {
 namespace {
 
-Measurement measurement_of(const PreparedSeries& series, const FitOptions& options,
-                           const distributed::Communicator& processes) {
+measurement::Measurement measurement_of(const measurement::PreparedSeries& series,
+                                        const fit::FitOptions& options,
+                                        const distributed::Communicator& processes) {
   return {.geometry = series.geometry,
           .roi = series.roi,
           .rays = series.rays.get(),
           .noise_sigma = series.noise_sigma,
           .mean_density = series.mean_density,
           .ray_geometry = series.ray_geometry,
-          .held_out = held_out_views(series.geometry.tilt_deg, options.hold_out),
+          .held_out = measurement::held_out_views(series.geometry.tilt_deg, options.hold_out),
           .processes = &processes};
 }
 
@@ -42,7 +43,7 @@ void resuming(const std::function<void()>& read) {
 }
 
 // Loads the checkpoint, if there is one yet, into `fit`.
-void resume(const OutputPaths& paths, const std::string& fingerprint, Fit& fit) {
+void resume(const OutputPaths& paths, const std::string& fingerprint, fit::Fit& fit) {
   if (!std::filesystem::exists(paths.model)) {
     base::log_info(
         fmt::format("no checkpoint {} yet: starting from the beginning", paths.model.string()));
@@ -57,7 +58,7 @@ std::filesystem::path directory_of(const std::filesystem::path& file) {
   return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
-base::ProgressReport progress_report(const Fit& fit, std::int64_t first_step,
+base::ProgressReport progress_report(const fit::Fit& fit, std::int64_t first_step,
                                      const base::Stopwatch& running) {
   base::ProgressReport report;
   const std::int64_t step = fit.progress().step;
@@ -77,20 +78,24 @@ base::ProgressReport progress_report(const Fit& fit, std::int64_t first_step,
 }
 
 // The settings that predict views held out from trials best. None if a stop was requested.
-std::optional<Tuned> choose_settings(const PreparedSeries& series, const Measurement& measurement,
-                                     const OutputPaths& paths, const ReconstructHooks& hooks,
-                                     const ReconstructOptions& options) {
-  const TuneHooks tune_hooks{.progress = hooks.tune_progress,
-                             .stop_requested = hooks.stop_requested};
-  if (!options.tune) return tune_penalty(measurement, options.field, options.fit, tune_hooks);
+std::optional<selection::Tuned> choose_settings(const measurement::PreparedSeries& series,
+                                                const measurement::Measurement& measurement,
+                                                const OutputPaths& paths,
+                                                const ReconstructHooks& hooks,
+                                                const ReconstructOptions& options) {
+  const selection::TuneHooks tune_hooks{.progress = hooks.tune_progress,
+                                        .stop_requested = hooks.stop_requested};
+  if (!options.tune)
+    return selection::tune_penalty(measurement, options.field, options.fit, tune_hooks);
   const distributed::Communicator& processes = *measurement.processes;
   const std::string fingerprint = fingerprint_of(options, series, processes);
-  std::optional<TrialFile> file;
+  std::optional<selection::TrialFile> file;
   processes.together([&] { file.emplace(paths.trials, fingerprint, options.resume); });
-  return tune(measurement, options.field, options.fit, options.choose_penalty, *file, tune_hooks);
+  return selection::tune(measurement, options.field, options.fit, options.choose_penalty, *file,
+                         tune_hooks);
 }
 
-void apply(const TrialSettings& settings, ReconstructOptions& options) {
+void apply(const selection::TrialSettings& settings, ReconstructOptions& options) {
   options.fit.penalty = settings.penalty;
   options.fit.density_variation = settings.variation;
   options.fit.epochs = settings.epochs;
@@ -99,9 +104,10 @@ void apply(const TrialSettings& settings, ReconstructOptions& options) {
 
 // Chooses what `options` leave to trials, or takes what the run that is resumed has chosen; false
 // if a stop was requested.
-bool settle_options(const PreparedSeries& series, const Measurement& measurement,
-                    const OutputPaths& paths, const ReconstructHooks& hooks,
-                    ReconstructOptions& options, std::optional<Tuned>& tuned) {
+bool settle_options(const measurement::PreparedSeries& series,
+                    const measurement::Measurement& measurement, const OutputPaths& paths,
+                    const ReconstructHooks& hooks, ReconstructOptions& options,
+                    std::optional<selection::Tuned>& tuned) {
   if (options.num_trials(measurement.num_fitted_views()) == 0) return true;
   if (options.resume && std::filesystem::exists(paths.model)) {
     measurement.processes->together([&] { resuming([&] { tuned = stored_choice(paths.model); }); });
@@ -114,13 +120,13 @@ bool settle_options(const PreparedSeries& series, const Measurement& measurement
 }
 
 // Fits, and calls save() when a checkpoint is due; false if it was stopped, after one.
-bool run_with_checkpoints(Fit& fit, double checkpoint_minutes, const ReconstructHooks& hooks,
+bool run_with_checkpoints(fit::Fit& fit, double checkpoint_minutes, const ReconstructHooks& hooks,
                           const std::function<void()>& save) {
   const base::Stopwatch running;
   base::Stopwatch since_checkpoint;
   const std::int64_t first_step = fit.progress().step;
   bool stopped = false;
-  fit.run([&](const Fit&) {
+  fit.run([&](const fit::Fit&) {
     if (hooks.progress) hooks.progress(progress_report(fit, first_step, running));
     const bool stop = hooks.stop_requested && hooks.stop_requested() && !fit.is_done();
     const bool is_due =
@@ -143,15 +149,15 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
                     const ReconstructHooks& hooks, const distributed::Communicator& processes) {
   ReconstructOptions options = requested;
   const OutputPaths paths = output_paths(options.output);
-  const PreparedSeries series =
-      prepare_series(tilt_series, options.specimen, directory_of(paths.volume),
-                     band_rows(options.field), processes);
-  const Measurement measurement = measurement_of(series, options.fit, processes);
+  const measurement::PreparedSeries series =
+      measurement::prepare_series(tilt_series, options.specimen, directory_of(paths.volume),
+                                  fit::band_rows(options.field), processes);
+  const measurement::Measurement measurement = measurement_of(series, options.fit, processes);
   FitOrigin origin;
   if (!settle_options(series, measurement, paths, hooks, options, origin.tuned))
     return Outcome::kStoppedTuning;
   origin.fingerprint = fingerprint_of(options, series, processes);
-  Fit fit(measurement, options.field, options.fit);
+  fit::Fit fit(measurement, options.field, options.fit);
   if (options.resume) processes.together([&] { resume(paths, origin.fingerprint, fit); });
 
   const base::Stopwatch running;
@@ -161,4 +167,4 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
   return Outcome::kFinished;
 }
 
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::reconstruction

@@ -7,11 +7,11 @@
 
 #include "base/progress.h"
 #include "distributed/communicator.h"
-#include "reconstruct/run_options.h"
-#include "reconstruct/stages.h"
+#include "fit/stages.h"
+#include "reconstruct/options.h"
 #include "tilt_series/tilt_series.h"
 
-namespace tomofield::reconstruct {
+namespace tomofield::reconstruction {
 
 /// What the caller sees while it runs.
 struct ReconstructHooks {
@@ -45,7 +45,7 @@ struct RunPlan {
   int num_leaves = 0;
   std::size_t num_parameters = 0;
   int num_trials = 0;  ///< short fits before it, about, that choose settings
-  std::vector<Stage> stages;
+  std::vector<fit::Stage> stages;
   std::int64_t num_steps = 0;    ///< of all of them
   std::size_t memory_bytes = 0;  ///< estimated peak, of each process
 };
@@ -55,4 +55,4 @@ struct RunPlan {
 RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
                  const distributed::Communicator& processes = distributed::Communicator::alone());
 
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::reconstruction

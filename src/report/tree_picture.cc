@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "field/sample_box.h"
+#include "field/sampling/sample_box.h"
 #include "report/canvas.h"
 #include "report/grey_scale.h"
 
@@ -14,7 +14,7 @@ namespace {
 constexpr Colour kBorder{255, 140, 0};
 
 // One voxel a pixel, halfway up: [y, x].
-std::vector<float> central_slice(const field::Model& model) {
+std::vector<float> central_slice(const output::Model& model) {
   const geometry::Roi& roi = model.roi;
   field::Box box;
   box.size = {roi.width(), roi.height(), 1};
@@ -36,7 +36,7 @@ void draw_border(const field::Square& square, const geometry::Roi& roi, std::int
 
 }  // namespace
 
-void write_tree_picture(const field::Model& model, const std::filesystem::path& path) {
+void write_tree_picture(const output::Model& model, const std::filesystem::path& path) {
   const geometry::Roi& roi = model.roi;
   const std::vector<float> slice = central_slice(model);
   const GreyScale scale(slice);

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "field/model_file.h"
+#include "output/model_file.h"
 
 namespace tomofield::report {
 
@@ -11,6 +11,6 @@ namespace tomofield::report {
 /// as the model holds them) with the leaves' borders over it in orange. Enlarged by
 /// whole pixels like the other pictures; a border is one picture pixel wide, on
 /// the inner side of a leaf's lower x and y faces. Replaces `path`. Throws Error.
-void write_tree_picture(const field::Model& model, const std::filesystem::path& path);
+void write_tree_picture(const output::Model& model, const std::filesystem::path& path);
 
 }  // namespace tomofield::report

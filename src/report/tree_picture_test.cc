@@ -21,13 +21,13 @@ constexpr Colour kOrange{255, 140, 0};
 
 // A cell of 64 px in quarters, the upper right one in quarters again; a ramp along x in the
 // density; a region of interest that starts inside the first leaf.
-field::Model stepped_model() {
+output::Model stepped_model() {
   field::Quadtree tree({.x0 = 0, .y0 = 0, .cell_size = 64, .columns = 1, .rows = 1},
                        {field::Region::kInterest});
   tree.split(0);
   tree.split(3);
   const field::LeafShape shape{.nx = 2, .ny = 2, .nz = 2};
-  field::Model model;
+  output::Model model;
   model.field = field::make_field("grid", tree, 10.0, std::vector<field::LeafShape>(7, shape));
   for (int leaf = 0; leaf < 7; ++leaf) {
     const field::Square& square = tree.leaf(leaf).square;
@@ -42,7 +42,7 @@ field::Model stepped_model() {
 TEST(TreePicture, DrawsLeafBordersOverTheSlice) {
   const testing::ScratchDirectory scratch;
   const std::filesystem::path path = scratch.path() / "tree.png";
-  const field::Model model = stepped_model();
+  const output::Model model = stepped_model();
   write_tree_picture(model, path);
   const auto picture = testing::read_png(path, PNG_FORMAT_RGB);
   const std::int64_t zoom = 9;  // 60 × 9 is the first multiple past 512

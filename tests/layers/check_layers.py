@@ -13,7 +13,7 @@ import pathlib
 import re
 import sys
 
-# Each folder may include those listed before it: DESIGN, section 6.
+# Each folder may include those listed before it: docs/architecture.md.
 LAYERS = [
     "base",
     "distributed",
@@ -23,9 +23,11 @@ LAYERS = [
     "kernels",
     "field",
     "projection",
-    "loss",
-    "optimize",
-    "structure",
+    "measurement",
+    "objective",
+    "fit",
+    "selection",
+    "output",
     "evaluate",
     "reconstruct",
     "baseline",

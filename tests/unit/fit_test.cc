@@ -1,4 +1,4 @@
-#include "reconstruct/fit.h"
+#include "fit/fit.h"
 
 #include <gtest/gtest.h>
 
@@ -14,13 +14,13 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "field/model_file.h"
 #include "kernels/lanes.h"
+#include "output/model_file.h"
 #include "reconstruct/checkpoint.h"
 #include "scratch_directory.h"
 #include "simulate/project_phantom.h"
 
-namespace tomofield::reconstruct {
+namespace tomofield::fit {
 namespace {
 
 using kernels::kLanes;
@@ -48,13 +48,13 @@ class BeadSeries {
  public:
   BeadSeries(const geometry::TiltGeometry& geometry, const Bead& bead, std::uint64_t noise_seed)
       : geometry_(geometry), bead_(bead), noise_seed_(noise_seed) {
-    const tilt_series::SlabViews::Shape shape{
+    const measurement::SlabViews::Shape shape{
         .num_views = static_cast<std::size_t>(geometry.num_views()),
         .width = geometry.width,
         .height = geometry.height,
         .first_row = 0,
         .num_rows = geometry.height};
-    rays_ = std::make_unique<tilt_series::SlabViews>(
+    rays_ = std::make_unique<measurement::SlabViews>(
         shape, 1.0,
         [this](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
           read(v, image);
@@ -67,7 +67,7 @@ class BeadSeries {
                     .noise_sigma = std::vector<double>(shape.num_views, kSigma),
                     .mean_density = 0.005};
   }
-  const Measurement& measurement() const { return measurement_; }
+  const measurement::Measurement& measurement() const { return measurement_; }
 
  private:
   void read(std::size_t view, std::span<float> image) const {
@@ -91,8 +91,8 @@ class BeadSeries {
   geometry::TiltGeometry geometry_;
   Bead bead_;
   std::uint64_t noise_seed_;
-  std::unique_ptr<tilt_series::SlabViews> rays_;
-  Measurement measurement_;
+  std::unique_ptr<measurement::SlabViews> rays_;
+  measurement::Measurement measurement_;
 };
 
 std::vector<double> tilts(double from, double to, double step) {
@@ -211,7 +211,7 @@ Outcome small_fit(const std::string& kind, int threads, std::uint64_t seed, int 
   Outcome outcome{{fit.field().parameters().begin(), fit.field().parameters().end()},
                   fit.progress().data_loss};
   outcome.parameters.push_back(fit.field().bias);
-  for (const loss::ViewModel& view : fit.progress().views) {
+  for (const measurement::ViewModel& view : fit.progress().views) {
     outcome.losses.push_back(view.scale);
     outcome.losses.push_back(view.offset);
   }
@@ -232,7 +232,8 @@ TEST_P(EachFittedField, SameBitsForAnyNumberOfThreads) {
 }
 
 // A tree that starts with sixteen leaves of 32 px.
-Fit adaptive_fit(const Measurement& measurement, const std::string& kind, int epochs, int budget) {
+Fit adaptive_fit(const measurement::Measurement& measurement, const std::string& kind, int epochs,
+                 int budget) {
   FieldOptions options = field_options(kind);
   options.leaf_size = 32;
   options.vertex_spacing = 4.0;
@@ -253,7 +254,7 @@ int leaves_of_interest(const field::Quadtree& tree) {
 TEST_P(EachFittedField, AdaptiveTreeFollowsTheDensityWithinItsBudget) {
   const geometry::TiltGeometry g = geometry::centred_geometry(128, 128, 12, tilts(-48, 48, 8));
   const BeadSeries series(g, Bead({40, 90, 5}), 4);
-  const Measurement measurement = series.measurement();
+  const measurement::Measurement measurement = series.measurement();
   const auto run = [&](int threads) {
     base::set_thread_count(threads);
     auto fit = std::make_unique<Fit>(adaptive_fit(measurement, GetParam(), 10, 13));
@@ -312,7 +313,7 @@ TEST(Fit, EveryEpochUsesEachViewOnce) {
     if (steps % 5 == 4) {
       // All but the last subset: its rays are still missing.
       double rays = 0;
-      for (const loss::ViewSums& s : f.progress().epoch_sums) {
+      for (const measurement::ViewSums& s : f.progress().epoch_sums) {
         EXPECT_TRUE(s.n == 0 || s.n == 16 * 20);
         rays += s.n;
       }
@@ -357,7 +358,7 @@ class CoarseToFine : public ::testing::TestWithParam<const char*> {
   }
   const Bead bead_{{17.3, 20.6, 11.2}};
   const BeadSeries series_{geometry::centred_geometry(41, 43, 24, tilts(-60, 60, 5)), bead_, 3};
-  const Measurement measurement_ = series_.measurement();
+  const measurement::Measurement measurement_ = series_.measurement();
 };
 INSTANTIATE_TEST_SUITE_P(Kinds, CoarseToFine, ::testing::Values("vm", "grid"),
                          [](const auto& kind) { return std::string(kind.param); });
@@ -390,12 +391,13 @@ TEST_P(CoarseToFine, GoesOnFromACheckpointOfEitherStageToTheSameBits) {
     const testing::ScratchDirectory scratch;
     const auto first = make_fit();
     first->run([&](const Fit& fit) { return fit.progress().step != pause_at; });
-    field::ModelInfo info;
+    output::ModelInfo info;
     info.geometry = measurement_.geometry;
     info.roi = measurement_.roi;
-    save_checkpoint(scratch / "fit.h5", *first, info, {.fingerprint = "{}", .tuned = {}});
+    reconstruction::save_checkpoint(scratch / "fit.h5", *first, info,
+                                    {.fingerprint = "{}", .tuned = {}});
     const auto second = make_fit();
-    restore_fit(scratch / "fit.h5", "{}", *second);
+    reconstruction::restore_fit(scratch / "fit.h5", "{}", *second);
     EXPECT_EQ(second->progress().step, pause_at);
     second->run([](const Fit&) { return true; });
     EXPECT_TRUE(std::ranges::equal(second->field().parameters(), whole->field().parameters()))
@@ -433,4 +435,4 @@ TEST(Fit, StopsWhenToldAndGoesOnToTheSameBits) {
 }
 
 }  // namespace
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::fit

@@ -1,4 +1,4 @@
-#include "reconstruct/held_out.h"
+#include "measurement/held_out.h"
 
 #include <gtest/gtest.h>
 
@@ -11,23 +11,24 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "reconstruct/domain.h"
-#include "reconstruct/fit.h"
+#include "fit/domain.h"
+#include "fit/fit.h"
 #include "scratch_directory.h"
 #include "sphere_series.h"
 #include "tomofield/error.h"
 
-namespace tomofield::reconstruct {
+namespace tomofield::fit {
 namespace {
 
 TEST(HeldOutViews, AreSpreadOverTheTiltsWithoutTheEnds) {
   // In order of tilt: -50 … 50 in steps of 10, recorded from the middle outwards.
   const std::vector<double> tilts = {0, 10, -10, 20, -20, 30, -30, 40, -40, 50, -50};
   // Sorted positions 2 and 6 are -30 and 10; position 10, the last, is always fitted.
-  EXPECT_EQ(held_out_views(tilts, 4), (std::vector<int>{1, 6}));
-  EXPECT_EQ(held_out_views(tilts, 2), (std::vector<int>{0, 3, 4, 7, 8}));
-  EXPECT_EQ(held_out_views(tilts, 19), (std::vector<int>{7}));
-  const std::string message = testing::message_of<Error>([&] { held_out_views(tilts, 20); });
+  EXPECT_EQ(measurement::held_out_views(tilts, 4), (std::vector<int>{1, 6}));
+  EXPECT_EQ(measurement::held_out_views(tilts, 2), (std::vector<int>{0, 3, 4, 7, 8}));
+  EXPECT_EQ(measurement::held_out_views(tilts, 19), (std::vector<int>{7}));
+  const std::string message =
+      testing::message_of<Error>([&] { measurement::held_out_views(tilts, 20); });
   EXPECT_NE(message.find("--hold-out 20"), std::string::npos) << message;
   EXPECT_NE(message.find("11 views"), std::string::npos) << message;
 }
@@ -57,16 +58,16 @@ class KnownField : public ::testing::Test {
   }
 
   // scale · A f + offset + noise; every 13th pixel is no measurement and far off.
-  std::unique_ptr<tilt_series::SlabViews> measure(double scale, double offset) const {
+  std::unique_ptr<measurement::SlabViews> measure(double scale, double offset) const {
     const auto num_views = static_cast<std::size_t>(geometry_.num_views());
-    const tilt_series::SlabViews::Shape shape{num_views, kWidth, kRows, 0, kRows};
-    const auto empty = std::make_unique<tilt_series::SlabViews>(
+    const measurement::SlabViews::Shape shape{num_views, kWidth, kRows, 0, kRows};
+    const auto empty = std::make_unique<measurement::SlabViews>(
         shape, 1.0, [](std::size_t, std::span<float>, std::span<std::uint8_t>) {}, "/tmp");
-    return std::make_unique<tilt_series::SlabViews>(
+    return std::make_unique<measurement::SlabViews>(
         shape, 1.0,
         [&](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
-          const auto clean = predicted_view(*sampler_, projector_, *empty, static_cast<int>(v),
-                                            {scale, offset, 1.0});
+          const auto clean = measurement::predicted_view(*sampler_, projector_, *empty,
+                                                         static_cast<int>(v), {scale, offset, 1.0});
           base::Random random(7, v);
           for (std::size_t i = 0; i < image.size(); ++i) {
             valid[i] = i % 13 != 0;
@@ -78,10 +79,12 @@ class KnownField : public ::testing::Test {
   }
   static double sigma(int view) { return 0.1 * (1 + view); }
 
-  HeldOutError error(const tilt_series::SlabViews& measured, bool fit_view_scale) const {
+  measurement::HeldOutError error(const measurement::SlabViews& measured,
+                                  bool fit_view_scale) const {
     std::vector<double> weights;
     for (int v = 0; v < geometry_.num_views(); ++v) weights.push_back(1 / (sigma(v) * sigma(v)));
-    return held_out_error(*sampler_, projector_, measured, {1, 4}, weights, fit_view_scale);
+    return measurement::held_out_error(*sampler_, projector_, measured, {1, 4}, weights,
+                                       fit_view_scale);
   }
 
   geometry::TiltGeometry geometry_;
@@ -94,7 +97,7 @@ class KnownField : public ::testing::Test {
 // 1772 rays a view: the mean of squares of standard normals is within 0.17 at five deviations.
 TEST_F(KnownField, PredictsItsOwnViewsToTheNoise) {
   const auto measured = measure(1.0, 0.0);
-  const HeldOutError e = error(*measured, false);
+  const measurement::HeldOutError e = error(*measured, false);
   EXPECT_NEAR(e.total, 1.0, 0.12);
   ASSERT_EQ(e.view_error.size(), 2u);
   for (const double view : e.view_error) EXPECT_NEAR(view, 1.0, 0.17);
@@ -106,9 +109,9 @@ TEST_F(KnownField, PredictsItsOwnViewsToTheNoise) {
 
 TEST_F(KnownField, ScaleAndOffsetOfAViewAreNoError) {
   const auto measured = measure(1.7, -3.0);
-  const HeldOutError with = error(*measured, true);
+  const measurement::HeldOutError with = error(*measured, true);
   EXPECT_NEAR(with.total, 1.0, 0.12);
-  for (const loss::ViewModel& model : with.models) {
+  for (const measurement::ViewModel& model : with.models) {
     EXPECT_NEAR(model.scale, 1.7, 0.1);
     EXPECT_NEAR(model.offset, -3.0, 1.0);
   }
@@ -117,7 +120,8 @@ TEST_F(KnownField, ScaleAndOffsetOfAViewAreNoError) {
 
 TEST_F(KnownField, MeasuredViewsAreShownAsTheyAre) {
   const auto measured = measure(1.0, 0.0);
-  const PredictedView view = predicted_view(*sampler_, projector_, *measured, 4, {1.0, 0.0, 1.0});
+  const measurement::PredictedView view =
+      measurement::predicted_view(*sampler_, projector_, *measured, 4, {1.0, 0.0, 1.0});
   ASSERT_EQ(view.measured.size(), static_cast<std::size_t>(kWidth * kRows));
   double squares = 0, count = 0;
   for (std::size_t i = 0; i < view.measured.size(); ++i) {
@@ -163,7 +167,7 @@ class FitWithHeldOut : public ::testing::Test {
   }
 
   std::unique_ptr<Series> series_;
-  Measurement measurement_;
+  measurement::Measurement measurement_;
   FitOptions fit_options_;
 };
 
@@ -199,4 +203,4 @@ TEST_F(FitWithHeldOut, StopsOnceTheErrorNoLongerFalls) {
 }
 
 }  // namespace
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::fit

@@ -1,4 +1,4 @@
-#include "reconstruct/ray_term.h"
+#include "objective/ray_term.h"
 
 #include <gtest/gtest.h>
 
@@ -11,10 +11,11 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "central_difference.h"
+#include "fit/fit.h"
 #include "random_arrays.h"
 #include "sphere_series.h"
 
-namespace tomofield::reconstruct {
+namespace tomofield::fit {
 namespace {
 
 using projection::Ray;
@@ -37,7 +38,7 @@ struct SphereTerm {
         geometry(ray_geometry(series)),
         domain(make_domain(geometry, roi, field_options())),
         field(make_initial_field(domain, SphereSeries::kThickness, 0.3, field_options(), 3)),
-        term(geometry, *series.rays, *field, domain, options) {}
+        term(geometry, *series.rays, *field, ray_term_options(domain, options)) {}
   static FieldOptions field_options() {
     FieldOptions o;
     o.kind = "grid";
@@ -50,7 +51,7 @@ struct SphereTerm {
   geometry::RayGeometry geometry;
   Domain domain;
   std::unique_ptr<field::Field> field;
-  RayTerm term;
+  objective::RayTerm term;
 };
 
 using Key = std::tuple<int, int, int>;
@@ -130,7 +131,7 @@ TEST(RayTerm, GradientIsTheDerivativeOfTheLoss) {
   options.subsets = 5;
   options.ray_samples = 20;
   SphereTerm s(options);
-  std::vector<loss::ViewModel> models;
+  std::vector<measurement::ViewModel> models;
   for (int v = 0; v < s.geometry.num_views(); ++v)
     models.push_back({1.0 + 0.01 * v, 0.02 * v, 2.0 - 0.03 * v});
   constexpr int kStep = 7;
@@ -160,4 +161,4 @@ TEST(RayTerm, GradientIsTheDerivativeOfTheLoss) {
 }
 
 }  // namespace
-}  // namespace tomofield::reconstruct
+}  // namespace tomofield::fit

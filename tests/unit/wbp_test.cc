@@ -1,4 +1,4 @@
-#include "baseline/wbp.h"
+#include "baseline/classical/wbp.h"
 
 #include <gtest/gtest.h>
 
@@ -30,8 +30,8 @@ struct Ball {
     geometry = geometry::centred_geometry(kWidth, kRows, kThickness, tilts);
     const std::vector<simulate::Ellipsoid> ball = {
         simulate::make_sphere({kX, 0, kZ}, kRadius, kDensity)};
-    rays = std::make_unique<tilt_series::SlabViews>(
-        tilt_series::SlabViews::Shape{tilts.size(), kWidth, kRows, 0, kRows}, 1.0,
+    rays = std::make_unique<measurement::SlabViews>(
+        measurement::SlabViews::Shape{tilts.size(), kWidth, kRows, 0, kRows}, 1.0,
         [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
           const auto exact =
               project_ellipsoids(ball, {.width = kWidth, .height = kRows, .tilt_deg = tilts[view]});
@@ -51,7 +51,7 @@ struct Ball {
   }
 
   geometry::TiltGeometry geometry;
-  std::unique_ptr<tilt_series::SlabViews> rays;
+  std::unique_ptr<measurement::SlabViews> rays;
 };
 
 // Mean density in the core of the ball.

@@ -1,0 +1,38 @@
+#include "baseline/neural/implicit.h"
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "baseline/neural/fourier_encoding.h"
+
+namespace tomofield::baseline {
+namespace {
+
+std::unique_ptr<PointEncoding> encoding_of(const ImplicitOptions& options) {
+  // The network has other streams of random numbers.
+  constexpr std::uint64_t kSeedStep = 1000003;
+  return std::make_unique<FourierEncoding>(options.features, options.shortest,
+                                           options.seed + kSeedStep);
+}
+
+}  // namespace
+
+nlohmann::json ImplicitOptions::json() const {
+  nlohmann::json json = NetworkOptions::json();
+  json["features"] = features;
+  json["shortest"] = shortest;
+  return json;
+}
+
+MethodSize ImplicitOptions::size(const projection::SampleGrid& samples,
+                                 std::int64_t num_rows) const {
+  return network_size(samples, num_rows, *encoding_of(*this), *this);
+}
+
+Solution reconstruct_implicit(VoxelProblem& problem, const ImplicitOptions& options,
+                              double mean_density, const AfterIteration& after_iteration) {
+  return fit_network(problem, options, encoding_of(options), mean_density, /*learns_noise=*/true,
+                     after_iteration);
+}
+
+}  // namespace tomofield::baseline

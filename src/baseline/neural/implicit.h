@@ -1,0 +1,33 @@
+#pragma once
+
+#include "baseline/neural/network_fit.h"
+
+namespace tomofield::baseline {
+
+/// A network of coordinates alone, with sines as activations (Sitzmann et al. 2020), and the noise
+/// of each view learned along (after Kniesel et al. 2022).
+struct ImplicitOptions : NetworkOptions {
+  ImplicitOptions()
+      : NetworkOptions{.hidden_layers = 2,
+                       .width = 64,
+                       .learning_rate = 0.006,
+                       .activation = Activation::kSine} {}
+  int features = 128;      ///< plane waves that the network is given (fourier_encoding.h)
+  double shortest = 20.0;  ///< wavelength of them, pixels
+
+  MethodFacts facts() const {
+    return {.name = "implicit",
+            .iterations = iterations,
+            .volumes = 1,
+            .detectors = 1,
+            .memory_advice = "; or a smaller --width, or fewer --features"};
+  }
+  nlohmann::json json() const;
+  MethodSize size(const projection::SampleGrid& samples, std::int64_t num_rows) const;
+};
+
+/// See fit_network().
+Solution reconstruct_implicit(VoxelProblem& problem, const ImplicitOptions& options,
+                              double mean_density, const AfterIteration& after_iteration);
+
+}  // namespace tomofield::baseline

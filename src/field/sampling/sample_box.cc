@@ -1,0 +1,144 @@
+#include "field/sampling/sample_box.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/check.h"
+#include "base/parallel.h"
+#include "field/sampling/aligned_rows.h"
+
+namespace tomofield::field {
+namespace {
+
+constexpr std::int64_t kPartValues = std::int64_t{1} << 22;
+
+// A box along the axes: some rows of all sections, then the next rows.
+void sample_aligned(const Field& field, const Box& box, const BoxRows& some, const BoxSink& sink) {
+  const AlignedRows rows(field, box);
+  const auto [nx, ny, nz] = box.size;
+  const std::int64_t block = rows.rows_at_once();
+  const std::int64_t part = std::clamp(kPartValues / (block * nx), std::int64_t{1}, nz);
+  TOMOFIELD_CHECK(some.first % block == 0 && some.end <= ny, "rows in whole blocks");
+  const std::int64_t num_blocks = (some.end - some.first + block - 1) / block;
+  base::parallel_for(num_blocks, [&, nx = nx, nz = nz](std::int64_t index) {
+    const std::int64_t first_row = some.first + index * block;
+    const std::int64_t num_rows = std::min(block, some.end - first_row);
+    const auto leaves = rows.contract(first_row, num_rows);
+    std::vector<float> values;
+    for (std::int64_t first = 0; first < nz; first += part) {
+      const std::int64_t count = std::min(part, nz - first);
+      values.assign(static_cast<std::size_t>(count * num_rows * nx), 0.0f);
+      rows.decode(leaves, first, count, num_rows, values.data());
+      sink({first, count, first_row, num_rows, values});
+    }
+  });
+}
+
+// Mean density of a voxel's points.
+double voxel_density(const Field& field, const Box& box, std::int64_t x, std::int64_t y,
+                     std::int64_t z) {
+  const std::int64_t factor = points_per_voxel(box);
+  const auto along = [factor](std::int64_t voxel, std::int64_t point) {
+    return static_cast<double>(voxel) +
+           (static_cast<double>(point) + 0.5) / static_cast<double>(factor);
+  };
+  double sum = 0.0;
+  for (std::int64_t k = 0; k < factor; ++k) {
+    for (std::int64_t j = 0; j < factor; ++j) {
+      for (std::int64_t i = 0; i < factor; ++i) {
+        const Point at = box.position({along(x, i), along(y, j), along(z, k)});
+        sum += field.density(at[0], at[1], at[2]);
+      }
+    }
+  }
+  return sum / static_cast<double>(factor * factor * factor);
+}
+
+void sample_rotated(const Field& field, const Box& box, const BoxRows& some, const BoxSink& sink) {
+  constexpr std::int64_t kBlock = 16;
+  const auto [nx, ny, nz] = box.size;
+  const std::int64_t blocks = (some.end - some.first + kBlock - 1) / kBlock;
+  base::parallel_for(nz * blocks, [&, nx = nx](std::int64_t index) {
+    const std::int64_t section = index / blocks;
+    const std::int64_t first_row = some.first + index % blocks * kBlock;
+    const std::int64_t num_rows = std::min(kBlock, some.end - first_row);
+    std::vector<float> values;
+    values.reserve(static_cast<std::size_t>(num_rows * nx));
+    for (std::int64_t row = first_row; row < first_row + num_rows; ++row) {
+      for (std::int64_t x = 0; x < nx; ++x)
+        values.push_back(static_cast<float>(voxel_density(field, box, x, row, section)));
+    }
+    sink({section, 1, first_row, num_rows, values});
+  });
+}
+
+}  // namespace
+
+Rotation rotation_from_euler(double rot_deg, double tilt_deg, double psi_deg) {
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  const double ca = std::cos(rot_deg * kDegree), sa = std::sin(rot_deg * kDegree);
+  const double cb = std::cos(tilt_deg * kDegree), sb = std::sin(tilt_deg * kDegree);
+  const double cg = std::cos(psi_deg * kDegree), sg = std::sin(psi_deg * kDegree);
+  return {{{cg * cb * ca - sg * sa, cg * cb * sa + sg * ca, -cg * sb},
+           {-sg * cb * ca - cg * sa, -sg * cb * sa + cg * ca, sg * sb},
+           {sb * ca, sb * sa, cb}}};
+}
+
+Point Box::position(const Point& voxel) const {
+  Point offset{};
+  for (std::size_t a = 0; a < 3; ++a)
+    offset[a] = (voxel[a] - static_cast<double>(size[a]) / 2) * voxel_px;
+  Point at = centre_px;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto& row = field_from_box[a];
+    at[a] += row[0] * offset[0] + row[1] * offset[1] + row[2] * offset[2];
+  }
+  return at;
+}
+
+Box box_between(const Point& low, const Point& high, double voxel_px) {
+  // Sizes that are whole but for rounding count as whole.
+  constexpr double kRounding = 1e-6;
+  Box box;
+  box.voxel_px = voxel_px;
+  for (std::size_t a = 0; a < 3; ++a) {
+    box.centre_px[a] = (low[a] + high[a]) / 2;
+    box.size[a] = std::max<std::int64_t>(
+        1, static_cast<std::int64_t>(std::floor((high[a] - low[a]) / voxel_px + kRounding)));
+  }
+  return box;
+}
+
+std::int64_t points_per_voxel(const Box& box) {
+  return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(box.voxel_px - 1e-9)));
+}
+
+void sample_box(const Field& field, const Box& box, const BoxSink& sink) {
+  sample_box(field, box, {0, box.size[1]}, sink);
+}
+
+void sample_box(const Field& field, const Box& box, const BoxRows& rows, const BoxSink& sink) {
+  TOMOFIELD_CHECK(box.size[0] > 0 && box.size[1] > 0 && box.size[2] > 0 && box.voxel_px > 0,
+                  fmt::format("a box of {} × {} × {} voxels of {} px", box.size[0], box.size[1],
+                              box.size[2], box.voxel_px));
+  box.is_aligned() ? sample_aligned(field, box, rows, sink)
+                   : sample_rotated(field, box, rows, sink);
+}
+
+std::vector<float> sample_box(const Field& field, const Box& box) {
+  const auto [nx, ny, nz] = box.size;
+  std::vector<float> volume(static_cast<std::size_t>(nx * ny * nz));
+  sample_box(field, box, [&, nx = nx, ny = ny](const BoxPart& part) {
+    const auto rows = static_cast<std::ptrdiff_t>(part.num_rows * nx);
+    for (std::int64_t s = 0; s < part.num_sections; ++s) {
+      const std::int64_t at = ((part.first_section + s) * ny + part.first_row) * nx;
+      std::copy_n(part.values.begin() + s * rows, rows, volume.begin() + at);
+    }
+  });
+  return volume;
+}
+
+}  // namespace tomofield::field

@@ -1,0 +1,108 @@
+#include "fit/halo.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "kernels/lanes.h"
+#include "tomofield/error.h"
+
+namespace tomofield::fit {
+namespace {
+
+using distributed::Range;
+
+// Calls body(run, length, where it is when packed) for the runs in order.
+template <typename Body>
+void for_each_run(const std::vector<field::ParameterRuns>& all, const Body& body) {
+  std::size_t packed = 0;
+  for (const field::ParameterRuns& runs : all) {
+    for (std::size_t r = 0; r < runs.repeats; ++r, packed += runs.count)
+      body(runs.first + r * runs.stride, runs.count, packed);
+  }
+}
+
+}  // namespace
+
+Range leaves_of_bands(const field::Quadtree& tree, Range bands) {
+  const auto first_of = [&](int band) {
+    int leaf = 0;
+    while (leaf < tree.num_leaves() && tree.band_of_leaf(leaf) < band) ++leaf;
+    return leaf;
+  };
+  return {first_of(bands.begin), first_of(bands.end)};
+}
+
+HaloLeaves halo_leaves(const field::Quadtree& tree, Range bands) {
+  const field::RootGrid& roots = tree.roots();
+  const std::int64_t first = roots.y0 + bands.begin * roots.cell_size;
+  const std::int64_t end = roots.y0 + bands.end * roots.cell_size;
+  HaloLeaves leaves;
+  if (bands.begin > 0) {
+    leaves.before = tree.leaves_across(first - 1, first);
+    leaves.own_first = tree.leaves_across(first, first + 1);
+  }
+  if (bands.end < roots.rows) {
+    leaves.own_last = tree.leaves_across(end - 1, end);
+    leaves.after = tree.leaves_across(end, end + 1);
+  }
+  return leaves;
+}
+
+std::vector<int> needed_leaves(const field::Quadtree& tree, Range bands) {
+  const Range own = leaves_of_bands(tree, bands);
+  const HaloLeaves halo = halo_leaves(tree, bands);
+  std::vector<int> leaves = halo.before;
+  for (int leaf = own.begin; leaf < own.end; ++leaf) leaves.push_back(leaf);
+  leaves.insert(leaves.end(), halo.after.begin(), halo.after.end());
+  return leaves;
+}
+
+Halo::Part Halo::part(const field::Field& field, const std::vector<int>& leaves, Side side,
+                      int pixel) {
+  Part part;
+  std::size_t size = 0;
+  for (const int leaf : leaves) {
+    const field::Square& square = field.tree().leaf(leaf).square;
+    // The face, and the centre of the row at it.
+    const double face = static_cast<double>(side == Side::kStart ? square.y0 : square.y1());
+    const double row = face + (side == Side::kStart ? 0.5 : -0.5) * pixel;
+    const double at_face = face + field::kPixelCentre;
+    for (field::ParameterRuns runs :
+         field.parameters_between(leaf, std::min(row, at_face), std::max(row, at_face))) {
+      runs.first += field.offset(leaf);
+      size += runs.size();
+      part.runs.push_back(runs);
+    }
+  }
+  part.packed.resize(size);
+  return part;
+}
+
+Halo::Halo(const field::Field& field, Range bands, int pixel,
+           const distributed::Communicator& processes)
+    : processes_(processes) {
+  const HaloLeaves leaves = halo_leaves(field.tree(), bands);
+  to_before_ = part(field, leaves.own_first, Side::kStart, pixel);
+  to_after_ = part(field, leaves.own_last, Side::kEnd, pixel);
+  from_before_ = part(field, leaves.before, Side::kEnd, pixel);
+  from_after_ = part(field, leaves.after, Side::kStart, pixel);
+}
+
+void Halo::refresh(field::Field& field) {
+  float* const parameters = field.parameters().data();
+  for (Part* part : {&to_before_, &to_after_}) {
+    for_each_run(part->runs, [&](std::size_t at, std::size_t count, std::size_t packed) {
+      std::copy_n(parameters + at, count, part->packed.data() + packed);
+    });
+  }
+  processes_.exchange(
+      {to_before_.packed, to_after_.packed, from_before_.packed, from_after_.packed});
+  for (const Part* part : {&from_before_, &from_after_}) {
+    for_each_run(part->runs, [&](std::size_t at, std::size_t count, std::size_t packed) {
+      std::copy_n(part->packed.data() + packed, count, parameters + at);
+    });
+  }
+}
+
+}  // namespace tomofield::fit

@@ -1,0 +1,84 @@
+#include "fit/stages.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/lanes.h"
+
+namespace tomofield::fit {
+namespace {
+
+// A step of plain vertices in steps of the usual factors, about, for the time that is left.
+constexpr double kVertexCost = 0.4;
+
+// Powers of two up to coarse_bin at which no slab straddles two leaves, at most one an epoch. An
+// adaptive tree has one: its structure is open in the first stage, where that should see most.
+std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
+  std::vector<int> bins;
+  if (fit.engine != "slab") return bins;
+  const bool is_adaptive = field.tree == "adaptive";
+  const bool may_halve = is_adaptive && field.leaf_size % (2 * base::kLanes) == 0;
+  const int smallest_leaf = may_halve ? field.leaf_size / 2 : field.leaf_size;
+  const int most = is_adaptive ? std::min(fit.coarse_bin, 2) : fit.coarse_bin;
+  for (int bin = 2; bin <= most && smallest_leaf % (bin * base::kLanes) == 0; bin *= 2) {
+    if (std::ssize(bins) < fit.coarse_epochs) bins.push_back(bin);
+  }
+  return bins;
+}
+
+}  // namespace
+
+int Schedule::vertex_epochs_of(int fine) const { return std::min(fine, epochs); }
+
+int Schedule::coarse_epochs_of(int fine) const {
+  constexpr double kCoarseEpochs = 80;
+  const double part = std::clamp(static_cast<double>(fine) / epochs, 0.0, 1.0);
+  return static_cast<int>(std::round(kCoarseEpochs * part));
+}
+
+bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit) {
+  if (field.kind != "vm" || field.tree != "uniform" || fit.engine != "slab") return false;
+  const double side = field.leaf_size / field.vertex_spacing;
+  const double left = side + 1 - field.rank;  // of x and y each, for vectors along z
+  const double margin_side = (field.leaf_size << field.depth) / field.margin_spacing;
+  return side <= 2 * field.rank && left > 0 && left * left >= field.rank &&
+         (!field.with_margin || margin_side <= 4 * field.margin_rank);
+}
+
+Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit) {
+  Schedule schedule{fit.vertex_epochs > 0 ? 10 : 30, 0.05};
+  if (field.kind == "grid") schedule = {10, 0.035};
+  const std::vector<int> bins = coarse_bins(field, fit);
+  if (!bins.empty() && field.finest_spacing() >= bins.front()) schedule.epochs = 5;
+  return schedule;
+}
+
+std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit) {
+  const std::vector<int> bins = coarse_bins(field, fit);
+  const bool has_vertices = fit.vertex_epochs > 0;
+  const std::string first_kind = has_vertices ? "grid" : field.kind;
+  const double rate = fit.learning_rate * (has_vertices ? fit.vertex_rate : 1.0);
+  const double cost = has_vertices ? kVertexCost : 1.0;
+  std::vector<Stage> stages;
+  std::int64_t first_epoch = 0;
+  double first_rate = rate;
+  const auto add_before_last = [&](int bin, int epochs) {
+    stages.push_back({first_kind, bin, first_epoch, epochs, first_rate,
+                      rate * fit.coarse_final_rate, cost / (bin * bin * bin)});
+    first_epoch += epochs;
+    first_rate = rate * fit.refined_rate;
+  };
+  for (std::size_t left = bins.size(); left > 0; --left) {
+    add_before_last(bins[left - 1],
+                    static_cast<int>((fit.coarse_epochs - first_epoch) / static_cast<int>(left)));
+  }
+  if (has_vertices) {
+    add_before_last(1, fit.vertex_epochs);
+    first_rate = fit.learning_rate * fit.factorised_rate;
+  }
+  stages.push_back(
+      {field.kind, 1, first_epoch, fit.epochs, first_rate, fit.learning_rate * fit.final_rate});
+  return stages;
+}
+
+}  // namespace tomofield::fit

@@ -1,0 +1,130 @@
+#include "measurement/held_out.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <utility>
+
+#include "base/aligned_buffer.h"
+#include "base/log.h"
+#include "base/parallel.h"
+#include "kernels/lanes.h"
+#include "tomofield/error.h"
+
+namespace tomofield::measurement {
+namespace {
+
+using kernels::kLanes;
+
+// Line integrals of a slab: [view, x, lane].
+base::AlignedBuffer<float> predict(const projection::SlabSampler& sampler,
+                                   const projection::SlabProjector& projector,
+                                   std::span<const int> views, int slab) {
+  base::AlignedBuffer<float> samples(projector.grid().size());
+  base::AlignedBuffer<float> rays(projector.detector_size(views.size()));
+  sampler.decode(slab, samples.data());
+  projector.forward(samples.data(), views, rays.data());
+  return rays;
+}
+
+SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
+                       const projection::SlabProjector& projector, const SlabViews& measured,
+                       std::span<const int> views, const distributed::Communicator& processes) {
+  const std::int64_t width = projector.geometry().width;
+  const auto num_slabs = static_cast<std::size_t>(measured.num_slabs());
+  std::vector<ViewSums> all(num_slabs * views.size());
+  base::parallel_for(measured.held().size(), [&](std::int64_t s) {
+    const int slab = measured.held().begin + static_cast<int>(s);
+    auto rays = predict(sampler, projector, views, slab);
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      all[static_cast<std::size_t>(slab) * views.size() + v] =
+          data_term({}, 1.0, measured.rays(slab, views[v]), measured.mask(slab, views[v]), width,
+                    rays.data() + static_cast<std::ptrdiff_t>(v) * width * kLanes);
+    }
+    measured.release(slab);
+  });
+  combine(processes, all);
+  SlabSums sums(num_slabs);
+  for (std::size_t s = 0; s < num_slabs; ++s) {
+    const auto first = all.begin() + static_cast<std::ptrdiff_t>(s * views.size());
+    sums[s].assign(first, first + std::ssize(views));
+  }
+  return sums;
+}
+
+}  // namespace
+
+std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every) {
+  if (every == 0) return {};
+  std::vector<int> by_tilt(tilt_deg.size());
+  std::iota(by_tilt.begin(), by_tilt.end(), 0);
+  std::ranges::stable_sort(by_tilt, [&](int a, int b) {
+    return tilt_deg[static_cast<std::size_t>(a)] < tilt_deg[static_cast<std::size_t>(b)];
+  });
+  const std::size_t step = static_cast<std::size_t>(every);
+  std::vector<int> views;
+  for (std::size_t i = step / 2; i + 1 < by_tilt.size(); i += step) views.push_back(by_tilt[i]);
+  if (views.empty()) {
+    throw Error(
+        fmt::format("--hold-out {} holds out none of {} views: the first and the last in order of "
+                    "tilt are always fitted, so give a smaller number, at least 2",
+                    every, tilt_deg.size()));
+  }
+  std::ranges::sort(views);
+  return views;
+}
+
+HeldOutError held_out_error(const projection::SlabSampler& sampler,
+                            const projection::SlabProjector& projector, const SlabViews& measured,
+                            std::vector<int> views, std::span<const double> noise_weight,
+                            bool fit_view_scale, const distributed::Communicator& processes) {
+  const SlabSums sums = sums_of_slabs(sampler, projector, measured, views, processes);
+  return view_errors(std::move(views), sums, noise_weight, fit_view_scale);
+}
+
+nlohmann::json report_held_out(const HeldOutError& error, const std::vector<double>& tilt_deg,
+                               bool stopped_by_them) {
+  base::log_info(fmt::format(
+      "held out: {} views, error {:.4f}{}", error.views.size(), error.total,
+      stopped_by_them ? " (they also chose when to stop, so others are predicted less well)" : ""));
+  nlohmann::json views = nlohmann::json::array();
+  for (std::size_t i = 0; i < error.views.size(); ++i) {
+    const auto view = static_cast<std::size_t>(error.views[i]);
+    views.push_back({{"view", view}, {"tilt_deg", tilt_deg[view]}, {"error", error.view_error[i]}});
+  }
+  return {{"error", error.total}, {"independent", !stopped_by_them}, {"views", views}};
+}
+
+PredictedView predicted_view(const projection::SlabSampler& sampler,
+                             const projection::SlabProjector& projector, const SlabViews& measured,
+                             int view, const ViewModel& model,
+                             const distributed::Communicator& processes) {
+  const auto& shape = measured.shape();
+  const auto size = static_cast<std::size_t>(shape.width * shape.num_rows);
+  PredictedView result{.width = shape.width,
+                       .height = shape.num_rows,
+                       .measured = std::vector<float>(size),
+                       .predicted = std::vector<float>(size)};
+  for (int slab = measured.held().begin; slab < measured.held().end; ++slab) {
+    const auto rays = predict(sampler, projector, std::span(&view, 1), slab);
+    const std::int64_t rows = std::min<std::int64_t>(kLanes, shape.num_rows - slab * kLanes);
+    for (std::int64_t lane = 0; lane < rows; ++lane)
+      for (std::int64_t x = 0; x < shape.width; ++x) {
+        const std::int64_t y = slab * kLanes + lane;
+        const auto at = static_cast<std::size_t>(y * shape.width + x);
+        const double p = static_cast<double>(rays.data()[x * kLanes + lane]);
+        result.predicted[at] = static_cast<float>(model.scale * p + model.offset);
+        result.measured[at] = measured.counts(view, x, y) ? measured.ray(view, x, y)
+                                                          : std::numeric_limits<float>::quiet_NaN();
+      }
+  }
+  processes.combine(std::span(result.measured));
+  processes.combine(std::span(result.predicted));
+  return result;
+}
+
+}  // namespace tomofield::measurement

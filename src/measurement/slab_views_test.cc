@@ -1,0 +1,151 @@
+#include "measurement/slab_views.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <span>
+
+#include "base/random.h"
+
+namespace tomofield::measurement {
+namespace {
+
+constexpr SlabViews::Shape kShape{
+    .num_views = 3, .width = 21, .height = 60, .first_row = 5, .num_rows = 39};
+constexpr double kUnit = 4.0;
+
+float pixel_of(std::size_t view, std::int64_t x, std::int64_t y) {
+  return static_cast<float>(
+      std::sin(static_cast<double>(x * 7 + y * 3) + static_cast<double>(view)));
+}
+
+// Three quarters of the pixels at random.
+bool is_valid(std::size_t view, std::int64_t x, std::int64_t y) {
+  return base::Random(11 + view, static_cast<std::uint64_t>(y * kShape.width + x)).below(4) > 0;
+}
+
+std::unique_ptr<SlabViews> make_views(SlabViews::Slabs held = SlabViews::all_slabs(kShape)) {
+  const auto read = [](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
+    for (std::int64_t y = 0; y < kShape.height; ++y) {
+      for (std::int64_t x = 0; x < kShape.width; ++x) {
+        const auto at = static_cast<std::size_t>(y * kShape.width + x);
+        image[at] = pixel_of(view, x, y);
+        valid[at] = is_valid(view, x, y);
+      }
+    }
+  };
+  return std::make_unique<SlabViews>(kShape, held, kUnit, read, "/tmp");
+}
+
+TEST(SlabViews, SomeSlabsAreThoseOfTheWhole) {
+  const auto all = make_views();
+  std::int64_t num_valid = 0;
+  for (const SlabViews::Slabs held : {SlabViews::Slabs{0, 2}, {2, 3}}) {
+    const auto some = make_views(held);
+    EXPECT_EQ(some->held(), held);
+    EXPECT_EQ(some->num_slabs(), all->num_slabs());
+    num_valid += some->num_valid(1);
+    for (std::int64_t y = held.begin * 16; y < std::min<std::int64_t>(held.end * 16, 39); ++y) {
+      for (std::int64_t x = 0; x < kShape.width; ++x) {
+        ASSERT_EQ(some->counts(1, x, y), all->counts(1, x, y));
+        ASSERT_EQ(some->ray(1, x, y), all->ray(1, x, y));
+      }
+    }
+    const auto coarse = some->binned(2), all_coarse = all->binned(2);
+    EXPECT_EQ(coarse->held(), (SlabViews::Slabs{held.begin / 2, (held.end + 1) / 2}));
+    for (std::int64_t y = held.begin * 8; y < std::min<std::int64_t>(held.end * 8, 20); ++y)
+      ASSERT_EQ(coarse->ray(2, 7, y), all_coarse->ray(2, 7, y));
+  }
+  EXPECT_EQ(num_valid, all->num_valid(1));
+}
+
+TEST(SlabViews, MiddleRowsAreCopied) {
+  const auto all = make_views();
+  const std::vector<int> every = {0, 1, 2}, some = {2, 0};
+  const auto middle = all->middle_rows(20, some);
+  ASSERT_EQ(middle->shape().num_rows, 20);
+  ASSERT_EQ(middle->shape().num_views, 2u);
+  for (int v = 0; v < 2; ++v) {
+    const int from = some[static_cast<std::size_t>(v)];
+    for (std::int64_t y = 0; y < 20; ++y) {
+      for (std::int64_t x = 0; x < kShape.width; ++x) {
+        ASSERT_EQ(middle->counts(v, x, y), all->counts(from, x, y + 9));
+        ASSERT_EQ(middle->ray(v, x, y), all->ray(from, x, y + 9));
+      }
+    }
+  }
+  EXPECT_EQ(all->middle_rows(100, every)->checksum(), all->checksum());
+}
+
+// Pages of files that the process holds, in bytes.
+std::size_t mapped_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  std::size_t size = 0, resident = 0, shared = 0;
+  statm >> size >> resident >> shared;
+  return shared * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+}
+
+TEST(SlabViews, ThoseOfALargeSeriesAreReleasedAndComeBack) {
+  constexpr SlabViews::Shape kWide{.num_views = 4, .width = 4000, .height = 48, .num_rows = 48};
+  const auto read = [](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
+    for (std::size_t i = 0; i < image.size(); ++i) {
+      image[i] = static_cast<float>(view + i % 977);
+      valid[i] = i % 5 > 0;
+    }
+  };
+  const SlabViews in_memory(kWide, kUnit, read, "/tmp");
+  const SlabViews in_file(kWide, kUnit, read, "/tmp", 1000);
+  const std::size_t before = mapped_bytes();
+  EXPECT_EQ(in_file.num_valid(3), in_memory.num_valid(3));
+  float sum = 0;
+  for (int v = 0; v < 4; ++v)
+    for (std::int64_t i = 0; i < kWide.width * 16; ++i) sum += in_file.rays(1, v)[i];
+  EXPECT_GT(sum, 0);
+  constexpr std::size_t kSlab = 4 * 4000 * 64;
+  EXPECT_GT(mapped_bytes(), before + kSlab * 9 / 10);
+  for (int slab = 0; slab < 3; ++slab) in_file.release(slab);
+  EXPECT_LT(mapped_bytes(), before + kSlab / 10);
+  EXPECT_EQ(in_file.checksum(), in_memory.checksum());
+  EXPECT_LT(mapped_bytes(), before + kSlab / 10);
+}
+
+TEST(SlabViews, BinnedAreMeansOfWhatCountsFromTheFirstRowOn) {
+  const auto fine = make_views();
+  for (const int bin : {2, 4}) {
+    const auto coarse = fine->binned(bin);
+    const SlabViews::Shape& shape = coarse->shape();
+    EXPECT_EQ(shape.width, (21 + bin - 1) / bin);
+    EXPECT_EQ(shape.num_rows, (39 + bin - 1) / bin);
+    std::int64_t counting = 0, not_counting = 0;
+    for (std::size_t v = 0; v < kShape.num_views; ++v) {
+      for (std::int64_t cy = 0; cy < shape.num_rows; ++cy) {
+        for (std::int64_t cx = 0; cx < shape.width; ++cx) {
+          double sum = 0;
+          int count = 0;
+          for (std::int64_t y = cy * bin; y < (cy + 1) * bin && y < kShape.num_rows; ++y) {
+            for (std::int64_t x = cx * bin; x < (cx + 1) * bin && x < kShape.width; ++x) {
+              if (!is_valid(v, x, y + kShape.first_row)) continue;
+              sum += static_cast<double>(pixel_of(v, x, y + kShape.first_row));
+              ++count;
+            }
+          }
+          const bool expected = count * 2 >= bin * bin;
+          ASSERT_EQ(coarse->counts(static_cast<int>(v), cx, cy), expected) << cx << " " << cy;
+          ++(expected ? counting : not_counting);
+          if (!expected) continue;
+          // Data units a density unit, and a ray is a bin-th as many pixels long.
+          ASSERT_NEAR(coarse->ray(static_cast<int>(v), cx, cy), sum / count / kUnit / bin, 1e-6);
+        }
+      }
+    }
+    EXPECT_GT(counting, 0);
+    EXPECT_GT(not_counting, 0);
+  }
+}
+
+}  // namespace
+}  // namespace tomofield::measurement

@@ -1,0 +1,91 @@
+#include "measurement/view_residuals.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "kernels/lanes.h"
+
+namespace tomofield::measurement {
+
+using kernels::kLanes;
+
+ViewSums& ViewSums::operator+=(const ViewSums& other) {
+  n += other.n;
+  p += other.p;
+  b += other.b;
+  pp += other.pp;
+  pb += other.pb;
+  bb += other.bb;
+  return *this;
+}
+
+void combine(const distributed::Communicator& processes, std::span<ViewSums> sums) {
+  static_assert(sizeof(ViewSums) == 6 * sizeof(double));
+  processes.combine(std::span(reinterpret_cast<double*>(sums.data()), 6 * sums.size()));
+}
+
+double ViewSums::squared_residual(const ViewModel& m) const {
+  return m.scale * m.scale * pp + bb + n * m.offset * m.offset + 2 * m.scale * m.offset * p -
+         2 * m.scale * pb - 2 * m.offset * b;
+}
+
+ViewSums data_term(const ViewModel& model, double multiplicity, const float* measured,
+                   const std::uint16_t* mask, std::int64_t width, float* rays) {
+  const float scale = static_cast<float>(model.scale);
+  const float offset = static_cast<float>(model.offset);
+  const float slope = static_cast<float>(multiplicity * model.weight * model.scale);
+  ViewSums sums;
+  for (std::int64_t x = 0; x < width; ++x) {
+    float n = 0, sp = 0, sb = 0, spp = 0, spb = 0, sbb = 0;
+    const unsigned bits = mask[x];
+    for (int l = 0; l < kLanes; ++l) {
+      const std::ptrdiff_t at = x * kLanes + l;
+      const float counts = static_cast<float>(bits >> l & 1u);
+      const float p = counts * rays[at];
+      const float b = counts * measured[at];
+      rays[at] = slope * (scale * p + counts * offset - b);
+      n += counts;
+      sp += p;
+      sb += b;
+      spp += p * p;
+      spb += p * b;
+      sbb += b * b;
+    }
+    sums += {static_cast<double>(n),   static_cast<double>(sp),  static_cast<double>(sb),
+             static_cast<double>(spp), static_cast<double>(spb), static_cast<double>(sbb)};
+  }
+  return sums;
+}
+
+double ray_data_term(const ViewModel& model, double multiplicity, double measured, double predicted,
+                     ViewSums& sums) {
+  sums +=
+      {1.0, predicted, measured, predicted * predicted, predicted * measured, measured * measured};
+  return multiplicity * model.weight * model.scale *
+         (model.scale * predicted + model.offset - measured);
+}
+
+// Keeps the equations of a view without rays solvable: it gets scale 1, offset 0.
+constexpr double kNoRays = 1e-9;
+
+void fit_nuisances(const NuisancePrior& prior, const std::vector<ViewSums>& sums,
+                   std::vector<ViewModel>& views) {
+  double log_scales = 0.0;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const ViewSums& s = sums[v];
+    const double w = views[v].weight;
+    const double prior_a = prior.shrinkage * w * s.pp + kNoRays;
+    const double prior_o = prior.shrinkage * w * s.n + kNoRays;
+    const double aa = w * s.pp + prior_a, ao = w * s.p, oo = w * s.n + prior_o;
+    const double rhs_a = w * s.pb + prior_a, rhs_o = w * s.b;
+    const double determinant = aa * oo - ao * ao;
+    views[v].scale = std::clamp((rhs_a * oo - rhs_o * ao) / determinant, 0.2, 5.0);
+    views[v].offset = (rhs_o - ao * views[v].scale) / oo;
+    log_scales += std::log(views[v].scale);
+  }
+  const double common = std::exp(log_scales / static_cast<double>(views.size()));
+  for (ViewModel& view : views) view.scale /= common;
+}
+
+}  // namespace tomofield::measurement

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "distributed/communicator.h"
+#include "distributed/partition.h"
+#include "field/field.h"
+#include "geometry/tilt_geometry.h"
+#include "objective/axis_penalty.h"
+
+namespace tomofield::objective {
+
+struct FourierPriorOptions {
+  double weight = 0.0;    ///< per px³ and density unit; 0 is off
+  int slices = 4;         ///< random heights z a step
+  int most_samples = 64;  ///< of the longer side of the region, at least 1 px apart
+  std::uint64_t seed = 1;
+  AxisPenaltyOptions axes;
+};
+
+/// Isotropic Fourier prior (eq. 7 and 8) of a field: `weight` · volume of the
+/// region of interest · axis_penalty of a few sections across it, on a coarse
+/// grid whose origin and heights are new in every step and depend on seed and
+/// step alone. Rings are measured anew in every step: their transform costs less
+/// than the samples, which the axis lines need anyway.
+class FourierPrior {
+ public:
+  /// `field` must outlive it and may change its parameters; rebuild it when the tree changes.
+  FourierPrior(const field::Field& field, const geometry::Roi& roi,
+               const FourierPriorOptions& options);
+  /// Of a field that processes share, of which this one has the leaves `own`.
+  FourierPrior(const field::Field& field, const geometry::Roi& roi,
+               const FourierPriorOptions& options, const distributed::Communicator& processes,
+               distributed::Range own);
+
+  struct Result {
+    double value = 0.0;
+    double grad_bias = 0.0;
+  };
+  /// Adds the gradient of the own leaves to `gradient` (all parameters). Runs on all threads, with
+  /// the same bits for any number of them.
+  Result accumulate_gradient(std::int64_t step, float* gradient) const;
+
+  const SliceShape& shape() const { return shape_; }
+
+ private:
+  struct LeafSamples;
+  std::vector<LeafSamples> leaf_samples(std::int64_t step) const;
+
+  const field::Field& field_;
+  geometry::Roi roi_;
+  FourierPriorOptions options_;
+  const distributed::Communicator& processes_;
+  distributed::Range own_;
+  double spacing_ = 1.0;
+  SliceShape shape_;
+  std::vector<int> leaves_;  // that meet the region
+};
+
+}  // namespace tomofield::objective

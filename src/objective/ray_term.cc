@@ -1,0 +1,142 @@
+#include "objective/ray_term.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/random.h"
+
+namespace tomofield::objective {
+namespace {
+
+using geometry::RayBundle;
+using projection::Ray;
+
+// Streams of the seed: what an epoch's batches and a step's samples are drawn from.
+constexpr std::uint64_t kBatchStream = std::uint64_t{1} << 44;
+constexpr std::uint64_t kSampleStream = std::uint64_t{2} << 40;
+
+// Rays that are traced and kept at once: some 100 samples each.
+constexpr std::size_t kRaysAtOnce = std::size_t{1} << 17;
+
+double smallest_leaf(const field::Quadtree& tree) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (int leaf = 0; leaf < tree.num_leaves(); ++leaf)
+    smallest = std::min(smallest, static_cast<double>(tree.leaf(leaf).square.size));
+  return smallest;
+}
+
+// One sample a pixel, along the diagonal of the smallest leaf.
+int samples_per_diagonal(const RayTermOptions& options, const field::Quadtree& tree,
+                         double thickness) {
+  if (options.ray_samples > 0) return options.ray_samples;
+  const double size = smallest_leaf(tree);
+  return static_cast<int>(std::ceil(std::hypot(size, size, thickness)));
+}
+
+std::uint32_t draw_of(std::uint64_t seed, std::uint64_t stream) {
+  return static_cast<std::uint32_t>(base::Random(seed, stream).bits() >> 32);
+}
+
+}  // namespace
+
+int ray_steps_per_epoch(const RayTermOptions& options, const measurement::SlabViews::Shape& shape) {
+  if (options.rays_per_step == 0) return options.subsets;
+  const std::int64_t rays =
+      static_cast<std::int64_t>(shape.num_views) * shape.width * shape.num_rows;
+  const std::int64_t steps = (rays + options.rays_per_step - 1) / options.rays_per_step;
+  return static_cast<int>(std::min<std::int64_t>(steps, std::numeric_limits<int>::max()));
+}
+
+RayTerm::RayTerm(const geometry::RayGeometry& geometry, const measurement::SlabViews& measured,
+                 const field::Field& field, const RayTermOptions& options)
+    : measured_(measured),
+      roi_{static_cast<double>(options.roi.x0), static_cast<double>(options.roi.y0),
+           static_cast<double>(options.roi.x1), static_cast<double>(options.roi.y1)},
+      thickness_(field.thickness()),
+      roots_(field.tree().roots()),
+      seed_(options.seed),
+      steps_per_epoch_(ray_steps_per_epoch(options, measured.shape())),
+      projector_(geometry, field, options.support,
+                 samples_per_diagonal(options, field.tree(), field.thickness())) {
+  for (int view = 0; view < geometry.num_views(); ++view) bundles_.push_back(geometry.rays(view));
+}
+
+std::size_t RayTerm::working_memory(const geometry::RayGeometry& geometry,
+                                    const field::Quadtree& tree, const RayTermOptions& options,
+                                    const measurement::SlabViews::Shape& shape) {
+  constexpr double kBytesPerPiece = 128, kBytesPerSample = 4, kPadding = 16, kBytesPerRay = 40;
+  const double thickness = geometry.aligned.thickness, size = smallest_leaf(tree);
+  const double per_pixel =
+      samples_per_diagonal(options, tree, thickness) / std::hypot(size, size, thickness);
+  double bytes_of_ray = 0;  // mean over the views
+  for (int view = 0; view < geometry.num_views(); ++view) {
+    const RayBundle rays = geometry.rays(view);
+    const double pieces = 1 + thickness * (std::abs(rays.x[3]) + std::abs(rays.y[3])) / size;
+    const double samples = thickness * rays.length_per_z * per_pixel + kPadding * pieces;
+    bytes_of_ray += (pieces * kBytesPerPiece + samples * kBytesPerSample) / geometry.num_views();
+  }
+  const double num_rays = static_cast<double>(shape.num_views) *
+                          static_cast<double>(shape.width * shape.num_rows) /
+                          ray_steps_per_epoch(options, shape);
+  const double at_once = std::min(num_rays, static_cast<double>(kRaysAtOnce));
+  return static_cast<std::size_t>(num_rays * kBytesPerRay + at_once * bytes_of_ray);
+}
+
+std::vector<Ray> RayTerm::batch(std::int64_t step) const {
+  const auto& shape = measured_.shape();
+  const std::int64_t epoch = step / steps_per_epoch_, turn = step % steps_per_epoch_;
+  const std::int64_t num_pixels = shape.width * shape.num_rows;
+  const std::uint32_t draw = draw_of(seed_, kBatchStream + static_cast<std::uint64_t>(epoch));
+  std::vector<std::vector<Ray>> by_band(static_cast<std::size_t>(roots_.rows));
+  for (std::size_t v = 0; v < bundles_.size(); ++v) {
+    const std::uint32_t key = kernels::mix_bits(draw ^ static_cast<std::uint32_t>(v));
+    for (std::int64_t first = 0; first < num_pixels; first += steps_per_epoch_) {
+      const auto chosen =
+          static_cast<std::int64_t>(kernels::mix_bits(key ^ static_cast<std::uint32_t>(first)) %
+                                    static_cast<std::uint32_t>(steps_per_epoch_));
+      const std::int64_t pixel = first + (chosen + turn) % steps_per_epoch_;
+      if (pixel >= num_pixels) continue;
+      const std::int64_t x = pixel % shape.width, y = pixel / shape.width;
+      if (!measured_.counts(static_cast<int>(v), x, y)) continue;
+      const RayBundle::Line line =
+          bundles_[v].line(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5);
+      if (clip(line, roi_, {0.0, thickness_}).empty()) continue;
+      const double middle = line.y0 + line.y_per_z * thickness_ / 2;
+      const double band = std::floor((middle - static_cast<double>(roots_.y0)) /
+                                     static_cast<double>(roots_.cell_size));
+      by_band[static_cast<std::size_t>(std::clamp(band, 0.0, roots_.rows - 1.0))].push_back(
+          {static_cast<std::int32_t>(v), static_cast<std::int32_t>(x),
+           static_cast<std::int32_t>(y)});
+    }
+  }
+  std::vector<Ray> rays;
+  for (const auto& band : by_band) rays.insert(rays.end(), band.begin(), band.end());
+  return rays;
+}
+
+RayTerm::Result RayTerm::accumulate_gradient(std::int64_t step,
+                                             std::span<const measurement::ViewModel> models,
+                                             float* gradient) const {
+  const std::vector<Ray> rays = batch(step);
+  const std::uint32_t draw = draw_of(seed_, kSampleStream + static_cast<std::uint64_t>(step));
+  Result result;
+  result.views.resize(bundles_.size());
+  projection::RayTrace trace;
+  for (std::size_t first = 0; first < rays.size(); first += kRaysAtOnce) {
+    const auto part = std::span(rays).subspan(first, std::min(kRaysAtOnce, rays.size() - first));
+    std::vector<float> values = projector_.forward(part, draw, trace);
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      const Ray& ray = part[i];
+      const auto view = static_cast<std::size_t>(ray.view);
+      values[i] = static_cast<float>(
+          measurement::ray_data_term(models[view], steps_per_epoch_,
+                                     static_cast<double>(measured_.ray(ray.view, ray.x, ray.y)),
+                                     static_cast<double>(values[i]), result.views[view]));
+    }
+    result.grad_bias += projector_.backward(trace, values, gradient);
+  }
+  return result;
+}
+
+}  // namespace tomofield::objective

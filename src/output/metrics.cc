@@ -1,0 +1,91 @@
+#include "output/metrics.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "base/parallel.h"
+#include "output/mask_metrics.h"
+
+namespace tomofield::output {
+namespace {
+
+// How an adaptive tree came about.
+nlohmann::json tree_json(const fit::TreeProgress& tree) {
+  nlohmann::json updates = nlohmann::json::array();
+  for (const fit::TreeUpdate& u : tree.updates) {
+    updates.push_back({{"epoch", u.epoch},
+                       {"splits", u.splits},
+                       {"merges", u.merges},
+                       {"error", u.error},
+                       {"predicted_error", u.predicted_error},
+                       {"leaves_by_level", u.leaves_by_level}});
+  }
+  return updates;
+}
+
+nlohmann::json stages_json(const std::vector<fit::Stage>& stages) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const fit::Stage& s : stages)
+    list.push_back({{"field", s.field_kind},
+                    {"bin", s.bin},
+                    {"first_epoch", s.first_epoch},
+                    {"epochs", s.epochs}});
+  return list;
+}
+
+}  // namespace
+
+nlohmann::json figures_json(const fit::Fit& fit, const measurement::PreparedSeries& series,
+                            double seconds) {
+  const fit::Progress& progress = fit.progress();
+  nlohmann::json views = nlohmann::json::array();
+  for (std::size_t v = 0; v < progress.views.size(); ++v) {
+    views.push_back({{"tilt_deg", series.geometry.tilt_deg[v]},
+                     {"scale", progress.views[v].scale},
+                     {"offset", progress.views[v].offset * series.unit},
+                     {"noise_sigma", series.noise_sigma[v] * series.unit}});
+  }
+  return {{"parameters", fit.field().num_parameters()},
+          {"leaves", fit.field().tree().num_leaves()},
+          {"tree_updates", tree_json(progress.tree)},
+          {"steps", progress.step},
+          {"mean_squared_residual_per_noise_variance", progress.data_loss},
+          {"density_unit", series.unit},
+          {"tv_gain", fit.variation_gain()},
+          {"pixel_size_A", series.pixel_size_A},
+          {"size_px", {series.roi.width(), series.roi.height(), series.geometry.thickness}},
+          {"stages", stages_json(fit.stages())},
+          {"seconds", seconds},
+          {"threads", base::thread_count()},
+          {"mask", mask_json(series)},
+          {"views", views}};
+}
+
+nlohmann::json processes_json(const fit::Fit& fit, double seconds) {
+  const distributed::Communicator& processes = fit.processes();
+  const fit::Fit::Traffic traffic = fit.traffic();
+  constexpr std::size_t kNumbers = 5;
+  std::vector<double> all(kNumbers * static_cast<std::size_t>(processes.size()));
+  const auto own = all.begin() + static_cast<std::ptrdiff_t>(kNumbers) * processes.rank();
+  const double steps = static_cast<double>(std::max<std::int64_t>(traffic.steps, 1));
+  std::ranges::copy(std::array<double, kNumbers>{static_cast<double>(fit.own_bands().size()),
+                                                 static_cast<double>(fit.own_leaves().size()),
+                                                 seconds - traffic.seconds, traffic.seconds,
+                                                 static_cast<double>(traffic.bytes) / steps},
+                    own);
+  processes.combine(std::span(all));
+  nlohmann::json list = nlohmann::json::array();
+  for (auto p = all.begin(); p != all.end(); p += kNumbers) {
+    list.push_back({{"bands", std::lround(p[0])},
+                    {"leaves", std::lround(p[1])},
+                    {"seconds_computing", p[2]},
+                    {"seconds_communicating", p[3]},
+                    {"bytes_sent_per_step", p[4]}});
+  }
+  return list;
+}
+
+}  // namespace tomofield::output

@@ -1,0 +1,395 @@
+#include "output/model_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <new>
+#include <utility>
+
+#include "io/atomic_file.h"
+#include "io/hdf5_file.h"
+#include "tomofield/error.h"
+#include "tomofield/version.h"
+
+namespace tomofield::output {
+namespace {
+
+using io::Hdf5Group;
+using Integers = std::vector<std::int64_t>;
+
+// Persisted: do not change either without a new version.
+constexpr const char* kFormat = "tomofield model";
+constexpr std::int64_t kFormatVersion = 2;
+
+// A list of structs as one array a member.
+template <typename Items, typename Get>
+void write_column(Hdf5Group& group, const char* name, const Items& items, Get get) {
+  Integers column;
+  for (const auto& item : items) column.push_back(static_cast<std::int64_t>(get(item)));
+  group.write_array<std::int64_t>(name, column);
+}
+
+void require_finite_parameters(const field::Field& field, const std::string& complaint) {
+  const std::span<const float> parameters = field.parameters();
+  for (int leaf = 0; leaf < field.tree().num_leaves(); ++leaf) {
+    for (std::size_t i = field.offset(leaf); field.keeps(leaf) && i < field.offset(leaf + 1); ++i) {
+      if (!std::isfinite(parameters[i]))
+        throw Error(fmt::format("{}: parameter {} is {}", complaint, i, parameters[i]));
+    }
+  }
+}
+
+void write_geometry(Hdf5Group group, const ModelInfo& info) {
+  const geometry::TiltGeometry& g = info.geometry;
+  group.write_integer("width", g.width);
+  group.write_integer("height", g.height);
+  group.write_number("thickness", g.thickness);
+  group.write_integer("hand", g.hand);
+  group.write_number("axis_x", g.axis_x);
+  group.write_number("axis_z", g.axis_z);
+  group.write_array<double>("tilt_deg", g.tilt_deg);
+  const Integers roi{info.roi.x0, info.roi.y0, info.roi.x1, info.roi.y1};
+  group.write_array<std::int64_t>("roi", roi);
+}
+
+void write_tree(Hdf5Group group, const field::Quadtree& tree) {
+  const field::RootGrid& roots = tree.roots();
+  group.write_integer("x0", roots.x0);
+  group.write_integer("y0", roots.y0);
+  group.write_integer("cell_size", roots.cell_size);
+  group.write_integer("columns", roots.columns);
+  group.write_integer("rows", roots.rows);
+  const auto& nodes = tree.nodes();
+  using Node = const field::QuadtreeNode&;
+  write_column(group, "node_x0", nodes, [](Node n) { return n.square.x0; });
+  write_column(group, "node_y0", nodes, [](Node n) { return n.square.y0; });
+  write_column(group, "node_size", nodes, [](Node n) { return n.square.size; });
+  write_column(group, "node_level", nodes, [](Node n) { return n.level; });
+  write_column(group, "node_is_margin", nodes,
+               [](Node n) { return n.region == field::Region::kMargin; });
+  write_column(group, "node_parent", nodes, [](Node n) { return n.parent; });
+  write_column(group, "node_first_child", nodes, [](Node n) { return n.first_child; });
+}
+
+void write_leaves(Hdf5Group group, const field::Field& field) {
+  write_column(group, "node", field.tree().leaves(), [](int node) { return node; });
+  const auto& shapes = field.shapes();
+  using Shape = const field::LeafShape&;
+  write_column(group, "nx", shapes, [](Shape s) { return s.nx; });
+  write_column(group, "ny", shapes, [](Shape s) { return s.ny; });
+  write_column(group, "nz", shapes, [](Shape s) { return s.nz; });
+  write_column(group, "rank_x", shapes, [](Shape s) { return s.rank_x; });
+  write_column(group, "rank_y", shapes, [](Shape s) { return s.rank_y; });
+  write_column(group, "rank_z", shapes, [](Shape s) { return s.rank_z; });
+  Integers offsets;
+  for (int i = 0; i <= field.tree().num_leaves(); ++i)
+    offsets.push_back(static_cast<std::int64_t>(field.offset(i)));
+  group.write_array<std::int64_t>("offset", offsets);
+}
+
+// Copies what comes in pieces, one float a parameter, of the leaves that a field keeps.
+class KeptCopy {
+ public:
+  KeptCopy(const field::Field& field, std::span<float> values) : field_(field), values_(values) {}
+
+  void operator()(std::span<const float> piece) {
+    for (const std::size_t end = at_ + piece.size(); at_ < end;) {
+      while (field_.offset(leaf_ + 1) <= at_) ++leaf_;
+      const std::size_t count = std::min(end, field_.offset(leaf_ + 1)) - at_;
+      if (field_.keeps(leaf_)) std::copy_n(piece.begin(), count, values_.begin() + offset());
+      piece = piece.subspan(count);
+      at_ += count;
+    }
+  }
+
+ private:
+  std::ptrdiff_t offset() const { return static_cast<std::ptrdiff_t>(at_); }
+
+  const field::Field& field_;
+  std::span<float> values_;
+  std::size_t at_ = 0;
+  int leaf_ = 0;
+};
+
+void write_field(Hdf5Group group, const field::Field& field, const FloatSource& parameters) {
+  group.write_text("kind", field.kind());
+  group.write_number("thickness", field.thickness());
+  group.write_number("bias", static_cast<double>(field.bias));
+  group.write_number("softplus_beta", static_cast<double>(field.activation.beta));
+  write_tree(group.create_group("tree"), field.tree());
+  write_leaves(group.create_group("leaves"), field);
+  group.write_floats("parameters", parameters.size, parameters.hand_out);
+}
+
+template <typename T>
+void write_arrays(Hdf5Group group, const std::map<std::string, std::vector<T>>& arrays) {
+  for (const auto& [name, values] : arrays) group.write_array<T>(name, values);
+}
+
+void write_training(Hdf5Group group, const TrainingState& state, const FloatArrays& more_floats) {
+  Hdf5Group floats = group.create_group("floats");
+  for (const auto& [name, values] : state.floats) floats.write_array<float>(name, values);
+  for (const auto& [name, source] : more_floats)
+    floats.write_floats(name, source.size, source.hand_out);
+  write_arrays(group.create_group("doubles"), state.doubles);
+  write_arrays(group.create_group("integers"), state.integers);
+}
+
+// Reading: every fault is an Error that names the file.
+class ModelReader {
+ public:
+  explicit ModelReader(const std::filesystem::path& path)
+      : path_(path.string()), file_(io::Hdf5File::open(path)) {}
+
+  // Without `choose`: all leaves, and of the training state the floats too.
+  Model read(TrainingState* training, const ChooseLeaves& choose) const {
+    const Hdf5Group root = file_.root();
+    require_known_format(root);
+    Model model;
+    model.x_tilt_deg = root.number("x_tilt_deg");
+    model.pixel_size_A = root.number("pixel_size_A");
+    model.density_unit = root.number("density_unit");
+    model.is_dark = root.text("contrast") == "dark";
+    model.options_json = root.text("options_json");
+    model.written_by = root.text("written_by");
+    require(std::isfinite(model.x_tilt_deg) && std::isfinite(model.pixel_size_A) &&
+                model.pixel_size_A > 0 && std::isfinite(model.density_unit),
+            "its pixel size or density unit is no usable number");
+    read_geometry(root.group("geometry"), model);
+    model.field = read_field(root.group("field"), choose);
+    if (training != nullptr) *training = read_training(root, /*with_floats=*/!choose);
+    return model;
+  }
+
+  void read_floats(const std::string& name, const field::Field& field,
+                   std::span<float> values) const {
+    const Hdf5Group root = file_.root();
+    const bool is_there = root.has("training") && root.group("training").has("floats") &&
+                          root.group("training").group("floats").has(name);
+    if (!is_there) {
+      throw Error(fmt::format(
+          "'{}' holds no optimiser state ('{}' is missing), so it is no checkpoint", path_, name));
+    }
+    const Hdf5Group floats = root.group("training").group("floats");
+    if (floats.array_size(name) != values.size()) {
+      throw Error(fmt::format("'{}' holds {} of the {} moments of its parameters, so it is damaged",
+                              path_, floats.array_size(name), values.size()));
+    }
+    floats.read_floats(name, KeptCopy(field, values));
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(fmt::format("'{}' is a damaged model: {}; use another copy", path_, what));
+  }
+  void require(bool condition, const char* what) const {
+    if (!condition) fail(what);
+  }
+
+  void require_known_format(const Hdf5Group& root) const {
+    if (!root.has_attribute("format") || root.text("format") != kFormat)
+      throw Error(fmt::format("'{}' is an HDF5 file, but no model of tomofield", path_));
+    const std::int64_t version = root.integer("format_version");
+    if (version != kFormatVersion)
+      throw Error(
+          fmt::format("'{}' is a model of format {}, written by {}; this is tomofield {}, which "
+                      "reads format {}: "
+                      "use the tomofield that wrote it",
+                      path_, version, root.text("written_by"), library_version(), kFormatVersion));
+  }
+
+  int small_integer(std::int64_t value) const {
+    require(value >= std::numeric_limits<int>::min() && value <= std::numeric_limits<int>::max(),
+            "a number is out of range");
+    return static_cast<int>(value);
+  }
+
+  void read_geometry(const Hdf5Group& group, ModelInfo& info) const {
+    geometry::TiltGeometry& g = info.geometry;
+    g.width = group.integer("width");
+    g.height = group.integer("height");
+    g.thickness = group.number("thickness");
+    g.hand = small_integer(group.integer("hand"));
+    g.axis_x = group.number("axis_x");
+    g.axis_z = group.number("axis_z");
+    g.tilt_deg = group.read_array<double>("tilt_deg");
+    const auto roi = group.read_array<std::int64_t>("roi");
+    require(roi.size() == 4, "its region of interest has no four corners");
+    info.roi = {roi[0], roi[1], roi[2], roi[3]};
+    constexpr std::int64_t kFar = std::int64_t{1} << 30;
+    require(g.width > 0 && g.height > 0 && g.width <= kFar && g.height <= kFar &&
+                std::isfinite(g.thickness) && g.thickness > 0 && (g.hand == 1 || g.hand == -1) &&
+                std::isfinite(g.axis_x) && std::isfinite(g.axis_z) &&
+                std::all_of(g.tilt_deg.begin(), g.tilt_deg.end(),
+                            [](double angle) { return std::abs(angle) < 90; }),
+            "its geometry makes no sense");
+    require(0 <= info.roi.x0 && info.roi.x0 < info.roi.x1 && info.roi.x1 <= g.width &&
+                0 <= info.roi.y0 && info.roi.y0 < info.roi.y1 && info.roi.y1 <= g.height,
+            "its region of interest is not inside the view");
+  }
+
+  field::Quadtree read_tree(const Hdf5Group& group) const {
+    field::RootGrid roots;
+    roots.x0 = group.integer("x0");
+    roots.y0 = group.integer("y0");
+    roots.cell_size = group.integer("cell_size");
+    roots.columns = small_integer(group.integer("columns"));
+    roots.rows = small_integer(group.integer("rows"));
+    std::vector<field::QuadtreeNode> nodes(group.array_size("node_x0"));
+    const auto read = [&](const char* name, auto&& set) {
+      Integers column(nodes.size());
+      group.read_array<std::int64_t>(name, column);
+      for (std::size_t i = 0; i < nodes.size(); ++i) set(nodes[i], column[i]);
+    };
+    using Node = field::QuadtreeNode&;
+    read("node_x0", [](Node n, std::int64_t v) { n.square.x0 = v; });
+    read("node_y0", [](Node n, std::int64_t v) { n.square.y0 = v; });
+    read("node_size", [](Node n, std::int64_t v) { n.square.size = v; });
+    read("node_level", [&](Node n, std::int64_t v) { n.level = small_integer(v); });
+    read("node_is_margin", [](Node n, std::int64_t v) {
+      n.region = v != 0 ? field::Region::kMargin : field::Region::kInterest;
+    });
+    read("node_parent", [&](Node n, std::int64_t v) { n.parent = small_integer(v); });
+    read("node_first_child", [&](Node n, std::int64_t v) { n.first_child = small_integer(v); });
+    return field::Quadtree(roots, std::move(nodes));
+  }
+
+  std::vector<field::LeafShape> read_shapes(const Hdf5Group& group, int num_leaves) const {
+    std::vector<field::LeafShape> shapes(static_cast<std::size_t>(num_leaves));
+    const auto read = [&](const char* name, int field::LeafShape::*member, std::int64_t least) {
+      Integers column(shapes.size());
+      group.read_array<std::int64_t>(name, column);
+      for (std::size_t i = 0; i < shapes.size(); ++i) {
+        require(column[i] >= least && column[i] <= field::LeafShape::kMostVertices,
+                "a leaf has an impossible shape");
+        shapes[i].*member = static_cast<int>(column[i]);
+      }
+    };
+    read("nx", &field::LeafShape::nx, 2);
+    read("ny", &field::LeafShape::ny, 2);
+    read("nz", &field::LeafShape::nz, 2);
+    read("rank_x", &field::LeafShape::rank_x, 0);
+    read("rank_y", &field::LeafShape::rank_y, 0);
+    read("rank_z", &field::LeafShape::rank_z, 0);
+    return shapes;
+  }
+
+  std::unique_ptr<field::Field> read_field(const Hdf5Group& group,
+                                           const ChooseLeaves& choose) const {
+    std::unique_ptr<field::Field> field;
+    const double thickness = group.number("thickness");
+    require(std::isfinite(thickness) && thickness > 0, "its thickness is no usable number");
+    try {
+      field::Quadtree tree = read_tree(group.group("tree"));
+      auto shapes = read_shapes(group.group("leaves"), tree.num_leaves());
+      const std::string kind = group.text("kind");
+      require(field::count_parameters(kind, shapes) <= group.array_size("parameters"),
+              "its leaves need more parameters than it holds");
+      field = field::make_field(kind, std::move(tree), thickness, std::move(shapes));
+    } catch (const std::bad_alloc&) {
+      throw Error(fmt::format("'{}' holds {} parameters, more than there is memory for", path_,
+                              group.array_size("parameters")));
+    } catch (const Error& error) {
+      const std::string what = error.what();
+      if (what.find(path_) != std::string::npos) throw;
+      fail(what);
+    }
+    field->bias = static_cast<float>(group.number("bias"));
+    field->activation.beta = static_cast<float>(group.number("softplus_beta"));
+    require(std::isfinite(field->bias) && std::isfinite(field->activation.beta) &&
+                field->activation.beta >= 0,
+            "its decoder is no usable number");
+    if (choose) {
+      require(group.array_size("parameters") == field->num_parameters(),
+              "its parameters are not those of its leaves");
+      field->keep_only(choose(field->tree()));
+      group.read_floats("parameters", KeptCopy(*field, field->parameters()));
+    } else {
+      group.read_array<float>("parameters", field->parameters());
+    }
+    require_finite_parameters(*field, fmt::format("'{}' is a damaged model", path_));
+    return field;
+  }
+
+  template <typename T>
+  static std::map<std::string, std::vector<T>> read_arrays(const Hdf5Group& group) {
+    std::map<std::string, std::vector<T>> arrays;
+    for (const std::string& name : group.names()) arrays[name] = group.read_array<T>(name);
+    return arrays;
+  }
+
+  static TrainingState read_training(const Hdf5Group& root, bool with_floats) {
+    if (!root.has("training")) return {};
+    const Hdf5Group group = root.group("training");
+    using Floats = std::map<std::string, std::vector<float>>;
+    return {.floats = with_floats ? read_arrays<float>(group.group("floats")) : Floats{},
+            .doubles = read_arrays<double>(group.group("doubles")),
+            .integers = read_arrays<std::int64_t>(group.group("integers"))};
+  }
+
+  std::string path_;
+  io::Hdf5File file_;
+};
+
+}  // namespace
+
+void require_finite(const field::Field& field, const std::filesystem::path& path) {
+  require_finite_parameters(field, fmt::format("the fit diverged, so '{}' is left as it was; a "
+                                               "lower learning rate may help",
+                                               path.string()));
+}
+
+void save_model(const std::filesystem::path& path, const field::Field& field, const ModelInfo& info,
+                const TrainingState* training, const FloatArrays& more_floats) {
+  require_finite(field, path);
+  save_model(path, field, FloatSource(field.parameters()), info, training, more_floats);
+}
+
+void save_model(const std::filesystem::path& path, const field::Field& field,
+                const FloatSource& parameters, const ModelInfo& info, const TrainingState* training,
+                const FloatArrays& more_floats) {
+  io::AtomicFile target(path);
+  {
+    io::Hdf5File file = io::Hdf5File::create(target.temporary_path());
+    {
+      Hdf5Group root = file.root();
+      root.write_text("format", kFormat);
+      root.write_integer("format_version", kFormatVersion);
+      root.write_text("written_by", fmt::format("tomofield {}", library_version()));
+      root.write_number("x_tilt_deg", info.x_tilt_deg);
+      root.write_number("pixel_size_A", info.pixel_size_A);
+      root.write_number("density_unit", info.density_unit);
+      root.write_text("contrast", info.is_dark ? "dark" : "bright");
+      root.write_text("options_json", info.options_json);
+      write_geometry(root.create_group("geometry"), info);
+      write_field(root.create_group("field"), field, parameters);
+      if (training != nullptr)
+        write_training(root.create_group("training"), *training, more_floats);
+    }
+    file.close();
+  }
+  target.commit();
+}
+
+void save_model(const std::filesystem::path& path, const Model& model,
+                const TrainingState* training) {
+  save_model(path, *model.field, model, training);
+}
+
+Model load_model(const std::filesystem::path& path, TrainingState* training) {
+  return ModelReader(path).read(training, {});
+}
+
+Model load_part(const std::filesystem::path& path, const ChooseLeaves& choose,
+                TrainingState& training) {
+  return ModelReader(path).read(&training, choose);
+}
+
+void load_floats(const std::filesystem::path& path, const std::string& name,
+                 const field::Field& field, std::span<float> values) {
+  ModelReader(path).read_floats(name, field, values);
+}
+
+}  // namespace tomofield::output

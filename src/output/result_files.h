@@ -1,0 +1,22 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::output {
+
+/// Every file that a series is read from.
+std::vector<std::filesystem::path> input_files(const tilt_series::TiltSeriesOptions& input);
+
+/// What stands in the way of writing the results of a series (io/output_files.h): none
+/// may replace a file that the series is read from. Pictures of slices (report/slices.h) are
+/// results too.
+void check_result_files(std::vector<std::filesystem::path> results,
+                        const std::filesystem::path& picture_prefix,
+                        const tilt_series::TiltSeriesOptions& input, bool may_replace,
+                        const std::string& advice);
+
+}  // namespace tomofield::output

@@ -1,0 +1,234 @@
+#include "output/volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include "base/log.h"
+#include "distributed/gathered_arrays.h"
+#include "tomofield/error.h"
+#include "tomofield/version.h"
+
+namespace tomofield::output {
+namespace {
+
+using field::Box;
+using field::BoxPart;
+using field::Point;
+
+constexpr const char* kMadeBy = "density field";
+
+// To the first process.
+void gather_parameters(const VolumeShare& share, field::Field& field) {
+  distributed::GatheredArrays arrays(share.processes, share.first_parameter, share.end_parameter);
+  const std::size_t parameters = arrays.add(field.parameters());
+  arrays.read_on_first([&] {
+    field.keep_only({});
+    auto into = field.parameters().begin();
+    arrays.hand_out(parameters, [&](std::span<const float> piece) {
+      if (piece.data() != std::to_address(into)) std::ranges::copy(piece, into);
+      into += std::ssize(piece);
+    });
+  });
+}
+
+// Where a box lies, turned or not.
+struct Bounds {
+  Point low, high;
+  explicit Bounds(const Box& box) {
+    low.fill(std::numeric_limits<double>::infinity());
+    high.fill(-std::numeric_limits<double>::infinity());
+    for (int corner = 0; corner < 8; ++corner) {
+      Point voxel{};
+      for (std::size_t a = 0; a < 3; ++a)
+        voxel[a] = (corner >> a & 1) ? static_cast<double>(box.size[a]) : 0.0;
+      const Point at = box.position(voxel);
+      for (std::size_t a = 0; a < 3; ++a) {
+        low[a] = std::min(low[a], at[a]);
+        high[a] = std::max(high[a], at[a]);
+      }
+    }
+  }
+};
+
+// Refuses a box that cannot meet the field: all of it would be zero.
+void require_inside(const field::Field& field, const Bounds& box) {
+  const field::RootGrid& roots = field.tree().roots();
+  const Point first{static_cast<double>(roots.x0), static_cast<double>(roots.y0), 0.0};
+  const Point last{first[0] + static_cast<double>(roots.columns * roots.cell_size),
+                   first[1] + static_cast<double>(roots.rows * roots.cell_size), field.thickness()};
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (box.low[a] < last[a] && box.high[a] > first[a]) continue;
+    throw Error(
+        fmt::format("the box lies outside of the model: its {} runs from {:.6g} to {:.6g} px, the "
+                    "model's from {:.6g} to {:.6g}",
+                    "xyz"[a], box.low[a], box.high[a], first[a], last[a]));
+  }
+}
+
+// Beside the region of interest the field is a margin, which only some views see.
+void warn_of_margin(const ModelInfo& info, const Bounds& box, double tolerance) {
+  const geometry::Roi& roi = info.roi;
+  const Point first{static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0};
+  const Point last{static_cast<double>(roi.x1), static_cast<double>(roi.y1),
+                   info.geometry.thickness};
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (box.low[a] >= first[a] - tolerance && box.high[a] <= last[a] + tolerance) continue;
+    base::log_warning(fmt::format(
+        "the box reaches outside the region that was reconstructed: its {} runs from {:.6g} to "
+        "{:.6g} px, the region's from {:.6g} to {:.6g}; what lies there is a guess or nothing",
+        "xyz"[a], box.low[a], box.high[a], first[a], last[a]));
+    return;
+  }
+}
+
+// Corner of the box in Å from the view's corner, IMOD's sign.
+std::array<double, 3> origin_A(const ModelInfo& info, const Box& box, VolumeAxes axes) {
+  if (!box.is_aligned()) return {0.0, 0.0, 0.0};
+  const auto [nx, ny, nz] = box.size;
+  Point corner = box.position({0.0, 0.0, 0.0});
+  if (axes == VolumeAxes::kXzy) {
+    // Rows run down from the upper face.
+    const double top = box.position({0.0, 0.0, static_cast<double>(nz)})[2];
+    corner = {corner[0], info.geometry.thickness - top, corner[1]};
+  }
+  for (double& value : corner) value = value == 0.0 ? 0.0 : -value * info.pixel_size_A;
+  return corner;
+}
+
+float largest_density(const VoxelSource& source, const distributed::Communicator& processes) {
+  std::mutex mutex;
+  float largest = 0.0f;
+  source([&](const BoxPart& part) {
+    float here = 0.0f;
+    for (const float value : part.values) here = std::max(here, std::abs(value));
+    const std::lock_guard lock(mutex);
+    largest = std::max(largest, here);
+  });
+  return static_cast<float>(processes.largest(static_cast<double>(largest)));
+}
+
+// Densities times `scale`, in the file's axes.
+class PartWriter {
+ public:
+  PartWriter(io::MrcWriter& file, const Box& box, VolumeAxes axes, double scale)
+      : file_(file), box_(box), axes_(axes), scale_(static_cast<float>(scale)) {}
+
+  void operator()(const BoxPart& part) const {
+    const std::int64_t nx = box_.size[0];
+    std::vector<float> values;
+    const auto append_row = [&](std::int64_t section, std::int64_t row) {
+      const float* from = part.values.data() + (section * part.num_rows + row) * nx;
+      for (std::int64_t x = 0; x < nx; ++x) values.push_back(scale_ * from[x] + 0.0f);  // no −0
+    };
+    if (axes_ == VolumeAxes::kXyz) {
+      for (std::int64_t s = 0; s < part.num_sections; ++s) {
+        values.clear();
+        for (std::int64_t r = 0; r < part.num_rows; ++r) append_row(s, r);
+        file_.write_rows(part.first_section + s, part.first_row, part.num_rows, values);
+      }
+      return;
+    }
+    const std::int64_t first = box_.size[2] - part.first_section - part.num_sections;
+    for (std::int64_t r = 0; r < part.num_rows; ++r) {
+      values.clear();
+      for (std::int64_t s = part.num_sections - 1; s >= 0; --s) append_row(s, r);
+      file_.write_rows(part.first_row + r, first, part.num_sections, values);
+    }
+  }
+
+ private:
+  io::MrcWriter& file_;
+  const Box& box_;
+  VolumeAxes axes_;
+  float scale_;
+};
+
+// The fit sees the specimen after its x-axis tilt: p = Ry(tilt) Rx(alpha) (P − C)
+// (CONVENTIONS), so a box of the specimen is turned by Rx(alpha) about C in the
+// field. A mirrored Z turns the other way.
+void rotate_about_x(const ModelInfo& model, Box& box) {
+  const geometry::TiltGeometry& g = model.geometry;
+  const double alpha = g.hand * model.x_tilt_deg * std::numbers::pi / 180.0;
+  const double c = std::cos(alpha), s = std::sin(alpha);
+  box.field_from_box = {{{1, 0, 0}, {0, c, -s}, {0, s, c}}};
+  const double axis_y = static_cast<double>(g.height) / 2;
+  const double y = box.centre_px[1] - axis_y, z = box.centre_px[2] - g.axis_z;
+  box.centre_px[1] = axis_y + c * y - s * z;
+  box.centre_px[2] = g.axis_z + s * y + c * z;
+}
+
+}  // namespace
+
+Box region_box(const ModelInfo& model, double voxel_px) {
+  const auto& roi = model.roi;
+  Box box = field::box_between(
+      {static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0},
+      {static_cast<double>(roi.x1), static_cast<double>(roi.y1), model.geometry.thickness},
+      voxel_px);
+  if (model.x_tilt_deg != 0.0) rotate_about_x(model, box);
+  return box;
+}
+
+void write_volume(const Model& model, const VolumeOptions& options,
+                  const std::filesystem::path& path) {
+  const Box box = options.box.value_or(region_box(model, 1.0));
+  const Bounds bounds(box);
+  require_inside(*model.field, bounds);
+  if (options.box) warn_of_margin(model, bounds, 0.5 * box.voxel_px);
+  write_voxels([&](const field::BoxSink& sink) { sample_box(*model.field, box, sink); }, box, model,
+               kMadeBy, options, path);
+}
+
+void write_volume(Model& model, const VolumeOptions& options, const std::filesystem::path& path,
+                  const VolumeShare& share) {
+  const Box box = region_box(model, 1.0);
+  if (share.processes.size() == 1) return write_volume(model, options, path);
+  if (box.is_aligned()) {
+    const auto source = [&](const field::BoxSink& sink) {
+      sample_box(*model.field, box, share.rows, sink);
+    };
+    return write_voxels(source, box, model, kMadeBy, options, path, share.processes);
+  }
+  gather_parameters(share, *model.field);
+  share.processes.together([&] {
+    if (share.processes.is_first()) write_volume(model, options, path);
+  });
+}
+
+void write_voxels(const VoxelSource& source, const Box& box, const ModelInfo& info,
+                  const std::string& made_by, const VolumeOptions& options,
+                  const std::filesystem::path& path, const distributed::Communicator& processes) {
+  io::MrcSpec spec;
+  spec.nx = box.size[0];
+  spec.ny = box.size[1];
+  spec.nz = box.size[2];
+  if (options.axes == VolumeAxes::kXzy) std::swap(spec.ny, spec.nz);
+  spec.mode = options.mode;
+  spec.voxel_size_A.fill(box.voxel_px * info.pixel_size_A);
+  spec.origin_A = origin_A(info, box, options.axes);
+  spec.label = fmt::format("tomofield {}: {}", library_version(), made_by);
+
+  double scale = options.invert ? -info.output_scale() : info.output_scale();
+  if (options.mode == io::MrcMode::kInt16) {
+    { const io::MrcWriter probe(path, spec, processes); }  // refuses before the pass, not after it
+    constexpr double kLargestStored = 32000.0;
+    const double largest =
+        std::abs(scale) * static_cast<double>(largest_density(source, processes));
+    const double factor = largest > 0 ? kLargestStored / largest : 1.0;
+    spec.label += fmt::format(", stored = {:.6g} x value", factor);
+    scale *= factor;
+  }
+  io::MrcWriter file(path, spec, processes);
+  processes.together([&] { source(PartWriter(file, box, options.axes, scale)); });
+  file.close();
+}
+
+}  // namespace tomofield::output

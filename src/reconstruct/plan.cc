@@ -1,0 +1,203 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "base/faults.h"
+#include "base/lanes.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "field/vm/factorise.h"
+#include "fit/domain.h"
+#include "fit/fit.h"
+#include "fit/halo.h"
+#include "fit/stages.h"
+#include "measurement/held_out.h"
+#include "measurement/slab_views.h"
+#include "projection/slab_projector.h"
+#include "reconstruct/reconstruct.h"
+#include "selection/trial_series.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+constexpr std::size_t kProgram = std::size_t{20} << 20;  // with its libraries
+constexpr std::size_t kMpi = std::size_t{40} << 20;      // OpenMPI's own, and what is packed for it
+
+constexpr int kSlabsOfThread = projection::SlabProjector::kSlabsTogether;
+
+// What each thread works on: a pair of slabs with their gradient and the views of a step, rows for
+// the total variation, a leaf's vertices; and then a part of the volume.
+std::size_t thread_memory(const measurement::PreparedSeries& plan, const fit::Domain& domain,
+                          int views_a_step) {
+  constexpr std::size_t kRow = base::kLanes * sizeof(float);
+  const std::size_t slab = domain.grid.size() * sizeof(float);
+  const std::size_t views =
+      static_cast<std::size_t>(views_a_step) * static_cast<std::size_t>(plan.geometry.width) * kRow;
+  std::size_t leaf = 0;
+  for (const field::LeafShape& shape : domain.shapes)
+    leaf = std::max(leaf, 2 * shape.vertices_xz() * kRow);
+  const std::size_t written = std::min(
+      std::size_t{16} << 20,
+      static_cast<std::size_t>(static_cast<double>(plan.roi.width()) * plan.geometry.thickness) *
+          kRow);
+  return kSlabsOfThread * (2 * slab + views) + 2 * slab / base::kLanes + leaf + written;
+}
+
+int num_fitted_views(const measurement::PreparedSeries& plan, const fit::FitOptions& options) {
+  const auto held_out = measurement::held_out_views(plan.geometry.tilt_deg, options.hold_out);
+  return plan.geometry.num_views() - static_cast<int>(held_out.size());
+}
+
+int steps_an_epoch(const measurement::PreparedSeries& plan, const fit::FitOptions& options) {
+  if (plan.ray_geometry)
+    return objective::ray_steps_per_epoch(
+        {.subsets = options.subsets, .rays_per_step = options.rays_per_step}, plan.rays_shape());
+  return std::min(options.subsets, num_fitted_views(plan, options));
+}
+
+// Of the first tree, or of an adaptive one whose budget is used up, as a field of this kind.
+std::size_t most_parameters(const fit::Domain& domain, const fit::FieldOptions& options,
+                            const std::string& kind) {
+  std::vector<field::LeafShape> shapes = domain.shapes, inside;
+  for (int i = 0; i < domain.tree.num_leaves(); ++i) {
+    if (domain.tree.leaf(i).region == field::Region::kInterest)
+      inside.push_back(domain.shapes[static_cast<std::size_t>(i)]);
+  }
+  const auto more = options.leaf_budget - static_cast<std::ptrdiff_t>(inside.size());
+  if (options.tree == "adaptive" && more > 0)
+    shapes.insert(shapes.end(), static_cast<std::size_t>(more), inside.front());
+  return field::count_parameters(kind, shapes);
+}
+
+// What this process has of the parameters with their gradient and moments, and of its neighbours'.
+double part_of_parameters(const fit::Domain& domain, const std::string& kind,
+                          const distributed::Communicator& processes) {
+  if (processes.size() == 1) return 1.0;
+  const distributed::Range bands =
+      measurement::own_bands(domain.num_rows, domain.tree.roots().cell_size, processes);
+  std::vector<field::LeafShape> needed;
+  for (const int leaf : fit::needed_leaves(domain.tree, bands))
+    needed.push_back(domain.shapes[static_cast<std::size_t>(leaf)]);
+  return static_cast<double>(field::count_parameters(kind, needed)) /
+         static_cast<double>(field::count_parameters(kind, domain.shapes));
+}
+
+// Those of a process as a field of this kind, in bytes.
+double parameter_bytes(const fit::Domain& domain, const fit::FieldOptions& options,
+                       const std::string& kind, const distributed::Communicator& processes) {
+  return static_cast<double>(sizeof(float) * most_parameters(domain, options, kind)) *
+         part_of_parameters(domain, kind, processes);
+}
+
+// Parameters, their gradient and two moments, of the stage with the most; a tree that is edited has
+// all but the gradient once more.
+double fitted_bytes(const fit::Domain& domain, const RunPlan& run, const fit::FieldOptions& options,
+                    const distributed::Communicator& processes) {
+  const double copies = options.tree == "adaptive" ? 7 : 4;
+  double most = 0;
+  for (const fit::Stage& s : run.stages)
+    most = std::max(most, copies * parameter_bytes(domain, options, s.field_kind, processes));
+  return most;
+}
+
+// While plain vertices become factors.
+double factorising_bytes(const fit::Domain& domain, const RunPlan& run,
+                         const fit::FieldOptions& options,
+                         const distributed::Communicator& processes) {
+  if (run.stages.front().field_kind == options.kind) return 0;
+  std::size_t largest = 0;
+  for (const field::LeafShape& shape : domain.shapes)
+    largest = std::max(largest, field::factorising_memory(shape));
+  return parameter_bytes(domain, options, "grid", processes) +
+         parameter_bytes(domain, options, options.kind, processes) +
+         static_cast<double>(largest) * base::thread_count();
+}
+
+// The rows of a shape that the process with most of them has.
+measurement::SlabViews::Shape own_part(measurement::SlabViews::Shape shape,
+                                       const fit::Domain& domain,
+                                       const distributed::Communicator& processes) {
+  const std::int64_t band_rows = domain.tree.roots().cell_size;
+  const std::int64_t bands = (shape.num_rows + band_rows - 1) / band_rows;
+  const std::int64_t most_bands = (bands + processes.size() - 1) / processes.size();
+  shape.num_rows = std::min(shape.num_rows, most_bands * band_rows);
+  return shape;
+}
+
+// Peak of a process.
+std::size_t estimate_memory(const measurement::PreparedSeries& plan, const fit::Domain& domain,
+                            const RunPlan& run, const ReconstructOptions& options,
+                            const distributed::Communicator& processes) {
+  using measurement::SlabViews;
+  const auto parameters =
+      static_cast<std::size_t>(fitted_bytes(domain, run, options.field, processes));
+  const auto factorising =
+      static_cast<std::size_t>(factorising_bytes(domain, run, options.field, processes));
+  const SlabViews::Shape own_shape = own_part(plan.rays_shape(), domain, processes);
+  const int slabs_in_use = kSlabsOfThread * base::thread_count();
+  const std::size_t rays = SlabViews::resident_memory(own_shape, slabs_in_use);
+  std::size_t coarse_rays = 0;  // the last coarse stage has the most of them
+  for (const fit::Stage& s : run.stages) {
+    if (s.bin == 1) continue;
+    coarse_rays =
+        SlabViews::resident_memory(SlabViews::binned_shape(own_shape, s.bin), slabs_in_use);
+  }
+  const int steps = steps_an_epoch(plan, options.fit);
+  const int views_a_step = plan.ray_geometry ? 0 : (run.num_views + steps - 1) / steps;
+  const std::size_t fitting = parameters + static_cast<std::size_t>(base::thread_count()) *
+                                               thread_memory(plan, domain, views_a_step);
+  const std::size_t tracing =
+      plan.ray_geometry ? objective::RayTerm::working_memory(
+                              *plan.ray_geometry, domain.tree,
+                              fit::ray_term_options(domain, options.fit), plan.rays_shape())
+                        : 0;
+  const std::size_t program = kProgram + (processes.size() > 1 ? kMpi : 0);
+  return program + rays + coarse_rays +
+         std::max({fitting + tracing, factorising, measurement::reading_memory(plan)});
+}
+
+}  // namespace
+
+RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
+                 const distributed::Communicator& processes) {
+  if (processes.size() > 1) base::require_no_faults(options.faults_of_job());
+  const measurement::PreparedSeries plan = measurement::plan_series(series, options.specimen);
+  const fit::Domain domain = plan.ray_geometry
+                                 ? fit::make_domain(*plan.ray_geometry, plan.roi, options.field)
+                                 : fit::make_domain(plan.geometry, plan.roi, options.field);
+  RunPlan run;
+  run.num_views = plan.geometry.num_views();
+  run.view_width = plan.geometry.width;
+  run.view_height = plan.geometry.height;
+  run.pixel_size_A = plan.pixel_size_A;
+  run.roi = plan.roi;
+  run.thickness = plan.geometry.thickness;
+  run.num_leaves = domain.tree.num_leaves();
+  run.num_parameters = most_parameters(domain, options.field, options.field.kind);
+  run.stages = fit::make_stages(options.field, options.fit);
+  const fit::Stage& last = run.stages.back();
+  run.num_trials = options.num_trials(num_fitted_views(plan, options.fit));
+  if (run.num_trials > 0)  // throws if there are too few
+    selection::trial_views(
+        plan.geometry.tilt_deg,
+        measurement::held_out_views(plan.geometry.tilt_deg, options.fit.hold_out));
+  run.num_steps = (last.first_epoch + last.epochs) * steps_an_epoch(plan, options.fit);
+  run.memory_bytes = estimate_memory(plan, domain, run, options, processes);
+  base::require_memory(run.memory_bytes * static_cast<std::size_t>(processes.size_on_machine()),
+                       "this reconstruction",
+                       "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, or "
+                       "fewer --threads");
+  for (const field::LeafShape& shape : domain.shapes) {
+    if (std::max(shape.nx, shape.nz) <= field::LeafShape::kMostVertices) continue;
+    throw Error(fmt::format(
+        "{} vertices along an axis of a leaf are more than {}: use a larger --vertex-spacing or "
+        "--bin, or a smaller --thickness",
+        std::max(shape.nx, shape.nz), field::LeafShape::kMostVertices));
+  }
+  return run;
+}
+
+}  // namespace tomofield::reconstruction

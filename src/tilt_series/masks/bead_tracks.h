@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "tilt_series/masks/spots.h"
+
+namespace tomofield::tilt_series {
+
+/// A bead that keeps its place in the specimen: in a view of tilt θ it is at
+/// x = x0 + x cos θ + z sin θ, y, with x0 the middle of the view.
+struct BeadTrack {
+  double x_px = 0.0, y_px = 0.0, z_px = 0.0;
+  std::size_t num_visible = 0;  ///< views in which its place was measured
+  std::size_t num_found = 0;    ///< of these, where a spot was found there
+};
+
+/// What is known of the views, in the order of their spots.
+struct TrackedViews {
+  std::vector<double> tilt_deg;
+  double middle_x_px = 0.0;
+  /// Whether a view measured what is at this place.
+  std::function<bool(std::size_t view, double x_px, double y_px)> is_measured;
+};
+
+struct TrackRules {
+  double tolerance_px = 2.0;     ///< a spot this near to the track's place belongs to it
+  double largest_z_px = 0.0;     ///< |z| of a bead
+  double seed_strength = 6.0;    ///< of the two spots that suggest a track
+  double part_of_visible = 0.6;  ///< fewest views with a spot, of those that see its place
+  std::size_t fewest_views = 4;  ///< and in all
+};
+
+/// Where a track is in a view.
+double track_x(const BeadTrack& track, double middle_x_px, double tilt_deg);
+
+/// Tracks of beads through spots[view], best first. Two strong spots at the
+/// same y in views some 15° apart fix a place; it stands if most views that
+/// measure it have a spot there (of any strength). A spot belongs to one track.
+/// No sign of the tilt and no position of the axis along z is assumed: both
+/// only change z and x.
+std::vector<BeadTrack> find_tracks(const std::vector<std::vector<Spot>>& spots,
+                                   const TrackedViews& views, const TrackRules& rules);
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,270 @@
+#include "tilt_series/masks/beads.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/parallel.h"
+#include "tilt_series/masks/bead_profile.h"
+#include "tilt_series/masks/bead_tracks.h"
+#include "tilt_series/masks/spots.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+// Strengths of spots. Structure reaches 5 in the series that we know (simulated
+// cells, dark-field films and particles), beads in vitreous ice 6 to 20.
+constexpr double kStrong = 6.0;
+constexpr double kLikely = 4.5;  // enough for a seed once it is known that there are beads
+constexpr double kWeak = 3.5;    // enough where a track says that a bead is there
+
+constexpr std::size_t kDiameterViews = 5;  // the lowest tilts, which the diameter is measured in
+constexpr double kDiameterStep = 1.4142135623730951;  // between the diameters that are tried
+
+// Clear evidence: this many beads, each with spots in this part of all views.
+constexpr std::size_t kFewestBeads = 3;
+constexpr double kPartOfViews = 0.5;
+
+// Spots of a view that are followed: more beads than anybody adds, and the
+// tracks of a view full of ice crystals are still found in seconds.
+constexpr std::size_t kMostSpots = 1000;
+
+// How far from a track its spots may be, at least: alignment is no better.
+constexpr double kLeastTolerance_px = 2.0;
+
+// A spot without a track is a bead's if it has this part of their median contrast in its view.
+constexpr double kPartOfContrast = 0.5;
+
+/// Spots of every view, and which of its pixels were measured.
+struct SearchedViews {
+  std::vector<std::vector<Spot>> spots;
+  std::vector<std::vector<bool>> is_valid;
+  std::int64_t width = 0, height = 0;
+
+  bool is_measured(std::size_t view, double x, double y) const {
+    const auto px = static_cast<std::int64_t>(std::floor(x)),
+               py = static_cast<std::int64_t>(std::floor(y));
+    return px >= 0 && px < width && py >= 0 && py < height &&
+           is_valid[view][static_cast<std::size_t>(py * width + px)];
+  }
+};
+
+/// The strongest spots of a view.
+std::vector<Spot> strongest_spots(const MaskedImage& image, double diameter) {
+  std::vector<Spot> spots = find_spots(image, diameter, kWeak);
+  std::stable_sort(spots.begin(), spots.end(),
+                   [](const Spot& a, const Spot& b) { return a.strength > b.strength; });
+  spots.resize(std::min(spots.size(), kMostSpots));
+  return spots;
+}
+
+SearchedViews search_views(const BeadViews& views, double diameter) {
+  SearchedViews searched;
+  const std::size_t num_views = views.tilt_deg.size();
+  searched.spots.resize(num_views);
+  searched.is_valid.resize(num_views);
+  base::parallel_for(static_cast<std::int64_t>(num_views), [&](std::int64_t v) {
+    const auto view = static_cast<std::size_t>(v);
+    const MaskedImage image = views.read(view);
+    searched.spots[view] = strongest_spots(image, diameter);
+    searched.is_valid[view].assign(image.valid.begin(), image.valid.end());
+    if (view > 0) return;
+    searched.width = image.width;
+    searched.height = image.height;
+  });
+  return searched;
+}
+
+/// The views of lowest tilt.
+std::vector<std::size_t> lowest_tilts(const BeadViews& views) {
+  std::vector<std::size_t> order(views.tilt_deg.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::fabs(views.tilt_deg[a]) < std::fabs(views.tilt_deg[b]);
+  });
+  order.resize(std::min(order.size(), kDiameterViews));
+  return order;
+}
+
+/// The spots of one size in several views.
+struct SizeTrial {
+  double about_px = 0.0;
+  BeadProfile profile;
+  double strength = 0.0;  ///< of all spots together
+};
+
+/// Diameter of the spots that stand out most; nothing if none does.
+std::optional<double> estimate_diameter(const BeadViews& views, const BeadSearchOptions& options) {
+  std::vector<SizeTrial> trials;
+  for (double about = options.smallest_px; about <= options.largest_px; about *= kDiameterStep) {
+    trials.push_back({about, BeadProfile(about)});
+  }
+  for (const std::size_t view : lowest_tilts(views)) {
+    const MaskedImage image = views.read(view);
+    base::parallel_for(static_cast<std::int64_t>(trials.size()), [&](std::int64_t i) {
+      SizeTrial& trial = trials[static_cast<std::size_t>(i)];
+      const std::vector<Spot> spots = find_spots(image, trial.about_px, kStrong);
+      for (const Spot& spot : spots) trial.strength += spot.strength;
+      trial.profile.add(image, spots);
+    });
+  }
+  const auto best = std::max_element(
+      trials.begin(), trials.end(),
+      [](const SizeTrial& a, const SizeTrial& b) { return a.strength < b.strength; });
+  if (best == trials.end() || best->strength == 0.0) return std::nullopt;
+  return best->profile.diameter_px();
+}
+
+bool is_evident(const std::vector<BeadTrack>& tracks, std::size_t num_views) {
+  const auto num_clear = std::count_if(tracks.begin(), tracks.end(), [&](const BeadTrack& track) {
+    return static_cast<double>(track.num_found) >= kPartOfViews * static_cast<double>(num_views);
+  });
+  return num_clear >= static_cast<std::ptrdiff_t>(kFewestBeads);
+}
+
+/// Tracks of beads; none if evidence is wanted and there is not enough.
+std::vector<BeadTrack> find_bead_tracks(const SearchedViews& searched,
+                                        const std::vector<double>& tilt_deg, double tolerance_px,
+                                        bool wants_evidence) {
+  TrackRules rules;
+  rules.tolerance_px = tolerance_px;
+  rules.largest_z_px = static_cast<double>(searched.width) / 2;
+  rules.seed_strength = kStrong;
+  const TrackedViews tracked{
+      tilt_deg, static_cast<double>(searched.width) / 2,
+      [&](std::size_t view, double x, double y) { return searched.is_measured(view, x, y); }};
+  if (wants_evidence && !is_evident(find_tracks(searched.spots, tracked, rules), tilt_deg.size())) {
+    return {};
+  }
+  rules.seed_strength = kLikely;
+  return find_tracks(searched.spots, tracked, rules);
+}
+
+double distance_between(const Spot& spot, const MaskDisc& disc) {
+  return std::hypot(spot.x_px - disc.x_px, spot.y_px - disc.y_px);
+}
+
+/// The spot of each disc: the nearest within `tolerance`, unless another disc
+/// shares it (two beads that overlap); spots.size() where there is none.
+std::vector<std::size_t> match_spots(const std::vector<MaskDisc>& discs,
+                                     const std::vector<Spot>& spots, double tolerance) {
+  std::vector<std::size_t> match, num_discs(spots.size(), 0);
+  for (const MaskDisc& disc : discs) {
+    const auto nearest =
+        std::min_element(spots.begin(), spots.end(), [&](const Spot& a, const Spot& b) {
+          return distance_between(a, disc) < distance_between(b, disc);
+        });
+    const bool is_near = nearest != spots.end() && distance_between(*nearest, disc) <= tolerance;
+    match.push_back(is_near ? static_cast<std::size_t>(nearest - spots.begin()) : spots.size());
+    if (is_near) ++num_discs[match.back()];
+  }
+  for (std::size_t& spot : match) {
+    if (spot < spots.size() && num_discs[spot] > 1) spot = spots.size();
+  }
+  return match;
+}
+
+/// Places of strong spots that no track has: beads that few views see.
+std::vector<MaskDisc> loose_discs(const std::vector<Spot>& spots, const std::vector<bool>& is_taken,
+                                  std::vector<double> bead_contrasts, double radius) {
+  std::vector<MaskDisc> discs;
+  if (bead_contrasts.empty()) return discs;
+  const auto middle =
+      bead_contrasts.begin() + static_cast<std::ptrdiff_t>(bead_contrasts.size() / 2);
+  std::nth_element(bead_contrasts.begin(), middle, bead_contrasts.end());
+  for (std::size_t i = 0; i < spots.size(); ++i) {
+    if (is_taken[i] || spots[i].strength < kLikely ||
+        spots[i].contrast < kPartOfContrast * *middle) {
+      continue;
+    }
+    discs.push_back({spots[i].x_px, spots[i].y_px, radius});
+  }
+  return discs;
+}
+
+/// Moves the discs of a view, which are where the tracks are, to their spots
+/// and adds those of spots without a track. Returns how many have a spot.
+std::size_t settle_discs(const std::vector<Spot>& spots, double tolerance, double radius,
+                         std::vector<MaskDisc>* discs) {
+  const std::vector<MaskDisc> predicted = *discs;
+  const std::vector<std::size_t> match = match_spots(predicted, spots, tolerance);
+  std::vector<double> contrasts;
+  for (std::size_t i = 0; i < discs->size(); ++i) {
+    if (match[i] == spots.size()) continue;
+    const Spot& spot = spots[match[i]];
+    (*discs)[i].x_px = spot.x_px;
+    (*discs)[i].y_px = spot.y_px;
+    contrasts.push_back(spot.contrast);
+  }
+  std::vector<bool> is_taken(spots.size(), false);
+  for (std::size_t i = 0; i < spots.size(); ++i) {
+    is_taken[i] = std::any_of(predicted.begin(), predicted.end(), [&](const MaskDisc& disc) {
+      return distance_between(spots[i], disc) <= tolerance;
+    });
+  }
+  const auto loose = loose_discs(spots, is_taken, contrasts, radius);
+  discs->insert(discs->end(), loose.begin(), loose.end());
+  return contrasts.size();
+}
+
+/// Where the tracks pass a view, if that is within it.
+std::vector<MaskDisc> predict_discs(const std::vector<BeadTrack>& tracks,
+                                    const SearchedViews& searched, double tilt_deg, double radius) {
+  std::vector<MaskDisc> discs;
+  for (const BeadTrack& track : tracks) {
+    const double x = track_x(track, static_cast<double>(searched.width) / 2, tilt_deg);
+    if (x < -radius || x > static_cast<double>(searched.width) + radius) continue;
+    discs.push_back({x, track.y_px, radius});
+  }
+  return discs;
+}
+
+}  // namespace
+
+BeadSearch find_beads(const BeadViews& views, const BeadSearchOptions& options) {
+  BeadSearch result;
+  const std::size_t num_views = views.tilt_deg.size();
+  result.num_found.assign(num_views, 0);
+  result.discs.resize(num_views);
+  const auto diameter =
+      options.diameter_px ? options.diameter_px : estimate_diameter(views, options);
+  if (!diameter) return result;
+  const SearchedViews searched = search_views(views, *diameter);
+  const double tolerance_px = std::max(kLeastTolerance_px, *diameter / 2);
+  const std::vector<BeadTrack> tracks =
+      find_bead_tracks(searched, views.tilt_deg, tolerance_px, !options.diameter_px);
+  if (tracks.empty() && !options.diameter_px) return result;
+  result.diameter_px = *diameter;
+  result.num_beads = tracks.size();
+  const double radius = mask_radius_px(*diameter);
+  for (std::size_t view = 0; view < num_views; ++view) {
+    result.discs[view] = predict_discs(tracks, searched, views.tilt_deg[view], radius);
+    result.num_found[view] =
+        settle_discs(searched.spots[view], tolerance_px, radius, &result.discs[view]);
+  }
+  return result;
+}
+
+double mask_radius_px(double diameter_px) { return 1.2 * diameter_px; }
+
+void mask_discs(const std::vector<MaskDisc>& discs, MaskedImage* image) {
+  for (const MaskDisc& disc : discs) {
+    const auto low = [&](double at) {
+      return std::max<std::int64_t>(static_cast<std::int64_t>(std::floor(at - disc.radius_px)), 0);
+    };
+    const auto high = [&](double at, std::int64_t size) {
+      return std::min(static_cast<std::int64_t>(std::ceil(at + disc.radius_px)), size);
+    };
+    for (std::int64_t y = low(disc.y_px); y < high(disc.y_px, image->height); ++y) {
+      for (std::int64_t x = low(disc.x_px); x < high(disc.x_px, image->width); ++x) {
+        const double distance = std::hypot(static_cast<double>(x) + 0.5 - disc.x_px,
+                                           static_cast<double>(y) + 0.5 - disc.y_px);
+        if (distance > disc.radius_px) continue;
+        image->valid[image->index(x, y)] = 0;
+        image->values[image->index(x, y)] = 0.0f;
+      }
+    }
+  }
+}
+
+}  // namespace tomofield::tilt_series

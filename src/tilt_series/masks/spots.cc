@@ -1,0 +1,185 @@
+#include "tilt_series/masks/spots.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "tilt_series/binning.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+// Diameter in pixels that larger spots are reduced to: beyond it a finer image shows no more.
+constexpr double kSearchDiameter = 5.0;
+
+constexpr int kDirections = 16;
+constexpr int kIgnoredDirections = 2;    // as many as a close neighbour takes
+constexpr int kFewestDirections = 8;     // at the image's edge
+constexpr double kDistance = 1.25;       // of the discs that are compared, in diameters
+constexpr float kFewestMeasured = 0.6f;  // part of a disc
+
+// Least spread, in standard deviations of the contrast: of images without noise.
+constexpr double kLeastSpread = 0.5;
+
+constexpr float kUnknown = -std::numeric_limits<float>::infinity();
+
+/// Pixels of a disc around the origin and the part of each that counts.
+struct Disc {
+  struct Pixel {
+    std::int64_t x, y;
+    float weight;
+  };
+  std::vector<Pixel> pixels;
+  float total = 0.0f;
+
+  explicit Disc(double radius) {
+    const auto reach = static_cast<std::int64_t>(std::ceil(radius));
+    for (std::int64_t y = -reach; y <= reach; ++y) {
+      for (std::int64_t x = -reach; x <= reach; ++x) {
+        const double distance = std::hypot(static_cast<double>(x), static_cast<double>(y));
+        const auto weight = static_cast<float>(std::clamp(radius + 0.5 - distance, 0.0, 1.0));
+        if (weight == 0.0f) continue;
+        pixels.push_back({x, y, weight});
+        total += weight;
+      }
+    }
+  }
+};
+
+/// Means of the disc around every pixel [y, x]; kUnknown where little was measured.
+std::vector<float> disc_means(const MaskedImage& image, const Disc& disc) {
+  std::vector<float> means(image.values.size(), kUnknown);
+  for (std::int64_t y = 0; y < image.height; ++y) {
+    for (std::int64_t x = 0; x < image.width; ++x) {
+      float sum = 0.0f, weight = 0.0f;
+      for (const Disc::Pixel& pixel : disc.pixels) {
+        const std::int64_t px = x + pixel.x, py = y + pixel.y;
+        if (px < 0 || px >= image.width || py < 0 || py >= image.height) continue;
+        const std::size_t at = image.index(px, py);
+        if (!image.valid[at]) continue;
+        sum += pixel.weight * image.values[at];
+        weight += pixel.weight;
+      }
+      if (weight >= kFewestMeasured * disc.total) means[image.index(x, y)] = sum / weight;
+    }
+  }
+  return means;
+}
+
+/// Contrast of every pixel [y, x], or kUnknown.
+std::vector<float> contrasts(const MaskedImage& image, double diameter) {
+  const std::vector<float> means = disc_means(image, Disc(diameter / 2));
+  std::array<std::int64_t, kDirections> dx, dy;
+  for (std::size_t i = 0; i < kDirections; ++i) {
+    const double angle = 2 * std::numbers::pi * static_cast<double>(i) / kDirections;
+    dx[i] = std::lround(kDistance * diameter * std::cos(angle));
+    dy[i] = std::lround(kDistance * diameter * std::sin(angle));
+  }
+  std::vector<float> contrast(means.size(), kUnknown);
+  for (std::int64_t y = 0; y < image.height; ++y) {
+    for (std::int64_t x = 0; x < image.width; ++x) {
+      const float centre = means[image.index(x, y)];
+      if (centre == kUnknown) continue;
+      std::array<float, kDirections> differences;
+      std::size_t count = 0;
+      for (std::size_t i = 0; i < kDirections; ++i) {
+        const std::int64_t px = x + dx[i], py = y + dy[i];
+        if (px < 0 || px >= image.width || py < 0 || py >= image.height) continue;
+        const float mean = means[image.index(px, py)];
+        if (mean != kUnknown) differences[count++] = centre - mean;
+      }
+      if (count < kFewestDirections) continue;
+      const auto third = differences.begin() + kIgnoredDirections;
+      std::nth_element(differences.begin(), third,
+                       differences.begin() + static_cast<std::ptrdiff_t>(count));
+      contrast[image.index(x, y)] = *third;
+    }
+  }
+  return contrast;
+}
+
+double median_in_place(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return static_cast<double>(*middle);
+}
+
+/// Spread of the known contrasts; 0 where nothing varies.
+double spread_of(const std::vector<float>& contrast) {
+  std::vector<float> known;
+  double sum = 0.0, squares = 0.0;
+  for (const float value : contrast) {
+    if (value == kUnknown) continue;
+    known.push_back(value);
+    sum += static_cast<double>(value);
+    squares += static_cast<double>(value) * static_cast<double>(value);
+  }
+  if (known.empty()) return 0.0;
+  const double count = static_cast<double>(known.size());
+  const double deviation = std::sqrt(std::max(squares / count - sum * sum / count / count, 0.0));
+  const auto median = static_cast<float>(median_in_place(known));
+  for (float& value : known) value = std::fabs(value - median);
+  constexpr double kSigmaOfMad = 1.4826;  // for a normal distribution
+  return std::max(kSigmaOfMad * median_in_place(known), kLeastSpread * deviation);
+}
+
+/// Whether no pixel within `radius` is higher; of equal ones the first counts.
+bool is_peak(const MaskedImage& image, const std::vector<float>& contrast, std::int64_t x,
+             std::int64_t y, std::int64_t radius) {
+  const std::size_t here = image.index(x, y);
+  for (std::int64_t py = std::max<std::int64_t>(y - radius, 0);
+       py <= std::min(y + radius, image.height - 1); ++py) {
+    for (std::int64_t px = std::max<std::int64_t>(x - radius, 0);
+         px <= std::min(x + radius, image.width - 1); ++px) {
+      const std::size_t at = image.index(px, py);
+      if (contrast[at] > contrast[here] || (contrast[at] == contrast[here] && at < here)) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+/// Where the parabola through three neighbouring values has its peak: −1/2…1/2.
+double peak_shift(float before, float here, float after) {
+  const double curvature =
+      static_cast<double>(before) - 2 * static_cast<double>(here) + static_cast<double>(after);
+  if (!std::isfinite(curvature) || curvature >= 0.0) return 0.0;
+  return std::clamp(static_cast<double>(before - after) / curvature / 2, -0.5, 0.5);
+}
+
+}  // namespace
+
+std::vector<Spot> find_spots(const MaskedImage& image, double diameter_px, double least_strength) {
+  const double factor = std::max(1.0, diameter_px / kSearchDiameter);
+  const MaskedImage reduced = factor > 1.0 ? reduce_image(image, factor) : image;
+  const double diameter = diameter_px / factor;
+  const std::vector<float> contrast = contrasts(reduced, diameter);
+  const double spread = spread_of(contrast);
+  std::vector<Spot> spots;
+  if (!(spread > 0.0)) return spots;
+  const auto threshold = static_cast<float>(least_strength * spread);
+  const std::int64_t radius = std::max<std::int64_t>(1, std::lround(diameter / 2));
+  const double centre_x = static_cast<double>(reduced.width) / 2,
+               centre_y = static_cast<double>(reduced.height) / 2;
+  for (std::int64_t y = 1; y + 1 < reduced.height; ++y) {
+    for (std::int64_t x = 1; x + 1 < reduced.width; ++x) {
+      const std::size_t at = reduced.index(x, y);
+      if (!(contrast[at] >= threshold) || !is_peak(reduced, contrast, x, y, radius)) continue;
+      const auto row = static_cast<std::size_t>(reduced.width);
+      const double px = static_cast<double>(x) + 0.5 +
+                        peak_shift(contrast[at - 1], contrast[at], contrast[at + 1]);
+      const double py = static_cast<double>(y) + 0.5 +
+                        peak_shift(contrast[at - row], contrast[at], contrast[at + row]);
+      const auto height = static_cast<double>(contrast[at]);
+      spots.push_back({(px - centre_x) * factor + static_cast<double>(image.width) / 2,
+                       (py - centre_y) * factor + static_cast<double>(image.height) / 2, height,
+                       height / spread});
+    }
+  }
+  return spots;
+}
+
+}  // namespace tomofield::tilt_series
