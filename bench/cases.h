@@ -5,6 +5,7 @@
 
 #include "bench/measure.h"
 #include "projection/slab_projector.h"
+#include "tomofield/options.h"
 
 namespace tomofield::bench {
 
@@ -33,6 +34,6 @@ std::vector<Case> load_bound_cases();
 /// default options: the projection, what else no field changes, and what
 /// depends on the kind of field.
 std::vector<Case> step_cases();
-std::vector<Case> field_cases(const std::string& kind);
+std::vector<Case> field_cases(FieldKind kind);
 
 }  // namespace tomofield::bench

@@ -19,8 +19,8 @@ namespace {
 
 std::vector<Case> all_cases() {
   std::vector<Case> cases;
-  for (const auto& some : {load_bound_cases(), projection_cases(), step_cases(), field_cases("vm"),
-                           field_cases("grid")}) {
+  for (const auto& some : {load_bound_cases(), projection_cases(), step_cases(),
+                           field_cases(FieldKind::kVm), field_cases(FieldKind::kGrid)}) {
     cases.insert(cases.end(), some.begin(), some.end());
   }
   return cases;

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "base/aligned_buffer.h"
+#include "base/enum_names.h"
 #include "bench/cases.h"
 #include "bench/projection_setup.h"
 #include "field/field.h"
@@ -24,7 +25,7 @@ using kernels::kLanes;
 constexpr int kThickness = 150;
 constexpr int kBand = 2;  // somewhere in the middle
 
-fit::FieldOptions field_options(const std::string& kind) {
+fit::FieldOptions field_options(FieldKind kind) {
   fit::FieldOptions options;
   options.kind = kind;
   options.leaf_size = fit::usual_leaf_size(options);
@@ -43,7 +44,7 @@ struct StepSetup {
   std::vector<int> leaves;
   base::AlignedBuffer<float> values, samples, gradient, grad_samples, m, v, flux, above;
 
-  explicit StepSetup(const std::string& kind)
+  explicit StepSetup(FieldKind kind)
       : domain(fit::make_domain(geometry, {0, 0, geometry.width, geometry.height},
                                 field_options(kind))),
         field(fit::make_initial_field(domain, kThickness, 0.3, field_options(kind), 1)),
@@ -188,7 +189,7 @@ Case data_case(const std::shared_ptr<ProjectionSetup>& p) {
 std::vector<Case> step_cases() {
   const auto projection =
       std::make_shared<ProjectionSetup>(kThickness, fit::FitOptions{}.subsets, kSlabsTogether);
-  const auto step = std::make_shared<StepSetup>("grid");
+  const auto step = std::make_shared<StepSetup>(FieldKind::kGrid);
   step->values.fill(0.1f);
   const auto decoding = std::make_shared<LeafDecoding>(*step);
   return {projection->forward_case(kStepForward, projection),
@@ -199,19 +200,20 @@ std::vector<Case> step_cases() {
           variation_case(step)};
 }
 
-std::vector<Case> field_cases(const std::string& kind) {
+std::vector<Case> field_cases(FieldKind kind) {
   const auto s = std::make_shared<StepSetup>(kind);
   const field::LeafShape& shape = s->domain.shapes[0];
   // FMAs a vertex and lane: three ranks of VM; 16 rows from so many vertices of the grid.
-  const double fmas = kind == "vm" ? shape.rank_x + shape.rank_y + shape.rank_z
-                                   : 16.0 * (shape.ny - 1) / field_options(kind).leaf_size + 1;
+  const double fmas = kind == FieldKind::kVm
+                          ? shape.rank_x + shape.rank_y + shape.rank_z
+                          : 16.0 * (shape.ny - 1) / field_options(kind).leaf_size + 1;
   std::size_t parameters = 0;
   for (const int leaf : s->leaves)
     parameters += s->field->offset(leaf + 1) - s->field->offset(leaf);
   // A leaf's step of Adam serves all slabs that cross it.
   const double share = static_cast<double>(kLanes) / field_options(kind).leaf_size;
   const double stepped = share * static_cast<double>(parameters);
-  const Case values{.name = kind + ": vertex values",
+  const Case values{.name = base::name_of(kind) + std::string(": vertex values"),
                     .run =
                         [s] {
                           for (const int leaf : s->leaves)
@@ -219,7 +221,7 @@ std::vector<Case> field_cases(const std::string& kind) {
                         },
                     .flops = 2 * fmas * s->vertices(),
                     .bytes = 4 * (2 * s->vertices() + static_cast<double>(parameters))};
-  const Case gradient{.name = kind + ": vertex gradient",
+  const Case gradient{.name = base::name_of(kind) + std::string(": vertex gradient"),
                       .run =
                           [s] {
                             for (const int leaf : s->leaves) {
@@ -227,9 +229,9 @@ std::vector<Case> field_cases(const std::string& kind) {
                                                       s->gradient.data() + s->field->offset(leaf));
                             }
                           },
-                      .flops = (kind == "vm" ? 4 : 2) * fmas * s->vertices(),
+                      .flops = (kind == FieldKind::kVm ? 4 : 2) * fmas * s->vertices(),
                       .bytes = 4 * (2 * s->vertices() + 3 * static_cast<double>(parameters))};
-  const Case adam{.name = kind + ": Adam",
+  const Case adam{.name = base::name_of(kind) + std::string(": Adam"),
                   .run =
                       [s, stepped] {
                         kernels::AdamStep step;

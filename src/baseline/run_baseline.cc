@@ -94,7 +94,7 @@ output::ModelInfo volume_info(const measurement::PreparedSeries& series,
   info.roi = series.roi;
   info.pixel_size_A = series.pixel_size_A;
   info.density_unit = series.unit;
-  info.is_dark = options.input.contrast == tilt_series::Contrast::kDark;
+  info.is_dark = options.input.contrast == Contrast::kDark;
   return info;
 }
 

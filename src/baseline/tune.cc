@@ -140,8 +140,8 @@ bool votes_on_penalty(const TvOptions& options) { return !options.penalty && !op
 TvOptions with_better_penalty(const TvOptions& options, Trials& trials) {
   if (!votes_on_penalty(options)) return options;
   TvOptions concave = options, smooth = options;
-  concave.penalty = "concave";
-  smooth.penalty = "smooth";
+  concave.penalty = Penalty::kConcave;
+  smooth.penalty = Penalty::kSmooth;
   const HeldOutScore with_concave = trials.trial(concave).score,
                      with_smooth = trials.trial(smooth).score;
   return selection::most_views_prefer(with_smooth, with_concave) ? smooth : concave;

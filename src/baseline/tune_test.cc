@@ -76,19 +76,20 @@ TEST_F(BaselineTune, FindsABetterWeightFromEitherEnd) {
 
 TEST_F(BaselineTune, TriesBothPenaltiesIfNothingIsSaid) {
   const Tuned found = tuned(tv({}));
-  EXPECT_EQ(std::get<TvOptions>(found.trials[0].method).penalty, "concave");
-  EXPECT_EQ(std::get<TvOptions>(found.trials[1].method).penalty, "smooth");
+  EXPECT_EQ(std::get<TvOptions>(found.trials[0].method).penalty, Penalty::kConcave);
+  EXPECT_EQ(std::get<TvOptions>(found.trials[1].method).penalty, Penalty::kSmooth);
   const bool votes_smooth =
       selection::most_views_prefer(found.trials[1].score, found.trials[0].score);
-  EXPECT_EQ(std::get<TvOptions>(found.method).penalty, votes_smooth ? "smooth" : "concave");
+  EXPECT_EQ(std::get<TvOptions>(found.method).penalty,
+            votes_smooth ? Penalty::kSmooth : Penalty::kConcave);
   TvOptions concave = tv({});
-  concave.penalty = "concave";
-  EXPECT_EQ(std::get<TvOptions>(tuned(concave).method).penalty, "concave");
+  concave.penalty = Penalty::kConcave;
+  EXPECT_EQ(std::get<TvOptions>(tuned(concave).method).penalty, Penalty::kConcave);
 }
 
 TEST_F(BaselineTune, IsNotMisledByIterationsThatAreTooFew) {
   TvOptions few = tv({}), many = tv({});
-  few.penalty = many.penalty = "smooth";
+  few.penalty = many.penalty = Penalty::kSmooth;
   few.iterations = 5;
   many.iterations = 200;
   const Tuned with_few = tuned(few), with_many = tuned(many);

@@ -10,6 +10,7 @@
 #include "baseline/tune.h"
 #include "cli/commands.h"
 #include "cli/common_options.h"
+#include "cli/enum_option.h"
 #include "cli/fit_options.h"
 #include "cli/input_options.h"
 #include "cli/number_checks.h"
@@ -33,7 +34,7 @@ struct Arguments {
 };
 
 void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts& method,
-                output::VolumeAxes axes) {
+                VolumeAxes axes) {
   print_sizes({plan.num_views, plan.geometry.width, plan.geometry.height, plan.pixel_size_A,
                plan.roi, plan.geometry.thickness, axes});
   fmt::print(
@@ -56,7 +57,7 @@ template <typename Method>
 void run(Arguments<Method>& arguments) {
   baseline::BaselineOptions& options = arguments.options;
   Method& method = arguments.method;
-  const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
+  const bool is_dark = options.input.contrast == Contrast::kDark;
   options.fit_view_scale = is_on(arguments.view_scale, is_dark);
   if constexpr (requires { method.non_negative; })
     method.non_negative = is_on(arguments.non_negative, !is_dark);
@@ -207,12 +208,10 @@ void add_tv(CLI::App& baseline) {
                   "default: 3, 8 if concave")
       ->check(number_above(0))
       ->group(group);
-  command
-      .add_option(
-          "--penalty", method.penalty,
-          "smooth: total variation; concave: spares edges, reweighted; default: smooth, and "
-          "with --tune the one that predicts held-out views better")
-      ->check(CLI::IsMember({"smooth", "concave"}))
+  add_enum_option<Penalty>(
+      command, "--penalty", method.penalty,
+      "smooth: total variation; concave: spares edges, reweighted; default: smooth, and "
+      "with --tune the one that predicts held-out views better")
       ->group(group);
 }
 

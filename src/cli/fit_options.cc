@@ -62,7 +62,7 @@ bool is_on(const std::string& value, bool automatic) {
 
 void print_sizes(const Sizes& sizes) {
   std::int64_t ny = sizes.roi.height(), nz = std::llround(sizes.thickness);
-  const bool swaps = sizes.axes == output::VolumeAxes::kXzy;
+  const bool swaps = sizes.axes == VolumeAxes::kXzy;
   if (swaps) std::swap(ny, nz);
   fmt::print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {} voxels{}\n",
              sizes.num_views, sizes.view_width, sizes.view_height, sizes.pixel_size_A,

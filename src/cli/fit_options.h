@@ -37,7 +37,7 @@ struct Sizes {
   double pixel_size_A;
   geometry::Roi roi;
   double thickness;
-  output::VolumeAxes axes;
+  VolumeAxes axes;
 };
 /// The first line of what a command says before it starts: the tomogram's sizes in the order of its
 /// file. compare::planned_grid() reads it.

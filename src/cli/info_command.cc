@@ -76,7 +76,7 @@ void print_series(const tilt_series::TiltSeriesOptions& options) {
   const tilt_series::TiltSeries series(options);
   fmt::print("  as a tilt series {} views of {} × {} pixels of {:.7g} Å, tilt axis along y\n",
              series.views().size(), series.width(), series.height(), series.pixel_size_A());
-  if (options.contrast == tilt_series::Contrast::kDark) {
+  if (options.contrast == Contrast::kDark) {
     fmt::print("  empty beam       {:.7g}\n", series.empty_beam());
   }
   const tilt_series::MaskFigures& masks = series.mask_figures();

@@ -6,7 +6,6 @@
 namespace tomofield::cli {
 namespace {
 
-using tilt_series::Contrast;
 using tilt_series::TiltSeriesOptions;
 
 void add_alignment_options(CLI::App& command, TiltSeriesOptions& options) {

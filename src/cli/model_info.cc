@@ -7,6 +7,7 @@
 #include <string>
 #include <tuple>
 
+#include "base/enum_names.h"
 #include "output/model_file.h"
 
 namespace tomofield::cli {
@@ -56,7 +57,7 @@ void print_leaves(const Field& field) {
 
 void print_field(const Field& field) {
   const field::RootGrid& roots = field.tree().roots();
-  fmt::print("  field            {}, {} parameters, bias {:.6g}, {}\n", field.kind(),
+  fmt::print("  field            {}, {} parameters, bias {:.6g}, {}\n", base::name_of(field.kind()),
              field.num_parameters(), field.bias,
              field.activation.beta > 0
                  ? fmt::format("softplus of sharpness {:.6g}", field.activation.beta)

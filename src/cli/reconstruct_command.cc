@@ -3,8 +3,10 @@
 #include <optional>
 #include <string>
 
+#include "base/enum_names.h"
 #include "cli/commands.h"
 #include "cli/common_options.h"
+#include "cli/enum_option.h"
 #include "cli/fit_options.h"
 #include "cli/input_options.h"
 #include "cli/run_reconstruction.h"
@@ -30,20 +32,19 @@ struct Arguments {
 void add_field_options(CLI::App& command, Arguments& arguments) {
   const char* group = "Field";
   fit::FieldOptions& field = arguments.options.field;
-  command.add_option("--field", field.kind, "vm: vector-matrix factors; grid: plain vertices")
-      ->check(CLI::IsMember({"vm", "grid"}))
-      ->capture_default_str()
+  add_enum_option<FieldKind>(command, "--field", field.kind,
+                             "vm: vector-matrix factors; grid: plain vertices")
+      ->default_str(base::name_of(field.kind))
       ->group(group);
   command
       .add_option("--leaf-size", arguments.leaf_size,
                   "side of a leaf in binned pixels, a multiple of 16; default: 32, 64 of a "
                   "uniform grid")
       ->group(group);
-  command
-      .add_option("--tree", field.tree,
-                  "uniform: all leaves alike; adaptive: finer where the density varies more")
-      ->check(CLI::IsMember({"uniform", "adaptive"}))
-      ->capture_default_str()
+  add_enum_option<TreeKind>(
+      command, "--tree", field.tree,
+      "uniform: all leaves alike; adaptive: finer where the density varies more")
+      ->default_str(base::name_of(field.tree))
       ->group(group);
   command
       .add_option("--leaf-budget", field.leaf_budget,
@@ -99,11 +100,10 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
                   "steps a pass, each with an interleaved subset of the views")
       ->capture_default_str()
       ->group(group);
-  command
-      .add_option("--engine", fit.engine,
-                  "slab: fast, one tilt axis; ray: any view geometry, without resampling the views")
-      ->check(CLI::IsMember({"slab", "ray"}))
-      ->capture_default_str()
+  add_enum_option<Engine>(
+      command, "--engine", fit.engine,
+      "slab: fast, one tilt axis; ray: any view geometry, without resampling the views")
+      ->default_str(base::name_of(fit.engine))
       ->group(group);
   command
       .add_option("--ray-samples", fit.ray_samples,
@@ -146,11 +146,10 @@ void add_fit_options(CLI::App& command, Arguments& arguments) {
                   "weight of the isotropic Fourier prior, against streaks along X and Y")
       ->capture_default_str()
       ->group(group);
-  command
-      .add_option("--ifp-ring", fit.fourier_ring,
-                  "what the Fourier axes are compared with: a ring's mean or its max")
-      ->check(CLI::IsMember({"mean", "max"}))
-      ->capture_default_str()
+  add_enum_option<RingReference>(
+      command, "--ifp-ring", fit.fourier_ring,
+      "what the Fourier axes are compared with: a ring's mean or its max")
+      ->default_str(base::name_of(fit.fourier_ring))
       ->group(group);
   add_shared_fit_options(
       command, {arguments.options.field.margin_spacing, fit.hold_out, arguments.view_scale});
@@ -191,20 +190,21 @@ void set_schedule(Arguments& arguments) {
 
 void run(Arguments& arguments, const distributed::Communicator& processes) {
   reconstruction::ReconstructOptions& options = arguments.options;
-  const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
+  const bool is_dark = options.input.contrast == Contrast::kDark;
   options.fit.fit_view_scale = is_on(arguments.view_scale, is_dark);
   options.field.with_margin = options.specimen.with_margin;
   set_leaves(arguments);
   set_schedule(arguments);
   options.choose_penalty = arguments.penalty == "auto" && !arguments.variation;
-  if (arguments.penalty != "auto") options.fit.penalty = arguments.penalty;
+  if (arguments.penalty != "auto")
+    options.fit.penalty = *base::enum_named<Penalty>(arguments.penalty);
   options.fit.density_variation =
       arguments.variation.value_or(fit::usual_variation(options.fit.penalty));
   if (arguments.activation != "auto")
-    options.field.activation = arguments.activation;
+    options.field.activation = *base::enum_named<Activation>(arguments.activation);
   else if (is_dark)
-    options.field.activation = "identity";
-  options.input.resample = options.fit.engine == "slab";
+    options.field.activation = Activation::kIdentity;
+  options.input.resample = options.fit.engine == Engine::kSlab;
   processes.together([&] { reconstruction::check_options(options); });
   const tilt_series::TiltSeries series(options.input, processes);
   run_reconstruction(series, options, arguments.dry_run, processes);

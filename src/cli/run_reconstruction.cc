@@ -1,4 +1,5 @@
 #include "cli/run_reconstruction.h"
+#include "base/enum_names.h"
 
 #include <fmt/format.h>
 
@@ -66,7 +67,7 @@ void print_plan(const reconstruction::ReconstructOptions& options,
       num_processes == 1 ? "" : fmt::format(" of each of {} processes", num_processes);
   fmt::print(
       "{} field, {} {}, {} parameters; {} steps on {} threads{}; about {:.2f} GiB of memory{}\n",
-      options.field.kind, plan.num_leaves, plan.num_leaves == 1 ? "leaf" : "leaves",
+      base::name_of(options.field.kind), plan.num_leaves, plan.num_leaves == 1 ? "leaf" : "leaves",
       plan.num_parameters, plan.num_steps, base::thread_count(), processes,
       static_cast<double>(plan.memory_bytes) / (1 << 30), num_processes == 1 ? "" : " each");
   fmt::print("epochs: {}\n", epochs_text(plan.stages));
@@ -139,7 +140,8 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   if (!processes.is_first()) return;
   print_files(paths);
   write_pictures(paths.volume, series, paths.picture_prefix);
-  if (options.field.tree == "adaptive") write_tree_picture(paths.model, paths.tree_picture);
+  if (options.field.tree == TreeKind::kAdaptive)
+    write_tree_picture(paths.model, paths.tree_picture);
 }
 
 }  // namespace tomofield::cli

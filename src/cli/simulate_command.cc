@@ -45,14 +45,13 @@ simulate::TiltRange parse_tilts(const std::string& text) {
 }
 
 /// The contrast that is meant: counts of electrons are dark by nature.
-tilt_series::Contrast resolve_contrast(const SimulateArguments& arguments) {
+Contrast resolve_contrast(const SimulateArguments& arguments) {
   const bool has_dose = arguments.options.dose.has_value();
   if (has_dose && arguments.contrast == "bright")
     throw Error(
         "--dose counts transmitted electrons, which is dark contrast: leave out --contrast "
         "bright");
-  return has_dose || arguments.contrast == "dark" ? tilt_series::Contrast::kDark
-                                                  : tilt_series::Contrast::kBright;
+  return has_dose || arguments.contrast == "dark" ? Contrast::kDark : Contrast::kBright;
 }
 
 // What reconstruct has to be told of the series.
@@ -64,8 +63,7 @@ std::string how_to_reconstruct(const std::filesystem::path& directory,
       "{}",
       file("tilt_series.mrc"), file("tilt_series.tlt"),
       options.shift_spread_px > 0 ? " --xf " + file("tilt_series.xf") : "",
-      options.cell.thickness_px,
-      options.contrast == tilt_series::Contrast::kDark ? "dark" : "bright",
+      options.cell.thickness_px, options.contrast == Contrast::kDark ? "dark" : "bright",
       options.cell.is_extended ? "" : " --no-margin", file("tomogram.mrc"));
 }
 

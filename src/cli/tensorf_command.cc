@@ -65,9 +65,10 @@ void add_method_options(CLI::App& command, Arguments& arguments) {
 
 void run(Arguments& arguments) {
   reconstruction::ReconstructOptions& options = arguments.options;
-  const bool is_dark = options.input.contrast == tilt_series::Contrast::kDark;
+  const bool is_dark = options.input.contrast == Contrast::kDark;
   options.fit.fit_view_scale = is_on(arguments.view_scale, is_dark);
-  options.field.activation = is_on(arguments.non_negative, !is_dark) ? "softplus" : "identity";
+  options.field.activation =
+      is_on(arguments.non_negative, !is_dark) ? Activation::kSoftplus : Activation::kIdentity;
   options.field.with_margin = options.specimen.with_margin;
   reconstruction::check_options(options);
   const tilt_series::TiltSeries series(options.input);

@@ -9,8 +9,8 @@ void add_volume_options(CLI::App& command, output::VolumeOptions& options) {
   const char* group = "Volume";
   const std::map<std::string, io::MrcMode> modes{
       {"2", io::MrcMode::kFloat32}, {"12", io::MrcMode::kFloat16}, {"1", io::MrcMode::kInt16}};
-  const std::map<std::string, output::VolumeAxes> axes{{"xyz", output::VolumeAxes::kXyz},
-                                                       {"xzy", output::VolumeAxes::kXzy}};
+  const std::map<std::string, VolumeAxes> axes{{"xyz", VolumeAxes::kXyz},
+                                               {"xzy", VolumeAxes::kXzy}};
   command
       .add_option_function<std::string>(
           "--mode", [&options, modes](const std::string& mode) { options.mode = modes.at(mode); },

@@ -227,20 +227,19 @@ std::unique_ptr<Field> Field::resampled(std::vector<LeafShape> shapes) const {
 
 double vertex_height(double thickness) { return std::max(1.0, thickness - 1.0); }
 
-std::size_t count_parameters(const std::string& kind, const std::vector<LeafShape>& shapes) {
+std::size_t count_parameters(FieldKind kind, const std::vector<LeafShape>& shapes) {
   std::size_t count = 0;
   for (const LeafShape& shape : shapes) {
-    count += kind == "vm" ? VmField::count(shape) : GridField::count(shape);
+    count += kind == FieldKind::kVm ? VmField::count(shape) : GridField::count(shape);
   }
   return count;
 }
 
-std::unique_ptr<Field> make_field(const std::string& kind, Quadtree tree, double thickness,
+std::unique_ptr<Field> make_field(FieldKind kind, Quadtree tree, double thickness,
                                   std::vector<LeafShape> shapes) {
-  if (kind == "vm") return std::make_unique<VmField>(std::move(tree), thickness, std::move(shapes));
-  if (kind == "grid")
-    return std::make_unique<GridField>(std::move(tree), thickness, std::move(shapes));
-  throw Error(fmt::format("there is no field '{}': take vm or grid", kind));
+  if (kind == FieldKind::kVm)
+    return std::make_unique<VmField>(std::move(tree), thickness, std::move(shapes));
+  return std::make_unique<GridField>(std::move(tree), thickness, std::move(shapes));
 }
 
 }  // namespace tomofield::field

@@ -16,6 +16,7 @@
 #include "kernels/lanes.h"
 #include "kernels/leaf_decoding.h"
 #include "kernels/total_variation.h"
+#include "tomofield/options.h"
 
 namespace tomofield::field {
 
@@ -74,7 +75,7 @@ class Field {
   Field(const Field&) = delete;
   Field& operator=(const Field&) = delete;
 
-  virtual std::string kind() const = 0;  ///< "vm" or "grid", as in --field
+  virtual FieldKind kind() const = 0;
 
   const Quadtree& tree() const { return tree_; }
   double thickness() const { return thickness_; }
@@ -193,10 +194,10 @@ class Field {
 double vertex_height(double thickness);
 
 /// Parameters that make_field would allocate.
-std::size_t count_parameters(const std::string& kind, const std::vector<LeafShape>& shapes);
+std::size_t count_parameters(FieldKind kind, const std::vector<LeafShape>& shapes);
 
-/// kind "vm": vector–matrix factors; "grid": plain trilinear vertices.
-std::unique_ptr<Field> make_field(const std::string& kind, Quadtree tree, double thickness,
+/// Makes a field whose parameters are all zero.
+std::unique_ptr<Field> make_field(FieldKind kind, Quadtree tree, double thickness,
                                   std::vector<LeafShape> shapes);
 
 }  // namespace tomofield::field

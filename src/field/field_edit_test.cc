@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "central_difference.h"
 #include "field/field.h"
 #include "field/vm/merge_factors.h"
@@ -20,7 +21,7 @@ constexpr double kThickness = 20.0;
 // Odd and even vertex counts: at odd ones a vertex lies where the quarters meet.
 constexpr LeafShape kShape{.nx = 7, .ny = 6, .nz = 5, .rank_x = 2, .rank_y = 3, .rank_z = 2};
 
-std::unique_ptr<Field> one_cell(const std::string& kind, std::uint64_t seed) {
+std::unique_ptr<Field> one_cell(FieldKind kind, std::uint64_t seed) {
   const RootGrid roots{.x0 = -16, .y0 = 8, .cell_size = 64, .columns = 1, .rows = 1};
   auto field = make_field(kind, Quadtree(roots, {Region::kInterest}), kThickness, {kShape});
   field->initialise(base::Random(seed), 1.0);
@@ -29,7 +30,7 @@ std::unique_ptr<Field> one_cell(const std::string& kind, std::uint64_t seed) {
 }
 
 // Four quarters with nothing in common, or with a little noise on what they had.
-std::unique_ptr<Field> four_quarters(const std::string& kind, double noise) {
+std::unique_ptr<Field> four_quarters(FieldKind kind, double noise) {
   auto field = one_cell(kind, 1);
   field->edit({.split = {0}, .merge = {}});
   const auto noises = random_floats(field->num_parameters(), 2, -noise, noise);
@@ -88,9 +89,10 @@ double misfit_slope(Field& leaf, const Field& quarters) {
   return std::sqrt(squares);
 }
 
-class EachEditedField : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, EachEditedField, ::testing::Values("vm", "grid"),
-                         [](const auto& kind) { return std::string(kind.param); });
+class EachEditedField : public ::testing::TestWithParam<FieldKind> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, EachEditedField,
+                         ::testing::Values(FieldKind::kVm, FieldKind::kGrid),
+                         [](const auto& kind) { return base::name_of(kind.param); });
 
 // Parameters and moments: what a split did, a merge takes back.
 TEST_P(EachEditedField, MergingTheQuartersOfALeafRestoresIt) {
@@ -144,30 +146,30 @@ TEST_P(EachEditedField, LeavesThatAreNotEditedKeepTheirBits) {
 }
 
 TEST(MergedGrid, IsTheLeastSquaresFit) {
-  const auto quarters = four_quarters("grid", 1.0);
+  const auto quarters = four_quarters(FieldKind::kGrid, 1.0);
   const auto merged = copy_of(*quarters);
   merge_all(*merged);
-  const auto start = one_cell("grid", 9);
+  const auto start = one_cell(FieldKind::kGrid, 9);
   EXPECT_LT(misfit_slope(*merged, *quarters), 1e-4 * misfit_slope(*start, *quarters));
   EXPECT_GT(misfit(*merged, *quarters), 1.0) << "the quarters are no leaf's";
 }
 
 TEST(MergedFactors, AreAStationaryPoint) {
   for (const double noise : {0.2, 2.0}) {
-    const auto quarters = four_quarters("vm", noise);
+    const auto quarters = four_quarters(FieldKind::kVm, noise);
     const auto merged = copy_of(*quarters);
     merge_all(*merged);
-    const auto start = one_cell("vm", 9);
+    const auto start = one_cell(FieldKind::kVm, 9);
     EXPECT_LT(misfit_slope(*merged, *quarters), 0.03 * misfit_slope(*start, *quarters)) << noise;
     EXPECT_GT(misfit(*merged, *quarters), 1.0) << "the quarters are no leaf's";
   }
 }
 
 TEST(MergedFactors, FitBetterThanWhatTheQuartersCameFrom) {
-  const auto quarters = four_quarters("vm", 0.1);
+  const auto quarters = four_quarters(FieldKind::kVm, 0.1);
   const auto merged = copy_of(*quarters);
   merge_all(*merged);
-  const auto start = one_cell("vm", 1);  // what the quarters were before the noise
+  const auto start = one_cell(FieldKind::kVm, 1);  // what the quarters were before the noise
   EXPECT_LT(misfit(*merged, *quarters), misfit(*start, *quarters));
 }
 
@@ -219,7 +221,7 @@ TEST(FitFactors, TakesMoreRanksThanVertices) {
 
 // The quarters' own vertex values as a grid field, merged: the misfit that no leaf goes below.
 double least_misfit(const Field& quarters) {
-  const auto grid = make_field("grid", quarters.tree(), kThickness, quarters.shapes());
+  const auto grid = make_field(FieldKind::kGrid, quarters.tree(), kThickness, quarters.shapes());
   grid->bias = quarters.bias;
   std::vector<float> row(kShape.vertices_xz());
   for (int c = 0; c < 4; ++c) {
@@ -241,7 +243,7 @@ double least_misfit(const Field& quarters) {
 // Above the least misfit, from quarters that are akin and from some that are not.
 TEST(MergedFactors, AreNotWorseThanFromRandomStarts) {
   for (const double noise : {0.3, 2.0}) {
-    const auto quarters = four_quarters("vm", noise);
+    const auto quarters = four_quarters(FieldKind::kVm, noise);
     const auto merged = copy_of(*quarters);
     merge_all(*merged);
     const double found = misfit(*merged, *quarters) - least_misfit(*quarters);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "central_difference.h"
 #include "field/variation_planes.h"
 #include "random_arrays.h"
@@ -29,8 +30,7 @@ constexpr LeafShape kFine{.nx = 5, .ny = 4, .nz = 7, .rank_x = 3, .rank_y = 1, .
 constexpr LeafShape kCoarse{.nx = 3, .ny = 2, .nz = 4, .rank_x = 1, .rank_y = 2, .rank_z = 1};
 
 // A fine cell beside a coarse one, every parameter random.
-std::unique_ptr<Field> two_cells(const std::string& kind, float beta,
-                                 const LeafShape& fine = kFine) {
+std::unique_ptr<Field> two_cells(FieldKind kind, float beta, const LeafShape& fine = kFine) {
   const RootGrid roots{.x0 = -16, .y0 = 8, .cell_size = 64, .columns = 2, .rows = 1};
   auto field = make_field(kind, Quadtree(roots, {Region::kInterest, Region::kMargin}), kThickness,
                           {fine, kCoarse});
@@ -51,7 +51,7 @@ double vertex_value(const Field& field, int leaf, int x, int y, int z) {
       return static_cast<double>(factor[(i0 * n1 + i1) * n2 + i2]);
     };
   };
-  if (field.kind() == "grid") return take(s.nx, s.nz, s.ny)(x, z, y);
+  if (field.kind() == FieldKind::kGrid) return take(s.nx, s.nz, s.ny)(x, z, y);
   const auto vx = take(1, s.nx, s.rank_x), myz = take(s.nz, s.ny, s.rank_x);
   const auto vy = take(1, s.ny, s.rank_y), mxz = take(s.nx, s.nz, s.rank_y);
   const auto vz = take(1, s.nz, s.rank_z), mxy = take(s.nx, s.ny, s.rank_z);
@@ -125,9 +125,9 @@ std::array<double, kLanes> pixels_of(const Square& square) {
 
 using RowsOfLeaf = std::function<std::array<double, kLanes>(const Square&)>;
 
-class EachField : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, EachField, ::testing::Values("vm", "grid"),
-                         [](const auto& kind) { return std::string(kind.param); });
+class EachField : public ::testing::TestWithParam<FieldKind> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, EachField, ::testing::Values(FieldKind::kVm, FieldKind::kGrid),
+                         [](const auto& kind) { return base::name_of(kind.param); });
 
 TEST_P(EachField, SlabValuesAreEquation4) {
   const auto field = two_cells(GetParam(), 0.0f);
@@ -340,8 +340,8 @@ struct VariedArray {
   std::size_t size() const { return static_cast<std::size_t>(n[0] * n[1] * n[2] * channels); }
 };
 
-std::vector<VariedArray> varied_arrays(const std::string& kind, const LeafShape& s) {
-  if (kind == "grid") return {{{s.nx, s.nz, s.ny}, 1, 1.0}};
+std::vector<VariedArray> varied_arrays(FieldKind kind, const LeafShape& s) {
+  if (kind == FieldKind::kGrid) return {{{s.nx, s.nz, s.ny}, 1, 1.0}};
   constexpr double kAlpha = 0.1;  // eq. 5
   return {{{1, 1, s.nx}, s.rank_x, kAlpha}, {{1, s.nz, s.ny}, s.rank_x, 1.0},
           {{1, 1, s.ny}, s.rank_y, kAlpha}, {{1, s.nx, s.nz}, s.rank_y, 1.0},
@@ -438,12 +438,11 @@ TEST_P(EachField, InitialDensitiesAreThoseOfTheBias) {
   EXPECT_NE(field->density(3, 33, 17), expected);
 }
 
-TEST(Field, IsMadeByItsName) {
+TEST(Field, HasTheKindThatItWasMadeWith) {
   const RootGrid roots{.x0 = 0, .y0 = 0, .cell_size = 16, .columns = 1, .rows = 1};
   const Quadtree tree(roots, std::vector{Region::kInterest});
-  EXPECT_EQ(make_field("vm", tree, 8.0, {kFine})->kind(), "vm");
-  EXPECT_EQ(make_field("grid", tree, 8.0, {kFine})->kind(), "grid");
-  EXPECT_THROW(make_field("mesh", tree, 8.0, {kFine}), Error);
+  EXPECT_EQ(make_field(FieldKind::kVm, tree, 8.0, {kFine})->kind(), FieldKind::kVm);
+  EXPECT_EQ(make_field(FieldKind::kGrid, tree, 8.0, {kFine})->kind(), FieldKind::kGrid);
 }
 
 TEST(ArrayVariation, IsZeroButForEpsilonOnAConstant) {

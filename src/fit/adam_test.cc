@@ -19,7 +19,7 @@ std::unique_ptr<field::Field> small_field() {
   field::Quadtree tree(roots, std::vector<field::Region>(6, field::Region::kInterest));
   std::vector<field::LeafShape> shapes;
   for (int i = 0; i < 6; ++i) shapes.push_back({.nx = 2 + i, .ny = 3, .nz = 2});
-  auto field = field::make_field("grid", std::move(tree), 8.0, std::move(shapes));
+  auto field = field::make_field(FieldKind::kGrid, std::move(tree), 8.0, std::move(shapes));
   field->initialise(base::Random(1), 0.5);
   return field;
 }

@@ -16,9 +16,9 @@ using field::Region;
 
 std::unique_ptr<field::Field> four_leaves() {
   const field::RootGrid roots{.x0 = 0, .y0 = 0, .cell_size = 32, .columns = 2, .rows = 2};
-  auto field =
-      field::make_field("grid", field::Quadtree(roots, std::vector<Region>(4, Region::kInterest)),
-                        10.0, std::vector<LeafShape>(4, {.nx = 3, .ny = 3, .nz = 3}));
+  auto field = field::make_field(FieldKind::kGrid,
+                                 field::Quadtree(roots, std::vector<Region>(4, Region::kInterest)),
+                                 10.0, std::vector<LeafShape>(4, {.nx = 3, .ny = 3, .nz = 3}));
   field->initialise(base::Random(1), 1.0);
   return field;
 }

@@ -153,7 +153,7 @@ std::unique_ptr<field::Field> make_initial_field(const Domain& domain, double th
                                                  double mean_density, const FieldOptions& options,
                                                  std::uint64_t seed, const std::vector<int>& kept) {
   auto field = field::make_field(options.kind, domain.tree, thickness, domain.shapes);
-  const double beta = options.activation == "softplus" ? options.sharpness : 0.0;
+  const double beta = options.activation == Activation::kSoftplus ? options.sharpness : 0.0;
   field->activation.beta = static_cast<float>(beta);
   field->bias = static_cast<float>(bias_of_density(mean_density, beta));
   field->keep_only(kept);

@@ -27,7 +27,7 @@ constexpr std::uint64_t kOrderStream = 1000;
 constexpr std::uint64_t kDirectionStream = std::uint64_t{1} << 40;
 
 double variation_gain_of(const FitOptions& options, const measurement::Measurement& measurement) {
-  if (options.penalty != "concave") return 1.0;
+  if (options.penalty != Penalty::kConcave) return 1.0;
   return objective::gain_of_little_noise(objective::typical_noise(measurement.noise_sigma),
                                          measurement.contrast());
 }
@@ -42,7 +42,7 @@ objective::ObjectiveWeights objective_weights(const FitOptions& options,
                                               const measurement::Measurement& measurement,
                                               double noise) {
   const double gain = variation_gain_of(options, measurement);
-  const double tau = options.penalty == "concave"
+  const double tau = options.penalty == Penalty::kConcave
                          ? objective::concavity(options.concavity, measurement.noise_sigma)
                          : 0.0;
   objective::ObjectiveWeights weights;
@@ -67,8 +67,7 @@ objective::FourierPriorOptions fourier_options(const FitOptions& options, double
   objective::FourierPriorOptions fourier;
   fourier.weight = options.fourier / noise;
   fourier.seed = options.seed;
-  fourier.axes.reference = options.fourier_ring == "max" ? objective::RingReference::kMax
-                                                         : objective::RingReference::kMean;
+  fourier.axes.reference = options.fourier_ring;
   return fourier;
 }
 
@@ -87,11 +86,11 @@ std::vector<int> views_but(int num_views, const std::vector<int>& held_out) {
 }
 
 FitOptions with_at_most_one_subset_a_view(FitOptions options, int num_views) {
-  if (options.engine == "slab") options.subsets = std::min(options.subsets, num_views);
+  if (options.engine == Engine::kSlab) options.subsets = std::min(options.subsets, num_views);
   return options;
 }
 
-FieldOptions of_kind(FieldOptions options, const std::string& kind) {
+FieldOptions of_kind(FieldOptions options, FieldKind kind) {
   options.kind = kind;
   return options;
 }
@@ -112,7 +111,7 @@ constexpr double kOpenPart = 0.4;
 
 TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
                               const FitOptions& options, const Stage& first) {
-  if (field.tree == "uniform") return {};
+  if (field.tree == TreeKind::kUniform) return {};
   const auto levels = leaves_by_level(domain.tree);
   const auto num_leaves = std::accumulate(levels.begin(), levels.end(), std::int64_t{0});
   return {std::max(field.leaf_size / 2, static_cast<int>(kernels::kLanes)),
@@ -146,7 +145,7 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
       optimizer_(*field_, AdamOptions{}),
       fitted_views_(views_but(measurement.geometry.num_views(), measurement.held_out)),
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())) {
-  if (options_.coarse_epochs > 0 && stages_.front().bin == 1 && options_.engine == "slab")
+  if (options_.coarse_epochs > 0 && stages_.front().bin == 1 && options_.engine == Engine::kSlab)
     base::log_info(
         "no coarse stage: leaves of this --leaf-size do not end with slabs of coarse pixels");
   enter_stage();

@@ -1,4 +1,5 @@
 #include "fit/halo.h"
+#include "base/enum_names.h"
 
 #include <gtest/gtest.h>
 
@@ -76,7 +77,7 @@ TEST(Share, HaloLeavesTouchAcrossTheBoundary) {
 // the row beside it.
 TEST(Share, AFewParametersAreAllThatTheBoundaryNeeds) {
   const field::Quadtree tree = uneven_tree();
-  for (const std::string kind : {"vm", "grid"}) {
+  for (const FieldKind kind : {FieldKind::kVm, FieldKind::kGrid}) {
     for (const auto& [ny, pixel] : {std::pair(33, 1), {65, 1}, {17, 2}, {5, 2}, {2, 4}}) {
       const std::vector<field::LeafShape> shapes(
           static_cast<std::size_t>(tree.num_leaves()),
@@ -108,7 +109,8 @@ TEST(Share, AFewParametersAreAllThatTheBoundaryNeeds) {
           float seen = 0.0f, expected = 1.0f;
           part->point_densities(leaf, {{&x, 1}, {&y, 1}, {&z, 1}}, {&seen, 1});
           whole->point_densities(leaf, {{&x, 1}, {&y, 1}, {&z, 1}}, {&expected, 1});
-          EXPECT_EQ(seen, expected) << kind << " " << ny << " " << pixel << " " << at_end;
+          EXPECT_EQ(seen, expected)
+              << base::name_of(kind) << " " << ny << " " << pixel << " " << at_end;
         }
       }
     }
@@ -124,8 +126,8 @@ TEST(Share, WhatIsNotKeptStaysZeroAndTheRestIsTheSame) {
       shapes.size(), {.nx = 5, .ny = 7, .nz = 9, .rank_x = 2, .rank_y = 2, .rank_z = 2});
   const Range bands{1, 2};
   const std::vector<int> needed = needed_leaves(tree, bands);
-  const auto whole = field::make_field("vm", tree, 16.0, shapes);
-  const auto part = field::make_field("vm", tree, 16.0, shapes);
+  const auto whole = field::make_field(FieldKind::kVm, tree, 16.0, shapes);
+  const auto part = field::make_field(FieldKind::kVm, tree, 16.0, shapes);
   part->keep_only(needed);
   whole->initialise(base::Random(3), 0.5);
   part->initialise(base::Random(3), 0.5);

@@ -19,7 +19,8 @@ constexpr LeafShape kShape{.nx = 3, .ny = 3, .nz = 3};
 std::unique_ptr<field::Field> ramp_field() {
   const field::RootGrid roots{.x0 = 0, .y0 = 0, .cell_size = 32, .columns = 3, .rows = 1};
   auto field = field::make_field(
-      "grid", field::Quadtree(roots, {Region::kInterest, Region::kInterest, Region::kMargin}), 10.0,
+      FieldKind::kGrid,
+      field::Quadtree(roots, {Region::kInterest, Region::kInterest, Region::kMargin}), 10.0,
       {kShape, kShape, kShape});
   field->initialise(base::Random(1), 1.0);
   for (int leaf = 0; leaf < 2; ++leaf) {

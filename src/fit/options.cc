@@ -44,11 +44,8 @@ constexpr double kMost = 1e9;  // of a count
 std::vector<std::string> FieldOptions::faults() const {
   constexpr int kLargestLeaf = 4096;
   Faults faults;
-  faults.require_one_of("--field", kind, "vm", "grid");
-  faults.require_one_of("--activation", activation, "softplus", "identity");
-  faults.require_one_of("--tree", tree, "uniform", "adaptive");
   faults.require_between("--leaf-budget", leaf_budget, 0, kMost);
-  if (leaf_budget > 0 && tree == "uniform")
+  if (leaf_budget > 0 && tree == TreeKind::kUniform)
     faults.add("--leaf-budget is for --tree adaptive alone");
   if (leaf_size < base::kLanes || leaf_size > kLargestLeaf || leaf_size % base::kLanes != 0) {
     faults.add(fmt::format("--leaf-size must be a multiple of {} up to {}, not {}", base::kLanes,
@@ -67,12 +64,11 @@ std::vector<std::string> FitOptions::faults() const {
   Faults faults;
   faults.require_between("--epochs", epochs, 1, kMost);
   faults.require_between("--vertex-epochs", vertex_epochs, 0, kMost);
-  if (vertex_epochs > 0 && engine == "ray")
+  if (vertex_epochs > 0 && engine == Engine::kRay)
     faults.add("--vertex-epochs needs --engine slab: with rays factors are fitted from the start");
   faults.require_between("--coarse-epochs", coarse_epochs, 0, kMost);
   faults.require_between("--coarse-bin", coarse_bin, 2, 64);
   faults.require_between("--subsets", subsets, 1, kMost);
-  faults.require_one_of("--engine", engine, "slab", "ray");
   faults.require_between("--ray-samples", ray_samples, 0, 1 << 20);
   faults.require_between("--rays-per-step", static_cast<double>(rays_per_step), 0, kMost);
   faults.require_positive("--learning-rate", learning_rate);
@@ -82,13 +78,11 @@ std::vector<std::string> FitOptions::faults() const {
   faults.require_between("--early-stop", patience, 0, kMost);
   if (patience > 0 && hold_out == 0)
     faults.add("--early-stop watches views that --hold-out keeps from the fit: give that as well");
-  if (hold_out > 0 && engine == "ray")
+  if (hold_out > 0 && engine == Engine::kRay)
     faults.add("--hold-out predicts aligned views: it needs --engine slab");
   faults.require_not_negative("--tv-factors", factor_variation);
   faults.require_not_negative("--bcc", boundary);
   faults.require_not_negative("--ifp", fourier);
-  faults.require_one_of("--ifp-ring", fourier_ring, "mean", "max");
-  faults.require_one_of("--tv-penalty", penalty, "concave", "smooth");
   faults.require_positive("the concavity", concavity);
   faults.require_positive("the gradient floor", gradient_floor);
   return faults.take();

@@ -15,8 +15,8 @@ constexpr double kVertexCost = 0.4;
 // adaptive tree has one: its structure is open in the first stage, where that should see most.
 std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
   std::vector<int> bins;
-  if (fit.engine != "slab") return bins;
-  const bool is_adaptive = field.tree == "adaptive";
+  if (fit.engine != Engine::kSlab) return bins;
+  const bool is_adaptive = field.tree == TreeKind::kAdaptive;
   const bool may_halve = is_adaptive && field.leaf_size % (2 * base::kLanes) == 0;
   const int smallest_leaf = may_halve ? field.leaf_size / 2 : field.leaf_size;
   const int most = is_adaptive ? std::min(fit.coarse_bin, 2) : fit.coarse_bin;
@@ -37,7 +37,9 @@ int Schedule::coarse_epochs_of(int fine) const {
 }
 
 bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit) {
-  if (field.kind != "vm" || field.tree != "uniform" || fit.engine != "slab") return false;
+  if (field.kind != FieldKind::kVm || field.tree != TreeKind::kUniform ||
+      fit.engine != Engine::kSlab)
+    return false;
   const double side = field.leaf_size / field.vertex_spacing;
   const double left = side + 1 - field.rank;  // of x and y each, for vectors along z
   const double margin_side = (field.leaf_size << field.depth) / field.margin_spacing;
@@ -47,7 +49,7 @@ bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit) {
 
 Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit) {
   Schedule schedule{fit.vertex_epochs > 0 ? 10 : 30, 0.05};
-  if (field.kind == "grid") schedule = {10, 0.035};
+  if (field.kind == FieldKind::kGrid) schedule = {10, 0.035};
   const std::vector<int> bins = coarse_bins(field, fit);
   if (!bins.empty() && field.finest_spacing() >= bins.front()) schedule.epochs = 5;
   return schedule;
@@ -56,7 +58,7 @@ Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit) {
 std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit) {
   const std::vector<int> bins = coarse_bins(field, fit);
   const bool has_vertices = fit.vertex_epochs > 0;
-  const std::string first_kind = has_vertices ? "grid" : field.kind;
+  const FieldKind first_kind = has_vertices ? FieldKind::kGrid : field.kind;
   const double rate = fit.learning_rate * (has_vertices ? fit.vertex_rate : 1.0);
   const double cost = has_vertices ? kVertexCost : 1.0;
   std::vector<Stage> stages;

@@ -13,7 +13,7 @@ namespace tomofield::fit {
 /// bin 1 and the kind of field that was asked for; those before it may have plain vertices for
 /// factors.
 struct Stage {
-  std::string field_kind = {};
+  FieldKind field_kind = FieldKind::kVm;
   int bin = 1;
   std::int64_t first_epoch = 0;
   int epochs = 0;

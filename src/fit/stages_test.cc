@@ -1,4 +1,5 @@
 #include "fit/stages.h"
+#include "base/enum_names.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +9,7 @@
 namespace tomofield::fit {
 namespace {
 
-int coarsest_bin(int leaf_size, const std::string& tree, int most,
-                 const std::string& engine = "slab") {
+int coarsest_bin(int leaf_size, TreeKind tree, int most, Engine engine = Engine::kSlab) {
   FieldOptions field;
   field.leaf_size = leaf_size;
   field.tree = tree;
@@ -21,16 +21,16 @@ int coarsest_bin(int leaf_size, const std::string& tree, int most,
 }
 
 TEST(Stages, NoSlabOfCoarsePixelsStraddlesLeaves) {
-  EXPECT_EQ(coarsest_bin(32, "uniform", 2), 2);
-  EXPECT_EQ(coarsest_bin(32, "uniform", 8), 2);
-  EXPECT_EQ(coarsest_bin(128, "uniform", 8), 8);
-  EXPECT_EQ(coarsest_bin(128, "uniform", 7), 4);
-  EXPECT_EQ(coarsest_bin(48, "uniform", 8), 1);
-  EXPECT_EQ(coarsest_bin(16, "uniform", 8), 1);
-  EXPECT_EQ(coarsest_bin(64, "adaptive", 8), 2);  // a leaf may become one of 32 px
-  EXPECT_EQ(coarsest_bin(256, "adaptive", 8), 2);
-  EXPECT_EQ(coarsest_bin(32, "adaptive", 8), 1);
-  EXPECT_EQ(coarsest_bin(128, "uniform", 8, "ray"), 1);
+  EXPECT_EQ(coarsest_bin(32, TreeKind::kUniform, 2), 2);
+  EXPECT_EQ(coarsest_bin(32, TreeKind::kUniform, 8), 2);
+  EXPECT_EQ(coarsest_bin(128, TreeKind::kUniform, 8), 8);
+  EXPECT_EQ(coarsest_bin(128, TreeKind::kUniform, 7), 4);
+  EXPECT_EQ(coarsest_bin(48, TreeKind::kUniform, 8), 1);
+  EXPECT_EQ(coarsest_bin(16, TreeKind::kUniform, 8), 1);
+  EXPECT_EQ(coarsest_bin(64, TreeKind::kAdaptive, 8), 2);  // a leaf may become one of 32 px
+  EXPECT_EQ(coarsest_bin(256, TreeKind::kAdaptive, 8), 2);
+  EXPECT_EQ(coarsest_bin(32, TreeKind::kAdaptive, 8), 1);
+  EXPECT_EQ(coarsest_bin(128, TreeKind::kUniform, 8, Engine::kRay), 1);
 }
 
 TEST(Stages, FollowOneAnother) {
@@ -97,7 +97,8 @@ TEST(Stages, FactorsMayBeginAsPlainVertices) {
   fit.epochs = 3;
   const auto stages = make_stages(factors(64, 40), fit);
   ASSERT_EQ(stages.size(), 4u);
-  const std::vector<std::string> kinds{"grid", "grid", "grid", "vm"};
+  const std::vector<FieldKind> kinds{FieldKind::kGrid, FieldKind::kGrid, FieldKind::kGrid,
+                                     FieldKind::kVm};
   const std::vector<int> bins{4, 2, 1, 1}, epochs{3, 3, 4, 3};
   std::int64_t first_epoch = 0;
   for (std::size_t s = 0; s < 4; ++s) {
@@ -117,7 +118,8 @@ TEST(Stages, FactorsMayBeginAsPlainVertices) {
   EXPECT_LT(stages[2].step_cost, stages[3].step_cost);
   EXPECT_DOUBLE_EQ(8 * stages[1].step_cost, stages[2].step_cost);
   fit.vertex_epochs = 0;
-  for (const Stage& stage : make_stages(factors(64, 40), fit)) EXPECT_EQ(stage.field_kind, "vm");
+  for (const Stage& stage : make_stages(factors(64, 40), fit))
+    EXPECT_EQ(stage.field_kind, FieldKind::kVm);
 }
 
 TEST(Stages, FactorsBeginAsVerticesWhereTheseAreNoMore) {
@@ -139,13 +141,13 @@ TEST(Stages, FactorsBeginAsVerticesWhereTheseAreNoMore) {
   dense_margin.with_margin = false;
   EXPECT_TRUE(begins_with_vertices(dense_margin, slabs));
   FieldOptions other = factors(32, 24);
-  other.tree = "adaptive";
+  other.tree = TreeKind::kAdaptive;
   EXPECT_FALSE(begins_with_vertices(other, slabs));
   other = factors(32, 24);
-  other.kind = "grid";
+  other.kind = FieldKind::kGrid;
   EXPECT_FALSE(begins_with_vertices(other, slabs));
   FitOptions rays;
-  rays.engine = "ray";
+  rays.engine = Engine::kRay;
   EXPECT_FALSE(begins_with_vertices(factors(32, 24), rays));
 }
 
@@ -161,8 +163,8 @@ TEST(Stages, FactorsThatBeginAsVerticesTakeAThirdOfTheEpochs) {
   EXPECT_EQ(usual.vertex_epochs_of(50), usual.epochs);
 }
 
-Schedule usual(const std::string& kind, double spacing, int coarse_epochs = 1,
-               const std::string& tree = "uniform") {
+Schedule usual(FieldKind kind, double spacing, int coarse_epochs = 1,
+               TreeKind tree = TreeKind::kUniform) {
   FieldOptions field;
   field.leaf_size = 128;
   field.kind = kind;
@@ -174,18 +176,21 @@ Schedule usual(const std::string& kind, double spacing, int coarse_epochs = 1,
 }
 
 TEST(Stages, FullResolutionIsShortIfTheCoarseOneHasAllVertices) {
-  for (const std::string kind : {"vm", "grid"}) {
-    EXPECT_EQ(usual(kind, 1.9).epochs, usual(kind, 1.0).epochs) << kind;
-    EXPECT_LT(usual(kind, 2.0).epochs, usual(kind, 1.0).epochs) << kind;
-    EXPECT_EQ(usual(kind, 2.0, 0).epochs, usual(kind, 1.0).epochs) << kind << ", no coarse stage";
+  for (const FieldKind kind : {FieldKind::kVm, FieldKind::kGrid}) {
+    EXPECT_EQ(usual(kind, 1.9).epochs, usual(kind, 1.0).epochs) << base::name_of(kind);
+    EXPECT_LT(usual(kind, 2.0).epochs, usual(kind, 1.0).epochs) << base::name_of(kind);
+    EXPECT_EQ(usual(kind, 2.0, 0).epochs, usual(kind, 1.0).epochs)
+        << base::name_of(kind) << ", no coarse stage";
   }
-  EXPECT_EQ(usual("vm", 2.0, 1, "adaptive").epochs, usual("vm", 1.0).epochs);
-  EXPECT_LT(usual("vm", 4.0, 1, "adaptive").epochs, usual("vm", 1.0).epochs);
-  EXPECT_LT(usual("grid", 1.0).epochs, usual("vm", 1.0).epochs);
-  EXPECT_EQ(usual("vm", 1.0).coarse_epochs_of(30), 80);
-  EXPECT_EQ(usual("vm", 1.0).coarse_epochs_of(15), 40);
-  EXPECT_EQ(usual("vm", 2.0).coarse_epochs_of(5), 80);
-  EXPECT_EQ(usual("vm", 2.0).coarse_epochs_of(30), 80);
+  EXPECT_EQ(usual(FieldKind::kVm, 2.0, 1, TreeKind::kAdaptive).epochs,
+            usual(FieldKind::kVm, 1.0).epochs);
+  EXPECT_LT(usual(FieldKind::kVm, 4.0, 1, TreeKind::kAdaptive).epochs,
+            usual(FieldKind::kVm, 1.0).epochs);
+  EXPECT_LT(usual(FieldKind::kGrid, 1.0).epochs, usual(FieldKind::kVm, 1.0).epochs);
+  EXPECT_EQ(usual(FieldKind::kVm, 1.0).coarse_epochs_of(30), 80);
+  EXPECT_EQ(usual(FieldKind::kVm, 1.0).coarse_epochs_of(15), 40);
+  EXPECT_EQ(usual(FieldKind::kVm, 2.0).coarse_epochs_of(5), 80);
+  EXPECT_EQ(usual(FieldKind::kVm, 2.0).coarse_epochs_of(30), 80);
 }
 
 }  // namespace

@@ -3,13 +3,9 @@
 #include <span>
 #include <vector>
 
-namespace tomofield::objective {
+#include "tomofield/options.h"
 
-/// What the axis lines of a slice's spectrum are compared with.
-enum class RingReference {
-  kMean,  ///< the mean amplitude of the ring of the same frequency: what stands out is a streak
-  kMax    ///< the ring's largest amplitude, as eq. 7 writes it
-};
+namespace tomofield::objective {
 
 struct AxisPenaltyOptions {
   RingReference reference = RingReference::kMean;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "central_difference.h"
 #include "random_arrays.h"
 
@@ -30,7 +31,7 @@ Quadtree uneven_tree() {
   return tree;
 }
 
-std::unique_ptr<field::Field> uneven_field(const std::string& kind) {
+std::unique_ptr<field::Field> uneven_field(FieldKind kind) {
   const Quadtree tree = uneven_tree();
   std::vector<LeafShape> shapes;
   for (int leaf = 0; leaf < tree.num_leaves(); ++leaf) {
@@ -82,9 +83,10 @@ TEST(SharedFaces, AreTheSidesBetweenNeighbours) {
   }
 }
 
-class EachBoundaryField : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, EachBoundaryField, ::testing::Values("vm", "grid"),
-                         [](const auto& kind) { return std::string(kind.param); });
+class EachBoundaryField : public ::testing::TestWithParam<FieldKind> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, EachBoundaryField,
+                         ::testing::Values(FieldKind::kVm, FieldKind::kGrid),
+                         [](const auto& kind) { return base::name_of(kind.param); });
 
 constexpr BoundaryOptions kOptions{.weight = 0.7, .spacing = 5.0, .epsilon = 0.02, .seed = 9};
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "base/parallel.h"
 #include "random_arrays.h"
 
@@ -20,7 +21,7 @@ using field::Region;
 constexpr geometry::Roi kRoi{.x0 = 4, .y0 = 16, .x1 = 118, .y1 = 106};
 
 // A margin cell, and leaves of 64 and 32 px over the region.
-std::unique_ptr<field::Field> uneven_field(const std::string& kind) {
+std::unique_ptr<field::Field> uneven_field(FieldKind kind) {
   const field::RootGrid roots{.x0 = -64, .y0 = 16, .cell_size = 64, .columns = 3, .rows = 2};
   std::vector<Region> regions(6, Region::kInterest);
   regions[0] = regions[3] = Region::kMargin;
@@ -44,9 +45,10 @@ FourierPriorOptions some_options() {
   return options;
 }
 
-class EachFourierField : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, EachFourierField, ::testing::Values("vm", "grid"),
-                         [](const auto& kind) { return std::string(kind.param); });
+class EachFourierField : public ::testing::TestWithParam<FieldKind> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, EachFourierField,
+                         ::testing::Values(FieldKind::kVm, FieldKind::kGrid),
+                         [](const auto& kind) { return base::name_of(kind.param); });
 
 // Stripes along y: all vertices of an x hold the same value.
 void make_stripes(field::Field& field) {
@@ -54,7 +56,7 @@ void make_stripes(field::Field& field) {
   for (int leaf = 0; leaf < field.tree().num_leaves(); ++leaf) {
     const LeafShape& s = field.shape(leaf);
     float* p = field.parameters().data() + field.offset(leaf);
-    const bool is_vm = field.kind() == "vm";
+    const bool is_vm = field.kind() == FieldKind::kVm;
     const int a_vertex = is_vm ? s.rank_x : s.nz * s.ny;
     for (int x = 0; x < s.nx; ++x)
       std::fill_n(p + x * a_vertex, a_vertex, x % 3 == 0 ? 0.4f : 0.0f);

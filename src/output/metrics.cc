@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "base/parallel.h"
 #include "output/mask_metrics.h"
 
@@ -29,7 +30,7 @@ nlohmann::json tree_json(const fit::TreeProgress& tree) {
 nlohmann::json stages_json(const std::vector<fit::Stage>& stages) {
   nlohmann::json list = nlohmann::json::array();
   for (const fit::Stage& s : stages)
-    list.push_back({{"field", s.field_kind},
+    list.push_back({{"field", base::name_of(s.field_kind)},
                     {"bin", s.bin},
                     {"first_epoch", s.first_epoch},
                     {"epochs", s.epochs}});

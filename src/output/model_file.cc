@@ -8,6 +8,7 @@
 #include <new>
 #include <utility>
 
+#include "base/enum_names.h"
 #include "io/atomic_file.h"
 #include "io/hdf5_file.h"
 #include "tomofield/error.h"
@@ -114,7 +115,7 @@ class KeptCopy {
 };
 
 void write_field(Hdf5Group group, const field::Field& field, const FloatSource& parameters) {
-  group.write_text("kind", field.kind());
+  group.write_text("kind", base::name_of(field.kind()));
   group.write_number("thickness", field.thickness());
   group.write_number("bias", static_cast<double>(field.bias));
   group.write_number("softplus_beta", static_cast<double>(field.activation.beta));
@@ -284,10 +285,11 @@ class ModelReader {
     try {
       field::Quadtree tree = read_tree(group.group("tree"));
       auto shapes = read_shapes(group.group("leaves"), tree.num_leaves());
-      const std::string kind = group.text("kind");
-      require(field::count_parameters(kind, shapes) <= group.array_size("parameters"),
+      const auto kind = base::enum_named<FieldKind>(group.text("kind"));
+      require(kind.has_value(), "there is no such kind of field");
+      require(field::count_parameters(*kind, shapes) <= group.array_size("parameters"),
               "its leaves need more parameters than it holds");
-      field = field::make_field(kind, std::move(tree), thickness, std::move(shapes));
+      field = field::make_field(*kind, std::move(tree), thickness, std::move(shapes));
     } catch (const std::bad_alloc&) {
       throw Error(fmt::format("'{}' holds {} parameters, more than there is memory for", path_,
                               group.array_size("parameters")));

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "base/random.h"
 #include "io/hdf5_file.h"
 #include "python_script.h"
@@ -84,9 +85,9 @@ void expect_refusal(const std::filesystem::path& path, const std::string& fact) 
 
 TEST(ModelFile, ComesBackBitForBit) {
   const ScratchDirectory scratch;
-  for (const char* kind : {"vm", "grid"}) {
+  for (const FieldKind kind : {FieldKind::kVm, FieldKind::kGrid}) {
     Model model = uneven_model(kind);
-    model.is_dark = kind[0] == 'v';
+    model.is_dark = kind == FieldKind::kVm;
     const TrainingState state = some_state();
     save_model(scratch / "model.h5", model, &state);
     TrainingState loaded_state;
@@ -101,7 +102,7 @@ TEST(ModelFile, ComesBackBitForBit) {
 
 TEST(ModelFile, SomeLeavesComeBackWithTheirMoments) {
   const ScratchDirectory scratch;
-  const Model model = uneven_model("vm");
+  const Model model = uneven_model(FieldKind::kVm);
   const field::Field& field = *model.field;
   std::vector<float> moments(field.num_parameters());
   for (std::size_t i = 0; i < moments.size(); ++i) moments[i] = static_cast<float>(i) + 0.5f;
@@ -144,7 +145,7 @@ TEST(ModelFile, SomeLeavesComeBackWithTheirMoments) {
 
 TEST(ModelFile, WithoutTrainingStateGivesAnEmptyOne) {
   const ScratchDirectory scratch;
-  save_model(scratch / "model.h5", uneven_model("vm"));
+  save_model(scratch / "model.h5", uneven_model(FieldKind::kVm));
   TrainingState state = some_state();
   load_model(scratch / "model.h5", &state);
   EXPECT_EQ(state, TrainingState{});
@@ -152,7 +153,7 @@ TEST(ModelFile, WithoutTrainingStateGivesAnEmptyOne) {
 
 TEST(ModelFile, HoldsTextsOfAnyLength) {
   const ScratchDirectory scratch;
-  Model model = uneven_model("grid");
+  Model model = uneven_model(FieldKind::kGrid);
   model.options_json = "{\"list\": \"" + std::string(200000, 'x') + "\"}";
   save_model(scratch / "model.h5", model);
   EXPECT_EQ(load_model(scratch / "model.h5").options_json, model.options_json);
@@ -161,8 +162,8 @@ TEST(ModelFile, HoldsTextsOfAnyLength) {
 TEST(ModelFile, TheSameModelIsTheSameBytes) {
   const ScratchDirectory scratch;
   const TrainingState state = some_state();
-  save_model(scratch / "a.h5", uneven_model("vm"), &state);
-  save_model(scratch / "b.h5", uneven_model("vm"), &state);
+  save_model(scratch / "a.h5", uneven_model(FieldKind::kVm), &state);
+  save_model(scratch / "b.h5", uneven_model(FieldKind::kVm), &state);
   EXPECT_TRUE(read_whole_file(scratch / "a.h5") == read_whole_file(scratch / "b.h5"));
 }
 
@@ -184,7 +185,7 @@ bool is_refused(const std::filesystem::path& path, const Model& model, const Tra
 
 TEST(ModelFile, IsRefusedWhereverItIsCutOff) {
   const ScratchDirectory scratch;
-  const Model model = uneven_model("grid");
+  const Model model = uneven_model(FieldKind::kGrid);
   TrainingState state;
   state.floats["m"] = std::vector<float>(500, 1.0f);
   save_model(scratch / "whole.h5", model, &state);
@@ -206,7 +207,7 @@ TEST(ModelFile, IsRefusedWhereverItIsCutOff) {
 
 TEST(ModelFile, AChangedByteIsFoundOrMeansNothing) {
   const ScratchDirectory scratch;
-  const Model model = uneven_model("grid");
+  const Model model = uneven_model(FieldKind::kGrid);
   TrainingState state;
   state.doubles["loss"] = {0.25, 0.125};
   save_model(scratch / "whole.h5", model, &state);
@@ -287,7 +288,7 @@ def edit(number, change):
 TEST(ModelFile, RefusesWhatIsConsistentHdf5ButNoSoundModel) {
   if (!python_has("h5py,numpy")) GTEST_SKIP() << "python3-h5py is not installed";
   const ScratchDirectory scratch;
-  save_model(scratch / "model.h5", uneven_model("vm"));
+  save_model(scratch / "model.h5", uneven_model(FieldKind::kVm));
   struct Damage {
     const char* change;
     const char* fact;
@@ -326,15 +327,15 @@ TEST(ModelFile, RefusesWhatIsConsistentHdf5ButNoSoundModel) {
 
 TEST(ModelFile, ReplacesAModelAsAWholeOrNotAtAll) {
   const ScratchDirectory scratch;
-  save_model(scratch / "model.h5", uneven_model("vm"));
-  Model diverged = uneven_model("vm");
+  save_model(scratch / "model.h5", uneven_model(FieldKind::kVm));
+  Model diverged = uneven_model(FieldKind::kVm);
   diverged.field->parameters()[7] = std::nanf("");
   const std::string message =
       message_of<Error>([&] { save_model(scratch / "model.h5", diverged); });
   EXPECT_NE(message.find("diverged"), std::string::npos) << message;
-  expect_same(load_model(scratch / "model.h5"), uneven_model("vm"));
-  save_model(scratch / "model.h5", uneven_model("grid"));
-  EXPECT_EQ(load_model(scratch / "model.h5").field->kind(), "grid");
+  expect_same(load_model(scratch / "model.h5"), uneven_model(FieldKind::kVm));
+  save_model(scratch / "model.h5", uneven_model(FieldKind::kGrid));
+  EXPECT_EQ(load_model(scratch / "model.h5").field->kind(), FieldKind::kGrid);
   EXPECT_EQ(scratch.num_files(), 1u) << "temporary files are left";
   EXPECT_THROW(save_model(scratch / "nowhere" / "model.h5", diverged), Error);
 }
@@ -344,7 +345,7 @@ TEST(ModelFile, ReplacesAModelAsAWholeOrNotAtAll) {
 TEST(ModelFile, IsReadByH5py) {
   if (!python_has("h5py,numpy")) GTEST_SKIP() << "python3-h5py is not installed";
   const ScratchDirectory scratch;
-  for (const char* kind : {"vm", "grid"}) {
+  for (const FieldKind kind : {FieldKind::kVm, FieldKind::kGrid}) {
     const Model model = uneven_model(kind);
     const TrainingState state = some_state();
     save_model(scratch / "model.h5", model, &state);
@@ -400,7 +401,7 @@ expected = float.fromhex(open('expected.txt').read())
 assert abs(density - expected) < 1e-6, (density, expected)
 )"),
               "")
-        << kind;
+        << base::name_of(kind);
   }
 }
 

@@ -10,13 +10,9 @@
 #include "field/sampling/sample_box.h"
 #include "io/mrc.h"
 #include "output/model_file.h"
+#include "tomofield/options.h"
 
 namespace tomofield::output {
-
-/// Order of the axes in the file: kXyz has sections along Z; kXzy has sections
-/// along Y and rows along −Z, as IMOD's tilt writes, so that its rotation about X
-/// (trimvol -rx: z = rows − 1 − row) gives kXyz without mirroring.
-enum class VolumeAxes { kXyz, kXzy };
 
 struct VolumeOptions {
   std::optional<field::Box> box;             ///< default: the region of interest, one voxel a pixel

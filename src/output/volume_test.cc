@@ -39,7 +39,7 @@ Written read(const std::filesystem::path& path) {
 
 TEST(WriteVolume, WritesTheRegionOfInterestInTheInputsUnits) {
   const ScratchDirectory scratch;
-  const auto model = uneven_model("vm");
+  const auto model = uneven_model(FieldKind::kVm);
   write_volume(model, {}, scratch / "out.mrc");
   const Written out = read(scratch / "out.mrc");
   EXPECT_EQ(out.header.nx, 100);
@@ -55,7 +55,7 @@ TEST(WriteVolume, WritesTheRegionOfInterestInTheInputsUnits) {
 
 TEST(WriteVolume, KeepsOrInvertsTheContrastOfTheInput) {
   const ScratchDirectory scratch;
-  auto model = uneven_model("grid");
+  auto model = uneven_model(FieldKind::kGrid);
   for (const bool is_dark : {false, true}) {
     for (const bool invert : {false, true}) {
       model.is_dark = is_dark;
@@ -72,7 +72,7 @@ TEST(WriteVolume, KeepsOrInvertsTheContrastOfTheInput) {
 // trimvol -rx turns sections along Y into sections along Z: z = rows − 1 − row.
 TEST(WriteVolume, AxesXzyTurnBackByImodsRotation) {
   const ScratchDirectory scratch;
-  const auto model = uneven_model("vm");
+  const auto model = uneven_model(FieldKind::kVm);
   VolumeOptions options;
   options.box = field::Box{.centre_px = {31.0, 44.0, 9.5}, .size = {30, 21, 15}, .voxel_px = 1.0};
   write_volume(model, options, scratch / "xyz.mrc");
@@ -95,7 +95,7 @@ TEST(WriteVolume, AxesXzyTurnBackByImodsRotation) {
 
 TEST(WriteVolume, ScalesIntegersAndSaysSo) {
   const ScratchDirectory scratch;
-  const auto model = uneven_model("vm");
+  const auto model = uneven_model(FieldKind::kVm);
   VolumeOptions options;
   write_volume(model, options, scratch / "float.mrc");
   options.mode = io::MrcMode::kInt16;
@@ -118,7 +118,7 @@ TEST(WriteVolume, ScalesIntegersAndSaysSo) {
 
 TEST(WriteVolume, RefusesWhatCannotBeWritten) {
   const ScratchDirectory scratch;
-  const auto model = uneven_model("vm");
+  const auto model = uneven_model(FieldKind::kVm);
   VolumeOptions options;
   EXPECT_NE(message_of<Error>([&] { write_volume(model, options, scratch / "no" / "out.mrc"); }),
             "");
@@ -132,7 +132,7 @@ TEST(WriteVolume, RefusesWhatCannotBeWritten) {
 // CONVENTIONS: p = Ry(tilt) Rx(alpha) (P − C): a point P of the specimen lies at
 // C + Rx(alpha) (P − C) in the field, wherever the region of interest is.
 TEST(WriteVolume, TurnsTheSpecimenBackByItsXTilt) {
-  auto model = uneven_model("vm");
+  auto model = uneven_model(FieldKind::kVm);
   const field::Box straight = region_box(model, 1.0);
   model.x_tilt_deg = 30.0;
   const double c = std::cos(M_PI / 6), s = std::sin(M_PI / 6);

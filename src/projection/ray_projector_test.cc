@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "base/parallel.h"
 #include "base/random.h"
 #include "central_difference.h"
@@ -60,13 +61,13 @@ std::vector<Ray> some_rays(const RayGeometry& g, int count, std::uint64_t seed) 
   return rays;
 }
 
-class EachRayField : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, EachRayField, ::testing::Values("vm", "grid"),
-                         [](const auto& kind) { return std::string(kind.param); });
+class EachRayField : public ::testing::TestWithParam<FieldKind> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, EachRayField, ::testing::Values(FieldKind::kVm, FieldKind::kGrid),
+                         [](const auto& kind) { return base::name_of(kind.param); });
 
 // The leaf that holds each point of a ray, found point by point.
 TEST(LeafCrossings, AreWhereTheTreeSaysThatPointsAre) {
-  const auto model = testing::uneven_model("grid");
+  const auto model = testing::uneven_model(FieldKind::kGrid);
   const field::Quadtree& tree = model.field->tree();
   const RayGeometry g = turned_geometry(model.field->thickness());
   for (const Ray& ray : some_rays(g, 300, 5)) {
@@ -104,7 +105,7 @@ TEST(RayProjector, ConstantSlabsHaveTheirPathLengths) {
   tree.split(4);
   const std::vector<field::LeafShape> shapes(static_cast<std::size_t>(tree.num_leaves()),
                                              {.nx = 4, .ny = 3, .nz = 5});
-  const auto field = make_field("grid", tree, kThickness, shapes);
+  const auto field = make_field(FieldKind::kGrid, tree, kThickness, shapes);
   field->bias = 0.7f;
   for (const int samples : {1, 7, 40}) {
     const RayProjector projector(g, *field, kEverywhere, samples);
@@ -128,7 +129,7 @@ TEST(RayProjector, SupportCutsRays) {
   const RayGeometry g = plain_geometry(64, 32, kThickness, {0, 63.43, -70});
   const field::Quadtree tree({.x0 = 0, .y0 = 0, .cell_size = 64, .columns = 1, .rows = 1},
                              {field::Region::kInterest});
-  const auto field = make_field("grid", tree, kThickness, {{.nx = 2, .ny = 2, .nz = 2}});
+  const auto field = make_field(FieldKind::kGrid, tree, kThickness, {{.nx = 2, .ny = 2, .nz = 2}});
   field->bias = 1.0f;
   const Extent2 box{10, 4, 50, 30};
   const RayProjector projector(g, *field, box, 10);
@@ -211,7 +212,7 @@ TEST_P(EachRayField, DrawsDifferAndAverageToTheIntegral) {
 // ⟨A f, r⟩ = ⟨f, Aᵀ r⟩ for the linear part: no activation, no bias; the vertices
 // of a grid field are f themselves.
 TEST(RayProjector, DotProductsAgree) {
-  const auto model = testing::uneven_model("grid");
+  const auto model = testing::uneven_model(FieldKind::kGrid);
   field::Field& field = *model.field;
   field.activation = {};
   field.bias = 0.0f;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "central_difference.h"
 #include "kernels/lanes.h"
 #include "random_arrays.h"
@@ -24,7 +25,7 @@ constexpr std::int64_t kRows = 90;  // the last slab has 10
 
 // Margin cells of 64 px on both sides of leaves of 64, 32 and 16 px, with
 // different numbers of vertices. With `pixel` 2, the smallest are of 32 px.
-std::unique_ptr<field::Field> uneven_field(const std::string& kind, int pixel = 1) {
+std::unique_ptr<field::Field> uneven_field(FieldKind kind, int pixel = 1) {
   using enum Region;
   const field::RootGrid roots{.x0 = -64, .y0 = kFirstRow, .cell_size = 64, .columns = 4, .rows = 2};
   field::Quadtree tree(roots, {kMargin, kInterest, kInterest, kMargin,  //
@@ -79,9 +80,10 @@ void for_each_sample(const SampleGrid& grid, int slab, Visit&& visit, int pixel 
   }
 }
 
-class EachSampledField : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, EachSampledField, ::testing::Values("vm", "grid"),
-                         [](const auto& kind) { return std::string(kind.param); });
+class EachSampledField : public ::testing::TestWithParam<FieldKind> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, EachSampledField,
+                         ::testing::Values(FieldKind::kVm, FieldKind::kGrid),
+                         [](const auto& kind) { return base::name_of(kind.param); });
 
 TEST_P(EachSampledField, DecodesTheDensityAtEverySample) {
   const auto field = uneven_field(GetParam());
@@ -204,7 +206,7 @@ TEST_P(EachSampledField, DecodedRowIsALaneOfTheSlab) {
 }
 
 TEST(SlabSampler, SlabsAndBandsCoverTheRows) {
-  const auto field = uneven_field("grid");
+  const auto field = uneven_field(FieldKind::kGrid);
   const SlabSampler sampler(*field, uneven_grid(), kFirstRow, kRows);
   EXPECT_EQ(sampler.rows_in_slab(0), 16);
   EXPECT_EQ(sampler.rows_in_slab(5), 10);

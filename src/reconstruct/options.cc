@@ -21,19 +21,20 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
 int ReconstructOptions::num_trials(int num_fitted_views) const {
   constexpr int kFewestViews = 14;
   if (tune)
-    return selection::expected_trials({.penalty = choose_penalty, .rank = field.kind == "vm"});
-  return choose_penalty && fit.engine == "slab" && num_fitted_views >= kFewestViews ? 2 : 0;
+    return selection::expected_trials(
+        {.penalty = choose_penalty, .rank = field.kind == FieldKind::kVm});
+  return choose_penalty && fit.engine == Engine::kSlab && num_fitted_views >= kFewestViews ? 2 : 0;
 }
 
 std::vector<std::string> ReconstructOptions::faults() const {
   std::vector<std::string> all = specimen.faults();
   for (const auto& faults : {field.faults(), fit.faults()})
     all.insert(all.end(), faults.begin(), faults.end());
-  if (fit.vertex_epochs > 0 && (field.kind != "vm" || field.tree != "uniform"))
+  if (fit.vertex_epochs > 0 && (field.kind != FieldKind::kVm || field.tree != TreeKind::kUniform))
     all.emplace_back(
         "--vertex-epochs is for the factors of a uniform tree: leave it out, or give --field vm "
         "and --tree uniform");
-  if (tune && fit.engine == "ray")
+  if (tune && fit.engine == Engine::kRay)
     all.emplace_back("--tune predicts aligned views: it needs --engine slab");
   if (tune && fit.patience > 0)
     all.emplace_back("--tune chooses the number of epochs: leave --early-stop out");
@@ -49,8 +50,8 @@ std::vector<std::string> ReconstructOptions::faults_of_job() const {
     all.push_back(fmt::format(
         "several processes cannot share {} yet: start one, with more --threads", option));
   };
-  if (field.tree == "adaptive") refuse("--tree adaptive");
-  if (fit.engine == "ray") refuse("--engine ray");
+  if (field.tree == TreeKind::kAdaptive) refuse("--tree adaptive");
+  if (fit.engine == Engine::kRay) refuse("--engine ray");
   return all;
 }
 
@@ -61,7 +62,7 @@ void check_options(const ReconstructOptions& options) {
   const bool resumes = options.resume && (std::filesystem::exists(paths.model) ||
                                           (options.tune && std::filesystem::exists(paths.trials)));
   std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json};
-  if (options.field.tree == "adaptive") results.push_back(paths.tree_picture);
+  if (options.field.tree == TreeKind::kAdaptive) results.push_back(paths.tree_picture);
   if (options.tune) results.push_back(paths.trials);
   if (options.fit.hold_out > 0) results.push_back(paths.held_out_picture);
   output::check_result_files(

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "base/enum_names.h"
 #include "reconstruct/options.h"
 
 namespace tomofield::reconstruction {
@@ -32,7 +33,7 @@ json input_json(const tilt_series::TiltSeriesOptions& o) {
           {"bin", o.bin},
           {"angpix", or_null(o.angpix)},
           {"pixel_size_A", or_null(o.pixel_size_A)},
-          {"contrast", o.contrast == tilt_series::Contrast::kDark ? "dark" : "bright"},
+          {"contrast", base::name_of(o.contrast)},
           {"log", o.take_log},
           {"bead_diameter_nm", or_null(o.bead_diameter_nm)},
           {"fiducials", or_null(o.fiducials)},
@@ -52,9 +53,9 @@ json specimen_json(const measurement::SpecimenOptions& o) {
 namespace {
 
 json field_json(const fit::FieldOptions& o) {
-  return {{"kind", o.kind},
+  return {{"kind", base::name_of(o.kind)},
           {"leaf_size", o.leaf_size},
-          {"tree", o.tree},
+          {"tree", base::name_of(o.tree)},
           {"depth", o.depth},
           {"leaf_budget", o.leaf_budget},
           {"vertex_spacing", o.vertex_spacing},
@@ -62,7 +63,7 @@ json field_json(const fit::FieldOptions& o) {
           {"with_margin", o.with_margin},
           {"margin_spacing", o.margin_spacing},
           {"margin_rank", o.margin_rank},
-          {"activation", o.activation},
+          {"activation", base::name_of(o.activation)},
           {"sharpness", o.sharpness},
           {"initial_scale", o.initial_scale}};
 }
@@ -73,7 +74,7 @@ json fit_json(const fit::FitOptions& o) {
           {"coarse_epochs", o.coarse_epochs},
           {"coarse_bin", o.coarse_bin},
           {"subsets", o.subsets},
-          {"engine", o.engine},
+          {"engine", base::name_of(o.engine)},
           {"ray_samples", o.ray_samples},
           {"rays_per_step", o.rays_per_step},
           {"learning_rate", o.learning_rate},
@@ -86,8 +87,8 @@ json fit_json(const fit::FitOptions& o) {
           {"factor_variation", o.factor_variation},
           {"boundary", o.boundary},
           {"fourier", o.fourier},
-          {"fourier_ring", o.fourier_ring},
-          {"penalty", o.penalty},
+          {"fourier_ring", base::name_of(o.fourier_ring)},
+          {"penalty", base::name_of(o.penalty)},
           {"concavity", o.concavity},
           {"gradient_floor", o.gradient_floor},
           {"hold_out", o.hold_out},
@@ -97,9 +98,8 @@ json fit_json(const fit::FitOptions& o) {
 }
 
 json volume_json(const output::VolumeOptions& o) {
-  return {{"mode", static_cast<int>(o.mode)},
-          {"axes", o.axes == output::VolumeAxes::kXyz ? "xyz" : "xzy"},
-          {"invert", o.invert}};
+  return {
+      {"mode", static_cast<int>(o.mode)}, {"axes", base::name_of(o.axes)}, {"invert", o.invert}};
 }
 
 }  // namespace

@@ -45,14 +45,14 @@ TEST(ReconstructOptions, EveryFaultIsNamedAtOnce) {
   ReconstructOptions options = good_options();
   options.specimen.thickness = 0;
   options.field.leaf_size = 24;
-  options.field.kind = "mesh";
+  options.field.rank = 0;
   options.fit.subsets = 0;
   options.checkpoint_minutes = -1;
   EXPECT_EQ(options.faults().size(), 5u);
   const std::string message =
       testing::message_of<Error>([&] { base::require_no_faults(options.faults()); });
   for (const char* word :
-       {"--thickness", "--leaf-size", "24", "mesh", "--subsets", "--checkpoint-minutes"})
+       {"--thickness", "--leaf-size", "24", "--rank", "--subsets", "--checkpoint-minutes"})
     EXPECT_NE(message.find(word), std::string::npos) << word << " in " << message;
 }
 
@@ -60,18 +60,17 @@ TEST(ReconstructOptions, LargeLeavesOfAUniformTreeAreRootCells) {
   fit::FieldOptions field;
   EXPECT_EQ(fit::usual_leaf_size(field), field.leaf_size);
   EXPECT_EQ(fit::usual_depth(field), field.depth);
-  field.kind = "grid";
+  field.kind = FieldKind::kGrid;
   field.leaf_size = fit::usual_leaf_size(field);
   EXPECT_GT(field.leaf_size, fit::FieldOptions{}.leaf_size);
   EXPECT_EQ(fit::usual_depth(field), 0);
-  field.tree = "adaptive";  // whose leaves may become twice as wide
+  field.tree = TreeKind::kAdaptive;  // whose leaves may become twice as wide
   EXPECT_EQ(fit::usual_leaf_size(field), fit::FieldOptions{}.leaf_size);
   EXPECT_EQ(fit::usual_depth(field), 1);
 }
 
 TEST(ReconstructOptions, OnlyFactorsOfAUniformTreeBeginAsVertices) {
-  const auto num_faults = [](const std::string& kind, const std::string& tree,
-                             const std::string& engine) {
+  const auto num_faults = [](FieldKind kind, TreeKind tree, Engine engine) {
     ReconstructOptions options = good_options();
     options.fit.vertex_epochs = 3;
     options.field.kind = kind;
@@ -79,22 +78,20 @@ TEST(ReconstructOptions, OnlyFactorsOfAUniformTreeBeginAsVertices) {
     options.fit.engine = engine;
     return options.faults().size();
   };
-  EXPECT_EQ(num_faults("vm", "uniform", "slab"), 0u);
-  EXPECT_EQ(num_faults("grid", "uniform", "slab"), 1u);
-  EXPECT_EQ(num_faults("vm", "adaptive", "slab"), 1u);
-  EXPECT_EQ(num_faults("vm", "uniform", "ray"), 1u);
+  EXPECT_EQ(num_faults(FieldKind::kVm, TreeKind::kUniform, Engine::kSlab), 0u);
+  EXPECT_EQ(num_faults(FieldKind::kGrid, TreeKind::kUniform, Engine::kSlab), 1u);
+  EXPECT_EQ(num_faults(FieldKind::kVm, TreeKind::kAdaptive, Engine::kSlab), 1u);
+  EXPECT_EQ(num_faults(FieldKind::kVm, TreeKind::kUniform, Engine::kRay), 1u);
 }
 
 TEST(ReconstructOptions, ABudgetIsForAdaptiveTrees) {
   fit::FieldOptions options;
   options.leaf_budget = 12;
   EXPECT_EQ(options.faults().size(), 1u);
-  options.tree = "adaptive";
+  options.tree = TreeKind::kAdaptive;
   EXPECT_TRUE(options.faults().empty());
   options.leaf_budget = -1;
   EXPECT_EQ(options.faults().size(), 1u);
-  options.tree = "binary";
-  EXPECT_EQ(options.faults().size(), 2u);
 }
 
 }  // namespace

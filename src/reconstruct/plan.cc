@@ -60,20 +60,20 @@ int steps_an_epoch(const measurement::PreparedSeries& plan, const fit::FitOption
 
 // Of the first tree, or of an adaptive one whose budget is used up, as a field of this kind.
 std::size_t most_parameters(const fit::Domain& domain, const fit::FieldOptions& options,
-                            const std::string& kind) {
+                            FieldKind kind) {
   std::vector<field::LeafShape> shapes = domain.shapes, inside;
   for (int i = 0; i < domain.tree.num_leaves(); ++i) {
     if (domain.tree.leaf(i).region == field::Region::kInterest)
       inside.push_back(domain.shapes[static_cast<std::size_t>(i)]);
   }
   const auto more = options.leaf_budget - static_cast<std::ptrdiff_t>(inside.size());
-  if (options.tree == "adaptive" && more > 0)
+  if (options.tree == TreeKind::kAdaptive && more > 0)
     shapes.insert(shapes.end(), static_cast<std::size_t>(more), inside.front());
   return field::count_parameters(kind, shapes);
 }
 
 // What this process has of the parameters with their gradient and moments, and of its neighbours'.
-double part_of_parameters(const fit::Domain& domain, const std::string& kind,
+double part_of_parameters(const fit::Domain& domain, FieldKind kind,
                           const distributed::Communicator& processes) {
   if (processes.size() == 1) return 1.0;
   const distributed::Range bands =
@@ -86,8 +86,8 @@ double part_of_parameters(const fit::Domain& domain, const std::string& kind,
 }
 
 // Those of a process as a field of this kind, in bytes.
-double parameter_bytes(const fit::Domain& domain, const fit::FieldOptions& options,
-                       const std::string& kind, const distributed::Communicator& processes) {
+double parameter_bytes(const fit::Domain& domain, const fit::FieldOptions& options, FieldKind kind,
+                       const distributed::Communicator& processes) {
   return static_cast<double>(sizeof(float) * most_parameters(domain, options, kind)) *
          part_of_parameters(domain, kind, processes);
 }
@@ -96,7 +96,7 @@ double parameter_bytes(const fit::Domain& domain, const fit::FieldOptions& optio
 // all but the gradient once more.
 double fitted_bytes(const fit::Domain& domain, const RunPlan& run, const fit::FieldOptions& options,
                     const distributed::Communicator& processes) {
-  const double copies = options.tree == "adaptive" ? 7 : 4;
+  const double copies = options.tree == TreeKind::kAdaptive ? 7 : 4;
   double most = 0;
   for (const fit::Stage& s : run.stages)
     most = std::max(most, copies * parameter_bytes(domain, options, s.field_kind, processes));
@@ -111,7 +111,7 @@ double factorising_bytes(const fit::Domain& domain, const RunPlan& run,
   std::size_t largest = 0;
   for (const field::LeafShape& shape : domain.shapes)
     largest = std::max(largest, field::factorising_memory(shape));
-  return parameter_bytes(domain, options, "grid", processes) +
+  return parameter_bytes(domain, options, FieldKind::kGrid, processes) +
          parameter_bytes(domain, options, options.kind, processes) +
          static_cast<double>(largest) * base::thread_count();
 }

@@ -16,7 +16,7 @@ namespace {
 
 TEST(PublicModel, SamplesWhatExportWrites) {
   const testing::ScratchDirectory scratch;
-  auto inner = testing::uneven_model("vm");
+  auto inner = testing::uneven_model(FieldKind::kVm);
   inner.is_dark = true;
   output::save_model(scratch / "model.h5", inner);
   output::write_volume(inner, {}, scratch / "volume.mrc");
@@ -36,7 +36,7 @@ TEST(PublicModel, SamplesWhatExportWrites) {
 
 TEST(PublicModel, TurnsBoxesByEulerAngles) {
   const testing::ScratchDirectory scratch;
-  const auto inner = testing::uneven_model("grid");
+  const auto inner = testing::uneven_model(FieldKind::kGrid);
   output::save_model(scratch / "model.h5", inner);
   const Model model(scratch / "model.h5");
   // rot 90: the box's x lies along the field's −y.
@@ -48,7 +48,7 @@ TEST(PublicModel, TurnsBoxesByEulerAngles) {
 
 TEST(PublicModel, RefusesBoxesThatCannotBeSampled) {
   const testing::ScratchDirectory scratch;
-  output::save_model(scratch / "model.h5", testing::uneven_model("grid"));
+  output::save_model(scratch / "model.h5", testing::uneven_model(FieldKind::kGrid));
   const Model model(scratch / "model.h5");
   EXPECT_THROW(model.sample({}), Error);
   EXPECT_THROW(model.sample({.centre_px = {0, std::nan(""), 0}, .size = {1, 1, 1}}), Error);

@@ -53,7 +53,7 @@ output::ModelInfo model_info(const measurement::PreparedSeries& series,
   info.x_tilt_deg = series.x_tilt_deg;
   info.pixel_size_A = series.pixel_size_A;
   info.density_unit = series.unit;
-  info.is_dark = options.input.contrast == tilt_series::Contrast::kDark;
+  info.is_dark = options.input.contrast == Contrast::kDark;
   info.options_json = options_json(options).dump();
   return info;
 }

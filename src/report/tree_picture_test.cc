@@ -28,7 +28,8 @@ output::Model stepped_model() {
   tree.split(3);
   const field::LeafShape shape{.nx = 2, .ny = 2, .nz = 2};
   output::Model model;
-  model.field = field::make_field("grid", tree, 10.0, std::vector<field::LeafShape>(7, shape));
+  model.field =
+      field::make_field(FieldKind::kGrid, tree, 10.0, std::vector<field::LeafShape>(7, shape));
   for (int leaf = 0; leaf < 7; ++leaf) {
     const field::Square& square = tree.leaf(leaf).square;
     for (std::size_t i = 0; i < 8; ++i)

@@ -72,8 +72,8 @@ class Search {
 
 TrialSettings choose_penalty(const TrialSettings& start, const RunTrial& run) {
   TrialSettings concave = start, smooth = start;
-  concave.penalty = "concave";
-  smooth.penalty = "smooth";
+  concave.penalty = Penalty::kConcave;
+  smooth.penalty = Penalty::kSmooth;
   for (TrialSettings* settings : {&concave, &smooth})
     settings->variation = fit::usual_variation(settings->penalty);
   const Trial with_concave = run(concave), with_smooth = run(smooth);

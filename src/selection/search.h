@@ -11,10 +11,10 @@ namespace tomofield::selection {
 
 /// What a trial fit of --tune is made with, in place of the options of the run.
 struct TrialSettings {
-  std::string penalty = {};  ///< FitOptions::penalty
-  double variation = 0;      ///< FitOptions::density_variation
-  int rank = 0;              ///< FieldOptions::rank
-  int epochs = 0;            ///< the learning rate falls over these, so each number is a schedule
+  Penalty penalty = Penalty::kConcave;  ///< FitOptions::penalty
+  double variation = 0;                 ///< FitOptions::density_variation
+  int rank = 0;                         ///< FieldOptions::rank
+  int epochs = 0;  ///< the learning rate falls over these, so each number is a schedule
   bool operator==(const TrialSettings&) const = default;
 };
 

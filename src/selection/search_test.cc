@@ -23,9 +23,9 @@ struct ImaginedSeries {
 
   Trial run(const TrialSettings& s) {
     ++num_trials;
-    const bool is_smooth = s.penalty == "smooth";
-    const double best = is_smooth ? best_variation * fit::usual_variation("smooth") /
-                                        fit::usual_variation("concave")
+    const bool is_smooth = s.penalty == Penalty::kSmooth;
+    const double best = is_smooth ? best_variation * fit::usual_variation(Penalty::kSmooth) /
+                                        fit::usual_variation(Penalty::kConcave)
                                   : best_variation;
     const double doublings = std::log2(s.variation / best);
     double error = 1 + (is_smooth ? smooth_error : 0) + 0.02 * doublings * doublings;
@@ -43,7 +43,8 @@ struct ImaginedSeries {
 TrialSettings search(ImaginedSeries& series, std::vector<Trial>& trials,
                      const SearchSpace& space = {.penalty = false}) {
   return search_settings(
-      {"concave", 9, 24, 30}, space, [&](const TrialSettings& s) { return series.run(s); }, trials);
+      {Penalty::kConcave, 9, 24, 30}, space, [&](const TrialSettings& s) { return series.run(s); },
+      trials);
 }
 
 TEST(SearchSettings, FindsTheWeightWithinAFactorOfRootTwo) {
@@ -78,9 +79,9 @@ TEST(SearchSettings, TakesThePenaltyThatPredictsBetterAndItsOwnWeight) {
     ImaginedSeries series{.best_variation = 28, .smooth_error = smooth_error};
     std::vector<Trial> trials;
     const TrialSettings found = search(series, trials, {});
-    EXPECT_EQ(found.penalty, smooth_error > 0 ? "concave" : "smooth");
+    EXPECT_EQ(found.penalty, smooth_error > 0 ? Penalty::kConcave : Penalty::kSmooth);
     EXPECT_NEAR(found.variation, smooth_error > 0 ? 28 : 10, 1e-9);
-    EXPECT_EQ(choose_penalty({"concave", 3, 24, 30},
+    EXPECT_EQ(choose_penalty({Penalty::kConcave, 3, 24, 30},
                              [&](const TrialSettings& s) { return series.run(s); })
                   .penalty,
               found.penalty);

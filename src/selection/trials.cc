@@ -9,6 +9,7 @@
 #include <memory>
 #include <utility>
 
+#include "base/enum_names.h"
 #include "base/log.h"
 #include "base/stopwatch.h"
 #include "io/json.h"
@@ -25,11 +26,14 @@ constexpr std::int64_t kPenaltyRows = 32;
 constexpr double kPenaltyPart = 0.5;  // of the epochs that plain vertices need
 
 json settings_json(const TrialSettings& s) {
-  return {{"tv_penalty", s.penalty}, {"tv", s.variation}, {"rank", s.rank}, {"epochs", s.epochs}};
+  return {{"tv_penalty", base::name_of(s.penalty)},
+          {"tv", s.variation},
+          {"rank", s.rank},
+          {"epochs", s.epochs}};
 }
 
 TrialSettings settings_from(const json& entry) {
-  return {.penalty = entry.at("tv_penalty"),
+  return {.penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>()).value(),
           .variation = entry.at("tv"),
           .rank = entry.at("rank"),
           .epochs = entry.at("epochs")};
@@ -138,8 +142,8 @@ class TrialFits {
     return base::progress_at(
         (num_done_ + of_trial) / expected, running_.seconds(),
         fmt::format("trial {}/{}  {} tv {:.3g}  rank {}  epochs {}  held out {}", num_done_ + 1,
-                    expected, settings.penalty, settings.variation, settings.rank, settings.epochs,
-                    errors.empty() ? "-" : fmt::format("{:.4f}", errors.back())));
+                    expected, base::name_of(settings.penalty), settings.variation, settings.rank,
+                    settings.epochs, errors.empty() ? "-" : fmt::format("{:.4f}", errors.back())));
   }
 
   Strip strip_;
@@ -188,8 +192,8 @@ std::optional<Tuned> found_by_first(const distributed::Communicator& processes,
 void log_trials(const std::vector<Trial>& trials) {
   for (const Trial& t : trials) {
     base::log_info(fmt::format("tried {} tv {:8.3f}  rank {:3}  epochs {:4}: held-out error {:.5f}",
-                               t.settings.penalty, t.settings.variation, t.settings.rank,
-                               t.settings.epochs, t.score.error));
+                               base::name_of(t.settings.penalty), t.settings.variation,
+                               t.settings.rank, t.settings.epochs, t.score.error));
   }
 }
 
@@ -241,7 +245,7 @@ Tuned tuned_from(const json& tuning) {
 std::optional<Tuned> tune(const measurement::Measurement& measurement,
                           const fit::FieldOptions& field, const fit::FitOptions& fit,
                           bool tunes_penalty, TrialFile& file, const TuneHooks& hooks) {
-  const SearchSpace space{.penalty = tunes_penalty, .rank = field.kind == "vm"};
+  const SearchSpace space{.penalty = tunes_penalty, .rank = field.kind == FieldKind::kVm};
   TrialFits fits(measurement, kTrialRows, field, fit, hooks, expected_trials(space));
   // A run without total variation still needs a weight to search from.
   const double first =
@@ -257,11 +261,11 @@ std::optional<Tuned> tune(const measurement::Measurement& measurement,
   const std::optional<Tuned> tuned = found_by_first(*measurement.processes, search);
   if (!tuned) return std::nullopt;
   log_trials(tuned->trials);
-  base::log_info(
-      fmt::format("tuned: --tv-penalty {} --tv {:.3f} --rank {} --epochs {} "
-                  "--vertex-epochs {} --coarse-epochs {}",
-                  tuned->settings.penalty, tuned->settings.variation, tuned->settings.rank,
-                  tuned->settings.epochs, fit.vertex_epochs, fit.coarse_epochs));
+  base::log_info(fmt::format(
+      "tuned: --tv-penalty {} --tv {:.3f} --rank {} --epochs {} "
+      "--vertex-epochs {} --coarse-epochs {}",
+      base::name_of(tuned->settings.penalty), tuned->settings.variation, tuned->settings.rank,
+      tuned->settings.epochs, fit.vertex_epochs, fit.coarse_epochs));
   return tuned;
 }
 
@@ -269,7 +273,7 @@ std::optional<Tuned> tune_penalty(const measurement::Measurement& measurement,
                                   const fit::FieldOptions& field, const fit::FitOptions& fit,
                                   const TuneHooks& hooks) {
   fit::FieldOptions plain = field;
-  plain.kind = "grid";
+  plain.kind = FieldKind::kGrid;
   const fit::FitOptions shorter = penalty_trial_options(plain, field, fit);
   TrialFits fits(measurement, kPenaltyRows, plain, shorter, hooks, 2);
   const auto search = [&] {

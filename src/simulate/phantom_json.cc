@@ -14,7 +14,7 @@ Json options_json(const SimulationOptions& options) {
       {"seed", cell.seed},
       {"tilts_deg", {options.tilts.first_deg, options.tilts.last_deg, options.tilts.step_deg}},
       {"voxel_size_A", options.voxel_size_A},
-      {"contrast", options.contrast == tilt_series::Contrast::kDark ? "dark" : "bright"},
+      {"contrast", options.contrast == Contrast::kDark ? "dark" : "bright"},
       {"gain_spread", options.gain_spread},
       {"shift_spread_px", options.shift_spread_px},
       {"gold_beads", cell.num_beads},

@@ -103,7 +103,7 @@ Detector::Detector(const SimulationOptions& options)
       absorption_per_px_(options.absorption_per_A * options.voxel_size_A) {
   if (counts_) {
     empty_beam_ = *options.dose;
-  } else if (options.contrast == tilt_series::Contrast::kDark) {
+  } else if (options.contrast == Contrast::kDark) {
     const double tilt_rad = largest_tilt_deg(options.tilts) * std::numbers::pi / 180.0;
     empty_beam_ = static_cast<double>(options.cell.thickness_px) / std::cos(tilt_rad);
     sign_ = -1.0;

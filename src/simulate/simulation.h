@@ -34,7 +34,7 @@ struct SimulationOptions {
   double absorption_per_A = 0.002;
   double gain_spread = 0.0;      ///< standard deviation of the logarithm of each view's scale
   double shift_spread_px = 0.0;  ///< standard deviation of each view's shift, in x and in y
-  tilt_series::Contrast contrast = tilt_series::Contrast::kBright;
+  Contrast contrast = Contrast::kBright;
   bool write_truth = true;
 
   /// Everything that is wrong, one sentence each; empty if nothing is.

@@ -10,10 +10,9 @@
 
 #include "distributed/communicator.h"
 #include "geometry/raw_from_aligned.h"
+#include "tomofield/options.h"
 
 namespace tomofield::tilt_series {
-
-enum class Contrast { kDark, kBright };
 
 /// Where a tilt series is and how its intensities are to be read.
 struct TiltSeriesOptions {

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "base/parallel.h"
 #include "base/random.h"
 #include "kernels/lanes.h"
@@ -101,11 +102,11 @@ std::vector<double> tilts(double from, double to, double step) {
   return result;
 }
 
-FieldOptions field_options(const std::string& kind) {
+FieldOptions field_options(FieldKind kind) {
   FieldOptions options;
   options.kind = kind;
   options.rank = 6;
-  options.initial_scale = kind == "vm" ? 0.1 : 0.0;
+  options.initial_scale = kind == FieldKind::kVm ? 0.1 : 0.0;
   return options;
 }
 
@@ -142,7 +143,7 @@ std::array<double, 3> center_of_mass(const field::Field& field, const geometry::
 
 struct BeadCase {
   const char* name;
-  const char* field;
+  FieldKind field;
   int hand;
   std::int64_t width, height;
   double thickness, axis_x, axis_z;  // the axis relative to the geometric centre
@@ -154,11 +155,12 @@ void PrintTo(const BeadCase& c, std::ostream* out) { *out << c.name; }
 class FindsTheBead : public ::testing::TestWithParam<BeadCase> {};
 INSTANTIATE_TEST_SUITE_P(
     Cases, FindsTheBead,
-    ::testing::Values(BeadCase{"grid_centred", "grid", 1, 64, 64, 40, 0, 0, false},
-                      BeadCase{"grid_other_hand_odd_off_axis", "grid", -1, 61, 53, 37, 3.3, -2.6,
-                               false},
-                      BeadCase{"vm_other_hand", "vm", -1, 64, 64, 40, 0, 0, false},
-                      BeadCase{"vm_odd_off_axis_margin", "vm", 1, 61, 53, 37, -4.4, 1.5, true}),
+    ::testing::Values(BeadCase{"grid_centred", FieldKind::kGrid, 1, 64, 64, 40, 0, 0, false},
+                      BeadCase{"grid_other_hand_odd_off_axis", FieldKind::kGrid, -1, 61, 53, 37,
+                               3.3, -2.6, false},
+                      BeadCase{"vm_other_hand", FieldKind::kVm, -1, 64, 64, 40, 0, 0, false},
+                      BeadCase{"vm_odd_off_axis_margin", FieldKind::kVm, 1, 61, 53, 37, -4.4, 1.5,
+                               true}),
     [](const auto& c) { return std::string(c.param.name); });
 
 TEST_P(FindsTheBead, WhereItIs) {
@@ -191,7 +193,7 @@ struct Outcome {
   std::vector<double> losses;
 };
 
-Outcome small_fit(const std::string& kind, int threads, std::uint64_t seed, int epochs = 3) {
+Outcome small_fit(FieldKind kind, int threads, std::uint64_t seed, int epochs = 3) {
   base::set_thread_count(threads);
   geometry::TiltGeometry g = geometry::centred_geometry(25, 75, 12, tilts(-48, 48, 8));
   const BeadSeries series(g, Bead({11, 30, 5}), 4);
@@ -218,9 +220,10 @@ Outcome small_fit(const std::string& kind, int threads, std::uint64_t seed, int 
   return outcome;
 }
 
-class EachFittedField : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, EachFittedField, ::testing::Values("vm", "grid"),
-                         [](const auto& kind) { return std::string(kind.param); });
+class EachFittedField : public ::testing::TestWithParam<FieldKind> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, EachFittedField,
+                         ::testing::Values(FieldKind::kVm, FieldKind::kGrid),
+                         [](const auto& kind) { return base::name_of(kind.param); });
 
 TEST_P(EachFittedField, SameBitsForAnyNumberOfThreads) {
   const Outcome one = small_fit(GetParam(), 1, 5);
@@ -232,12 +235,12 @@ TEST_P(EachFittedField, SameBitsForAnyNumberOfThreads) {
 }
 
 // A tree that starts with sixteen leaves of 32 px.
-Fit adaptive_fit(const measurement::Measurement& measurement, const std::string& kind, int epochs,
+Fit adaptive_fit(const measurement::Measurement& measurement, FieldKind kind, int epochs,
                  int budget) {
   FieldOptions options = field_options(kind);
   options.leaf_size = 32;
   options.vertex_spacing = 4.0;
-  options.tree = "adaptive";
+  options.tree = TreeKind::kAdaptive;
   options.leaf_budget = budget;
   options.with_margin = false;
   FitOptions fit_options;
@@ -305,7 +308,7 @@ TEST(Fit, EveryEpochUsesEachViewOnce) {
   options.coarse_epochs = 0;
   options.epochs = 2;
   options.subsets = 5;  // 13 views: subsets of 3 and 2
-  Fit fit(series.measurement(), field_options("grid"), options);
+  Fit fit(series.measurement(), field_options(FieldKind::kGrid), options);
   EXPECT_EQ(fit.num_steps(), 10);
   int steps = 0;
   fit.run([&](const Fit& f) {
@@ -326,7 +329,7 @@ TEST(Fit, EveryEpochUsesEachViewOnce) {
 }
 
 // 25 views of a bead, fitted in a coarse and a fine stage.
-class CoarseToFine : public ::testing::TestWithParam<const char*> {
+class CoarseToFine : public ::testing::TestWithParam<FieldKind> {
  protected:
   static constexpr int kCoarseEpochs = 4, kEpochs = 3;
   std::unique_ptr<Fit> make_fit(int coarse_epochs = kCoarseEpochs) const {
@@ -360,8 +363,8 @@ class CoarseToFine : public ::testing::TestWithParam<const char*> {
   const BeadSeries series_{geometry::centred_geometry(41, 43, 24, tilts(-60, 60, 5)), bead_, 3};
   const measurement::Measurement measurement_ = series_.measurement();
 };
-INSTANTIATE_TEST_SUITE_P(Kinds, CoarseToFine, ::testing::Values("vm", "grid"),
-                         [](const auto& kind) { return std::string(kind.param); });
+INSTANTIATE_TEST_SUITE_P(Kinds, CoarseToFine, ::testing::Values(FieldKind::kVm, FieldKind::kGrid),
+                         [](const auto& kind) { return base::name_of(kind.param); });
 
 TEST_P(CoarseToFine, StartsTheFineStageCloserToTheSpecimen) {
   const auto both = make_fit(), fine_alone = make_fit(0);
@@ -425,7 +428,7 @@ TEST(Fit, StopsWhenToldAndGoesOnToTheSameBits) {
   options.coarse_epochs = 2;
   options.epochs = 3;
   const auto parameters = [&](std::int64_t pause_at) {
-    Fit fit(series.measurement(), field_options("vm"), options);
+    Fit fit(series.measurement(), field_options(FieldKind::kVm), options);
     fit.run([&](const Fit& f) { return f.progress().step != pause_at; });
     EXPECT_EQ(fit.progress().step, pause_at > 0 ? pause_at : fit.num_steps());
     fit.run([](const Fit&) { return true; });

@@ -51,7 +51,7 @@ class KnownField : public ::testing::Test {
 
   static FieldOptions options() {
     FieldOptions options;
-    options.kind = "grid";
+    options.kind = FieldKind::kGrid;
     options.leaf_size = 16;
     options.with_margin = false;
     return options;
@@ -155,7 +155,7 @@ class FitWithHeldOut : public ::testing::Test {
                     .ray_geometry = {},
                     .held_out = held_out};
     FieldOptions field;
-    field.kind = "grid";
+    field.kind = FieldKind::kGrid;
     field.leaf_size = 16;
     field.with_margin = false;
     fit_options_.epochs = epochs;

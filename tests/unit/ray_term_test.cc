@@ -41,7 +41,7 @@ struct SphereTerm {
         term(geometry, *series.rays, *field, ray_term_options(domain, options)) {}
   static FieldOptions field_options() {
     FieldOptions o;
-    o.kind = "grid";
+    o.kind = FieldKind::kGrid;
     o.leaf_size = 16;
     o.vertex_spacing = 4;
     return o;

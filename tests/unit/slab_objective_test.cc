@@ -199,7 +199,7 @@ ObjectiveWeights weights_of(double density, double factor, double concavity) {
   return w;
 }
 
-Problem random_problem(const std::string& kind, const ObjectiveWeights& weights) {
+Problem random_problem(FieldKind kind, const ObjectiveWeights& weights) {
   fit::FieldOptions options;
   options.kind = kind;
   options.leaf_size = 16;  // cells of 32 rows: two bands, with margin cells on both sides
@@ -207,14 +207,14 @@ Problem random_problem(const std::string& kind, const ObjectiveWeights& weights)
   options.rank = 3;
   options.margin_rank = 2;
   options.sharpness = 3;
-  options.initial_scale = kind == "vm" ? 0.7 : 1.0;
+  options.initial_scale = kind == FieldKind::kVm ? 0.7 : 1.0;
   const fit::Domain domain = fit::make_domain(tilted_geometry(), {0, 0, kWidth, kRows}, options);
   return {fit::make_initial_field(domain, kThickness, 0.5, options, 3), domain.grid, weights};
 }
 
 struct Kind {
   const char* name;
-  const char* field;
+  FieldKind field;
   double density_variation, factor_variation, concavity;
 };
 
@@ -227,13 +227,13 @@ class WholeObjective : public ::testing::TestWithParam<Kind> {
   }
 };
 INSTANTIATE_TEST_SUITE_P(Kinds, WholeObjective,
-                         ::testing::Values(Kind{"grid_data", "grid", 0, 0, 0},
-                                           Kind{"grid_smooth", "grid", 0.4, 0, 0},
-                                           Kind{"grid_concave", "grid", 0.4, 0, 0.3},
-                                           Kind{"grid_factors", "grid", 0, 0.3, 0.3},
-                                           Kind{"vm_data", "vm", 0, 0, 0},
-                                           Kind{"vm_smooth", "vm", 0.4, 0.3, 0},
-                                           Kind{"vm_concave", "vm", 0.4, 0.3, 0.3}),
+                         ::testing::Values(Kind{"grid_data", FieldKind::kGrid, 0, 0, 0},
+                                           Kind{"grid_smooth", FieldKind::kGrid, 0.4, 0, 0},
+                                           Kind{"grid_concave", FieldKind::kGrid, 0.4, 0, 0.3},
+                                           Kind{"grid_factors", FieldKind::kGrid, 0, 0.3, 0.3},
+                                           Kind{"vm_data", FieldKind::kVm, 0, 0, 0},
+                                           Kind{"vm_smooth", FieldKind::kVm, 0.4, 0.3, 0},
+                                           Kind{"vm_concave", FieldKind::kVm, 0.4, 0.3, 0.3}),
                          [](const auto& k) { return std::string(k.param.name); });
 
 TEST_P(WholeObjective, ValueIsThatOfTheWholeVolume) {
@@ -257,7 +257,7 @@ TEST_P(WholeObjective, GradientIsTheDerivative) {
     const int leaf = n % field.tree().num_leaves();
     std::size_t at = field.offset(leaf) + random.below(field.offset(leaf + 1) - field.offset(leaf));
     // Every second one of the grid at the first or last row of a leaf: V [nx, nz, ny].
-    if (field.kind() == "grid" && n % 2 == 1) {
+    if (field.kind() == FieldKind::kGrid && n % 2 == 1) {
       const auto ny = static_cast<std::size_t>(field.shape(leaf).ny);
       at = field.offset(leaf) + (at - field.offset(leaf)) / ny * ny + (n % 4 == 1 ? 0 : ny - 1);
     }
@@ -280,7 +280,7 @@ std::unique_ptr<field::Field> field_of_cells(std::int64_t cell_size) {
   tree.split_to_level(Region::kInterest, cell_size == 64 ? 1 : 0);
   const std::vector<field::LeafShape> shapes(static_cast<std::size_t>(tree.num_leaves()),
                                              {.nx = 9, .ny = 17, .nz = 5});
-  auto field = field::make_field("grid", std::move(tree), kThickness, shapes);
+  auto field = field::make_field(FieldKind::kGrid, std::move(tree), kThickness, shapes);
   field->activation = {3.0f};
   for (int leaf = 0; leaf < field->tree().num_leaves(); ++leaf) {
     const field::Square& square = field->tree().leaf(leaf).square;
@@ -317,7 +317,7 @@ TEST(SlabObjective, BandsLeaveNoSeam) {
 }
 
 TEST(SlabObjective, OrderOfBandsChangesNoBit) {
-  const Problem p = random_problem("vm", weights_of(0.4, 0.3, 0.3));
+  const Problem p = random_problem(FieldKind::kVm, weights_of(0.4, 0.3, 0.3));
   EXPECT_EQ(p.evaluate(false).gradient, p.evaluate(true).gradient);
 }
 

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/enum_names.h"
 #include "baseline/classical/slab_gradient.h"
 #include "kernels/lanes.h"
 #include "objective/noise_scale.h"
@@ -36,7 +37,7 @@ constexpr int kReweightings = 8;
 constexpr float kFirstWeight = 0.5f;
 
 bool takes_weights_after(int iteration, const TvOptions& options) {
-  if (options.penalty != "concave" || iteration == 0) return false;
+  if (options.penalty != Penalty::kConcave || iteration == 0) return false;
   const int first = options.iterations * 3 / 10;
   const int interval = std::max(1, (options.iterations - first) / kReweightings);
   return iteration >= first && iteration < options.iterations &&
@@ -125,7 +126,7 @@ ChambollePock::ChambollePock(VoxelProblem& problem, const TvOptions& options, do
     q_.emplace_back(SlabPair::kMost * problem.detector_size());
   measure_steps();
   x_.fill(static_cast<float>(options.non_negative ? std::max(0.0, start) : start));
-  if (options.penalty == "concave") begin_concave_penalty();
+  if (options.penalty == Penalty::kConcave) begin_concave_penalty();
 }
 
 void ChambollePock::begin_concave_penalty() {
@@ -249,7 +250,7 @@ void ChambollePock::take_step(int slab, const float* adjoint, float relaxation) 
 nlohmann::json TvOptions::json() const {
   return {{"iterations", iterations},
           {"weight", weight.value_or(usual_weight())},
-          {"penalty", penalty.value_or("smooth")},
+          {"penalty", base::name_of(penalty.value_or(Penalty::kSmooth))},
           {"concavity", concavity},
           {"non_negative", non_negative}};
 }

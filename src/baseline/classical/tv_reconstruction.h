@@ -6,20 +6,21 @@
 
 #include "baseline/solver.h"
 #include "baseline/voxel_problem.h"
+#include "tomofield/options.h"
 
 namespace tomofield::baseline {
 
 struct TvOptions {
-  int iterations = 200;                ///< passes over all views
-  std::optional<double> weight;        ///< λ, see reconstruct_tv; none: usual_weight()
-  std::optional<std::string> penalty;  ///< smooth, also if none is given, or concave
-  double concavity = 1.6;              ///< τ of the concave penalty, in units of a voxel's noise
+  int iterations = 200;            ///< passes over all views
+  std::optional<double> weight;    ///< λ, see reconstruct_tv; none: usual_weight()
+  std::optional<Penalty> penalty;  ///< smooth, also if none is given, or concave
+  double concavity = 1.6;          ///< τ of the concave penalty, in units of a voxel's noise
   bool non_negative = true;
 
   /// A concave penalty counts large steps less, and so needs more (docs/baselines.md).
-  double usual_weight() const { return penalty == "concave" ? 8.0 : 3.0; }
+  double usual_weight() const { return penalty == Penalty::kConcave ? 8.0 : 3.0; }
   /// A penalty that is not given may become the concave one, by tuning.
-  MethodFacts facts() const { return {"tv", iterations, penalty == "smooth" ? 5 : 6, 2}; }
+  MethodFacts facts() const { return {"tv", iterations, penalty == Penalty::kSmooth ? 5 : 6, 2}; }
   nlohmann::json json() const;
 };
 

@@ -109,7 +109,7 @@ TEST_F(Tv, MoreWeightMeansLessVariation) {
 
 TvOptions concave(int iterations, double weight) {
   TvOptions result = options(iterations, weight);
-  result.penalty = "concave";
+  result.penalty = Penalty::kConcave;
   return result;
 }
 

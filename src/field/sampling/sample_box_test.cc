@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "base/parallel.h"
 #include "random_arrays.h"
 #include "uneven_model.h"
@@ -36,9 +37,9 @@ std::vector<double> point_by_point(const Field& field, const Box& box) {
   return expected;
 }
 
-class EachBoxedField : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, EachBoxedField, ::testing::Values("vm", "grid"),
-                         [](const auto& kind) { return std::string(kind.param); });
+class EachBoxedField : public ::testing::TestWithParam<FieldKind> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, EachBoxedField, ::testing::Values(FieldKind::kVm, FieldKind::kGrid),
+                         [](const auto& kind) { return base::name_of(kind.param); });
 
 TEST_P(EachBoxedField, AlignedBoxesAreTheDensity) {
   const auto model = uneven_model(GetParam());
@@ -151,7 +152,7 @@ TEST(SampleBox, BoxesFillTheirCornersWithWholeVoxels) {
 }
 
 TEST(SampleBox, PartsCoverTheBoxOnceOnAnyNumberOfThreads) {
-  const auto model = uneven_model("vm");
+  const auto model = uneven_model(FieldKind::kVm);
   const Box box{.centre_px = {30, 35, 10}, .size = {20, 37, 23}, .voxel_px = 1.0};
   const int threads = base::thread_count();
   std::vector<std::vector<float>> results;

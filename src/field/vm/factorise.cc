@@ -143,8 +143,10 @@ std::size_t factorising_memory(const LeafShape& shape) {
 }
 
 std::unique_ptr<Field> factorised(const Field& vertices, std::vector<LeafShape> shapes) {
-  TOMOFIELD_CHECK(vertices.kind() == "grid", "plain vertices, which are their own values");
-  auto factors = make_field("vm", vertices.tree(), vertices.thickness(), std::move(shapes));
+  TOMOFIELD_CHECK(vertices.kind() == FieldKind::kGrid,
+                  "plain vertices, which are their own values");
+  auto factors =
+      make_field(FieldKind::kVm, vertices.tree(), vertices.thickness(), std::move(shapes));
   factors->bias = vertices.bias;
   factors->activation = vertices.activation;
   std::vector<int> kept;

@@ -23,7 +23,7 @@ LeafShape shape_of_ranks(int x, int y, int z) {
   return {.nx = kX, .ny = kY, .nz = kZ, .rank_x = x, .rank_y = y, .rank_z = z};
 }
 
-std::unique_ptr<Field> cells(int count, const std::string& kind, const LeafShape& shape) {
+std::unique_ptr<Field> cells(int count, FieldKind kind, const LeafShape& shape) {
   const RootGrid roots{.x0 = -16, .y0 = 8, .cell_size = 64, .columns = count, .rows = 1};
   const auto number = static_cast<std::size_t>(count);
   auto field = make_field(kind, Quadtree(roots, std::vector(number, Region::kInterest)), kThickness,
@@ -34,7 +34,7 @@ std::unique_ptr<Field> cells(int count, const std::string& kind, const LeafShape
   return field;
 }
 
-std::unique_ptr<Field> one_cell(const std::string& kind, const LeafShape& shape) {
+std::unique_ptr<Field> one_cell(FieldKind kind, const LeafShape& shape) {
   return cells(1, kind, shape);
 }
 
@@ -56,7 +56,7 @@ std::vector<double> values_of(const Field& field, int leaf = 0) {
 // Plain vertices with the values of another field.
 std::unique_ptr<Field> as_vertices(const Field& field) {
   const LeafShape& s = field.shape(0);
-  auto vertices = one_cell("grid", s);
+  auto vertices = one_cell(FieldKind::kGrid, s);
   const std::vector<double> values = values_of(field);
   for (std::size_t i = 0; i < s.vertices_xz(); ++i) {
     for (int j = 0; j < s.ny; ++j) {
@@ -78,7 +78,7 @@ double squared_error(const Field& vertices, const LeafShape& shape) {
 }
 
 TEST(Factorise, IsExactIfOneAxisHasARankAVertex) {
-  const auto vertices = one_cell("grid", shape_of_ranks(0, 0, 0));
+  const auto vertices = one_cell(FieldKind::kGrid, shape_of_ranks(0, 0, 0));
   for (const LeafShape& shape : {shape_of_ranks(kX, 1, 2), shape_of_ranks(2, kY, 1),
                                  shape_of_ranks(1, 2, kZ), shape_of_ranks(kX + 3, kY + 1, kZ + 2)})
     EXPECT_LT(squared_error(*vertices, shape), 1e-9);
@@ -87,7 +87,7 @@ TEST(Factorise, IsExactIfOneAxisHasARankAVertex) {
 TEST(Factorise, FindsFactorsAlongOneAxis) {
   for (const LeafShape& shape :
        {shape_of_ranks(2, 0, 0), shape_of_ranks(0, 2, 0), shape_of_ranks(0, 0, 2)}) {
-    const auto vertices = as_vertices(*one_cell("vm", shape));
+    const auto vertices = as_vertices(*one_cell(FieldKind::kVm, shape));
     EXPECT_LT(squared_error(*vertices, shape), 1e-9);
     EXPECT_LT(squared_error(*vertices, shape_of_ranks(2, 2, 2)), 1e-9);
   }
@@ -100,7 +100,7 @@ double square_beyond(const RowMajorMatrix& unfolded, Eigen::Index rank) {
 }
 
 TEST(Factorise, IsTheBestOfItsRankAlongOneAxis) {
-  const auto vertices = one_cell("grid", shape_of_ranks(0, 0, 0));
+  const auto vertices = one_cell(FieldKind::kGrid, shape_of_ranks(0, 0, 0));
   RowMajorMatrix x(kX, kZ * kY), y(kY, kX * kZ), z(kZ, kX * kY);
   for (int i = 0; i < kX; ++i) {
     for (int k = 0; k < kZ; ++k) {
@@ -119,7 +119,7 @@ TEST(Factorise, IsTheBestOfItsRankAlongOneAxis) {
 }
 
 TEST(Factorise, EachRankOfEachAxisHelps) {
-  const auto vertices = one_cell("grid", shape_of_ranks(0, 0, 0));
+  const auto vertices = one_cell(FieldKind::kGrid, shape_of_ranks(0, 0, 0));
   const double without = squared_error(*vertices, shape_of_ranks(2, 2, 2));
   for (const LeafShape& shape :
        {shape_of_ranks(3, 2, 2), shape_of_ranks(2, 3, 2), shape_of_ranks(2, 2, 3)})
@@ -128,7 +128,7 @@ TEST(Factorise, EachRankOfEachAxisHelps) {
 
 TEST(Factorise, AVectorIsAsLargeAsItsMatrix) {
   const LeafShape shape = shape_of_ranks(3, 2, 2);
-  const auto factors = factorised(*one_cell("grid", shape_of_ranks(0, 0, 0)), {shape});
+  const auto factors = factorised(*one_cell(FieldKind::kGrid, shape_of_ranks(0, 0, 0)), {shape});
   const VmLayout at(shape);
   const auto mean_square = [&](std::size_t first, std::size_t end, int rank, int r) {
     double sum = 0;
@@ -150,7 +150,7 @@ TEST(Factorise, AVectorIsAsLargeAsItsMatrix) {
 }
 
 TEST(Factorise, RanksWithNothingToHoldAreZero) {
-  auto vertices = one_cell("grid", shape_of_ranks(0, 0, 0));
+  auto vertices = one_cell(FieldKind::kGrid, shape_of_ranks(0, 0, 0));
   std::ranges::fill(vertices->parameters(), 0.0f);
   for (const LeafShape& shape : {shape_of_ranks(2, 3, 2), shape_of_ranks(kX + 1, kY + 1, kZ + 1)}) {
     const auto factors = factorised(*vertices, {shape});
@@ -159,11 +159,11 @@ TEST(Factorise, RanksWithNothingToHoldAreZero) {
 }
 
 TEST(Factorise, KeepsTheDecoderAndTheLeavesThatAreKept) {
-  auto vertices = cells(3, "grid", shape_of_ranks(0, 0, 0));
+  auto vertices = cells(3, FieldKind::kGrid, shape_of_ranks(0, 0, 0));
   vertices->keep_only({2});
   const LeafShape shape = shape_of_ranks(kX, 1, 1);
   const auto factors = factorised(*vertices, {shape, shape, shape});
-  EXPECT_EQ(factors->kind(), "vm");
+  EXPECT_EQ(factors->kind(), FieldKind::kVm);
   EXPECT_EQ(factors->bias, vertices->bias);
   EXPECT_EQ(factors->activation.beta, vertices->activation.beta);
   EXPECT_TRUE(factors->keeps(2) && !factors->keeps(0) && !factors->keeps(1));

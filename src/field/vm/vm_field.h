@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "field/field.h"
+#include "tomofield/options.h"
 
 namespace tomofield::field {
 
@@ -28,7 +29,7 @@ class VmField final : public Field {
   /// Parameters of a leaf.
   static std::size_t count(const LeafShape& shape);
 
-  std::string kind() const override { return "vm"; }
+  FieldKind kind() const override { return FieldKind::kVm; }
   void slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
                      float* gradient) const override;
   double parameter_variation(int leaf, const kernels::VariationPenalty& penalty, double weight,

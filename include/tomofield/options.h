@@ -1,0 +1,111 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace tomofield {
+
+/// Whether dense matter is dark (transmission images) or bright (phantoms, HAADF) in the views.
+enum class Contrast { kDark, kBright };
+/// Vector–matrix factors in every leaf, or plain trilinear vertices.
+enum class FieldKind { kVm, kGrid };
+/// All leaves alike, or finer leaves where the density varies more.
+enum class TreeKind { kUniform, kAdaptive };
+/// Decoded density, or softplus of it, which keeps it above zero.
+enum class Activation { kSoftplus, kIdentity };
+/// Projection along slabs of 16 rows with one tilt axis, or along single rays of any geometry.
+enum class Engine { kSlab, kRay };
+/// Total variation of the usual kind, or a concave penalty, which spares edges.
+enum class Penalty { kConcave, kSmooth };
+/// The Fourier prior compares an axis with its ring's mean or largest amplitude.
+enum class RingReference { kMean, kMax };
+/// Order of the axes in a volume file: sections along Z, or along Y as IMOD's tilt writes them.
+enum class VolumeAxes { kXyz, kXzy };
+/// Type of a voxel in a volume file: MRC modes 2, 12 and 1 (scaled).
+enum class VoxelType { kFloat32, kFloat16, kInt16 };
+
+/// The files that a tilt series is read from.
+struct SeriesFiles {
+  std::filesystem::path stack;                 ///< MRC stack, raw or aligned
+  std::optional<std::filesystem::path> tlt;    ///< .tlt or .rawtlt: an angle in degrees a section
+  std::optional<std::filesystem::path> xf;     ///< IMOD raw-to-aligned transforms
+  std::optional<std::filesystem::path> xtilt;  ///< IMOD x-axis tilt, degrees a section
+  std::optional<std::filesystem::path> aln;    ///< AreTomo alignment (angles, rotation, shifts)
+  std::optional<std::filesystem::path> mdoc;   ///< SerialEM metadata (angles, pixel size)
+  std::optional<std::filesystem::path> mask;   ///< MRC as the stack: 0 is no measurement
+  std::optional<std::filesystem::path> fiducials;  ///< text of model2point, stack coordinates
+};
+
+/// A rectangle [x0, x1) × [y0, y1) of the aligned view at zero tilt, in unbinned pixels.
+struct Rectangle {
+  std::int64_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  bool operator==(const Rectangle&) const = default;
+};
+
+/// Everything that a user can choose for a reconstruction. Members that are std::optional are
+/// chosen from the data, or from the other options, unless they are given; docs/options.md lists
+/// flags, units, ranges and defaults. Lengths on the specimen are unbinned pixels of the aligned
+/// view; lengths of the field are binned pixels.
+struct Options {
+  // Views
+  std::string exclude;                 ///< 1-based sections to leave out: "1-3,40"
+  double bin = 1.0;                    ///< reduce views by this factor, at least 1
+  std::optional<double> angpix;        ///< or to this pixel size in Å
+  std::optional<double> pixel_size_A;  ///< overrides the header's pixel size
+  Contrast contrast = Contrast::kDark;
+  bool take_log = false;  ///< −ln(I / I0) instead of I0 − I; dark contrast only
+  std::optional<double> bead_diameter_nm;  ///< of gold beads to find and mask; 0: none
+
+  // Specimen
+  double thickness = 0;          ///< of the tomogram along Z; required
+  std::optional<Rectangle> roi;  ///< region of interest; default: the whole field of view
+  int hand = 1;                  ///< 1: x = X cos + Z sin; −1: mirrored in Z
+  std::optional<double> axis_x;  ///< tilt axis on the view; default: its centre
+  std::optional<double> axis_z;  ///< tilt axis in the volume; default: its centre
+  bool with_margin = true;       ///< false: the specimen ends inside the field of view
+
+  // Field
+  FieldKind field = FieldKind::kVm;
+  std::optional<int> leaf_size;  ///< side of a leaf in binned pixels, a multiple of 16
+  TreeKind tree = TreeKind::kUniform;
+  int leaf_budget = 0;          ///< most leaves of an adaptive tree; 0: as many as at the start
+  double vertex_spacing = 1.0;  ///< binned pixels between vertices
+  int rank = 24;                ///< components of each mode (vm)
+  std::optional<Activation> activation;
+  double margin_spacing = 2.0;  ///< binned pixels between samples of the margin
+
+  // Fit
+  std::optional<int> epochs;         ///< passes over all views at full resolution
+  std::optional<int> vertex_epochs;  ///< passes before them with plain vertices
+  std::optional<int> coarse_epochs;  ///< passes before all of these over binned views
+  int coarse_bin = 4;                ///< the coarsest pixels on each axis, a power of two
+  int subsets = 16;                  ///< steps a pass
+  Engine engine = Engine::kSlab;
+  int ray_samples = 0;                      ///< ray engine: along a leaf's diagonal; 0: one a pixel
+  std::int64_t rays_per_step = 0;           ///< ray engine: about; 0: all rays over `subsets`
+  std::optional<double> learning_rate;      ///< of the first step
+  std::optional<double> density_variation;  ///< weight of total variation, in noise units
+  double factor_variation = 0.0;            ///< weight of the factors' total variation
+  std::optional<Penalty> penalty;           ///< of total variation
+  double boundary = 4.0;                    ///< weight of the boundary consistency (eq. 6)
+  double fourier = 0.0;                     ///< weight of the isotropic Fourier prior (eq. 7)
+  RingReference fourier_ring = RingReference::kMean;
+  std::optional<bool> fit_view_scale;  ///< fit a scale and an offset a view
+  int hold_out = 0;                    ///< keep every Nth view from the fit and score it; 0: none
+  bool tune = false;                   ///< choose penalty, weight, rank and epochs by trials
+  int patience = 0;                    ///< epochs without a better held-out error; 0: never stop
+  std::uint64_t seed = 1;
+
+  // Volume and run
+  VoxelType voxel_type = VoxelType::kFloat32;
+  VolumeAxes axes = VolumeAxes::kXyz;
+  bool invert = false;           ///< write the other contrast than the input's
+  std::filesystem::path output;  ///< the tomogram; empty: results stay in memory
+  bool overwrite = false;        ///< replace existing results
+  bool resume = false;           ///< continue from the model file, if there is one
+  double checkpoint_minutes = 5;
+};
+
+}  // namespace tomofield

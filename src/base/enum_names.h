@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "tomofield/options.h"
+
+namespace tomofield::base {
+
+/// Names the values of an enum as the command line, JSON and model files write them. A
+/// specialisation holds `kNames`, a std::array of pairs (value, name).
+template <typename Enum>
+struct EnumNames;
+
+template <>
+struct EnumNames<Contrast> {
+  static constexpr std::array kNames{std::pair{Contrast::kDark, "dark"},
+                                     std::pair{Contrast::kBright, "bright"}};
+};
+template <>
+struct EnumNames<FieldKind> {
+  static constexpr std::array kNames{std::pair{FieldKind::kVm, "vm"},
+                                     std::pair{FieldKind::kGrid, "grid"}};
+};
+template <>
+struct EnumNames<TreeKind> {
+  static constexpr std::array kNames{std::pair{TreeKind::kUniform, "uniform"},
+                                     std::pair{TreeKind::kAdaptive, "adaptive"}};
+};
+template <>
+struct EnumNames<Activation> {
+  static constexpr std::array kNames{std::pair{Activation::kSoftplus, "softplus"},
+                                     std::pair{Activation::kIdentity, "identity"}};
+};
+template <>
+struct EnumNames<Engine> {
+  static constexpr std::array kNames{std::pair{Engine::kSlab, "slab"},
+                                     std::pair{Engine::kRay, "ray"}};
+};
+template <>
+struct EnumNames<Penalty> {
+  static constexpr std::array kNames{std::pair{Penalty::kConcave, "concave"},
+                                     std::pair{Penalty::kSmooth, "smooth"}};
+};
+template <>
+struct EnumNames<RingReference> {
+  static constexpr std::array kNames{std::pair{RingReference::kMean, "mean"},
+                                     std::pair{RingReference::kMax, "max"}};
+};
+template <>
+struct EnumNames<VolumeAxes> {
+  static constexpr std::array kNames{std::pair{VolumeAxes::kXyz, "xyz"},
+                                     std::pair{VolumeAxes::kXzy, "xzy"}};
+};
+
+/// Returns the name of a value.
+template <typename Enum>
+constexpr const char* name_of(Enum value) {
+  for (const auto& [known, name] : EnumNames<Enum>::kNames)
+    if (known == value) return name;
+  return "";
+}
+
+/// Returns the value with this name, or nothing.
+template <typename Enum>
+constexpr std::optional<Enum> enum_named(std::string_view text) {
+  for (const auto& [value, name] : EnumNames<Enum>::kNames)
+    if (text == name) return value;
+  return std::nullopt;
+}
+
+}  // namespace tomofield::base
