@@ -76,7 +76,7 @@ void require_shared_command(const std::vector<std::string>& arguments,
 // Parses the command line and runs the command; 0, or throws.
 int run_command(CLI::App& program, std::vector<std::string> arguments,
                 const distributed::Communicator& processes) {
-  processes.together([&] {
+  processes.run_collectively([&] {
     require_known_command(program, arguments);
     require_shared_command(arguments, processes);
     expand_config_file(program, arguments);

@@ -205,7 +205,7 @@ void run(Arguments& arguments, const distributed::Communicator& processes) {
   else if (is_dark)
     options.field.activation = Activation::kIdentity;
   options.input.resample = options.fit.engine == Engine::kSlab;
-  processes.together([&] { reconstruction::check_options(options); });
+  processes.run_collectively([&] { reconstruction::check_options(options); });
   const tilt_series::TiltSeries series(options.input, processes);
   run_reconstruction(series, options, arguments.dry_run, processes);
 }

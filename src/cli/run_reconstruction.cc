@@ -114,7 +114,7 @@ void add_run_options(CLI::App& command, reconstruction::ReconstructOptions& opti
 void run_reconstruction(const tilt_series::TiltSeries& series,
                         const reconstruction::ReconstructOptions& options, bool dry_run,
                         const distributed::Communicator& processes) {
-  processes.together([&] {
+  processes.run_collectively([&] {
     print_plan(options, reconstruction::plan_run(series, options, processes), processes.size());
   });
   if (dry_run) return;

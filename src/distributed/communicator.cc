@@ -84,7 +84,7 @@ const Communicator& Communicator::alone() {
 }
 
 template <typename T>
-void Communicator::combine(std::span<T> values) const {
+void Communicator::allreduce_sum(std::span<T> values) const {
   if (size_ == 1) return;
   const Waiting waiting(traffic_.seconds);
   for_each_piece(values, [this](std::span<T> piece) {
@@ -95,11 +95,11 @@ void Communicator::combine(std::span<T> values) const {
   });
   traffic_.bytes += static_cast<std::int64_t>(values.size_bytes());
 }
-template void Communicator::combine(std::span<float>) const;
-template void Communicator::combine(std::span<double>) const;
-template void Communicator::combine(std::span<std::int64_t>) const;
+template void Communicator::allreduce_sum(std::span<float>) const;
+template void Communicator::allreduce_sum(std::span<double>) const;
+template void Communicator::allreduce_sum(std::span<std::int64_t>) const;
 
-double Communicator::largest(double value) const {
+double Communicator::allreduce_max(double value) const {
   if (size_ == 1) return value;
   const Waiting waiting(traffic_.seconds);
   Requests request;
@@ -112,7 +112,7 @@ double Communicator::largest(double value) const {
 std::string Communicator::broadcast(std::string text, int owner) const {
   if (size_ == 1) return text;
   std::int64_t length = rank_ == owner ? std::ssize(text) : 0;
-  combine(std::span(&length, 1));
+  allreduce_sum(std::span(&length, 1));
   text.resize(static_cast<std::size_t>(length));
   broadcast(std::as_writable_bytes(std::span(text)), owner);
   return text;
@@ -179,7 +179,7 @@ void Communicator::receive(std::span<T> values, int from) const {
 template void Communicator::receive(std::span<float>, int) const;
 template void Communicator::receive(std::span<std::int64_t>, int) const;
 
-void Communicator::together(const std::function<void()>& body) const {
+void Communicator::run_collectively(const std::function<void()>& body) const {
   if (size_ == 1) return body();
   std::string complaint;
   bool failed = false;
@@ -190,7 +190,7 @@ void Communicator::together(const std::function<void()>& body) const {
     complaint = error.what();
   }
   // The first that failed has the largest of these.
-  const double first = largest(failed ? size_ - rank_ : 0);
+  const double first = allreduce_max(failed ? size_ - rank_ : 0);
   if (first <= 0) return;
   throw SharedError(broadcast(complaint, size_ - static_cast<int>(first)));
 }

@@ -6,12 +6,13 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "tomofield/error.h"
 
 namespace tomofield::distributed {
 
-/// An Error that every process of a job throws alike (Communicator::together), so that the
+/// An Error that every process of a job throws alike (Communicator::run_collectively), so that the
 /// job can end in order: one of them has to say it.
 class SharedError : public Error {
  public:
@@ -39,8 +40,25 @@ class Communicator {
   /// Completes an array of which every element is 0 but in the process that owns it: the sum
   /// over all of them, element by element. T is float, double or std::int64_t.
   template <typename T>
-  void combine(std::span<T> values) const;
-  double largest(double value) const;
+  void allreduce_sum(std::span<T> values) const;
+  /// The same for structs: `members` name every member that is to be summed, all of type T.
+  template <typename Struct, typename T, typename... More>
+  void allreduce_sum(std::span<Struct> structs, T Struct::*member, More Struct::*... more) const {
+    if (size_ == 1) return;
+    std::vector<T> values;
+    for (Struct& s : structs) {
+      values.push_back(s.*member);
+      (values.push_back(s.*more), ...);
+    }
+    allreduce_sum(std::span(values));
+    auto next = values.begin();
+    for (Struct& s : structs) {
+      s.*member = *next++;
+      ((s.*more = *next++), ...);
+    }
+  }
+  /// Returns the largest of what the processes hand over.
+  double allreduce_max(double value) const;
   /// What `owner` has, to all.
   void broadcast(std::span<std::byte> bytes, int owner) const;
   std::string broadcast(std::string text, int owner = 0) const;
@@ -61,7 +79,7 @@ class Communicator {
 
   /// Runs `body`, which does not communicate, on every process. If it throws Error on one, all
   /// throw SharedError with the message of the first of those.
-  void together(const std::function<void()>& body) const;
+  void run_collectively(const std::function<void()>& body) const;
 
   /// `check` is called now and then while this process waits for others for long.
   void while_waiting(std::function<void()> check) const { check_ = std::move(check); }

@@ -18,9 +18,9 @@ TEST(Communicator, AloneNothingChanges) {
   EXPECT_EQ(alone.size(), 1);
   EXPECT_TRUE(alone.is_first());
   std::vector<double> values{1.5, -2.0};
-  alone.combine(std::span(values));
+  alone.allreduce_sum(std::span(values));
   EXPECT_EQ(values, (std::vector<double>{1.5, -2.0}));
-  EXPECT_EQ(alone.largest(-3.0), -3.0);
+  EXPECT_EQ(alone.allreduce_max(-3.0), -3.0);
   EXPECT_EQ(alone.broadcast("text"), "text");
   alone.exchange({});
   EXPECT_EQ(alone.traffic().bytes, 0);
@@ -28,7 +28,7 @@ TEST(Communicator, AloneNothingChanges) {
 
 TEST(Communicator, AloneAnErrorIsNotShared) {
   try {
-    Communicator::alone().together([] { throw Error("as it was"); });
+    Communicator::alone().run_collectively([] { throw Error("as it was"); });
     FAIL() << "it was lost";
   } catch (const SharedError&) {
     FAIL() << "nobody shares it";

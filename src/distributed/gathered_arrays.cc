@@ -33,7 +33,7 @@ GatheredArrays::GatheredArrays(const Communicator& processes, std::size_t first,
   std::vector<std::int64_t> firsts(static_cast<std::size_t>(processes.size()) + 1);
   firsts[static_cast<std::size_t>(processes.rank())] = static_cast<std::int64_t>(first);
   if (processes.rank() + 1 == processes.size()) firsts.back() = static_cast<std::int64_t>(end);
-  processes.combine(std::span(firsts));
+  processes.allreduce_sum(std::span(firsts));
   limits_.assign(firsts.begin(), firsts.end());
 }
 
@@ -43,7 +43,7 @@ std::size_t GatheredArrays::add(std::span<const float> values) {
 }
 
 void GatheredArrays::read_on_first(const std::function<void()>& body) const {
-  processes_.together([&] {
+  processes_.run_collectively([&] {
     if (!processes_.is_first()) return answer();
     // However it ends, the others must not wait for more.
     struct Dismissal {

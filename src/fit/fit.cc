@@ -364,7 +364,7 @@ void Fit::share(std::size_t num_views, std::vector<objective::BandResult>& bands
     all.insert(all.end(), band.views.begin(), band.views.end());
     all.push_back({.n = band.grad_bias, .p = band.boundary_grad_bias});
   }
-  measurement::combine(processes(), all);
+  measurement::allreduce_sum(processes(), all);
   for (auto from = all.begin(); objective::BandResult & band : bands) {
     std::copy_n(from, num_views, band.views.begin());
     from += static_cast<std::ptrdiff_t>(num_views);

@@ -85,7 +85,7 @@ struct MrcWriter::Impl {
         processes(all),
         rows(static_cast<std::size_t>(spec.ny * spec.nz)) {
     std::filesystem::path temporary;
-    processes.together([&] {
+    processes.run_collectively([&] {
       if (!processes.is_first()) return;
       target.emplace(path);
       temporary = target->temporary_path();
@@ -95,7 +95,7 @@ struct MrcWriter::Impl {
       file->resize(bytes);
     });
     temporary = processes.broadcast(temporary.string());
-    processes.together([&] {
+    processes.run_collectively([&] {
       if (!file) file.emplace(temporary, PositionedFile::Access::kReadWrite);
     });
   }
@@ -116,11 +116,10 @@ struct MrcWriter::Impl {
 
   // What others know of their rows.
   void share_statistics() {
-    static_assert(sizeof(RowMoments) == 2 * sizeof(double));
-    processes.combine(std::span(reinterpret_cast<double*>(rows.data()), 2 * rows.size()));
-    processes.combine(std::span(&num_rows_written, 1));
-    min = -static_cast<float>(processes.largest(-static_cast<double>(min)));
-    max = static_cast<float>(processes.largest(static_cast<double>(max)));
+    processes.allreduce_sum(std::span(rows), &RowMoments::mean, &RowMoments::squares);
+    processes.allreduce_sum(std::span(&num_rows_written, 1));
+    min = -static_cast<float>(processes.allreduce_max(-static_cast<double>(min)));
+    max = static_cast<float>(processes.allreduce_max(static_cast<double>(max)));
   }
 
   void finish_statistics() {
@@ -180,11 +179,11 @@ void MrcWriter::write_rows(std::int64_t section, std::int64_t first_row, std::in
 }
 
 void MrcWriter::close() {
-  impl_->processes.together([&] {
+  impl_->processes.run_collectively([&] {
     if (!impl_->processes.is_first()) impl_->file->close();
   });
   impl_->share_statistics();
-  impl_->processes.together([&] {
+  impl_->processes.run_collectively([&] {
     if (!impl_->processes.is_first()) return;
     impl_->finish_statistics();
     const MrcHeaderBytes bytes = encode_mrc_header(impl_->header);

@@ -47,7 +47,7 @@ SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
     }
     measured.release(slab);
   });
-  combine(processes, all);
+  allreduce_sum(processes, all);
   SlabSums sums(num_slabs);
   for (std::size_t s = 0; s < num_slabs; ++s) {
     const auto first = all.begin() + static_cast<std::ptrdiff_t>(s * views.size());
@@ -122,8 +122,8 @@ PredictedView predicted_view(const projection::SlabSampler& sampler,
                                                           : std::numeric_limits<float>::quiet_NaN();
       }
   }
-  processes.combine(std::span(result.measured));
-  processes.combine(std::span(result.predicted));
+  processes.allreduce_sum(std::span(result.measured));
+  processes.allreduce_sum(std::span(result.predicted));
   return result;
 }
 

@@ -137,7 +137,7 @@ class SharedViews {
   void read_own(std::size_t view, std::size_t size) {
     own_image_.resize(size);
     own_valid_.resize(size);
-    processes_.together([&] {
+    processes_.run_collectively([&] {
       if (view < series_.views().size()) series_.read_view(view, own_image_, own_valid_);
     });
   }
@@ -166,8 +166,7 @@ std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& s
         view_brightness(std::span(image).subspan(first, count),
                         std::span(valid).subspan(first, count), series.noise_sigma()[view]);
   }
-  static_assert(sizeof(ViewBrightness) == 2 * sizeof(double));
-  processes.combine(std::span(reinterpret_cast<double*>(views.data()), 2 * num_views));
+  processes.allreduce_sum(std::span(views), &ViewBrightness::mean, &ViewBrightness::contrast);
   return views;
 }
 
@@ -196,7 +195,7 @@ std::vector<double> masked_parts(const SlabViews& rays,
   std::vector<std::int64_t> valid;
   for (int view = 0; view < static_cast<int>(rays.shape().num_views); ++view)
     valid.push_back(rays.num_valid(view));
-  processes.combine(std::span(valid));
+  processes.allreduce_sum(std::span(valid));
   const auto num_rays = static_cast<double>(rays.shape().width * rays.shape().num_rows);
   std::vector<double> masked;
   for (const std::int64_t n : valid) masked.push_back(1.0 - static_cast<double>(n) / num_rays);

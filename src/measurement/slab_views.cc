@@ -189,8 +189,8 @@ std::unique_ptr<SlabViews> SlabViews::middle_rows(
         is_valid[at] = counts(view, x, first + y);
       }
     }
-    processes.combine(image);
-    processes.combine(std::span(is_valid));
+    processes.allreduce_sum(image);
+    processes.allreduce_sum(std::span(is_valid));
     std::ranges::copy(is_valid, valid.begin());
   };
   const Shape shape{views.size(), shape_.width, rows, 0, rows};
@@ -244,7 +244,7 @@ std::uint64_t SlabViews::checksum(const distributed::Communicator& processes) co
         add_words(first, count, hash);
         state = static_cast<std::int64_t>(hash);
       }
-      processes.combine(std::span(&state, 1));
+      processes.allreduce_sum(std::span(&state, 1));
       if (processes.size() > 1) hash = static_cast<std::uint64_t>(state);
     }
   };

@@ -20,9 +20,9 @@ ViewSums& ViewSums::operator+=(const ViewSums& other) {
   return *this;
 }
 
-void combine(const distributed::Communicator& processes, std::span<ViewSums> sums) {
-  static_assert(sizeof(ViewSums) == 6 * sizeof(double));
-  processes.combine(std::span(reinterpret_cast<double*>(sums.data()), 6 * sums.size()));
+void allreduce_sum(const distributed::Communicator& processes, std::span<ViewSums> sums) {
+  processes.allreduce_sum(sums, &ViewSums::n, &ViewSums::p, &ViewSums::b, &ViewSums::pp,
+                          &ViewSums::pb, &ViewSums::bb);
 }
 
 double ViewSums::squared_residual(const ViewModel& m) const {

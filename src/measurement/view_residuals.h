@@ -24,8 +24,8 @@ struct ViewSums {
   /// Σ (scale p + offset − b)².
   double squared_residual(const ViewModel& model) const;
 };
-/// Completes sums of which every one is of one process, as Communicator::combine.
-void combine(const distributed::Communicator& processes, std::span<ViewSums> sums);
+/// Completes sums of which every one is of one process, as Communicator::allreduce_sum.
+void allreduce_sum(const distributed::Communicator& processes, std::span<ViewSums> sums);
 
 /// Eq. 2 for one view of a slab: ½ · weight · Σ mask (scale p + offset − b)².
 /// `rays` holds p [x, lane] and is overwritten by multiplicity · dL/dp;

@@ -110,7 +110,7 @@ FourierPrior::Result FourierPrior::accumulate_gradient(std::int64_t step, float*
     field_.point_densities(leaf, own.points(), own.densities);
     for (std::size_t n = 0; n < own.index.size(); ++n) samples[own.index[n]] = own.densities[n];
   });
-  processes_.combine(std::span(samples));
+  processes_.allreduce_sum(std::span(samples));
   const double volume =
       static_cast<double>(roi_.width()) * static_cast<double>(roi_.height()) * field_.thickness();
   Result result;
@@ -126,7 +126,7 @@ FourierPrior::Result FourierPrior::accumulate_gradient(std::int64_t step, float*
     grad_bias[static_cast<std::size_t>(l)] = field_.point_gradient(
         leaf, own.points(), own.densities, grad, gradient + field_.offset(leaf));
   });
-  processes_.combine(std::span(grad_bias));
+  processes_.allreduce_sum(std::span(grad_bias));
   for (const double g : grad_bias) result.grad_bias += g;
   return result;
 }

@@ -77,7 +77,7 @@ nlohmann::json processes_json(const fit::Fit& fit, double seconds) {
                                                  seconds - traffic.seconds, traffic.seconds,
                                                  static_cast<double>(traffic.bytes) / steps},
                     own);
-  processes.combine(std::span(all));
+  processes.allreduce_sum(std::span(all));
   nlohmann::json list = nlohmann::json::array();
   for (auto p = all.begin(); p != all.end(); p += kNumbers) {
     list.push_back({{"bands", std::lround(p[0])},

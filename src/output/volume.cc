@@ -112,7 +112,7 @@ float largest_density(const VoxelSource& source, const distributed::Communicator
     const std::lock_guard lock(mutex);
     largest = std::max(largest, here);
   });
-  return static_cast<float>(processes.largest(static_cast<double>(largest)));
+  return static_cast<float>(processes.allreduce_max(static_cast<double>(largest)));
 }
 
 // Densities times `scale`, in the file's axes.
@@ -198,7 +198,7 @@ void write_volume(Model& model, const VolumeOptions& options, const std::filesys
     return write_voxels(source, box, model, kMadeBy, options, path, share.processes);
   }
   gather_parameters(share, *model.field);
-  share.processes.together([&] {
+  share.processes.run_collectively([&] {
     if (share.processes.is_first()) write_volume(model, options, path);
   });
 }
@@ -227,7 +227,7 @@ void write_voxels(const VoxelSource& source, const Box& box, const ModelInfo& in
     scale *= factor;
   }
   io::MrcWriter file(path, spec, processes);
-  processes.together([&] { source(PartWriter(file, box, options.axes, scale)); });
+  processes.run_collectively([&] { source(PartWriter(file, box, options.axes, scale)); });
   file.close();
 }
 

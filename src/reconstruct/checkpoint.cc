@@ -156,7 +156,7 @@ distributed::GatheredArrays own_parts(const fit::Fit& fit) {
 void save(const std::filesystem::path& path, const fit::Fit& fit, const output::ModelInfo& info,
           const output::TrainingState& state,
           const std::map<std::string, std::span<const float>>& moments) {
-  fit.processes().together([&] { output::require_finite(fit.field(), path); });
+  fit.processes().run_collectively([&] { output::require_finite(fit.field(), path); });
   distributed::GatheredArrays arrays = own_parts(fit);
   const auto source = [&](std::span<const float> values) {
     const std::size_t array = arrays.add(values);
@@ -199,7 +199,7 @@ void save_checkpoint(const std::filesystem::path& path, const fit::Fit& fit,
   std::vector<std::int64_t> leaf_steps(adam.leaf_steps.size());
   for (int leaf = fit.own_leaves().begin; leaf < fit.own_leaves().end; ++leaf)
     leaf_steps[static_cast<std::size_t>(leaf)] = adam.leaf_steps[static_cast<std::size_t>(leaf)];
-  fit.processes().combine(std::span(leaf_steps));
+  fit.processes().allreduce_sum(std::span(leaf_steps));
   state.integers["leaf_steps"] = std::move(leaf_steps);
   state.doubles["bias_moments"] = {adam.bias_m, adam.bias_v};
   state.integers["bias_steps"] = {adam.bias_steps};

@@ -90,7 +90,7 @@ std::optional<selection::Tuned> choose_settings(const measurement::PreparedSerie
   const distributed::Communicator& processes = *measurement.processes;
   const std::string fingerprint = fingerprint_of(options, series, processes);
   std::optional<selection::TrialFile> file;
-  processes.together([&] { file.emplace(paths.trials, fingerprint, options.resume); });
+  processes.run_collectively([&] { file.emplace(paths.trials, fingerprint, options.resume); });
   return selection::tune(measurement, options.field, options.fit, options.choose_penalty, *file,
                          tune_hooks);
 }
@@ -110,7 +110,8 @@ bool settle_options(const measurement::PreparedSeries& series,
                     std::optional<selection::Tuned>& tuned) {
   if (options.num_trials(measurement.num_fitted_views()) == 0) return true;
   if (options.resume && std::filesystem::exists(paths.model)) {
-    measurement.processes->together([&] { resuming([&] { tuned = stored_choice(paths.model); }); });
+    measurement.processes->run_collectively(
+        [&] { resuming([&] { tuned = stored_choice(paths.model); }); });
   } else {
     tuned = choose_settings(series, measurement, paths, hooks, options);
     if (!tuned) return false;
@@ -132,7 +133,7 @@ bool run_with_checkpoints(fit::Fit& fit, double checkpoint_minutes, const Recons
     const bool is_due =
         fit.processes().is_first() && since_checkpoint.seconds() > 60 * checkpoint_minutes;
     // One that must stop stops all; when it is time for a checkpoint is up to the first.
-    const double wanted = fit.processes().largest(stop ? 2.0 : is_due ? 1.0 : 0.0);
+    const double wanted = fit.processes().allreduce_max(stop ? 2.0 : is_due ? 1.0 : 0.0);
     stopped = wanted == 2.0;
     if (wanted > 0.0) {
       save();
@@ -158,7 +159,7 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
     return Outcome::kStoppedTuning;
   origin.fingerprint = fingerprint_of(options, series, processes);
   fit::Fit fit(measurement, options.field, options.fit);
-  if (options.resume) processes.together([&] { resume(paths, origin.fingerprint, fit); });
+  if (options.resume) processes.run_collectively([&] { resume(paths, origin.fingerprint, fit); });
 
   const base::Stopwatch running;
   const auto save = [&] { save_checkpoint(paths.model, fit, model_info(series, options), origin); };

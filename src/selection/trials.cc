@@ -175,7 +175,7 @@ std::optional<Tuned> found_by_first(const distributed::Communicator& processes,
                                     const std::function<Tuned()>& search) {
   std::optional<Tuned> tuned;
   json found = nullptr;
-  processes.together([&] {
+  processes.run_collectively([&] {
     if (!processes.is_first()) return;
     try {
       tuned = search();

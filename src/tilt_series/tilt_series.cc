@@ -66,13 +66,13 @@ std::vector<float> gather(const std::vector<std::vector<float>>& views,
                           const distributed::Communicator& processes) {
   std::vector<std::int64_t> sizes;
   for (const auto& values : views) sizes.push_back(std::ssize(values));
-  processes.combine(std::span(sizes));
+  processes.allreduce_sum(std::span(sizes));
   std::vector<float> all(
       static_cast<std::size_t>(std::accumulate(sizes.begin(), sizes.end(), std::int64_t{0})));
   auto at = all.begin();
   for (std::size_t view = 0; view < views.size(); at += sizes[view++])
     std::ranges::copy(views[view], at);
-  processes.combine(std::span(all));
+  processes.allreduce_sum(std::span(all));
   return all;
 }
 
@@ -120,7 +120,7 @@ struct TiltSeries::Impl {
   /// Reads every view and says what was found.
   void look_over(const distributed::Communicator& processes) {
     survey(processes);
-    processes.together([&] { find_beads(); });
+    processes.run_collectively([&] { find_beads(); });
     base::log_info(
         fmt::format("'{}': {} of {} sections, tilts {:.1f}° to {:.1f}° from {}, views of {} × {} "
                     "pixels of {:.6g} Å",
@@ -220,7 +220,7 @@ struct TiltSeries::Impl {
         noise_sigma[view] = estimate_noise_sigma(image);
     });
     check(std::move(found), processes);
-    processes.combine(std::span(noise_sigma));
+    processes.allreduce_sum(std::span(noise_sigma));
     if (options.contrast == Contrast::kBright) return;
     std::vector<float> block_means = gather(means, processes);
     if (!block_means.empty()) empty_beam = percentile_in_place(block_means, kEmptyBeamFraction);
@@ -230,7 +230,7 @@ struct TiltSeries::Impl {
   /// Calls body(view) on one of the processes for each view.
   template <typename Body>
   void for_own_views(const distributed::Communicator& processes, const Body& body) const {
-    processes.together([&] {
+    processes.run_collectively([&] {
       for (std::size_t view = static_cast<std::size_t>(processes.rank()); view < views.size();
            view += static_cast<std::size_t>(processes.size()))
         body(view);
@@ -243,9 +243,9 @@ struct TiltSeries::Impl {
       if (static_cast<int>(view) % processes.size() != processes.rank())
         found[view].is_constant = 0;
     }
-    static_assert(sizeof(PixelCensus) == 4 * sizeof(std::int64_t));
-    processes.combine(std::span(reinterpret_cast<std::int64_t*>(found.data()), 4 * found.size()));
-    processes.together([&] {
+    processes.allreduce_sum(std::span(found), &PixelCensus::num_not_finite, &PixelCensus::num_bad,
+                            &PixelCensus::is_constant, &PixelCensus::has_measurements);
+    processes.run_collectively([&] {
       for (std::size_t view = 0; view < views.size(); ++view) {
         require_measurements(view, found[view]);
         beads.figures.num_bad_pixels += found[view].num_bad;
@@ -300,8 +300,8 @@ struct TiltSeries::Impl {
       num_raised += convert(&image);
       noise_sigma[view] = estimate_noise_sigma(image);
     });
-    processes.combine(std::span(noise_sigma));
-    processes.combine(std::span(&num_raised, 1));
+    processes.allreduce_sum(std::span(noise_sigma));
+    processes.allreduce_sum(std::span(&num_raised, 1));
     if (num_raised == 0) return;
     base::log_warning(fmt::format(
         "{} pixels of '{}' ({:.3g} %) are zero, negative or below a thousandth of the empty beam "
@@ -315,7 +315,7 @@ struct TiltSeries::Impl {
 
 TiltSeries::TiltSeries(const TiltSeriesOptions& options,
                        const distributed::Communicator& processes) {
-  processes.together([&] { impl_ = std::make_unique<Impl>(options); });
+  processes.run_collectively([&] { impl_ = std::make_unique<Impl>(options); });
   impl_->look_over(processes);
 }
 TiltSeries::~TiltSeries() = default;
