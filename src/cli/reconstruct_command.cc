@@ -199,7 +199,7 @@ void run(Arguments& arguments, const distributed::Communicator& processes) {
   if (arguments.penalty != "auto")
     options.fit.penalty = *base::enum_named<Penalty>(arguments.penalty);
   options.fit.density_variation =
-      arguments.variation.value_or(fit::usual_variation(options.fit.penalty));
+      arguments.variation.value_or(objective::usual_variation(options.fit.penalty));
   if (arguments.activation != "auto")
     options.field.activation = *base::enum_named<Activation>(arguments.activation);
   else if (is_dark)

@@ -6,14 +6,15 @@
 #include <numeric>
 #include <utility>
 
+#include "base/lanes.h"
 #include "base/log.h"
-#include "base/parallel.h"
 #include "base/random.h"
 #include "base/shuffle.h"
 #include "field/vm/factorise.h"
-#include "kernels/lanes.h"
-#include "objective/noise_scale.h"
+#include "measurement/bands.h"
+#include "objective/ray_data_term.h"
 #include "objective/slab_objective.h"
+#include "objective/terms.h"
 
 namespace tomofield::fit {
 namespace {
@@ -21,63 +22,10 @@ namespace {
 // The bias moves every density at once, so it takes smaller steps than a factor.
 constexpr double kBiasRate = 0.02;
 
-// Streams of the seed: one for the starting values, one for each epoch's order, one for
-// each step's differences.
+// The stream of the seed that the order of an epoch's subsets comes from.
 constexpr std::uint64_t kOrderStream = 1000;
-constexpr std::uint64_t kDirectionStream = std::uint64_t{1} << 40;
 
-double variation_gain_of(const FitOptions& options, const measurement::Measurement& measurement) {
-  if (options.penalty != Penalty::kConcave) return 1.0;
-  return objective::gain_of_little_noise(objective::typical_noise(measurement.noise_sigma),
-                                         measurement.contrast());
-}
-
-// The residuals are in units of the noise, so a prior that were the same for
-// every series would have one weight there. Total variation is not such a
-// prior: what it must suppress is noise, and its best weight grows with the
-// noise's deviation rather than its variance (as in denoising, Rudin, Osher and
-// Fatemi 1992). Dividing by the noise makes one setting serve every size. `noise` is that of the
-// stage's pixels.
-objective::ObjectiveWeights objective_weights(const FitOptions& options,
-                                              const measurement::Measurement& measurement,
-                                              double noise) {
-  const double gain = variation_gain_of(options, measurement);
-  const double tau = options.penalty == Penalty::kConcave
-                         ? objective::concavity(options.concavity, measurement.noise_sigma)
-                         : 0.0;
-  objective::ObjectiveWeights weights;
-  weights.density_variation = gain * options.density_variation / noise;
-  weights.factor_variation = options.factor_variation / noise;
-  weights.density_penalty.epsilon = static_cast<float>(options.gradient_floor);
-  weights.density_penalty.concavity = static_cast<float>(tau);
-  weights.factor_penalty = weights.density_penalty;
-  return weights;
-}
-
-// A jump at a face counts in total variation's units, density times area, and what
-// stands out on a Fourier axis as a density times a volume.
-objective::BoundaryOptions boundary_options(const FitOptions& options, double noise) {
-  objective::BoundaryOptions boundary;
-  boundary.weight = options.boundary / noise;
-  boundary.seed = options.seed;
-  return boundary;
-}
-
-objective::FourierPriorOptions fourier_options(const FitOptions& options, double noise) {
-  objective::FourierPriorOptions fourier;
-  fourier.weight = options.fourier / noise;
-  fourier.seed = options.seed;
-  fourier.axes.reference = options.fourier_ring;
-  return fourier;
-}
-
-std::vector<std::vector<int>> leaves_of_bands(const projection::SlabSampler& sampler) {
-  std::vector<std::vector<int>> bands;
-  for (int band = 0; band < sampler.num_bands(); ++band)
-    bands.push_back(sampler.leaves_of_band(band));
-  return bands;
-}
-
+// Returns the views that are not held out.
 std::vector<int> views_but(int num_views, const std::vector<int>& held_out) {
   std::vector<int> views;
   for (int v = 0; v < num_views; ++v)
@@ -100,13 +48,19 @@ Domain domain_of(const measurement::Measurement& measurement, const FieldOptions
                                   : make_domain(measurement.geometry, measurement.roi, options);
 }
 
-// None if that is all of them.
+int steps_per_epoch_of(const measurement::Measurement& measurement, const FitOptions& options) {
+  return measurement.ray_geometry
+             ? objective::ray_steps_per_epoch(options, measurement.rays->shape())
+             : options.subsets;
+}
+
+// Returns the leaves that a process keeps; none: all.
 std::vector<int> leaves_to_keep(const distributed::Communicator& processes,
                                 const field::Quadtree& tree, distributed::Range bands) {
   return processes.size() == 1 ? std::vector<int>{} : needed_leaves(tree, bands);
 }
 
-// The structure is open for the first stage, or for this part of the only one.
+// The part of an only stage in which the tree may change; else that is the first stage.
 constexpr double kOpenPart = 0.4;
 
 TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
@@ -114,22 +68,13 @@ TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
   if (field.tree == TreeKind::kUniform) return {};
   const auto levels = leaves_by_level(domain.tree);
   const auto num_leaves = std::accumulate(levels.begin(), levels.end(), std::int64_t{0});
-  return {std::max(field.leaf_size / 2, static_cast<int>(kernels::kLanes)),
+  return {std::max(field.leaf_size / 2, static_cast<int>(base::kLanes)),
           field.leaf_budget > 0 ? field.leaf_budget : static_cast<int>(num_leaves),
           first.bin > 1 ? first.epochs - 1 : static_cast<std::int64_t>(kOpenPart * first.epochs),
           options.seed};
 }
 
 }  // namespace
-
-objective::RayTermOptions ray_term_options(const Domain& domain, const FitOptions& options) {
-  return {.roi = domain.roi,
-          .support = domain.support,
-          .subsets = options.subsets,
-          .rays_per_step = options.rays_per_step,
-          .ray_samples = options.ray_samples,
-          .seed = options.seed};
-}
 
 Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_options,
          const FitOptions& options)
@@ -143,8 +88,9 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
                                 of_kind(field_options, stages_.front().field_kind), options.seed,
                                 leaves_to_keep(*measurement.processes, domain_.tree, bands_))),
       optimizer_(*field_, AdamOptions{}),
+      tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())),
       fitted_views_(views_but(measurement.geometry.num_views(), measurement.held_out)),
-      tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())) {
+      steps_per_epoch_(steps_per_epoch_of(measurement, options_)) {
   if (options_.coarse_epochs > 0 && stages_.front().bin == 1 && options_.engine == Engine::kSlab)
     base::log_info(
         "no coarse stage: leaves of this --leaf-size do not end with slabs of coarse pixels");
@@ -162,15 +108,16 @@ const Stage& Fit::stage() const {
                        [&](const Stage& s) { return epoch >= s.first_epoch; });
 }
 
-// What is made for one stage.
+// Makes what belongs to one stage.
 void Fit::enter_stage() {
+  objective_.reset();
   binned_.reset();  // before its successor needs memory
-  binned_.emplace(measurement_, stage().bin);
-  projector_.emplace(binned_->geometry,
-                     sample_grid(domain_, measurement_.geometry.thickness, stage().bin));
+  binned_ = std::make_unique<measurement::BinnedMeasurement>(measurement_, stage().bin);
+  projector_ = std::make_unique<projection::SlabProjector>(
+      binned_->geometry, sample_grid(domain_, measurement_.geometry.thickness, stage().bin));
 }
 
-// To the vertices of the stage, or from them to factors; the optimiser starts anew.
+// Resamples the field to the vertices of the stage, or factorises it; the optimiser starts anew.
 void Fit::resample_field() {
   std::vector<field::LeafShape> shapes;
   const field::Quadtree& tree = field_->tree();
@@ -183,7 +130,7 @@ void Fit::resample_field() {
   optimizer_ = Adam(*field_, AdamOptions{});
 }
 
-// From the end of a stage to the start of the next.
+// Passes from the end of a stage to the start of the next.
 void Fit::refine() {
   const int last_bin = std::prev(&stage())->bin;
   enter_stage();
@@ -198,28 +145,23 @@ void Fit::refine() {
   halo_->refresh(*field_);  // other vertices depend on more of the old ones
 }
 
-// What is made for one tree.
+// Makes what belongs to one tree.
 void Fit::follow_tree() {
   gradient_.reset(field_->num_parameters());
-  const int bin = stage().bin;
-  sampler_.emplace(*field_, projector_->grid(), domain_.first_row,
-                   (domain_.num_rows + bin - 1) / bin, bin);
-  // These two count fine pixels: bin² of a face and bin³ of the volume to one of the stage.
-  const double noise = objective::typical_noise(binned_->noise_sigma) * bin * bin;
-  const auto bands = leaves_of_bands(*sampler_);
-  boundary_.emplace(*field_, bands, boundary_options(options_, noise));
-  fourier_.emplace(*field_, measurement_.roi, fourier_options(options_, noise * bin), processes(),
-                   own_leaves());
-  if (measurement_.ray_geometry) {
-    ray_term_ = std::make_unique<objective::RayTerm>(*measurement_.ray_geometry, *measurement_.rays,
-                                                     *field_, ray_term_options(domain_, options_));
-  }
-  touched_leaves_.clear();
-  for (int band = bands_.begin; band < bands_.end; ++band) {
-    const std::vector<int>& leaves = bands[static_cast<std::size_t>(band)];
-    touched_leaves_.insert(touched_leaves_.end(), leaves.begin(), leaves.end());
-  }
-  halo_.emplace(*field_, bands_, bin, processes());
+  objective_ = std::make_unique<objective::SlabObjective>(objective::SlabObjectiveContext{
+      .field = *field_,
+      .projector = *projector_,
+      .measured = *binned_,
+      .full = measurement_,
+      .bin = stage().bin,
+      .first_row = domain_.first_row,
+      .num_rows = domain_.num_rows,
+      .support = domain_.support,
+      .has_factors = stage().field_kind == stages_.back().field_kind,
+      .own_bands = bands_,
+      .own_leaves = own_leaves(),
+      .options = options_});
+  halo_.emplace(*field_, bands_, stage().bin, processes());
 }
 
 std::vector<int> Fit::kept_leaves(const field::Quadtree& tree) const {
@@ -234,13 +176,7 @@ void Fit::go_on_from(Progress progress, std::unique_ptr<field::Field> field) {
   follow_tree();
 }
 
-double Fit::variation_gain() const { return variation_gain_of(options_, measurement_); }
-
-int Fit::steps_per_epoch() const {
-  return ray_term_ ? ray_term_->steps_per_epoch() : options_.subsets;
-}
-
-std::int64_t Fit::num_steps() const { return num_epochs() * steps_per_epoch(); }
+double Fit::variation_gain() const { return objective::variation_gain(options_, measurement_); }
 
 std::int64_t Fit::num_epochs() const { return stages_.back().first_epoch + stages_.back().epochs; }
 
@@ -268,20 +204,18 @@ bool Fit::is_done() const {
 measurement::HeldOutError Fit::held_out_error() const {
   std::vector<double> weights;
   for (const measurement::ViewModel& view : progress_.views) weights.push_back(view.weight);
-  return measurement::held_out_error(*sampler_, *projector_, *binned_->rays, measurement_.held_out,
-                                     weights, options_.fit_view_scale, processes());
+  return objective_->held_out_error(weights, options_.fit_view_scale);
 }
 
 measurement::PredictedView Fit::predict_held_out(int view,
                                                  const measurement::ViewModel& model) const {
-  return measurement::predicted_view(*sampler_, *projector_, *binned_->rays, view, model,
-                                     processes());
+  return objective_->predict(view, model);
 }
 
 void Fit::run(const AfterStep& after_step) {
   while (!is_done()) {
     const auto before = processes().traffic();
-    take_step(ray_term_ ? std::vector<int>{} : subset_of_step(progress_.step));
+    take_step();
     ++progress_.step;
     if (progress_.step % steps_per_epoch() == 0) end_epoch();
     const auto after = processes().traffic();
@@ -292,14 +226,15 @@ void Fit::run(const AfterStep& after_step) {
   }
 }
 
-// Every subsets-th view, from a first one that visits each residue once an
-// epoch in random order: a subset covers the whole tilt range evenly.
-std::vector<int> Fit::subset_of_step(std::int64_t step) const {
+// Returns every subsets-th view, from a first one that visits each residue once an epoch in random
+// order, so that a subset covers the whole tilt range evenly. With rays, slabs have no views.
+std::vector<int> Fit::views_of_step(std::int64_t step) const {
+  std::vector<int> views;
+  if (measurement_.ray_geometry) return views;
   const std::int64_t epoch = step / options_.subsets;
   const auto subsets = static_cast<std::size_t>(options_.subsets);
   const std::vector<std::size_t> order = base::shuffled(
       subsets, base::Random(options_.seed, kOrderStream + static_cast<std::uint64_t>(epoch)));
-  std::vector<int> views;
   for (std::size_t i = order[static_cast<std::size_t>(step) % subsets]; i < fitted_views_.size();
        i += subsets)
     views.push_back(fitted_views_[i]);
@@ -314,86 +249,17 @@ double Fit::learning_rate(std::int64_t step) const {
   return s.first_rate * std::pow(s.last_rate / s.first_rate, done);
 }
 
-void Fit::take_step(const std::vector<int>& views) {
-  std::vector<objective::BandResult> bands = band_gradients(views);
-  share(views.size(), bands);
-  double grad_bias = sum_of_bands(views, bands);
-  grad_bias += fourier_->accumulate_gradient(progress_.step, gradient_.data()).grad_bias;
-  if (ray_term_) grad_bias += add_ray_gradient();
-  const double rate = learning_rate(progress_.step);
-  optimizer_.step(*field_, touched_leaves_, gradient_, rate);
-  optimizer_.step_bias(*field_, grad_bias, kBiasRate * rate);
-  halo_->refresh(*field_);
-}
-
-// The data term of these views, total variation and boundary consistency of the own bands.
-std::vector<objective::BandResult> Fit::band_gradients(const std::vector<int>& views) {
-  objective::ObjectiveWeights weights =
-      objective_weights(options_, measurement_, objective::typical_noise(binned_->noise_sigma));
-  if (stage().field_kind != stages_.back().field_kind)
-    weights.factor_variation = 0;  // there are no factors yet
-  // Each step looks at edges from another corner: forward differences alone treat
-  // their two sides differently.
-  base::Random directions(options_.seed,
-                          kDirectionStream + static_cast<std::uint64_t>(progress_.step));
-  weights.backward_x = directions.below(2) == 1;
-  weights.backward_z = directions.below(2) == 1;
-  const objective::SlabObjective objective(*sampler_, *projector_, *binned_->rays, *field_,
-                                           weights);
+void Fit::take_step() {
+  const std::vector<int> views = views_of_step(progress_.step);
   const double multiplicity =
       static_cast<double>(fitted_views_.size()) / std::max(static_cast<double>(views.size()), 1.0);
-  std::vector<objective::BandResult> bands(static_cast<std::size_t>(sampler_->num_bands()));
-  base::parallel_for(bands_.size(), [&](std::int64_t i) {
-    const int band = bands_.begin + static_cast<int>(i);
-    objective::BandResult& result = bands[static_cast<std::size_t>(band)];
-    result =
-        objective.accumulate_gradient(band, views, progress_.views, multiplicity, gradient_.data());
-    result.boundary_grad_bias =
-        boundary_->accumulate_gradient(band, progress_.step, gradient_.data()).grad_bias;
-  });
-  return bands;
-}
-
-// Every process gets the sums of the others' bands, in one message.
-void Fit::share(std::size_t num_views, std::vector<objective::BandResult>& bands) const {
-  if (processes().size() == 1) return;
-  // Of a band: its views, and after them both gradients of the bias.
-  std::vector<measurement::ViewSums> all;
-  for (objective::BandResult& band : bands) {
-    band.views.resize(num_views);
-    all.insert(all.end(), band.views.begin(), band.views.end());
-    all.push_back({.n = band.grad_bias, .p = band.boundary_grad_bias});
-  }
-  measurement::allreduce_sum(processes(), all);
-  for (auto from = all.begin(); objective::BandResult & band : bands) {
-    std::copy_n(from, num_views, band.views.begin());
-    from += static_cast<std::ptrdiff_t>(num_views);
-    band.grad_bias = from->n;
-    band.boundary_grad_bias = from->p;
-    ++from;
-  }
-}
-
-// In order: the same sums for any number of threads and processes. Returns dL/d bias.
-double Fit::sum_of_bands(const std::vector<int>& views,
-                         const std::vector<objective::BandResult>& bands) {
-  double grad_bias = 0.0, boundary_grad_bias = 0.0;
-  for (const objective::BandResult& band : bands) {
-    for (std::size_t v = 0; v < views.size(); ++v) {
-      progress_.epoch_sums[static_cast<std::size_t>(views[v])] += band.views[v];
-    }
-    grad_bias += band.grad_bias;
-    boundary_grad_bias += band.boundary_grad_bias;
-  }
-  return grad_bias + boundary_grad_bias;
-}
-
-// The data term of this step's rays; returns dL/d bias.
-double Fit::add_ray_gradient() {
-  const objective::RayTerm::Result result =
-      ray_term_->accumulate_gradient(progress_.step, progress_.views, gradient_.data());
-  for (std::size_t v = 0; v < result.views.size(); ++v) progress_.epoch_sums[v] += result.views[v];
-  return result.grad_bias;
+  const double grad_bias =
+      objective_->add_gradient({progress_.step, views, progress_.views, multiplicity},
+                               gradient_.data(), progress_.epoch_sums);
+  const double rate = learning_rate(progress_.step);
+  optimizer_.step(*field_, objective_->own_leaves(), gradient_, rate);
+  optimizer_.step_bias(*field_, grad_bias, kBiasRate * rate);
+  halo_->refresh(*field_);
 }
 
 void Fit::score_held_out() {

@@ -124,10 +124,9 @@ double BoundaryConsistency::face_gradient(std::size_t index, std::int64_t step, 
   return options_.weight * area * (root - epsilon);
 }
 
-BoundaryConsistency::Result BoundaryConsistency::accumulate_gradient(int band, std::int64_t step,
-                                                                     float* gradient) const {
+TermValue BoundaryConsistency::add_gradient(int band, std::int64_t step, float* gradient) const {
   thread_local Samples s;
-  Result result;
+  TermValue result;
   if (options_.weight <= 0) return result;
   for (const FaceOfBand& owned : bands_[static_cast<std::size_t>(band)]) {
     const Face& face = faces_[owned.face];

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "field/field.h"
+#include "objective/term.h"
 
 namespace tomofield::objective {
 
@@ -36,20 +36,20 @@ struct BoundaryOptions {
 /// which is the total variation of a jump there, so its weight has the same
 /// units as total variation's. Points are new in every step and depend on seed,
 /// step and face alone.
-class BoundaryConsistency {
+class BoundaryConsistency : public Term {
  public:
   /// Faces between leaves that are listed; leaves_of_band[b] are those that band b owns.
   BoundaryConsistency(const field::Field& field,
                       const std::vector<std::vector<int>>& leaves_of_band,
                       const BoundaryOptions& options);
 
-  struct Result {
-    double value = 0.0;      ///< of the faces whose lower leaf is the band's
-    double grad_bias = 0.0;  ///< through the band's leaves
-  };
-  /// Adds the gradient of the band's own leaves to `gradient` (all parameters).
-  /// A face between two bands is evaluated by both, so bands may run on any thread.
-  Result accumulate_gradient(int band, std::int64_t step, float* gradient) const;
+  /// Adds the gradient of the band's own leaves to `gradient` (all parameters). The value counts
+  /// the faces whose lower leaf is the band's. A face between two bands is evaluated by both, so
+  /// bands may run on any thread.
+  TermValue add_gradient(int band, std::int64_t step, float* gradient) const;
+  TermValue add_band(const Step& step, int band, float* gradient) const override {
+    return add_gradient(band, step.number, gradient);
+  }
 
  private:
   struct FaceOfBand {

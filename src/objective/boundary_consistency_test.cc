@@ -99,7 +99,7 @@ Total evaluate(const field::Field& field, const BoundaryOptions& options, std::i
   Total total;
   total.gradient.resize(field.num_parameters());
   for (const int band : {1, 0}) {
-    const auto result = boundary.accumulate_gradient(band, step, total.gradient.data());
+    const auto result = boundary.add_gradient(band, step, total.gradient.data());
     total.value += result.value;
     total.grad_bias += result.grad_bias;
   }
@@ -176,7 +176,7 @@ TEST_P(EachBoundaryField, LeavesOfNoBandAreLeftAlone) {
   std::vector<float> gradient(field->num_parameters());
   for (const int band : {0, 1}) {
     std::vector<float> own(field->num_parameters());
-    boundary.accumulate_gradient(band, 0, own.data());
+    boundary.add_gradient(band, 0, own.data());
     for (int leaf = 0; leaf < field->tree().num_leaves(); ++leaf) {
       const auto begin = own.begin() + static_cast<std::ptrdiff_t>(field->offset(leaf));
       const auto end = own.begin() + static_cast<std::ptrdiff_t>(field->offset(leaf + 1));

@@ -98,7 +98,7 @@ std::vector<FourierPrior::LeafSamples> FourierPrior::leaf_samples(std::int64_t s
   return all;
 }
 
-FourierPrior::Result FourierPrior::accumulate_gradient(std::int64_t step, float* gradient) const {
+TermValue FourierPrior::add_gradient(std::int64_t step, float* gradient) const {
   if (options_.weight <= 0) return {};
   std::vector<LeafSamples> leaves = leaf_samples(step);
   std::vector<float> samples(shape_.size()), grad_samples(shape_.size(), 0.0f);
@@ -113,7 +113,7 @@ FourierPrior::Result FourierPrior::accumulate_gradient(std::int64_t step, float*
   processes_.allreduce_sum(std::span(samples));
   const double volume =
       static_cast<double>(roi_.width()) * static_cast<double>(roi_.height()) * field_.thickness();
-  Result result;
+  TermValue result;
   result.value =
       axis_penalty(shape_, samples, options_.axes, options_.weight * volume, grad_samples);
   std::vector<double> grad_bias(leaves.size());

@@ -5,9 +5,9 @@
 
 #include "distributed/communicator.h"
 #include "distributed/partition.h"
-#include "field/field.h"
 #include "geometry/tilt_geometry.h"
 #include "objective/axis_penalty.h"
+#include "objective/term.h"
 
 namespace tomofield::objective {
 
@@ -24,7 +24,7 @@ struct FourierPriorOptions {
 /// grid whose origin and heights are new in every step and depend on seed and
 /// step alone. Rings are measured anew in every step: their transform costs less
 /// than the samples, which the axis lines need anyway.
-class FourierPrior {
+class FourierPrior : public Term {
  public:
   /// `field` must outlive it and may change its parameters; rebuild it when the tree changes.
   FourierPrior(const field::Field& field, const geometry::Roi& roi,
@@ -34,13 +34,13 @@ class FourierPrior {
                const FourierPriorOptions& options, const distributed::Communicator& processes,
                distributed::Range own);
 
-  struct Result {
-    double value = 0.0;
-    double grad_bias = 0.0;
-  };
   /// Adds the gradient of the own leaves to `gradient` (all parameters). Runs on all threads, with
   /// the same bits for any number of them.
-  Result accumulate_gradient(std::int64_t step, float* gradient) const;
+  TermValue add_gradient(std::int64_t step, float* gradient) const;
+  TermValue add_field(const Step& step, float* gradient,
+                      std::span<measurement::ViewSums>) const override {
+    return add_gradient(step.number, gradient);
+  }
 
   const SliceShape& shape() const { return shape_; }
 

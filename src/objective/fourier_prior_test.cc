@@ -71,7 +71,7 @@ TEST_P(EachFourierField, ValueFallsAsTheGradientPromises) {
   make_stripes(*field);
   const FourierPrior prior(*field, kRoi, some_options());
   std::vector<float> gradient(field->num_parameters());
-  const auto first = prior.accumulate_gradient(0, gradient.data());
+  const auto first = prior.add_gradient(0, gradient.data());
   ASSERT_GT(first.value, 0.0);
   double squares = first.grad_bias * first.grad_bias;
   for (const float g : gradient) squares += static_cast<double>(g) * static_cast<double>(g);
@@ -81,7 +81,7 @@ TEST_P(EachFourierField, ValueFallsAsTheGradientPromises) {
     field->parameters()[i] -= static_cast<float>(step * static_cast<double>(gradient[i]));
   field->bias -= static_cast<float>(step * first.grad_bias);
   std::vector<float> unused(gradient.size());
-  const double after = prior.accumulate_gradient(0, unused.data()).value;
+  const double after = prior.add_gradient(0, unused.data()).value;
   EXPECT_LT(after, first.value);
   EXPECT_NEAR((first.value - after) / first.value, 0.01, 0.001);
 }
@@ -94,7 +94,7 @@ TEST_P(EachFourierField, IsTheSameForAnyThreadsAndNewInEveryStep) {
   const auto run = [&](int threads, std::int64_t step) {
     base::set_thread_count(threads);
     std::vector<float> gradient(field->num_parameters());
-    prior.accumulate_gradient(step, gradient.data());
+    prior.add_gradient(step, gradient.data());
     base::set_thread_count(1);
     return gradient;
   };
@@ -107,7 +107,7 @@ TEST_P(EachFourierField, LeavesTheMarginAlone) {
   const auto field = uneven_field(GetParam());
   const FourierPrior prior(*field, kRoi, some_options());
   std::vector<float> gradient(field->num_parameters());
-  for (std::int64_t step = 0; step < 3; ++step) prior.accumulate_gradient(step, gradient.data());
+  for (std::int64_t step = 0; step < 3; ++step) prior.add_gradient(step, gradient.data());
   for (int leaf = 0; leaf < field->tree().num_leaves(); ++leaf) {
     double largest = 0.0;
     for (std::size_t i = field->offset(leaf); i < field->offset(leaf + 1); ++i)

@@ -1,170 +1,153 @@
 #include "objective/slab_objective.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
-#include "base/aligned_buffer.h"
-#include "kernels/lanes.h"
+#include "base/parallel.h"
+#include "objective/terms.h"
 
 namespace tomofield::objective {
+namespace {
 
-using kernels::kLanes;
-using projection::SampleSegment;
+constexpr int kSlabsTogether = projection::SlabProjector::kSlabsTogether;
 
-constexpr int kPair = projection::SlabProjector::kSlabsTogether;
+projection::SlabSampler make_sampler(const SlabObjectiveContext& c) {
+  return {c.field, c.projector.grid(), c.first_row, (c.num_rows + c.bin - 1) / c.bin, c.bin};
+}
 
-// What a thread needs for a band; kept between calls. Slabs and detectors of a pair follow each
-// other.
+TermContext term_context(const SlabObjectiveContext& c, const projection::SlabSampler& sampler) {
+  return {c.field,   sampler,       c.measured,   c.full,   c.bin,
+          c.support, c.has_factors, c.own_leaves, c.options};
+}
+
+}  // namespace
+
+// Holds what a thread needs for a batch; kept between calls.
 struct SlabObjective::Workspace {
-  base::AlignedBuffer<float> samples, grad_samples, detector;
-  base::AlignedBuffer<float> flux, row;
+  base::AlignedBuffer<float> samples, gradients;
 
-  void fit(std::size_t slab_size, std::size_t detector_size, std::size_t row_size) {
+  void fit(std::size_t slab_size) {
     // Padding has to start as zeros and stays so: a new layout needs new buffers.
-    if (samples.size() != kPair * slab_size) {
-      samples.reset(kPair * slab_size);
-      grad_samples.reset(kPair * slab_size);
-    }
-    detector.reserve(kPair * detector_size);
-    if (row.size() != row_size) {
-      flux.reset(row_size);
-      row.reset(row_size);
-    }
+    if (samples.size() == kSlabsTogether * slab_size) return;
+    samples.reset(kSlabsTogether * slab_size);
+    gradients.reset(kSlabsTogether * slab_size);
   }
 };
 
-SlabObjective::SlabObjective(const projection::SlabSampler& sampler,
-                             const projection::SlabProjector& projector,
-                             const measurement::SlabViews& measured, const field::Field& field,
-                             const ObjectiveWeights& weights)
-    : sampler_(sampler),
-      projector_(projector),
-      measured_(measured),
-      field_(field),
-      weights_(weights) {}
+SlabObjective::SlabObjective(const SlabObjectiveContext& context) : SlabObjective(context, {}) {
+  terms_ = make_terms(term_context(context, sampler_));
+}
 
-BandResult SlabObjective::accumulate_gradient(int band_index, std::span<const int> views,
-                                              std::span<const measurement::ViewModel> models,
-                                              double multiplicity, float* gradient) const {
+SlabObjective::SlabObjective(const SlabObjectiveContext& context,
+                             std::vector<std::unique_ptr<Term>> terms)
+    : projector_(context.projector),
+      measured_(context.measured),
+      sampler_(make_sampler(context)),
+      own_bands_(context.own_bands),
+      terms_(std::move(terms)) {
+  for (int band = own_bands_.begin; band < own_bands_.end; ++band)
+    std::ranges::copy(sampler_.leaves_of_band(band), std::back_inserter(own_leaves_));
+}
+
+double SlabObjective::add_gradient(const Step& step, float* gradient,
+                                   std::span<measurement::ViewSums> view_sums) const {
+  std::vector<BandSums> bands(static_cast<std::size_t>(sampler_.num_bands()));
+  for (BandSums& band : bands) {
+    band.views.resize(step.views.size());
+    band.terms.resize(terms_.size());
+  }
+  base::parallel_for(own_bands_.size(), [&](std::int64_t i) {
+    const int band = own_bands_.begin + static_cast<int>(i);
+    bands[static_cast<std::size_t>(band)] = add_band(step, band, gradient);
+  });
+  share(bands);
+  // In order: the same sums for any number of threads and processes.
+  double slab_grad_bias = 0.0;
+  std::vector<double> term_grad_bias(terms_.size());
+  for (const BandSums& band : bands) {
+    for (std::size_t v = 0; v < step.views.size(); ++v)
+      view_sums[static_cast<std::size_t>(step.views[v])] += band.views[v];
+    slab_grad_bias += band.slab_grad_bias;
+    for (std::size_t t = 0; t < terms_.size(); ++t) term_grad_bias[t] += band.terms[t].grad_bias;
+  }
+  double grad_bias = slab_grad_bias;
+  for (const double of_term : term_grad_bias) grad_bias += of_term;
+  for (const auto& term : terms_)
+    grad_bias += term->add_field(step, gradient, view_sums).grad_bias;
+  return grad_bias;
+}
+
+SlabObjective::BandSums SlabObjective::add_band(const Step& step, int band,
+                                                float* gradient) const {
   thread_local Workspace w;
-  w.fit(projector_.grid().size(), projector_.detector_size(views.size()), sampler_.row_size());
-  const auto band = sampler_.band(band_index);
-  BandResult result;
-  result.views.resize(views.size());
-
-  for (int slab = band.first; slab < band.end; slab += kPair) {
-    const projection::SlabSampler::Range pair{slab, std::min(slab + kPair, band.end)};
-    for_each_slab(pair, w, [&](int at, float* samples, float*) { sampler_.decode(at, samples); });
-    if (slab == band.first) start_flux(slab, w);
-    add_data_term(pair, views, models, multiplicity, w, result);
-    if (pair.end < sampler_.num_slabs() && weights_.density_variation > 0)
-      sampler_.decode_row(static_cast<std::int64_t>(pair.end) * kLanes, w.row.data());
-    for_each_slab(pair, w, [&](int at, float* samples, float* grad_samples) {
-      add_variation(at, pair, samples, grad_samples, w, result);
-      result.grad_bias += sampler_.decode_adjoint(at, samples, grad_samples, gradient);
-    });
+  w.fit(projector_.grid().size());
+  BandSums sums;
+  sums.views.resize(step.views.size());
+  sums.terms.resize(terms_.size());
+  const auto slabs = sampler_.band(band);
+  for (int slab = slabs.first; slab < slabs.end; slab += kSlabsTogether) {
+    add_batch(step,
+              {.sampler = sampler_,
+               .projector = projector_,
+               .slabs = {slab, std::min(slab + kSlabsTogether, slabs.end)},
+               .begins_band = slab == slabs.first,
+               .all_samples = w.samples.data(),
+               .all_gradients = w.gradients.data()},
+              gradient, sums);
   }
-  if (weights_.factor_variation > 0) {
-    for (const int leaf : sampler_.leaves_of_band(band_index)) {
-      result.variation += field_.parameter_variation(
-          leaf, weights_.factor_penalty, weights_.factor_variation, gradient + field_.offset(leaf));
+  for (std::size_t t = 0; t < terms_.size(); ++t) {
+    const TermValue of_band = terms_[t]->add_band(step, band, gradient);
+    sums.terms[t].value += of_band.value;
+    sums.terms[t].grad_bias += of_band.grad_bias;
+  }
+  return sums;
+}
+
+void SlabObjective::add_batch(const Step& step, const SlabBatch& batch, float* gradient,
+                              BandSums& sums) const {
+  for (int slab = batch.slabs.first; slab < batch.slabs.end; ++slab)
+    sampler_.decode(slab, batch.samples(slab));
+  if (terms_.empty() || !terms_.front()->replaces_gradient())
+    std::fill_n(batch.all_gradients,
+                static_cast<std::size_t>(batch.size()) * projector_.grid().size(), 0.0f);
+  for (std::size_t t = 0; t < terms_.size(); ++t)
+    sums.terms[t].value += terms_[t]->add_slabs(step, batch, sums.views);
+  for (int slab = batch.slabs.first; slab < batch.slabs.end; ++slab) {
+    sums.slab_grad_bias +=
+        sampler_.decode_adjoint(slab, batch.samples(slab), batch.gradient(slab), gradient);
+  }
+}
+
+// Gives every process the sums of the others' bands, in one message.
+void SlabObjective::share(std::vector<BandSums>& bands) const {
+  const distributed::Communicator& processes = *measured_.processes;
+  if (processes.size() == 1) return;
+  std::vector<double> numbers;
+  const auto for_each_number = [&](const auto& body) {
+    for (BandSums& band : bands) {
+      for (measurement::ViewSums& s : band.views)
+        for (double* number : {&s.n, &s.p, &s.b, &s.pp, &s.pb, &s.bb}) body(*number);
+      body(band.slab_grad_bias);
+      for (TermValue& term : band.terms) body(term.grad_bias);
     }
-  }
-  return result;
+  };
+  for_each_number([&](double& number) { numbers.push_back(number); });
+  processes.allreduce_sum(std::span(numbers));
+  auto next = numbers.begin();
+  for_each_number([&](double& number) { number = *next++; });
 }
 
-// body(slab, its samples, their gradient)
-template <typename Body>
-void SlabObjective::for_each_slab(const projection::SlabSampler::Range& pair, Workspace& w,
-                                  const Body& body) const {
-  std::size_t at = 0;
-  for (int slab = pair.first; slab < pair.end; ++slab, at += projector_.grid().size())
-    body(slab, w.samples.data() + at, w.grad_samples.data() + at);
+measurement::HeldOutError SlabObjective::held_out_error(std::span<const double> noise_weight,
+                                                        bool fit_view_scale) const {
+  return measurement::held_out_error(sampler_, projector_, *measured_.rays, measured_.held_out,
+                                     noise_weight, fit_view_scale, *measured_.processes);
 }
 
-// Its gradient takes the place of what was in `grad_samples`.
-void SlabObjective::add_data_term(const projection::SlabSampler::Range& pair,
-                                  std::span<const int> views,
-                                  std::span<const measurement::ViewModel> models,
-                                  double multiplicity, Workspace& w, BandResult& result) const {
-  const std::int64_t width = projector_.geometry().width;
-  const std::size_t detector_size = projector_.detector_size(views.size());
-  const int count = pair.end - pair.first;
-  std::fill_n(w.detector.data(), static_cast<std::size_t>(count) * detector_size, 0.0f);
-  projector_.forward(w.samples.data(), views, w.detector.data(), count);
-  float* detector = w.detector.data();
-  for (int slab = pair.first; slab < pair.end; ++slab, detector += detector_size) {
-    for (std::size_t v = 0; v < views.size(); ++v) {
-      result.views[v] +=
-          measurement::data_term(models[static_cast<std::size_t>(views[v])], multiplicity,
-                                 measured_.rays(slab, views[v]), measured_.mask(slab, views[v]),
-                                 width, detector + static_cast<std::ptrdiff_t>(v) * width * kLanes);
-    }
-    measured_.release(slab);
-  }
-  projector_.backward(w.detector.data(), views, w.grad_samples.data(), count);
-}
-
-kernels::SlabVariation SlabObjective::variation_of(std::size_t index) const {
-  const SampleSegment& segment = projector_.grid().segments()[index];
-  kernels::SlabVariation variation;
-  variation.nx = segment.nx;
-  variation.nz = segment.nz;
-  variation.stride_z = segment.stride_z();
-  variation.per_hx = static_cast<float>(1.0 / segment.hx);
-  variation.per_hz = static_cast<float>(1.0 / segment.hz);
-  variation.weight = static_cast<float>(weights_.density_variation * segment.hx * segment.hz);
-  variation.penalty = weights_.density_penalty;
-  variation.backward_x = weights_.backward_x;
-  variation.backward_z = weights_.backward_z;
-  return variation;
-}
-
-void SlabObjective::add_variation(int slab, const projection::SlabSampler::Range& pair,
-                                  const float* samples, float* grad_samples, Workspace& w,
-                                  BandResult& result) const {
-  if (weights_.density_variation <= 0) return;
-  for (std::size_t s = 0; s < projector_.grid().segments().size(); ++s) {
-    const std::ptrdiff_t origin = projector_.grid().segments()[s].origin;
-    kernels::SlabVariation variation = variation_of(s);
-    variation.samples = samples + origin;
-    variation.gradient = grad_samples + origin;
-    variation.num_rows = sampler_.rows_in_slab(slab);
-    variation.above = row_above(slab, pair, s, w);
-    variation.flux = w.flux.data() + sampler_.row_origin(s);
-    result.variation += kernels::slab_variation(variation);
-  }
-}
-
-// The flux from the band before into the first row of this one.
-void SlabObjective::start_flux(int slab, Workspace& w) const {
-  w.flux.fill(0.0f);
-  if (slab == 0 || weights_.density_variation <= 0) return;
-  sampler_.decode_row(static_cast<std::int64_t>(slab) * kLanes - 1, w.row.data());
-  for (std::size_t s = 0; s < projector_.grid().segments().size(); ++s) {
-    kernels::row_flux(variation_of(s), decoded_row(w, s), first_row(w.samples.data(), s),
-                      w.flux.data() + sampler_.row_origin(s));
-  }
-}
-
-// The first row past a slab of a pair; none past the last slab of all.
-kernels::DensityRow SlabObjective::row_above(int slab, const projection::SlabSampler::Range& pair,
-                                             std::size_t segment, const Workspace& w) const {
-  if (slab + 1 == sampler_.num_slabs()) return {};
-  if (slab + 1 == pair.end) return decoded_row(w, segment);
-  const auto next = static_cast<std::size_t>(slab + 1 - pair.first);
-  return first_row(w.samples.data() + next * projector_.grid().size(), segment);
-}
-
-// The first row of a slab, where it lies among the others.
-kernels::DensityRow SlabObjective::first_row(const float* samples, std::size_t segment) const {
-  const SampleSegment& s = projector_.grid().segments()[segment];
-  return {samples + s.origin, kLanes, s.stride_z()};
-}
-
-// The row that was decoded by itself.
-kernels::DensityRow SlabObjective::decoded_row(const Workspace& w, std::size_t segment) const {
-  return {w.row.data() + sampler_.row_origin(segment), projector_.grid().segments()[segment].nz, 1};
+measurement::PredictedView SlabObjective::predict(int view,
+                                                  const measurement::ViewModel& model) const {
+  return measurement::predicted_view(sampler_, projector_, *measured_.rays, view, model,
+                                     *measured_.processes);
 }
 
 }  // namespace tomofield::objective

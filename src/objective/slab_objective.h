@@ -1,72 +1,69 @@
 #pragma once
 
-#include <cstdint>
-#include <span>
+#include <memory>
 #include <vector>
 
-#include "kernels/total_variation.h"
-#include "measurement/slab_views.h"
-#include "measurement/view_residuals.h"
-#include "projection/slab_projector.h"
-#include "projection/slab_sampler.h"
+#include "base/aligned_buffer.h"
+#include "distributed/partition.h"
+#include "objective/objective.h"
 
 namespace tomofield::objective {
 
-/// Weights of the terms of eq. 9, in noise units: the data term is
-/// ½ Σ (residual / σ)², so that one weight serves every size (DESIGN §3).
-struct ObjectiveWeights {
-  double density_variation = 0.0;
-  double factor_variation = 0.0;
-  kernels::VariationPenalty density_penalty;
-  kernels::VariationPenalty factor_penalty;
-  bool backward_x = false, backward_z = false;  ///< direction of the density's differences
+/// What a slab objective is made for.
+struct SlabObjectiveContext {
+  const field::Field& field;
+  const projection::SlabProjector& projector;  ///< of the stage's pixels
+  const measurement::Measurement& measured;    ///< in pixels of the stage
+  const measurement::Measurement& full;        ///< at full resolution
+  int bin = 1;                                 ///< pixels of `full` in one of the stage, on an axis
+  std::int64_t first_row = 0, num_rows = 0;    ///< of the slabs, in pixels of `full`
+  geometry::Extent2 support;                   ///< where densities count
+  bool has_factors = true;                     ///< the field has the factors that were asked for
+  distributed::Range own_bands;                ///< bands of this process
+  distributed::Range own_leaves;               ///< and their leaves
+  const ObjectiveOptions& options;
 };
 
-/// What a pass over a band of slabs found.
-struct BandResult {
-  std::vector<measurement::ViewSums> views;  ///< one each of the step's views
-  double variation = 0.0;                    ///< both total variations, weighted
-  double grad_bias = 0.0;
-  double boundary_grad_bias = 0.0;  ///< of boundary consistency, which is another pass
-};
-
-/// The loss of a band of slabs (one row of root cells) for some of the views,
-/// and its gradient. A band writes the gradient of its own leaves alone and
-/// reads its neighbours' parameters for halos only, so bands may run in any
-/// order and on any thread.
-class SlabObjective {
+/// Evaluates the terms over batches of slabs on this machine's cores: a band (one row of root
+/// cells) is one piece of work. A band writes the gradient of its own leaves alone and only reads
+/// its neighbours' parameters, so bands may run in any order and on any thread. All that the
+/// context names must outlive the objective; it is made anew when the tree or the stage changes.
+class SlabObjective : public Objective {
  public:
-  SlabObjective(const projection::SlabSampler& sampler, const projection::SlabProjector& projector,
-                const measurement::SlabViews& measured, const field::Field& field,
-                const ObjectiveWeights& weights);
+  explicit SlabObjective(const SlabObjectiveContext& context);
+  /// Evaluates these terms in place of the usual ones.
+  SlabObjective(const SlabObjectiveContext& context, std::vector<std::unique_ptr<Term>> terms);
 
-  /// `multiplicity` scales the views of this step up to the whole series.
-  BandResult accumulate_gradient(int band, std::span<const int> views,
-                                 std::span<const measurement::ViewModel> models,
-                                 double multiplicity, float* gradient) const;
+  double add_gradient(const Step& step, float* gradient,
+                      std::span<measurement::ViewSums> view_sums) const override;
+  const std::vector<int>& own_leaves() const override { return own_leaves_; }
+  measurement::HeldOutError held_out_error(std::span<const double> noise_weight,
+                                           bool fit_view_scale) const override;
+  measurement::PredictedView predict(int view,
+                                     const measurement::ViewModel& model) const override;
+
+  const projection::SlabSampler& sampler() const { return sampler_; }
+
+  /// What a pass over a band found.
+  struct BandSums {
+    std::vector<measurement::ViewSums> views;  ///< one each of the step's views
+    double slab_grad_bias = 0.0;               ///< dL/d bias through the samples of slabs
+    std::vector<TermValue> terms;              ///< one each; grad_bias from Term::add_band alone
+  };
+  /// Adds the gradient of the band's own leaves to `gradient` (all parameters).
+  BandSums add_band(const Step& step, int band, float* gradient) const;
 
  private:
   struct Workspace;
-  template <typename Body>
-  void for_each_slab(const projection::SlabSampler::Range& pair, Workspace& w,
-                     const Body& body) const;
-  void add_data_term(const projection::SlabSampler::Range& pair, std::span<const int> views,
-                     std::span<const measurement::ViewModel> models, double multiplicity,
-                     Workspace& w, BandResult& result) const;
-  void add_variation(int slab, const projection::SlabSampler::Range& pair, const float* samples,
-                     float* grad_samples, Workspace& w, BandResult& result) const;
-  void start_flux(int slab, Workspace& w) const;
-  kernels::DensityRow row_above(int slab, const projection::SlabSampler::Range& pair,
-                                std::size_t segment, const Workspace& w) const;
-  kernels::DensityRow first_row(const float* samples, std::size_t segment) const;
-  kernels::DensityRow decoded_row(const Workspace& w, std::size_t segment) const;
-  kernels::SlabVariation variation_of(std::size_t segment) const;
+  void add_batch(const Step& step, const SlabBatch& batch, float* gradient, BandSums& sums) const;
+  void share(std::vector<BandSums>& bands) const;
 
-  const projection::SlabSampler& sampler_;
   const projection::SlabProjector& projector_;
-  const measurement::SlabViews& measured_;
-  const field::Field& field_;
-  ObjectiveWeights weights_;
+  const measurement::Measurement& measured_;
+  projection::SlabSampler sampler_;
+  distributed::Range own_bands_;
+  std::vector<int> own_leaves_;
+  std::vector<std::unique_ptr<Term>> terms_;
 };
 
 }  // namespace tomofield::objective

@@ -285,8 +285,9 @@ class ModelReader {
     try {
       field::Quadtree tree = read_tree(group.group("tree"));
       auto shapes = read_shapes(group.group("leaves"), tree.num_leaves());
-      const auto kind = base::enum_named<FieldKind>(group.text("kind"));
-      require(kind.has_value(), "there is no such kind of field");
+      const std::string name = group.text("kind");
+      const auto kind = base::enum_named<FieldKind>(name);
+      if (!kind) fail(fmt::format("there is no field '{}'", name));
       require(field::count_parameters(*kind, shapes) <= group.array_size("parameters"),
               "its leaves need more parameters than it holds");
       field = field::make_field(*kind, std::move(tree), thickness, std::move(shapes));

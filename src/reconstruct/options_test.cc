@@ -30,11 +30,11 @@ TEST(ReconstructOptions, NoNumberMayBeNaN) {
     options.*number = nan;
     EXPECT_EQ(options.faults().size(), 1u);
   }
-  for (double fit::FitOptions::*number :
-       {&fit::FitOptions::learning_rate, &fit::FitOptions::final_rate,
-        &fit::FitOptions::density_variation, &fit::FitOptions::factor_variation,
-        &fit::FitOptions::boundary, &fit::FitOptions::fourier, &fit::FitOptions::concavity,
-        &fit::FitOptions::gradient_floor}) {
+  for (double fit::FitOptions::*number : std::initializer_list<double fit::FitOptions::*>{
+           &fit::FitOptions::learning_rate, &fit::FitOptions::final_rate,
+           &fit::FitOptions::density_variation, &fit::FitOptions::factor_variation,
+           &fit::FitOptions::boundary, &fit::FitOptions::fourier, &fit::FitOptions::concavity,
+           &fit::FitOptions::gradient_floor}) {
     fit::FitOptions options;
     options.*number = nan;
     EXPECT_EQ(options.faults().size(), 1u);

@@ -15,6 +15,7 @@
 #include "fit/stages.h"
 #include "measurement/held_out.h"
 #include "measurement/slab_views.h"
+#include "objective/ray_data_term.h"
 #include "projection/slab_projector.h"
 #include "reconstruct/reconstruct.h"
 #include "selection/trial_series.h"
@@ -52,9 +53,7 @@ int num_fitted_views(const measurement::PreparedSeries& plan, const fit::FitOpti
 }
 
 int steps_an_epoch(const measurement::PreparedSeries& plan, const fit::FitOptions& options) {
-  if (plan.ray_geometry)
-    return objective::ray_steps_per_epoch(
-        {.subsets = options.subsets, .rays_per_step = options.rays_per_step}, plan.rays_shape());
+  if (plan.ray_geometry) return objective::ray_steps_per_epoch(options, plan.rays_shape());
   return std::min(options.subsets, num_fitted_views(plan, options));
 }
 
@@ -150,9 +149,8 @@ std::size_t estimate_memory(const measurement::PreparedSeries& plan, const fit::
   const std::size_t fitting = parameters + static_cast<std::size_t>(base::thread_count()) *
                                                thread_memory(plan, domain, views_a_step);
   const std::size_t tracing =
-      plan.ray_geometry ? objective::RayTerm::working_memory(
-                              *plan.ray_geometry, domain.tree,
-                              fit::ray_term_options(domain, options.fit), plan.rays_shape())
+      plan.ray_geometry ? objective::RayDataTerm::working_memory(*plan.ray_geometry, domain.tree,
+                                                                 options.fit, plan.rays_shape())
                         : 0;
   const std::size_t program = kProgram + (processes.size() > 1 ? kMpi : 0);
   return program + rays + coarse_rays +

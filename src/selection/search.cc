@@ -75,7 +75,7 @@ TrialSettings choose_penalty(const TrialSettings& start, const RunTrial& run) {
   concave.penalty = Penalty::kConcave;
   smooth.penalty = Penalty::kSmooth;
   for (TrialSettings* settings : {&concave, &smooth})
-    settings->variation = fit::usual_variation(settings->penalty);
+    settings->variation = objective::usual_variation(settings->penalty);
   const Trial with_concave = run(concave), with_smooth = run(smooth);
   return most_views_prefer(with_smooth.score, with_concave.score) ? smooth : concave;
 }

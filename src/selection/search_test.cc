@@ -24,8 +24,8 @@ struct ImaginedSeries {
   Trial run(const TrialSettings& s) {
     ++num_trials;
     const bool is_smooth = s.penalty == Penalty::kSmooth;
-    const double best = is_smooth ? best_variation * fit::usual_variation(Penalty::kSmooth) /
-                                        fit::usual_variation(Penalty::kConcave)
+    const double best = is_smooth ? best_variation * objective::usual_variation(Penalty::kSmooth) /
+                                        objective::usual_variation(Penalty::kConcave)
                                   : best_variation;
     const double doublings = std::log2(s.variation / best);
     double error = 1 + (is_smooth ? smooth_error : 0) + 0.02 * doublings * doublings;

@@ -249,7 +249,7 @@ std::optional<Tuned> tune(const measurement::Measurement& measurement,
   TrialFits fits(measurement, kTrialRows, field, fit, hooks, expected_trials(space));
   // A run without total variation still needs a weight to search from.
   const double first =
-      fit.density_variation > 0 ? fit.density_variation : fit::usual_variation(fit.penalty);
+      fit.density_variation > 0 ? fit.density_variation : objective::usual_variation(fit.penalty);
   const auto search = [&] {
     Tuned tuned;
     tuned.predicted_views = fits.predicted_views();

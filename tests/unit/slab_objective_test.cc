@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +13,8 @@
 #include "central_difference.h"
 #include "fit/domain.h"
 #include "kernels/lanes.h"
+#include "objective/slab_data_term.h"
+#include "objective/total_variation.h"
 #include "random_arrays.h"
 
 namespace tomofield::objective {
@@ -60,36 +63,69 @@ std::vector<measurement::ViewModel> random_models(int num_views) {
   return models;
 }
 
-// Everything an objective needs, and its value and gradient.
+// The weights of the variations and their penalty.
+struct Weights {
+  double density_variation = 0.0, factor_variation = 0.0;
+  kernels::VariationPenalty penalty;
+};
+
+// Returns a seed whose first step takes forward differences, as the reference below does.
+std::uint64_t seed_of_forward_differences() {
+  std::uint64_t seed = 1;
+  for (;; ++seed) {
+    const DifferenceSides sides = difference_sides(seed, 0);
+    if (!sides.backward_x && !sides.backward_z) return seed;
+  }
+}
+
+// Holds everything an objective needs, and evaluates it.
 class Problem {
  public:
-  Problem(std::unique_ptr<field::Field> field, SampleGrid grid, const ObjectiveWeights& weights)
+  Problem(std::unique_ptr<field::Field> field, SampleGrid grid, const Weights& weights)
       : geometry_(tilted_geometry()),
         field_(std::move(field)),
-        measured_(random_views(geometry_.num_views())),
+        rays_(random_views(geometry_.num_views())),
         models_(random_models(geometry_.num_views())),
         weights_(weights),
         projector_(geometry_, grid),
-        sampler_(*field_, grid, 0, kRows) {}
+        sampler_(*field_, grid, 0, kRows) {
+    measured_.geometry = geometry_;
+    measured_.rays = rays_.get();
+  }
 
   struct Result {
     double data = 0, variation = 0, grad_bias = 0;
     std::vector<float> gradient;
   };
   Result evaluate(bool last_band_first = false) const {
-    const SlabObjective objective(sampler_, projector_, *measured_, *field_, weights_);
+    std::vector<std::unique_ptr<Term>> terms;
+    terms.push_back(std::make_unique<SlabDataTerm>(*rays_));
+    terms.push_back(std::make_unique<DensityVariation>(weights_.density_variation, weights_.penalty,
+                                                       seed_of_forward_differences()));
+    terms.push_back(std::make_unique<FactorVariation>(*field_, sampler_, weights_.factor_variation,
+                                                      weights_.penalty));
+    const ObjectiveOptions options;
+    const SlabObjective objective({.field = *field_,
+                                   .projector = projector_,
+                                   .measured = measured_,
+                                   .full = measured_,
+                                   .num_rows = kRows,
+                                   .own_bands = {0, sampler_.num_bands()},
+                                   .own_leaves = {0, field_->tree().num_leaves()},
+                                   .options = options},
+                                  std::move(terms));
+    const Step step{.views = kViews, .models = models_, .multiplicity = kMultiplicity};
     Result result;
     result.gradient.resize(field_->num_parameters());
     for (int i = 0; i < sampler_.num_bands(); ++i) {
       const int band = last_band_first ? sampler_.num_bands() - 1 - i : i;
-      const BandResult b = objective.accumulate_gradient(band, kViews, models_, kMultiplicity,
-                                                         result.gradient.data());
+      const SlabObjective::BandSums b = objective.add_band(step, band, result.gradient.data());
       for (std::size_t v = 0; v < kViews.size(); ++v) {
         const measurement::ViewModel& m = models_[static_cast<std::size_t>(kViews[v])];
         result.data += kMultiplicity * m.weight / 2 * b.views[v].squared_residual(m);
       }
-      result.variation += b.variation;
-      result.grad_bias += b.grad_bias;
+      for (const TermValue& term : b.terms) result.variation += term.value;
+      result.grad_bias += b.slab_grad_bias;
     }
     return result;
   }
@@ -105,11 +141,11 @@ class Problem {
       const float* p = rays.data();
       for (const int v : kViews) {
         const measurement::ViewModel& m = models_[static_cast<std::size_t>(v)];
-        const float* b = measured_->rays(slab, v);
+        const float* b = rays_->rays(slab, v);
         for (std::int64_t x = 0; x < kWidth; ++x) {
           for (int l = 0; l < kLanes; ++l, ++p, ++b) {
             const double r = m.scale * static_cast<double>(*p) + m.offset - static_cast<double>(*b);
-            if (measured_->mask(slab, v)[x] >> l & 1) loss += kMultiplicity * m.weight / 2 * r * r;
+            if (rays_->mask(slab, v)[x] >> l & 1) loss += kMultiplicity * m.weight / 2 * r * r;
           }
         }
       }
@@ -123,7 +159,7 @@ class Problem {
     if (weights_.factor_variation > 0) {
       std::vector<float> ignored(field_->num_parameters());
       for (int leaf = 0; leaf < field_->tree().num_leaves(); ++leaf) {
-        sum += field_->parameter_variation(leaf, weights_.factor_penalty, weights_.factor_variation,
+        sum += field_->parameter_variation(leaf, weights_.penalty, weights_.factor_variation,
                                            ignored.data());
       }
     }
@@ -142,8 +178,8 @@ class Problem {
   inline static const std::vector<int> kViews = {5, 0, 2, 4};  // a subset, in any order
 
   double penalty(double square) const {
-    const double epsilon = static_cast<double>(weights_.density_penalty.epsilon);
-    const double tau = static_cast<double>(weights_.density_penalty.concavity);
+    const double epsilon = static_cast<double>(weights_.penalty.epsilon);
+    const double tau = static_cast<double>(weights_.penalty.concavity);
     const double m = std::sqrt(square + epsilon * epsilon);
     return tau > 0 ? tau * std::log1p(m / tau) : m;
   }
@@ -182,24 +218,24 @@ class Problem {
 
   geometry::TiltGeometry geometry_;
   std::unique_ptr<field::Field> field_;
-  std::unique_ptr<SlabViews> measured_;
+  std::unique_ptr<SlabViews> rays_;
+  measurement::Measurement measured_;
   std::vector<measurement::ViewModel> models_;
-  ObjectiveWeights weights_;
+  Weights weights_;
   SlabProjector projector_;
   SlabSampler sampler_;
 };
 
 // Penalties whose curvature is mild at the scale of the finite differences.
-ObjectiveWeights weights_of(double density, double factor, double concavity) {
-  ObjectiveWeights w;
+Weights weights_of(double density, double factor, double concavity) {
+  Weights w;
   w.density_variation = density;
   w.factor_variation = factor;
-  w.density_penalty = {.epsilon = 0.2f, .concavity = static_cast<float>(concavity)};
-  w.factor_penalty = w.density_penalty;
+  w.penalty = {.epsilon = 0.2f, .concavity = static_cast<float>(concavity)};
   return w;
 }
 
-Problem random_problem(FieldKind kind, const ObjectiveWeights& weights) {
+Problem random_problem(FieldKind kind, const Weights& weights) {
   fit::FieldOptions options;
   options.kind = kind;
   options.leaf_size = 16;  // cells of 32 rows: two bands, with margin cells on both sides
@@ -295,7 +331,7 @@ std::unique_ptr<field::Field> field_of_cells(std::int64_t cell_size) {
 TEST(SlabObjective, BandsLeaveNoSeam) {
   const SampleGrid grid = projection::make_sample_grid(tilted_geometry(), 0, kWidth, 2);
   for (const double concavity : {0.0, 0.3}) {
-    const ObjectiveWeights weights = weights_of(0.4, 0.2, concavity);
+    const Weights weights = weights_of(0.4, 0.2, concavity);
     Problem two(field_of_cells(32), grid, weights), one(field_of_cells(64), grid, weights);
     const auto a = two.evaluate(), b = one.evaluate();
     EXPECT_NEAR(a.data, b.data, 1e-9 * b.data);
@@ -314,6 +350,15 @@ TEST(SlabObjective, BandsLeaveNoSeam) {
       }
     }
   }
+}
+
+TEST(DensityVariation, StepsTakeDifferencesToEverySide) {
+  std::set<std::pair<bool, bool>> seen;
+  for (std::int64_t step = 0; step < 40; ++step) {
+    const DifferenceSides sides = difference_sides(1, step);
+    seen.emplace(sides.backward_x, sides.backward_z);
+  }
+  EXPECT_EQ(seen.size(), 4u);
 }
 
 TEST(SlabObjective, OrderOfBandsChangesNoBit) {

@@ -18,7 +18,7 @@ reconstruction::ReconstructOptions tensorf_options() {
       fit::usual_schedule(options.field, options.fit).coarse_epochs_of(options.fit.epochs);
   options.fit.coarse_bin = 8;
   options.fit.penalty = Penalty::kSmooth;
-  options.fit.density_variation = fit::usual_variation(options.fit.penalty);
+  options.fit.density_variation = objective::usual_variation(options.fit.penalty);
   options.fit.boundary = 0;
   return options;
 }

@@ -5,51 +5,43 @@
 #include <span>
 #include <vector>
 
-#include "field/field.h"
 #include "geometry/ray_geometry.h"
 #include "measurement/slab_views.h"
 #include "measurement/view_residuals.h"
+#include "objective/term.h"
 #include "projection/ray_projector.h"
 
 namespace tomofield::objective {
 
-/// What the ray engine is told of the field's domain and of its batches.
-struct RayTermOptions {
+/// Where rays count: they must meet the region of interest, and densities outside the support are
+/// 0.
+struct RayRegion {
   geometry::Roi roi;
-  geometry::Extent2 support;       ///< where densities count
-  int subsets = 16;                ///< steps an epoch, unless `rays_per_step` says otherwise
-  std::int64_t rays_per_step = 0;  ///< about; 0: all rays of an epoch over `subsets`
-  int ray_samples = 0;             ///< N_max of eq. 10; 0: one a pixel of a leaf's diagonal
-  std::uint64_t seed = 1;
+  geometry::Extent2 support;
 };
 
-/// Steps in which the ray engine sees every ray of a series once.
-int ray_steps_per_epoch(const RayTermOptions& options, const measurement::SlabViews::Shape& shape);
+/// Returns the number of steps in which the ray engine sees every ray of a series once.
+int ray_steps_per_epoch(const ObjectiveOptions& options,
+                        const measurement::SlabViews::Shape& shape);
 
 /// The data term of eq. 9 over random batches of rays: each step of an epoch
 /// takes one pixel, at random, of every run of as many pixels as an epoch has
 /// steps, in every view, so that an epoch uses each ray once and every step has
 /// all views and places. Rays that miss the region of interest or are masked do
 /// not count.
-class RayTerm {
+class RayDataTerm : public Term {
  public:
-  RayTerm(const geometry::RayGeometry& geometry, const measurement::SlabViews& measured,
-          const field::Field& field, const RayTermOptions& options);
+  RayDataTerm(const geometry::RayGeometry& geometry, const measurement::SlabViews& measured,
+              const field::Field& field, const RayRegion& region, const ObjectiveOptions& options);
 
   int steps_per_epoch() const { return steps_per_epoch_; }
 
-  struct Result {
-    std::vector<measurement::ViewSums> views;  ///< of every view
-    double grad_bias = 0.0;
-  };
-  /// Adds the gradient of step `step` (counted from the first of the fit) by the
-  /// parameters; the loss is scaled up from the step's rays to all of them.
-  Result accumulate_gradient(std::int64_t step, std::span<const measurement::ViewModel> models,
-                             float* gradient) const;
+  TermValue add_field(const Step& step, float* gradient,
+                      std::span<measurement::ViewSums> view_sums) const override;
 
   /// Bytes that a step needs beside the parameters, about.
   static std::size_t working_memory(const geometry::RayGeometry& geometry,
-                                    const field::Quadtree& tree, const RayTermOptions& options,
+                                    const field::Quadtree& tree, const ObjectiveOptions& options,
                                     const measurement::SlabViews::Shape& shape);
 
   /// The rays of a step: those over the same row of root cells together.

@@ -1,4 +1,4 @@
-#include "objective/ray_term.h"
+#include "objective/ray_data_term.h"
 
 #include <gtest/gtest.h>
 
@@ -38,7 +38,8 @@ struct SphereTerm {
         geometry(ray_geometry(series)),
         domain(make_domain(geometry, roi, field_options())),
         field(make_initial_field(domain, SphereSeries::kThickness, 0.3, field_options(), 3)),
-        term(geometry, *series.rays, *field, ray_term_options(domain, options)) {}
+        term(geometry, *series.rays, *field, objective::RayRegion{domain.roi, domain.support},
+             options) {}
   static FieldOptions field_options() {
     FieldOptions o;
     o.kind = FieldKind::kGrid;
@@ -51,7 +52,7 @@ struct SphereTerm {
   geometry::RayGeometry geometry;
   Domain domain;
   std::unique_ptr<field::Field> field;
-  objective::RayTerm term;
+  objective::RayDataTerm term;
 };
 
 using Key = std::tuple<int, int, int>;
@@ -64,7 +65,7 @@ std::vector<Key> rays_of_epoch(const SphereTerm& s, int epoch) {
   return keys;
 }
 
-TEST(RayTerm, AnEpochUsesEachRayOnceInRandomBatches) {
+TEST(RayDataTerm, AnEpochUsesEachRayOnceInRandomBatches) {
   FitOptions options;
   for (const int subsets : {1, 7, 16, 40}) {
     options.subsets = subsets;
@@ -89,14 +90,14 @@ TEST(RayTerm, AnEpochUsesEachRayOnceInRandomBatches) {
   }
 }
 
-TEST(RayTerm, StepsAreAsLargeAsAskedFor) {
+TEST(RayDataTerm, StepsAreAsLargeAsAskedFor) {
   FitOptions options;
   options.rays_per_step = 1000;
   const SphereTerm s(options);
   EXPECT_EQ(s.term.steps_per_epoch(), (31 * 32 * 21 + 999) / 1000);
 }
 
-TEST(RayTerm, RaysThatMissTheRegionAreLeftOut) {
+TEST(RayDataTerm, RaysThatMissTheRegionAreLeftOut) {
   FitOptions options;
   options.subsets = 3;
   const geometry::Roi roi{10, 6, 20, 14};
@@ -126,7 +127,7 @@ TEST(RayTerm, RaysThatMissTheRegionAreLeftOut) {
 }
 
 // ½ Σ weight (scale p + offset − b)² of a step's rays, times the steps of an epoch.
-TEST(RayTerm, GradientIsTheDerivativeOfTheLoss) {
+TEST(RayDataTerm, GradientIsTheDerivativeOfTheLoss) {
   FitOptions options;
   options.subsets = 5;
   options.ray_samples = 20;
@@ -137,14 +138,17 @@ TEST(RayTerm, GradientIsTheDerivativeOfTheLoss) {
   constexpr int kStep = 7;
   const auto loss = [&] {
     std::vector<float> unused(s.field->num_parameters(), 0.0f);
-    const auto result = s.term.accumulate_gradient(kStep, models, unused.data());
+    std::vector<measurement::ViewSums> sums(models.size());
+    s.term.add_field({.number = kStep, .models = models}, unused.data(), sums);
     double sum = 0;
     for (std::size_t v = 0; v < models.size(); ++v)
-      sum += 0.5 * 5 * models[v].weight * result.views[v].squared_residual(models[v]);
+      sum += 0.5 * 5 * models[v].weight * sums[v].squared_residual(models[v]);
     return sum;
   };
   std::vector<float> gradient(s.field->num_parameters(), 0.0f);
-  const auto result = s.term.accumulate_gradient(kStep, models, gradient.data());
+  std::vector<measurement::ViewSums> sums(models.size());
+  const objective::TermValue result =
+      s.term.add_field({.number = kStep, .models = models}, gradient.data(), sums);
   const auto derivative = [&](float& p) { return testing::central_difference(p, 4e-3f, loss); };
   base::set_thread_count(1);  // tiny pieces of work
   EXPECT_NEAR(result.grad_bias / derivative(s.field->bias), 1.0, 1e-3);

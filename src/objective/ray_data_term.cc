@@ -1,4 +1,4 @@
-#include "objective/ray_term.h"
+#include "objective/ray_data_term.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,7 +27,7 @@ double smallest_leaf(const field::Quadtree& tree) {
 }
 
 // One sample a pixel, along the diagonal of the smallest leaf.
-int samples_per_diagonal(const RayTermOptions& options, const field::Quadtree& tree,
+int samples_per_diagonal(const ObjectiveOptions& options, const field::Quadtree& tree,
                          double thickness) {
   if (options.ray_samples > 0) return options.ray_samples;
   const double size = smallest_leaf(tree);
@@ -40,7 +40,8 @@ std::uint32_t draw_of(std::uint64_t seed, std::uint64_t stream) {
 
 }  // namespace
 
-int ray_steps_per_epoch(const RayTermOptions& options, const measurement::SlabViews::Shape& shape) {
+int ray_steps_per_epoch(const ObjectiveOptions& options,
+                        const measurement::SlabViews::Shape& shape) {
   if (options.rays_per_step == 0) return options.subsets;
   const std::int64_t rays =
       static_cast<std::int64_t>(shape.num_views) * shape.width * shape.num_rows;
@@ -48,23 +49,25 @@ int ray_steps_per_epoch(const RayTermOptions& options, const measurement::SlabVi
   return static_cast<int>(std::min<std::int64_t>(steps, std::numeric_limits<int>::max()));
 }
 
-RayTerm::RayTerm(const geometry::RayGeometry& geometry, const measurement::SlabViews& measured,
-                 const field::Field& field, const RayTermOptions& options)
+RayDataTerm::RayDataTerm(const geometry::RayGeometry& geometry,
+                         const measurement::SlabViews& measured, const field::Field& field,
+                         const RayRegion& region, const ObjectiveOptions& options)
     : measured_(measured),
-      roi_{static_cast<double>(options.roi.x0), static_cast<double>(options.roi.y0),
-           static_cast<double>(options.roi.x1), static_cast<double>(options.roi.y1)},
+      roi_{static_cast<double>(region.roi.x0), static_cast<double>(region.roi.y0),
+           static_cast<double>(region.roi.x1), static_cast<double>(region.roi.y1)},
       thickness_(field.thickness()),
       roots_(field.tree().roots()),
       seed_(options.seed),
       steps_per_epoch_(ray_steps_per_epoch(options, measured.shape())),
-      projector_(geometry, field, options.support,
+      projector_(geometry, field, region.support,
                  samples_per_diagonal(options, field.tree(), field.thickness())) {
   for (int view = 0; view < geometry.num_views(); ++view) bundles_.push_back(geometry.rays(view));
 }
 
-std::size_t RayTerm::working_memory(const geometry::RayGeometry& geometry,
-                                    const field::Quadtree& tree, const RayTermOptions& options,
-                                    const measurement::SlabViews::Shape& shape) {
+std::size_t RayDataTerm::working_memory(const geometry::RayGeometry& geometry,
+                                        const field::Quadtree& tree,
+                                        const ObjectiveOptions& options,
+                                        const measurement::SlabViews::Shape& shape) {
   constexpr double kBytesPerPiece = 128, kBytesPerSample = 4, kPadding = 16, kBytesPerRay = 40;
   const double thickness = geometry.aligned.thickness, size = smallest_leaf(tree);
   const double per_pixel =
@@ -83,7 +86,7 @@ std::size_t RayTerm::working_memory(const geometry::RayGeometry& geometry,
   return static_cast<std::size_t>(num_rays * kBytesPerRay + at_once * bytes_of_ray);
 }
 
-std::vector<Ray> RayTerm::batch(std::int64_t step) const {
+std::vector<Ray> RayDataTerm::batch(std::int64_t step) const {
   const auto& shape = measured_.shape();
   const std::int64_t epoch = step / steps_per_epoch_, turn = step % steps_per_epoch_;
   const std::int64_t num_pixels = shape.width * shape.num_rows;
@@ -115,13 +118,14 @@ std::vector<Ray> RayTerm::batch(std::int64_t step) const {
   return rays;
 }
 
-RayTerm::Result RayTerm::accumulate_gradient(std::int64_t step,
-                                             std::span<const measurement::ViewModel> models,
-                                             float* gradient) const {
-  const std::vector<Ray> rays = batch(step);
-  const std::uint32_t draw = draw_of(seed_, kSampleStream + static_cast<std::uint64_t>(step));
-  Result result;
-  result.views.resize(bundles_.size());
+// Adds the gradient of the step's rays; the loss is scaled up from them to all rays.
+TermValue RayDataTerm::add_field(const Step& step, float* gradient,
+                                 std::span<measurement::ViewSums> view_sums) const {
+  const std::vector<Ray> rays = batch(step.number);
+  const std::uint32_t draw =
+      draw_of(seed_, kSampleStream + static_cast<std::uint64_t>(step.number));
+  TermValue result;
+  std::vector<measurement::ViewSums> sums(bundles_.size());
   projection::RayTrace trace;
   for (std::size_t first = 0; first < rays.size(); first += kRaysAtOnce) {
     const auto part = std::span(rays).subspan(first, std::min(kRaysAtOnce, rays.size() - first));
@@ -130,12 +134,13 @@ RayTerm::Result RayTerm::accumulate_gradient(std::int64_t step,
       const Ray& ray = part[i];
       const auto view = static_cast<std::size_t>(ray.view);
       values[i] = static_cast<float>(
-          measurement::ray_data_term(models[view], steps_per_epoch_,
+          measurement::ray_data_term(step.models[view], steps_per_epoch_,
                                      static_cast<double>(measured_.ray(ray.view, ray.x, ray.y)),
-                                     static_cast<double>(values[i]), result.views[view]));
+                                     static_cast<double>(values[i]), sums[view]));
     }
     result.grad_bias += projector_.backward(trace, values, gradient);
   }
+  for (std::size_t v = 0; v < sums.size(); ++v) view_sums[v] += sums[v];
   return result;
 }
 

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "measurement/held_out.h"
+#include "objective/term.h"
+
+namespace tomofield::objective {
+
+/// The loss (eq. 9) of a field on one tree at one resolution: a list of terms that one engine
+/// evaluates. An engine on a device would be a second class of this kind.
+class Objective {
+ public:
+  virtual ~Objective() = default;
+
+  /// Adds the gradient by all parameters of the own leaves to `gradient`, and the sums of the
+  /// step's residuals to `view_sums` (one for every view). Returns the derivative by the bias.
+  /// Every process calls it; sums have the same bits for any number of threads and processes.
+  virtual double add_gradient(const Step& step, float* gradient,
+                              std::span<measurement::ViewSums> view_sums) const = 0;
+
+  /// Returns the leaves whose gradient add_gradient() computes in this process.
+  virtual const std::vector<int>& own_leaves() const = 0;
+
+  /// Scores the field on views that it was not fitted to; `noise_weight` is 1 / variance of the
+  /// noise of every view.
+  virtual measurement::HeldOutError held_out_error(std::span<const double> noise_weight,
+                                                   bool fit_view_scale) const = 0;
+  /// Predicts a view, beside what was measured.
+  virtual measurement::PredictedView predict(int view,
+                                             const measurement::ViewModel& model) const = 0;
+};
+
+}  // namespace tomofield::objective

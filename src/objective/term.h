@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "field/field.h"
+#include "geometry/ray_geometry.h"
+#include "measurement/measurement.h"
+#include "measurement/view_residuals.h"
+#include "objective/options.h"
+#include "projection/slab_projector.h"
+#include "projection/slab_sampler.h"
+
+namespace tomofield::objective {
+
+/// One step of a fit, as the terms of the loss see it.
+struct Step {
+  std::int64_t number = 0;                         ///< counted from the first step of the fit
+  std::span<const int> views;                      ///< views that the slabs are compared with
+  std::span<const measurement::ViewModel> models;  ///< of every view of the series
+  double multiplicity = 1.0;  ///< scales the step's views up to the whole series
+};
+
+/// Consecutive slabs of one band that a thread works on together: decoded samples, and the gradient
+/// of the loss by them. Slabs follow each other in memory, projector.grid().size() floats each.
+struct SlabBatch {
+  const projection::SlabSampler& sampler;
+  const projection::SlabProjector& projector;
+  projection::SlabSampler::Range slabs;  ///< [first, end), counted over the whole volume
+  bool begins_band = false;
+  float* all_samples = nullptr;
+  float* all_gradients = nullptr;
+
+  int size() const { return slabs.end - slabs.first; }
+  float* samples(int slab) const { return all_samples + offset(slab); }
+  float* gradient(int slab) const { return all_gradients + offset(slab); }
+
+ private:
+  std::size_t offset(int slab) const {
+    return static_cast<std::size_t>(slab - slabs.first) * projector.grid().size();
+  }
+};
+
+/// A part of the loss and its derivative by the field's bias.
+struct TermValue {
+  double value = 0.0;
+  double grad_bias = 0.0;
+};
+
+/// A term of the loss (eq. 9). It adds its value and its gradient where that is cheapest: to
+/// decoded samples of slabs, to the parameters of the leaves of a band, or to the whole field at
+/// once. Objects hold no state of a step, so bands may run on any threads.
+class Term {
+ public:
+  virtual ~Term() = default;
+
+  /// Says whether add_slabs() replaces the batch's gradient, which then need not be cleared. Only
+  /// the first term may do so.
+  virtual bool replaces_gradient() const { return false; }
+  /// Adds the term of a batch of slabs: its gradient by the samples to batch.gradient(), sums of
+  /// residuals to `view_sums` (one each of step.views). Returns its value. The batches of a band
+  /// come in order and on one thread.
+  virtual double add_slabs(const Step& /*step*/, const SlabBatch& /*batch*/,
+                           std::span<measurement::ViewSums> /*view_sums*/) const {
+    return 0.0;
+  }
+  /// Adds the gradient by the parameters of a band's own leaves to `gradient` (all parameters).
+  virtual TermValue add_band(const Step& /*step*/, int /*band*/, float* /*gradient*/) const {
+    return {};
+  }
+  /// Adds the gradient by the parameters of all leaves of this process, on all its threads. Sums of
+  /// residuals go to `view_sums` (one for every view). Every process calls it.
+  virtual TermValue add_field(const Step& /*step*/, float* /*gradient*/,
+                              std::span<measurement::ViewSums> /*view_sums*/) const {
+    return {};
+  }
+};
+
+/// What terms are made for: a field on one tree, at the resolution of one stage.
+struct TermContext {
+  const field::Field& field;
+  const projection::SlabSampler& sampler;
+  const measurement::Measurement& measured;  ///< in pixels of the stage
+  const measurement::Measurement& full;      ///< at full resolution
+  int bin = 1;                               ///< pixels of `full` in one of the stage, on an axis
+  geometry::Extent2 support;                 ///< where densities count
+  bool has_factors = true;                   ///< the field has the factors that were asked for
+  distributed::Range own_leaves;             ///< leaves of this process
+  const ObjectiveOptions& options;
+};
+
+}  // namespace tomofield::objective

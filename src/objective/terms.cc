@@ -1,0 +1,74 @@
+#include "objective/terms.h"
+
+#include "objective/boundary_consistency.h"
+#include "objective/fourier_prior.h"
+#include "objective/noise_scale.h"
+#include "objective/ray_data_term.h"
+#include "objective/slab_data_term.h"
+#include "objective/total_variation.h"
+
+namespace tomofield::objective {
+namespace {
+
+std::vector<std::vector<int>> leaves_of_bands(const projection::SlabSampler& sampler) {
+  std::vector<std::vector<int>> bands;
+  for (int band = 0; band < sampler.num_bands(); ++band)
+    bands.push_back(sampler.leaves_of_band(band));
+  return bands;
+}
+
+// Returns the penalty of both variations, in density units.
+kernels::VariationPenalty variation_penalty(const TermContext& c) {
+  kernels::VariationPenalty penalty;
+  penalty.epsilon = static_cast<float>(c.options.gradient_floor);
+  if (c.options.penalty == Penalty::kConcave)
+    penalty.concavity = static_cast<float>(concavity(c.options.concavity, c.full.noise_sigma));
+  return penalty;
+}
+
+// A jump at a face counts as total variation does, density times area. Faces and the Fourier prior
+// count fine pixels: bin² of a face and bin³ of a volume to one of the stage.
+BoundaryOptions boundary_options(const TermContext& c, double noise) {
+  return {.weight = c.options.boundary / (noise * c.bin * c.bin), .seed = c.options.seed};
+}
+
+FourierPriorOptions fourier_options(const TermContext& c, double noise) {
+  FourierPriorOptions fourier;
+  fourier.weight = c.options.fourier / (noise * c.bin * c.bin * c.bin);
+  fourier.seed = c.options.seed;
+  fourier.axes.reference = c.options.fourier_ring;
+  return fourier;
+}
+
+}  // namespace
+
+double variation_gain(const ObjectiveOptions& options, const measurement::Measurement& full) {
+  if (options.penalty != Penalty::kConcave) return 1.0;
+  return gain_of_little_noise(typical_noise(full.noise_sigma), full.contrast());
+}
+
+// The residuals are in units of the noise, so a prior that were the same for every series would
+// have one weight there. Total variation is not such a prior: it must suppress noise, and its best
+// weight grows with the noise's deviation rather than its variance (as in denoising: Rudin, Osher
+// and Fatemi 1992). Weights divided by the noise of the stage's pixels serve every size.
+std::vector<std::unique_ptr<Term>> make_terms(const TermContext& c) {
+  const double noise = typical_noise(c.measured.noise_sigma);
+  const double density = variation_gain(c.options, c.full) * c.options.density_variation / noise;
+  const double factors = c.has_factors ? c.options.factor_variation / noise : 0.0;
+  const kernels::VariationPenalty penalty = variation_penalty(c);
+  const bool has_rays = c.full.ray_geometry.has_value();
+  std::vector<std::unique_ptr<Term>> terms;
+  if (!has_rays) terms.push_back(std::make_unique<SlabDataTerm>(*c.measured.rays));
+  terms.push_back(std::make_unique<DensityVariation>(density, penalty, c.options.seed));
+  terms.push_back(std::make_unique<FactorVariation>(c.field, c.sampler, factors, penalty));
+  terms.push_back(std::make_unique<BoundaryConsistency>(c.field, leaves_of_bands(c.sampler),
+                                                        boundary_options(c, noise)));
+  terms.push_back(std::make_unique<FourierPrior>(c.field, c.full.roi, fourier_options(c, noise),
+                                                 *c.full.processes, c.own_leaves));
+  if (has_rays)
+    terms.push_back(std::make_unique<RayDataTerm>(*c.full.ray_geometry, *c.full.rays, c.field,
+                                                  RayRegion{c.full.roi, c.support}, c.options));
+  return terms;
+}
+
+}  // namespace tomofield::objective

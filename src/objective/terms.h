@@ -1,0 +1,18 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "objective/term.h"
+
+namespace tomofield::objective {
+
+/// Makes the terms of the loss in the order in which they are evaluated. A new term is a new file
+/// and a line here.
+std::vector<std::unique_ptr<Term>> make_terms(const TermContext& context);
+
+/// Returns how many times its usual weight the density's variation has: more than once where there
+/// is little noise and the penalty is concave (noise_scale.h).
+double variation_gain(const ObjectiveOptions& options, const measurement::Measurement& full);
+
+}  // namespace tomofield::objective

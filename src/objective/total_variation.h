@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+
+#include "kernels/total_variation.h"
+#include "objective/term.h"
+
+namespace tomofield::objective {
+
+/// The sides to which the differences of a step go along x and z.
+struct DifferenceSides {
+  bool backward_x = false, backward_z = false;
+};
+/// Draws them for a step.
+DifferenceSides difference_sides(std::uint64_t seed, std::int64_t step);
+
+/// Isotropic total variation of the density on the samples of slabs (kernels/total_variation.h):
+/// weight · Σ penalty(|∇ density|) times the area that a sample stands for. Each step looks at
+/// edges from another corner, since forward differences alone treat the two sides of an edge
+/// differently.
+class DensityVariation : public Term {
+ public:
+  /// `weight` is per pixel of area and density unit; 0 is off.
+  DensityVariation(double weight, const kernels::VariationPenalty& penalty, std::uint64_t seed)
+      : weight_(weight), penalty_(penalty), seed_(seed) {}
+
+  double add_slabs(const Step& step, const SlabBatch& batch,
+                   std::span<measurement::ViewSums> view_sums) const override;
+
+ private:
+  kernels::SlabVariation variation_of(const SlabBatch& batch, std::size_t segment,
+                                      std::int64_t step) const;
+  void start_flux(const Step& step, const SlabBatch& batch, float* row, float* flux) const;
+
+  double weight_;
+  kernels::VariationPenalty penalty_;
+  std::uint64_t seed_;
+};
+
+/// Total variation of the factors of each leaf (field::Field::parameter_variation).
+class FactorVariation : public Term {
+ public:
+  /// The field and the sampler must outlive the term. A weight of 0 is off.
+  FactorVariation(const field::Field& field, const projection::SlabSampler& sampler, double weight,
+                  const kernels::VariationPenalty& penalty)
+      : field_(field), sampler_(sampler), weight_(weight), penalty_(penalty) {}
+
+  TermValue add_band(const Step& step, int band, float* gradient) const override;
+
+ private:
+  const field::Field& field_;
+  const projection::SlabSampler& sampler_;
+  double weight_;
+  kernels::VariationPenalty penalty_;
+};
+
+}  // namespace tomofield::objective
