@@ -12,6 +12,7 @@ enum class LogLevel { kInfo, kWarning };
 /// sink drops everything; the program sets its own before any work starts. Several threads may log,
 /// but the sink is called by one at a time.
 void set_log_sink(std::function<void(LogLevel, std::string_view)> sink);
+/// Sends a message to the sink.
 void log_info(const std::string& message);
 void log_warning(const std::string& message);
 

@@ -87,8 +87,9 @@ class Communicator {
   template <typename T>
   void receive(std::span<T> values, int from) const;
 
-  /// Runs `body`, which must not communicate, on every rank. If it throws Error on some ranks, all
-  /// ranks throw SharedError with the message of the lowest of them.
+  /// Runs `body` on every rank. If it throws Error on some ranks, all ranks throw SharedError with
+  /// the message of the lowest of them. `body` must not make collective calls, because a rank that
+  /// throws would not join them. A job of one rank throws the Error itself.
   void run_collectively(const std::function<void()>& body) const;
 
   /// Sets a function that is called now and then while this rank waits long for others.

@@ -24,7 +24,7 @@ namespace tomofield::field {
 /// modes (0 for fields that are not factorised).
 struct LeafShape {
   int nx = 0, ny = 0, nz = 0;
-  int rank_x = 0, rank_y = 0, rank_z = 0;  ///< of VX⊗MYZ, VY⊗MXZ, VZ⊗MXY
+  int rank_x = 0, rank_y = 0, rank_z = 0;  ///< ranks of VX⊗MYZ, VY⊗MXZ, VZ⊗MXY
   bool operator==(const LeafShape&) const = default;
   static constexpr int kMostVertices = 1 << 16;  ///< along an axis
   std::size_t vertices_xz() const { return static_cast<std::size_t>(nx) * nz; }
@@ -188,7 +188,7 @@ class Field {
   double thickness_;
   std::vector<LeafShape> shapes_;
   std::vector<std::size_t> offsets_;
-  std::vector<char> is_kept_;  // of each leaf; empty if all leaves are kept
+  std::vector<char> is_kept_;  // a flag for each leaf; empty if all leaves are kept
   base::AlignedBuffer<float> parameters_;
 };
 

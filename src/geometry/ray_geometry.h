@@ -41,7 +41,8 @@ struct RayGeometry {
   std::vector<double> x_tilt_deg;                ///< α of each view
   std::vector<RawFromAligned> raw_from_aligned;  ///< M and shift of each view
   std::int64_t raw_width = 0,
-               raw_height = 0;  ///< of the recorded views, in pixels as large as the aligned ones
+               raw_height =
+                   0;  ///< size of the recorded views, in pixels as large as the aligned ones
 
   int num_views() const { return aligned.num_views(); }
   /// Returns (u, v) in the raw image of a specimen point; pixel i covers [i, i + 1).

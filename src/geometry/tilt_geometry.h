@@ -23,8 +23,8 @@ struct Roi {
 /// hand +1 is the right-handed rotation about +Y of IMOD, AreTomo and RELION (docs/geometry.md);
 /// with −1 the volume comes out mirrored in Z.
 struct TiltGeometry {
-  std::int64_t width = 0, height = 0;  ///< of a view
-  double thickness = 0;
+  std::int64_t width = 0, height = 0;  ///< size of a view in pixels
+  double thickness = 0;                ///< thickness of the specimen in pixels
   std::vector<double> tilt_deg;
   int hand = 1;
   double axis_x = 0;  ///< x of the tilt axis in the view; width / 2 is the geometric centre

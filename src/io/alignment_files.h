@@ -46,7 +46,7 @@ struct MdocSection {
 
 /// The contents of SerialEM's .mdoc, with sections in ascending order of n.
 struct Mdoc {
-  std::optional<double> pixel_spacing_A;  ///< of the series, or of its first section
+  std::optional<double> pixel_spacing_A;  ///< value of the series, or of its first section
   std::vector<MdocSection> sections;
 };
 
@@ -58,14 +58,15 @@ Mdoc read_mdoc(const std::filesystem::path& path);
 struct AreTomoRow {
   std::int64_t section = 0;  ///< SEC as written; assign_aretomo_sections interprets it
   int line = 0;
-  double rotation_deg = 0.0;  ///< of the tilt axis, counter-clockwise from +Y
+  double rotation_deg = 0.0;  ///< angle of the tilt axis, counter-clockwise from +Y
   double magnification = 1.0;
   double shift_x_px = 0.0, shift_y_px = 0.0;
   double tilt_deg = 0.0;
 };
 
+/// The contents of AreTomo's .aln file.
 struct AreTomoAlignment {
-  std::optional<std::array<std::int64_t, 3>> raw_size;  ///< of the stack that was aligned
+  std::optional<std::array<std::int64_t, 3>> raw_size;  ///< size of the stack that was aligned
   std::vector<std::int64_t> dark_sections;              ///< second number of each # DarkFrame line
   double alpha_offset_deg = 0.0;                        ///< already included in the rows' angles
   double beta_offset_deg = 0.0;
@@ -73,6 +74,7 @@ struct AreTomoAlignment {
   std::int64_t num_local_rows = 0;  ///< number of rows for patches, which are not used
 };
 
+/// Reads an .aln file. Rows of local alignments are counted and skipped.
 AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path);
 
 /// Returns the zero-based section of the stack for each row. AreTomo's versions count SEC from 0 or

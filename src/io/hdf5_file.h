@@ -31,7 +31,7 @@ class Hdf5Group {
   Hdf5Group group(const std::string& name) const;
   bool has(const std::string& name) const;  ///< true for a group or an array
   bool has_attribute(const std::string& name) const;
-  std::vector<std::string> names() const;  ///< of groups and arrays, sorted
+  std::vector<std::string> names() const;  ///< names of groups and arrays, sorted
 
   void write_number(const std::string& name, double value);
   void write_integer(const std::string& name, std::int64_t value);

@@ -36,7 +36,7 @@ struct MrcHeader {
   bool bytes_are_unsigned = false;  ///< mode 0 with IMOD's stamp and without its signed flag
   std::int64_t extended_header_bytes = 0;
   std::string extended_header_type;
-  std::vector<double> extended_tilt_deg;  ///< from a SERI header under flag 1, else empty
+  std::vector<double> extended_tilt_deg;  ///< angles of a SERI header with flag 1, else empty
   std::vector<std::string> labels;
 };
 

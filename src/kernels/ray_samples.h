@@ -20,8 +20,8 @@ struct LeafVertices {
 struct RayPiece {
   float start_x = 0, start_y = 0, start_z = 0;
   float span_x = 0, span_y = 0, span_z = 0;
-  float segment_length = 0;  ///< in pixels; the weight of a sample
-  std::uint32_t key = 0;     ///< of the piece's random numbers
+  float segment_length = 0;  ///< length in pixels; the weight of a sample
+  std::uint32_t key = 0;     ///< key of the piece's random numbers
   int num_samples = 0;
 };
 

@@ -24,6 +24,7 @@ struct SmallGemm {
   std::ptrdiff_t c_row = 0;
 };
 
+/// Computes C += A B.
 void small_gemm(const SmallGemm& gemm);
 
 }  // namespace tomofield::kernels

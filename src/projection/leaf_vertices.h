@@ -5,6 +5,7 @@
 
 namespace tomofield::projection {
 
+/// Returns a leaf's vertex counts as the ray kernels take them.
 kernels::LeafVertices vertices_of(const field::LeafShape& shape);
 
 /// Overwrites values[x, z, y] with the pre-activation at every vertex of a leaf, bias included. Its

@@ -29,7 +29,7 @@ class RayTrace {
     std::size_t first_density = 0;
     double sum = 0.0;
   };
-  std::vector<Piece> pieces_;               // by leaf; within a leaf in the order of the rays
+  std::vector<Piece> pieces_;  // sorted by leaf; within a leaf in the order of the rays
   std::vector<std::size_t> first_of_leaf_;  // one more than there are leaves
   base::AlignedBuffer<float> densities_;
 };

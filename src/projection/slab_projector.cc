@@ -69,7 +69,7 @@ struct Crossing {
   LineCrossing& line;
   double offset = 0, step = 1;  // position(pixel), as in LineCrossing
   int part_first = 0, part_end = 0;
-  double low_face = 0, high_face = 0, spread = 0;  // in samples
+  double low_face = 0, high_face = 0, spread = 0;  // measured in samples
 
   double position(int pixel) const { return offset + step * pixel; }
   // Returns the share of a pixel's piece that lies within the faces.

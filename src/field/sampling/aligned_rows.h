@@ -56,7 +56,7 @@ class AlignedRows {
   Box box_;
   std::int64_t factor_;                   // points a voxel along each axis
   std::int64_t first_z_ = 0, end_z_ = 0;  // points inside the thickness
-  std::map<int, TapsZ> taps_z_;           // by number of vertices
+  std::map<int, TapsZ> taps_z_;           // the key is the number of vertices
 };
 
 }  // namespace tomofield::field

@@ -27,6 +27,7 @@ struct Square {
 /// Returns quarter 0 … 3 of a square, x fastest.
 Square quarter_of(const Square& square, int quarter);
 
+/// A node of the tree: a root cell or one of four quarters of its parent.
 struct QuadtreeNode {
   Square square;
   Region region = Region::kInterest;

@@ -22,6 +22,7 @@ struct LeafOrigin {
   int quarter = 0;  ///< quarter of the old leaf, x fastest
 };
 
+/// The result of an edit.
 struct EditedTree {
   Quadtree tree;
   std::vector<LeafOrigin> origins;  ///< origin of each leaf of `tree`

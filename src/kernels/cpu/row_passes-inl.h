@@ -135,6 +135,7 @@ HWY_INLINE void pass_all_rows_of_half(const SmallGemm& g, std::ptrdiff_t first,
           HWY_ATTR { pass_rows_of_half<kDepth, 1>(d, pairs, a, c + col, g.c_row); });
 }
 
+// Adds the product of kDepth columns of A, from `first`, and all columns of B to C.
 template <int kDepth>
 HWY_INLINE void pass_all_columns(const SmallGemm& g, std::ptrdiff_t first) {
   std::ptrdiff_t col = 0;

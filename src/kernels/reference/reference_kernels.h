@@ -16,6 +16,7 @@
 /// structs are not used.
 namespace tomofield::kernels::reference {
 
+/// Computes C += A B.
 void small_gemm(const SmallGemm& shape, const double* a, const double* b, double* c);
 
 /// Returns the weight with which pixel u sees sample j: weight · hat(position(u) − j), or 0.
@@ -31,6 +32,7 @@ void project_line(const LineCrossing& line, int num_samples, std::ptrdiff_t stri
 void backproject_line(const LineCrossing& line, std::ptrdiff_t stride, int first, int end,
                       const double* detector, double* samples);
 
+/// Return act(value) and act′(value).
 double activation_value(Activation activation, double value);
 double activation_derivative(Activation activation, double value);
 
@@ -69,6 +71,7 @@ double integrate_piece(const LeafVertices& leaf, Activation activation, const do
 double spread_piece(const LeafVertices& leaf, Activation activation, const double* values,
                     const RayPiece& piece, double g, double* grad_values);
 
+/// Applies a step of Adam and sets the gradient to zero.
 void adam_step(const AdamStep& step, std::ptrdiff_t count, double* parameters, double* gradient,
                double* m, double* v);
 
