@@ -13,10 +13,10 @@
 
 namespace tomofield::base {
 
-/// A zero-initialised array of plain values, aligned for any SIMD vector and,
-/// when it is large, for huge pages, which it asks the kernel for: slab
-/// columns stride over many 4 KiB pages and would otherwise miss the TLB.
-/// Pages of a large one that are never written take no memory.
+/// A zero-initialised array of plain values, aligned for any SIMD vector. A large array is also
+/// aligned for huge pages and asks the kernel for them, because slab columns stride over many 4 KiB
+/// pages and would otherwise miss the TLB. Pages of a large array that are never written take no
+/// memory. Throws std::bad_alloc.
 template <typename T>
 class AlignedBuffer {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -37,7 +37,7 @@ class AlignedBuffer {
       data_ = map_zeros((bytes + kHugePage - 1) / kHugePage * kHugePage);
     } else {
       const std::size_t rounded = (bytes + kCacheLine - 1) / kCacheLine * kCacheLine;
-      // With a deleter of its own: what was there before may have been mapped.
+      // Sets the deleter too, because the memory that is replaced may have been mapped.
       data_ = Memory(static_cast<T*>(std::aligned_alloc(kCacheLine, rounded)), Free{});
       if (!data_) throw std::bad_alloc();
       fill(T{});
@@ -68,7 +68,7 @@ class AlignedBuffer {
   static constexpr std::size_t kCacheLine = 64;
   static constexpr std::size_t kHugePage = std::size_t{2} << 20;
   struct Free {
-    std::size_t mapped_bytes = 0;  // 0: from the heap
+    std::size_t mapped_bytes = 0;  // 0: the memory is from the heap
     void operator()(T* p) const {
       if (mapped_bytes > 0)
         munmap(p, mapped_bytes);
@@ -78,7 +78,7 @@ class AlignedBuffer {
   };
   using Memory = std::unique_ptr<T[], Free>;
 
-  // Whole huge pages of zeros: a stretch that is one too long, without its ends.
+  // Returns whole huge pages of zeros. It maps one page too many and unmaps both unaligned ends.
   static Memory map_zeros(std::size_t bytes) {
     void* mapped = mmap(nullptr, bytes + kHugePage, PROT_READ | PROT_WRITE,
                         MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);

@@ -41,7 +41,7 @@ TEST(AlignedBuffer, LargeOnesAreAlignedForHugePages) {
   }
 }
 
-// Resident pages of the program, in bytes.
+// Returns the memory that the program occupies now, in bytes.
 std::size_t resident_bytes() {
   std::ifstream file("/proc/self/statm");
   std::size_t size = 0, resident = 0;
@@ -57,7 +57,7 @@ TEST(AlignedBuffer, PagesThatAreNotWrittenTakeNoMemory) {
   EXPECT_LT(resident_bytes(), before + 16 * kMiB);
 }
 
-// Memory of the heap must not go back as if it were mapped, which it may lie in the middle of.
+// Heap memory must not be unmapped, because it may lie in the middle of a mapped region.
 TEST(AlignedBuffer, ASmallOneInPlaceOfALargeOneIsFreed) {
   constexpr std::size_t kLarge = std::size_t{2} << 20, kSmall = 20000;
   const std::size_t before = mallinfo2().uordblks;
@@ -73,7 +73,7 @@ TEST(AlignedBuffer, EmptyHasNoElements) {
   EXPECT_TRUE(none.empty());
   EXPECT_TRUE(zero.empty());
   EXPECT_EQ(zero.begin(), zero.end());
-  zero.fill(3.0);  // of nothing
+  zero.fill(3.0);  // must not write anything
 }
 
 TEST(AlignedBuffer, ResetForgetsAndReserveOnlyGrows) {

@@ -13,8 +13,9 @@ namespace tomofield::base {
 
 }  // namespace tomofield::base
 
-/// Guards an invariant of ours (never the user's input: that is tomofield::Error).
-/// `context` is evaluated on failure only and says what a maintainer needs.
+/// Guards an invariant of the program and throws std::logic_error if it does not hold. The user's
+/// input is checked with tomofield::Error instead. `context` is evaluated on failure only and says
+/// what a maintainer needs.
 #define TOMOFIELD_CHECK(condition, context)                                                     \
   do {                                                                                          \
     if (!(condition)) ::tomofield::base::check_failed(#condition, __FILE__, __LINE__, context); \

@@ -2,8 +2,8 @@
 
 namespace tomofield::base {
 
-/// `git describe --always --dirty` of the sources when this library was built; "unknown" without
-/// git.
+/// Returns `git describe --always --dirty` of the sources when this library was built, or "unknown"
+/// without git.
 const char* source_commit();
 
 }  // namespace tomofield::base

@@ -9,7 +9,7 @@
 
 namespace tomofield::base {
 
-// MemAvailable of Linux.
+// Reads MemAvailable, which Linux reports.
 std::size_t available_memory() {
   std::ifstream file("/proc/meminfo");
   std::string line;

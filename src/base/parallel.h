@@ -6,16 +6,16 @@
 
 namespace tomofield::base {
 
-/// Number of threads that parallel_for uses; set once, at start-up.
+/// Returns the number of threads that parallel_for uses. It is set once, at start-up.
 int thread_count();
 void set_thread_count(int count);
 
-/// Index of the calling thread inside a parallel_for, 0 <= index < thread_count().
+/// Returns the index of the calling thread inside a parallel_for, 0 <= index < thread_count().
 int thread_index();
 
-/// Calls body(i) for i in [0, count), in any order, on thread_count() threads.
-/// The first exception that a body throws is rethrown here, after all have
-/// stopped. Results must not depend on which thread runs an index.
+/// Calls body(i) for i in [0, count), in any order, on thread_count() threads. If bodies throw,
+/// rethrows the first exception after all threads have stopped. Results must not depend on which
+/// thread runs an index.
 template <typename Body>
 void parallel_for(std::int64_t count, Body&& body) {
   std::exception_ptr failure;

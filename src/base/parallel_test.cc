@@ -48,7 +48,7 @@ TEST_P(ParallelFor, RethrowsWhatABodyThrows) {
     EXPECT_EQ(std::string(error.what()), "thirty-seven");
   }
   EXPECT_GT(visits.load(), 0);
-  // And nothing is left behind for the next loop.
+  // The next loop must not see an exception of the last one.
   EXPECT_NO_THROW(parallel_for(10, [](std::int64_t) {}));
 }
 

@@ -8,9 +8,9 @@
 
 namespace tomofield::base {
 
-/// The value below which `percent` of the values lie, linear between neighbours
-/// (numpy's default). Takes a copy, which it reorders. `values` must not be empty
-/// and hold no NaN.
+/// Returns the value below which `percent` of the values lie, interpolated linearly between
+/// neighbours as numpy does by default. Takes a copy, which it reorders. `values` must not be empty
+/// and must not contain NaN.
 inline double percentile(std::vector<float> values, double percent) {
   TOMOFIELD_CHECK(!values.empty(), "percentile of nothing");
   const double position = percent / 100.0 * static_cast<double>(values.size() - 1);

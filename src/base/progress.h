@@ -6,14 +6,14 @@
 
 namespace tomofield::base {
 
-/// How far a long computation is; handed to a sink, which may draw it.
+/// The progress of a long computation. A sink receives it and may draw it.
 struct ProgressReport {
   double fraction_done = 0.0;
   double seconds_elapsed = 0.0;
   double seconds_left = 0.0;
-  std::string detail;  ///< what else is worth seeing, such as the loss: a few words
+  std::string detail;  ///< a few words on the state, such as the loss
 };
-/// A report whose remaining time is what `fraction_done`, above 0, took.
+/// Returns a report whose remaining time is extrapolated from `fraction_done`, which is above 0.
 inline ProgressReport progress_at(double fraction_done, double seconds_elapsed,
                                   std::string detail) {
   return {fraction_done, seconds_elapsed, seconds_elapsed * (1 - fraction_done) / fraction_done,

@@ -7,10 +7,9 @@
 
 namespace tomofield::base {
 
-/// Random numbers that are the same on every machine and for every thread
-/// count: xoshiro256** (Blackman and Vigna 2018), seeded by splitmix64 from a
-/// seed and a stream number, so that independent parts of the work each own a
-/// stream and never share a generator.
+/// Generates random numbers that are the same on every machine and for every thread count. The
+/// generator is xoshiro256** (Blackman and Vigna 2018), seeded by splitmix64 from a seed and a
+/// stream number. Independent parts of the work each own a stream and never share a generator.
 class Random {
  public:
   explicit Random(std::uint64_t seed, std::uint64_t stream = 0) {
@@ -18,7 +17,7 @@ class Random {
     for (auto& word : state_) word = splitmix(s);
   }
 
-  /// 64 uniformly distributed bits.
+  /// Returns 64 uniformly distributed bits.
   std::uint64_t bits() {
     const std::uint64_t result = rotate_left(state_[1] * 5, 7) * 9;
     const std::uint64_t t = state_[1] << 17;
@@ -31,14 +30,15 @@ class Random {
     return result;
   }
 
-  /// Uniform in [0, 1).
+  /// Returns a number that is uniform in [0, 1).
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
 
-  /// Uniform in {0, …, count − 1}; the bias of the modulo is below count / 2^64.
+  /// Returns an integer that is uniform in {0, …, count − 1}; the modulo's bias is below
+  /// count / 2^64.
   std::uint64_t below(std::uint64_t count) { return bits() % count; }
 
-  /// Standard normal (Box–Muller, one of the pair).
+  /// Returns a standard normal number (Box–Muller; only one of each pair is used).
   double normal() {
     const double radius = std::sqrt(-2.0 * std::log1p(-uniform()));
     return radius * std::cos(2.0 * std::numbers::pi * uniform());

@@ -11,8 +11,8 @@ namespace tomofield::base {
 namespace {
 
 TEST(Random, SequenceIsTheSameForEver) {
-  // Computed by an independent implementation of splitmix64 and xoshiro256**:
-  // a change of these would change the results of every seed.
+  // An independent implementation of splitmix64 and xoshiro256** computed these values. Changing
+  // the generator would change the results of every seed.
   struct Case {
     std::array<std::uint64_t, 2> seed_and_stream;
     std::array<std::uint64_t, 3> first;
@@ -41,7 +41,7 @@ TEST(Random, NumbersAreUniform) {
     sum += x;
     squares += x * x;
   }
-  // Five standard deviations of each estimate; χ² has 63 ± 11.2.
+  // The tolerances are five standard deviations of each estimate; χ² has 63 ± 11.2.
   EXPECT_NEAR(sum / kCount, 0.5, 5 * std::sqrt(1.0 / 12 / kCount));
   EXPECT_NEAR(squares / kCount, 1.0 / 3, 5 * std::sqrt(4.0 / 45 / kCount));
   double chi2 = 0;
@@ -83,7 +83,7 @@ TEST(Random, NormalHasItsMoments) {
 }
 
 TEST(Random, StreamsAndSeedsAreIndependent) {
-  // Neighbouring streams and seeds, as bands and epochs use them.
+  // Bands and epochs use neighbouring streams and seeds like these.
   constexpr int kCount = 20000;
   const std::vector<std::array<std::uint64_t, 2>> generators = {{1, 0}, {1, 1}, {1, 2},
                                                                 {2, 0}, {2, 1}, {0, 0}};

@@ -9,7 +9,7 @@
 
 namespace tomofield::base {
 
-/// 0, 1, …, count − 1 in random order (Fisher and Yates), each order equally likely.
+/// Returns 0, 1, …, count − 1 in random order (Fisher and Yates); every order is equally likely.
 inline std::vector<std::size_t> shuffled(std::size_t count, Random random) {
   std::vector<std::size_t> order(count);
   std::iota(order.begin(), order.end(), 0);

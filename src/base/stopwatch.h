@@ -4,7 +4,7 @@
 
 namespace tomofield::base {
 
-/// Wall-clock time since it was made or restarted.
+/// Measures the wall-clock time since it was made or restarted.
 class Stopwatch {
  public:
   double seconds() const {

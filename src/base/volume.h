@@ -15,8 +15,8 @@ struct Shape3 {
   bool operator==(const Shape3&) const = default;
 };
 
-/// A volume [z, y, x] held in memory: test data, phantoms and metrics; large
-/// tomograms are streamed instead.
+/// A volume [z, y, x] in memory. It serves test data, phantoms and metrics; large tomograms are
+/// streamed instead.
 struct Volume {
   Shape3 shape;
   double voxel_size_A = 1.0;

@@ -9,7 +9,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-// Names and values of the specification.
+// The names and values are those of the specification.
 constexpr std::uint64_t kPrime1 = 0x9e3779b185ebca87ULL;
 constexpr std::uint64_t kPrime2 = 0xc2b2ae3d27d4eb4fULL;
 constexpr std::uint64_t kPrime3 = 0x165667b19e3779f9ULL;

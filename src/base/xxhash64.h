@@ -7,24 +7,24 @@
 
 namespace tomofield::base {
 
-/// XXH64 with seed 0 (Collet, xxHash specification 0.1.1): a checksum as fast as
-/// memory, with implementations in every language. Bytes are read as this
-/// machine orders them, so the machine must be little-endian.
+/// Returns XXH64 of `bytes` with seed 0 (Collet, xxHash specification 0.1.1): a checksum as fast as
+/// memory, with implementations in every language. Words are read in this machine's byte order, so
+/// the machine must be little-endian.
 std::uint64_t xxhash64(std::span<const std::byte> bytes);
 
-/// The same of bytes that come piece by piece.
+/// Computes XXH64 of bytes that arrive in pieces.
 class Xxhash64 {
  public:
   Xxhash64();
   void add(std::span<const std::byte> bytes);
-  std::uint64_t value() const;  ///< of all so far
+  std::uint64_t value() const;  ///< of all bytes added so far
 
  private:
   static constexpr std::size_t kStripe = 32;
   void add_stripe(const std::byte* stripe);
 
   std::array<std::uint64_t, 4> lanes_;
-  std::array<std::byte, kStripe> rest_{};  // what makes no whole stripe yet
+  std::array<std::byte, kStripe> rest_{};  // bytes that do not fill a stripe yet
   std::size_t rest_size_ = 0;
   std::uint64_t length_ = 0;
 };

@@ -11,7 +11,7 @@ namespace {
 
 std::uint64_t hash_of(const std::string& text) { return xxhash64(std::as_bytes(std::span(text))); }
 
-// What the reference implementation gives.
+// The expected values come from the reference implementation.
 TEST(Xxhash64, AgreesWithPublishedValues) {
   EXPECT_EQ(hash_of(""), 0xef46db3751d8e999ULL);
   EXPECT_EQ(hash_of("a"), 0xd24ec4f1a98c6e5bULL);

@@ -19,7 +19,7 @@ namespace {
 
 const MPI_Comm kAll = MPI_COMM_WORLD;
 constexpr int kTag = 1;
-// MPI counts in ints; an array of more goes in pieces.
+// MPI counts in ints, so longer arrays go in pieces of this many elements.
 constexpr std::size_t kMostAtOnce = std::size_t{1} << 28;
 
 template <typename T>
@@ -37,7 +37,7 @@ MPI_Datatype type_of<std::int64_t>() {
   return MPI_INT64_T;
 }
 
-// Counts the time from its making to its end as spent on others.
+// Adds the time for which it lives to the seconds spent on waiting for others.
 class Waiting {
  public:
   explicit Waiting(double& seconds) : seconds_(seconds) {}
@@ -48,7 +48,7 @@ class Waiting {
   base::Stopwatch since_;
 };
 
-// Calls body(piece) for pieces that MPI can count.
+// Calls body(piece) for pieces whose elements MPI can count.
 template <typename T, typename Body>
 void for_each_piece(std::span<T> values, const Body& body) {
   for (std::size_t at = 0; at < values.size(); at += kMostAtOnce)
@@ -62,7 +62,8 @@ struct Communicator::Requests {
   MPI_Request* next() { return &all.emplace_back(MPI_REQUEST_NULL); }
 };
 
-// Until all requests are met. Others may need this core, above all if it takes long.
+// Waits until all requests are complete. It yields the core, which other ranks may need, and sleeps
+// between tests if the wait is long.
 void Communicator::finish(Requests& requests) const {
   constexpr int kTestsBeforeSleep = 2000;
   for (int done = 0, tests = 0;; ++tests) {
@@ -189,18 +190,18 @@ void Communicator::run_collectively(const std::function<void()>& body) const {
     failed = true;
     complaint = error.what();
   }
-  // The first that failed has the largest of these.
+  // The lowest rank that failed hands over the largest number.
   const double first = allreduce_max(failed ? size_ - rank_ : 0);
   if (first <= 0) return;
   throw SharedError(broadcast(complaint, size_ - static_cast<int>(first)));
 }
 
 bool is_part_of_a_job(const std::function<const char*(const char*)>& environment) {
-  // Numbers of processes as OpenMPI's mpirun, PMI (MPICH, older srun) and srun tell them.
+  // OpenMPI's mpirun, PMI (MPICH, older srun) and srun give the number of processes in these.
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"}) {
     const char* const value = environment(name);
     if (value == nullptr) continue;
-    // What srun starts without MPI's help is several programs, not one.
+    // Without MPI support, srun starts several independent programs instead of one job.
     if (name == std::string_view("SLURM_STEP_NUM_TASKS") && environment("PMIX_RANK") == nullptr)
       continue;
     return std::atoi(value) > 1;

@@ -12,36 +12,42 @@
 
 namespace tomofield::distributed {
 
-/// An Error that every process of a job throws alike (Communicator::run_collectively), so that the
-/// job can end in order: one of them has to say it.
+/// An Error that all ranks of a job throw together, with the same message
+/// (Communicator::run_collectively). Every rank can then end in order, and the first rank reports
+/// the message once.
 class SharedError : public Error {
  public:
   using Error::Error;
 };
 
-/// The processes of a job, one of which is this one: itself alone, or all that mpirun or
-/// srun started (Session). Every process makes the same calls in the same order; those of a
-/// process that is alone do nothing. For one thread of a process, the one that started it.
+/// Connects the ranks (processes) of a job: this process alone, or all processes that mpirun or
+/// srun started together (Session).
 ///
-/// Nothing here depends on the order in which messages arrive: arrays are combined where each
-/// element has one owner, so results have the same bits for any number of processes.
+/// Every rank makes the same collective calls in the same order. In a job of one rank, the
+/// collective calls do nothing. Only the thread that started the process may call.
+///
+/// Results do not depend on the order in which messages arrive: arrays are summed such that each
+/// element has one owner and all other ranks contribute 0. Results therefore have the same bits for
+/// any number of ranks.
 class Communicator {
  public:
-  /// Of a process that works by itself.
+  /// Returns the communicator of a job of one rank.
   static const Communicator& alone();
 
   int rank() const { return rank_; }  ///< 0 <= rank < size
   int size() const { return size_; }
-  /// Rank 0, which talks and writes what is not shared.
+  /// Returns true on rank 0, which reports to the user and writes what the ranks do not share.
   bool is_first() const { return rank_ == 0; }
-  /// Processes of the job that share this one's machine, itself included.
+  /// Returns the number of ranks on this machine, this one included.
   int size_on_machine() const { return size_on_machine_; }
 
-  /// Completes an array of which every element is 0 but in the process that owns it: the sum
-  /// over all of them, element by element. T is float, double or std::int64_t.
+  /// Replaces `values` on every rank by the sum over all ranks, element by element. To keep results
+  /// independent of the number of ranks, an element must be 0 on every rank but its owner. T is
+  /// float, double or std::int64_t.
   template <typename T>
   void allreduce_sum(std::span<T> values) const;
-  /// The same for structs: `members` name every member that is to be summed, all of type T.
+  /// Sums structs over all ranks. `member` and `more` name the members to sum, which all have type
+  /// T; other members stay as they are.
   template <typename Struct, typename T, typename... More>
   void allreduce_sum(std::span<Struct> structs, T Struct::*member, More Struct::*... more) const {
     if (size_ == 1) return;
@@ -57,34 +63,40 @@ class Communicator {
       ((s.*more = *next++), ...);
     }
   }
-  /// Returns the largest of what the processes hand over.
+  /// Returns the largest of the values that the ranks hand over.
   double allreduce_max(double value) const;
-  /// What `owner` has, to all.
+  /// Broadcasts the bytes of rank `owner` to all ranks; `bytes` has the same size everywhere.
   void broadcast(std::span<std::byte> bytes, int owner) const;
+  /// Broadcasts the text of rank `owner` and returns it on all ranks.
   std::string broadcast(std::string text, int owner = 0) const;
 
-  /// Hands an array to the process before this one (in order of ranks) and takes one from it,
-  /// and the same with the process after it. What has no neighbour is empty.
+  /// The arrays that a rank exchanges with its neighbours, which are the ranks before and after it.
+  /// Both spans towards a neighbour that does not exist are empty.
   struct Halo {
     std::span<const float> to_before, to_after;
     std::span<float> from_before, from_after;
   };
+  /// Sends `to_before` and `to_after` to the neighbours, and receives `from_before` and
+  /// `from_after` from them.
   void exchange(const Halo& halo) const;
 
-  /// From one process to another, which waits for it. T is float or std::int64_t.
+  /// Sends `values` to rank `to`, which must receive as many. T is float or std::int64_t.
   template <typename T>
   void send(std::span<const T> values, int to) const;
+  /// Waits for values that rank `from` sends, and fills `values` with them.
   template <typename T>
   void receive(std::span<T> values, int from) const;
 
-  /// Runs `body`, which does not communicate, on every process. If it throws Error on one, all
-  /// throw SharedError with the message of the first of those.
+  /// Runs `body` on every rank. If it throws Error on some ranks, all ranks throw SharedError with
+  /// the message of the lowest of them. `body` must not make collective calls, because a rank that
+  /// throws would not join them. A job of one rank throws the Error itself.
   void run_collectively(const std::function<void()>& body) const;
 
-  /// `check` is called now and then while this process waits for others for long.
+  /// Sets a function that is called now and then while this rank waits long for others.
   void while_waiting(std::function<void()> check) const { check_ = std::move(check); }
 
-  /// What this process has sent and how long it has waited for others, since it began.
+  /// The bytes that this rank has sent, and the seconds for which it has waited for others, since
+  /// the job started.
   struct Traffic {
     double seconds = 0.0;
     std::int64_t bytes = 0;
@@ -102,11 +114,12 @@ class Communicator {
   mutable std::function<void()> check_ = [] {};
 };
 
-/// Whether mpirun or srun started this process as one of several, told from the environment.
+/// Returns true if mpirun or srun started this process as one of several. The environment tells.
 bool is_part_of_a_job(const std::function<const char*(const char*)>& environment);
 
-/// Makes this process part of its job, if it was started as part of one, for as long as this
-/// object lives: one a program, in main(). Else MPI is not touched.
+/// Connects this process to its job for as long as the object lives. A program makes one, in
+/// main(). MPI is not touched if the process was not started as part of a job. Throws Error if it
+/// was, but MPI sees only this process.
 class Session {
  public:
   Session();
@@ -115,8 +128,8 @@ class Session {
   Session& operator=(const Session&) = delete;
 
   const Communicator& communicator() const { return communicator_; }
-  /// Ends all processes at once: for faults of one that the others do not know of. Returns
-  /// if this process is alone.
+  /// Ends all ranks at once, for a failure on this rank that the others do not know of. Returns if
+  /// this process is alone.
   void abort(int status) const;
 
  private:

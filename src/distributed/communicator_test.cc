@@ -8,7 +8,7 @@
 
 #include "distributed/gathered_arrays.h"
 
-// Of one process; several are tested in tests/program/mpi_test.py.
+// These tests run on one rank; tests/program/mpi_test.py tests several.
 namespace tomofield::distributed {
 namespace {
 
@@ -49,7 +49,7 @@ TEST(Session, TellsFromTheEnvironmentWhetherOthersWereStarted) {
   EXPECT_TRUE(is_part({{"OMPI_COMM_WORLD_SIZE", "4"}, {"PMIX_RANK", "0"}}));
   EXPECT_FALSE(is_part({{"OMPI_COMM_WORLD_SIZE", "1"}, {"PMIX_RANK", "0"}}));
   EXPECT_TRUE(is_part({{"PMI_RANK", "1"}, {"PMI_SIZE", "2"}}));
-  // srun with and without MPI's help; a batch script of a job of four.
+  // The cases are srun with and without MPI support, and a batch script in a job of four.
   EXPECT_TRUE(is_part({{"SLURM_STEP_NUM_TASKS", "4"}, {"PMIX_RANK", "3"}}));
   EXPECT_FALSE(is_part({{"SLURM_STEP_NUM_TASKS", "4"}}));
   EXPECT_FALSE(is_part({{"SLURM_NTASKS", "4"}, {"SLURM_PROCID", "0"}}));

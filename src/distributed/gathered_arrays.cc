@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kPiece = std::size_t{1} << 20;
 
-// What the first process asks another one for: [first, end) of an array; or nothing more.
+// A request of the first rank for [first, end) of an array; array −1 ends the service.
 struct Request {
   std::int64_t array = -1, first = 0, end = 0;
 };
@@ -45,7 +45,7 @@ std::size_t GatheredArrays::add(std::span<const float> values) {
 void GatheredArrays::read_on_first(const std::function<void()>& body) const {
   processes_.run_collectively([&] {
     if (!processes_.is_first()) return answer();
-    // However it ends, the others must not wait for more.
+    // Releases the other ranks from waiting, also if the body throws.
     struct Dismissal {
       const Communicator& processes;
       ~Dismissal() {

@@ -9,23 +9,27 @@
 
 namespace tomofield::distributed {
 
-/// Long arrays of which each process has a part, one after another in order of ranks, for the
-/// first process to read in order and without ever having the whole: to write them to a file.
+/// Gives the first rank access to long arrays that are distributed over the ranks, one consecutive
+/// part a rank. The first rank reads them in order, piece by piece, without ever holding a whole
+/// array, for example to write them to a file.
 ///
-///   GatheredArrays arrays(processes, first, end);   // of each array, what this process has
-///   const std::size_t a = arrays.add(values);       // all of it, of which [first, end) is true
+///   GatheredArrays arrays(processes, first, end);   // this rank owns [first, end) of each array
+///   const std::size_t a = arrays.add(values);       // whole length; [first, end) is valid here
 ///   arrays.read_on_first([&] { …arrays.hand_out(a, sink)… });
 class GatheredArrays {
  public:
   GatheredArrays(const Communicator& processes, std::size_t first, std::size_t end);
 
-  /// `values` are indexed as in the whole array. They must stay until read_on_first() has ended.
+  /// Adds an array and returns its number. `values` has the length and indices of the whole array
+  /// and must stay valid until read_on_first() has ended.
   std::size_t add(std::span<const float> values);
 
-  /// Runs `body` on the first process while the others answer it. What it throws (Error) all throw.
+  /// Runs `body` on the first rank while the other ranks serve its reads. If it throws Error, all
+  /// ranks throw SharedError.
   void read_on_first(const std::function<void()>& body) const;
 
-  /// Inside that: one of the arrays, piece by piece.
+  /// Hands array number `array` to `sink` in pieces, from the first element on. Only the `body` of
+  /// read_on_first() may call it.
   using Sink = std::function<void(std::span<const float>)>;
   void hand_out(std::size_t array, const Sink& sink) const;
 
@@ -33,7 +37,7 @@ class GatheredArrays {
   void answer() const;
 
   const Communicator& processes_;
-  std::vector<std::size_t> limits_;  // process r has [limits_[r], limits_[r + 1])
+  std::vector<std::size_t> limits_;  // rank r owns [limits_[r], limits_[r + 1])
   std::vector<std::span<const float>> arrays_;
 };
 

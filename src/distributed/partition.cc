@@ -9,7 +9,7 @@
 namespace tomofield::distributed {
 namespace {
 
-// The first piece of a part: parts before and after it need a piece each.
+// Returns the first piece of a part. It leaves a piece at least to each part before and after it.
 int first_piece(std::span<const double> work, int index, int count) {
   const double all = std::accumulate(work.begin(), work.end(), 0.0);
   const double wanted = all * index / count;

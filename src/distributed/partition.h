@@ -4,7 +4,7 @@
 
 namespace tomofield::distributed {
 
-/// Consecutive numbers [begin, end).
+/// The consecutive integers [begin, end).
 struct Range {
   int begin = 0, end = 0;
   int size() const { return end - begin; }
@@ -12,8 +12,9 @@ struct Range {
   bool operator==(const Range&) const = default;
 };
 
-/// Part `index` of `count` of consecutive pieces of work: every part gets at least one piece,
-/// and starts where the work before it is nearest to its share. There must be as many pieces.
+/// Returns part `index` of `count` parts of consecutive pieces, where `work` holds the cost of each
+/// piece. Every part has at least one piece, and begins where the work before it is nearest to
+/// index / count of the total. There must be at least `count` pieces.
 Range part_of(std::span<const double> work, int index, int count);
 
 }  // namespace tomofield::distributed

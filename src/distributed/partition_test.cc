@@ -19,7 +19,8 @@ TEST(Partition, EqualPiecesMakeEqualParts) {
   EXPECT_EQ(part_of(work, 0, 1), (Range{0, 12}));
 }
 
-// Every piece has one owner, no part is empty, and none has more than its share and one piece.
+// Checks that every piece has one owner, that no part is empty, and that none exceeds its share by
+// more than one piece.
 TEST(Partition, PartsCoverTheWorkAndAreBalanced) {
   base::Random random(4);
   for (int trial = 0; trial < 500; ++trial) {

@@ -17,7 +17,8 @@
 namespace tomofield::field {
 namespace {
 
-// One axis of points between n vertices from `low` on over `length`; kept between calls.
+// Places points between n vertices of one axis, from `low` on over `length`. The arrays stay
+// allocated between calls.
 kernels::AxisTaps axis_taps(std::span<const double> positions, double low, double length, int n,
                             int axis) {
   thread_local std::vector<int> lower[3];
@@ -43,7 +44,7 @@ Field::Field(Quadtree tree, double thickness, std::vector<LeafShape> shapes)
 }
 
 void Field::allocate() {
-  // Every leaf starts on a cache line: leaves are updated by different threads.
+  // Every leaf starts on a cache line, because different threads update different leaves.
   constexpr std::size_t kAlignment = 16;
   offsets_.assign(1, 0);
   for (const LeafShape& s : shapes_) {
@@ -54,7 +55,7 @@ void Field::allocate() {
 }
 
 void Field::initialise(base::Random random, double scale) {
-  // What is not kept is drawn too: values do not depend on which leaves are.
+  // Leaves that are not kept are drawn too, so that values do not depend on which leaves are kept.
   for (int leaf = 0; leaf < tree_.num_leaves(); ++leaf) {
     for (std::size_t i = offset(leaf); i < offset(leaf + 1); ++i) {
       const float value = static_cast<float>(random.uniform(-scale, scale));
@@ -158,7 +159,7 @@ double Field::density(double x, double y, double z) const {
   return static_cast<double>(density);
 }
 
-// From an array of this field to one leaf of the edited one.
+// Carries a leaf's values from an array of this field to one leaf of the edited field.
 void Field::carry_leaf(const LeafOrigin& origin, const float* from, float* to) const {
   const LeafShape& s = shape(origin.leaf);
   const float* leaf = from + offset(origin.leaf);

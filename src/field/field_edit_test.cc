@@ -18,7 +18,7 @@ namespace {
 using testing::random_floats;
 
 constexpr double kThickness = 20.0;
-// Odd and even vertex counts: at odd ones a vertex lies where the quarters meet.
+// The vertex counts are odd and even: with odd ones, a vertex lies where the quarters meet.
 constexpr LeafShape kShape{.nx = 7, .ny = 6, .nz = 5, .rank_x = 2, .rank_y = 3, .rank_z = 2};
 
 std::unique_ptr<Field> one_cell(FieldKind kind, std::uint64_t seed) {
@@ -29,7 +29,8 @@ std::unique_ptr<Field> one_cell(FieldKind kind, std::uint64_t seed) {
   return field;
 }
 
-// Four quarters with nothing in common, or with a little noise on what they had.
+// Returns the four quarters of one leaf with noise on their parameters. With much noise they have
+// nothing in common, with little they are similar.
 std::unique_ptr<Field> four_quarters(FieldKind kind, double noise) {
   auto field = one_cell(kind, 1);
   field->edit({.split = {0}, .merge = {}});
@@ -49,7 +50,7 @@ void merge_all(Field& field, const std::vector<base::AlignedBuffer<float>*>& mom
   field.edit({.split = {}, .merge = {0}}, moments);
 }
 
-// Σ over the quarters' vertices of (the leaf there − the quarter)².
+// Returns Σ over the quarters' vertices of (the leaf there − the quarter)².
 double misfit(const Field& leaf, const Field& quarters) {
   double sum = 0.0;
   std::vector<float> from(kShape.vertices_xz()), to(from.size());
@@ -77,8 +78,8 @@ double misfit(const Field& leaf, const Field& quarters) {
   return sum;
 }
 
-// Norm of its gradient with respect to the leaf's parameters. The misfit is
-// quadratic in each, so that central differences are exact for any step.
+// Returns the norm of the misfit's gradient with respect to the leaf's parameters. The misfit is
+// quadratic in each parameter, so central differences are exact for any step.
 double misfit_slope(Field& leaf, const Field& quarters) {
   double squares = 0.0;
   for (float& parameter : leaf.parameters()) {
@@ -94,7 +95,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, EachEditedField,
                          ::testing::Values(FieldKind::kVm, FieldKind::kGrid),
                          [](const auto& kind) { return base::name_of(kind.param); });
 
-// Parameters and moments: what a split did, a merge takes back.
+// Checks that a merge undoes a split, for parameters and moments.
 TEST_P(EachEditedField, MergingTheQuartersOfALeafRestoresIt) {
   auto field = one_cell(GetParam(), 1);
   const auto before = copy_of(*field);
@@ -115,7 +116,7 @@ TEST_P(EachEditedField, MergingTheQuartersOfALeafRestoresIt) {
   }
 }
 
-// Adam's |m| <= √v survives, because both go by the same weights (Jensen).
+// Checks that Adam's |m| <= √v survives. It does because both use the same weights (Jensen).
 TEST_P(EachEditedField, MomentsStayInProportion) {
   const auto field = four_quarters(GetParam(), 1.0);
   base::AlignedBuffer<float> m(field->num_parameters()), v(field->num_parameters());
@@ -169,7 +170,7 @@ TEST(MergedFactors, FitBetterThanWhatTheQuartersCameFrom) {
   const auto quarters = four_quarters(FieldKind::kVm, 0.1);
   const auto merged = copy_of(*quarters);
   merge_all(*merged);
-  const auto start = one_cell(FieldKind::kVm, 1);  // what the quarters were before the noise
+  const auto start = one_cell(FieldKind::kVm, 1);  // the quarters without the noise
   EXPECT_LT(misfit(*merged, *quarters), misfit(*start, *quarters));
 }
 
@@ -186,7 +187,7 @@ LeafFactors random_factors(const LeafShape& s, std::uint64_t seed) {
           random_matrix(s.nz, s.rank_z, seed + 4), random_matrix(s.nx * s.ny, s.rank_z, seed + 5)};
 }
 
-// Entry by entry, as eq. 4 says.
+// Computes eq. 4 entry by entry.
 RowMajorMatrix product_of(const LeafShape& s, const LeafFactors& f) {
   RowMajorMatrix b(s.nx, s.nz * s.ny);
   for (int x = 0; x < s.nx; ++x) {
@@ -219,7 +220,8 @@ TEST(FitFactors, TakesMoreRanksThanVertices) {
   EXPECT_LT(fit_factors(b, factors), 1e-8 * b.squaredNorm());
 }
 
-// The quarters' own vertex values as a grid field, merged: the misfit that no leaf goes below.
+// Returns the smallest misfit that any leaf can have, from the quarters' vertex values merged as a
+// grid field.
 double least_misfit(const Field& quarters) {
   const auto grid = make_field(FieldKind::kGrid, quarters.tree(), kThickness, quarters.shapes());
   grid->bias = quarters.bias;
@@ -240,7 +242,7 @@ double least_misfit(const Field& quarters) {
   return misfit(*grid, quarters);
 }
 
-// Above the least misfit, from quarters that are akin and from some that are not.
+// Compares misfits above the smallest one, for quarters that are similar and for some that are not.
 TEST(MergedFactors, AreNotWorseThanFromRandomStarts) {
   for (const double noise : {0.3, 2.0}) {
     const auto quarters = four_quarters(FieldKind::kVm, noise);

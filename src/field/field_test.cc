@@ -24,12 +24,11 @@ using testing::random_floats;
 
 constexpr double kThickness = 37.5;
 
-// Unequal vertex counts and ranks, even and odd ones, so that no axis can be
-// taken for another.
+// Vertex counts and ranks are unequal, even and odd, so that a confusion of axes fails.
 constexpr LeafShape kFine{.nx = 5, .ny = 4, .nz = 7, .rank_x = 3, .rank_y = 1, .rank_z = 2};
 constexpr LeafShape kCoarse{.nx = 3, .ny = 2, .nz = 4, .rank_x = 1, .rank_y = 2, .rank_z = 1};
 
-// A fine cell beside a coarse one, every parameter random.
+// Returns a fine cell beside a coarse one, with random parameters.
 std::unique_ptr<Field> two_cells(FieldKind kind, float beta, const LeafShape& fine = kFine) {
   const RootGrid roots{.x0 = -16, .y0 = 8, .cell_size = 64, .columns = 2, .rows = 1};
   auto field = make_field(kind, Quadtree(roots, {Region::kInterest, Region::kMargin}), kThickness,
@@ -40,7 +39,7 @@ std::unique_ptr<Field> two_cells(FieldKind kind, float beta, const LeafShape& fi
   return field;
 }
 
-// Parameters as the headers lay them out, in double: eq. 4 at the vertices.
+// Computes eq. 4 at a vertex in double, from the parameter layout that the headers state.
 double vertex_value(const Field& field, int leaf, int x, int y, int z) {
   const LeafShape& s = field.shape(leaf);
   const float* at = field.parameters().data() + field.offset(leaf);
@@ -65,10 +64,10 @@ double vertex_value(const Field& field, int leaf, int x, int y, int z) {
 struct Position {
   int lower;
   double fraction;
-  // `position` runs from 0 to 1 over n vertices.
+  // Places `position`, from 0 to 1, among n vertices.
   Position(double position, int n) {
     double vertex = position * (n - 1);
-    // Beyond the outer vertices their values go on.
+    // Beyond the outer vertices, their values continue.
     vertex = std::clamp(vertex, 0.0, n - 1.0);
     lower = std::min(static_cast<int>(vertex), n - 2);
     fraction = vertex - lower;
@@ -76,7 +75,7 @@ struct Position {
   double weight(int upper) const { return upper ? fraction : 1.0 - fraction; }
 };
 
-// Value at (x vertex, y, z vertex), bias included.
+// Returns the value at (x vertex, y, z vertex), bias included.
 double value_at_row(const Field& field, int leaf, int x, double y, int z) {
   const Square& square = field.tree().leaf(leaf).square;
   const Position at((y - 0.5 - static_cast<double>(square.y0)) / static_cast<double>(square.size),
@@ -86,7 +85,7 @@ double value_at_row(const Field& field, int leaf, int x, double y, int z) {
   return sum;
 }
 
-// As one leaf gives it, also on its last faces.
+// Returns the density that one leaf gives, also on its last faces.
 double expected_density(const Field& field, int leaf, double x, double y, double z) {
   const Square& square = field.tree().leaf(leaf).square;
   const LeafShape& s = field.shape(leaf);
@@ -106,7 +105,7 @@ double expected_density(const Field& field, double x, double y, double z) {
   return expected_density(field, field.tree().find_leaf(x, y), x, y, z);
 }
 
-// Rows of a leaf from its first face to its last, and some outside of it.
+// Returns rows of a leaf from its first face to its last, and some outside of it.
 std::array<double, kLanes> rows_of(const Square& square) {
   std::array<double, kLanes> y{};
   for (std::size_t l = 0; l < kLanes; ++l)
@@ -115,7 +114,7 @@ std::array<double, kLanes> rows_of(const Square& square) {
   return y;
 }
 
-// The rows of 16 pixels in it.
+// Returns the rows of 16 pixels in a leaf.
 std::array<double, kLanes> pixels_of(const Square& square) {
   std::array<double, kLanes> y{};
   for (std::size_t l = 0; l < kLanes; ++l)
@@ -193,7 +192,7 @@ LeafShape with_vertices(LeafShape shape, int nx, int ny, int nz) {
 
 TEST_P(EachField, MoreVerticesBetweenThoseThatAreThereChangeNothing) {
   const auto field = two_cells(GetParam(), 4.0f);
-  const auto finer = field->resampled({with_vertices(kFine, 9, 10, 13),  // 2, 3 and 2 times
+  const auto finer = field->resampled({with_vertices(kFine, 9, 10, 13),  // 2, 3 and 2 times finer
                                        with_vertices(kCoarse, 9, 5, 4)});
   EXPECT_GT(finer->num_parameters(), 2 * field->num_parameters());
   for_each_point([&](double x, double y, double z) {
@@ -229,8 +228,8 @@ TEST_P(EachField, DensityOutsideTheDomainIsZero) {
   EXPECT_EQ(field->density(0, 20, std::nan("")), 0.0);
 }
 
-// Values are linear in each single parameter, so that central differences of
-// any step are its derivative to rounding.
+// Compares with central differences. Values are linear in each single parameter, so central
+// differences of any step are the derivative to rounding.
 void expect_slab_gradient_is_the_derivative(Field* field, const RowsOfLeaf& rows_of_leaf) {
   for (int leaf = 0; leaf < 2; ++leaf) {
     const std::size_t size = field->shape(leaf).vertices_xz() * kLanes;
@@ -265,7 +264,7 @@ TEST_P(EachField, SlabGradientAtVerticesIsTheDerivative) {
   expect_slab_gradient_is_the_derivative(two_cells(GetParam(), 0.0f, fine).get(), pixels_of);
 }
 
-// Random points of a leaf, its corners among them.
+// Random points of a leaf, its corners included.
 struct RandomPoints {
   std::vector<double> x, y, z;
   RandomPoints(const Field& field, int leaf, int count) {
@@ -298,8 +297,8 @@ TEST_P(EachField, PointDensitiesAreOneLeafsOnItsFacesToo) {
   }
 }
 
-// The expected densities are in double and read the parameters as they are, so
-// central differences of a power of two are exact but for the activation's curvature.
+// The expected densities are in double and read the parameters directly. Central differences with a
+// step that is a power of two are therefore exact but for the activation's curvature.
 TEST_P(EachField, PointGradientIsTheDerivative) {
   for (const float beta : {0.0f, 4.0f}) {
     const auto field = two_cells(GetParam(), beta);
@@ -419,7 +418,7 @@ TEST_P(EachField, SplittingLeavesTheFieldAsItIs) {
       const double z = random.uniform(0, kThickness);
       samples.push_back({x, y, z, field->density(x, y, z)});
     }
-    // Leaves of 64, 32 and 16 px beside each other; before and after the split ones.
+    // Leaves of 64, 32 and 16 px lie beside each other, before and after the split ones.
     for (const int leaf : {1, 0, 2, 7}) {
       field->edit({.split = {leaf}, .merge = {}});
       for (const Sample& s : samples) ASSERT_NEAR(field->density(s.x, s.y, s.z), s.density, 3e-6);

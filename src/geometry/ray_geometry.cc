@@ -7,13 +7,14 @@
 namespace tomofield::geometry {
 namespace {
 
-// (u, v) = linear (X, Y, Z) + constant.
+// The affine map (u, v) = linear · (X, Y, Z) + constant.
 struct Projection {
   std::array<double, 3> u{}, v{};
   double u0 = 0, v0 = 0;
 };
 
-// Rows x and y of Ry(θ) Rx(α) diag(1, 1, hand).
+// Returns the map of a view. Its linear part is M times rows x and y of Ry(θ) Rx(α) diag(1, 1,
+// hand).
 Projection projection(const RayGeometry& g, int view) {
   const auto at = static_cast<std::size_t>(view);
   const double alpha = g.x_tilt_deg[at] * std::numbers::pi / 180.0;
@@ -25,7 +26,7 @@ Projection projection(const RayGeometry& g, int view) {
   const std::array<double, 3> qy{0.0, ca, -hand * sa};
   const std::array<double, 3> centre{g.aligned.axis_x, static_cast<double>(g.aligned.height) / 2,
                                      g.aligned.axis_z};
-  // From the aligned view's centre to the axis: C − c has no y.
+  // C − c, from the aligned view's centre to the axis, has no y component.
   const double axis = g.aligned.axis_x - static_cast<double>(g.aligned.width) / 2;
   const RawFromAligned& m = g.raw_from_aligned[at];
   Projection p;
@@ -97,7 +98,7 @@ Extent2 reach_of_rays(const RayGeometry& geometry, const Roi& roi) {
         }
       }
     }
-    // A ray that meets the region is nowhere further from it than its own span.
+    // A ray that meets the region is never further from it than the ray's own lateral span.
     reach.x0 = std::min(reach.x0, std::max(image.x0, inside.x0 - dx));
     reach.y0 = std::min(reach.y0, std::max(image.y0, inside.y0 - dy));
     reach.x1 = std::max(reach.x1, std::min(image.x1, inside.x1 + dx));

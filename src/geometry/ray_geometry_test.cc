@@ -33,7 +33,7 @@ RawFromAligned rotation(double rot_deg, double shift_x, double shift_y) {
           shift_y};
 }
 
-// Everything at once: rotations, shifts, x tilts, raw images of another shape, the other hand.
+// Returns a geometry with rotations, shifts, x tilts, raw images of another shape, and either hand.
 RayGeometry general_geometry(int hand) {
   RayGeometry g = plain_geometry({-60, -20, 0, 35, 70});
   g.aligned.hand = hand;
@@ -65,11 +65,11 @@ TEST(RayGeometry, WithoutAlignmentItIsTheTiltGeometry) {
   }
 }
 
-// The canonical projection, written out with matrices.
+// Compares with the canonical projection of docs/geometry.md, written out with matrices.
 TEST(RayGeometry, IsTheCanonicalProjection) {
   for (const int hand : {1, -1}) {
     RayGeometry g = general_geometry(hand);
-    g.aligned.axis_x = 32;  // the centre of the aligned view: t is the shift alone
+    g.aligned.axis_x = 32;  // the aligned view's centre, so that t is the shift alone
     for (int v = 0; v < 4; ++v) {
       const auto at = static_cast<std::size_t>(v);
       const double X = 50 - 32, Y = 10 - 24, Z = hand * (25 - 12.5);
@@ -124,8 +124,8 @@ TEST(RayGeometry, PiecesOfALineAddUpOverATiling) {
   }
 }
 
-// Brute force over many rays and heights: none that meets the region leaves the
-// rectangle, and each side is needed.
+// Tests many rays and heights by brute force: no ray that meets the region leaves the rectangle,
+// and each side of it is needed.
 TEST(RayGeometry, ReachHoldsTheRaysOfTheRegion) {
   const RayGeometry g = general_geometry(1);
   for (const Roi& roi : {Roi{0, 0, 64, 48}, Roi{20, 15, 40, 30}}) {
@@ -151,7 +151,7 @@ TEST(RayGeometry, ReachHoldsTheRaysOfTheRegion) {
     EXPECT_LE(reach.y0, seen.y0 + 1e-9);
     EXPECT_GE(reach.x1, seen.x1 - 1e-9);
     EXPECT_GE(reach.y1, seen.y1 - 1e-9);
-    // Loose only by what corners cost.
+    // The rectangle is larger than needed only by what the region's corners cost.
     EXPECT_NEAR(reach.x0, seen.x0, 8);
     EXPECT_NEAR(reach.x1, seen.x1, 8);
     EXPECT_NEAR(reach.y0, seen.y0, 8);

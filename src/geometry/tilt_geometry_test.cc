@@ -13,8 +13,8 @@ namespace {
 constexpr double kRoot2 = std::numbers::sqrt2;
 
 TEST(TiltGeometry, PixelsAreCentredAtHalves) {
-  // Even and odd sizes alike: the middle of the view is width / 2, the middle
-  // of an odd view is the centre of its middle pixel.
+  // The middle of the view is width / 2 for even and odd sizes. In an odd view it is the centre of
+  // the middle pixel.
   EXPECT_DOUBLE_EQ(centred_geometry(64, 8, 40, {0}).axis_x, 32.0);
   EXPECT_DOUBLE_EQ(centred_geometry(65, 8, 41, {0}).axis_x, 32.5);
   EXPECT_DOUBLE_EQ(centred_geometry(64, 8, 40, {0}).axis_z, 20.0);
@@ -23,7 +23,7 @@ TEST(TiltGeometry, PixelsAreCentredAtHalves) {
 
 TEST(TiltGeometry, DetectorXFollowsTheRightHandedRotation) {
   const auto g = centred_geometry(64, 8, 40, {0, 45, -45, 30});
-  // 10 px right of the axis and 6 px above it, towards the source.
+  // The point is 10 px right of the axis and 6 px above it, towards the source.
   EXPECT_DOUBLE_EQ(g.detector_x(0, 42, 26), 42.0);
   EXPECT_DOUBLE_EQ(g.detector_x(1, 42, 26), 32 + (10 + 6) / kRoot2);
   EXPECT_DOUBLE_EQ(g.detector_x(2, 42, 26), 32 + (10 - 6) / kRoot2);
@@ -77,7 +77,7 @@ TEST(TiltGeometry, RowsServeUpTo45DegreesColumnsBeyond) {
 
 TEST(TiltGeometry, ReachIsHalfWidthOverCosinePlusHalfThicknessTimesTangent) {
   for (const double largest : {0.0, 30.0, 60.0, 70.0, 80.0}) {
-    // Only one view is as steep: both sides must be served by it.
+    // Only one view is as steep as this, so it determines the reach on both sides.
     const auto g = centred_geometry(65, 8, 41, {-largest, 0, largest / 2});
     const double angle = largest * std::numbers::pi / 180;
     const double half_width = 32.5 / std::cos(angle) + 20.5 * std::tan(angle);

@@ -12,7 +12,7 @@
 namespace tomofield::io {
 namespace {
 
-/// Lines in errors are cut: a file that is no text table may have very long ones.
+/// Cuts a line for an error message, because a file that is no text table may have very long ones.
 std::string quote(std::string_view text) {
   constexpr std::size_t kLongest = 60;
   return text.size() <= kLongest ? std::string(text) : std::string(text.substr(0, kLongest)) + "…";

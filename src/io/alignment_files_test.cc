@@ -156,7 +156,7 @@ TEST(AreTomoSections, EveryWayOfCounting) {
   EXPECT_EQ(assign({2, 3, 4}, {1}, 4), (Sections{1, 2, 3}));  // before removal, from 1
   EXPECT_EQ(assign({0, 1, 2}, {1}, 4), (Sections{0, 2, 3}));  // after removal
   EXPECT_EQ(assign({1, 2, 3}, {2}, 4), (Sections{0, 2, 3}));  // after removal, from 1
-  EXPECT_EQ(assign({0, 2, 3}, {1}, 3), (Sections{0, 1, 2}));  // the stack has lost the dark ones
+  EXPECT_EQ(assign({0, 2, 3}, {1}, 3), (Sections{0, 1, 2}));  // dark frames removed from the stack
   EXPECT_EQ(assign({0, 1, 2}, {1}, 3), (Sections{0, 1, 2}));
 }
 

@@ -19,7 +19,7 @@ namespace {
                           expected));
 }
 
-/// The words of a line as finite numbers; empty if any is none.
+/// Returns the words of a line as finite numbers, or nothing if any word is not one.
 std::vector<double> parse_numbers(std::string_view text) {
   std::vector<double> numbers;
   for (const std::string_view word : split_words(text)) {
@@ -30,7 +30,7 @@ std::vector<double> parse_numbers(std::string_view text) {
   return numbers;
 }
 
-/// "# name = numbers"; comments of any other form are skipped.
+/// Parses "# name = numbers" and skips comments of any other form.
 void parse_header_line(const std::filesystem::path& path, const TextLine& line,
                        AreTomoAlignment* alignment) {
   const std::size_t equals = line.text.find('=');
@@ -63,7 +63,7 @@ AreTomoRow parse_row(const std::filesystem::path& path, const TextLine& line) {
   constexpr std::size_t kColumns = 10;  // SEC ROT GMAG TX TY SMEAN SFIT SCALE BASE TILT
   const std::vector<std::string_view> words = split_words(line.text);
   const auto section = words.empty() ? std::nullopt : parse_integer(words.front());
-  // The middle columns (image statistics) may be nan and are not used.
+  // The middle columns are image statistics, which may be nan and are not used.
   std::array<double, 5> used{};
   constexpr std::array<std::size_t, 5> kUsedColumns{1, 2, 3, 4, 9};
   bool is_valid = words.size() == kColumns && section && *section >= 0;
@@ -78,7 +78,7 @@ AreTomoRow parse_row(const std::filesystem::path& path, const TextLine& line) {
   return {*section, line.number, used[0], used[1], used[2], used[3], used[4]};
 }
 
-/// Whether the numbers are exactly first, …, first + count − 1 in some order.
+/// Returns true if the numbers are exactly first, …, first + count − 1 in some order.
 bool are_consecutive(const std::set<std::int64_t>& numbers, std::int64_t first, std::size_t count) {
   return numbers.size() == count && !numbers.empty() && *numbers.begin() == first &&
          *numbers.rbegin() == first + static_cast<std::int64_t>(count) - 1;
@@ -138,8 +138,8 @@ std::vector<std::int64_t> assign_aretomo_sections(const AreTomoAlignment& alignm
   with_dark.insert(alignment.dark_sections.begin(), alignment.dark_sections.end());
   const auto total = rows.size() + alignment.dark_sections.size();
 
-  // The numbering: before removal (rows and dark frames together are complete)
-  // or after it (the rows alone are).
+  // The numbering is from before the removal if rows and dark frames together are complete, and
+  // from after it if the rows alone are.
   const bool is_before =
       are_consecutive(with_dark, 0, total) || are_consecutive(with_dark, 1, total);
   const bool is_after =
@@ -156,8 +156,8 @@ std::vector<std::int64_t> assign_aretomo_sections(const AreTomoAlignment& alignm
     for (const AreTomoRow& row : rows) sections.push_back(row.section - *with_dark.begin());
     return sections;
   }
-  // Otherwise only the rows' ranks count: in the reduced stack directly, in
-  // the complete one among the sections that are not dark.
+  // Otherwise only the order of the rows counts. In a reduced stack it gives the section directly;
+  // in a complete one it gives the place among the sections that are not dark.
   std::vector<std::int64_t> kept(rows.size());
   std::iota(kept.begin(), kept.end(), 0);
   if (stack_is_complete) kept = all_but(alignment.dark_sections, *numbers.begin(), num_sections);

@@ -20,7 +20,7 @@ namespace tomofield::io {
 namespace fs = std::filesystem;
 namespace {
 
-/// Where the data shall lie: replacing a symbolic link would lose the link.
+/// Returns the file to replace. It follows a symbolic link, because replacing a link would lose it.
 fs::path resolve_target(const fs::path& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
@@ -44,8 +44,8 @@ std::string temporary_prefix(const fs::path& target) {
   return fmt::format(".{}.tmp-", target.filename().string());
 }
 
-/// Removes the temporary files of this target whose process was killed: nobody
-/// else would, and a volume may have gigabytes.
+/// Removes temporary files of this target whose process was killed. Nothing else would remove them,
+/// and a volume may have gigabytes.
 void remove_abandoned(const fs::path& target) {
   const std::string prefix = temporary_prefix(target);
   std::error_code error;
@@ -61,8 +61,8 @@ void remove_abandoned(const fs::path& target) {
   }
 }
 
-/// Creates an empty file that nobody else uses. Permissions come from the
-/// umask, which mkstemp would not honour.
+/// Creates an empty file that no other process uses. Permissions come from the umask, which mkstemp
+/// would not honour.
 fs::path create_temporary(const fs::path& target) {
   static std::atomic<unsigned> counter{0};
   remove_abandoned(target);
@@ -76,7 +76,7 @@ fs::path create_temporary(const fs::path& target) {
       return candidate;
     }
     if (errno == EEXIST) {
-      ::unlink(candidate.c_str());  // left by a killed process that had our number
+      ::unlink(candidate.c_str());  // left by a killed process that had the same process id
     } else {
       throw Error(fmt::format("cannot write '{}': no file can be created in the directory '{}': {}",
                               target.string(), directory_of(target).string(),
@@ -88,7 +88,7 @@ fs::path create_temporary(const fs::path& target) {
 void flush_to_disk(const fs::path& path, int open_flags) {
   const int descriptor = ::open(path.c_str(), open_flags | O_CLOEXEC);
   const bool flushed = descriptor >= 0 && ::fsync(descriptor) == 0;
-  // Some file systems cannot flush a directory; then the rename must do.
+  // Some file systems cannot flush a directory; then the rename alone must suffice.
   const bool unsupported = descriptor >= 0 && !flushed && (errno == EINVAL || errno == ENOTSUP);
   const int error = errno;
   if (descriptor >= 0) ::close(descriptor);

@@ -5,8 +5,8 @@
 
 namespace tomofield::io {
 
-/// Replaces a file as a whole or not at all: whoever reads `path` sees the old
-/// file until commit(), then the complete new one, even through a power cut.
+/// Replaces a file as a whole or not at all. Readers of `path` see the old file until commit(), and
+/// then the complete new one, even through a power cut.
 ///
 ///   AtomicFile file(path);
 ///   …write file.temporary_path() by any means, and close it…
@@ -15,10 +15,10 @@ namespace tomofield::io {
 /// Without commit() the temporary file is removed and `path` stays as it was.
 class AtomicFile {
  public:
-  /// Creates an empty temporary file in the directory of `path` (of the file
-  /// that it points to, if it is a symbolic link). Throws Error at once if that
-  /// directory does not exist or cannot be written, or if `path` is no regular file.
-  /// Removes what killed processes of this machine left of the same file.
+  /// Creates an empty temporary file in the directory of `path`, or of its target if `path` is a
+  /// symbolic link. Throws Error at once if that directory does not exist or cannot be written, or
+  /// if `path` exists and is no regular file. Removes temporary files that killed processes of this
+  /// machine left for the same file.
   explicit AtomicFile(const std::filesystem::path& path);
   ~AtomicFile();
   AtomicFile(AtomicFile&& other) noexcept;

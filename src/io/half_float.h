@@ -7,7 +7,7 @@
 
 namespace tomofield::io {
 
-/// IEEE 754 binary16 bits to float; exact for every input.
+/// Converts IEEE 754 binary16 bits to float, exactly for every input.
 inline float float_from_half(std::uint16_t half) {
   const std::uint32_t sign = (half & 0x8000u) << 16;
   const std::uint32_t exponent = (half >> 10) & 0x1fu;
@@ -20,7 +20,7 @@ inline float float_from_half(std::uint16_t half) {
   return std::bit_cast<float>(sign | (wide_exponent << 23) | (fraction << 13));
 }
 
-/// The nearest binary16, ties to even; finite values beyond ±65504 become ±65504.
+/// Converts to the nearest binary16, ties to even; finite values beyond ±65504 become ±65504.
 inline std::uint16_t half_from_float(float value) {
   constexpr float kLargest = 65504.0f;
   const auto sign =

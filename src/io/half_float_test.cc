@@ -27,12 +27,12 @@ TEST(HalfFloat, KnownValues) {
 }
 
 TEST(HalfFloat, RoundsToNearestTiesToEven) {
-  const float step = 0x1p-10f;  // between 1 and 2
+  const float step = 0x1p-10f;  // spacing of half floats between 1 and 2
   EXPECT_EQ(half_from_float(1.0f + 0.5f * step), 0x3c00);
   EXPECT_EQ(half_from_float(1.0f + 1.5f * step), 0x3c02);
   EXPECT_EQ(half_from_float(1.0f + 0.51f * step), 0x3c01);
   EXPECT_EQ(half_from_float(2.0f - 0.1f * step), 0x4000);   // carries into the exponent
-  EXPECT_EQ(half_from_float(0x1p-14f - 0x1p-26f), 0x0400);  // out of the subnormals
+  EXPECT_EQ(half_from_float(0x1p-14f - 0x1p-26f), 0x0400);  // leaves the subnormals
 }
 
 TEST(HalfFloat, FiniteValuesStayFinite) {

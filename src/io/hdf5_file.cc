@@ -21,16 +21,16 @@ static_assert(std::is_same_v<hid_t, std::int64_t>, "handles are passed as 64-bit
 
 constexpr const char* kChecksum = "xxh64";
 
-// Set once metadata turned out to be damaged: HDF5 1.10 then cannot close the
-// file, and says so when the program ends, unless errors are still quiet.
+// Is set once metadata turned out to be damaged. HDF5 1.10 then cannot close the file, and prints
+// so when the program ends, unless errors are still quiet.
 bool must_stay_quiet = false;
 
-// HDF5 prints its errors unless it is told not to; libraries never print.
+// Silences HDF5, which prints its errors by default; a library must never print.
 class QuietErrors {
  public:
   QuietErrors() {
-    // HDF5 1.10 crashes when it ends a program in which a file could not be
-    // closed for want of disk space. Files are closed here, so it has nothing to end.
+    // HDF5 1.10 crashes at program exit if a file could not be closed for lack of disk space.
+    // Files are closed here explicitly, so HDF5 has nothing to do at exit.
     [[maybe_unused]] static const herr_t never_at_exit = H5dont_atexit();
     H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
@@ -46,7 +46,7 @@ class QuietErrors {
   void* data_ = nullptr;
 };
 
-// The innermost message of the last failure, which names the cause.
+// Returns the innermost message of the last failure, which names the cause.
 std::string last_reason() {
   std::string reason;
   const auto visit = [](unsigned depth, const H5E_error2_t* error, void* out) -> herr_t {
@@ -54,7 +54,7 @@ std::string last_reason() {
     return 0;
   };
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, visit, &reason);
-  // Failed system calls come with all their arguments; what the system said is enough.
+  // HDF5 reports failed system calls with all their arguments; the system's own message is enough.
   constexpr std::string_view kSystemMessage = "error message = '";
   const std::size_t message = reason.find(kSystemMessage);
   if (message != std::string::npos) {
@@ -112,8 +112,8 @@ struct Stored<std::int64_t> {
       file, item, reason));
 }
 
-// Properties of a file: the format whose metadata all have checksums, and no
-// complaint where the file system has no locks (clusters).
+// Returns the access properties of a file: the format whose metadata all have checksums, and no
+// error if the file system has no locks, as on clusters.
 Handle file_access() {
   const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
   H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);
@@ -121,7 +121,7 @@ Handle file_access() {
   return {access, H5Pclose};
 }
 
-// Properties of a new item of class `kind`: without times, so that the same
+// Returns the creation properties of an item of class `kind`. They exclude times, so that the same
 // contents are the same bytes.
 Handle creation(hid_t kind) {
   const hid_t properties = H5Pcreate(kind);
@@ -129,7 +129,7 @@ Handle creation(hid_t kind) {
   return {properties, H5Pclose};
 }
 
-// Of fixed length: texts of variable length lie in a heap without checksum.
+// Writes a text of fixed length; texts of variable length lie in a heap without checksum.
 void write_text_attribute(hid_t owner, const std::string& name, const std::string& value,
                           const std::string& file, const std::string& item) {
   const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
@@ -348,7 +348,7 @@ std::size_t Hdf5Group::array_size(const std::string& name) const {
   if (H5Sget_simple_extent_ndims(space.id()) != 1)
     fail_reading(file_, path_of(name), "it is not a one-dimensional array");
   const auto size = static_cast<std::size_t>(H5Sget_simple_extent_npoints(space.id()));
-  // A size that the file cannot hold would be believed, and memory asked for it.
+  // A damaged size must be refused before memory is allocated for it.
   const Handle type(H5Dget_type(dataset.id()), H5Tclose);
   if (H5Dget_storage_size(dataset.id()) / H5Tget_size(type.id()) < size)
     fail_reading(file_, path_of(name), "it is shorter than it says");

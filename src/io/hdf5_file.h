@@ -10,17 +10,16 @@
 
 namespace tomofield::io {
 
-/// A group of an HDF5 file: named numbers and texts (attributes), one-dimensional
-/// arrays (datasets) and groups. Every byte that means something is covered by a
-/// checksum: metadata by HDF5's own, an array by its attribute "xxh64" (XXH64 of
-/// its bytes, hexadecimal), so that a file which lost its end, a page or a bit is
-/// found out when it is read. (HDF5's Fletcher-32 filter takes a page of zeros, checksum
-/// included, for sound.) Arrays are written as they are, without chunks. The
-/// same contents make the same bytes.
+/// A group of an HDF5 file. It holds named numbers and texts (attributes), one-dimensional arrays
+/// (datasets) and groups. Checksums cover every byte that has a meaning, so that reading detects a
+/// file that lost its end, a page or a bit. HDF5's own checksums protect the metadata. The
+/// attribute "xxh64" of an array holds XXH64 of its bytes in hexadecimal. (HDF5's Fletcher-32
+/// filter accepts a page of zeros, checksum included.) Arrays are written contiguously, without
+/// chunks. The same contents make the same bytes.
 ///
-/// Reading throws Error, naming the file and the item, for what is missing, of
-/// another kind, or damaged. T is float, double or std::int64_t. One thread at
-/// a time may use HDF5 files; groups must not outlive their file.
+/// Reading throws Error, naming the file and the item, if something is missing, of another kind, or
+/// damaged. T is float, double or std::int64_t. Only one thread at a time may use HDF5 files.
+/// Groups must not outlive their file.
 class Hdf5Group {
  public:
   Hdf5Group(std::string file, std::string name, std::int64_t id);
@@ -30,9 +29,9 @@ class Hdf5Group {
 
   Hdf5Group create_group(const std::string& name);
   Hdf5Group group(const std::string& name) const;
-  bool has(const std::string& name) const;  ///< a group or an array
+  bool has(const std::string& name) const;  ///< true for a group or an array
   bool has_attribute(const std::string& name) const;
-  std::vector<std::string> names() const;  ///< of groups and arrays, sorted
+  std::vector<std::string> names() const;  ///< names of groups and arrays, sorted
 
   void write_number(const std::string& name, double value);
   void write_integer(const std::string& name, std::int64_t value);
@@ -43,16 +42,16 @@ class Hdf5Group {
 
   template <typename T>
   void write_array(const std::string& name, std::span<const T> values);
-  /// An array of floats that comes in pieces, from the first element on: `source` hands each
-  /// of them to what it is called with.
+  /// Writes an array of `size` floats that comes in pieces, from the first element on. `source` is
+  /// called once and hands each piece to the sink that it receives.
   using FloatSink = std::function<void(std::span<const float>)>;
   void write_floats(const std::string& name, std::size_t size,
                     const std::function<void(const FloatSink&)>& source);
-  /// Hands an array of floats to `sink` in pieces, from the first element on; its checksum is known
-  /// to be wrong, if it is, at the end only.
+  /// Hands an array of floats to `sink` in pieces, from the first element on. Throws Error for a
+  /// wrong checksum only after the last piece.
   void read_floats(const std::string& name, const FloatSink& sink) const;
   std::size_t array_size(const std::string& name) const;
-  /// Fills `values`, which has as many elements as the array.
+  /// Fills `values`, which must have as many elements as the array.
   template <typename T>
   void read_array(const std::string& name, std::span<T> values) const;
   template <typename T>
@@ -73,19 +72,19 @@ class Hdf5Group {
   std::int64_t id_;
 };
 
-/// An HDF5 file as a whole.
+/// An open HDF5 file.
 class Hdf5File {
  public:
-  /// Makes an empty file, replacing what is there.
+  /// Creates an empty file and replaces any that exists.
   static Hdf5File create(const std::filesystem::path& path);
-  /// Opens for reading. Throws Error for what does not exist, is no HDF5 file, or is cut off.
+  /// Opens a file for reading. Throws Error if it does not exist, is no HDF5 file, or is cut off.
   static Hdf5File open(const std::filesystem::path& path);
   ~Hdf5File();
   Hdf5File(Hdf5File&& other) noexcept;
   Hdf5File& operator=(Hdf5File&&) = delete;
 
   Hdf5Group root() const;
-  /// Writes everything out; throws Error where the disk does not take it.
+  /// Writes everything to the disk. Throws Error if the disk does not take it.
   void close();
 
  private:
@@ -94,7 +93,7 @@ class Hdf5File {
   std::int64_t id_;
 };
 
-/// Whether a file begins as HDF5 files do; false for what cannot be read.
+/// Returns true if a file begins with the HDF5 signature, and false if it cannot be read.
 bool has_hdf5_signature(const std::filesystem::path& path);
 
 }  // namespace tomofield::io

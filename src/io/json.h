@@ -7,7 +7,7 @@
 
 namespace tomofield::io {
 
-/// Atomically writes `document`, indented for people, to `path`.
+/// Writes `document` to `path` atomically, indented for people.
 inline void write_json(const std::filesystem::path& path, const nlohmann::json& document) {
   write_text_file(path,
                   document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");

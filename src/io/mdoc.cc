@@ -15,7 +15,7 @@ struct KeyValue {
   std::string_view key, value;
 };
 
-/// "key = value"; an empty key for lines of another form.
+/// Splits "key = value". Returns an empty key for lines of another form.
 KeyValue split_key_value(std::string_view text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string_view::npos) return {};
@@ -30,7 +30,8 @@ double require_number(const std::filesystem::path& path, const TextLine& line,
                           line.number, line.text));
 }
 
-/// n of "[ZValue = n]"; nothing for other heads, "[T = …]" and "[MontSection = …]".
+/// Returns n of "[ZValue = n]", and nothing for other heads such as "[T = …]" and
+/// "[MontSection = …]".
 std::optional<std::int64_t> parse_section_head(const std::filesystem::path& path,
                                                const TextLine& line) {
   const std::string_view inside = std::string_view(line.text).substr(1, line.text.find(']') - 1);
@@ -63,7 +64,7 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
   for (const TextLine& line : read_text_lines(path)) {
     if (line.text.starts_with('[')) {
       const auto section = parse_section_head(path, line);
-      // Titles "[T = …]" stand anywhere; what follows them belongs where it would without.
+      // Titles "[T = …]" stand anywhere. They do not end a section.
       if (section) mdoc.sections.push_back({*section, line.number, {}, {}});
       is_in_section = is_in_section || section.has_value();
       continue;

@@ -21,8 +21,8 @@ enum class MrcMode : std::int32_t {
   kFloat16 = 12
 };
 
-/// What an MRC header says, in units that the program uses. Sections are the
-/// file's slowest axis, x the fastest.
+/// The contents of an MRC header in the program's units. Sections are the file's slowest axis, x is
+/// the fastest.
 struct MrcHeader {
   std::int64_t nx = 0;
   std::int64_t ny = 0;
@@ -36,16 +36,16 @@ struct MrcHeader {
   bool bytes_are_unsigned = false;  ///< mode 0 with IMOD's stamp and without its signed flag
   std::int64_t extended_header_bytes = 0;
   std::string extended_header_type;
-  std::vector<double> extended_tilt_deg;  ///< from a SERI header under flag 1, else empty
+  std::vector<double> extended_tilt_deg;  ///< angles of a SERI header with flag 1, else empty
   std::vector<std::string> labels;
 };
 
-/// Reads any part of an MRC file as float32 without holding more than the part.
-/// Opening checks the header and that the file is as long as it says.
-/// Thread-safe: reads are positioned.
+/// Reads any part of an MRC file as float32 without holding more than that part. Thread-safe,
+/// because reads are positioned.
 class MrcReader {
  public:
-  /// Throws Error for a missing, truncated (bytes expected and found) or hostile file.
+  /// Checks the header and that the file is as long as it says. Throws Error for a missing,
+  /// truncated (with the bytes expected and found) or hostile file.
   explicit MrcReader(const std::filesystem::path& path);
   ~MrcReader();
   MrcReader(MrcReader&&) noexcept;
@@ -54,9 +54,9 @@ class MrcReader {
   const MrcHeader& header() const;
   const std::filesystem::path& path() const;
 
-  /// Section `section` as ny × nx floats.
+  /// Reads section `section` as ny × nx floats.
   void read_section(std::int64_t section, std::span<float> out) const;
-  /// Rows [first_row, first_row + num_rows) of a section.
+  /// Reads rows [first_row, first_row + num_rows) of a section.
   void read_rows(std::int64_t section, std::int64_t first_row, std::int64_t num_rows,
                  std::span<float> out) const;
 
@@ -65,7 +65,7 @@ class MrcReader {
   std::unique_ptr<Impl> impl_;
 };
 
-/// What a new MRC file shall be.
+/// The properties of a new MRC file.
 struct MrcSpec {
   std::int64_t nx = 0;
   std::int64_t ny = 0;
@@ -74,18 +74,17 @@ struct MrcSpec {
   std::array<double, 3> voxel_size_A{1.0, 1.0, 1.0};
   std::array<double, 3> origin_A{0.0, 0.0, 0.0};
   bool is_volume = true;
-  std::string label;  ///< how the file was made; at most 80 characters are kept
+  std::string label;  ///< a note on how the file was made; at most 80 characters are kept
 };
 
-/// Writes an MRC file piece by piece into a temporary file beside `path`, and
-/// puts it in place of `path` in close() alone, with true statistics in the
-/// header. A writer that is destroyed before close() leaves `path` as it was
-/// and removes its temporary file. Rows may come in any order, each once;
-/// rows never written are zero. Writes from several threads are safe.
-/// Integer modes round and saturate; int16/int8/uint16 values outside the range are clamped.
+/// Writes an MRC file piece by piece into a temporary file beside `path`. Only close() replaces
+/// `path`, with correct statistics in the header. A writer that is destroyed before close() leaves
+/// `path` as it was and removes its temporary file. Rows may come in any order, each once; rows
+/// that are never written are zero. Several threads may write. Integer modes round; int8, int16 and
+/// uint16 clamp values outside their range.
 ///
-/// Several processes may write one file, each its rows; all of them make a writer and close it, and
-/// the first puts the file in place.
+/// Several ranks may write one file, each its own rows. All of them make a writer and close it; the
+/// first rank puts the file in place.
 class MrcWriter {
  public:
   MrcWriter(const std::filesystem::path& path, const MrcSpec& spec,

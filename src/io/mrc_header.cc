@@ -18,7 +18,7 @@ static_assert(std::endian::native == std::endian::little,
 
 namespace {
 
-// Byte offsets of MRC2014 (Cheng et al. 2015), and IMOD's use of the free area.
+// Byte offsets of MRC2014 (Cheng et al. 2015), and of IMOD's fields in the free area.
 enum Offset : std::size_t {
   kSize = 0,
   kMode = 12,
@@ -61,7 +61,7 @@ class Fields {
     const auto* first = reinterpret_cast<const char*>(bytes_.data() + offset);
     std::string result(first, std::find(first, first + length, '\0'));
     for (char& c : result) {
-      if (static_cast<unsigned char>(c) < ' ') c = '?';  // labels are shown on terminals
+      if (static_cast<unsigned char>(c) < ' ') c = '?';  // terminals show labels
     }
     result.erase(result.find_last_not_of(' ') + 1);
     return result;
@@ -87,8 +87,8 @@ bool detect_byte_swap(const MrcHeaderBytes& bytes) {
   const auto stamp = std::to_integer<int>(bytes[kMachineStamp]);
   if (stamp == 0x44) return false;
   if (stamp == 0x11) return true;
-  // Without a stamp (before MRC2014): the order in which the mode makes sense.
-  // Mode 0 is the same in both, so the size decides then.
+  // Files from before MRC2014 have no stamp. Then the byte order is the one in which the mode makes
+  // sense. Mode 0 is the same in both orders, so the size decides.
   const Fields native(bytes, false), swapped(bytes, true);
   if (native.int32(kMode) != 0) return !is_known_mode(native.int32(kMode));
   return static_cast<std::uint32_t>(native.int32(kSize)) >
@@ -123,7 +123,7 @@ void require_axis_order(const Fields& fields, const std::string& name) {
       name, axes[0], axes[1], axes[2]));
 }
 
-/// Cell length over number of samples, never rounded; 0 where the header has none.
+/// Returns cell length over number of samples, never rounded; 0 if the header has none.
 double decode_voxel_size(const Fields& fields, std::size_t axis) {
   const double cell_A = fields.float32(kCell + 4 * axis);
   const auto samples = static_cast<double>(fields.int32(kSampling + 4 * axis));
@@ -131,7 +131,7 @@ double decode_voxel_size(const Fields& fields, std::size_t axis) {
   return std::isfinite(size_A) && size_A > 0 ? size_A : 0.0;
 }
 
-/// Bytes a section that SerialEM's flags announce (IMOD's description of the header).
+/// Returns the bytes a section that SerialEM's flags announce (IMOD's description of the header).
 int bytes_of_section_flags(int flags) {
   int bytes = 0;
   constexpr std::array<int, 6> kBytesOfFlag{2, 6, 4, 2, 2, 4};
@@ -267,7 +267,7 @@ MrcHeaderBytes encode_mrc_header(const MrcHeader& header) {
   put<float>(bytes, kRms, static_cast<float>(header.rms));
   put<std::int32_t>(bytes, kSpaceGroup, header.is_volume ? 1 : 0);
   put<std::int32_t>(bytes, kVersion, 20141);
-  if (header.mode == MrcMode::kInt8) {  // or IMOD would take the bytes as unsigned
+  if (header.mode == MrcMode::kInt8) {  // without the stamp, IMOD reads the bytes as unsigned
     put<std::int32_t>(bytes, kImodStamp, kImodStampValue);
     put<std::int32_t>(bytes, kImodFlags, kImodSignedBytes);
   }

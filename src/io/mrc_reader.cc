@@ -66,7 +66,7 @@ void MrcReader::read_rows(std::int64_t section, std::int64_t first_row, std::int
       fmt::format("rows {}+{} of section {} are outside the file", first_row, num_rows, section));
   TOMOFIELD_CHECK(out.size() == static_cast<std::size_t>(num_rows * header.nx),
                   "the output must have as many values as the rows");
-  // A megabyte at a time, so that the raw bytes stay in the cache while they are converted.
+  // A megabyte at a time keeps the raw bytes in the cache while they are converted.
   constexpr std::size_t kChunkValues = std::size_t{1} << 18;
   const std::size_t width = bytes_per_value(header.mode);
   std::vector<std::byte> raw(std::min(kChunkValues, out.size()) * width);

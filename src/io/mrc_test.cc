@@ -43,8 +43,8 @@ std::vector<float> read_all(const std::filesystem::path& path) {
   return values;
 }
 
-/// Value i of the files that Python and this test both make: every mode of
-/// MRC holds it (the unsigned one without its sign).
+/// Returns value i of the files that both Python and this test make. Every mode of MRC can hold it;
+/// the unsigned mode holds its magnitude.
 float pattern(std::size_t i, bool is_unsigned) {
   const auto value = static_cast<float>((i * 37) % 41) - 20.0f;
   return is_unsigned ? std::fabs(value) : value;
@@ -53,8 +53,8 @@ float pattern(std::size_t i, bool is_unsigned) {
 TEST(Mrc, ReadsEveryModeInBothByteOrders) {
   if (!python_has("mrcfile")) GTEST_SKIP() << "python3-mrcfile is not installed";
   const ScratchDirectory scratch;
-  // mrcfile writes the native order; the other one is made by turning every
-  // word round, and mrcfile must agree that it says the same.
+  // mrcfile writes the native order. Reversing every word makes the other order, and mrcfile must
+  // agree that it holds the same.
   ASSERT_EQ(run_python(scratch, R"(
 import numpy as np, mrcfile
 values = (np.arange(5 * 4 * 3) * 37 % 41 - 20).astype(np.float32).reshape(3, 4, 5)
@@ -107,7 +107,7 @@ TEST(Mrc, OtherProgramsReadWhatIsWritten) {
     spec.voxel_size_A = {1.7, 1.7, 3.3};
     spec.origin_A = {-5, 6, 7};
     spec.is_volume = mode != MrcMode::kInt16;
-    spec.label = std::string(100, 'L');  // 80 are kept
+    spec.label = std::string(100, 'L');  // 80 characters are kept
     MrcWriter writer(scratch / ("mode_" + std::to_string(static_cast<int>(mode)) + ".mrc"), spec);
     std::vector<float> section(20);
     for (const std::int64_t z : {2, 0, 1}) {  // in any order
@@ -224,7 +224,7 @@ TEST(Mrc, FilesBeyondFourGibibytesWork) {
   const auto path = scratch / "large.mrc";
   std::vector<float> row(16384);
   for (std::size_t i = 0; i < row.size(); ++i) row[i] = static_cast<float>(i);
-  MrcWriter writer(path, spec_of(16384, 16384, 5));  // 5 GiB, of which two rows are written
+  MrcWriter writer(path, spec_of(16384, 16384, 5));  // 5 GiB, but only two rows are written
   writer.write_rows(4, 16383, 1, row);
   writer.write_rows(0, 0, 1, row);
   writer.close();
@@ -235,12 +235,12 @@ TEST(Mrc, FilesBeyondFourGibibytesWork) {
   std::vector<float> found(row.size());
   reader.read_rows(4, 16383, 1, found);
   EXPECT_EQ(found, row);
-  reader.read_rows(4, 16382, 1, found);  // 4 GiB would wrap to elsewhere
+  reader.read_rows(4, 16382, 1, found);  // 32-bit offsets would wrap to another place
   EXPECT_EQ(found, std::vector<float>(row.size()));
   EXPECT_EQ(reader.header().max, 16383);
 }
 
-// A header with chosen words changed.
+// A header in which chosen words are changed.
 struct Damage {
   const char* name;
   std::size_t offset;
@@ -300,7 +300,7 @@ TEST(Mrc, TruncationTellsBothLengths) {
   EXPECT_THROW(MrcReader(scratch.path()), Error);
 }
 
-/// A file of the given extended header, with changed words in the fixed one.
+/// Writes a file with the given extended header and changed words in the fixed one.
 void write_with_extended_header(const std::filesystem::path& path, const std::string& extended,
                                 const char* type, std::int16_t section_bytes, std::int16_t flags) {
   MrcWriter(path, spec_of(2, 1, 3, MrcMode::kInt16)).close();
@@ -316,7 +316,7 @@ void write_with_extended_header(const std::filesystem::path& path, const std::st
 
 TEST(Mrc, SeriTiltAngles) {
   const ScratchDirectory scratch;
-  // Tilt (flag 1) and intensity (flag 16): two shorts a section.
+  // Each section holds two shorts: its tilt (flag 1) and its intensity (flag 16).
   const std::vector<std::int16_t> records{-6000, 7, 0, 8, 4550, 9};
   const std::string extended(reinterpret_cast<const char*>(records.data()), 12);
   const auto tilts = [&](const char* type, std::int16_t section_bytes, std::int16_t flags) {
@@ -325,7 +325,7 @@ TEST(Mrc, SeriTiltAngles) {
   };
   const std::vector<double> expected{-60.0, 0.0, 45.5};
   EXPECT_EQ(tilts("SERI", 4, 17), expected);
-  EXPECT_EQ(tilts("\0\0\0\0", 4, 17), expected);  // before there were type codes
+  EXPECT_EQ(tilts("\0\0\0\0", 4, 17), expected);  // from before there were type codes
   EXPECT_TRUE(tilts("SERI", 4, 16).empty());      // no angles among the flags
   EXPECT_TRUE(tilts("SERI", 6, 17).empty());      // records longer than the header
   EXPECT_TRUE(tilts("SERI", -4, 17).empty());
@@ -342,7 +342,7 @@ TEST(Mrc, ImodStampTellsSignedFromUnsignedBytes) {
   bytes[156] = 0;  // IMOD's flag for signed bytes
   scratch.write("a.mrc", bytes);
   EXPECT_EQ(read_all(scratch / "a.mrc"), (std::vector<float>{255, 5}));
-  bytes[152] = 0;  // without the stamp MRC2014 holds: signed
+  bytes[152] = 0;  // without the stamp, MRC2014 applies: bytes are signed
   scratch.write("a.mrc", bytes);
   EXPECT_EQ(read_all(scratch / "a.mrc"), (std::vector<float>{-1, 5}));
 }

@@ -20,9 +20,9 @@
 namespace tomofield::io {
 namespace {
 
-/// Mean and sum of squared deviations of one row. They are kept for every row
-/// (a thousandth of the file) and combined in the file's order at the end, so
-/// that the header is the same whatever thread wrote what and when.
+/// The mean and the sum of squared deviations of one row. They are kept for every row (a thousandth
+/// of the file) and combined in the file's order at the end. The header is therefore the same
+/// whichever thread wrote which row and when.
 struct RowMoments {
   double mean = 0.0;
   double squares = 0.0;
@@ -71,10 +71,10 @@ void warn_if_disk_is_small(const std::filesystem::path& path, std::int64_t bytes
 struct MrcWriter::Impl {
   MrcHeader header;
   const distributed::Communicator& processes;
-  std::optional<AtomicFile> target;  // of the first process
+  std::optional<AtomicFile> target;  // only on the first rank
   std::optional<PositionedFile> file;
 
-  std::mutex mutex;  // guards what follows
+  std::mutex mutex;  // guards the members below
   std::vector<RowMoments> rows;
   std::int64_t num_rows_written = 0;
   float min = std::numeric_limits<float>::infinity();
@@ -114,7 +114,7 @@ struct MrcWriter::Impl {
     max = std::max(max, *high);
   }
 
-  // What others know of their rows.
+  // Combines the statistics of all ranks' rows.
   void share_statistics() {
     processes.allreduce_sum(std::span(rows), &RowMoments::mean, &RowMoments::squares);
     processes.allreduce_sum(std::span(&num_rows_written, 1));

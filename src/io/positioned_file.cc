@@ -25,7 +25,7 @@ namespace {
 
 PositionedFile::PositionedFile(const std::filesystem::path& path, Access access) : path_(path) {
   const int flags = access == Access::kRead ? O_RDONLY : O_RDWR;
-  // O_NONBLOCK: a pipe must be refused below, not waited for.
+  // O_NONBLOCK prevents waiting for a pipe, which is refused below.
   descriptor_ = ::open(path.c_str(), flags | O_CLOEXEC | O_NONBLOCK);
   if (descriptor_ < 0) throw_system_error("open", path);
   struct stat status {};

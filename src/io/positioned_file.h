@@ -6,8 +6,8 @@
 
 namespace tomofield::io {
 
-/// An open regular file that is read and written at 64-bit byte offsets, from
-/// any number of threads. Failures are tomofield::Error and name the file.
+/// An open regular file that any number of threads read and write at 64-bit byte offsets. Failures
+/// throw Error and name the file.
 class PositionedFile {
  public:
   enum class Access { kRead, kReadWrite };
@@ -20,11 +20,11 @@ class PositionedFile {
   const std::filesystem::path& path() const { return path_; }
   std::int64_t size() const;
 
-  /// Exactly `bytes` bytes; a file that ends before is an Error.
+  /// Reads exactly `bytes` bytes. Throws Error if the file ends before.
   void read_at(std::int64_t offset, void* out, std::size_t bytes) const;
   void write_at(std::int64_t offset, const void* data, std::size_t bytes) const;
 
-  /// Sets the length; what was never written reads as zeros and takes no space.
+  /// Sets the length. Parts that were never written read as zeros and take no space.
   void resize(std::int64_t bytes) const;
   void close();
 

@@ -31,7 +31,7 @@ std::string read_text(const std::filesystem::path& path) {
 
 template <typename T>
 std::optional<T> parse_whole(std::string_view word) {
-  if (word.starts_with('+')) word.remove_prefix(1);  // from_chars knows no plus
+  if (word.starts_with('+')) word.remove_prefix(1);  // from_chars does not accept a plus sign
   T value{};
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (error != std::errc{} || end != word.data() + word.size()) return std::nullopt;

@@ -14,16 +14,16 @@ struct TextLine {
   std::string text;
 };
 
-/// The lines of a small text file, empty ones left out; either kind of line
-/// end. Throws Error for a file that cannot be read or that is no text
-/// (larger than any alignment file, or with zero bytes).
+/// Returns the lines of a small text file without the empty ones. Either kind of line end is
+/// accepted. Throws Error if the file cannot be read or is no text (larger than any alignment file,
+/// or with zero bytes).
 std::vector<TextLine> read_text_lines(const std::filesystem::path& path);
 
 std::string_view trim(std::string_view text);
 std::vector<std::string_view> split_words(std::string_view text);
 
-/// A whole word as a number; nothing if any character is left over. "nan" and
-/// "inf" are numbers here.
+/// Parses a whole word as a number. Returns nothing if any character is left over. "nan" and "inf"
+/// are numbers here.
 std::optional<double> parse_number(std::string_view word);
 std::optional<long long> parse_integer(std::string_view word);
 

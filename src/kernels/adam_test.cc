@@ -19,7 +19,8 @@ using testing::to_double;
 TEST(Adam, AgreesWithTheReferenceOverManySteps) {
   for_each_simd_target([] {
     for (const std::size_t count : {1u, 3u, 7u, 17u, 33u, 100u}) {
-      // One float past the allocation: unaligned; one before and after: untouched.
+      // The arrays start one float past the allocation, so they are unaligned. The floats before
+      // and after them must stay as they are.
       auto p = random_floats(count + 2, 1), m = random_floats(count + 2, 3);
       auto v = random_floats(count + 2, 4, 0.0, 1.0);
       auto p2 = to_double(p), m2 = to_double(m), v2 = to_double(v);

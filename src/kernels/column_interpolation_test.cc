@@ -16,7 +16,8 @@ namespace {
 using testing::random_floats;
 using testing::to_double;
 
-// Columns of more vertices than are used, from the second on; a buffer ends with the last used one.
+// Columns have more vertices than are used, which begin at the second. Buffers end with the last
+// vertex in use.
 constexpr int kStride = 20, kCount = 7;
 
 struct Case {
@@ -32,7 +33,7 @@ struct Case {
   LaneTaps taps() const { return {lower.data(), fraction.data()}; }
 };
 
-// Of one column, the reference's rows of one float are the same.
+// For one column, the reference's interpolation of rows of one float does the same.
 TEST(ColumnInterpolation, AgreesWithTheReference) {
   testing::for_each_simd_target([] {
     Case c;

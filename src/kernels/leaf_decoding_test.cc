@@ -18,7 +18,7 @@ using testing::for_each_simd_target;
 using testing::random_floats;
 using testing::to_double;
 
-// Samples spread evenly over the vertices of one axis, both ends included.
+// Samples that are spread evenly over the vertices of one axis, both ends included.
 struct Axis {
   std::vector<int> lower;
   std::vector<float> fraction;
@@ -45,7 +45,7 @@ struct Leaf {
             .stride_z = (samples_x + 2) * kLanes + 1,
             .activation = {beta}};
   }
-  // One float more in front, so that nothing is aligned.
+  // Arrays have one float more in front, so that nothing is aligned.
   std::size_t num_values() const {
     return static_cast<std::size_t>(1 + vertices_x * vertices_z * kLanes);
   }
@@ -62,7 +62,7 @@ const std::vector<Leaf> kLeaves = {
     {17, 33, 33, 17, 1.0f},
     {5, 4, 33, 50, 100.0f},
     {17, 9, 5, 4, 5.0f},
-    // At vertices; at every other one; on one axis alone.
+    // These samples lie at vertices, at every other vertex, or at vertices of one axis alone.
     {33, 19, 33, 19, 5.0f},
     {17, 9, 9, 5, 0.0f},
     {9, 6, 9, 7, 5.0f},
@@ -77,7 +77,7 @@ TEST(LeafDecoding, AgreesWithTheReference) {
       auto expected = to_double(samples);
       reference::decode_leaf(leaf.piece(), values2.data() + 1, expected.data() + 1);
       decode_leaf(leaf.piece(), values.data() + 1, samples.data() + 1);
-      // Gaps between rows included: they keep what they held.
+      // The gaps between rows are compared too: they must keep what they held.
       expect_near(samples, expected, 2e-6);
     }
   });
@@ -98,7 +98,7 @@ TEST(LeafDecoding, AdjointAgreesWithTheReference) {
       const double bias = decode_leaf_adjoint(leaf.piece(), samples.data() + 1,
                                               grad_samples.data() + 1, grad_values.data() + 1);
       const double scale = std::sqrt(static_cast<double>(leaf.num_samples()));
-      // act′ comes back from act: its error is that of β act, relative to 1.
+      // act′ is computed from act, so its error is that of β act, relative to 1.
       const double tolerance = 4e-6 * (1.0 + static_cast<double>(leaf.beta));
       expect_near(grad_values, expected, tolerance);
       EXPECT_NEAR(bias, expected_bias, tolerance * scale);
@@ -106,8 +106,8 @@ TEST(LeafDecoding, AdjointAgreesWithTheReference) {
   });
 }
 
-// d/dt Σ g·decode(v + t d) = <adjoint(g), d>, with the left side from the
-// double reference by central differences.
+// Checks that d/dt Σ g · decode(v + t d) = <adjoint(g), d>. Central differences of the double
+// reference give the left side.
 TEST(LeafDecoding, AdjointIsTheDerivative) {
   for_each_simd_target([] {
     for (const float beta : {0.0f, 5.0f}) {
@@ -141,7 +141,7 @@ TEST(LeafDecoding, AdjointIsTheDerivative) {
 
 TEST(LeafDecoding, SoftplusIsItsLimitFarFromZero) {
   for_each_simd_target([] {
-    // 19 values: no multiple of any vector. The last one is not to be touched.
+    // 19 values are no multiple of any vector. The last one must stay as it is.
     std::vector<float> values = {-1e30f, -1e4f, -40.0f, -20.0f, -1.0f, -0.0f, 0.0f,
                                  1e-6f,  0.5f,  1.0f,   20.0f,  40.0f, 1e4f,  1e30f,
                                  -0.3f,  0.3f,  2.0f,   -2.0f,  7.0f};

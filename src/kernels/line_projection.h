@@ -8,23 +8,23 @@
 
 namespace tomofield::kernels {
 
-// Joseph's projector, line by line. A line is a row of samples along x (views
-// up to 45°) or a column along z (steeper views); each sample is kLanes floats
-// (the slab's detector rows). Detector pixel u of a view crosses the line at
+// Joseph's projector, line by line. A line is a row of samples along x (views up to 45°) or a
+// column along z (steeper views). Each sample is kLanes floats, one for each detector row of the
+// slab. Detector pixel u of a view crosses the line at
 //
 //   position(u) = offset + step u        in samples of the line, |step| > 0
 //
-// and takes weight · hat(position(u) − j) of sample j, hat(t) = max(0, 1 − |t|).
-// Pixels with position outside [low, high) or index outside
-// [first_pixel, end_pixel) do not see the line. Forward and adjoint evaluate
-// the same expression, so they are each other's exact transpose.
+// and takes weight · hat(position(u) − j) of sample j, with hat(t) = max(0, 1 − |t|). Pixels do not
+// see the line if their position is outside [low, high) or their index outside
+// [first_pixel, end_pixel). Forward and adjoint evaluate the same expression, so they are exact
+// transposes of each other.
 
-/// One line as one view sees it.
+/// One line as seen by one view.
 struct LineCrossing {
-  /// For group_lines: sample 0. Samples −1 and num_samples must be readable (padding).
+  /// Points to sample 0, for group_lines. Samples −1 and num_samples must be readable (padding).
   const float* samples = nullptr;
-  /// For group_views: pixel 0 of the view, [pixel, lane]. Pixel end_pixel must be readable: it is
-  /// multiplied by 0.
+  /// Points to pixel 0 of the view, [pixel, lane], for group_views. Pixel end_pixel must be
+  /// readable: it is multiplied by 0.
   const float* detector = nullptr;
   float offset = 0, step = 1;
   float low = 0, high = 0;  ///< within [−1, num_samples]
@@ -32,13 +32,13 @@ struct LineCrossing {
   float weight = 0;
 };
 
-/// Up to four crossings side by side, numbers by kind, arranged once for all tiles in which they
-/// are used: lines that one view sees, or views that see one line.
+/// Up to four crossings as a structure of arrays: lines that one view sees, or views that see one
+/// line. A group is made once and serves all tiles.
 struct CrossingGroup {
   static constexpr int kMost = 4;
   template <typename T>
   using Numbers = std::array<T, kMost>;
-  /// [first, end), empty if the end is not after the first.
+  /// The integers [first, end); empty if end <= first.
   struct Range {
     int first = 0, end = 0;
     bool is_empty() const { return end <= first; }
@@ -48,7 +48,7 @@ struct CrossingGroup {
       const Range common{std::max(first, other.first), std::min(end, other.end)};
       return common.is_empty() ? Range{} : common;
     }
-    /// The least that has both.
+    /// Returns the smallest range that contains both.
     Range joined_with(Range other) const {
       if (is_empty()) return other;
       if (other.is_empty()) return *this;
@@ -57,46 +57,48 @@ struct CrossingGroup {
   };
 
   alignas(16) Numbers<float> offset, step, low, high, first_pixel, last_pixel, weight;
-  /// Of views, for sample j: the pair of pixel p = floor(inverse · j + bias) + skipped and p + 1.
-  /// One pair reaches a sample if |step| >= 1, else more, which are crossings of their own.
+  /// For views: sample j takes from pixel p = floor(inverse · j + bias) + skipped and from p + 1.
+  /// One such pair of pixels reaches a sample if |step| >= 1; otherwise several do, and each is a
+  /// crossing of its own.
   alignas(16) Numbers<float> inverse, bias, skipped;
-  /// Sample 0 or pixel 0, in floats from where all sources are counted from.
+  /// The position of sample 0 or pixel 0, in floats from the common source.
   alignas(16) Numbers<int> origin;
-  /// Pixels (lines) or samples (views) for which no crossing of the group has to be tested for
-  /// its ends, and those outside of which none weighs anything.
+  /// `whole` are the pixels (for lines) or samples (for views) for which no crossing of the group
+  /// needs a test of its ends. Outside of `reached`, no crossing has any weight.
   Range whole, reached;
 };
 
-/// Appends `lines` of one view, all of the same step and with a sample at least, to groups. Samples
+/// Appends `lines` of one view to groups. All have the same step and at least one sample. Samples
 /// are counted from `source` and begin within 2³¹ floats of it.
 void group_lines(std::span<const LineCrossing> lines, const float* source,
                  std::vector<CrossingGroup>& groups);
 
-/// Appends views of one line. Pixels are counted from `source`, likewise. Views with an empty
-/// window are left out, and those with |step| < 1 become several items: how many groups there are
-/// differs from line to line.
+/// Appends views of one line to groups. Pixels are counted from `source` and begin within 2³¹
+/// floats of it. Views with an empty window are left out, and those with |step| < 1 become several
+/// crossings, so the number of groups differs from line to line.
 void group_views(std::span<const LineCrossing> views, const float* source,
                  std::vector<CrossingGroup>& groups);
 
-/// Slabs that are treated together, one or two: they are crossed alike, so what a crossing's
-/// indices and weights cost is paid once. Those of the second lie so many floats after the first's.
+/// One or two slabs that are processed together. They have the same crossings, so the indices and
+/// weights are computed once. `samples_apart` and `detectors_apart` are the distances in floats
+/// from the first slab's arrays to the second's.
 struct Slabs {
   int count = 1;
   std::ptrdiff_t samples_apart = 0, detectors_apart = 0;
 };
 
-/// detector[u, lane] += Σ_lines weight Σ_j hat(position(u) − j) samples_j[lane],
-/// for pixels [first, end). All lines belong to one view: same detector, same step; their samples
-/// are counted from `samples` and `stride` floats apart, and all lie within 2³¹.
-/// Traffic a pixel and line: two cache lines of samples; the detector once for all lines.
+/// Projects lines: detector[u, lane] += Σ_lines weight Σ_j hat(position(u) − j) samples_j[lane] for
+/// pixels u in [first, end). All lines belong to one view, with the same detector and step. Their
+/// samples are counted from `samples`, are `stride` floats apart, and lie within 2³¹ floats. Memory
+/// traffic a pixel and line: two cache lines of samples; the detector once for all lines.
 void project_lines(const CrossingGroup* lines, int num_groups, const float* samples,
                    std::ptrdiff_t stride, int first, int end, float* detector,
                    const Slabs& slabs = {});
 
-/// The adjoint: samples[j, lane] += Σ_views weight Σ_u hat(position_view(u) − j) detector_view[u,
-/// lane] for samples j in [first, end), padding included. All views see one line; their pixels
-/// are counted from `detector` and lie within 2³¹ floats. Traffic a sample and view: two cache
-/// lines of the detector (more for |step| < 1); the sample once for all views.
+/// Applies the adjoint: samples[j, lane] += Σ_views weight Σ_u hat(position_view(u) − j)
+/// detector_view[u, lane] for samples j in [first, end), padding included. All views see one line.
+/// Their pixels are counted from `detector` and lie within 2³¹ floats. Memory traffic a sample and
+/// view: two cache lines of the detector (more for |step| < 1); the sample once for all views.
 void backproject_lines(const CrossingGroup* views, int num_groups, const float* detector,
                        std::ptrdiff_t stride, int first, int end, float* samples,
                        const Slabs& slabs = {});

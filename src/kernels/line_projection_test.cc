@@ -22,8 +22,8 @@ using testing::for_each_simd_target;
 using testing::random_floats;
 using testing::to_double;
 
-// Lines of samples −1 … num_samples (padding included), one after the other in
-// an unaligned buffer. Columns along z have a stride that is no multiple of the lanes.
+// Lines of samples −1 … num_samples (padding included), one after the other in an unaligned buffer.
+// Columns along z have a stride that is no multiple of the lanes.
 struct Lines {
   int num_samples;
   std::ptrdiff_t stride;
@@ -33,13 +33,13 @@ struct Lines {
         stride(are_columns ? 3 * kLanes + 5 : kLanes),
         values(random_floats(static_cast<std::size_t>(1 + count * line_size()), seed)) {}
   std::ptrdiff_t line_size() const { return (num_samples + 2) * stride; }
-  std::ptrdiff_t origin(std::size_t line) const {  // of sample 0
+  std::ptrdiff_t origin(std::size_t line) const {  // position of sample 0
     return 1 + static_cast<std::ptrdiff_t>(line) * line_size() + stride;
   }
   float* sample0(std::size_t line) { return values.data() + origin(line); }
 };
 
-// Views one after the other, likewise; one pixel more, which is read.
+// Views, one after the other in an unaligned buffer, with one more pixel that may be read.
 struct Detectors {
   int num_pixels;
   std::vector<float> values;
@@ -59,8 +59,8 @@ struct Case {
   bool is_column;
 };
 
-// Steps of rows (1 / cos), of columns (1 / sin) and of coarse samples (a
-// margin's), either sign; 0.99993896 is just below 1.
+// The steps are those of rows (1 / cos), of columns (1 / sin) and of a margin's coarse samples,
+// with either sign; 0.99993896 is just below 1.
 const std::vector<Case> kCases = {
     {1, 1, 1.0f, false},          {1, 7, 0.5f, true},       {3, 1, -1.0f, false},
     {7, 17, 0.25f, false},        {17, 33, -0.75f, true},   {33, 40, 1.0f, false},
@@ -70,9 +70,9 @@ const std::vector<Case> kCases = {
     {3, 60, -1.25f, true},
 };
 
-// The line as the view sees it, centred more or less. All numbers are small
-// binary fractions: positions are exact, so both implementations must make
-// the same decision at the cuts, which positions often hit.
+// Returns the line as the view sees it, roughly centred. All numbers are small binary fractions, so
+// positions are exact. Both implementations must then make the same decision at the cuts, which
+// positions often hit.
 LineCrossing dyadic_crossing(const Case& c, int variant) {
   LineCrossing line;
   line.step = c.step;
@@ -89,7 +89,7 @@ LineCrossing dyadic_crossing(const Case& c, int variant) {
 }
 constexpr int kVariants = 5;
 
-// Lines that lie in `source`, projected together.
+// Projects lines that lie in `source` together.
 void project(const std::vector<LineCrossing>& lines, const float* source, std::ptrdiff_t stride,
              int first, int end, float* detector) {
   std::vector<CrossingGroup> groups;
@@ -106,7 +106,8 @@ void backproject(const std::vector<LineCrossing>& views, const float* source, st
                     samples);
 }
 
-// Each line's samples lie `slant` further along it than those of the line before.
+// Compares with the reference. Each line's samples lie `slant` further along than the previous
+// line's.
 void compare_projection(const Case& c, int num_lines, int first, int end, float slant = 0) {
   Lines lines(num_lines, c.num_samples, c.is_column, 3);
   Detectors detector(1, c.num_pixels, 77);
@@ -132,7 +133,7 @@ TEST(LineProjection, AgreesWithTheReference) {
       for (const int num_lines : {1, 3, 8, 9, 33}) {
         compare_projection(c, num_lines, 0, c.num_pixels);
       }
-      // Few or no pixels see all lines of a group.
+      // With these slants, few or no pixels see all lines of a group.
       for (const float slant : {1.25f, -4.0f}) {
         for (int pixel = 0; pixel < c.num_pixels; ++pixel)
           compare_projection(c, 8, pixel, pixel + 1, slant);
@@ -142,7 +143,7 @@ TEST(LineProjection, AgreesWithTheReference) {
   });
 }
 
-// One line seen by views of every case and variant at once.
+// Backprojects views of every case and variant onto one line at once.
 class Backprojection {
  public:
   Backprojection(int num_samples, bool is_column)
@@ -179,7 +180,7 @@ TEST(LineBackprojection, AgreesWithTheReference) {
   for_each_simd_target([] {
     for (const int num_samples : {1, 3, 7, 17, 33, 50, 100}) {
       SCOPED_TRACE(num_samples);
-      // Padding included.
+      // Samples −1 and num_samples are the padding.
       Backprojection(num_samples, false).compare_with_reference(-1, num_samples + 1);
       Backprojection(num_samples, true).compare_with_reference(-1, num_samples + 1);
       Backprojection(num_samples, true).compare_with_reference(num_samples / 3, num_samples / 2);
@@ -187,7 +188,7 @@ TEST(LineBackprojection, AgreesWithTheReference) {
   });
 }
 
-// A view alone in its group, so that tiles inside of the window are treated without tests; the
+// One view alone in its group, so that tiles inside the window are processed without tests. The
 // window's ends pass every sample of the tiles.
 TEST(LineBackprojection, AgreesWhereTheWindowEnds) {
   constexpr int kSamples = 100, kTile = 32;
@@ -218,8 +219,8 @@ TEST(LineBackprojection, AgreesWhereTheWindowEnds) {
   });
 }
 
-// Rows (or columns) seen by views of all angles, far from the detector's
-// origin: <A f, r> = <f, Aᵀ r>.
+// Checks <A f, r> = <f, Aᵀ r> for rows (or columns) seen by views of all angles, far from the
+// detector's origin.
 void check_adjoint(bool are_columns, int num_lines, int num_samples, int num_pixels,
                    double origin) {
   base::Random random(11);
@@ -255,7 +256,7 @@ void check_adjoint(bool are_columns, int num_lines, int num_samples, int num_pix
   }
   const double size = std::sqrt(testing::dot(projected.values, projected.values));
   EXPECT_GT(size, 0.0);
-  // Sums of random products: their errors grow like the root of their number.
+  // Both sides sum random products, whose errors grow like the root of their number.
   EXPECT_NEAR(testing::dot(projected.values, residual.values),
               testing::dot(gradient.values, image.values), 1e-5 * size);
 }

@@ -4,20 +4,20 @@
 
 namespace tomofield::kernels {
 
-/// One product of eq. 4 at scattered points: value(p) = Σ_r V_r(a) M_r(b, c) with
-/// the vector V [na, rank] and the matrix M [nb, nc, rank] interpolated linearly.
-/// The taps of the three axes have one entry a point.
+/// One product of eq. 4 at scattered points: value(p) = Σ_r V_r(a) M_r(b, c). The vector
+/// V [na, rank] and the matrix M [nb, nc, rank] are interpolated linearly. The taps of the three
+/// axes have one entry a point.
 struct PointProducts {
   AxisTaps a, b, c;
   int nc = 0;
   int rank = 0;
 };
 
-/// values[point] += the product there.
+/// Adds the product at each point to values[point].
 void add_point_products(const PointProducts& points, const float* vector, const float* matrix,
                         float* values);
 
-/// Adjoint: adds dL/dV and dL/dM, given dL/d values.
+/// Applies the adjoint: adds dL/dV and dL/dM, given dL/d values.
 void add_point_products_gradient(const PointProducts& points, const float* vector,
                                  const float* matrix, const float* grad_values, float* grad_vector,
                                  float* grad_matrix);

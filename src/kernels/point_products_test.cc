@@ -20,7 +20,7 @@ constexpr int kPoints = 37, kNa = 5, kNb = 4, kNc = 6;
 struct Axis {
   std::vector<int> lower;
   std::vector<float> fraction;
-  // Points at the vertices are among them, the last one too.
+  // Includes points at vertices, also at the last one.
   Axis(int num_vertices, std::uint64_t seed) {
     base::Random random(seed);
     for (int n = 0; n < kPoints; ++n) {
@@ -37,7 +37,7 @@ struct Axis {
   }
 };
 
-// The definition: every vertex of every axis with its hat weight, in double.
+// Computes the definition in double: every vertex of every axis with its hat weight.
 struct Expected {
   std::vector<double> values, grad_vector, grad_matrix;
 
@@ -77,7 +77,7 @@ TEST(PointProducts, ValuesAndAdjointAreTheDefinition) {
       const Expected expected(a, b, c, rank, vector, matrix, grad_values);
       const PointProducts points{a.taps(), b.taps(), c.taps(), kNc, rank};
 
-      std::vector<float> values(kPoints, 0.5f);  // what is there stays
+      std::vector<float> values(kPoints, 0.5f);  // the kernel adds to these
       std::vector<float> grad_vector(vector.size()), grad_matrix(matrix.size());
       add_point_products(points, vector.data(), matrix.data(), values.data());
       add_point_products_gradient(points, vector.data(), matrix.data(), grad_values.data(),

@@ -20,7 +20,7 @@ using testing::to_double;
 
 constexpr LeafVertices kLeaf{.nx = 5, .nz = 7, .ny = 4};
 
-// Through the leaf from face to face, along an edge, within one cell, and backwards.
+// Returns pieces through the leaf from face to face, along an edge, within one cell, and backwards.
 std::vector<RayPiece> pieces() {
   return {{0, 0.3f, 0, 4, 2.5f, 6, 0.7f, 11, 1},
           {0, 0.3f, 0, 4, 2.5f, 6, 0.25f, 12, 16},
@@ -40,7 +40,7 @@ TEST(RaySamples, RandomNumbersAreUniformAndDistinct) {
     squares += u * u;
     product += u * random_unit(8, i);
   }
-  // Ten standard deviations of each mean.
+  // The tolerances are ten standard deviations of each mean.
   EXPECT_NEAR(sum / kCount, 0.5, 10 * 0.289 / std::sqrt(kCount));
   EXPECT_NEAR(squares / kCount, 1.0 / 3, 10 * 0.298 / std::sqrt(kCount));
   EXPECT_NEAR(product / kCount, 0.25, 10 * 0.22 / std::sqrt(kCount));
@@ -56,7 +56,7 @@ TEST(RaySamples, IntegralIsTheReference) {
             reference::integrate_piece(kLeaf, {beta}, to_double(values).data(), piece);
         const double found = integrate_piece(kLeaf, {beta}, values.data(), piece, densities.data());
         EXPECT_NEAR(found, expected, 2e-5) << piece.num_samples;
-        // What it stores is what it sums.
+        // The stored densities must have the returned sum.
         double sum = 0;
         for (int i = 0; i < piece.num_samples; ++i) sum += densities[static_cast<std::size_t>(i)];
         EXPECT_NEAR(sum * piece.segment_length, found, 2e-5);

@@ -17,7 +17,7 @@ using testing::for_each_simd_target;
 using testing::random_floats;
 using testing::to_double;
 
-// Rows that are finer, as fine, and coarser than the matrix's, in any order.
+// Rows that are finer than the matrix's, equal to them, and coarser, in either order.
 struct Rows {
   std::vector<int> lower;
   std::vector<float> fraction;

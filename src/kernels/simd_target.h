@@ -4,7 +4,7 @@
 
 namespace tomofield::kernels {
 
-/// Name of the instruction set that the kernels run on here, as Highway calls
+/// Returns the name of the instruction set that the kernels use on this machine, as Highway calls
 /// it ("AVX3" is AVX-512).
 std::string simd_target_name();
 

@@ -14,12 +14,12 @@ using testing::for_each_simd_target;
 using testing::random_floats;
 using testing::to_double;
 
-// How the operands lie in memory. Every buffer starts one float past its
-// allocation, so that no vector is aligned.
+// The arrangement of the operands in memory. Every buffer starts one float past its allocation, so
+// that no vector is aligned.
 struct Arrangement {
   std::ptrdiff_t rows, depth, width;
   bool transposed_a = false;
-  std::ptrdiff_t gap = 0;  // unused floats after each row
+  std::ptrdiff_t gap = 0;  // number of unused floats after each row
 };
 
 void compare_with_reference(const Arrangement& t) {
@@ -39,7 +39,7 @@ void compare_with_reference(const Arrangement& t) {
   g.b = b.data() + 1;
   g.c = c.data() + 1;
   small_gemm(g);
-  // Gaps included: nothing beside C may change.
+  // The gaps are compared too, because nothing beside C may change.
   expect_near(c, expected, 1e-6 * static_cast<double>(t.depth + 1));
 }
 
@@ -57,7 +57,8 @@ TEST(SmallGemm, AgreesWithTheReferenceAtOddSizes) {
   });
 }
 
-// Depths and widths of whole and half vectors, as the ranks of factors are; 24 neighbouring rows.
+// Uses depths and widths of whole and half vectors, as the ranks of factors are, and 24 adjacent
+// rows.
 TEST(SmallGemm, AgreesWithTheReferenceAtRanks) {
   for_each_simd_target([] {
     for (const std::ptrdiff_t rows : {1, 2, 6, 18, 24, 33}) {

@@ -6,7 +6,7 @@
 
 namespace tomofield::kernels {
 
-/// How the gradient's magnitude is penalised. With m = √(|∇f|² + ε²):
+/// The penalty φ on the gradient's magnitude m = √(|∇f|² + ε²):
 ///   smooth    φ(m) = m                        (concavity τ = 0)
 ///   concave   φ(m) = τ log(1 + m / τ)         (τ > 0; slope 1 at 0, so τ → ∞ is smooth)
 struct VariationPenalty {
@@ -14,37 +14,38 @@ struct VariationPenalty {
   float concavity = 0.0f;
 };
 
-/// A row of densities: that of sample (x, z) at data[x step_x + z step_z].
+/// A row of densities. The density of sample (x, z) is data[x step_x + z step_z].
 struct DensityRow {
   const float* data = nullptr;
   std::ptrdiff_t step_x = 0, step_z = 1;
 };
 
-/// Total variation of a decoded slab: weight · Σ φ over its voxels, with forward
-/// differences (D_x / h_x, D_y, D_z / h_z) that are zero past the last x and z, or backward
-/// ones in x or z.
-/// Rows couple slabs: `above` is the first row of the next slab and `flux`
-/// carries the y-flux of the last row of the one before, so that no slab
-/// writes another's gradient and rows 15 | 16 are penalised like any others.
+/// The total variation of a decoded slab: weight · Σ φ over its voxels. The differences
+/// (D_x / h_x, D_y, D_z / h_z) are forward and zero past the last x and z; in x and z they may be
+/// backward instead.
+///
+/// Slabs are coupled through their rows. `above` is the first row of the next slab, and `flux`
+/// carries the y-flux of the last row of the slab before. No slab therefore writes another slab's
+/// gradient, and the pair of rows 15 and 16 is penalised like any other.
 struct SlabVariation {
   const float* samples =
-      nullptr;  ///< [z, x, lane] with stride_z between z rows; one float past the end is read
+      nullptr;  ///< [z, x, lane], stride_z floats between z; one float past the end is read
   float* gradient = nullptr;  ///< same layout, accumulated into
   int nx = 0, nz = 0;
   std::ptrdiff_t stride_z = 0;
   int num_rows =
-      0;  ///< lanes that are rows of the volume; below kLanes only at its end (above null)
-  DensityRow above;       ///< past the last row; without data at the volume's end
+      0;  ///< lanes that are rows of the volume; below kLanes only at its end, without `above`
+  DensityRow above;       ///< the row past the last one; no data at the volume's end
   float* flux = nullptr;  ///< [x, z]; in: y-flux of the row before the first (0 at the volume's
-                          ///< start); out: of the last
+                          ///< start); out: y-flux of the last row
   float per_hx = 1.0f, per_hz = 1.0f;  ///< 1 / sample spacing
   float weight = 0.0f;
   VariationPenalty penalty;
   bool backward_x = false, backward_z = false;  ///< differences to the sample before instead
 };
 
-/// Where sample (x, z) lies in an array of these steps, x and z counted in the direction in which
-/// the differences run.
+/// Returns the position of sample (x, z) in an array with the given steps. x and z are counted in
+/// the direction in which the differences run.
 struct SampleOrder {
   std::ptrdiff_t first = 0, step_x, step_z;
   SampleOrder(const SlabVariation& s, std::ptrdiff_t along_x, std::ptrdiff_t along_z)
@@ -61,11 +62,11 @@ struct SampleOrder {
   std::ptrdiff_t operator()(int x, int z) const { return first + x * step_x + z * step_z; }
 };
 
-/// Adds the gradient and returns the value (terms anchored at this slab's rows).
+/// Adds the gradient and returns the value of the terms that belong to this slab's rows.
 double slab_variation(const SlabVariation& slab);
 
-/// The y-flux weight · φ′(m)/m · D_y of a single row, for the start of a band:
-/// `row` and `next` are the densities of this row and of the one after; flux is [x, z].
+/// Computes the y-flux weight · φ′(m)/m · D_y of a single row, for the start of a band. `row` and
+/// `next` are the densities of this row and of the one after it; flux is [x, z].
 void row_flux(const SlabVariation& slab, const DensityRow& row, const DensityRow& next,
               float* flux);
 

@@ -29,8 +29,8 @@ Result from_reference(const VolumeVariation& shape, const std::vector<float>& vo
   return r;
 }
 
-// The volume cut into slabs, each in an unaligned, padded buffer whose lanes
-// past the volume's end hold rubbish.
+// The volume cut into slabs. Each slab is in an unaligned, padded buffer whose lanes past the
+// volume's end hold arbitrary values.
 class Slabs {
  public:
   Slabs(const VolumeVariation& shape, const std::vector<float>& volume)
@@ -46,7 +46,8 @@ class Slabs {
     }
   }
 
-  // Slabs from `first` on; the flux of the row before is taken over or given.
+  // Computes the slabs from `first` on. The flux of the row before comes from the last run or from
+  // start_band_at().
   Result run(std::size_t first = 0) {
     Result r{0.0, std::vector<double>(static_cast<std::size_t>(shape_.nx * shape_.ny * shape_.nz))};
     for (std::size_t s = first; s < samples_.size(); ++s) {
@@ -65,7 +66,7 @@ class Slabs {
         r.gradient[at] = static_cast<double>(gradient[in_slab]) - 0.25;
         gradient[in_slab] = 0.25f;
       });
-      // Beside the volume's samples nothing was written.
+      // Nothing may be written beside the volume's samples.
       for (const float g : gradient) EXPECT_EQ(g, 0.25f);
     }
     return r;
@@ -187,8 +188,8 @@ TEST(SlabVariation, ABandStartsWithTheFluxOfTheRowBefore) {
   });
 }
 
-// The reference's gradient, to which the kernels are compared above, against
-// its own value.
+// Checks the reference's gradient, with which the kernels are compared above, against its own
+// value.
 TEST(SlabVariation, TheReferencesGradientIsTheDerivative) {
   for (const VariationPenalty& penalty : kPenalties) {
     const VolumeVariation shape{

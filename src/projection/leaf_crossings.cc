@@ -22,7 +22,7 @@ void descend(const field::Quadtree& tree, int index, const Line& line, const Hei
   for (int c = 0; c < 4; ++c) descend(tree, node.first_child + c, line, heights, crossings);
 }
 
-// Root cells [first, end) along one axis that positions between a and b touch.
+// The root cells [first, end) along one axis that positions between a and b touch.
 struct CellRange {
   int first, end;
 };
@@ -32,7 +32,7 @@ CellRange cells_between(double a, double b, std::int64_t origin, std::int64_t si
         std::floor((position - static_cast<double>(origin)) / static_cast<double>(size));
     return static_cast<int>(std::clamp(at, -1.0, static_cast<double>(count)));
   };
-  // A cell more on either side: clip() decides, and rounding may not.
+  // One cell more on either side protects against rounding; clip() decides.
   return {std::max(cell(std::min(a, b)) - 1, 0), std::min(cell(std::max(a, b)) + 2, count)};
 }
 

@@ -13,9 +13,9 @@ struct LeafCrossing {
   geometry::HeightRange heights;  ///< never empty
 };
 
-/// Appends the leaves that a line crosses within `heights`, in the order of the
-/// leaves. Leaves are vertical prisms, so only (X, Y) matters; each point of the
-/// line that lies over the tree belongs to exactly one crossing.
+/// Appends the leaves that a line crosses within `heights`, in the order of the leaves. Leaves are
+/// vertical prisms, so only (X, Y) matters. Each point of the line over the tree belongs to exactly
+/// one crossing.
 void find_crossings(const field::Quadtree& tree, const geometry::RayBundle::Line& line,
                     const geometry::HeightRange& heights, std::vector<LeafCrossing>& crossings);
 

@@ -10,8 +10,8 @@ namespace {
 
 using kernels::kLanes;
 
-// 16 rows of vertices as the rows of a slab, from row `first` on; what is past
-// the last one repeats it.
+// Returns 16 rows of vertices, from row `first` on, as the rows of a slab. Rows past the last
+// vertex repeat it.
 field::LaneRows vertex_rows(int first, int ny) {
   field::LaneRows rows;
   for (int l = 0; l < kLanes; ++l) {

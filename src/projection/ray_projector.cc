@@ -13,8 +13,8 @@ namespace {
 using geometry::RayBundle;
 using kernels::RayPiece;
 
-constexpr std::int64_t kRaysAtOnce = 512;       // traced by a thread at a time
-constexpr std::uint32_t kGolden = 0x9e3779b9U;  // what random_unit steps its counter by
+constexpr std::int64_t kRaysAtOnce = 512;       // rays that a thread traces at a time
+constexpr std::uint32_t kGolden = 0x9e3779b9U;  // step of random_unit's counter
 
 std::uint32_t key_of(const Ray& ray, std::uint32_t draw) {
   std::uint32_t key = kernels::mix_bits(draw + kGolden);
@@ -38,7 +38,7 @@ RayProjector::RayProjector(const geometry::RayGeometry& geometry, const field::F
   for (int view = 0; view < geometry.num_views(); ++view) bundles_.push_back(geometry.rays(view));
 }
 
-// Without the key.
+// Returns the samples of a crossing without the key.
 RayPiece RayProjector::sample_positions(const RayBundle& bundle, const RayBundle::Line& line,
                                         const LeafCrossing& crossing) const {
   const field::Square& square = field_.tree().leaf(crossing.leaf).square;
@@ -95,7 +95,7 @@ void RayProjector::trace_rays(std::span<const Ray> rays, std::uint32_t draw,
     }
   });
 
-  // By leaf, each leaf's pieces in the order of the rays.
+  // Sort the pieces by leaf; each leaf's pieces stay in the order of the rays.
   trace.first_of_leaf_.assign(static_cast<std::size_t>(field_.tree().num_leaves()) + 1, 0);
   for (const auto& block : blocks) {
     for (const Found& found : block)

@@ -28,7 +28,7 @@ using geometry::RayGeometry;
 
 constexpr Extent2 kEverywhere{-1e6, -1e6, 1e6, 1e6};
 
-// Aligned views, not rotated.
+// Returns the geometry of aligned views without rotation.
 RayGeometry plain_geometry(std::int64_t width, std::int64_t height, double thickness,
                            std::vector<double> tilts) {
   RayGeometry g;
@@ -40,7 +40,7 @@ RayGeometry plain_geometry(std::int64_t width, std::int64_t height, double thick
   return g;
 }
 
-// Over the uneven model, with rotation, shift and x tilt.
+// Returns a geometry for the uneven model, with rotation, shift and x tilt.
 RayGeometry turned_geometry(double thickness) {
   RayGeometry g = plain_geometry(130, 140, thickness, {-60, 0, 40, 75});
   g.x_tilt_deg = {4, -3, 0, 6};
@@ -65,7 +65,7 @@ class EachRayField : public ::testing::TestWithParam<FieldKind> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, EachRayField, ::testing::Values(FieldKind::kVm, FieldKind::kGrid),
                          [](const auto& kind) { return base::name_of(kind.param); });
 
-// The leaf that holds each point of a ray, found point by point.
+// Compares with the leaf that contains each point of a ray, found point by point.
 TEST(LeafCrossings, AreWhereTheTreeSaysThatPointsAre) {
   const auto model = testing::uneven_model(FieldKind::kGrid);
   const field::Quadtree& tree = model.field->tree();
@@ -93,8 +93,8 @@ TEST(LeafCrossings, AreWhereTheTreeSaysThatPointsAre) {
   }
 }
 
-// A constant density makes path lengths exact, whatever the sampling: what is
-// left is the rounding of floats.
+// Uses a constant density, for which path lengths are exact for any sampling. Only the rounding of
+// floats remains.
 TEST(RayProjector, ConstantSlabsHaveTheirPathLengths) {
   constexpr double kThickness = 30;
   const std::vector<double> angles{0, 26.57, 45, 63.43, 70, 71.57, -26.57, -45, -71.57};
@@ -123,7 +123,7 @@ TEST(RayProjector, ConstantSlabsHaveTheirPathLengths) {
   }
 }
 
-// And in a box that ends on all sides, by the box's faces.
+// Checks path lengths in a box that ends on all sides: its faces must cut the rays.
 TEST(RayProjector, SupportCutsRays) {
   constexpr double kThickness = 20;
   const RayGeometry g = plain_geometry(64, 32, kThickness, {0, 63.43, -70});
@@ -158,8 +158,8 @@ TEST(RayProjector, SupportCutsRays) {
   }
 }
 
-// A point-by-point oracle with the field's own density: the mean over many draws
-// is the line integral, and every draw is near it.
+// Compares with the field's own density, integrated point by point. With many samples, the
+// projector must return the line integral.
 TEST_P(EachRayField, ManySamplesGiveTheLineIntegral) {
   const auto model = testing::uneven_model(GetParam());
   const RayGeometry g = turned_geometry(model.field->thickness());
@@ -181,7 +181,7 @@ TEST_P(EachRayField, ManySamplesGiveTheLineIntegral) {
   }
 }
 
-// Each sample is at a place of its own, drawn anew for each draw.
+// Checks that draws place the samples differently and that the mean over draws is the integral.
 TEST_P(EachRayField, DrawsDifferAndAverageToTheIntegral) {
   const auto model = testing::uneven_model(GetParam());
   const RayGeometry g = turned_geometry(model.field->thickness());
@@ -194,7 +194,7 @@ TEST_P(EachRayField, DrawsDifferAndAverageToTheIntegral) {
   EXPECT_EQ(once, coarse.forward(rays, 0, trace));
   EXPECT_NE(once, coarse.forward(rays, 1, trace));
   constexpr int kDraws = 100;
-  base::set_thread_count(1);  // tiny pieces of work
+  base::set_thread_count(1);  // the pieces of work are tiny
   std::vector<double> mean(rays.size()), square(rays.size());
   for (std::uint32_t draw = 0; draw < kDraws; ++draw) {
     const auto p = coarse.forward(rays, draw, trace);
@@ -209,8 +209,8 @@ TEST_P(EachRayField, DrawsDifferAndAverageToTheIntegral) {
     EXPECT_LE(std::abs(mean[i]), 5 * std::sqrt(square[i] / kDraws) + 2e-3 * expected[i]) << i;
 }
 
-// ⟨A f, r⟩ = ⟨f, Aᵀ r⟩ for the linear part: no activation, no bias; the vertices
-// of a grid field are f themselves.
+// Checks ⟨A f, r⟩ = ⟨f, Aᵀ r⟩ for the linear part, without activation and bias. f are the vertices
+// of a grid field.
 TEST(RayProjector, DotProductsAgree) {
   const auto model = testing::uneven_model(FieldKind::kGrid);
   field::Field& field = *model.field;
@@ -306,8 +306,8 @@ TEST_P(EachRayField, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one, run(5));
 }
 
-// Both engines integrate the same field: what is left between them is the slab
-// engine's sampling, one pixel apart, which falls with the field's smoothness.
+// Both engines integrate the same field. They differ by the slab engine's sampling, one pixel
+// apart, whose error falls with the field's smoothness.
 TEST_P(EachRayField, AgreesWithTheSlabEngineAsSamplesGrow) {
   constexpr double kThickness = 24;
   RayGeometry g = plain_geometry(48, 32, kThickness, {-63.43, -26.57, 0, 45, 70});
@@ -339,7 +339,7 @@ TEST_P(EachRayField, AgreesWithTheSlabEngineAsSamplesGrow) {
       }
     }
   }
-  // Root mean square difference, relative to the signal.
+  // Returns the root mean square difference, relative to the signal.
   const auto difference = [&](int samples_per_diagonal) {
     const RayProjector projector(g, *field, {0, 0, 48, 32}, samples_per_diagonal);
     RayTrace trace;
@@ -356,7 +356,7 @@ TEST_P(EachRayField, AgreesWithTheSlabEngineAsSamplesGrow) {
   EXPECT_LT(some, 0.5 * few);
   EXPECT_LT(many, 0.7 * some);
   EXPECT_LE(most, many);
-  EXPECT_LT(most, 0.015);  // measured 0.012: what Joseph's interpolation differs by
+  EXPECT_LT(most, 0.015);  // measured 0.012: the error of Joseph's interpolation
 }
 
 }  // namespace

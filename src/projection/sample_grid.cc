@@ -8,8 +8,8 @@
 
 namespace tomofield::projection {
 
-// An odd number of eight cache lines, so that neighbouring rows and the samples of a column
-// spread over all sets of a cache.
+// Returns an odd multiple of eight cache lines, so that neighbouring rows and the samples of a
+// column spread over all sets of a cache.
 std::ptrdiff_t SampleSegment::stride_z() const {
   const int padded = (nx + 2 + 7) / 16 * 16 + 8;
   return static_cast<std::ptrdiff_t>(padded) * kernels::kLanes;
@@ -21,7 +21,7 @@ SampleGrid::SampleGrid(std::vector<SampleSegment> segments) : segments_(std::mov
     s.origin = end + s.stride_z() + kernels::kLanes;
     end += s.stride_z() * (s.nz + 2);
   }
-  // One vector more: the total variation reads a float past the last sample.
+  // One vector is added, because the total variation reads a float past the last sample.
   size_ = static_cast<std::size_t>(end + kernels::kLanes);
 }
 

@@ -19,10 +19,10 @@ using kernels::Slabs;
 
 using Beam = SlabProjector::Beam;
 
-// Lines and views are treated in blocks, over tiles of samples, that fit in L1:
-// each sample or pixel then comes from further away once for several uses.
+// Lines and views are processed in blocks over tiles of samples that fit in L1. Each sample or
+// pixel is then loaded from a farther cache once for several uses.
 constexpr int kLinesAtOnce = 8;
-constexpr int kGroupsAtOnce = 2;  // of views
+constexpr int kGroupsAtOnce = 2;  // groups of views
 constexpr int kSamplesAtOnce = 32;
 
 Beam row_beam(const geometry::TiltGeometry& g, const SampleSegment& s, int view) {
@@ -45,12 +45,12 @@ Beam column_beam(const geometry::TiltGeometry& g, const SampleSegment& s, int vi
           .spread = s.hx * std::abs(cotangent) / s.hz};
 }
 
-// The lines of a segment that one kind of view crosses.
+// The lines of a segment that one kind of view (flat or steep) crosses.
 struct Family {
   bool flat;
   int num_lines, num_samples;
   std::ptrdiff_t origin, line_stride, sample_stride;
-  bool cut_low, cut_high;  // whether the lines end at faces where another segment goes on
+  bool cut_low, cut_high;  // true if the lines end at a face where another segment continues
 };
 
 Family rows_of(const SampleSegment& s) {
@@ -60,32 +60,32 @@ Family columns_of(const SampleSegment& s) {
   return {false, s.nx, s.nz, s.origin, kLanes, s.stride_z(), false, false};
 }
 
-// A line as a view sees it. It stands for a piece of ray that spans some width
-// along the line; where that piece straddles a cut face, the line counts for the
-// part on its side, so that a ray's pieces on both sides, which differ in
-// length, add up. Such pixels [part_first, part_end) around those of `line` are
-// few and dealt with here.
+// A line as a view sees it. The line represents a piece of each ray, which spans some width along
+// the line. If that piece straddles a cut face, the line counts only for the part on its side. The
+// pieces of a ray on both sides of the face, which differ in length, then add up correctly. Few
+// pixels are affected: those of [part_first, part_end) outside the range of `line`. They are
+// processed here.
 struct Crossing {
   LineCrossing& line;
   double offset = 0, step = 1;  // position(pixel), as in LineCrossing
   int part_first = 0, part_end = 0;
-  double low_face = 0, high_face = 0, spread = 0;  // in samples
+  double low_face = 0, high_face = 0, spread = 0;  // measured in samples
 
   double position(int pixel) const { return offset + step * pixel; }
-  // Share of a pixel's piece within the faces.
+  // Returns the share of a pixel's piece that lies within the faces.
   double share(int pixel) const {
     const double p = position(pixel);
     return std::clamp(std::min(p - low_face, high_face - p) / spread + 0.5, 0.0, 1.0);
   }
 };
 
-// First pixel whose position is at least `position`; steps are positive.
+// Returns the first pixel whose position is at least `position`; steps are positive.
 int first_pixel_from(const Crossing& c, double position, int width) {
   const double pixel = std::ceil((position - c.offset) / c.step);
   return static_cast<int>(std::clamp(pixel, 0.0, static_cast<double>(width)));
 }
 
-// Writes what the view sees of a line, but for where its samples or pixels are.
+// Writes what the view sees of a line to `seen`, except for the pointers to samples or pixels.
 Crossing crossing(const Beam& beam, const Family& family, int line, int width, LineCrossing& seen) {
   Crossing c{seen, beam.offset + line * beam.offset_per_line, beam.step};
   c.line.offset = static_cast<float>(c.offset);
@@ -97,7 +97,7 @@ Crossing crossing(const Beam& beam, const Family& family, int line, int width, L
   c.line.end_pixel = c.part_end = width;
   if (!family.cut_low && !family.cut_high) return c;
 
-  // Where the field ends instead, the hat of the last sample does.
+  // On a side where the field ends, the hat of the last sample ends it.
   constexpr double kNowhere = 1e9, kThinnest = 1e-6;
   c.low_face = family.cut_low ? -0.5 : -kNowhere;
   c.high_face = family.cut_high ? family.num_samples - 0.5 : kNowhere;
@@ -110,7 +110,8 @@ Crossing crossing(const Beam& beam, const Family& family, int line, int width, L
   return c;
 }
 
-// A cut side repeats its last sample, so that the field is constant up to the face.
+// Repeats the last sample of cut sides in the padding, so that the field is constant up to the
+// face.
 void fill_padding(const SampleSegment& s, float* samples) {
   for (int k = 0; k < s.nz; ++k) {
     float* row = samples + s.origin + k * s.stride_z();
@@ -135,8 +136,8 @@ void fold_padding(const SampleSegment& s, float* samples) {
   }
 }
 
-// Calls visit(pixel, lower sample, its weight, weight of the next) for the
-// pixels of which only a part counts.
+// Calls visit(pixel, lower sample, its weight, weight of the next) for the pixels that count only
+// in part.
 template <typename Visit>
 void for_each_part(const Crossing& c, Visit&& visit) {
   for (int pixel = c.part_first; pixel < c.part_end; ++pixel) {
@@ -180,8 +181,8 @@ void backproject_parts(const Crossing& c, std::ptrdiff_t stride, const Slabs& sl
   });
 }
 
-// The pixels that cross the middle of a block of lines within a tile of samples, of those `reached`
-// at all; the first and last tile take all that lie beyond them.
+// Returns the pixels, among those `reached` at all, that cross the middle of a block of lines
+// within a tile of samples. The first and the last tile take all pixels beyond them.
 CrossingGroup::Range pixels_of_tile(const Beam& beam, const Family& family, double middle_line,
                                     int tile, CrossingGroup::Range reached) {
   const double inverse = 1.0 / beam.step;
@@ -240,8 +241,9 @@ void project_family(const Family& family, const std::vector<Beam>& beams, int wi
   }
 }
 
-// Clears rows [first, first + count) with their padding, and the rows of padding before the first
-// and after the last: right before they are added to, so that they lie in a cache by then.
+// Clears rows [first, first + count) with their padding, and the padding rows before the first and
+// after the last row. This happens right before they are added to, so that they are then in a
+// cache.
 void clear_rows(const Family& rows, int first, int count, const Slabs& slabs, float* samples) {
   const int from = first == 0 ? -1 : first;
   const int end = first + count == rows.num_lines ? first + count + 1 : first + count;
@@ -312,7 +314,7 @@ std::size_t SlabProjector::detector_size(std::size_t num_views) const {
   return (num_views * static_cast<std::size_t>(geometry_.width) + 1) * kLanes;
 }
 
-// The last of an odd number is projected alone.
+// Calls project for pairs of slabs. The last of an odd number is projected alone.
 template <typename ProjectSlabs>
 void for_each_pair(int num_slabs, std::ptrdiff_t samples, std::ptrdiff_t detector,
                    const ProjectSlabs& project) {
@@ -348,7 +350,7 @@ void SlabProjector::backward(const float* detector, std::span<const int> views, 
     const SampleSegment& s = grid_.segments()[i];
     for_each_pair(num_slabs, samples_apart, detectors_apart,
                   [&](const Slabs& slabs, auto at, auto rays) {
-                    // Rows first: they clear what columns add to.
+                    // Rows come first, because they clear what columns add to.
                     backproject_family(rows_of(s), beams_[i], width, slabs, detector + rays, views,
                                        samples + at);
                     backproject_family(columns_of(s), beams_[i], width, slabs, detector + rays,

@@ -9,39 +9,39 @@
 
 namespace tomofield::projection {
 
-/// Line integrals of a sampled slab (16 detector rows) and their adjoint, after
-/// Joseph (1982): views up to 45° integrate along rows of z, steeper ones along
-/// columns of x, with linear interpolation across, so that no view steps by
-/// more than √2 samples. Lengths are in pixels. Forward and adjoint are exact
-/// transposes. Thread-safe.
+/// Computes line integrals of a sampled slab (16 detector rows) and their adjoint, after Joseph
+/// (1982). Views up to 45° integrate along rows of z and steeper ones along columns of x, with
+/// linear interpolation across, so that no view steps by more than √2 samples. Lengths are in
+/// pixels. Forward and adjoint are exact transposes. Thread-safe.
 class SlabProjector {
  public:
-  /// Slabs that share the work of a crossing; of more, so many at a time do.
+  /// The number of slabs that share the computation of a crossing. More slabs go in such groups.
   static constexpr int kSlabsTogether = 2;
-  /// How the rays of a view cross the lines of a segment, which are rows of z
-  /// for flat views and columns of x for steep ones: pixel u crosses line l at
-  /// sample offset + l offset_per_line + u step.
+  /// The crossings of a view's rays with the lines of a segment, which are rows of z for flat views
+  /// and columns of x for steep ones. Pixel u crosses line l at sample
+  /// offset + l offset_per_line + u step.
   struct Beam {
     bool flat = true;
     double offset = 0, offset_per_line = 0, step = 1;
-    float weight = 0;   ///< length of ray that a line stands for
-    double spread = 0;  ///< how many samples that piece of ray spans
+    float weight = 0;   ///< length of the piece of ray that a line represents, in pixels
+    double spread = 0;  ///< number of samples that this piece of ray spans
   };
 
   SlabProjector(const geometry::TiltGeometry& geometry, const SampleGrid& grid);
 
   const geometry::TiltGeometry& geometry() const { return geometry_; }
   const SampleGrid& grid() const { return grid_; }
-  /// Floats of the predicted rays of `num_views` views: [view, x, lane], and one pixel more,
-  /// which is read.
+  /// Returns the floats of the predicted rays of `num_views` views: [view, x, lane], and one more
+  /// pixel, which is read.
   std::size_t detector_size(std::size_t num_views) const;
 
-  /// detector += A samples for the named views. Writes the padding of `samples`. Of several
-  /// slabs, samples follow each other (grid().size() floats), and so do detectors
-  /// (detector_size(views.size())); two together take less time than one after the other.
+  /// Adds A samples to `detector` for the given views. Writes the padding of `samples`. With
+  /// several slabs, their samples are consecutive (grid().size() floats each), and so are their
+  /// detectors (detector_size(views.size()) floats each). Two slabs together take less time than
+  /// one after the other.
   void forward(float* samples, std::span<const int> views, float* detector,
                int num_slabs = 1) const;
-  /// samples ← Aᵀ detector, and 0 in the padding of the segments.
+  /// Overwrites `samples` with Aᵀ detector, and the padding of the segments with 0.
   void backward(const float* detector, std::span<const int> views, float* samples,
                 int num_slabs = 1) const;
 

@@ -9,39 +9,43 @@
 
 namespace tomofield::projection {
 
-/// Evaluates a field on the samples of a slab and carries gradients back: the
-/// bridge between leaves, which know nothing of sampling, and the projector,
-/// which knows nothing of leaves. Slab s covers rows
-/// first_row + pixel · [16 s, 16 (s + 1)): the grid and the rows count pixels of a
-/// coarse stage, `pixel` of the field's, in which first_row is given. Rebuild it when the tree
-/// changes. Thread-safe; `field` must outlive it and may change its parameters.
+/// Evaluates a field at the samples of a slab and carries gradients back. It connects leaves, which
+/// know nothing of sampling, with the projector, which knows nothing of leaves.
+///
+/// Slab s covers rows first_row + pixel · [16 s, 16 (s + 1)). The grid and the rows count the
+/// pixels of a coarse stage; each is `pixel` pixels of the field wide. first_row is in pixels of
+/// the field.
+///
+/// Make a new one when the tree changes. Thread-safe; `field` must outlive it and may change its
+/// parameters.
 class SlabSampler {
  public:
   SlabSampler(const field::Field& field, const SampleGrid& grid, std::int64_t first_row,
               std::int64_t num_rows, int pixel = 1);
 
   int num_slabs() const { return static_cast<int>(slabs_.size()); }
-  /// Rows of the volume in a slab: 16, or fewer in the last one.
+  /// Returns the rows of the volume in a slab: 16, or fewer in the last one.
   int rows_in_slab(int slab) const;
-  /// Slabs [first, end) of a band of root cells, 0 <= band < num_bands().
+  /// The slabs [first, end) of a band of root cells, 0 <= band < num_bands().
   struct Range {
     int first, end;
   };
   int num_bands() const { return static_cast<int>(bands_.size()); }
   Range band(int index) const { return bands_[static_cast<std::size_t>(index)]; }
 
-  /// Densities of a slab at every sample; padding is left alone.
+  /// Overwrites `samples` with the densities of a slab; leaves the padding as it is.
   void decode(int slab, float* samples) const;
-  /// gradient (all parameters) += dL/d parameters; returns dL/d bias.
+  /// Adds dL/d parameters to gradient (all parameters), given dL/d samples; returns dL/d bias.
   double decode_adjoint(int slab, const float* samples, const float* grad_samples,
                         float* gradient) const;
-  /// Densities of one row, counted from first_row, as [segment][x][z] without padding.
+  /// Computes the densities of one row, counted from first_row, as [segment][x][z] without padding.
   void decode_row(std::int64_t row, float* densities) const;
-  /// Floats that decode_row writes, and where each segment's begin.
+  /// Returns the floats that decode_row writes.
   std::size_t row_size() const { return row_origins_.back(); }
+  /// Returns the position of a segment's first float in them.
   std::size_t row_origin(std::size_t segment) const { return row_origins_[segment]; }
 
-  /// Leaves that slabs of a band sample.
+  /// Returns the leaves that the slabs of a band sample.
   std::vector<int> leaves_of_band(int band) const;
 
  private:
@@ -54,7 +58,7 @@ class SlabSampler {
     std::vector<float> fraction_x;
     field::LaneRows rows;
   };
-  // Interpolation along z for a number of vertices, shared by pieces.
+  // The interpolation along z for a number of vertices, which pieces share.
   struct TapsZ {
     std::size_t segment = 0;
     int num_vertices = 0;
@@ -68,7 +72,7 @@ class SlabSampler {
 
   const field::Field& field_;
   SampleGrid grid_;
-  /// In the field's coordinates, of row `row` counted from the first one.
+  /// Returns the field's y coordinate of row `row`, which is counted from the first one.
   double row_centre(std::int64_t row) const {
     return static_cast<double>(first_row_) + pixel_ * (static_cast<double>(row) + 0.5);
   }

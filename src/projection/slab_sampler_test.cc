@@ -23,8 +23,8 @@ constexpr double kThickness = 11.5;
 constexpr std::int64_t kFirstRow = -8;
 constexpr std::int64_t kRows = 90;  // the last slab has 10
 
-// Margin cells of 64 px on both sides of leaves of 64, 32 and 16 px, with
-// different numbers of vertices. With `pixel` 2, the smallest are of 32 px.
+// Returns a field with margin cells of 64 px on both sides of leaves of 64, 32 and 16 px, which
+// have different numbers of vertices. With `pixel` 2, the smallest leaves have 32 px.
 std::unique_ptr<field::Field> uneven_field(FieldKind kind, int pixel = 1) {
   using enum Region;
   const field::RootGrid roots{.x0 = -64, .y0 = kFirstRow, .cell_size = 64, .columns = 4, .rows = 2};
@@ -49,7 +49,7 @@ std::unique_ptr<field::Field> uneven_field(FieldKind kind, int pixel = 1) {
   return field;
 }
 
-// The columns of interest at one pixel, the margins at four.
+// Returns a grid that samples the columns of interest at one pixel and the margins at four.
 SampleGrid uneven_grid(int pixel = 1) {
   const auto segment = [pixel](double x0, int nx, double h, int nz) {
     SampleSegment s;
@@ -172,7 +172,7 @@ TEST_P(EachSampledField, AdjointIsTheDerivative) {
                 derivative(field->parameters()[at]), 6e-4)
         << "leaf " << leaf << " parameter " << at;
   }
-  // Leaves that the slab does not meet are left alone.
+  // Leaves that the slab does not meet must stay as they are.
   for (int leaf = 0; leaf < field->tree().num_leaves(); ++leaf) {
     if (field->tree().band_of_leaf(leaf) == 0) continue;
     for (std::size_t at = field->offset(leaf); at < field->offset(leaf + 1); ++at)
@@ -223,7 +223,7 @@ TEST(SlabSampler, SlabsAndBandsCoverTheRows) {
       all.push_back(leaf);
     }
   }
-  // Of the second band the rows end below the upper half of a split cell.
+  // In the second band, the rows end below the upper half of a split cell.
   EXPECT_EQ(all.size(), static_cast<std::size_t>(field->tree().num_leaves() - 2));
 }
 

@@ -15,8 +15,8 @@ namespace {
 using kernels::kLanes;
 using kernels::small_gemm;
 
-// The interpolation along y as a small dense matrix over the vertices that the
-// slab's rows touch: [first, first + count).
+// The interpolation along y as a small dense matrix over the vertices that the slab's rows touch,
+// [first, first + count).
 struct RowMatrix {
   int first, count;
   std::vector<float> by_vertex;  // [vertex, lane]
@@ -166,7 +166,7 @@ void GridField::join_leaves(const LeafShape& s, const Quarters& leaves, float* j
   join_quarters(leaves, {.x = s.nx, .middle = s.nz, .y = s.ny}, joined);
 }
 
-// a = Lx⁻ᵀ B Ly⁻¹
+// Solves a = Lx⁻ᵀ B Ly⁻¹.
 void GridField::fit_merged(const LeafShape& s, const MergeTarget& target, float* parameters) const {
   RowMajorMatrix a = target.b;
   target.chol_x.transpose().triangularView<Eigen::Upper>().solveInPlace(a);

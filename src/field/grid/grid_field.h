@@ -9,8 +9,8 @@
 
 namespace tomofield::field {
 
-/// The simplest field on the same quadtree: the vertices themselves are the
-/// parameters, V [nx, nz, ny]. What the factorisation is measured against.
+/// The simplest field on the quadtree: its parameters are the vertex values themselves, V
+/// [nx, nz, ny]. It is the yardstick for the factorised field.
 class GridField final : public Field {
  public:
   GridField(Quadtree tree, double thickness, std::vector<LeafShape> shapes)
@@ -18,7 +18,7 @@ class GridField final : public Field {
     allocate();
   }
 
-  /// Parameters of a leaf.
+  /// Returns the number of parameters of a leaf.
   static std::size_t count(const LeafShape& shape);
 
   FieldKind kind() const override { return FieldKind::kGrid; }

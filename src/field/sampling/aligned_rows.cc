@@ -101,7 +101,7 @@ void AlignedRows::decode(const std::vector<LeafRows>& leaves, std::int64_t first
   const std::int64_t first_z = std::max(first * factor_, first_z_);
   const std::int64_t num_z = std::min((first + count) * factor_, end_z_) - first_z;
   if (num_z <= 0) return;
-  // As many columns at a time as stay in L2.
+  // Columns are decoded in batches that stay in L2.
   constexpr std::int64_t kScratch = std::int64_t{1} << 17;
   const std::int64_t num_x = std::max<std::int64_t>(1, kScratch / (num_z * kLanes));
   for (const LeafRows& rows : leaves) {

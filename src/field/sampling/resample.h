@@ -6,9 +6,9 @@
 
 namespace tomofield::field {
 
-/// A point between vertices of one axis: lower vertex and weight of the upper.
-/// Points outside are moved to the end: export may ask for the domain's last face. What is
-/// within rounding of a vertex is at it, since kernels need not interpolate there.
+/// A point between the vertices of one axis: its lower vertex and the weight of the upper one.
+/// Points outside are moved to the end, because export may ask for the domain's last face. Points
+/// within rounding of a vertex are moved to it, because kernels need not interpolate there.
 struct AxisPoint {
   std::ptrdiff_t lower;
   double fraction;
@@ -22,7 +22,8 @@ struct AxisPoint {
   }
 };
 
-/// to[o, i, :] = from[o, :, :] by linear interpolation, n vertices to m on the same length.
+/// Interpolates n vertices linearly to m vertices on the same length: to[o, i, :] from
+/// from[o, :, :].
 inline void resample_axis(const float* from, int outer, int n, int inner, int m, float* to) {
   for (int o = 0; o < outer; ++o) {
     for (int i = 0; i < m; ++i) {
@@ -36,9 +37,9 @@ inline void resample_axis(const float* from, int outer, int n, int inner, int m,
   }
 }
 
-/// to[o, i, :] = from[o, first + i / 2, :] by linear interpolation, 0 <= i < n:
-/// the vertices of one half of an axis at half the spacing, which contain
-/// every vertex of that half, so that no breakpoint is lost.
+/// Interpolates one half of an axis linearly at half the spacing: to[o, i, :] =
+/// from[o, first + i / 2, :], 0 <= i < n. The new vertices contain every old vertex of that half,
+/// so that no breakpoint is lost.
 inline void halve_axis(const float* from, int outer, int n, int inner, double first, float* to) {
   for (int o = 0; o < outer; ++o) {
     for (int i = 0; i < n; ++i) {

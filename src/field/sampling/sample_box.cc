@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::int64_t kPartValues = std::int64_t{1} << 22;
 
-// A box along the axes: some rows of all sections, then the next rows.
+// Samples a box along the axes: some rows of all sections, then the next rows.
 void sample_aligned(const Field& field, const Box& box, const BoxRows& some, const BoxSink& sink) {
   const AlignedRows rows(field, box);
   const auto [nx, ny, nz] = box.size;
@@ -37,7 +37,7 @@ void sample_aligned(const Field& field, const Box& box, const BoxRows& some, con
   });
 }
 
-// Mean density of a voxel's points.
+// Returns the mean density of a voxel's points.
 double voxel_density(const Field& field, const Box& box, std::int64_t x, std::int64_t y,
                      std::int64_t z) {
   const std::int64_t factor = points_per_voxel(box);

@@ -22,7 +22,7 @@ std::size_t index(const Box& box, std::int64_t x, std::int64_t y, std::int64_t z
   return static_cast<std::size_t>((z * box.size[1] + y) * box.size[0] + x);
 }
 
-// Densities at the voxels' centres, one by one.
+// Computes the densities at the voxels' centres, one by one.
 std::vector<double> point_by_point(const Field& field, const Box& box) {
   std::vector<double> expected;
   for (std::int64_t z = 0; z < box.size[2]; ++z) {
@@ -63,7 +63,8 @@ TEST_P(EachBoxedField, OutsideTheDomainThereIsNothing) {
   EXPECT_GT(values.back(), 0.0f);
 }
 
-// A voxel of f pixels is the mean of f³ voxels of one pixel: 2.5 px are three points.
+// A voxel of f pixels is the mean of f³ voxels of one pixel. A voxel of 2.5 px has three points
+// along each axis.
 TEST_P(EachBoxedField, CoarseVoxelsAreMeansOfFineOnes) {
   const auto model = uneven_model(GetParam());
   for (const double voxel_px : {2.0, 2.5, 20.0}) {
@@ -87,7 +88,7 @@ TEST_P(EachBoxedField, CoarseVoxelsAreMeansOfFineOnes) {
       }
     }
     testing::expect_near(sample_box(*model.field, coarse), expected, 3e-6);
-    // Rotated by a full turn, which takes the other path.
+    // A rotation by a full turn takes the other code path.
     Box turned = coarse;
     turned.field_from_box = rotation_from_euler(90, 0, 270);
     ASSERT_FALSE(turned.is_aligned());
@@ -99,7 +100,7 @@ TEST_P(EachBoxedField, QuarterTurnsPermuteTheVolume) {
   const auto model = uneven_model(GetParam());
   const Box box{.centre_px = {33.0, 35.0, 10.0}, .size = {13, 15, 11}, .voxel_px = 1.0};
   const auto straight = sample_box(*model.field, box);
-  // About z: field = R · box takes the box's x to the field's −y (rot is RELION's, passive).
+  // Rotate about z: field = R · box takes the box's x to the field's −y (RELION's rot is passive).
   Box turned = box;
   turned.size = {15, 13, 11};
   turned.field_from_box = rotation_from_euler(90, 0, 0);
@@ -110,7 +111,7 @@ TEST_P(EachBoxedField, QuarterTurnsPermuteTheVolume) {
         EXPECT_NEAR(values[index(turned, x, y, z)], straight[index(box, y, 14 - x, z)], 3e-6);
     }
   }
-  // About y: the box's x goes to the field's z.
+  // Rotate about y: the box's x goes to the field's z.
   turned.size = {11, 15, 13};
   turned.field_from_box = rotation_from_euler(0, 90, 0);
   values = sample_box(*model.field, turned);
@@ -123,7 +124,7 @@ TEST_P(EachBoxedField, QuarterTurnsPermuteTheVolume) {
 }
 
 TEST(SampleBox, EulerAnglesAreRelions) {
-  // Its third row is the direction (rot, tilt) in polar angles; psi turns about it.
+  // The third row is the direction with polar angles (rot, tilt); psi turns about it.
   const Rotation r = rotation_from_euler(30, 40, 50);
   const double degree = std::acos(-1.0) / 180.0;
   EXPECT_NEAR(r[2][0], std::sin(40 * degree) * std::cos(30 * degree), 1e-12);

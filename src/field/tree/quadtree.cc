@@ -46,12 +46,12 @@ Quadtree::Quadtree(const RootGrid& roots, std::vector<QuadtreeNode> nodes)
   require(roots.columns > 0 && roots.rows > 0 && num_nodes >= num_roots,
           "fewer nodes than root cells");
   require(num_nodes < std::numeric_limits<int>::max(), "too many nodes");
-  constexpr std::int64_t kFar = std::int64_t{1} << 30;  // pixels; no sum of these overflows
+  constexpr std::int64_t kFar = std::int64_t{1} << 30;  // in pixels; no sum of these overflows
   require(roots.cell_size > 0 && roots.cell_size <= kFar && std::abs(roots.x0) <= kFar &&
               std::abs(roots.y0) <= kFar,
           "its root cells have a wrong size or place");
-  // Children are unique because each names its one parent; so counting them
-  // finds nodes that nothing leads to.
+  // Each child names its one parent, so children are unique. Counting them therefore finds nodes
+  // that cannot be reached from a root.
   std::int64_t num_reached = num_roots;
   for (std::int64_t n = 0; n < num_nodes; ++n) {
     const QuadtreeNode& node = nodes_[static_cast<std::size_t>(n)];

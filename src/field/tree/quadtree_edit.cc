@@ -12,9 +12,9 @@ namespace {
 
 using Kind = LeafOrigin::Kind;
 
-// What becomes of each old node.
+// The change that the edit makes at each old node.
 struct NodeFates {
-  std::vector<int> leaf;  // its number, −1 for inner nodes
+  std::vector<int> leaf;  // leaf number, −1 for inner nodes
   std::vector<bool> split, merge;
 
   NodeFates(const Quadtree& tree, const QuadtreeEdit& edit)
@@ -40,7 +40,7 @@ struct NodeFates {
   }
 };
 
-// A new node and what it was: an old node, or a quarter of the old leaf `old`.
+// A new node and its origin: an old node, or a quarter of the old leaf `old`.
 struct Pending {
   QuadtreeNode node;
   std::size_t old = 0;

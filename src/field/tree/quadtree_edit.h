@@ -6,30 +6,30 @@
 
 namespace tomofield::field {
 
-/// Changes of a tree that are made at once: each leaf is in at most one of them.
+/// Changes of a tree that are made together. Each leaf takes part in at most one of them.
 struct QuadtreeEdit {
-  std::vector<int> split;  ///< leaf numbers: replaced by their four quarters
-  std::vector<int> merge;  ///< node numbers: their four children, all leaves, become one
+  std::vector<int> split;  ///< numbers of leaves that are replaced by their four quarters
+  std::vector<int> merge;  ///< numbers of nodes whose four children, all leaves, become one leaf
   bool is_empty() const { return split.empty() && merge.empty(); }
   bool operator==(const QuadtreeEdit&) const = default;
 };
 
-/// Where a leaf of the edited tree comes from.
+/// The origin of a leaf of the edited tree.
 struct LeafOrigin {
   enum class Kind { kSame, kQuarter, kUnion };
   Kind kind = Kind::kSame;
-  int leaf = 0;     ///< of the old tree; the first of four consecutive ones for a union
-  int quarter = 0;  ///< which of the old leaf's, x fastest
+  int leaf = 0;     ///< leaf of the old tree; for a union, the first of four consecutive ones
+  int quarter = 0;  ///< quarter of the old leaf, x fastest
 };
 
+/// The result of an edit.
 struct EditedTree {
   Quadtree tree;
-  std::vector<LeafOrigin> origins;  ///< of each of its leaves
+  std::vector<LeafOrigin> origins;  ///< origin of each leaf of `tree`
 };
 
-/// The tree after an edit; the edit must be one of this tree (leaves in two
-/// changes, nodes whose children are not all leaves and squares too small to be
-/// split are errors of the program).
+/// Returns the tree after an edit. Throws std::logic_error for an edit that does not fit the tree:
+/// a leaf in two changes, a node whose children are not all leaves, or a square too small to split.
 EditedTree edit_tree(const Quadtree& tree, const QuadtreeEdit& edit);
 
 }  // namespace tomofield::field

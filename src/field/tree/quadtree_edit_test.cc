@@ -22,7 +22,7 @@ Quadtree uneven_tree() {
   return tree;
 }
 
-// Every leaf lies where its origin says, and together they fill the domain.
+// Checks that every leaf lies where its origin says, and that together they fill the domain.
 void expect_origins(const Quadtree& before, const EditedTree& after) {
   ASSERT_EQ(static_cast<int>(after.origins.size()), after.tree.num_leaves());
   std::int64_t area = 0;
@@ -69,7 +69,7 @@ TEST(EditTree, AnEmptyEditKeepsTheTree) {
   }
 }
 
-// Many edits in a row, whose trees come back from their stored nodes.
+// Applies many edits in a row. Each tree is made again from its stored nodes.
 TEST(EditTree, RandomEditsKeepTheTiling) {
   Quadtree tree(RootGrid{.x0 = 0, .y0 = 0, .cell_size = 128, .columns = 2, .rows = 1},
                 {Region::kInterest, Region::kMargin});
@@ -102,11 +102,11 @@ TEST(EditTree, RefusesEditsOfAnotherTree) {
   const Quadtree tree = uneven_tree();
   const int inner = tree.leaf(2).parent, grandparent = tree.leaf(1).parent;
   const std::vector<QuadtreeEdit> wrong = {
-      {.split = {1, 1}, .merge = {}},          // twice
-      {.split = {2}, .merge = {}},             // too small
-      {.split = {}, .merge = {inner, inner}},  // twice
-      {.split = {}, .merge = {grandparent}},   // a child is no leaf
-      {.split = {}, .merge = {0}},             // a leaf itself
+      {.split = {1, 1}, .merge = {}},          // the same leaf twice
+      {.split = {2}, .merge = {}},             // a leaf too small to split
+      {.split = {}, .merge = {inner, inner}},  // the same node twice
+      {.split = {}, .merge = {grandparent}},   // a node with a child that is no leaf
+      {.split = {}, .merge = {0}},             // a node that is a leaf
       {.split = {tree.num_leaves()}, .merge = {}},
       {.split = {}, .merge = {1000}},
   };

@@ -14,13 +14,13 @@ namespace {
 
 constexpr RootGrid kRoots{.x0 = -64, .y0 = 32, .cell_size = 64, .columns = 3, .rows = 2};
 
-// Margin columns on both sides, the middle one of interest.
+// Returns a tree of three columns: the middle one of interest, margins on both sides.
 Quadtree three_columns() {
   using enum Region;
   return Quadtree(kRoots, {kMargin, kInterest, kMargin, kMargin, kInterest, kMargin});
 }
 
-// Leaves of 64, 32 and 16 px beside each other.
+// Returns a tree with leaves of 64, 32 and 16 px beside each other.
 Quadtree uneven_tree() {
   Quadtree tree = three_columns();
   tree.split(1);  // middle cell of the first band: leaves 1 … 4
@@ -28,7 +28,7 @@ Quadtree uneven_tree() {
   return tree;
 }
 
-// Every point of the domain is in exactly one leaf.
+// Checks that every point of the domain is in exactly one leaf.
 void expect_tiling(const Quadtree& tree) {
   const RootGrid& roots = tree.roots();
   std::int64_t area = 0;
@@ -97,8 +97,8 @@ TEST(Quadtree, FindsTheLeafOfEveryPoint) {
     EXPECT_EQ(bounds.x1, static_cast<double>(s.x1()) + 0.5);
     EXPECT_EQ(bounds.y1, static_cast<double>(s.y1()) + 0.5);
   }
-  // Faces lie on centres of pixels. A face belongs to the leaf above it; the domain's last faces to
-  // none.
+  // Faces lie on centres of pixels. A face belongs to the leaf above it. The domain's last faces
+  // belong to no leaf.
   EXPECT_EQ(tree.leaf(tree.find_leaf(32.5, 40)).square.x0, 32);
   EXPECT_EQ(tree.find_leaf(128.5, 40), -1);
   EXPECT_EQ(tree.find_leaf(0, 160.5), -1);

@@ -11,7 +11,7 @@
 
 namespace tomofield::field {
 
-/// Factors between a leaf's parameters and the coordinates of a merge.
+/// Converts factors between a leaf's parameters and the coordinates of a merge (MergeTarget).
 class FactorMaps {
  public:
   FactorMaps(const LeafShape& shape, const MergeTarget& target)
@@ -56,7 +56,7 @@ class FactorMaps {
     return Eigen::Map<const Floats>(p, rows, rank).cast<double>();
   }
 
-  // Along x of three factors and along y of three.
+  // Applies one function along x of the three factors that have an x, and one along y likewise.
   template <typename AlongX, typename AlongY>
   void apply(LeafFactors& f, const AlongX& along_x, const AlongY& along_y) const {
     const auto flat = [](RowMajorMatrix& m, Eigen::Index rows) {

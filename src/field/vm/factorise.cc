@@ -17,12 +17,13 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-// Orthonormal columns along an axis: those that hold most of the values, and the others.
+// Orthonormal columns along an axis: the leading ones, which represent most of the values, and the
+// rest.
 struct Basis {
   MatrixXd leading, rest;
 };
 
-// Of a Gram matrix, whose eigenvectors come by ascending eigenvalue.
+// Returns the eigenvectors of a Gram matrix. The solver orders them by ascending eigenvalue.
 Basis basis_of(const MatrixXd& gram, Index rank) {
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
   const Index leading = std::min(rank, gram.rows());
@@ -30,12 +31,12 @@ Basis basis_of(const MatrixXd& gram, Index rank) {
           eigen.eigenvectors().leftCols(gram.rows() - leading)};
 }
 
-// vectors · matricesᵀ, a column a rank.
+// The product vectors · matricesᵀ, with one column a rank.
 struct Product {
   RowMajorMatrix vectors, matrices;
 };
 
-// The closest product of a rank, by singular vectors of the shorter side.
+// Returns the closest product of a rank, from singular vectors of the shorter side.
 Product closest_product(const RowMajorMatrix& values, Index rank) {
   if (values.cols() < values.rows()) {
     const MatrixXd right = basis_of(values.transpose() * values, rank).leading;
@@ -56,7 +57,8 @@ class LeafValues {
     y_ = basis_of(along_y.transpose() * along_y, s.rank_y);
   }
 
-  // What vectors along x take: all but half of what those along y can.
+  // Returns the product with vectors along x. It leaves out half of the part that vectors along y
+  // can represent.
   Product along_x() const {
     RowMajorMatrix part = columns(values_);
     part -= 0.5 * (part * y_.leading) * y_.leading.transpose();
@@ -70,7 +72,8 @@ class LeafValues {
     return {y_.leading, columns(part) * y_.leading};
   }
 
-  // Of what neither can, in the coordinates of the other basis vectors, which are few.
+  // Returns the product with vectors along z, for the part that neither x nor y can represent. It
+  // works in the coordinates of the other basis vectors, which are few.
   Product along_z(Index rank) const {
     const Index rest_x = x_.rest.cols(), rest_y = y_.rest.cols();
     if (rest_x == 0 || rest_y == 0) return {};
@@ -89,7 +92,7 @@ class LeafValues {
     return {lines.data(), lines.size() / ny_, ny_};
   }
 
-  // Matrices [rest_x·rest_y, rank] as [nx·ny, rank].
+  // Expands matrices [rest_x·rest_y, rank] to [nx·ny, rank].
   RowMajorMatrix at_vertices(const RowMajorMatrix& matrices) const {
     const Index rank = matrices.cols(), rest_y = y_.rest.cols();
     const Eigen::Map<const RowMajorMatrix> by_x(matrices.data(), x_.rest.cols(), rest_y * rank);
@@ -111,7 +114,8 @@ double root_mean_square(const RowMajorMatrix& m, Index column) {
   return m.col(column).norm() / std::sqrt(static_cast<double>(m.rows()));
 }
 
-// The first ranks of two factors [n, rank], balanced; what is zero to rounding is left out.
+// Writes the first ranks of two factors [n, rank], balanced. Ranks that are zero to rounding are
+// left out.
 void write(const Product& product, Index rank, float* vectors, float* matrices) {
   constexpr double kNothing = 1e-12;
   for (Index r = 0; r < product.vectors.cols(); ++r) {
@@ -136,7 +140,7 @@ void factorise(const LeafShape& s, const float* values, float* p) {
 
 }  // namespace
 
-// The values, what is left of them for an axis, and products of that size.
+// The copies are the values, what is left of them for an axis, and products of that size.
 std::size_t factorising_memory(const LeafShape& shape) {
   constexpr std::size_t kCopies = 6;
   return kCopies * sizeof(double) * shape.vertices_xz() * static_cast<std::size_t>(shape.ny);

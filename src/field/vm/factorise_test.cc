@@ -16,7 +16,7 @@ namespace tomofield::field {
 namespace {
 
 constexpr double kThickness = 20.0;
-// Unequal counts, so that no axis can be taken for another.
+// The counts are unequal, so that a confusion of axes fails.
 constexpr int kX = 7, kY = 6, kZ = 5;
 
 LeafShape shape_of_ranks(int x, int y, int z) {
@@ -38,7 +38,7 @@ std::unique_ptr<Field> one_cell(FieldKind kind, const LeafShape& shape) {
   return cells(1, kind, shape);
 }
 
-// All vertex values of a leaf, [y, x·nz + z], without the bias.
+// Returns all vertex values of a leaf, [y, x·nz + z], without the bias.
 std::vector<double> values_of(const Field& field, int leaf = 0) {
   const LeafShape& s = field.shape(leaf);
   const Square& square = field.tree().leaf(leaf).square;
@@ -53,7 +53,7 @@ std::vector<double> values_of(const Field& field, int leaf = 0) {
   return all;
 }
 
-// Plain vertices with the values of another field.
+// Returns a grid field with the values of another field.
 std::unique_ptr<Field> as_vertices(const Field& field) {
   const LeafShape& s = field.shape(0);
   auto vertices = one_cell(FieldKind::kGrid, s);
@@ -93,7 +93,8 @@ TEST(Factorise, FindsFactorsAlongOneAxis) {
   }
 }
 
-// Of the values unfolded along an axis [n, others], what singular values beyond a rank hold.
+// Returns the sum of squares of the singular values beyond a rank, for values unfolded along an
+// axis [n, others].
 double square_beyond(const RowMajorMatrix& unfolded, Eigen::Index rank) {
   const Eigen::VectorXd singular = Eigen::JacobiSVD<Eigen::MatrixXd>(unfolded).singularValues();
   return singular.tail(singular.size() - rank).squaredNorm();

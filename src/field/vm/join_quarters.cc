@@ -3,14 +3,14 @@
 namespace tomofield::field {
 namespace {
 
-// Where vertex i of n is found in the two halves of its axis.
+// The places of vertex i of n in the two halves of its axis.
 struct Sources {
   int count = 0;
   int half[2] = {0, 0};
   int index[2] = {0, 0};
 
   Sources(int i, int n) {
-    if (n == 1) {  // independent of the axis: both halves tell
+    if (n == 1) {  // independent of the axis: the mean of both halves
       count = 2;
       half[1] = 1;
       return;

@@ -4,18 +4,18 @@ namespace tomofield::field {
 namespace {
 
 constexpr int kMostSweeps = 60;
-constexpr double kLeastChange = 1e-3;  // of the residual's square in a sweep
-constexpr double kExact = 1e-13;       // of the target's square: the floats' rounding
-constexpr double kProximity = 1e-6;    // of the mean diagonal of the normal matrix
+constexpr double kLeastChange = 1e-3;  // relative to the residual's square, in a sweep
+constexpr double kExact = 1e-13;       // relative to the target's square: the floats' rounding
+constexpr double kProximity = 1e-6;    // relative to the mean diagonal of the normal matrix
 
-// The least-squares `factor` in residual + factor otherᵀ ≈ factor' otherᵀ; the
-// residual [rows of factor, rows of other] follows.
+// Improves `factor` to the least-squares solution of residual + factor otherᵀ ≈ factor' otherᵀ, and
+// updates the residual [rows of factor, rows of other].
 template <typename Residual>
 void improve(Residual&& residual, const RowMajorMatrix& other, RowMajorMatrix& factor) {
   const Eigen::Index rank = other.cols();
   Eigen::MatrixXd normal = other.transpose() * other;
   const double proximity = kProximity * normal.trace() / static_cast<double>(rank);
-  if (!(proximity > 0)) return;  // a factor of zeros: nothing to learn from it
+  if (!(proximity > 0)) return;  // the other factor is zero, so this one has no influence
   normal.diagonal().array() += proximity;
   const Eigen::MatrixXd right = (residual * other).transpose();
   const RowMajorMatrix change = normal.llt().solve(right).transpose();
@@ -23,7 +23,7 @@ void improve(Residual&& residual, const RowMajorMatrix& other, RowMajorMatrix& f
   residual -= change * other.transpose();
 }
 
-// Residual [nx, nz·ny] as [nz, nx·ny] and back.
+// Copies a residual [nx, nz·ny] to [nz, nx·ny]; put_back() writes it back.
 class SectionsFirst {
  public:
   SectionsFirst(RowMajorMatrix& residual, Eigen::Index nz, Eigen::Index ny)

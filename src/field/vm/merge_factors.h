@@ -4,8 +4,8 @@
 
 namespace tomofield::field {
 
-/// The six factors of a leaf in the coordinates of a MergeTarget: along x and y
-/// they are Lᵀ times the factor.
+/// The six factors of a leaf in the coordinates of a MergeTarget, which are Lᵀ times the factor
+/// along x and y.
 struct LeafFactors {
   RowMajorMatrix vx;   ///< [nx, rank_x]
   RowMajorMatrix myz;  ///< [nz·ny, rank_x]
@@ -15,11 +15,10 @@ struct LeafFactors {
   RowMajorMatrix mxy;  ///< [nx·ny, rank_z]
 };
 
-/// Alternating least squares over the six factors (Carroll and Chang 1970; Harshman
-/// 1970), each step with a faint pull to where the factor is (proximal), so that it has one
-/// solution where ranks exceed vertices: ‖B − Σ VX MYZ + VY MXZ + VZ MXY‖²
-/// never grows. Ends when a sweep changes it by less than a thousandth. Returns
-/// what is left of it.
+/// Minimises ‖B − (Σ VX MYZ + VY MXZ + VZ MXY)‖² by alternating least squares over the six factors
+/// (Carroll and Chang 1970; Harshman 1970), starting from `factors`. Each step is proximal: a faint
+/// pull to the present factor makes its solution unique where ranks exceed vertices. The misfit
+/// never grows. Ends when a sweep changes it by less than a thousandth. Returns the final misfit.
 double fit_factors(const RowMajorMatrix& b, LeafFactors& factors);
 
 }  // namespace tomofield::field

@@ -16,7 +16,7 @@ Eigen::MatrixXd normal_cholesky(int n) {
   return normal.llt().matrixL();
 }
 
-// Vertex values [x, z·y] of a leaf without the bias.
+// Returns the vertex values [x, z·y] of a leaf without the bias.
 RowMajorMatrix vertex_values(const Field& field, int leaf) {
   const LeafShape& s = field.shape(leaf);
   const Square& square = field.tree().leaf(leaf).square;
@@ -59,7 +59,7 @@ MergeTarget make_merge_target(const Field& field, int first_leaf) {
     right_y += Eigen::Map<const RowMajorMatrix>(along_x.data(), right_y.rows(), s.ny) *
                half_interpolation(s.ny, c >> 1);
   }
-  // B = Lx⁻¹ right Ly⁻ᵀ
+  // Solves B = Lx⁻¹ right Ly⁻ᵀ.
   target.chol_x.triangularView<Eigen::Lower>().solveInPlace(right);
   const RowMajorMatrix solved =
       target.chol_y.triangularView<Eigen::Lower>().solve(right_y.transpose()).transpose();

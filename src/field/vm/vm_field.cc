@@ -23,7 +23,7 @@ using kernels::small_gemm;
 using kernels::spread_rows;
 using kernels::transpose_lanes;
 
-// The three products of eq. 4 at points, and where their factors lie.
+// One of the three products of eq. 4 at points, and the offsets of its factors.
 struct Product {
   kernels::PointProducts points;
   std::size_t vector, matrix;
@@ -35,14 +35,15 @@ std::array<Product, 3> products(const LeafShape& s, const PointTaps& t) {
           Product{{t.z, t.x, t.y, s.ny, s.rank_z}, at.vz, at.mxy}};
 }
 // A matrix product at the rows of a slab: values[first_value + row · value_row + lane] is a sum
-// over ranks of factor[row, rank] and plane[y, rank] at the lane's y.
+// over ranks of factor[row, rank] times plane[y, rank] at the lane's y.
 struct SlabProduct {
   std::ptrdiff_t rows, first_value, value_row;
   int rank;
   std::size_t factor, plane;
 };
 
-// Those of VY ⊗ MXZ, of VX ⊗ MYZ a vertex in z, and of VZ ⊗ MXY a vertex in x.
+// Calls body for the products of a slab: one for VY ⊗ MXZ, one for each vertex in z for VX ⊗ MYZ,
+// and one for each vertex in x for VZ ⊗ MXY.
 template <typename Body>
 void for_each_slab_product(const LeafShape& s, const Body& body) {
   const VmLayout at(s);
@@ -59,20 +60,20 @@ void for_each_slab_product(const LeafShape& s, const Body& body) {
     body(SlabProduct{s.nz, i * column, kLanes, s.rank_z, at.vz, at.mxy + plane(i, s.rank_z)});
 }
 
-// Of a plane's rows at the lanes.
+// Returns the size of a plane's rows at the lanes, in floats.
 std::size_t lane_size(const LeafShape& s) {
   return static_cast<std::size_t>(std::max({s.rank_x, s.rank_y, s.rank_z})) * kLanes;
 }
 
-// Scratch that a thread keeps between calls.
+// Returns scratch memory that a thread keeps between calls.
 float* scratch(std::size_t size, int which) {
   thread_local base::AlignedBuffer<float> buffers[2];
   buffers[which].reserve(size);
   return buffers[which].data();
 }
 
-// A plane's rows at the lanes of a slab, [lane, rank]: those of the plane itself if nothing lies
-// between them.
+// A plane's rows at the lanes of a slab, [lane, rank]. If all lanes lie at vertices, these are the
+// rows of the plane itself.
 struct PlaneRows {
   PlaneRows(const LeafShape& s, const LaneRows& rows)
       : taps{rows.lower.data(), rows.fraction.data()},
@@ -85,7 +86,7 @@ struct PlaneRows {
     interpolate_rows(taps, rank, plane, lanes);
     return lanes;
   }
-  // Adds a gradient [rank, lane] to that of the plane.
+  // Adds a gradient [rank, lane] to the gradient of the plane.
   void add(const float* by_rank, int rank, float* plane) const {
     if (at_vertices) return add_transposed(rank, by_rank, plane + first(rank));
     float* lanes = scratch(scratch_size, 0);
@@ -107,7 +108,7 @@ struct PlaneRows {
 
 std::size_t VmField::count(const LeafShape& shape) { return VmLayout(shape).count; }
 
-// VX, MXZ and VZ have no y; of the others, y comes after z or x and before the rank.
+// VX, MXZ and VZ have no y. In the others, y comes after z or x and before the rank.
 std::vector<ParameterRuns> VmField::runs_of_rows(const LeafShape& s, int first_y, int end_y) const {
   const VmLayout at(s);
   const auto rows = [&](std::size_t factor, int rank, int repeats) {
@@ -143,8 +144,8 @@ void VmField::add_slab_values(int leaf, const LaneRows& rows, float* values) con
   });
 }
 
-// Every gradient is a matrix product whose columns are ranks or lanes: the sums over the others are
-// part of the product's depth.
+// Every gradient is a matrix product whose columns are ranks or lanes. The sums over the other
+// indices are part of the product's depth.
 void VmField::slab_gradient(int leaf, const LaneRows& rows, const float* grad_values,
                             float* gradient) const {
   const LeafShape& s = shape(leaf);
@@ -186,7 +187,7 @@ void VmField::add_row_values(int leaf, int lower, float fraction, float* values)
     const float* a = factor + static_cast<std::ptrdiff_t>(lower) * rank + r;
     return a[0] + fraction * (a[rank] - a[0]);
   };
-  // [r, z] operands, so that the products run along z.
+  // The operands are [r, z], so that the products run along z.
   float* by_rank = scratch(static_cast<std::size_t>(std::max(s.rank_x, s.rank_z)) * s.nz, 0);
   for (int k = 0; k < s.nz; ++k) {
     const float* plane = p + at.myz + static_cast<std::size_t>(k) * s.ny * s.rank_x;
@@ -290,7 +291,7 @@ void VmField::sample_quarter(const LeafShape& s, const float* leaf, double x0, d
 void VmField::resample_leaf(const LeafShape& f, const float* from, const LeafShape& t,
                             float* to) const {
   const VmLayout at(f), into(t);
-  // [slow, fast, rank], the slow axis first.
+  // Matrices are [slow, fast, rank]; the slow axis is resampled first.
   const auto matrix = [&](std::size_t where, int slow, int fast, int rank, std::size_t target,
                           int new_slow, int new_fast) {
     std::vector<float> along_slow(static_cast<std::size_t>(new_slow) * fast * rank);

@@ -9,16 +9,16 @@
 
 namespace tomofield::field {
 
-/// Vector–matrix factors (eq. 4): a leaf stores, with the rank innermost so that
-/// interpolation and gradients run over contiguous ranks,
+/// A field of vector–matrix factors (eq. 4). The parameters of a leaf are, in this order,
 ///
-///   VX [nx, Rx]   MYZ [nz, ny, Rx]   VY [ny, Ry]   MXZ [nx, nz, Ry]   VZ [nz, Rz]   MXY [nx, ny,
-///   Rz]
+///   VX [nx, Rx]      MYZ [nz, ny, Rx]
+///   VY [ny, Ry]      MXZ [nx, nz, Ry]
+///   VZ [nz, Rz]      MXY [nx, ny, Rz]
 ///
 ///   value(x, y, z) = Σ_r VX(x) MYZ(y, z) + Σ_r VY(y) MXZ(x, z) + Σ_r VZ(z) MXY(x, y)
 ///
-/// in that order. A slab costs 3R FMAs a vertex and row forward and 6R back,
-/// all of them small matrix products.
+/// The rank is innermost, so that interpolation and gradients run over contiguous ranks. A slab
+/// costs 3R FMAs a vertex and row forward and 6R back, all of them small matrix products.
 class VmField final : public Field {
  public:
   VmField(Quadtree tree, double thickness, std::vector<LeafShape> shapes)
@@ -26,7 +26,7 @@ class VmField final : public Field {
     allocate();
   }
 
-  /// Parameters of a leaf.
+  /// Returns the number of parameters of a leaf.
   static std::size_t count(const LeafShape& shape);
 
   FieldKind kind() const override { return FieldKind::kVm; }

@@ -6,7 +6,7 @@
 
 namespace tomofield::field {
 
-/// Positions of the six factors inside a leaf's parameters.
+/// The offsets of the six factors in a leaf's parameters.
 struct VmLayout {
   std::size_t vx, myz, vy, mxz, vz, mxy, count;
   explicit VmLayout(const LeafShape& s) {

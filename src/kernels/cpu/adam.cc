@@ -3,16 +3,16 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/cpu/adam.cc"
 #include <hwy/foreach_target.h>
-// Highway's own order of includes: foreach_target first.
+// Highway requires foreach_target to come before its other headers.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// 1 / √x and 1 / x from the processor's estimates (12 bits or more) and a step of Newton's method
-// each, which squares their errors: to float's rounding, at a third of the cost of square root and
-// division.
+// Computes 1 / √x and 1 / x from the processor's estimates (12 bits or more) and one step of
+// Newton's method each, which doubles the number of bits. The result is accurate to float's
+// rounding, at a third of the cost of square root and division.
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE V reciprocal_root(D d, V x) {
   const V y = hn::ApproximateReciprocalSqrt(x);
@@ -25,10 +25,10 @@ HWY_INLINE V reciprocal(D d, V x) {
   return hn::Mul(y, hn::NegMulAdd(x, y, hn::Set(d, 2.0f)));
 }
 
-constexpr float kSmallestSquare = 1e-30f;  // what is below has a root of 1e-15 at most: ε rules
+constexpr float kSmallestSquare = 1e-30f;  // smaller squares have roots below 1e-15: ε dominates
 
-// Bound: 32 bytes a parameter and step, four arrays read and written, from memory, since a field
-// does not fit in a cache; its dozen operations and two estimates take less.
+// The bound is memory traffic, because a field does not fit in a cache: four arrays are read and
+// written, 32 bytes a parameter. The dozen operations and two estimates take less time.
 template <class D>
 HWY_INLINE void update(D d, const AdamStep& s, float* p, float* g, float* m, float* v) {
   const auto gradient = hn::LoadU(d, g);

@@ -5,14 +5,15 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/cpu/column_interpolation.cc"
 #include <hwy/foreach_target.h>
-// Highway's own order of includes: foreach_target first.
+// Highway requires foreach_target to come before its other headers.
 #include "kernels/cpu/slab_vector-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
 
-// Bound of both: bytes. A column is two FMAs a vector for 64 bytes of values, which are read and
-// written, and two cache lines of vertices, which lie a column apart and come from L2 at best.
+// Both functions are bound by memory traffic. A column takes two FMAs a vector for 64 bytes of
+// values, which are read and written, and two cache lines of vertices. The vertices lie a column
+// apart and come from L2 at best.
 void interpolate_columns(const Columns& columns, const float* vertices, float* values) {
   const Tag d;
   Vec lower[kVecs], upper[kVecs];
@@ -31,8 +32,8 @@ void interpolate_columns(const Columns& columns, const float* vertices, float* v
   }
 }
 
-// A column's vertices take from the lane at them and from the one below, which is loaded from one
-// float before: lane 0 has none below, and its weight is 0.
+// Each vertex takes from its own lane and from the lane below, which is loaded from one float
+// before. Lane 0 has no lane below; its weight there is 0.
 void spread_columns(const Columns& columns, const float* values, float* vertices) {
   const Tag d;
   HWY_ALIGN float of_lane_below[kLanes];
@@ -44,7 +45,7 @@ void spread_columns(const Columns& columns, const float* values, float* vertices
     below[v] = hn::Load(d, of_lane_below + v * kVecLanes);
     lower[v] = hn::Sub(hn::Set(d, 1.0f), hn::LoadU(d, columns.fraction + v * kVecLanes));
   }
-  // Nothing lies before the first column's values.
+  // The first column is copied, because no memory lies before its values.
   HWY_ALIGN float first[kLanes + 1] = {};
   for (int l = 0; l < kLanes && columns.count > 0; ++l) first[l + 1] = values[l];
   const float* before = first;

@@ -9,8 +9,8 @@ namespace {
 using Range = CrossingGroup::Range;
 constexpr std::size_t kMost = CrossingGroup::kMost;
 
-// More than positions and the pixels of samples differ by rounding, for up to 10⁵ pixels: what is
-// called whole is used without tests, so this keeps it within its memory.
+// An upper bound on the rounding errors of positions and of samples' pixels, for up to 10⁵ pixels.
+// It keeps the `whole` range, which is used without tests, within its memory.
 constexpr double kRounding = 0.01;
 
 int rounded_up(double at) {
@@ -23,8 +23,8 @@ double position(const LineCrossing& c, int pixel) {
   return c.offset + static_cast<double>(c.step) * pixel;
 }
 
-// Of a group's lines: pixels of all windows whose positions lie within [low, high) of every line
-// by more than rounding, and those of any that may lie within one.
+// Sets a group's pixels. `whole` are those in all windows whose positions lie within [low, high) of
+// every line by more than rounding. `reached` are those that may lie within some line.
 void set_pixels(std::span<const LineCrossing> lines, CrossingGroup& group) {
   constexpr double kFar = 1e30;
   double low_of_all = -kFar, low_of_any = kFar, high_of_all = kFar, high_of_any = -kFar;
@@ -41,7 +41,7 @@ void set_pixels(std::span<const LineCrossing> lines, CrossingGroup& group) {
   }
   const double inverse = 1.0 / lines[0].step;
   const auto pixels = [&](double low, double high) {
-    if (low >= high) return Range{};  // no pixel is within all of them
+    if (low >= high) return Range{};  // no pixel is within all lines
     const double a = low * inverse, b = high * inverse;
     return Range{rounded_up(std::min(a, b)), rounded_up(std::max(a, b))};
   };
@@ -49,9 +49,9 @@ void set_pixels(std::span<const LineCrossing> lines, CrossingGroup& group) {
   group.reached = pixels(low_of_any - kRounding, high_of_any + kRounding).common_with(in_any);
 }
 
-// Samples between two pixels of the window, with all of a pixel's hat within [low, high). For
-// |step| >= 1 no other pixel reaches them; for any step, none that sees the line reaches further
-// than two samples beyond them.
+// Returns the samples between two pixels of the window whose whole hats lie within [low, high). For
+// |step| >= 1 no other pixel reaches them. For any step, the pixels that see the line reach at most
+// two samples further.
 Range samples_within(const LineCrossing& c) {
   const auto [low, high] = std::minmax({position(c, c.first_pixel), position(c, c.end_pixel - 1)});
   const double first = std::max(c.low + 1.0, low + kRounding);
@@ -59,8 +59,8 @@ Range samples_within(const LineCrossing& c) {
   return {rounded_up(first), 1 - rounded_up(-last)};
 }
 
-// How many pairs of pixels reach a sample. Rounding can only lose a weight that is itself of the
-// size of the rounding.
+// Returns the number of pairs of pixels that reach a sample. Rounding can only lose a weight that
+// is itself as small as the rounding.
 int pairs_a_sample(const LineCrossing& c) {
   return static_cast<int>(std::ceil((1.0f - 1e-6f) / std::abs(c.step)));
 }
@@ -82,7 +82,7 @@ void put_pair(const LineCrossing& c, int pair, std::size_t k, CrossingGroup& gro
   group.skipped[k] = static_cast<float>(2 * pair + 1);
 }
 
-// The group of item `count`, a new one for every four.
+// Returns the group of crossing number `count`; starts a new group for every four.
 CrossingGroup& group_of(std::size_t count, std::vector<CrossingGroup>& groups) {
   if (count % kMost == 0) groups.emplace_back();
   return groups.back();
@@ -93,7 +93,7 @@ void include(Range whole, Range reached, std::size_t k, CrossingGroup& group) {
   group.reached = k == 0 ? reached : group.reached.joined_with(reached);
 }
 
-// The items after the last of `count` repeat it, without weight: what they read is there.
+// Fills the last group with copies of its last crossing without weight, whose memory is readable.
 void fill_up(std::size_t count, std::vector<CrossingGroup>& groups) {
   if (count % kMost == 0) return;
   CrossingGroup& g = groups.back();

@@ -9,13 +9,14 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/cpu/leaf_decoding.cc"
 #include <hwy/foreach_target.h>
-// Highway's own order of includes: foreach_target first.
+// Highway requires foreach_target to come before its other headers.
 #include "kernels/cpu/slab_vector-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
 
-// Samples that are at vertices, as they are of vertices one pixel apart, are not interpolated.
+// Returns true if all samples lie at vertices, as they do for vertices one pixel apart. They then
+// need no interpolation.
 inline bool are_at_vertices(const AxisTaps& axis) {
   return std::all_of(axis.fraction, axis.fraction + axis.count,
                      [](float fraction) { return fraction == 0.0f || fraction == 1.0f; });
@@ -49,8 +50,8 @@ HWY_INLINE void add_to(Vec sum, float* to) {
   hn::StoreU(hn::Add(hn::LoadU(Tag(), to), sum), Tag(), to);
 }
 
-// Of samples that are at vertices, those of a row: visit(vertex, sample), both in floats from the
-// first, for every vector.
+// Calls visit(vertex, sample) for every vector of a row whose samples lie at vertices. Both are
+// counted in floats from the first.
 template <class Visit>
 HWY_INLINE void for_each_at_vertices(const LeafPiece& p, int z, const Visit& visit) {
   const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(p.num_vertices_z) * kLanes;
@@ -61,7 +62,7 @@ HWY_INLINE void for_each_at_vertices(const LeafPiece& p, int z, const Visit& vis
   }
 }
 
-// Bound for 16 samples: a load from L2 and a store to L3, and the activation.
+// The bound for 16 samples is a load from L2, a store to L3, and the activation.
 template <class Act>
 HWY_INLINE void decode_at_vertices(const LeafPiece& p, const Act& act, const float* values,
                                    float* samples) {
@@ -73,7 +74,7 @@ HWY_INLINE void decode_at_vertices(const LeafPiece& p, const Act& act, const flo
   }
 }
 
-// Bound for 16 samples: two loads from L3, a load and a store of L2, and about 12 operations.
+// The bound for 16 samples is two loads from L3, a load and a store of L2, and about 12 operations.
 template <class Act>
 HWY_INLINE double decode_adjoint_at_vertices(const LeafPiece& p, const Act& act,
                                              const float* samples, const float* grad_samples,
@@ -97,11 +98,11 @@ HWY_INLINE Vec interpolate(Vec lower, Vec upper, Vec fraction) {
   return hn::MulAdd(fraction, hn::Sub(upper, lower), lower);
 }
 
-// Rows of samples along x are decoded one after the other, between two rows of
-// vertex values that are already interpolated in x and rise through the leaf.
+// Two neighbouring rows of vertex values, already interpolated in x. Rows of samples are decoded
+// between them, one after the other, while the pair moves up through the leaf.
 struct RowPair {
-  float* lower;  // of vertex row `index`, [x, lane]
-  float* upper;  // of the next
+  float* lower;  // vertex row `index`, [x, lane]
+  float* upper;  // vertex row index + 1
   int index = -2;
   RowPair(const LeafPiece& piece, float* scratch)
       : lower(scratch), upper(scratch + static_cast<std::ptrdiff_t>(piece.x.count) * kLanes) {}
@@ -132,9 +133,10 @@ HWY_INLINE void move_to(const LeafPiece& p, const float* values, int z, RowPair&
   rows.index = z;
 }
 
-// Bound for 16 samples: two loads from L1 and a store to L3, where a slab lies, and about 25
-// operations of softplus, 13 cycles of two ports. The rows' interpolation in x is shared by all
-// samples between two vertices in z: at a vertex a sample another two loads and two operations.
+// The bound for 16 samples is two loads from L1, a store to L3, where a slab lies, and about 25
+// operations of softplus, which are 13 cycles of two ports. All samples between two vertices in z
+// share the rows' interpolation in x. With as many vertices as samples in z, it adds
+// two loads and two operations a sample.
 template <class Act>
 HWY_INLINE void decode(const LeafPiece& p, const Act& act, const float* values, float* scratch,
                        float* samples) {
@@ -152,14 +154,14 @@ HWY_INLINE void decode(const LeafPiece& p, const Act& act, const float* values, 
   }
 }
 
-// Adjoint of interpolate_row: empties the row into the gradient of its
-// vertices. What neighbouring samples give a vertex is summed in registers.
+// Applies the adjoint of interpolate_row: adds the row to the gradient of its vertices and sets it
+// to zero. The contributions of neighbouring samples to a vertex are summed in registers.
 HWY_INLINE void spread_row(const LeafPiece& p, float* row, int z, float* grad_values) {
   const Tag d;
   const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(p.num_vertices_z) * kLanes;
   grad_values += static_cast<std::ptrdiff_t>(z) * kLanes;
   for (int v = 0; v < kLanes; v += kVecLanes) {
-    Vec low = hn::Zero(d), high = hn::Zero(d);  // of vertices `at` and at + 1
+    Vec low = hn::Zero(d), high = hn::Zero(d);  // sums for vertices `at` and at + 1
     int at = p.x.lower[0];
     for (int x = 0; x < p.x.count; ++x) {
       if (p.x.lower[x] != at) {
@@ -183,7 +185,8 @@ HWY_INLINE void spread_row(const LeafPiece& p, float* row, int z, float* grad_va
   }
 }
 
-// Bound for 16 samples: two loads from L3, four of L1 with two stores, and about 16 operations.
+// The bound for 16 samples is two loads from L3, four loads and two stores of L1, and about 16
+// operations.
 template <class Act>
 HWY_INLINE double decode_adjoint(const LeafPiece& p, const Act& act, const float* samples,
                                  const float* grad_samples, float* scratch, float* grad_values) {

@@ -10,23 +10,23 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/cpu/line_projection.cc"
 #include <hwy/foreach_target.h>
-// Highway's own order of includes: foreach_target first.
+// Highway requires foreach_target to come before its other headers.
 #include "kernels/cpu/slab_vector-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
-// Destinations are treated in tiles. What they take from the four items of a group (lines, or
-// pairs of pixels of a view) is worked out first, a vector of items and destinations at a time,
-// and then used. So the two taps of an item share an index, and the weights of four items are
-// loaded together and broadcast in registers.
+// Destinations (pixels forward, samples back) are processed in tiles. For each tile, a table first
+// receives the indices and weights of the two taps of every item of a group; an item is a line, or
+// a pair of pixels of a view. Then the sums are gathered. The two taps of an item thus share an
+// index, and the weights of four items are loaded together and broadcast in registers.
 //
-// Bound with AVX-512: an item of two slabs is four loads of samples in four FMAs, a load of its
-// index, half a load of weights and two broadcasts, which take one of the two ports of the FMAs:
-// 2.75 cycles of two load ports and 3 of the two others for 32 rows, of which loading samples
-// alone would be 2. With two address additions and a share of what a destination takes these are
-// some eleven instructions, which is the limit where another hardware thread is busy on the same
-// core; hence the loops that are unrolled and what is known when compiled. Making the tables is
-// another sixth (docs/results/speed.md).
+// The bound with AVX-512, for one item and the 32 rows of two slabs: four loads of samples inside
+// four FMAs, a load of the index, half a load of weights, and two broadcasts, which use one of the
+// two ports of the FMAs. That is 2.75 cycles of the two load ports and 3 cycles of the two others;
+// loading the samples alone would take 2. With two address additions and a share of the work for
+// the destination, there are some eleven instructions. They are the limit if another hardware
+// thread is busy on the same core, which is why loops are unrolled and constants are known at
+// compile time. Making the tables takes another sixth of the time (docs/results/speed.md).
 constexpr int kTile = 32;
 constexpr int kItems = CrossingGroup::kMost;
 constexpr int kMaxTables = 2;
@@ -34,12 +34,12 @@ using IntVec = hn::Vec<IntTag>;
 template <typename T>
 using Numbers = CrossingGroup::Numbers<T>;
 
-// A vector has numbers of so many items, for so many destinations.
+// A vector holds numbers of kItemsAVector items for kDestinations destinations.
 constexpr int kItemsAVector = std::min(kItems, kVecLanes);
 constexpr int kDestinations = kVecLanes / kItemsAVector;
 static_assert(kItemsAVector == 4 || kItemsAVector == 1);
 
-// Two taps of items: the source at `index` floats and the one after it.
+// The two taps of a vector of items: the source at `index` floats and the next source.
 struct Taps {
   IntVec index;
   Vec weight0, weight1;
@@ -56,7 +56,7 @@ struct TapTable {
   }
 };
 
-// The taps of a group's items for destinations [first, end), or a few more.
+// Computes the taps of a group's items for destinations [first, end), or for a few more.
 template <typename Items, bool kWhole>
 HWY_INLINE void fill(const CrossingGroup& group, std::ptrdiff_t next, int first, int end,
                      TapTable& table) {
@@ -72,19 +72,18 @@ HWY_INLINE void fill(const CrossingGroup& group, std::ptrdiff_t next, int first,
   }
 }
 
-// Sums of a destination; the taps of an item go to different ones, so that an
-// addition waits for half as many others.
+// The sums of a destination. The two taps of an item go to different sums, so that half as many
+// additions depend on each other.
 struct Sums {
   Vec of_tap0[kVecs], of_tap1[kVecs];
 };
 
-// Where the second of two slabs lies, in floats after the first.
+// The distance from the first of two slabs to the second, in floats.
 struct Apart {
   std::ptrdiff_t source, out;
 };
 
-// Sources that follow each other are so many floats apart; what is known when compiled
-// saves address arithmetic.
+// The distance of consecutive sources in floats. A compile-time constant saves address arithmetic.
 using Adjacent = std::integral_constant<std::ptrdiff_t, kLanes>;
 
 template <int kItem>
@@ -115,7 +114,7 @@ HWY_INLINE void add_item(const float* source, Next next, Apart apart, const TapT
   }
 }
 
-// Adds what tables take to destinations [0, count), `stride` floats apart.
+// Adds the tables' contributions to destinations [0, count), which are `stride` floats apart.
 template <int kSlabs, int kTables, typename Next>
 HWY_INLINE void gather(const TapTable* tables, const float* source, Next next, Apart apart,
                        int count, std::ptrdiff_t stride, float* out) {
@@ -175,9 +174,9 @@ HWY_INLINE Vec of_items(const Numbers<float>& numbers, int k) {
   return hn::LoadDup128(Tag(), &numbers[k]);
 }
 
-// origin + stride · integer for integers below 2^22 in magnitude, held as floats:
-// adding 1.5 · 2^23 leaves them in the low bits. The constant above them is
-// taken off together with `origin`, modulo 2^32.
+// These two functions compute origin + stride · n for integers n below 2^22 in magnitude that are
+// held as floats. Adding 1.5 · 2^23 leaves n in the low bits. The constant bits above n are
+// subtracted together with `origin`, modulo 2^32.
 constexpr float kIntegerShift = 12582912.0f;
 constexpr std::ptrdiff_t kShiftBits = 0x4b400000;
 HWY_INLINE IntVec index_origin(const Numbers<int>& origin, int k, std::ptrdiff_t stride) {
@@ -188,7 +187,7 @@ HWY_INLINE IntVec integer_bits(Vec integral) {
   return hn::BitCast(IntTag(), hn::Add(integral, hn::Set(Tag(), kIntegerShift)));
 }
 
-// The lines of a group, from the k-th item.
+// A vector of a group's crossings, from item k on.
 struct Lines {
   Vec step, offset, weight, first_pixel, last_pixel, low, high;
   HWY_INLINE Lines(const CrossingGroup& group, int k)
@@ -201,14 +200,14 @@ struct Lines {
         high(of_items(group.high, k)) {}
 
   HWY_INLINE Vec position(Vec pixel) const { return hn::MulAdd(pixel, step, offset); }
-  // Whether pixels weigh anything: those of the window, and within [low, high).
+  // Returns a mask of the pixels that have weight: those in the window and within [low, high).
   HWY_INLINE auto sees(Vec pixel, Vec at) const {
     return hn::And(hn::And(hn::Ge(pixel, first_pixel), hn::Le(pixel, last_pixel)),
                    hn::And(hn::Ge(at, low), hn::Lt(at, high)));
   }
 };
 
-// What pixels take of lines: a sample and the one after it.
+// Computes what pixels take from lines: a sample and the one after it.
 struct ForwardItems {
   Lines lines;
   IntVec origin, stride;
@@ -226,15 +225,15 @@ struct ForwardItems {
     if (!kAllSee) {
       const auto seen = lines.sees(pixel, position);
       weight = hn::IfThenElseZero(seen, weight);
-      base = hn::IfThenElseZero(seen, base);  // others may lie anywhere, but sample 0 exists
+      base = hn::IfThenElseZero(seen, base);  // sample 0 exists; other bases may be out of bounds
     }
     return {hn::Add(hn::Mul(stride, integer_bits(base)), origin),
             hn::NegMulAdd(weight, fraction, weight), hn::Mul(weight, fraction)};
   }
 };
 
-// What samples take of pairs of pixels, which are shifted into the window if
-// need be; the pixel past the window's end may be read, with weight 0.
+// Computes what samples take from pairs of pixels. A pair is moved into the window if it lies
+// outside. The pixel past the window's end may be read, with weight 0.
 struct AdjointItems {
   Lines lines;
   Vec inverse, bias, skipped;

@@ -5,17 +5,17 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/cpu/point_products.cc"
 #include <hwy/foreach_target.h>
-// Highway's own order of includes: foreach_target first.
+// Highway requires foreach_target to come before its other headers.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Where one point's six rows of ranks begin, and their weights.
+// The offsets of one point's six rows of ranks, and their weights.
 struct Corners {
-  std::ptrdiff_t vector, matrix;          // of the lower vertices
-  std::ptrdiff_t next_a, next_b, next_c;  // to the upper ones
+  std::ptrdiff_t vector, matrix;          // offsets of the lower vertices
+  std::ptrdiff_t next_a, next_b, next_c;  // steps to the upper ones
   float a, w00, w01, w10, w11;
 
   Corners(const PointProducts& p, int point) {
@@ -32,8 +32,8 @@ struct Corners {
   }
 };
 
-// Bound: latency. A point's six rows of ranks lie in as many places of a leaf, two cache lines each
-// for 24 ranks, against seven operations a vector forward and twice as many back.
+// The bound is latency. A point's six rows of ranks lie in six places of a leaf, two cache lines
+// each for 24 ranks. They serve seven operations a vector forward and twice as many back.
 template <class D>
 HWY_INLINE hn::Vec<D> vector_at(D d, const Corners& at, const float* v) {
   const auto low = hn::LoadU(d, v);
@@ -53,7 +53,8 @@ HWY_INLINE void add_scaled(D d, float weight, hn::Vec<D> v, float* to) {
   hn::StoreU(hn::MulAdd(hn::Set(d, weight), v, hn::LoadU(d, to)), d, to);
 }
 
-// Calls body(tag, first rank) for all ranks: as many full vectors as fit, then narrower ones.
+// Calls body(tag, first rank) for all ranks, with full vectors as far as they fit and narrower ones
+// for the rest.
 template <class Body>
 HWY_INLINE void for_each_vector(int rank, const Body& body) {
   int r = 0;

@@ -3,7 +3,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/cpu/ray_samples.cc"
 #include <hwy/foreach_target.h>
-// Highway's own order of includes: foreach_target first.
+// Highway requires foreach_target to come before its other headers.
 #include "kernels/cpu/slab_vector-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -11,13 +11,13 @@ namespace tomofield::kernels::HWY_NAMESPACE {
 
 using Ints = hn::Vec<IntTag>;
 
-// Where a vector of samples lies in a leaf: lower vertices and what the upper ones weigh.
+// The places of a vector of samples in a leaf: lower vertices, and the weights of the upper ones.
 struct Taps {
-  Ints lower;  // element of the corner with the lowest x, y and z
+  Ints lower;  // index of the corner with the lowest x, y and z
   Vec fx, fy, fz;
 };
 
-// The lower vertex of positions along an axis, and the rest.
+// Returns the lower vertex of positions along an axis and leaves the fraction in `position`.
 HWY_INLINE Ints split(Vec& position, int num_vertices) {
   const IntTag di;
   const Vec last = hn::Set(Tag(), static_cast<float>(num_vertices - 1));
@@ -57,7 +57,7 @@ HWY_INLINE Vec interpolate(Vec lower, Vec upper, Vec fraction) {
   return hn::MulAdd(fraction, hn::Sub(upper, lower), lower);
 }
 
-// Eight gathers, which are what this costs: about 20 cycles each for 16 samples.
+// Interpolates with eight gathers, which determine the cost: about 20 cycles each for 16 samples.
 HWY_INLINE Vec sample(const LeafVertices& leaf, const float* values, const Taps& at) {
   const Tag d;
   const auto along_y = [&](std::ptrdiff_t column) {
@@ -93,8 +93,8 @@ double integrate_piece(const LeafVertices& leaf, Activation activation, const fl
   return total * static_cast<double>(piece.segment_length);
 }
 
-// Two samples may share a vertex, so the scatter is scalar: eight additions a
-// sample, most of them to lines that the sample before has touched.
+// Adds the adjoint of sample(). The scatter is scalar, because two samples may share a vertex:
+// eight additions a sample, most of them to cache lines that the sample before has touched.
 HWY_INLINE void scatter(const LeafVertices& leaf, const Taps& at, Vec g, int count,
                         float* grad_values) {
   const Tag d;

@@ -7,14 +7,15 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/cpu/row_interpolation.cc"
 #include <hwy/foreach_target.h>
-// Highway's own order of includes: foreach_target first.
+// Highway requires foreach_target to come before its other headers.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Calls body(tag, first column) for all columns: as many full vectors as fit, then narrower ones.
+// Calls body(tag, first column) for all columns, with full vectors as far as they fit and narrower
+// ones for the rest.
 template <class Body>
 HWY_INLINE void for_each_vector(int width, const Body& body) {
   int c = 0;
@@ -27,10 +28,10 @@ HWY_INLINE void for_each_vector(int width, const Body& body) {
   with(hn::CappedTag<float, 1>());
 }
 
-// Bound of interpolating and spreading: bytes. A lane is two loads, two operations and a store a
-// vector in L1, but rows are used for one product each and stream from L2 or, where the factors of
-// a slab's leaves do not fit there, from L3 (14 GB/s measured: as long as a third of the products
-// that they serve).
+// Interpolating and spreading are bound by memory traffic. A lane takes two loads, two operations
+// and a store a vector in L1. But each row serves only one product and streams from L2, or from L3
+// if the factors of a slab's leaves do not fit in L2. L3 delivered 14 GB/s, so that
+// reading the rows took a third as long as the products that they serve.
 template <class D>
 HWY_INLINE hn::Vec<D> interpolated(D d, const LaneTaps& taps, int lane, int width,
                                    const float* column) {
@@ -60,9 +61,9 @@ HWY_INLINE void for_each_block(D, hn::Vec<D> v, int first, const Body& body) {
   }
 }
 
-// Of four rows `from_row` apart, as many columns as a vector has lanes: calls body(column's four,
-// column) for all of them. Bound: eight shuffles for four vectors, one a cycle, and a store or
-// addition to memory for every four numbers.
+// Transposes four rows, `from_row` floats apart, for as many columns as a vector has lanes. Calls
+// body(a column's four numbers, column) for each column. The bound is eight shuffles for four
+// vectors, one a cycle, and a store or an addition to memory for every four numbers.
 template <class D, class Body>
 HWY_INLINE void transpose_four_rows(D d, const float* from, std::ptrdiff_t from_row,
                                     const Body& body) {
@@ -117,14 +118,14 @@ void add_transposed(int width, const float* columns, float* lanes) {
     for (int l = 0; l < kLanes; ++l) lanes[l * width + c] += columns[c * kLanes + l];
 }
 
-// What neighbouring lanes give a row is summed in registers.
+// Sums the contributions of neighbouring lanes to a row in registers.
 void spread_rows(const LaneTaps& taps, int width, const float* grad, float* grad_matrix) {
   for_each_vector(width, [&](auto d, int c) HWY_ATTR {
     const auto add_to_row = [&](int row, auto sum) HWY_ATTR {
       float* const to = grad_matrix + static_cast<std::ptrdiff_t>(row) * width + c;
       hn::StoreU(hn::Add(hn::LoadU(d, to), sum), d, to);
     };
-    auto low = hn::Zero(d), high = hn::Zero(d);  // for rows `at` and at + 1
+    auto low = hn::Zero(d), high = hn::Zero(d);  // sums for rows `at` and at + 1
     int at = taps.lower[0];
     for (int l = 0; l < kLanes; ++l) {
       if (taps.lower[l] != at) {

@@ -1,6 +1,6 @@
-// Products C += A B of little depth: up to 24 rows of B stay in registers while the rows of A and C
-// pass by, four at a time. It takes the 32 registers of AVX-512. Included once per target by
-// foreach_target.
+// Matrix products C += A B of small depth for AVX-512, which has 32 registers. Up to 24 rows of B
+// stay in registers, and four rows of A and C at a time pass through them. foreach_target includes
+// this file once per target; on other targets multiplied_by_passes() declines every product.
 #if defined(TOMOFIELD_KERNELS_CPU_ROW_PASSES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TOMOFIELD_KERNELS_CPU_ROW_PASSES_INL_H_
 #undef TOMOFIELD_KERNELS_CPU_ROW_PASSES_INL_H_
@@ -20,10 +20,11 @@ namespace tomofield::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET <= HWY_AVX3
-// Adds the product of kDepth numbers of each row of A and a vector of columns of B. The two halves
-// of a row are summed apart, which for four rows covers the latency of their FMAs. Bound: kDepth
-// FMAs a row, two a cycle, each with its broadcast inside; with a pointer of its own for every row
-// that is a single micro-operation.
+// Adds the product of kRows rows of A, kDepth columns wide, and kDepth rows of B, one vector wide,
+// to C. a[m] points into row m of A. Each row keeps two sums, one for either half of the depth, so
+// that with four rows there are enough independent FMAs to hide their latency. The bound is kDepth
+// FMAs a row at two a cycle. Each FMA includes its broadcast of a number of A; as every row has its
+// own pointer, this is a single micro-operation.
 template <int kDepth, int kRows, class D>
 HWY_INLINE void pass_rows(D d, const hn::Vec<D> (&b)[kDepth], const float* const (&a)[kRows],
                           float* c, std::ptrdiff_t c_row) {
@@ -46,7 +47,8 @@ HWY_INLINE void pass_rows(D d, const hn::Vec<D> (&b)[kDepth], const float* const
   for (int m = 0; m < kRows; ++m) hn::StoreU(hn::Add(low[m], high[m]), d, c + m * c_row);
 }
 
-// Calls pass(rows of A from `first`, row of C) for all rows, four by four.
+// Calls pass_four(rows of A from column `first`, row of C) for every four rows, and pass_one for
+// the rows that remain.
 template <class PassFour, class PassOne>
 HWY_INLINE void for_each_four_rows(const SmallGemm& g, std::ptrdiff_t first,
                                    const PassFour& pass_four, const PassOne& pass_one) {
@@ -64,6 +66,8 @@ HWY_INLINE void for_each_four_rows(const SmallGemm& g, std::ptrdiff_t first,
   }
 }
 
+// Adds the product of kDepth columns of A, from `first`, and one vector of columns of B, from
+// `col`, to all rows of C.
 template <int kDepth>
 HWY_INLINE void pass_all_rows(const SmallGemm& g, std::ptrdiff_t first, std::ptrdiff_t col) {
   const hn::FixedTag<float, 16> d;
@@ -76,8 +80,9 @@ HWY_INLINE void pass_all_rows(const SmallGemm& g, std::ptrdiff_t first, std::ptr
       [&](const auto& a, float* c) HWY_ATTR { pass_rows<kDepth, 1>(d, b, a, c + col, g.c_row); });
 }
 
-// The same for half a vector of columns: two rows of B lie interleaved in one vector, and so do the
-// sums of what even and odd columns of A give. Half as many FMAs, two numbers broadcast for each.
+// Does the same as pass_rows for columns that fill half a vector. Two rows of B are interleaved in
+// one vector, and so are two partial sums, from the even and from the odd columns of A. This halves
+// the number of FMAs; each broadcasts a pair of numbers of A.
 template <int kDepth, int kRows, class D>
 HWY_INLINE void pass_rows_of_half(D d, const hn::Vec<D> (&pairs)[kDepth / 2],
                                   const float* const (&a)[kRows], float* c, std::ptrdiff_t c_row) {
@@ -106,6 +111,7 @@ HWY_INLINE void pass_rows_of_half(D d, const hn::Vec<D> (&pairs)[kDepth / 2],
   }
 }
 
+// Does the same as pass_all_rows for columns that fill half a vector.
 template <int kDepth>
 HWY_INLINE void pass_all_rows_of_half(const SmallGemm& g, std::ptrdiff_t first,
                                       std::ptrdiff_t col) {
@@ -129,6 +135,7 @@ HWY_INLINE void pass_all_rows_of_half(const SmallGemm& g, std::ptrdiff_t first,
           HWY_ATTR { pass_rows_of_half<kDepth, 1>(d, pairs, a, c + col, g.c_row); });
 }
 
+// Adds the product of kDepth columns of A, from `first`, and all columns of B to C.
 template <int kDepth>
 HWY_INLINE void pass_all_columns(const SmallGemm& g, std::ptrdiff_t first) {
   std::ptrdiff_t col = 0;
@@ -136,7 +143,8 @@ HWY_INLINE void pass_all_columns(const SmallGemm& g, std::ptrdiff_t first) {
   if (col < g.width) pass_all_rows_of_half<kDepth>(g, first, col);
 }
 
-// Whether the product was one that suits, and is done.
+// Computes the product and returns true if its shape suits passes; otherwise returns false and
+// leaves C as it is.
 HWY_INLINE bool multiplied_by_passes(const SmallGemm& g) {
   if (g.a_col != 1 || g.depth > 48 || g.depth % 8 != 0 || g.width % 8 != 0) return false;
   std::ptrdiff_t first = 0;

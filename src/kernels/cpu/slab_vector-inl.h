@@ -1,5 +1,5 @@
-// Slab vectors for Highway kernels: the 16 rows of a sample as few registers
-// as the target has. Included once per target by foreach_target.
+// Slab vectors for Highway kernels: the 16 rows of a sample in as few registers as the target
+// allows. foreach_target includes this file once per target.
 #if defined(TOMOFIELD_KERNELS_CPU_SLAB_VECTOR_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TOMOFIELD_KERNELS_CPU_SLAB_VECTOR_INL_H_
 #undef TOMOFIELD_KERNELS_CPU_SLAB_VECTOR_INL_H_
@@ -21,7 +21,7 @@ using IntTag = hn::RebindToSigned<Tag>;
 constexpr int kVecLanes = static_cast<int>(hn::MaxLanes(Tag()));
 constexpr int kVecs = kLanes / kVecLanes;
 
-// c[0] + c[1] x + c[2] x² + …
+// Returns c[0] + c[1] x + c[2] x² + …
 template <int kCount>
 HWY_INLINE Vec polynomial(Vec x, const float (&c)[kCount]) {
   Vec sum = hn::Set(Tag(), c[kCount - 1]);
@@ -29,9 +29,9 @@ HWY_INLINE Vec polynomial(Vec x, const float (&c)[kCount]) {
   return sum;
 }
 
-// 2^x for x <= 0; −126 and below give 2^−126. x = n + r with an integer n, taken
-// from the low bits of x + 1.5 · 2^23, and |r| <= 1/2; minimax polynomial of 2^r
-// that is exact at 0. Relative error below 3e-7.
+// Returns 2^x for x <= 0; −126 and below give 2^−126. x is split into n + r with |r| <= 1/2. The
+// low bits of x + 1.5 · 2^23 hold the integer n. A minimax polynomial that is exact at 0 gives 2^r.
+// The relative error is below 3e-7.
 HWY_INLINE Vec exp2_of_negative(Vec x) {
   const Tag d;
   const IntTag di;
@@ -44,15 +44,15 @@ HWY_INLINE Vec exp2_of_negative(Vec x) {
   return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(hn::BitCast(di, shifted))));
 }
 
-// log(1 + t) for 0 <= t <= 1: t times a minimax polynomial of the rest that is
-// exact at 0. Relative error below 3e-7.
+// Returns log(1 + t) for 0 <= t <= 1, as t times a minimax polynomial that is exact at 0. The
+// relative error is below 3e-7.
 HWY_INLINE Vec log1p_of_unit(Vec t) {
   return hn::Mul(t, polynomial(t, {1.0f, -0.49999648f, 0.333213226f, -0.248571636f, 0.191536547f,
                                    -0.137538017f, 0.0792045266f, -0.0300657857f, 0.00536482241f}));
 }
 
-// log(x) for finite x >= 1: exponent · ln 2 + log of the mantissa. Relative
-// error below 3e-7.
+// Returns log(x) for finite x >= 1, as exponent · ln 2 + log of the mantissa. The relative error is
+// below 3e-7.
 HWY_INLINE Vec log_above_one(Vec x) {
   const Tag d;
   const IntTag di;

@@ -11,7 +11,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/cpu/slab_vector_test.cc"
 #include <hwy/foreach_target.h>
-// Highway's own order of includes: foreach_target first.
+// Highway requires foreach_target to come before its other headers.
 #include "kernels/cpu/slab_vector-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -46,8 +46,8 @@ HWY_EXPORT(log_of_all);
 
 namespace {
 
-// Every kStride-th float of [first, last] by bit pattern: all binades alike. With
-// stride 1, all floats, the same bounds hold (run once by hand, 2026).
+// The test takes every kStride-th float of [first, last] by bit pattern, so all binades alike. The
+// same bounds hold with stride 1, for all floats (run once by hand, 2026).
 constexpr std::uint32_t kStride = 4999;
 
 struct Worst {
@@ -68,7 +68,7 @@ Worst worst_relative_error(float first, float last, float sign, Function functio
     function(y);
     for (int i = 0; i < kLanes; ++i) {
       const double truth = expected(static_cast<double>(x[i]));
-      // Relative to the smallest normal number at least: denormals have few bits.
+      // The error is relative to at least the smallest normal number: denormals have few bits.
       const double error =
           std::abs(static_cast<double>(y[i]) - truth) / std::max(std::abs(truth), 0x1p-126);
       if (!(error <= worst.error)) worst = {error, x[i]};

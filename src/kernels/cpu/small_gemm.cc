@@ -3,7 +3,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/cpu/small_gemm.cc"
 #include <hwy/foreach_target.h>
-// Highway's own order of includes: foreach_target first.
+// Highway requires foreach_target to come before its other headers.
 #include <hwy/highway.h>
 
 #include "kernels/cpu/row_passes-inl.h"
@@ -12,15 +12,15 @@ HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Vectors of columns of C that are worked on together.
+// Vectors of columns of C that are computed together.
 //
-// A block of kMostRows rows of a panel lives in registers. Bound: kRows · kVecs FMAs, two a cycle,
-// against kRows broadcasts of A and kVecs loads of B, two a cycle as well; a row of one vector has
-// its broadcast inside the FMA. Eight FMAs at least cover their latency.
+// A block of kMostRows rows of a panel stays in registers. The bound is kRows · kVecs FMAs, two a
+// cycle, against kRows broadcasts of A and kVecs loads of B, also two a cycle. With one vector a
+// row, the broadcast is part of the FMA. At least eight FMAs are needed to hide their latency.
 //
-// Where the rows of A are neighbours (a transposed matrix), they are addressed without the stride,
-// and with AVX-512 an FMA that has its broadcast inside is a single micro-operation: 24 ranks times
-// 16 lanes are then 25 of them a step of the depth.
+// If the rows of A are adjacent in memory (a transposed matrix), they are addressed without the
+// stride. With AVX-512, an FMA that includes its broadcast is then a single micro-operation, so a
+// step of the depth takes 25 of them for 24 ranks times 16 lanes.
 template <int kVectors, bool kAreNeighbours = false>
 struct Panel {
   static constexpr int kVecs = kVectors;
@@ -28,11 +28,11 @@ struct Panel {
 #if HWY_TARGET <= HWY_AVX3
   static constexpr int kMostRows = kNeighbours ? 24 : kVecs == 3 ? 8 : 12;  // of 32 registers
 #else
-  static constexpr int kMostRows = kVecs == 1 ? 8 : 12 / kVecs;  // of 16
+  static constexpr int kMostRows = kVecs == 1 ? 8 : 12 / kVecs;  // of 16 registers
 #endif
 };
 
-// Rows of A, four by four: a pointer and the stride address all four.
+// Addresses rows of A. One pointer and the stride address four rows.
 template <int kRows, bool kNeighbours>
 class RowsOfA {
  public:
@@ -100,8 +100,8 @@ HWY_INLINE void block_of_rows(std::ptrdiff_t rows, D d, const SmallGemm& g, std:
   }
 }
 
-// All rows of a panel in as few blocks as there can be, which differ by a row at most: a short
-// one would wait for its few FMAs. Returns the column after the panel.
+// Computes all rows of a panel in as few blocks as possible. Their sizes differ by one row at most,
+// because a short block would wait for its few FMAs. Returns the column after the panel.
 template <class P, class D>
 HWY_INLINE std::ptrdiff_t panel(D d, const SmallGemm& g, std::ptrdiff_t col) {
   const std::ptrdiff_t blocks = (g.rows + P::kMostRows - 1) / P::kMostRows;
@@ -131,8 +131,8 @@ void small_gemm(const SmallGemm& g) {
   if (g.a_row == 1 && vectors_left() == 1) col = panel<Panel<1, true>>(d, g, col);
   while (vectors_left() >= 4 || vectors_left() == 2) col = panel<Panel<2>>(d, g, col);
   if (vectors_left() == 3) col = panel<Panel<3>>(d, g, col);
-  // Narrower vectors take what is left over at the right: masked loads and
-  // stores may touch memory beside the row on targets without true masks.
+  // Narrower vectors handle the remaining columns at the right. Masked loads and stores may touch
+  // memory beside the row on targets without true masks.
   col = single_vectors(d, g, col);
   col = single_vectors(hn::CappedTag<float, 8>(), g, col);
   col = single_vectors(hn::CappedTag<float, 4>(), g, col);

@@ -9,13 +9,13 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/cpu/total_variation.cc"
 #include <hwy/foreach_target.h>
-// Highway's own order of includes: foreach_target first.
+// Highway requires foreach_target to come before its other headers.
 #include "kernels/cpu/slab_vector-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tomofield::kernels::HWY_NAMESPACE {
 
-// Lanes that are rows of the volume, and those that have a next one, as 0 or 1.
+// Masks of the lanes that are rows of the volume, and of those that have a next row, as 0 or 1.
 struct RowMasks {
   HWY_ALIGN float is_row[kLanes];
   HWY_ALIGN float has_next[kLanes];
@@ -28,12 +28,12 @@ struct RowMasks {
   }
 };
 
-// Σ log of numbers of at least 1, as the mantissa and the exponent of their
-// product. Numbers up to 2^31 can be multiplied kAtOnce times before the
-// exponent has to be taken out.
+// Computes Σ log of numbers of at least 1 as the logarithm of their product, held as mantissa and
+// exponent. Numbers up to 2^31 can be multiplied kAtOnce times before the exponent has to be taken
+// out.
 class SumOfLogs {
  public:
-  // Explicit, or the compiler would not build it for the target.
+  // This is explicit, because the compiler would not build a default one for the target.
   HWY_INLINE SumOfLogs() : product_(hn::Set(Tag(), 1.0f)), exponent_(hn::Zero(IntTag())) {}
   HWY_INLINE void multiply(Vec factor) {
     product_ = hn::Mul(product_, factor);
@@ -75,8 +75,8 @@ class Penalty {
 
   Vec epsilon2() const { return epsilon2_; }
 
-  // weight φ′(m)/m = weight / (m + m²/τ) where `rows` is 1, for square = |∇f|² + ε² = m²;
-  // counts φ(m) there.
+  // Returns weight φ′(m)/m = weight / (m + m²/τ) where `rows` is 1, and 0 elsewhere, for
+  // square = |∇f|² + ε² = m². Adds φ(m) there to the value.
   HWY_INLINE Vec slope(Vec square, Vec rows) {
     const Vec m = hn::Sqrt(square);
     if (kConcave) {
@@ -92,7 +92,7 @@ class Penalty {
     value_ += static_cast<double>(hn::GetLane(hn::SumOfLanes(Tag(), sum)));
     sum_ = hn::Zero(Tag());
   }
-  // Σ φ over all rows that have ended.
+  // Returns Σ φ over all rows that have ended.
   double value() const { return value_; }
 
  private:
@@ -109,7 +109,7 @@ struct LaneShift {
   Indices rotation;
   LaneShift() : rotation(rotate_by_one()) {}
 
-  // Returns what was the last lane.
+  // Returns the previous value of the last lane.
   HWY_INLINE float apply(const Vec (&from)[kVecs], float below, Vec (&to)[kVecs]) const {
     const Tag d;
     const auto first = hn::FirstN(d, 1);
@@ -130,7 +130,7 @@ struct LaneShift {
   }
 };
 
-// Density one row up (y + 1): the next lane, and past the last lane `above`.
+// Returns the density one row up (y + 1): that of the next lane, and `above` past the last lane.
 HWY_INLINE Vec next_row(const float* sample, int v, float above) {
   const Tag d;
   const Vec next = hn::LoadU(d, sample + v * kVecLanes + 1);
@@ -138,14 +138,14 @@ HWY_INLINE Vec next_row(const float* sample, int v, float above) {
   return hn::IfThenElse(hn::FirstN(d, kVecLanes - 1), next, hn::Set(d, above));
 }
 
-// Bound for 16 samples with AVX-512: eight loads and two stores; about 25 operations, of which
-// square root and division keep their one port busy for some 36 cycles; and 16 bytes a sample from
-// L3, where a slab lies, which take as long: with estimates and a step of Newton's method for the
-// two the whole took no less.
+// Processes samples [first, end) of row z: gradient += −div(flux). flux_x holds the flux into the
+// first sample from the one before; on return, it holds the flux out of the last. flux_z, [x,
+// lane], holds the fluxes into the row from the one below; on return, those out of it.
 //
-// Samples [first, end) of row z: gradient += −div(flux). flux_x is the flux into
-// the first sample from the one before, and out of the last when done; flux_z,
-// [x, lane], the fluxes into the row from the one below, and out of it when done.
+// The bound for 16 samples with AVX-512 is eight loads and two stores; about 25 operations, of
+// which square root and division keep their one port busy for some 36 cycles; and 16 bytes a sample
+// from L3, where a slab lies, which takes as long. Replacing square root and division by estimates
+// and a step of Newton's method therefore saved no time.
 template <bool kConcave>
 HWY_INLINE void add_row(const SlabVariation& s, const RowMasks& masks, const LaneShift& shift,
                         Penalty<kConcave>& penalty, int z, int first, int end, float* flux_x,
@@ -193,8 +193,8 @@ HWY_INLINE void add_row(const SlabVariation& s, const RowMasks& masks, const Lan
   penalty.end_row();
 }
 
-// x is treated in tiles whose flux along z, [x, lane], is carried from row to
-// row; the flux along x out of a tile is kept for all rows, [z, lane].
+// The fluxes between tiles of x. Within a tile, flux_z, [x, lane], is carried from row to row.
+// flux_x, [z, lane], keeps the flux along x out of a tile for all rows.
 struct Scratch {
   int tile;
   float *flux_z, *flux_x;
