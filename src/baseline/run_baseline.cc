@@ -193,10 +193,10 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
         "--xtilt out (the volume is then turned by it), or use reconstruct or baseline tensorf",
         planned.x_tilt_deg));
   }
-  const std::vector<int> held_out =  // throws if no view would be held out
+  // This and trial_views() throw if there are too few views.
+  const std::vector<int> held_out =
       measurement::held_out_views(planned.geometry.tilt_deg, options.hold_out);
-  if (options.tune)
-    selection::trial_views(planned.geometry.tilt_deg, held_out);  // throws if too few are left
+  if (options.tune) selection::trial_views(planned.geometry.tilt_deg, held_out);
   const projection::SampleGrid grid = grid_of(planned, options);
   BaselinePlan plan;
   plan.num_views = planned.geometry.num_views();
