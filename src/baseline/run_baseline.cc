@@ -36,8 +36,8 @@ projection::SampleGrid grid_of(const measurement::PreparedSeries& series,
                                       options.specimen.with_margin ? options.margin_spacing : 0.0);
 }
 
-// Estimates the memory: what the method holds of each slab, and a pair of slabs and its rays for
-// each thread. A tuning holds copies of the rays of its rows.
+// Estimates the memory: the volumes and detectors of the method, and a pair of slabs and its rays
+// for each thread. A tuning holds copies of the rays of its rows.
 std::size_t estimate_memory(const measurement::PreparedSeries& plan,
                             const projection::SampleGrid& grid, const MethodFacts& method,
                             const MethodSize& size, bool tunes) {

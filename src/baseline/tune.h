@@ -36,7 +36,7 @@ struct Trial {
 struct Tuned {
   Method method;
   std::vector<Trial> trials;         ///< in order
-  std::vector<int> predicted_views;  ///< the views that chose
+  std::vector<int> predicted_views;  ///< views of the trials' scores
 };
 
 /// The data of the trials.

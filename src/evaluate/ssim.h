@@ -4,6 +4,7 @@
 
 namespace tomofield::evaluate {
 
+/// The structural similarity of two volumes; 1 if they are equal.
 struct SsimScore {
   double raw = 0.0;
   double affine = 0.0;  ///< SSIM of scale · reconstruction + offset

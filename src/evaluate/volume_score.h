@@ -17,6 +17,7 @@ struct VolumeScoreOptions {
   int hold_out = 0;  ///< score every Nth view, as reconstruct holds them out; 0: all
 };
 
+/// The reprojection error of a volume.
 struct VolumeScore {
   measurement::ViewErrors errors;
   std::vector<double> tilt_deg;  ///< one a scored view

@@ -14,6 +14,7 @@
 
 namespace tomofield::output {
 
+/// The options of a volume to write.
 struct VolumeOptions {
   std::optional<field::Box> box;             ///< default: the region of interest, one voxel a pixel
   io::MrcMode mode = io::MrcMode::kFloat32;  ///< kFloat32, kFloat16, or kInt16, which is scaled

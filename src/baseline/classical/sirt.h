@@ -17,9 +17,9 @@ struct SirtOptions {
 };
 
 /// Reconstructs by weighted simultaneous iterative reconstruction (Gilbert 1972) from zero
-/// densities. An iteration is the step of row_action.h with all views at once. It minimises ½ Σ
-/// (residual / σ)² / ray length. It has no prior, and must therefore stop before it has fitted the
-/// noise.
+/// densities. An iteration is the step of row_action.h with all views at once. It minimises
+///   ½ Σ (residual / σ)² / ray length.
+/// The method has no prior, and must therefore stop before it has fitted the noise.
 Solution reconstruct_sirt(VoxelProblem& problem, const SirtOptions& options,
                           const AfterIteration& after_iteration);
 

@@ -24,7 +24,7 @@ void gradient_of_row(const projection::SampleSegment& segment, int k, int num_ro
                      float* out_x, float* out_y, float* out_z);
 
 /// Adds Kᵀ p of z row k to `samples`. The slab buffers p must be zero in the padding and wherever K
-/// x is always zero. `p_y_below` is the buffer of the slab before (null before the first).
+/// x is zero by definition. `p_y_below` is the buffer of the slab before (null before the first).
 void add_gradient_adjoint_of_row(const projection::SampleSegment& segment, int k,
                                  const GradientFactors& factors, const float* p_x, const float* p_y,
                                  const float* p_z, const float* p_y_below, float* samples);

@@ -6,9 +6,10 @@
 
 namespace tomofield::baseline {
 
-/// Descends the total variation of a volume, Σ h_x h_z √(|∇x|² + ε²), along its steepest direction.
-/// Forward differences are divided by the sample spacing (1 in y). The length of a step is √(Σ h_x
-/// h_z change²).
+/// Descends the total variation of a volume along its steepest direction:
+///   Σ h_x h_z √(|∇x|² + ε²)
+/// with forward differences divided by the sample spacing (1 in y). The length of a step is
+///   √(Σ h_x h_z change²).
 class VariationDescent {
  public:
   VariationDescent(const projection::SampleGrid& grid, std::int64_t num_rows);

@@ -12,8 +12,8 @@ namespace tomofield::baseline {
 enum class Activation { kRectifier, kSine };
 
 /// A small multilayer perceptron: affine layers with an activation between them and one output. It
-/// holds no parameters: every call receives them, as [layer][weights [input, output], biases
-/// [output]].
+/// holds no parameters. Every call receives them as
+///   [layer][weights [input, output], biases [output]].
 class DenseNetwork {
  public:
   /// Makes a network. `widths` is the number of inputs, then that of the neurons in each hidden

@@ -13,7 +13,7 @@
 
 namespace tomofield::baseline {
 
-/// Returns the size of the box that holds all samples of a grid, in pixels.
+/// Returns the size of the box that holds all samples of a grid, in pixels along x, y and z.
 Point box_of(const projection::SampleGrid& grid, std::int64_t num_rows);
 
 /// The rows of a slab that are computed together: lanes first, first + kStride, … up to the last
@@ -88,8 +88,8 @@ class NetworkDensity {
   base::AlignedBuffer<float> parameters_;
   std::vector<Chunk> chunks_;
   std::size_t num_columns_ = 0;
-  // Both hold values of a set of rows: [column, row], and [column, row, feature] where the encoding
-  // is fitted.
+  // points_ is [column, row] of a set of rows. grad_features_ is [column, row, feature] where the
+  // encoding is fitted, and empty elsewhere.
   std::vector<Point> points_;
   std::vector<float> grad_features_;
   std::vector<float> parts_;  // gradients of the network by parts of a slab

@@ -18,7 +18,7 @@ namespace tomofield::baseline {
 namespace {
 
 constexpr double kRateFall = 0.1;   // factor of the learning rate over all steps
-constexpr double kNoiseRate = 0.1;  // rate of the noise levels, which falls likewise
+constexpr double kNoiseRate = 0.1;  // rate of the noise levels; it falls by the same factor
 
 NetworkDensity::Shape shape_of(const NetworkOptions& options, double mean_density) {
   return {options.hidden_layers, options.width, options.activation,
