@@ -7,7 +7,7 @@
 namespace tomofield::output {
 
 /// Returns the metrics of the masks as JSON, for every command that reconstructs: beads, hot and
-/// dead pixels, and the fraction without loss of all rays and of each view's. Views are in the
+/// dead pixels, and the fraction of rays without a loss, of all rays and by view. Views are in the
 /// stack's order.
 nlohmann::json mask_json(const measurement::PreparedSeries& series);
 
