@@ -10,19 +10,19 @@
 
 namespace tomofield::testing {
 
-/// Where a bead is: relative to the middle of the view in x and on the axis in z.
+/// The position of a bead: relative to the middle of the view in x, and to the axis in z.
 struct TrueBead {
   double x_px, y_px, z_px;
 };
 
-/// A made-up tilt series: soft round bodies and a straight edge that turn with
-/// the specimen, white noise of deviation 1, and spheres of gold.
+/// A made-up tilt series: soft round bodies and a straight edge that turn with the specimen, white
+/// noise of deviation 1, and spheres of gold.
 struct BeadScene {
   std::int64_t width = 160, height = 128;
   std::vector<double> tilt_deg;
   std::vector<TrueBead> beads;
   double diameter_px = 5.0;
-  double contrast = 10.0;  ///< of a bead's middle
+  double contrast = 10.0;  ///< contrast of a bead's middle
   double specimen = 3.0;   ///< contrast of bodies and edge
   double noise = 1.0;
 
@@ -35,7 +35,7 @@ struct BeadScene {
     return static_cast<double>(width) / 2 + bead.x_px * std::cos(tilt) + bead.z_px * std::sin(tilt);
   }
 
-  /// Beads far enough apart to be told from each other at zero tilt.
+  /// Scatters beads that are far enough apart to tell them from each other at zero tilt.
   void scatter_beads(int count, std::uint64_t seed) {
     base::Random random(seed);
     while (static_cast<int>(beads.size()) < count) {

@@ -2,8 +2,8 @@
 
 namespace tomofield::testing {
 
-/// Derivative of objective() by a float that it depends on, from both sides; the
-/// float is put back.
+/// Returns the derivative of objective() by a float that it depends on, from both sides. Restores
+/// the float.
 template <typename Objective>
 double central_difference(float& parameter, float step, Objective&& objective) {
   const float kept = parameter, up = kept + step, down = kept - step;

@@ -9,7 +9,7 @@
 
 namespace tomofield::testing {
 
-/// value(x, y, section) for every pixel of a stack.
+/// Returns the value at (x, y, section) of a stack.
 using PixelFunction = std::function<float(std::int64_t, std::int64_t, std::int64_t)>;
 
 inline std::filesystem::path write_stack(const std::filesystem::path& path, std::int64_t nx,

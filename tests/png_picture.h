@@ -9,7 +9,7 @@
 
 namespace tomofield::testing {
 
-/// A PNG file's pixels, rows from the top.
+/// The pixels of a PNG file, rows from the top.
 struct PngPicture {
   std::int64_t width = 0, height = 0, channels = 0;
   std::vector<std::uint8_t> pixels;
@@ -18,7 +18,7 @@ struct PngPicture {
   }
 };
 
-/// As PNG_FORMAT_GRAY or PNG_FORMAT_RGB.
+/// Reads a PNG file as PNG_FORMAT_GRAY or PNG_FORMAT_RGB.
 inline PngPicture read_png(const std::filesystem::path& path, png_uint_32 format) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;

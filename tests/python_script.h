@@ -9,13 +9,13 @@
 
 namespace tomofield::testing {
 
-/// Whether Debian's Python has the modules that a test compares with.
+/// Returns true if Debian's Python has the modules that a test compares with.
 inline bool python_has(const std::string& modules) {
   return std::system((TOMOFIELD_PYTHON " -c 'import " + modules + "' 2>/dev/null").c_str()) == 0;
 }
 
-/// Runs a Python script in `directory`; what it printed (an assertion's
-/// message, too) is the result, "" for success without output.
+/// Runs a Python script in `directory`. Returns all that it printed, with the message of a failed
+/// assertion. Success without output is "".
 inline std::string run_python(const ScratchDirectory& directory, const std::string& script) {
   const auto path = directory.write("script.py", script);
   const auto output = directory / "output.txt";

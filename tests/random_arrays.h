@@ -23,7 +23,7 @@ inline std::vector<double> to_double(const std::vector<float>& values) {
   return {values.begin(), values.end()};
 }
 
-/// Every element within `tolerance` of what is expected.
+/// Expects every element to be within `tolerance` of the expected one.
 inline void expect_near(const std::vector<float>& found, const std::vector<double>& expected,
                         double tolerance) {
   ASSERT_EQ(found.size(), expected.size());

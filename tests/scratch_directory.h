@@ -10,7 +10,7 @@
 
 namespace tomofield::testing {
 
-/// A new, empty directory for one test; removed with all that is in it.
+/// Makes a new, empty directory for one test. Removes it with all its contents.
 class ScratchDirectory {
  public:
   ScratchDirectory() {
@@ -49,7 +49,7 @@ inline std::string read_whole_file(const std::filesystem::path& path) {
   return text.str();
 }
 
-/// The message of the exception of type E that `call` throws, or "" if it throws none.
+/// Returns the message of the exception of type E that `call` throws, or "" if it throws none.
 template <typename E, typename Call>
 std::string message_of(Call&& call) {
   try {

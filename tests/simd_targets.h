@@ -9,8 +9,8 @@
 
 namespace tomofield::testing {
 
-/// Runs `check` once for each SIMD target that the kernels were compiled for
-/// and this machine supports, then restores the usual choice.
+/// Runs `check` once for each SIMD target that the kernels were compiled for and this machine
+/// supports. Restores the usual choice afterwards.
 template <typename Check>
 void for_each_simd_target(Check&& check) {
   struct Restore {
@@ -19,7 +19,7 @@ void for_each_simd_target(Check&& check) {
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
     SCOPED_TRACE(hwy::TargetName(target));
-    // The kernels are compiled elsewhere: make sure that they follow.
+    // The kernels are compiled elsewhere: check that they use the same target.
     ASSERT_EQ(kernels::simd_target_name(), hwy::TargetName(target));
     check();
   }

@@ -12,15 +12,14 @@
 
 namespace tomofield::testing {
 
-/// A noisy series of a few spheres in empty space, projected analytically: small
-/// enough for unit tests, with a last slab that is not full and with pixels that
-/// are no measurements.
+/// A noisy series of a few spheres in empty space, projected analytically. It is small enough for
+/// unit tests. Its last slab is not full, and some of its pixels are no measurements.
 class SphereSeries {
  public:
   struct Options {
     double noise_sigma = 0.3;
-    float masked_value = 0.0f;          ///< stored where the mask is false
-    std::vector<double> scale_of_view;  ///< gains that the views are multiplied by; empty: 1
+    float masked_value = 0.0f;          ///< value of the pixels where the mask is false
+    std::vector<double> scale_of_view;  ///< gain of each view; empty: 1
   };
   static constexpr std::int64_t kWidth = 32, kRows = 21;
   static constexpr int kThickness = 20;
@@ -44,7 +43,7 @@ class SphereSeries {
         "/tmp");
   }
 
-  /// Density at a voxel's centre.
+  /// Returns the density at a voxel's centre.
   static double truth(int x, int y, int z) {
     double density = 0;
     for (const simulate::Ellipsoid& s : spheres()) {

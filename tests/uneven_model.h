@@ -10,9 +10,9 @@
 
 namespace tomofield::testing {
 
-/// A model with leaves of 64, 32 and 16 px beside each other, margin cells on
-/// both sides, unequal vertex counts and ranks, a thickness that is no whole
-/// number, a region of interest inside, and random densities of about 0 … 1.
+/// Returns a model with leaves of 64, 32 and 16 px beside each other, margin cells on both sides,
+/// unequal numbers of vertices and ranks, a thickness that is no whole number, a region of interest
+/// inside, and random densities of about 0 … 1.
 inline output::Model uneven_model(FieldKind kind) {
   using enum field::Region;
   const field::RootGrid roots{.x0 = -60, .y0 = 4, .cell_size = 64, .columns = 4, .rows = 2};

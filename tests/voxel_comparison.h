@@ -15,15 +15,16 @@
 
 namespace tomofield::testing {
 
-/// Problems of two slabs are no work for several threads; a test may set its own number.
+/// Runs a test with one thread: problems of two slabs are no work for several. A test may set its
+/// own number.
 class OneThread : public ::testing::Test {
  protected:
   OneThread() { base::set_thread_count(1); }
   ~OneThread() override { base::set_thread_count(0); }
 };
 
-/// The voxels of a sphere series without margins: nothing lies outside.
-/// `series` must outlive it.
+/// Returns the problem of a sphere series without margins: nothing lies outside. `series` must
+/// outlive it.
 inline baseline::VoxelProblem voxel_problem(const SphereSeries& series,
                                             const baseline::ViewHandling& handling = {}) {
   return {series.geometry,
@@ -43,7 +44,7 @@ void for_each_density(const baseline::VoxelVolume& volume, Body&& body) {
   }
 }
 
-/// Root mean square distance to the spheres.
+/// Returns the root mean square distance between a volume and the spheres.
 inline double rms_error(const baseline::VoxelVolume& volume) {
   double squares = 0, count = 0;
   for_each_density(volume, [&](int x, int y, int z, float density) {
@@ -54,7 +55,7 @@ inline double rms_error(const baseline::VoxelVolume& volume) {
   return std::sqrt(squares / count);
 }
 
-/// Root mean square of the spheres themselves: the error of an empty volume.
+/// Returns the root mean square of the spheres themselves: the error of an empty volume.
 inline double rms_truth() {
   double squares = 0, count = 0;
   for (int z = 0; z < SphereSeries::kThickness; ++z) {

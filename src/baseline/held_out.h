@@ -7,7 +7,8 @@
 
 namespace tomofield::baseline {
 
-/// How well densities, whose padding it writes, predict views (evaluate/view_errors.h).
+/// Computes how well densities predict `views` (measurement/view_errors.h). Writes the padding of
+/// `densities`.
 measurement::ViewErrors held_out_errors(const VoxelProblem& problem, const std::vector<int>& views,
                                         bool fit_view_scale, VoxelVolume& densities);
 

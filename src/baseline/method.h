@@ -15,17 +15,17 @@
 namespace tomofield::baseline {
 
 /// The options of one of the methods. Each has facts() and json(), and an overload of
-/// reconstruct_with() in method.cc: that and a line here are all that a method needs.
+/// reconstruct_with() in method.cc. A new method needs these and a line here.
 using Method =
     std::variant<WbpOptions, SirtOptions, SartTvOptions, TvOptions, IngpOptions, ImplicitOptions>;
 
 MethodFacts facts_of(const Method& method);
-/// Of a method whose options do not say it in a size(), every voxel is a parameter.
+/// Returns the size of a method. Every voxel is a parameter unless its options have a size().
 MethodSize size_of(const Method& method, const projection::SampleGrid& grid, std::int64_t num_rows);
-/// The name and every option.
+/// Returns the name and every option.
 nlohmann::json json_of(const Method& method);
 
-/// Reconstructs with it. `mean_density` is that of the specimen, in density units.
+/// Reconstructs with a method. `mean_density` is the specimen's, in density units.
 Solution reconstruct(VoxelProblem& problem, const Method& method, double mean_density,
                      const AfterIteration& after_iteration);
 

@@ -36,8 +36,8 @@ projection::SampleGrid grid_of(const measurement::PreparedSeries& series,
                                       options.specimen.with_margin ? options.margin_spacing : 0.0);
 }
 
-// What the method holds of each slab, and a pair of slabs and its rays for each thread; a tuning
-// has copies of the rays of its rows.
+// Estimates the memory: the volumes and detectors of the method, and a pair of slabs and its rays
+// for each thread. A tuning holds copies of the rays of its rows.
 std::size_t estimate_memory(const measurement::PreparedSeries& plan,
                             const projection::SampleGrid& grid, const MethodFacts& method,
                             const MethodSize& size, bool tunes) {
@@ -65,7 +65,7 @@ base::ProgressReport progress_report(const IterationReport& report, int num_iter
                                        2 * report.data_loss / static_cast<double>(num_rays)));
 }
 
-// Voxels of the region of interest, slab by slab.
+// Returns the voxels of the region of interest, slab by slab.
 output::VoxelSource voxels_of(const VoxelVolume& densities) {
   return [&densities](const field::BoxSink& sink) {
     const projection::SampleSegment& segment = densities.grid().segments().front();
@@ -109,7 +109,7 @@ nlohmann::json options_json(const BaselineOptions& options) {
           {"method", json_of(options.method)}};
 }
 
-// How well the densities predict the views that were not fitted; null if all were.
+// Returns the error of the held-out views as JSON, or null if there are none.
 nlohmann::json held_out_json(const VoxelProblem& problem, const std::vector<int>& views,
                              bool fit_view_scale, VoxelVolume& densities) {
   if (views.empty()) return nullptr;
@@ -193,9 +193,10 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
         "--xtilt out (the volume is then turned by it), or use reconstruct or baseline tensorf",
         planned.x_tilt_deg));
   }
-  const std::vector<int> held_out =  // throws if there are none
+  // This and trial_views() throw if there are too few views.
+  const std::vector<int> held_out =
       measurement::held_out_views(planned.geometry.tilt_deg, options.hold_out);
-  if (options.tune) selection::trial_views(planned.geometry.tilt_deg, held_out);  // or too few
+  if (options.tune) selection::trial_views(planned.geometry.tilt_deg, held_out);
   const projection::SampleGrid grid = grid_of(planned, options);
   BaselinePlan plan;
   plan.num_views = planned.geometry.num_views();

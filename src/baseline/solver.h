@@ -12,53 +12,52 @@
 
 namespace tomofield::baseline {
 
-/// What a method is called and what it needs besides its own scratch space.
+/// The name of a method and what it holds besides its own scratch space.
 struct MethodFacts {
   const char* name;
-  int iterations;   ///< passes over the views
-  int volumes;      ///< held at once, the densities among them
-  int detectors;    ///< held at once, of all views of a slab, the measured rays among them
-  int buffers = 1;  ///< of a pair of slabs, that each thread has
-  const char* memory_advice = "";  ///< what of its own options takes less, as the end of a sentence
+  int iterations;                  ///< passes over the views
+  int volumes;                     ///< volumes held at once, with the densities
+  int detectors;                   ///< detectors of a slab held at once, with the measured rays
+  int buffers = 1;                 ///< buffers of a pair of slabs in each thread
+  const char* memory_advice = "";  ///< its options that save memory, as the end of a sentence
 };
 
-/// How much of it a method needs for a series: what it fits, and the memory that it takes besides
-/// the volumes and detectors.
+/// The size of a method for a series: what it fits, and the memory besides the volumes and
+/// detectors.
 struct MethodSize {
   std::size_t num_parameters;
   std::size_t bytes;
 };
 
-/// What a reconstruction ends with. The histories of iterative ones have one entry for
-/// the starting densities and one for the densities after each iteration.
+/// The result of a reconstruction. The histories of iterative methods have one entry for the
+/// starting densities and one for the densities after each iteration.
 struct Solution {
   VoxelVolume densities;
   std::vector<double> data_loss;  ///< ½ Σ (residual / σ)²
-  std::vector<double> objective;  ///< what is minimised
-  /// Of the fitted views, in density units times pixels, if the method learns it.
+  std::vector<double> objective;  ///< the minimised sum
+  /// The noise of the fitted views, in density units times pixels, if the method learns it.
   std::vector<double> noise_sigma = {};
 };
 
-/// By how much the objective fell in the last tenth of the iterations, as a fraction of it; none of
-/// a method that does not iterate.
+/// Returns the fall of the objective in the last tenth of the iterations, as a fraction of the
+/// objective. Returns nothing for a method that does not iterate.
 std::optional<double> last_decrease(const Solution& solution);
 
-/// An iteration that is done; the figures are those of the densities that it began with.
+/// The report of a finished iteration. Its losses are those of the densities that it began with.
 struct IterationReport {
   int iteration = 0;  ///< 1 is the first
   double data_loss = 0.0;
   double objective = 0.0;
 };
 
-/// Called after every iteration, with the densities that it ended with, of which it may write the
-/// padding.
+/// Called after every iteration with the densities at its end. It may write their padding.
 using AfterIteration = std::function<void(const IterationReport&, VoxelVolume&)>;
 
-/// The rays of a pair of slabs and some buffers of its samples for each thread of
+/// Holds the rays of a pair of slabs and some buffers of its samples for each thread of
 /// base::parallel_for.
 class ThreadScratch {
  public:
-  /// For the views that are fitted.
+  /// Makes room for the fitted views and one buffer.
   explicit ThreadScratch(const VoxelProblem& problem)
       : ThreadScratch(problem, problem.views().size(), 1) {}
   ThreadScratch(const VoxelProblem& problem, std::size_t num_views, std::size_t num_buffers)
@@ -70,7 +69,7 @@ class ThreadScratch {
       samples_.emplace_back(SlabPair::kMost * problem.grid().size());
   }
   float* detector() { return detectors_[thread()].data(); }
-  /// As they were left.
+  /// Returns a buffer with what its last user left in it.
   float* samples(std::size_t buffer = 0) {
     return samples_[thread() * num_buffers_ + buffer].data();
   }

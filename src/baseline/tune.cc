@@ -20,16 +20,17 @@ namespace {
 
 using selection::HeldOutScore;
 
-constexpr int kLadderSteps = 4;  // of numbers of iterations, of √2, to either side of the first
-constexpr int kCutoffs = 7;      // a √2 apart
+constexpr int kLadderSteps = 4;  // factors of √2 up and down from the first number of iterations
+constexpr int kCutoffs = 7;      // candidates, each √2 times the one before
 
-// A trial of `tv` is at its minimum when the objective falls by no more than this part in the last
-// tenth of the iterations. Before, a held-out error says how near it is rather than how good the
-// weight is: after 10 iterations on a phantom a tenth of the best weight seemed better.
+// The largest fall of the objective in the last tenth of the iterations at which a trial of `tv`
+// counts as converged. Before that, a held-out error says how near the trial is to its minimum
+// rather than how good the weight is: after 10 iterations on a phantom a tenth of the best weight
+// seemed better.
 constexpr double kAtMinimum = 0.01;
-constexpr int kMostIterations = 400;  // of trials that are not there yet
+constexpr int kMostIterations = 400;  // upper limit for trials that have not converged
 
-// The settings that a tuning may change, as they are written on the command line.
+// Returns the settings that a tuning may change, as the command line writes them.
 std::string settings_text(const Method& method) {
   const nlohmann::json json = json_of(method);
   std::string text;
@@ -43,7 +44,7 @@ std::string settings_text(const Method& method) {
   return text;
 }
 
-// Makes the trials of a search, with its progress; none twice.
+// Makes the trials of a search and reports its progress. It makes no trial twice.
 class Trials {
  public:
   Trials(const TrialData& data, const base::ProgressSink& progress)
@@ -65,7 +66,7 @@ class Trials {
     return trials_.back();
   }
 
-  // One run, scored after each of these numbers of iterations, which ascend.
+  // Makes one run and scores it after each of these numbers of iterations, which ascend.
   template <StopsEarly Options>
   std::vector<HeldOutScore> scores(Options options, const std::vector<int>& iterations) {
     options.iterations = iterations.back();
@@ -80,7 +81,7 @@ class Trials {
     return scores;
   }
 
-  // Says for the progress what comes: about so many runs, with so many iterations in all.
+  // Tells the progress what will come: about `runs` more runs, with `iterations` in all.
   void expect(int runs, int iterations) {
     expected_runs_ = num_runs_ + runs;
     expected_iterations_ = iterations_done_ + iterations;
@@ -91,8 +92,8 @@ class Trials {
   }
 
  private:
-  // Adds a trial after each iteration for which trial_after names what it is a trial of. Returns by
-  // how much the objective fell in the end.
+  // Adds a trial after each iteration for which trial_after() returns the trial's method. Returns
+  // the fall of the objective at the end.
   template <typename TrialAfter>
   std::optional<double> run(const Method& method, TrialAfter trial_after) {
     VoxelProblem problem(series_.geometry, data_.grid, *series_.rays, series_.noise_sigma,
@@ -191,7 +192,7 @@ void choose_cutoff(Options& options, Trials& trials) {
   options.filter.cutoff = cutoffs[selection::first_as_good_as_the_best(scores)];
 }
 
-// Again with more iterations until the trial that is chosen is at its minimum.
+// Repeats the search with more iterations until the chosen trial is at its minimum.
 Method tuned(const TvOptions& start, Trials& trials) {
   for (TvOptions tried = start;;) {
     const int runs = selection::kUsualWeights + (votes_on_penalty(tried) ? 1 : 0);

@@ -13,7 +13,7 @@
 
 namespace tomofield::baseline {
 
-/// Methods that tune() can choose something of.
+/// The methods of which tune() can choose something.
 template <typename Options>
 concept HasWeight = requires(Options options) {
   options.weight;
@@ -25,21 +25,21 @@ concept HasCutoff = std::same_as<Options, WbpOptions>;
 template <typename Options>
 concept Tunable = HasWeight<Options> || StopsEarly<Options> || HasCutoff<Options>;
 
-/// A method with its settings, and how well it predicts the views held out.
+/// A method with its settings and its error on the held-out views.
 struct Trial {
   Method method;
   selection::HeldOutScore score = {};
   double seconds = 0;
-  std::optional<double> last_decrease = {};  ///< of its own run: see last_decrease()
+  std::optional<double> last_decrease = {};  ///< last_decrease() of its own run
 };
 
 struct Tuned {
   Method method;
   std::vector<Trial> trials;         ///< in order
-  std::vector<int> predicted_views;  ///< by which they were chosen
+  std::vector<int> predicted_views;  ///< views of the trials' scores
 };
 
-/// What trials are made on.
+/// The data of the trials.
 struct TrialData {
   const measurement::PreparedSeries& series;
   projection::SampleGrid grid;
@@ -47,19 +47,22 @@ struct TrialData {
   bool fit_view_scale = false;
 };
 
-/// Chooses the settings that predict views held out from the trials best, by the rules of the main
-/// method's tuning (reconstruct/tune.h) and on the same rows and views
-/// (reconstruct/trial_series.h): the penalty, if neither it nor a weight is given, by a vote of the
-/// views on both with their usual weights; the weight by search_weight(); and of methods that stop
-/// early the number of iterations, between a quarter and four times that of `start` in steps of √2,
-/// all of one run, the fewest of those that cannot be told from the best; of `wbp` the cutoff, from
-/// that of `start` down to an eighth of it, the smallest of those that cannot be told from the
-/// best. Methods that are not Tunable stay as they are. Of `tv` everything is tried anew with more
-/// iterations until the trial that is chosen has converged; what is chosen has the iterations of
-/// `start`.
+/// Chooses the settings that best predict views held out from the trials. Its rules, rows and views
+/// are those of the main method's tuning (selection/trials.h, selection/trial_series.h).
+///
+/// It chooses the penalty if neither the penalty nor a weight is given: the views vote on both
+/// penalties with their usual weights. It chooses the weight by search_weight(). For methods that
+/// stop early it chooses the number of iterations: the candidates lie between a quarter and four
+/// times that of `start`, in steps of √2, all of one run, and the smallest that cannot be told from
+/// the best wins. For `wbp` it chooses the cutoff: the candidates lie between that of `start` and
+/// an eighth of it, and the smallest that cannot be told from the best wins. Methods that are not
+/// Tunable stay as they are.
+///
+/// For `tv` it repeats all trials with more iterations until the chosen trial has converged. The
+/// result has the iterations of `start` all the same.
 Tuned tune(const Method& start, const TrialData& data, const base::ProgressSink& progress);
 
-/// What was chosen, and every trial.
+/// Returns the chosen settings and every trial as JSON.
 nlohmann::json tuning_json(const Tuned& tuned);
 
 }  // namespace tomofield::baseline

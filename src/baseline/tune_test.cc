@@ -35,7 +35,7 @@ class BaselineTune : public testing::OneThread {
     return tune(start, {series_, grid, {}, false}, progress_);
   }
 
-  // Root mean square distance to the truth of what all views give.
+  // Returns the root mean square distance between the truth and the result of all views.
   double error_of(const Method& method) const {
     VoxelProblem problem(series_.geometry,
                          projection::make_sample_grid(series_.geometry, 0, SphereSeries::kWidth, 0),
@@ -116,7 +116,7 @@ TEST_F(BaselineTune, AStopIsTheSameAsARunOfSoManyIterations) {
   options.iterations = 8;
   const Tuned all = tuned(options);
   ASSERT_EQ(all.trials.size(), 9u);
-  options.iterations = 2;  // its longest run is a trial of the other's
+  options.iterations = 2;  // its longest run has 8 iterations
   const Tuned few = tuned(options);
   EXPECT_EQ(std::get<SirtOptions>(all.trials[4].method).iterations, 8);
   EXPECT_EQ(std::get<SirtOptions>(few.trials.back().method).iterations, 8);
@@ -138,7 +138,8 @@ TEST_F(BaselineTune, CutsOffWhereNoiseIsAllThereIs) {
   EXPECT_LT(error_of(found.method), error_of(start));
 }
 
-// The number of weights that a search tries is not known before; here it is what is usual.
+// A search does not know in advance how many weights it tries; the progress assumes the usual
+// number.
 TEST_F(BaselineTune, TellsHowFarItIs) {
   TvOptions concave = tv(3.0);
   concave.iterations = 120;

@@ -14,18 +14,18 @@
 
 namespace tomofield::baseline {
 
-/// What is done with single views.
+/// The handling of single views.
 struct ViewHandling {
-  std::vector<int> held_out = {};  ///< kept from the fit, ascending
+  std::vector<int> held_out = {};  ///< views kept from the fit, ascending
   bool fit_scale = false;          ///< per-view scale and offset as nuisances
 };
 
-/// What all baselines fit: ½ Σ ((scale A x + offset − b) / σ_view)² over the
-/// rays that count, for densities x at the samples of `grid`. Everything is in
-/// the density units of the main method. `rays` must outlive it.
+/// The problem that all baselines fit: ½ Σ ((scale A x + offset − b) / σ_view)² over the rays that
+/// count, for densities x at the samples of `grid`. Everything is in the density units of the main
+/// method. `rays` must outlive the problem.
 ///
-/// A detector is a slab's rays of some views, one after the other: [view, x, lane]. Those of a
-/// pair of slabs follow each other, detector_size(views) floats apart.
+/// A detector is a slab's rays of some views, one view after the other: [view, x, lane]. The
+/// detectors of a pair of slabs follow each other, detector_size(views) floats apart.
 class VoxelProblem {
  public:
   VoxelProblem(const geometry::TiltGeometry& geometry, projection::SampleGrid grid,
@@ -38,29 +38,29 @@ class VoxelProblem {
   std::int64_t num_rows() const { return rays_.shape().num_rows; }
   int num_slabs() const { return rays_.num_slabs(); }
   std::size_t num_pairs() const { return static_cast<std::size_t>(SlabPair::number(num_slabs())); }
-  /// The views that are fitted, ascending.
+  /// Returns the fitted views, ascending.
   const std::vector<int>& views() const { return views_; }
   const measurement::ViewModel& view_model(int view) const {
     return models_[static_cast<std::size_t>(view)];
   }
-  /// Of all views.
+  /// Returns the noise of all views.
   const std::vector<double>& noise_sigma() const { return noise_sigma_; }
   std::int64_t width() const { return projector_.geometry().width; }
-  /// Floats of a detector of the views that are fitted, or of these.
+  /// Returns the number of floats of a detector of the fitted views, or of `views`.
   std::size_t detector_size() const { return detector_size(views_); }
   std::size_t detector_size(std::span<const int> views) const {
     return projector_.detector_size(views.size());
   }
-  /// Rays that count, of the views that are fitted.
+  /// Returns the number of rays of the fitted views that count.
   std::int64_t num_rays() const;
 
-  /// Row sums of A, [x]: the length of each ray of a view within the samples, at
-  /// least one pixel. They are the same for every row of the detector.
+  /// Returns the row sums of A for a view, [x]: the length of each ray within the samples, at least
+  /// one pixel. They are the same for every row of the detector.
   std::span<const float> ray_lengths(int view) const {
     return std::span(ray_lengths_).subspan(static_cast<std::size_t>(view * width()), row_size());
   }
-  /// Calls body(view model, ray length, at) for each pixel of a detector row of these
-  /// views; `at` is where its lanes lie in their detector.
+  /// Calls body(view model, ray length, at) for each pixel of a detector row of these views. The
+  /// lanes of the pixel begin at index `at` of their detector.
   template <typename Body>
   void for_each_ray(std::span<const int> views, Body&& body) const {
     std::size_t at = 0;
@@ -72,27 +72,28 @@ class VoxelProblem {
     }
   }
 
-  /// detector ← scale (scale A x + offset − b) for the rays of some slabs of these views, 0 for
-  /// those that do not count. Writes the padding of `samples`. Returns sums, one each view.
-  /// Only rays of these `lanes`, a bit each, count.
+  /// Sets detector ← scale (scale A x + offset − b) for the rays of these slabs and views, and 0
+  /// for rays that do not count. Only rays of these `lanes`, a bit each, count. Writes the padding
+  /// of `samples`. Returns the sums, one a view.
   std::vector<measurement::ViewSums> residuals(const SlabPair& slabs, std::span<const int> views,
                                                float* samples, float* detector,
                                                std::uint16_t lanes = kAllLanes) const;
-  /// ½ Σ (residual / σ)² of one slab or, with added sums, of all; sums of the fitted views.
+  /// Returns ½ Σ (residual / σ)² from the sums of the fitted views, of one slab or added up over
+  /// several.
   double data_loss(const std::vector<measurement::ViewSums>& sums) const;
 
-  /// samples ← Aᵀ detector, of so many slabs.
+  /// Sets samples ← Aᵀ detector for `num_slabs` slabs.
   void backproject(std::span<const int> views, const float* detector, float* samples,
                    int num_slabs = 1) const {
     projector_.backward(detector, views, samples, num_slabs);
   }
 
   bool fits_view_models() const { return fits_scale_; }
-  /// Fits scale and offset of each view to the sums of all slabs (loss/data_term.h),
-  /// if the problem is to.
+  /// Fits the scale and the offset of each view to the sums of all slabs
+  /// (measurement/view_residuals.h), if the problem fits them at all.
   void fit_view_models(const std::vector<measurement::ViewSums>& sums);
 
-  /// detector ← 1 / σ² of the view for the rays of a slab that count, 0 for the others.
+  /// Sets detector ← 1 / σ² of the view for the rays of a slab that count, and 0 for the others.
   void fill_weights(int slab, std::span<const int> views, float* detector) const;
 
  private:
@@ -105,15 +106,16 @@ class VoxelProblem {
   std::vector<double> noise_sigma_;
   bool fits_scale_;
   std::vector<int> views_;
-  std::vector<measurement::ViewModel> models_;  // of all views
+  std::vector<measurement::ViewModel> models_;  // [view], of all views
   std::vector<float> ray_lengths_;              // [view, x], of all views
 };
 
-/// The sums of these views over all slabs, for the densities of a volume, whose padding it writes.
+/// Returns the sums of these views over all slabs for the densities of a volume. Writes its
+/// padding.
 std::vector<measurement::ViewSums> view_sums(const VoxelProblem& problem,
                                              std::span<const int> views, VoxelVolume& densities);
 
-/// The sums of all parts, added in their order: the same for any thread count.
+/// Returns the sums over all parts, added in their order: the same for any thread count.
 std::vector<measurement::ViewSums> total(
     const std::vector<std::vector<measurement::ViewSums>>& sums_of_part);
 

@@ -15,8 +15,8 @@
 
 namespace tomofield::baseline {
 
-/// Slabs that are projected together, which takes less time: an even one and, but for the end, the
-/// one after it.
+/// Two slabs that are projected together, which takes less time: an even one and the one after it,
+/// unless that is past the end.
 struct SlabPair {
   static constexpr int kMost = projection::SlabProjector::kSlabsTogether;
   int first = 0, count = 1;
@@ -25,9 +25,9 @@ struct SlabPair {
   static int number(int num_slabs) { return (num_slabs + kMost - 1) / kMost; }
 };
 
-/// A volume whose voxels are the samples of the projector, slab after slab: each
-/// slab a buffer [segment][z][x][lane] of a SampleGrid, zero at first. Padding
-/// and the lanes past the last row are no voxels and stay zero.
+/// A volume whose voxels are the samples of the projector, slab after slab. Each slab is a buffer
+/// [segment][z][x][lane] of a SampleGrid, zero at first. Padding and the lanes past the last row
+/// are no voxels and stay zero.
 class VoxelVolume {
  public:
   VoxelVolume(projection::SampleGrid grid, std::int64_t num_rows)
@@ -40,7 +40,8 @@ class VoxelVolume {
   int num_slabs() const {
     return static_cast<int>((num_rows_ + kernels::kLanes - 1) / kernels::kLanes);
   }
-  /// Lanes of a slab that are rows of the volume: 16, or fewer in the last one.
+  /// Returns the number of lanes of a slab that are rows of the volume: 16, or fewer in the last
+  /// slab.
   int rows_in_slab(int slab) const {
     return static_cast<int>(
         std::min<std::int64_t>(kernels::kLanes, num_rows_ - std::int64_t{slab} * kernels::kLanes));
@@ -72,9 +73,8 @@ class VoxelVolume {
   base::AlignedBuffer<float> samples_;
 };
 
-/// Calls body(segment, row) for each z row of a slab's samples: `row` is where
-/// sample (0, k, lane 0) lies in a slab buffer, and the nx · kLanes floats from
-/// there on are the row's samples.
+/// Calls body(segment, row) for each z row of a slab's samples. `row` is the index of sample (0, k,
+/// lane 0) in a slab buffer; the nx · kLanes floats from there on are the row's samples.
 template <typename Body>
 void for_each_sample_row(const projection::SampleGrid& grid, Body&& body) {
   for (const projection::SampleSegment& segment : grid.segments()) {
@@ -82,7 +82,7 @@ void for_each_sample_row(const projection::SampleGrid& grid, Body&& body) {
   }
 }
 
-/// Of all slabs, with the margins.
+/// Returns the number of voxels of all slabs, with the margins.
 inline std::size_t num_voxels(const projection::SampleGrid& grid, std::int64_t num_rows) {
   std::size_t count = 0;
   for (const projection::SampleSegment& segment : grid.segments())
@@ -99,7 +99,7 @@ void for_each_pair(int num_slabs, Body&& body) {
   });
 }
 
-/// Sum of body(pair) over all pairs, in their order whatever the thread count.
+/// Returns the sum of body(pair) over all pairs, added in their order whatever the thread count.
 template <typename Body>
 double sum_over_pairs(int num_slabs, Body&& body) {
   std::vector<double> parts(static_cast<std::size_t>(SlabPair::number(num_slabs)));
@@ -107,7 +107,7 @@ double sum_over_pairs(int num_slabs, Body&& body) {
   return std::accumulate(parts.begin(), parts.end(), 0.0);
 }
 
-/// Sum of body(slab) over all slabs, in their order whatever the thread count.
+/// Returns the sum of body(slab) over all slabs, added in their order whatever the thread count.
 template <typename Body>
 double sum_over_slabs(int num_slabs, Body&& body) {
   std::vector<double> parts(static_cast<std::size_t>(num_slabs));

@@ -12,15 +12,16 @@ void add_common_options(CLI::App& command) {
   constexpr int kMostThreads = 1024;
   command
       .add_option_function<int>("--threads", base::set_thread_count,
-                                "to compute with; default: OMP_NUM_THREADS, or every core. The "
-                                "result is the same for any number")
+                                "number of threads; default: OMP_NUM_THREADS, or every core. The "
+                                "result is the same for any "
+                                "number")
       ->check(number_between(1, kMostThreads))
       ->type_name("INT")
       ->group(group);
   command
       .add_option_function<std::string>(
           "--config", [](const std::string&) {},
-          "options from a TOML file, such as thickness = 150; those on the command line win")
+          "read options from a TOML file, such as thickness = 150; the command line wins")
       ->type_name("FILE.toml")
       ->group(group);
 }

@@ -4,9 +4,9 @@
 
 namespace tomofield::cli {
 
-/// Registers what every command that computes has: --threads, which takes effect
-/// as soon as it is parsed, and --config, so that the help lists it
-/// (expand_config_file() has taken it from the arguments by then).
+/// Registers the options of every command that computes: --threads, which takes effect as soon as
+/// it is parsed, and --config. The latter is registered for the help alone: expand_config_file()
+/// has removed it from the arguments by then.
 void add_common_options(CLI::App& command);
 
 }  // namespace tomofield::cli

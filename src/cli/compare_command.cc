@@ -24,9 +24,9 @@ namespace {
 constexpr double kMostViews = 1e9;
 
 struct Arguments {
-  tilt_series::TiltSeriesOptions input;  // checked here, read by the methods
+  tilt_series::TiltSeriesOptions input;  // checked here, read again by the methods
   measurement::SpecimenOptions specimen;
-  std::string view_scale = "auto";  // likewise
+  std::string view_scale = "auto";  // checked here, used by the methods
   std::vector<std::string> names{"vm", "tv", "sirt", "wbp"};
   std::vector<std::string> others;
   std::string truth, folder;
@@ -34,7 +34,7 @@ struct Arguments {
   int hold_out = 0;
 };
 
-// The words that say what the series is, as they were given: every method gets them.
+// Returns the words that describe the series, as they were given. Every method gets them.
 std::vector<std::string> series_words(const CLI::App& command,
                                       const std::vector<std::string>& own_options) {
   std::vector<std::string> words;
@@ -45,7 +45,7 @@ std::vector<std::string> series_words(const CLI::App& command,
       words.push_back(option->get_name());
     if (is_flag) continue;
     const std::string value = fmt::format("{}", fmt::join(option->results(), ","));
-    // A value that begins with a minus would be taken for an option.
+    // A separate value that begins with a minus would count as an option.
     if (!words.empty() && words.back() == option->get_name() && value.rfind('-', 0) == 0)
       words.back() += "=" + value;
     else
@@ -58,7 +58,7 @@ ExitStatus stopped(compare::Outcome outcome, const Arguments& arguments) {
   if (outcome == compare::Outcome::kStoppedBeforeRuns)
     return {stop_status(), "stopped before the first run; nothing has been made or removed"};
   return {stop_status(),
-          fmt::format("stopped; what is finished is in '{}': continue with the same command{}",
+          fmt::format("stopped; finished runs are in '{}': continue with the same command{}",
                       arguments.folder, arguments.overwrite ? " without --overwrite" : "")};
 }
 
@@ -80,8 +80,9 @@ void run(const CLI::App& command, const Arguments& arguments,
   const compare::RunHooks hooks{
       .run_starts =
           [](const compare::Run& run, bool is_there) {
-            base::log_info(fmt::format("{}: {}", run.name,
-                                       is_there ? "there already" : "running, its log beside it"));
+            base::log_info(
+                fmt::format("{}: {}", run.name,
+                            is_there ? "already done" : "running; its log is beside the volume"));
           },
       .stop_requested = stop_was_requested};
   const compare::Outcome outcome = compare::compare_methods(options, hooks);
@@ -95,7 +96,7 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
   const char* group = "Comparison";
   command
       .add_option("--methods", arguments.names,
-                  fmt::format("which, the first being the main one: {}",
+                  fmt::format("methods to run, the main one first: some of {}",
                               fmt::join(compare::names_of(compare::known_methods()), ", ")))
       ->delimiter(',')
       ->capture_default_str()
@@ -110,23 +111,25 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
   command
       .add_flag(
           "--tune", arguments.tune,
-          "tune the methods that have --tune, in every run anew: those for --hold-out without "
-          "the views that score them")
+          "tune the methods that have --tune, anew in every run; a run for --hold-out is tuned "
+          "without the views that score it")
       ->group(group);
   command
       .add_flag("--halves", arguments.halves,
-                "run every method on the odd and on the even views too, and correlate the two")
+                "also run every method on the odd and on the even views, and correlate the two")
       ->group(group);
   command
       .add_option("--hold-out", arguments.hold_out,
-                  "run every method without every Nth view too, and report how well it predicts "
-                  "them")
+                  "also run every method without every Nth view, and report how well it predicts "
+                  "these views")
       ->check(number_between(2, kMostViews))
       ->group(group);
-  command.add_option("-o,--output", arguments.folder, "folder of everything that it makes")
+  command.add_option("-o,--output", arguments.folder, "folder of all results")
       ->required()
       ->group(group);
-  command.add_flag("--overwrite", arguments.overwrite, "make everything anew")->group(group);
+  command
+      .add_flag("--overwrite", arguments.overwrite, "remove old results and run all methods anew")
+      ->group(group);
   return {"--methods",  "--also",   "--truth",     "--tune",   "--halves",
           "--hold-out", "--output", "--overwrite", "--exclude"};
 }
@@ -135,7 +138,8 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
 
 void add_compare_command(CLI::App& program) {
   CLI::App& command = *program.add_subcommand(
-      "compare", "several methods on one series: volumes, a table and a report.html side by side");
+      "compare",
+      "Run several methods on one series: their volumes, a table and report.html side by side");
   auto arguments = std::make_shared<Arguments>();
   add_input_options(command, arguments->input);
   add_specimen_options(command, arguments->specimen);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kConfigFlag = "--config";
 
-// Removes `--config FILE` or `--config=FILE`; returns FILE or nothing.
+// Removes `--config FILE` or `--config=FILE` from the arguments. Returns FILE, or nothing.
 std::optional<std::string> take_config_path(std::vector<std::string>& arguments) {
   std::optional<std::string> path;
   const std::string assignment = std::string(kConfigFlag) + "=";
@@ -48,7 +48,7 @@ toml::table read_toml(const std::string& path) {
   }
 }
 
-// One entry of the file; faults name the line.
+// One entry of the file. Its faults name the line.
 class Entry {
  public:
   Entry(const std::string& path, std::string name, const toml::node& node)
@@ -61,7 +61,7 @@ class Entry {
         fmt::format("'{}', line {}: '{}' {}", path_, node_.source().begin.line, name_, what));
   }
 
-  // The words of the command line that it stands for.
+  // Returns the words of the command line that the entry stands for.
   std::vector<std::string> arguments(int most_values) const {
     const bool is_flag = most_values == 0;
     const auto flag = node_.value_exact<bool>();
@@ -69,10 +69,10 @@ class Entry {
       fail(is_flag ? "must be true or false" : "needs a value, not true or false");
     if (flag) return *flag ? std::vector{"--" + name_} : std::vector<std::string>{};
     const toml::array* array = node_.as_array();
-    if (array == nullptr) return {"--" + name_ + "=" + text_of(node_)};  // also of "-60:60:2"
+    if (array == nullptr) return {"--" + name_ + "=" + text_of(node_)};  // also for "-60:60:2"
     std::vector<std::string> words;
     for (const toml::node& element : *array) words.push_back(text_of(element));
-    // A list in one word, like --roi's; other options say that it is not what they take.
+    // The list becomes one word, like --roi's. Other options refuse such a word themselves.
     if (most_values == 1) return {fmt::format("--{}={}", name_, fmt::join(words, ","))};
     if (words.size() > static_cast<std::size_t>(most_values))
       fail(fmt::format("takes at most {} values, not {}", most_values, words.size()));
@@ -100,13 +100,13 @@ bool is_given(const CLI::Option& option, const std::vector<std::string>& argumen
   });
 }
 
-// How the user calls it: "tomofield baseline tv".
+// Returns the words that call a command, such as "tomofield baseline tv".
 std::string full_name(const CLI::App& command) {
   const CLI::App* parent = command.get_parent();
   return parent == nullptr ? "tomofield" : full_name(*parent) + " " + command.get_name();
 }
 
-// The subcommand that the leading words of the arguments name.
+// Returns the subcommand that the leading words of the arguments name.
 const CLI::App* find_command(const CLI::App& program, const std::vector<std::string>& arguments) {
   const CLI::App* command = &program;
   for (const std::string& word : arguments) {

@@ -6,11 +6,10 @@
 
 namespace tomofield::cli {
 
-/// Replaces `--config FILE` in the arguments of a subcommand by the options
-/// that the TOML file sets: `thickness = 150` stands for `--thickness 150`,
-/// `overwrite = true` for `--overwrite`, an array for several values. Options
-/// given on the command line win. Throws Error for a file that cannot be read
-/// and for keys that the subcommand does not know.
+/// Replaces `--config FILE` in the arguments of a subcommand by the options that the TOML file
+/// sets. `thickness = 150` stands for `--thickness 150`, `overwrite = true` for `--overwrite`, and
+/// an array for several values. Options on the command line win. Throws Error for a file that
+/// cannot be read and for keys that the subcommand does not know.
 void expand_config_file(const CLI::App& program, std::vector<std::string>& arguments);
 
 }  // namespace tomofield::cli

@@ -18,7 +18,7 @@
 namespace tomofield::cli {
 namespace {
 
-// Everything that is written, after all of it was found.
+// All results, which are written after every score has been computed.
 struct Findings {
   nlohmann::json figures;
   std::optional<evaluate::Fsc> fsc;
@@ -37,7 +37,7 @@ void print_comparison(const evaluate::Comparison& comparison) {
              box.first[0], box.first[1], box.first[2]);
 }
 
-// Where a curve falls below a threshold, or why there is no such place.
+// Returns the resolution at which a curve falls below a threshold, or why there is none.
 std::string crossing_text(const evaluate::Fsc& fsc, const evaluate::FscCurve& curve,
                           double threshold) {
   if (const auto at = evaluate::crossing_A(fsc.frequency_per_A, curve, threshold))
@@ -113,7 +113,7 @@ void measure_contrast(const EvaluateArguments& arguments, const base::Volume& vo
   print_contrast(score, regions, chosen);
 }
 
-// What a volume tells by itself.
+// Computes the scores that need the volume alone.
 void examine(const EvaluateArguments& arguments, Findings& findings) {
   const bool has_profile = arguments.profile && !arguments.truth;
   const bool nothing_asked =

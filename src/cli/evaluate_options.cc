@@ -18,7 +18,7 @@ namespace {
 
 constexpr const char* kBoxType = "X0,Y0,Z0,X1,Y1,Z1";
 
-/// A box of whole numbers; nothing for any other text.
+/// Parses a box of whole numbers. Returns nothing for any other text.
 std::optional<evaluate::Box> parse_box(const std::string& text) {
   const auto numbers = parse_whole_numbers(text);
   if (!numbers || numbers->size() != 6) return std::nullopt;
@@ -54,7 +54,9 @@ CLI::Option* add_boxes(CLI::App& command, const std::string& name,
 }
 
 void add_comparison_options(CLI::App& command, EvaluateArguments& arguments) {
-  command.add_option("volume", arguments.volume, "MRC volume")->type_name("VOLUME")->required();
+  command.add_option("volume", arguments.volume, "MRC volume to score")
+      ->type_name("VOLUME")
+      ->required();
   command
       .add_option("truth", arguments.truth,
                   "MRC volume to score it against: PSNR and SSIM, raw and after the best scale and "
@@ -63,8 +65,8 @@ void add_comparison_options(CLI::App& command, EvaluateArguments& arguments) {
   command
       .add_option_function<std::string>(
           "--box", [&arguments](const std::string& text) { arguments.box = parse_box(text); },
-          "compare (PSNR, SSIM, FSC) within these voxels of the other volume only, zero-based, the "
-          "last excluded")
+          "compare (PSNR, SSIM, FSC) only these voxels of the other volume, zero-based, the last "
+          "excluded")
       ->check(box_check())
       ->type_name(kBoxType);
 }
@@ -78,8 +80,8 @@ void add_fsc_options(CLI::App& command, EvaluateArguments& arguments) {
   CLI::Option* fsc = add_file("--fsc", arguments.fsc_with,
                               "correlate with this MRC volume: the other half, or the truth");
   add_file("--fsc-mask", arguments.fsc_mask,
-           "MRC volume with weights from 0 to 1, soft at its edges; default: all, faded over the "
-           "outer eighth at every face")
+           "MRC volume with weights from 0 to 1, soft at its edges; default: a weight of 1 that "
+           "fades over the outer eighth at every face")
       ->needs(fsc);
   command
       .add_option_function<std::vector<double>>(
@@ -87,8 +89,9 @@ void add_fsc_options(CLI::App& command, EvaluateArguments& arguments) {
           [&arguments](const std::vector<double>& tilts) {
             arguments.tilts = {tilts[0], tilts[1]};
           },
-          "lowest and highest tilt in degrees, as in --tilt-range=-60,50: correlate what the views "
-          "measured and the missing wedge apart as well (tilt axis Y)")
+          "lowest and highest tilt in degrees, as in --tilt-range=-60,50: also correlate the "
+          "measured "
+          "frequencies and the missing wedge separately (tilt axis Y)")
       ->delimiter(',')
       ->expected(2)
       ->check(number_between(-90.0, 90.0))
@@ -102,15 +105,17 @@ void add_fsc_options(CLI::App& command, EvaluateArguments& arguments) {
 void add_contrast_options(CLI::App& command, EvaluateArguments& arguments) {
   const char* group = "Contrast and noise";
   command
-      .add_flag("--cnr", arguments.contrast,
-                "contrast-to-noise ratio and equivalent number of looks; regions are chosen unless "
-                "given (default where nothing else is asked for)")
+      .add_flag(
+          "--cnr", arguments.contrast,
+          "compute the contrast-to-noise ratio and the equivalent number of looks; regions are "
+          "chosen unless given (default if no other score is asked for)")
       ->group(group);
   CLI::Option* foreground =
       add_boxes(command, "--foreground", arguments.regions.foreground,
                 "voxels of VOLUME that show structure; may be given several times");
-  CLI::Option* background = add_boxes(command, "--background", arguments.regions.background,
-                                      "voxels that show none; may be given several times");
+  CLI::Option* background =
+      add_boxes(command, "--background", arguments.regions.background,
+                "voxels of VOLUME that show no structure; may be given several times");
   foreground->needs(background)->group(group);
   background->needs(foreground)->group(group);
 }
@@ -124,8 +129,8 @@ void add_profile_options(CLI::App& command, EvaluateArguments& arguments) {
               [&arguments](const std::vector<double>& v) {
                 arguments.profile = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
               },
-              "sample a line between two points, in voxels (of TRUTH, if there is one), voxel i "
-              "covering [i, i+1)")
+              "sample a line between two points, in voxels (of TRUTH, if there is one); voxel i "
+              "covers [i, i+1)")
           ->delimiter(',')
           ->expected(6)
           ->check(number_between(-1e9, 1e9))
@@ -139,15 +144,16 @@ void add_profile_options(CLI::App& command, EvaluateArguments& arguments) {
   csv->needs(line);
 }
 
-// How the series is read and where the volume lies in it: nothing without --series.
+// Adds the options of the series and of the volume's place in it. They need --series.
 void add_reprojection_options(CLI::App& command, EvaluateArguments& arguments) {
   const char* group = "Reprojection error";
   CLI::Option* series =
       command
-          .add_option("--series", arguments.series,
-                      "tilt series (MRC stack) that the volume shall explain: projects it and "
-                      "compares, after the best scale and offset of each view. Options as for "
-                      "reconstruct")
+          .add_option(
+              "--series", arguments.series,
+              "tilt series (MRC stack): project the volume and compare it with the views, after "
+              "the best scale and offset of each view. The options of the series are those "
+              "of reconstruct")
           ->type_name("STACK")
           ->group(group);
   const std::size_t first = command.get_options().size();
@@ -189,7 +195,8 @@ void add_evaluate_options(CLI::App& command, EvaluateArguments& arguments) {
   add_contrast_options(command, arguments);
   add_profile_options(command, arguments);
   add_reprojection_options(command, arguments);
-  command.add_option("--json", arguments.json, "write all figures to this file")->type_name("FILE");
+  command.add_option("--json", arguments.json, "write all metrics to this JSON file")
+      ->type_name("FILE");
   command.add_flag("--overwrite", arguments.overwrite, "replace existing files");
 }
 

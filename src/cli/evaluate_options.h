@@ -13,7 +13,7 @@
 
 namespace tomofield::cli {
 
-/// What `evaluate` was asked for.
+/// The arguments of `evaluate`.
 struct EvaluateArguments {
   std::filesystem::path volume;
   std::optional<std::filesystem::path> truth;
@@ -23,24 +23,25 @@ struct EvaluateArguments {
   std::optional<evaluate::TiltRange> tilts;
 
   bool contrast = false;
-  evaluate::Regions regions;  ///< empty: to be chosen
+  evaluate::Regions regions;  ///< empty: chosen automatically
 
   std::optional<evaluate::LineSegment> profile;
   std::optional<std::filesystem::path> profile_csv;
 
   std::optional<std::filesystem::path> series;
-  tilt_series::TiltSeriesOptions input;  ///< how the series is read
+  tilt_series::TiltSeriesOptions input;  ///< options of `series`
   measurement::SpecimenOptions specimen;
   int hold_out = 0;
 
   std::optional<std::filesystem::path> json;
   bool overwrite = false;
 
-  /// Throws Error for options that need others, and for outputs that must not be written.
+  /// Checks the arguments. Throws Error for options that need others, and for outputs that must not
+  /// be written.
   void check() const;
 };
 
-/// Registers everything. `arguments` must outlive the parsing.
+/// Registers all options of `evaluate`. `arguments` must outlive the parsing.
 void add_evaluate_options(CLI::App& command, EvaluateArguments& arguments);
 
 }  // namespace tomofield::cli

@@ -5,8 +5,8 @@
 
 namespace tomofield::cli {
 
-/// Ends the program with a status of its own after saying why: a run that a
-/// signal stopped is neither a success nor a fault.
+/// Ends the program with a message and a status of its own. A run that a signal stopped is neither
+/// a success nor a fault.
 class ExitStatus : public std::runtime_error {
  public:
   ExitStatus(int status, const std::string& message)

@@ -105,7 +105,7 @@ void add_box_options(CLI::App& command, ExportArguments& arguments) {
           ->check(finite)
           ->excludes(box)
           ->group(group);
-  CLI::Option* size = command.add_option("--size", arguments.size, "nx,ny,nz: voxels")
+  CLI::Option* size = command.add_option("--size", arguments.size, "nx,ny,nz: size in voxels")
                           ->delimiter(',')
                           ->expected(3)
                           ->check(number_between(1, std::numeric_limits<std::int32_t>::max()))
@@ -115,17 +115,18 @@ void add_box_options(CLI::App& command, ExportArguments& arguments) {
   command
       .add_option("--rotate", arguments.rotation,
                   "rot,tilt,psi: Euler angles in degrees as RELION's rlnAngleRot, Tilt, Psi; the "
-                  "box, turned about its centre, shows a particle as its reference lies")
+                  "box turns about its centre and shows a particle in its reference's orientation")
       ->delimiter(',')
       ->expected(3)
       ->check(finite)
       ->group(group);
   const CLI::Validator positive = number_between(1e-3, 1e6);
-  CLI::Option* voxel_size =
-      command.add_option("--voxel-size", arguments.voxel_size_A, "Å; default: the pixel size")
-          ->check(positive)
-          ->group(group);
-  command.add_option("--bin", arguments.bin, "or voxels of so many pixels")
+  CLI::Option* voxel_size = command
+                                .add_option("--voxel-size", arguments.voxel_size_A,
+                                            "voxel size in Å; default: the pixel size")
+                                ->check(positive)
+                                ->group(group);
+  command.add_option("--bin", arguments.bin, "voxel size in pixels, instead of --voxel-size")
       ->check(positive)
       ->excludes(voxel_size)
       ->group(group);

@@ -20,7 +20,7 @@ namespace {
 
 enum class FileKind { kMrc, kHdf5 };
 
-/// Told by the first bytes, never by the name.
+/// Returns the kind of a file by its first bytes, never by its name.
 FileKind kind_of(const std::filesystem::path& path) {
   constexpr std::string_view kHdf5Signature = "\x89HDF\r\n\x1a\n";
   const io::PositionedFile file(path, io::PositionedFile::Access::kRead);
@@ -105,7 +105,7 @@ void print_info(const tilt_series::TiltSeriesOptions& options) {
 void add_info_command(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "info",
-      "Show what a file is; with tilt angles (--tlt, --aln, --mdoc) also check it as a "
+      "Show the contents of a file; with tilt angles (--tlt, --aln, --mdoc) also check it as a "
       "tilt series and list its views");
   auto options = std::make_shared<tilt_series::TiltSeriesOptions>();
   add_input_options(*command, *options);

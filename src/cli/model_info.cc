@@ -30,7 +30,7 @@ void print_geometry(const output::ModelInfo& model) {
   }
   fmt::print("  tilt axis        x = {:.6g} px, z = {:.6g} px, hand {:+}\n", g.axis_x, g.axis_z,
              g.hand);
-  fmt::print("  contrast         {}, {:.6g} units of the series a density unit\n",
+  fmt::print("  contrast         {}, 1 density unit is {:.6g} units of the series\n",
              model.is_dark ? "dark" : "bright", model.density_unit);
 }
 
@@ -42,7 +42,7 @@ std::string describe(const LeafShape& shape) {
   return text;
 }
 
-// Leaves of the same kind in one line, large ones first.
+// Prints a line for each kind of leaves, large ones first.
 void print_leaves(const Field& field) {
   std::map<std::tuple<bool, std::int64_t, std::string>, int> kinds;
   for (int i = 0; i < field.tree().num_leaves(); ++i) {

@@ -12,7 +12,8 @@
 namespace tomofield::cli {
 namespace {
 
-// `holds` tells whether a finite number will do, `wanted` describes those that do.
+// Returns a check that accepts a finite number if `holds` is true for it. `wanted` describes these
+// numbers.
 template <typename Holds>
 CLI::Validator number_that(std::string wanted, Holds holds) {
   return {[wanted, holds](std::string& text) -> std::string {

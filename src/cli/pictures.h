@@ -6,12 +6,12 @@
 
 namespace tomofield::cli {
 
-/// Writes pictures of the central slices of a volume (report/slices.h) and of the masks of the
-/// series that it comes from (report/mask_picture.h), and prints where they are.
+/// Writes pictures of the central slices of a volume (report/slices.h) and of the masks of its
+/// series (report/mask_picture.h), and prints their paths.
 void write_pictures(const std::filesystem::path& volume, const tilt_series::TiltSeries& series,
                     const std::filesystem::path& prefix);
 
-/// A picture of a model's leaves (report/tree_picture.h); prints where it is.
+/// Writes a picture of a model's leaves (report/tree_picture.h) and prints its path.
 void write_tree_picture(const std::filesystem::path& model, const std::filesystem::path& picture);
 
 }  // namespace tomofield::cli

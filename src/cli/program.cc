@@ -35,7 +35,7 @@ void add_commands(CLI::App& program, const distributed::Communicator& processes)
   add_info_command(program);
 }
 
-// The subcommand that was called, as the user writes it.
+// Returns the subcommand that was called, as the user writes it.
 std::string command_name(const CLI::App& program) {
   std::string name = program.get_name();
   for (const CLI::App* app = &program; !app->get_subcommands().empty();) {
@@ -45,7 +45,7 @@ std::string command_name(const CLI::App& program) {
   return name;
 }
 
-// CLI11 would say that a command is missing where it is misspelt.
+// Refuses a misspelt command. CLI11 would say that a command is missing.
 void require_known_command(const CLI::App& program, const std::vector<std::string>& arguments) {
   const CLI::App* app = &program;
   std::string command = program.get_name();
@@ -61,7 +61,7 @@ void require_known_command(const CLI::App& program, const std::vector<std::strin
   }
 }
 
-// Other commands would do all of their work in each process.
+// Refuses a job of several processes for other commands, which would do all of their work in each.
 void require_shared_command(const std::vector<std::string>& arguments,
                             const distributed::Communicator& processes) {
   if (processes.size() == 1 || arguments.empty() || arguments.front().rfind('-', 0) == 0 ||
@@ -73,7 +73,7 @@ void require_shared_command(const std::vector<std::string>& arguments,
                   processes.size(), arguments.front()));
 }
 
-// Parses the command line and runs the command; 0, or throws.
+// Parses the command line and runs the command. Returns 0, or throws.
 int run_command(CLI::App& program, std::vector<std::string> arguments,
                 const distributed::Communicator& processes) {
   processes.run_collectively([&] {
@@ -92,7 +92,7 @@ int run_command(CLI::App& program, std::vector<std::string> arguments,
   return 0;
 }
 
-// What goes wrong in one process alone: the others wait for it, and must be ended.
+// Reports a fault of one process alone and ends the others, which wait for it.
 int fail_alone(const distributed::Session& session, int status, const std::string& message) {
   const std::string who = session.communicator().size() == 1
                               ? ""
@@ -108,7 +108,7 @@ int fail_alone(const distributed::Session& session, int status, const std::strin
 
 int run_program(int argc, char** argv, const distributed::Session& session) {
   const distributed::Communicator& processes = session.communicator();
-  // One of several talks.
+  // Only the first process prints.
   if (!processes.is_first() && std::freopen("/dev/null", "w", stdout) == nullptr) return 1;
   if (processes.is_first()) base::set_log_sink(print_log);
   const auto say = [&](const char* message) {

@@ -18,7 +18,7 @@ constexpr double kSecondsBetweenDraws = 0.2;
 constexpr std::size_t kBarWidth = 24;
 constexpr std::size_t kLeastBarWidth = 8;
 
-// Columns of the terminal; a line that is longer would wrap and could not be redrawn.
+// Returns the columns of the terminal. A longer line would wrap and could not be redrawn.
 std::size_t terminal_width() {
   winsize size{};
   const bool is_known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
@@ -43,8 +43,8 @@ std::string terminal_line(const std::string& title, double fraction, const std::
   return line;
 }
 
-// When the last report was shown, and whether the cursor is behind it on a terminal:
-// what is printed after a run that stopped or failed begins on a line of its own.
+// The time of the last report and whether the cursor is still behind it on a terminal. If so, the
+// destructor ends the line, so that later output of a run that stopped or failed begins on its own.
 struct Display {
   double last_shown = -1e9;
   bool line_is_open = false;

@@ -4,11 +4,11 @@
 
 namespace tomofield::cli {
 
-/// Shows progress on standard error: a bar that redraws itself on a terminal,
-/// a plain line every few seconds otherwise. `title` begins every line.
+/// Returns a sink that shows progress on standard error: a bar that redraws itself on a terminal,
+/// and a plain line every few seconds otherwise. `title` begins every line.
 base::ProgressSink make_progress_bar(const std::string& title);
 
-/// "2 h 05 min", "3 min 20 s" or "12 s".
+/// Returns a duration as "2 h 05 min", "3 min 20 s" or "12 s".
 std::string format_duration(double seconds);
 
 }  // namespace tomofield::cli

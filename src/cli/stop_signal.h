@@ -2,15 +2,15 @@
 
 namespace tomofield::cli {
 
-/// From now on Ctrl-C (SIGINT), SIGTERM and, of a job of several processes, SIGUSR1 (which mpirun
-/// passes on without a time limit) ask the program to stop instead of ending it.
+/// Lets Ctrl-C (SIGINT) and SIGTERM ask the program to stop instead of ending it. In a job of
+/// several processes SIGUSR1 does the same, because mpirun passes it on without a time limit.
 void stop_on_signals(bool is_job = false);
 
-/// Whether one of them has come.
+/// Returns true if one of these signals has come.
 bool stop_was_requested();
 
-/// The exit status of what was stopped by it: 128 and the signal; SIGTERM's if none came here,
-/// since of a job another process may have got it.
+/// Returns the exit status of a stopped run: 128 plus the signal. If this process got no signal,
+/// another process of the job did, and SIGTERM's status is returned.
 int stop_status();
 
 }  // namespace tomofield::cli

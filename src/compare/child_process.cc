@@ -36,7 +36,7 @@ pid_t start(const std::vector<std::string>& command, const std::filesystem::path
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log.c_str(),
                                    O_WRONLY | O_CREAT | O_TRUNC, 0644);
   posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  // OpenMP's threads spin while they wait, the longer the more else the machine has to do.
+  // OpenMP's threads spin while they wait, and all the longer on a busy machine.
   setenv("OMP_WAIT_POLICY", "passive", /*overwrite=*/0);
   pid_t child = 0;
   const int fault = posix_spawn(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
@@ -78,7 +78,7 @@ ChildResult run_child(const std::vector<std::string>& command, const std::filesy
 std::string reason_of_failure(const std::filesystem::path& log) {
   constexpr std::string_view kSpeaker = "tomofield: ";
   std::ifstream file(log);
-  std::string last, sentence;  // what was printed before may come after it in the file
+  std::string last, sentence;  // earlier output may come after it in the file
   for (std::string line; std::getline(file, line);) {
     if (line.starts_with(kSpeaker)) sentence = line.substr(kSpeaker.size());
     if (!line.empty()) last = line;

@@ -8,24 +8,24 @@
 
 namespace tomofield::compare {
 
-/// How a program ended, and what it took.
+/// The exit status of a program and its costs.
 struct ChildResult {
-  int exit_status = 0;  ///< 128 + the signal, if one ended it
+  int exit_status = 0;  ///< 128 + the signal if a signal ended it
   double core_seconds = 0;
   double wall_seconds = 0;
   std::int64_t peak_bytes = 0;  ///< largest resident size
 };
 
-/// Runs `command` (the program's path first) to its end, with all that it says in the file
-/// `log`: a process of its own, so that its time and memory are its own; its threads sleep while
-/// they wait (OMP_WAIT_POLICY, unless it is set), so that core-seconds are of work.
-/// `stop_requested` is asked often; when it says so, the child is asked to stop (SIGTERM) and
-/// waited for. Throws Error if the log cannot be written or the program not be started.
+/// Runs `command` (the program's path first) to its end and writes all its output to the file
+/// `log`. It runs as its own process, so that its time and memory are its own. Its threads sleep
+/// while they wait (OMP_WAIT_POLICY, unless it is set), so that core-seconds measure work. Asks
+/// `stop_requested` often; once it returns true, asks the child to stop (SIGTERM) and waits for it.
+/// Throws Error if the log cannot be written or the program cannot be started.
 ChildResult run_child(const std::vector<std::string>& command, const std::filesystem::path& log,
                       const std::function<bool()>& stop_requested);
 
-/// Why tomofield failed, by the file `log` of all that it said: its own sentence, without its name
-/// in front, or else the last line.
+/// Returns the reason why tomofield failed, from the file `log` of its output: its error message
+/// without the program's name, or the last line if there is none.
 std::string reason_of_failure(const std::filesystem::path& log);
 
 }  // namespace tomofield::compare

@@ -23,8 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What is shown side by side: the truth, if it has the size of the volumes, and every volume. The
-// first decides the grey scale and the detail.
+// Returns the volumes that are shown side by side: the truth, if it has their size, and every
+// volume. The first decides the grey scale and the detail.
 std::vector<Shown> shown_volumes(const std::vector<Row>& rows,
                                  const std::optional<fs::path>& truth) {
   std::vector<Shown> shown;
@@ -63,7 +63,7 @@ void add_pictures(const CompareOptions& options, const std::vector<Row>& rows,
   page.add_heading("Profile");
   page.add_paragraph("Density along x through the middle of the detail, in the file's units.");
   std::vector<report::Curve> profiles = detail_profiles(shown, detail, voxel_A);
-  // The truth last, so that methods have the colours of the plots in which it is not.
+  // The truth goes last, so that methods keep the colours of the plots without a truth.
   std::ranges::rotate(profiles,
                       profiles.begin() + static_cast<std::ptrdiff_t>(shown.size() - rows.size()));
   page.add_svg(report::curve_plot_svg(
@@ -81,7 +81,7 @@ void add_commands(const std::vector<Row>& rows, report::HtmlPage& page) {
   page.add_listing(listing);
 }
 
-// Shell correlations over spatial frequency.
+// Adds the shell correlations over spatial frequency.
 void add_correlations(const Scores& scores, report::HtmlPage& page) {
   for (const auto& [title, curves] : scores.correlations) {
     page.add_heading(title);
@@ -118,7 +118,8 @@ nlohmann::json comparison_json(const CompareOptions& options, const std::vector<
           {"methods", methods}};
 }
 
-// No old report stands beside new volumes, and what stops before it is finished leaves no old ones.
+// Removes all old results, so that no old report stands beside new volumes, even if the comparison
+// stops before it is finished.
 void remove_all_results(const fs::path& folder, const std::vector<Row>& rows) {
   for (const char* file : {"report.html", "comparison.json", "comparison.csv"})
     fs::remove(folder / file);

@@ -34,7 +34,7 @@ Grid planned_grid(const std::string& said) {
 }
 
 void require_one_grid(const NamedGrid& main, const NamedGrid& other) {
-  constexpr double kRounding = 1e-3;  // of a plan's four digits
+  constexpr double kRounding = 1e-3;  // rounding of a plan's four digits
   if (main.grid.size == other.grid.size &&
       !evaluate::voxel_sizes_differ(other.grid.voxel_A, main.grid.voxel_A, kRounding))
     return;

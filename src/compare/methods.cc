@@ -14,7 +14,8 @@
 namespace tomofield::compare {
 namespace {
 
-// Whether a known method with the same first words, such as "baseline tv", can.
+// Returns true if a known method with the same first words, such as "baseline tv", has a
+// capability.
 bool can_do(bool Method::*what, const std::vector<std::string>& arguments) {
   return std::ranges::any_of(known_methods(), [&](const Method& known) {
     const auto& words = known.arguments;
@@ -22,7 +23,7 @@ bool can_do(bool Method::*what, const std::vector<std::string>& arguments) {
   });
 }
 
-// A method's files must not be those of the comparison or of another method.
+// Refuses a name whose files would be those of the comparison or of another method.
 void require_free_name(const std::string& name) {
   constexpr std::array kTaken{"comparison", "report", "pictures", "truth"};
   constexpr std::string_view kTrials = "_tune";  // NAME_tune.json: trials of the method NAME

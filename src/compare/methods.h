@@ -5,27 +5,26 @@
 
 namespace tomofield::compare {
 
-/// One way to reconstruct: what a comparison runs and how its report calls it.
+/// A method of reconstruction: the command that a comparison runs and its names in the report.
 struct Method {
-  std::string name;   ///< also of its files
-  std::string title;  ///< for people
+  std::string name;   ///< also the name of its files
+  std::string title;  ///< its name in the report
   std::vector<std::string>
-      arguments;         ///< of tomofield, before the series: the command, its options
-  bool resumes = false;  ///< whether an interrupted run goes on with --resume
-  bool tunes = false;    ///< whether --tune chooses its weights
+      arguments;         ///< words of tomofield before the series: command and options
+  bool resumes = false;  ///< true if --resume continues an interrupted run
+  bool tunes = false;    ///< true if --tune chooses its weights
 };
 
-/// The methods that have a name.
+/// Returns the methods that have a name.
 const std::vector<Method>& known_methods();
 
-/// In order.
+/// Returns the names of methods, in order.
 std::vector<std::string> names_of(const std::vector<Method>& methods);
 
-/// The methods of a comparison, in order: `names` of known ones, then `others`, each
-/// NAME=COMMAND with the words of a tomofield command, as in
-/// "smooth=reconstruct --tv-penalty smooth". Throws Error for unknown names, for names that
-/// are there twice, cannot name a file or are those of the comparison's own files, and for commands
-/// that make no tomogram.
+/// Returns the methods of a comparison, in order: the known ones in `names`, then `others`, each as
+/// NAME=COMMAND with the words of a tomofield command, such as "smooth=reconstruct --tv-penalty
+/// smooth". Throws Error for unknown names, for names that are there twice, cannot name a file or
+/// are names of the comparison's own files, and for commands that make no tomogram.
 std::vector<Method> choose_methods(const std::vector<std::string>& names,
                                    const std::vector<std::string>& others);
 

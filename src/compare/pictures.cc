@@ -6,7 +6,7 @@
 namespace tomofield::compare {
 namespace {
 
-constexpr std::int64_t kPictureWidth = 320;  // at least, where whole voxels allow it
+constexpr std::int64_t kPictureWidth = 320;  // smallest width where whole voxels allow it
 
 double standard_deviation(const report::Slice& plane, const Detail& d) {
   double n = 0, sum = 0, squares = 0;

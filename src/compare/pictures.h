@@ -12,30 +12,31 @@
 
 namespace tomofield::compare {
 
-/// A volume with the name that its pictures get and the title below them.
+/// A volume with the name of its pictures and the title below them.
 struct Shown {
   std::string name, title;
   std::vector<report::Slice> planes;  ///< xy, xz, yz
 };
 
-/// Part of the xy plane that is looked at closely, in voxels, the last excluded.
+/// The part of the xy plane that the report enlarges, in voxels; the last ones are excluded.
 struct Detail {
   std::int64_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
-/// The square of a third of the plane's shorter side (32 voxels at least) with the largest
-/// standard deviation, on a lattice of half its side.
+/// Returns the square with the largest standard deviation on a lattice of half its side. Its side
+/// is a third of the plane's shorter side, at least 32 voxels.
 Detail busiest_detail(const report::Slice& plane);
 
-/// The same plane (0: xy, 1: xz, 2: yz) of every volume. PNG files go to `folder`.
+/// Draws the same plane (0: xy, 1: xz, 2: yz) of every volume. PNG files go to `folder`.
 std::vector<report::HtmlFigure> plane_figures(const std::vector<Shown>& volumes, std::size_t plane,
                                               const report::GreyScale& scale,
                                               const std::filesystem::path& folder);
-/// The detail of every xy plane, likewise.
+/// Draws the detail of every xy plane. PNG files go to `folder`.
 std::vector<report::HtmlFigure> detail_figures(const std::vector<Shown>& volumes,
                                                const Detail& detail, const report::GreyScale& scale,
                                                const std::filesystem::path& folder);
-/// Densities along x through the middle of the detail; distances in Å, or voxels without size.
+/// Returns the densities along x through the middle of the detail. Distances are in Å, or in voxels
+/// if their size is not known.
 std::vector<report::Curve> detail_profiles(const std::vector<Shown>& volumes, const Detail& detail,
                                            double voxel_size_A);
 

@@ -5,7 +5,7 @@
 namespace tomofield::compare {
 namespace {
 
-// Flat, but for a checkerboard of the columns and rows from 60 on.
+// Returns a flat plane with a checkerboard from column and row 60 on.
 report::Slice plane_with_texture() {
   report::Slice plane("xy", 128, 96);
   for (std::int64_t y = 60; y < 90; ++y) {

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A directory of its own where a folder is, or will be made; removed with all that is in it.
+// Makes a directory where a folder is, or will be made. Removes it with all its contents.
 class ScratchFolder {
  public:
   explicit ScratchFolder(const fs::path& folder) {
@@ -54,12 +54,13 @@ std::string text_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-// What the row's volume will be; none if it was asked to stop.
+// Returns the grid of the row's future volume, or nothing if it was asked to stop.
 std::optional<Grid> grid_to_be(const CompareOptions& options, const RunHooks& hooks, const Row& row,
                                const fs::path& scratch) {
   if (is_done(row)) return read_grid(row.volume);
   const fs::path log = scratch / "log";
-  // In the folder, if it is there: no result may replace an input.
+  // The volume lies in the folder if that exists, so that the check finds a result that would
+  // replace an input.
   const bool has_folder = fs::is_directory(options.folder);
   auto command =
       full_command(options.program, row, has_folder ? row.volume : scratch / row.volume.filename());

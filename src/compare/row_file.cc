@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 constexpr const char* kAdvice =
     "give another folder with -o, or --overwrite to make everything in this one anew";
 
-// What `read` makes of a JSON file, whose mistakes are errors that name the file.
+// Returns what `read` makes of a JSON file. Mistakes in the file are errors that name it.
 template <typename Read>
 auto read_json(const fs::path& path, Read&& read) {
   const auto fail = [&](const char* why) {
@@ -51,7 +51,7 @@ std::vector<std::string> changed_files(const json& before, const json& now) {
   return changes;
 }
 
-// In what two origins differ, a clause each.
+// Returns the differences of two origins, a clause each.
 std::vector<std::string> changes(const json& before, const json& now) {
   std::vector<std::string> all = changed_files(before.at("files"), now.at("files"));
   if (before.at("command") != now.at("command")) {

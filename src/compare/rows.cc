@@ -12,19 +12,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// FOLDER/NAME with what follows it.
+// Returns the path FOLDER/NAME with a suffix.
 fs::path file_of(const Row& row, const char* suffix) {
   return row.volume.parent_path() / (row.run.name + suffix);
 }
 
-// Whether there is a checkpoint, or trials of a tuning that was stopped.
+// Returns true if there is a checkpoint, or trials of a tuning that was stopped.
 bool can_resume(const Row& row) {
   if (!row.run.method.resumes) return false;
   return fs::exists(file_of(row, ".h5")) ||
          (row.state.progress != Progress::kFinished && fs::exists(file_of(row, "_tune.json")));
 }
 
-// What a run took until now that is part of what it takes in all.
+// Returns the costs of earlier sessions that count towards the costs of a run.
 Costs costs_until_now(const Row& row) {
   if (!can_resume(row)) return {};
   if (row.state.progress != Progress::kStopped) {
@@ -36,11 +36,11 @@ Costs costs_until_now(const Row& row) {
   return row.state.costs;
 }
 
-// Runs one method; false if it was stopped.
+// Runs one method. Returns false if it was stopped.
 bool run(const fs::path& program, const RunHooks& hooks, Row& row) {
   const fs::path log = file_of(row, ".log");
   const std::vector<std::string> command = full_command(program, row, row.volume);
-  // Its fit is finished, and the volume alone is written again.
+  // The fit is finished; only the volume is written again.
   const bool is_paid = can_resume(row) && row.state.progress == Progress::kFinished;
   const auto keep = [&](Progress progress, const Costs& costs) {
     if (is_paid) return;

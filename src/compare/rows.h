@@ -13,20 +13,20 @@ namespace tomofield::compare {
 
 /// A run of a method.
 struct Run {
-  std::string name;  ///< of its files
+  std::string name;  ///< the name of its files
   Method method;
   std::vector<std::string> command;           ///< without the program and the output's name
   std::vector<std::filesystem::path> inputs;  ///< every file that it reads
 };
 
-/// A run and how far it is: its files are FOLDER/NAME.mrc, .json and .log, and what it took is kept
-/// in FOLDER/NAME.row.json, so that a comparison that was interrupted goes on where it stopped.
+/// A run and its progress. Its files are FOLDER/NAME.mrc, .json and .log. Its costs are in
+/// FOLDER/NAME.row.json, so that a comparison that was interrupted continues where it stopped.
 struct Row {
   Run run;
   std::filesystem::path volume;
   nlohmann::json origin;  ///< origin_of() the run
   RowState state;
-  nlohmann::json figures = nullptr;  ///< of the method's own JSON, once it is finished
+  nlohmann::json figures = nullptr;  ///< the metrics in the method's JSON, once it is finished
 };
 
 struct RunHooks {
@@ -35,25 +35,26 @@ struct RunHooks {
   bool must_stop() const { return stop_requested && stop_requested(); }
 };
 
-/// A row a run, as `folder` has it. Throws Error if a row there is of other options, files or
-/// another version (read_row).
+/// Returns a row a run, with the state stored in `folder`. Throws Error if a stored row has other
+/// options, other files or another version (read_row).
 std::vector<Row> stored_rows(const std::vector<Run>& runs, const std::filesystem::path& folder);
-/// The same, as if the folder were empty.
+/// Returns a row a run, as if the folder were empty.
 std::vector<Row> new_rows(const std::vector<Run>& runs, const std::filesystem::path& folder);
 
-/// Whether the row is finished and its files are there.
+/// Returns true if the row is finished and its files exist.
 bool is_done(const Row& row);
 
-/// Of the row's run, by `program` into `volume`: --resume if it goes on from what is there.
+/// Returns the command of the row's run, made by `program` into `volume`. It has --resume if the
+/// run continues from stored files.
 std::vector<std::string> full_command(const std::filesystem::path& program, const Row& row,
                                       const std::filesystem::path& volume);
 
-/// Removes whatever rows and their runs have left.
+/// Removes all files of the rows and their runs.
 void remove_results(const std::vector<Row>& rows);
 
-/// Makes every run that is not done with `program`, one after the other; false if it was stopped.
-/// Throws Error if a run fails, with what it said and where its log is, and for a volume of other
-/// sizes than the first; what is finished stays.
+/// Makes every run that is not done with `program`, one after the other. Returns false if it was
+/// stopped. Throws Error if a run fails, with its message and the place of its log, and for a
+/// volume of another size than the first. Finished runs stay.
 bool run_rows(const std::filesystem::path& program, const RunHooks& hooks, std::vector<Row>& rows);
 
 }  // namespace tomofield::compare

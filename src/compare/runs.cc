@@ -26,7 +26,7 @@ const char* suffix_of(Purpose purpose) {
   return "";
 }
 
-// 1-based sections that are left out: the user's, and every other one of the rest.
+// Returns the 1-based sections that are left out: the user's, and every second one of the rest.
 std::string excluded(Purpose purpose, const CompareOptions& options,
                      const tilt_series::TiltSeries& series) {
   std::string sections = options.input.exclude;
@@ -37,14 +37,14 @@ std::string excluded(Purpose purpose, const CompareOptions& options,
   return sections;
 }
 
-// The words that name the command, such as "baseline tv"; its options follow.
+// Returns the number of words that name the command, such as "baseline tv". Its options follow.
 std::ptrdiff_t num_command_words(const Method& method) {
   const auto option = std::ranges::find_if(
       method.arguments, [](const std::string& word) { return word.starts_with('-'); });
   return option - method.arguments.begin();
 }
 
-// Files among a method's own words: `--mask FILE`, `--config=FILE`.
+// Returns the files among a method's own words: `--mask FILE`, `--config=FILE`.
 std::vector<std::filesystem::path> named_files(const std::vector<std::string>& words) {
   std::vector<std::filesystem::path> files;
   for (const std::string& word : words) {
@@ -58,7 +58,8 @@ std::vector<std::filesystem::path> named_files(const std::vector<std::string>& w
 Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
              const CompareOptions& options) {
   Run run{.name = method.name + suffix_of(purpose), .method = method, .command = {}, .inputs = {}};
-  // The series before the method's own options, of which the last may take several values.
+  // The series comes before the method's own options, because the last of these may take several
+  // values.
   const auto own = method.arguments.begin() + num_command_words(method);
   run.command.assign(method.arguments.begin(), own);
   std::ranges::copy(options.series_words, std::back_inserter(run.command));
@@ -66,7 +67,8 @@ Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
   if (!exclude.empty()) run.command.insert(run.command.end(), {"--exclude", exclude});
   if (purpose == Purpose::kHeldOutViews)
     run.command.insert(run.command.end(), {"--hold-out", std::to_string(options.hold_out)});
-  // Anew for every purpose: settings that were chosen on all views have seen those held out.
+  // Settings are tuned anew for every purpose: those chosen on all views have seen the held-out
+  // ones.
   if (options.tune && method.tunes) run.command.push_back("--tune");
   run.inputs = output::input_files(options.input);
   std::ranges::copy(named_files({own, method.arguments.end()}), std::back_inserter(run.inputs));

@@ -6,12 +6,12 @@
 
 namespace tomofield::compare {
 
-/// Why a run is made.
+/// The purpose of a run.
 enum class Purpose { kVolume, kOddViews, kEvenViews, kHeldOutViews };
 
-/// Every run of a comparison, purpose by purpose and in each in the order of the methods: what
-/// runs for another purpose than the volume itself has its files named METHOD.odd, .even and
-/// .held_out. Odd and even are counted in the stack's order among the sections that are not
+/// Every run of a comparison, purpose by purpose, and for each purpose in the order of the methods.
+/// The files of a run whose purpose is not the volume itself are named METHOD.odd, METHOD.even and
+/// METHOD.held_out. Odd and even are counted in the stack's order among the sections that are not
 /// excluded.
 struct PlannedRuns {
   std::vector<Purpose> purposes;

@@ -41,7 +41,8 @@ std::string boxes_text(const std::vector<evaluate::Box>& boxes) {
   return fmt::format("{}", fmt::join(texts, " and "));
 }
 
-// On the main method's regions; returns which they are.
+// Adds CNR and ENL, measured on the main method's regions. Returns a sentence that names the
+// regions.
 std::string add_contrast(std::span<const Row> rows, Table& table) {
   evaluate::Regions regions;
   Figures cnr, enl;
@@ -58,8 +59,9 @@ std::string add_contrast(std::span<const Row> rows, Table& table) {
                      boxes_text(regions.foreground), boxes_text(regions.background));
 }
 
-// Where the correlation falls to `threshold`; if it never does, the finest shell's resolution: a
-// method without a figure would seem to be worse than those that have one.
+// Returns the resolution at which the correlation falls to `threshold`. If it never does, returns
+// the finest shell's resolution: a method without a value would seem worse than those that have
+// one.
 std::optional<double> resolution_A(const evaluate::Fsc& fsc, double threshold) {
   const auto crossing = evaluate::crossing_A(fsc.frequency_per_A, fsc.all, threshold);
   const bool falls =
@@ -67,7 +69,7 @@ std::optional<double> resolution_A(const evaluate::Fsc& fsc, double threshold) {
   return falls ? crossing : std::optional(1 / fsc.frequency_per_A.back());
 }
 
-// Correlates pairs of volumes, a pair a method; the resolution at `threshold` becomes a column.
+// Correlates pairs of volumes, a pair a method, and adds the resolution at `threshold` as a column.
 std::vector<report::Curve> add_correlation(std::span<const Row> rows,
                                            const std::vector<fs::path>& others, double threshold,
                                            Column column, Table& table) {

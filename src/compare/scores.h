@@ -11,17 +11,18 @@
 
 namespace tomofield::compare {
 
-/// What the report shows of the scores beside the table.
+/// The scores that the report shows beside the table.
 struct Scores {
-  std::string remark;  ///< what has to be known about the table
-  /// Shell correlations: what is correlated, and a curve a method.
+  std::string remark;  ///< the note below the table
+  /// Shell correlations: a title and a curve a method.
   std::vector<std::pair<std::string, std::vector<report::Curve>>> correlations;
 };
 
-/// Adds the columns of scores to a table with a row a method: against the truth if there is one,
-/// PSNR, SSIM and where the shell correlation falls to 0.5; contrast (CNR, ENL) on regions that
-/// are chosen on the main method's volume; with halves, where the correlation of the two falls to
-/// 0.143; and the error of views held out. `rows` are [purpose][method].
+/// Adds the columns of scores to a table with a row a method. If there is a truth, these are PSNR,
+/// SSIM and the resolution at which the shell correlation with it falls to 0.5. Contrast (CNR, ENL)
+/// is measured on regions that are chosen on the main method's volume. With halves, the resolution
+/// at which their correlation falls to 0.143 is added; with held-out views, their error. `rows` are
+/// [purpose][method].
 Scores add_scores(const CompareOptions& options, const std::vector<Purpose>& purposes,
                   const std::vector<Row>& rows, Table& table);
 

@@ -10,7 +10,7 @@
 
 namespace tomofield::evaluate {
 
-/// A box of voxels, zero-based, the last ones excluded.
+/// A box of voxels. Indices count from zero; `last` is excluded.
 struct Box {
   std::array<std::int64_t, 3> first{};  ///< x, y, z
   std::array<std::int64_t, 3> last{};
@@ -20,19 +20,19 @@ struct Box {
   bool operator==(const Box&) const = default;
 };
 
-/// The box of all voxels.
+/// Returns the box that holds all voxels.
 Box whole_box(const base::Shape3& shape);
 Box whole_box(const io::MrcReader& file);
 
-/// Whether a box has voxels, and all of them in `outer`.
+/// Returns true if `box` has voxels and all of them lie in `outer`.
 bool lies_within(const Box& box, const Box& outer);
 
-/// x0,y0,z0,x1,y1,z1: as a box is written on the command line.
+/// Returns "x0,y0,z0,x1,y1,z1", the form of a box on the command line.
 std::string to_text(const Box& box);
 
-/// The voxels of a box that lies within the file; nothing else is in memory.
+/// Reads the voxels of a box that lies within the file. No other voxel is held in memory.
 base::Volume read_box(const io::MrcReader& file, const Box& box);
-/// All of a file. Throws Error if it cannot be read.
+/// Reads all voxels of an MRC file. Throws Error if the file cannot be read.
 base::Volume read_volume(const std::filesystem::path& path);
 
 }  // namespace tomofield::evaluate

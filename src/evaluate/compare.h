@@ -10,17 +10,18 @@
 
 namespace tomofield::evaluate {
 
-/// Score of one volume against another.
+/// The scores of one volume against another.
 struct Comparison {
   PsnrScore psnr;
   SsimScore ssim;
   Box box;  ///< the voxels compared, in the truth's coordinates
 };
 
-/// Scores two volumes of one shape; the peak is that of the second, the truth.
+/// Scores the first volume of a pair against the second, the truth. The peak of the PSNR is the
+/// truth's.
 Comparison compare(const VolumePair& pair);
 
-/// The comparison as JSON; an infinite PSNR is written as null.
+/// Returns the comparison as JSON. An infinite PSNR is written as null.
 nlohmann::json comparison_json(const Comparison& comparison,
                                const std::filesystem::path& reconstruction,
                                const std::filesystem::path& truth);

@@ -20,7 +20,7 @@ base::Volume random_volume(base::Shape3 shape, std::uint64_t seed) {
   return volume;
 }
 
-/// One window after the other, straight from the definition.
+/// Computes the mean SSIM window by window, straight from the definition.
 double plain_ssim(const base::Volume& x, const base::Volume& y, double peak) {
   const double c1 = 1e-4 * peak * peak, c2 = 9e-4 * peak * peak;
   double sum = 0.0;

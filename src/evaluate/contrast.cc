@@ -63,7 +63,7 @@ void check_regions(const Regions& regions, const base::Shape3& shape) {
   }
 }
 
-// The cubes of the lattice in order of z, y, x.
+// Returns the cubes of the lattice in order of z, y, x.
 std::vector<Box> lattice_cubes(const base::Shape3& shape) {
   const std::array<std::int64_t, 3> sizes{shape.nx, shape.ny, shape.nz};
   const std::int64_t side =
@@ -86,7 +86,7 @@ std::vector<Box> lattice_cubes(const base::Shape3& shape) {
   return cubes;
 }
 
-// The smoothest of the cubes of middling density.
+// Returns the index of the cube of smallest variance among the half nearest to the median mean.
 std::size_t background_cube(const std::vector<Moments>& cubes) {
   std::vector<double> means;
   for (const Moments& cube : cubes) means.push_back(cube.mean);

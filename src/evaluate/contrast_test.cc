@@ -11,7 +11,7 @@
 namespace tomofield::evaluate {
 namespace {
 
-// Noise of uniform spread about 1, with denser and less noisy cubes at known places.
+// Holds a volume of uniform noise about 1, with denser and less noisy cubes at known places.
 class ContrastTest : public ::testing::Test {
  protected:
   static constexpr base::Shape3 kShape{48, 40, 32};  // cubes of 4 voxels
@@ -51,7 +51,7 @@ TEST_F(ContrastTest, SeveralBoxesAreOneRegion) {
 }
 
 TEST_F(ContrastTest, FindsTheDenseAndTheSmoothCube) {
-  fill({{0, 0, 0}, {4, 4, 4}}, -4.0f, 0.01f);  // smoother still, but not of middling density
+  fill({{0, 0, 0}, {4, 4, 4}}, -4.0f, 0.01f);  // smoother still, but far from the median
   fill(dense_, 30.0f, 0.2f);
   const Regions regions = choose_regions(volume_);
   ASSERT_EQ(regions.background.size(), 1u);

@@ -12,10 +12,10 @@
 namespace tomofield::evaluate {
 namespace {
 
-constexpr std::int64_t kTile = 16;  // neighbouring lines: 128 bytes of each row that they cross
+constexpr std::int64_t kTile = 16;  // lines copied together, 128 bytes of each row
 
-// Lines of n values that lie `stride` apart: `stride` lines beside each other,
-// and as many such bundles behind each other as there are.
+// Transforms all lines of n values along one axis. Neighbours on a line are `stride` apart. The
+// lines lie in bundles: `stride` lines beside each other, one bundle behind the other.
 void transform_axis(std::int64_t n, std::int64_t stride, std::vector<std::complex<float>>& values) {
   const std::unique_ptr<void, decltype(&std::free)> plan(
       kiss_fft_alloc(static_cast<int>(n), 0, nullptr, nullptr), &std::free);

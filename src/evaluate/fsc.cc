@@ -16,7 +16,7 @@
 namespace tomofield::evaluate {
 namespace {
 
-// Sums over the Fourier voxels of a shell.
+// The sums over the Fourier voxels of a shell.
 struct ShellSums {
   double product = 0.0, first = 0.0, second = 0.0;
   std::int64_t voxels = 0;
@@ -28,7 +28,7 @@ struct ShellSums {
   }
 };
 
-// [shell]: frequencies that the tilts cover, and those that they do not.
+// The sums [shell] over frequencies that the tilts cover and over those that they do not.
 struct WedgeSums {
   std::vector<ShellSums> measured, missing;
 };
@@ -37,7 +37,7 @@ std::int64_t longest_axis(const base::Shape3& shape) {
   return std::max({shape.nx, shape.ny, shape.nz});
 }
 
-// Adds body(z) of all sections in their order.
+// Returns the sum of body(z) over all sections, added in their order.
 template <typename Body>
 auto sum_sections(std::int64_t nz, const Body& body) {
   std::vector<decltype(body(std::int64_t{}))> parts(static_cast<std::size_t>(nz));
@@ -57,8 +57,8 @@ void check_weights(const base::Volume& weights) {
                   *low, *high));
 }
 
-// What the transform is taken of: values[i] = scale · weight[i] (volume[i] − mean), with a mean
-// square of 1, so that both volumes fit one complex transform in single precision.
+// The input of the transform: values[i] = scale · weight[i] (volume[i] − mean). Its mean square is
+// 1, so that both volumes fit one complex transform in single precision.
 struct Normalised {
   const base::Volume& volume;
   const base::Volume& weights;
@@ -83,7 +83,7 @@ struct Normalised {
     });
     if (!std::isfinite(squares))
       throw Error("a volume has NaN or infinite voxels: no shell correlation means anything");
-    // Of a constant volume rounding leaves about 10⁻³² of its square.
+    // Rounding leaves about 10⁻³² of the square of a constant volume.
     if (!(squares > 1e-20 * mean * mean))
       throw Error("a volume is constant under the mask: it correlates with nothing");
     scale = std::sqrt(static_cast<double>(v.data.size()) / squares);
@@ -95,7 +95,7 @@ struct Normalised {
   }
 };
 
-// Transform of first + i second: both volumes for one transform.
+// Returns the transform of first + i second: one transform serves both volumes.
 std::vector<std::complex<float>> joint_transform(const Normalised& first,
                                                  const Normalised& second) {
   const base::Shape3& shape = first.volume.shape;
@@ -109,8 +109,8 @@ std::vector<std::complex<float>> joint_transform(const Normalised& first,
   return values;
 }
 
-// The sums of one section kz of a joint transform F. The volumes are real, so their own are
-// A(k) = (F(k) + conj F(−k)) / 2 and B(k) = (F(k) − conj F(−k)) / 2i.
+// Computes the sums of one section kz of a joint transform F. The volumes are real, so their own
+// transforms are A(k) = (F(k) + conj F(−k)) / 2 and B(k) = (F(k) − conj F(−k)) / 2i.
 WedgeSums section_sums(const base::Shape3& shape, const std::vector<std::complex<float>>& joint,
                        std::int64_t kz, const TiltRange& tilts) {
   const std::int64_t longest = longest_axis(shape);

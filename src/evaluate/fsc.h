@@ -9,49 +9,49 @@
 
 namespace tomofield::evaluate {
 
-/// Tilts that a single-axis series about Y covers, in degrees, low to high.
+/// The tilts that a single-axis series about Y covers, in degrees.
 struct TiltRange {
   double low_deg = 0.0, high_deg = 0.0;
-  /// Whether a view of the series measured the frequency (kx, ky, kz) for any ky:
-  /// the view at θ shows x = X cos θ + Z sin θ, and so the frequencies along (cos θ, sin θ).
+  /// Returns true if a view of the series measured the frequency (kx, ky, kz), for any ky. The view
+  /// at θ shows x = X cos θ + Z sin θ, and so the frequencies along (cos θ, sin θ).
   bool covers(double kx, double kz) const;
 };
 
-/// Fourier shell correlation of one set of Fourier voxels. Shell s, from 1 on,
-/// is entry s − 1 of everything.
+/// The Fourier shell correlation over one set of Fourier voxels. Entry s − 1 belongs to shell s;
+/// the shells count from 1.
 struct FscCurve {
   std::vector<double> correlation;   ///< NaN where a shell is empty
   std::vector<std::int64_t> voxels;  ///< Fourier voxels of the shell, k and −k both counted
 };
 
-/// Curves and what they are drawn over.
+/// The curves and their frequencies.
 struct Fsc {
-  std::vector<double> frequency_per_A;  ///< of each shell, up to the Nyquist frequency
+  std::vector<double> frequency_per_A;  ///< one a shell, up to the Nyquist frequency
   FscCurve all;
-  std::optional<FscCurve> measured, missing;  ///< within the tilt range, and in the missing wedge
+  std::optional<FscCurve> measured, missing;  ///< inside the tilt range; missing wedge
 };
 
-/// Weights of the voxels by default: a window that falls to zero over the outer
-/// eighth of every axis at either end as a raised cosine, so that the faces of the box,
-/// where the volume breaks off, are no detail that both volumes share.
+/// Returns the default weights of the voxels. The window falls to zero as a raised cosine over the
+/// outer eighth of every axis at either end. Without it, the faces of the box, where the volume
+/// breaks off, would be a detail that both volumes share.
 base::Volume edge_window(const base::Shape3& shape);
 
-/// Fourier shell correlation (Harauz and van Heel, Optik 73, 1986)
+/// Computes the Fourier shell correlation (Harauz and van Heel, Optik 73, 1986)
 ///   FSC(s) = Σ Re(A conj B) / √(Σ |A|² Σ |B|²)
-/// over the Fourier voxels with |k| within half a shell of s; a shell is one
-/// Fourier pixel of the longest axis wide, and |k| is in cycles a voxel, so that
-/// shells are spheres whatever the sizes of the axes. A and B are the transforms of
-/// w (v − mean of v under w), with `weights` w between 0 and 1.
+/// over the Fourier voxels with |k| within half a shell of s. A shell is as wide as one Fourier
+/// pixel of the longest axis. |k| is in cycles a voxel, so shells are spheres whatever the sizes of
+/// the axes. A and B are the transforms of w (v − mean of v under w), where w is `weights`, from 0
+/// to 1.
 ///
-/// All of the same shape. Sums are in double and in a fixed order, whatever the
-/// thread count. Throws Error for volumes that are constant under the weights, that hold
-/// NaN or infinite voxels, for weights outside of [0, 1], and for axes too short for a shell.
+/// All three volumes have the same shape. Sums are in double and in a fixed order, whatever the
+/// thread count. Throws Error for volumes that are constant under the weights, that hold NaN or
+/// infinite voxels, for weights outside of [0, 1], and for axes too short for a shell.
 Fsc fourier_shell_correlation(const base::Volume& first, const base::Volume& second,
                               const base::Volume& weights, const std::optional<TiltRange>& tilts);
 
-/// The resolution at which a curve first falls below `threshold` on the way from low to
-/// high frequencies, in Å, linear in frequency between the shells; none if it never does or
-/// starts below.
+/// Returns the resolution in Å at which a curve first falls below `threshold` on the way from low
+/// to high frequencies. It interpolates linearly in frequency between the shells. Returns nothing
+/// if the curve never falls below the threshold or starts below it.
 std::optional<double> crossing_A(std::span<const double> frequency_per_A, const FscCurve& curve,
                                  double threshold);
 

@@ -13,13 +13,13 @@
 namespace tomofield::evaluate {
 namespace {
 
-// Both volumes, the weights and the complex transform, in single precision.
+// Counts both volumes, the weights and the complex transform, in single precision.
 constexpr std::size_t kBytesOfVoxel = 20;
 
 void check_memory(const FscFiles& files) {
   const io::MrcReader file(files.second);
   const Box box = files.box.value_or(whole_box(file));
-  if (!lies_within(box, whole_box(file))) return;  // read_pair() says what is wrong with it
+  if (!lies_within(box, whole_box(file))) return;  // read_pair() reports this error
   base::require_memory(kBytesOfVoxel * box.shape().voxels(), "the shell correlation",
                        "restrict it with --box, or bin both volumes");
 }

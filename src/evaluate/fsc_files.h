@@ -10,7 +10,7 @@
 
 namespace tomofield::evaluate {
 
-/// Which files to correlate, and how.
+/// The two files to correlate and the voxels of them that count.
 struct FscFiles {
   std::filesystem::path first, second;
   std::optional<std::filesystem::path> mask;  ///< default: edge_window()
@@ -18,17 +18,17 @@ struct FscFiles {
   std::optional<TiltRange> tilts;
 };
 
-/// Shell correlation of two MRC volumes, read as a pair (volume_pair.h). The mask is an
-/// MRC volume of the size of the second with weights from 0 to 1. Without a voxel
-/// size in the second's header frequencies count voxels, with a warning to base/log.h.
-/// Throws Error for what cannot be correlated, and if memory is too small.
+/// Computes the shell correlation of two MRC volumes, read as a pair (volume_pair.h). The mask is
+/// an MRC volume of the size of the second, with weights from 0 to 1. Where the second's header has
+/// no voxel size, frequencies count voxels, and a warning goes to base/log.h. Throws Error for
+/// volumes that cannot be correlated, and if memory is too small.
 Fsc correlate_files(const FscFiles& files);
 
-/// Everything about a correlation; crossings that there are not, and empty shells, are null.
+/// Returns the correlation as JSON. A crossing that does not exist and an empty shell are null.
 nlohmann::json fsc_json(const Fsc& fsc, const FscFiles& files);
 
-/// A line a shell: frequency, resolution, and of each curve its correlation and
-/// number of Fourier voxels. Empty shells have an empty correlation.
+/// Returns a table with a line a shell: its frequency, its resolution, and the correlation and the
+/// number of Fourier voxels of each curve. An empty shell has an empty correlation.
 std::string fsc_csv(const Fsc& fsc);
 
 }  // namespace tomofield::evaluate

@@ -27,7 +27,7 @@ base::Volume ones(base::Shape3 shape) {
   return volume;
 }
 
-// cos 2π (kx x + ky y + kz z) with whole cycles over each axis.
+// Returns cos 2π (kx x + ky y + kz z), where kx, ky and kz are whole cycles over each axis.
 base::Volume wave(base::Shape3 shape, int kx, int ky, int kz) {
   base::Volume volume(shape, 4.0);
   const auto part = [](int k, std::int64_t i, std::int64_t n) {
@@ -80,8 +80,8 @@ TEST(Fsc, IsOneForEqualVolumesMinusOneForInvertedOnesWhateverTheScale) {
 }
 
 TEST(Fsc, ShellsAreSpheresInAnUnevenBox) {
-  // 6 cycles over 24 voxels along x, 3 over 12 along y and 2 over 8 along z: all of 4 voxels,
-  // shell 6 of the longest axis.
+  // The periods are 4 voxels on every axis: 6 cycles over 24 voxels along x, 3 over 12 along y and
+  // 2 over 8 along z. This is shell 6 of the longest axis.
   const base::Shape3 shape{24, 12, 8};
   const base::Volume a = random_volume(shape, 4), b = random_volume(shape, 5);
   const Fsc of_noise = fourier_shell_correlation(a, b, ones(shape), std::nullopt);
@@ -156,7 +156,7 @@ TEST(EdgeWindow, FallsToZeroAtTheFaces) {
   const base::Volume window = edge_window({32, 8, 16});
   EXPECT_EQ(window.at(16, 4, 8), 1.0f);
   EXPECT_EQ(window.at(4, 4, 8), 1.0f);
-  // Half a voxel into an edge of four.
+  // The voxel's centre is half a voxel into an edge of four.
   EXPECT_NEAR(window.at(0, 4, 8), std::pow(std::sin(std::numbers::pi / 16.0), 2), 1e-6);
   EXPECT_EQ(window.at(0, 4, 8), window.at(31, 4, 8));
   EXPECT_LT(window.at(16, 4, 0), 0.2f);

@@ -10,7 +10,7 @@
 namespace tomofield::evaluate {
 namespace {
 
-// The two voxels of an axis that a position lies between, and the second one's share.
+// The two voxels of an axis between which a position lies, and the weight of the second.
 struct Neighbours {
   std::int64_t low, high;
   double share;

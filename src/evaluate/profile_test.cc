@@ -7,7 +7,7 @@
 namespace tomofield::evaluate {
 namespace {
 
-// 2 x − 3 y + 5 z of the centre of each voxel: trilinear interpolation keeps it.
+// Returns 2 x − 3 y + 5 z at the centre of each voxel. Trilinear interpolation reproduces it.
 base::Volume ramp(base::Shape3 shape) {
   base::Volume volume(shape);
   for (std::int64_t z = 0; z < shape.nz; ++z)

@@ -17,8 +17,8 @@ namespace {
 
 constexpr std::size_t kChunk = std::size_t{1} << 16;
 
-/// Sums of `terms(x, y)`, N of them, over all voxels: a partial sum for each
-/// fixed chunk, added in order.
+/// Returns N sums of `terms(x, y)` over all voxels. Each fixed chunk has a partial sum; they are
+/// added in order.
 template <std::size_t N, typename Terms>
 std::array<double, N> sum_pairs(std::span<const float> xs, std::span<const float> ys,
                                 const Terms& terms) {

@@ -18,7 +18,8 @@ namespace {
 
 using kernels::kLanes;
 
-// Samples of a slab at the centres of the voxels; lanes past the last row stay zero.
+// Copies a slab of the volume to samples at the centres of the voxels. Lanes past the last row stay
+// zero.
 void copy_slab(const base::Volume& volume, int slab, const projection::SampleSegment& segment,
                float* samples) {
   const std::int64_t first_row = std::int64_t{slab} * kLanes;
@@ -31,8 +32,8 @@ void copy_slab(const base::Volume& volume, int slab, const projection::SampleSeg
   }
 }
 
-// Whether a ray stays within the centres of the outermost voxels across x as long as it
-// crosses samples, which fade over half a voxel beyond the thickness.
+// Returns true if a ray stays within the centres of the outermost voxels across x as long as it
+// crosses samples. These fade over half a voxel beyond the thickness.
 bool stays_inside(const VolumePlace& place, int view, double u) {
   const geometry::TiltGeometry& g = place.geometry;
   const double low = static_cast<double>(place.roi.x0) + 0.5;
@@ -43,7 +44,7 @@ bool stays_inside(const VolumePlace& place, int view, double u) {
   });
 }
 
-// The rays of a view that are scored, of all rows: [x].
+// Returns for each x of a view whether its rays are scored; it is the same for all rows.
 std::vector<char> scored_pixels(const VolumePlace& place, int view) {
   std::vector<char> scored;
   for (std::int64_t x = 0; x < place.geometry.width; ++x)
@@ -52,7 +53,8 @@ std::vector<char> scored_pixels(const VolumePlace& place, int view) {
   return scored;
 }
 
-// Sums in double, ray by ray: volumes may have offsets that are large against their contrast.
+// Adds up the errors ray by ray in double: the offset of a volume may be large against its
+// contrast.
 measurement::ViewSums ray_sums(const float* measured, const std::uint16_t* mask,
                                const std::vector<char>& scored, const float* predicted) {
   measurement::ViewSums sums;

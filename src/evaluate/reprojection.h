@@ -10,20 +10,20 @@
 
 namespace tomofield::evaluate {
 
-/// Where a volume of one voxel a pixel lies in the views.
+/// The place of a volume of one voxel a pixel in the views.
 struct VolumePlace {
   geometry::TiltGeometry geometry;  ///< thickness: the volume's voxels in z
-  geometry::Roi roi;                ///< its voxels in x and y are these pixels at zero tilt
-  /// Nothing of the specimen lies outside of the volume. Otherwise only those rays count
-  /// that stay within its x while they cross its thickness.
+  geometry::Roi roi;                ///< the pixels of its voxels at zero tilt
+  /// True if nothing of the specimen lies outside of the volume. Otherwise a ray counts only if it
+  /// stays within the volume's x while it crosses the thickness.
   bool is_whole_specimen = false;
 };
 
-/// Errors of `views` against line integrals through a volume, by the projector of the
-/// main method (projection/slab_projector.h), after the least-squares scale and offset of each
-/// view: of any volume, whatever its units and contrast. `measured` has the rows of the region,
-/// `noise_weight` 1 / variance of the noise of every view of the series. The
-/// sums are the same for any number of threads. Throws Error for a view of which no ray counts.
+/// Computes the errors of `views` against line integrals through a volume, after the least-squares
+/// scale and offset of each view. The units and the contrast of the volume therefore do not matter.
+/// The projector is the main method's (projection/slab_projector.h). `measured` has the rows of the
+/// region; `noise_weight` is 1 / variance of the noise of every view of the series. The sums are
+/// the same for any number of threads. Throws Error for a view of which no ray counts.
 measurement::ViewErrors reprojection_errors(const base::Volume& volume, const VolumePlace& place,
                                             const measurement::SlabViews& measured,
                                             std::vector<int> views,

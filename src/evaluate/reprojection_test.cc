@@ -12,8 +12,8 @@
 namespace tomofield::evaluate {
 namespace {
 
-// A volume on part of views that are 60 wide and 30 high, without change along x and z: rays that
-// stay in it see value(y) · thickness / cos θ.
+// Holds a volume on a part of views that are 60 wide and 30 high. It does not change along x and z,
+// so rays that stay in it see value(y) · thickness / cos θ.
 class ReprojectionTest : public ::testing::Test {
  protected:
   static constexpr std::int64_t kWidth = 60, kHeight = 30, kThickness = 8;
@@ -31,8 +31,8 @@ class ReprojectionTest : public ::testing::Test {
     return {geometry::centred_geometry(kWidth, kHeight, kThickness, std::move(tilts)), roi_};
   }
 
-  // 3 · line integral − 7 where the ray is in the volume all the way, and not
-  // within a voxel of its faces; `elsewhere` on the other side.
+  // Computes the errors of views that measure 3 · line integral − 7 where a ray is in the volume
+  // all the way and not within a voxel of its faces, and `elsewhere` on the other rays.
   measurement::ViewErrors errors(const VolumePlace& place, float elsewhere) const {
     const std::size_t views = place.geometry.tilt_deg.size();
     const measurement::SlabViews measured(
@@ -75,7 +75,7 @@ TEST_F(ReprojectionTest, FindsScaleAndOffsetFromRaysThatStayInside) {
     EXPECT_NEAR(flat.models[v].offset, -7.0, 2e-2) << v;
     EXPECT_LT(flat.view_error[v], 1e-5) << v;
   }
-  // Steep rays step along x, and meet the faces across z between samples: a ripple of 1 %.
+  // Steep rays step along x and meet the faces across z between samples: the ripple is 1 %.
   const measurement::ViewErrors steep = errors(place({-60.0, 50.0}), 1e4f);
   for (std::size_t v = 0; v < steep.views.size(); ++v) {
     EXPECT_NEAR(steep.models[v].scale, 3.0, 0.03) << v;
@@ -84,7 +84,7 @@ TEST_F(ReprojectionTest, FindsScaleAndOffsetFromRaysThatStayInside) {
 }
 
 TEST_F(ReprojectionTest, CountsEveryRayOfAWholeSpecimen) {
-  // Nothing but −7, the offset, beside the volume.
+  // The views beside the volume show −7, the offset, and nothing else.
   VolumePlace whole = place({0.0});
   whole.is_whole_specimen = true;
   EXPECT_LT(errors(whole, -7.0f).total, 1e-5);

@@ -16,10 +16,10 @@ namespace {
 
 constexpr std::int64_t kWindow = 7;
 constexpr double kWindowVoxels = 343.0;
-constexpr std::int64_t kBandRows = 32;  // windows' rows: the sums of a band fit the L2 cache
+constexpr std::int64_t kBandRows = 32;  // rows of windows; the sums of a band fit the L2 cache
 constexpr std::size_t kNumSums = 5;     // of x, y, x², y², xy
 
-/// Five planes [rows, width] of window sums, one after the other.
+/// Holds five planes [rows, width] of window sums, one after the other.
 using Planes = std::vector<double>;
 
 struct Statistics {
@@ -32,8 +32,8 @@ double similarity(const Statistics& s, double peak) {
          ((s.mean_x * s.mean_x + s.mean_y * s.mean_y + c1) * (s.variance_x + s.variance_y + c2));
 }
 
-/// The windows whose first rows are [first_row, first_row + num_rows): walks
-/// along z with the sums of the last seven sections in a ring.
+/// Computes the windows whose first rows are [first_row, first_row + num_rows). It walks along z
+/// and keeps the sums of the last seven sections in a ring.
 class Band {
  public:
   Band(const base::Volume& x, const base::Volume& y, std::int64_t first_row, std::int64_t num_rows)
@@ -48,7 +48,7 @@ class Band {
     ring_.fill(Planes(totals_.size()));
   }
 
-  /// Sums of both similarities over all windows of the band.
+  /// Returns the sums of both similarities over all windows of the band.
   SsimScore run(double peak, double scale, double offset) {
     SsimScore sum;
     for (std::int64_t z = 0; z < x_.shape.nz; ++z) {
@@ -59,7 +59,7 @@ class Band {
   }
 
  private:
-  /// Sums over 7 × 7 squares of one section: down the columns, then along x.
+  /// Sums 7 × 7 squares of one section: down the columns first, then along x.
   void sum_section(std::int64_t z, Planes& planes) {
     for (std::int64_t row = 0; row < num_rows_; ++row) {
       sum_columns(z, first_row_ + row);

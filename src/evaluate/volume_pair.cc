@@ -30,7 +30,7 @@ void check_voxel_sizes(const io::MrcReader& first, const io::MrcReader& second) 
                   a, b));
 }
 
-// Where the first voxel of `a` lies in voxels of `b`.
+// The voxel of `b` on which the first voxel of `a` lies.
 using Offset = std::array<std::int64_t, 3>;
 
 bool is_ours(const io::MrcReader& volume) {
@@ -39,8 +39,8 @@ bool is_ours(const io::MrcReader& volume) {
   });
 }
 
-// What ORIGIN says, in IMOD's sign, where it makes one volume a part of the other: many programs
-// write other things there, and most nothing.
+// Returns the offset by the ORIGINs, in IMOD's sign, if they make one volume a part of the other.
+// Otherwise they say nothing: many programs write other things there, and most nothing.
 std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcReader& b) {
   const VolumeSizes size_a = whole_box(a).last, size_b = whole_box(b).last;
   Offset offset{};
@@ -69,7 +69,7 @@ Offset offset_by_centres(const io::MrcReader& a, const io::MrcReader& b) {
   return offset;
 }
 
-// What both have, in voxels of `b`.
+// Returns the box that both volumes have, in voxels of `b`.
 Box common_box(const io::MrcReader& a, const io::MrcReader& b, const Offset& offset) {
   const VolumeSizes size_a = whole_box(a).last, size_b = whole_box(b).last;
   Box common;
@@ -80,7 +80,8 @@ Box common_box(const io::MrcReader& a, const io::MrcReader& b, const Offset& off
   return common;
 }
 
-// Of volumes that are laid centre on centre.
+// Refuses sizes of which laying the volumes centre on centre makes no sense, and warns of different
+// ones.
 void check_sizes(const io::MrcReader& first, const io::MrcReader& second) {
   const VolumeSizes a = whole_box(first).last, b = whole_box(second).last;
   if (a == b) return;

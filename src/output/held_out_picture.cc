@@ -44,7 +44,7 @@ void write_held_out_picture(const std::filesystem::path& path,
   std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width * view.height), 255);
   for (std::int64_t panel = 0; panel < 3; ++panel) {
     for (std::int64_t y = 0; y < view.height; ++y) {
-      const std::int64_t row = view.height - 1 - y;  // the first row at the bottom
+      const std::int64_t row = view.height - 1 - y;  // the first row is at the bottom
       for (std::int64_t x = 0; x < view.width; ++x) {
         const auto value =
             static_cast<double>(panels[panel].values[static_cast<std::size_t>(y * view.width + x)]);

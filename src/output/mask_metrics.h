@@ -6,9 +6,9 @@
 
 namespace tomofield::output {
 
-/// What was masked, for the figures of every command that reconstructs: beads,
-/// hot and dead pixels, and the part of all rays and of each view's that
-/// carries no loss, views in the stack's order.
+/// Returns the metrics of the masks as JSON, for every command that reconstructs: beads, hot and
+/// dead pixels, and the fraction of rays without a loss, of all rays and by view. Views are in the
+/// stack's order.
 nlohmann::json mask_json(const measurement::PreparedSeries& series);
 
 }  // namespace tomofield::output

@@ -13,7 +13,7 @@
 namespace tomofield::output {
 namespace {
 
-// How an adaptive tree came about.
+// Returns the history of an adaptive tree as JSON.
 nlohmann::json tree_json(const fit::TreeProgress& tree) {
   nlohmann::json updates = nlohmann::json::array();
   for (const fit::TreeUpdate& u : tree.updates) {

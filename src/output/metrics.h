@@ -7,11 +7,13 @@
 
 namespace tomofield::output {
 
-/// What a fit that took so many seconds amounts to, for the JSON beside the volume.
+/// Returns the metrics of a fit as JSON, for the file beside the volume. `seconds` is the fit's
+/// time.
 nlohmann::json figures_json(const fit::Fit& fit, const measurement::PreparedSeries& series,
                             double seconds);
 
-/// What each process did in the steps of this run. Every process calls it.
+/// Returns as JSON the work and the times of each process in the steps of this run. Every process
+/// calls it.
 nlohmann::json processes_json(const fit::Fit& fit, double seconds);
 
 }  // namespace tomofield::output

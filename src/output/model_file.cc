@@ -20,11 +20,11 @@ namespace {
 using io::Hdf5Group;
 using Integers = std::vector<std::int64_t>;
 
-// Persisted: do not change either without a new version.
+// Both values are in files: do not change either without a new version.
 constexpr const char* kFormat = "tomofield model";
 constexpr std::int64_t kFormatVersion = 2;
 
-// A list of structs as one array a member.
+// Writes one member of a list of structs as an array.
 template <typename Items, typename Get>
 void write_column(Hdf5Group& group, const char* name, const Items& items, Get get) {
   Integers column;
@@ -90,7 +90,8 @@ void write_leaves(Hdf5Group group, const field::Field& field) {
   group.write_array<std::int64_t>("offset", offsets);
 }
 
-// Copies what comes in pieces, one float a parameter, of the leaves that a field keeps.
+// Copies floats that arrive in pieces, one a parameter, and keeps those of the leaves that a field
+// keeps.
 class KeptCopy {
  public:
   KeptCopy(const field::Field& field, std::span<float> values) : field_(field), values_(values) {}
@@ -138,13 +139,13 @@ void write_training(Hdf5Group group, const TrainingState& state, const FloatArra
   write_arrays(group.create_group("integers"), state.integers);
 }
 
-// Reading: every fault is an Error that names the file.
+// Reads a model. Every fault is an Error that names the file.
 class ModelReader {
  public:
   explicit ModelReader(const std::filesystem::path& path)
       : path_(path.string()), file_(io::Hdf5File::open(path)) {}
 
-  // Without `choose`: all leaves, and of the training state the floats too.
+  // Keeps all leaves if `choose` is empty; then the training state has its floats too.
   Model read(TrainingState* training, const ChooseLeaves& choose) const {
     const Hdf5Group root = file_.root();
     require_known_format(root);

@@ -15,18 +15,18 @@
 
 namespace tomofield::output {
 
-/// What a field means: where it lies, its scale, and where it came from.
+/// The meaning of a field: its place, its scale and its source.
 struct ModelInfo {
   geometry::TiltGeometry geometry;
-  geometry::Roi roi;  ///< the region that was asked for; the field goes further
+  geometry::Roi roi;  ///< the region asked for; the field is larger by the margin
   double x_tilt_deg =
       0.0;  ///< the specimen's rotation about X before the tilt, the same for all views
-  double pixel_size_A = 1.0;  ///< of the pixels that every length counts
+  double pixel_size_A = 1.0;  ///< side of a pixel, the unit of every length
   double density_unit = 1.0;  ///< data units a density unit
-  bool is_dark = false;       ///< the series was dark where dense, so volumes leave negated
+  bool is_dark = false;       ///< dense was dark in the series, so volumes are negated
   std::string options_json;   ///< the resolved options of the reconstruction
   std::string written_by;     ///< program and version; filled in by load_model
-  /// What turns densities into values of the input's kind and contrast.
+  /// Returns the factor from densities to values of the input's units and contrast.
   double output_scale() const { return is_dark ? -density_unit : density_unit; }
 };
 
@@ -35,7 +35,7 @@ struct Model : ModelInfo {
   std::unique_ptr<field::Field> field;
 };
 
-/// Arrays that a fit needs to go on, bit for bit. Names are free but for '/'.
+/// The arrays that a fit needs to continue bit for bit. A name may hold anything but '/'.
 struct TrainingState {
   std::map<std::string, std::vector<float>> floats;
   std::map<std::string, std::vector<double>> doubles;
@@ -43,7 +43,8 @@ struct TrainingState {
   bool operator==(const TrainingState&) const = default;
 };
 
-/// One float a parameter, in pieces from the first on, for arrays that need not be in one place.
+/// One float a parameter, handed out in pieces from the first on. The array need not be in one
+/// place.
 struct FloatSource {
   using Sink = std::function<void(std::span<const float>)>;
   std::size_t size = 0;
@@ -51,43 +52,45 @@ struct FloatSource {
 
   FloatSource(std::size_t all, std::function<void(const Sink&)> pieces)
       : size(all), hand_out(std::move(pieces)) {}
-  /// An array as it is.
+  /// Hands out an array in one piece.
   FloatSource(std::span<const float> whole)
       : size(whole.size()), hand_out([whole](const Sink& sink) { sink(whole); }) {}
 };
 
-/// Large arrays of a training state that are written from where they are.
+/// The large arrays of a training state. They are written from where they are, without a copy.
 using FloatArrays = std::map<std::string, FloatSource>;
 
-/// Writes a model (docs/model-format.md): atomically, so that `path` holds the
-/// old file or the whole new one, whatever happens. Parameters are written
-/// from where they are. Throws Error if `path` cannot be written, or if a
-/// parameter is not finite, which would replace a good model by a useless one.
-/// `more_floats` join those of `training`, without which they are not written.
+/// Writes a model (docs/model-format.md) atomically: `path` holds the old file or the whole new
+/// one, whatever happens. Parameters are written from where they are, without a copy. `more_floats`
+/// join those of `training`; they are not written if `training` is null. Throws Error if `path`
+/// cannot be written, or if a parameter is not finite, because such a model would replace a good
+/// one.
 void save_model(const std::filesystem::path& path, const field::Field& field, const ModelInfo& info,
                 const TrainingState* training = nullptr, const FloatArrays& more_floats = {});
-/// The same for a field whose parameters are not all kept here (Field::keep_only).
+/// Writes a field of which this process keeps only some parameters (Field::keep_only); `parameters`
+/// hands out all of them.
 void save_model(const std::filesystem::path& path, const field::Field& field,
                 const FloatSource& parameters, const ModelInfo& info, const TrainingState* training,
                 const FloatArrays& more_floats);
-/// Throws Error if a parameter that is kept is not finite, naming the file that was to be written.
+/// Throws Error if a parameter that is kept is not finite. The message names `path`, the file that
+/// would have been written.
 void require_finite(const field::Field& field, const std::filesystem::path& path);
 void save_model(const std::filesystem::path& path, const Model& model,
                 const TrainingState* training = nullptr);
 
-/// Reads a model, and its training state into `training` if that is asked for:
-/// empty where the model was saved without. Throws Error, naming the file and
-/// the reason, for anything but a whole model of a known version.
+/// Reads a model, and its training state into `training` unless that is null. The state is empty if
+/// the model was saved without one. Throws Error, with the file and the reason, for anything but a
+/// whole model of a known version.
 Model load_model(const std::filesystem::path& path, TrainingState* training = nullptr);
 
-/// The leaves of a tree whose parameters are asked for; none: all.
+/// Returns the leaves of a tree whose parameters shall be kept. An empty function keeps all.
 using ChooseLeaves = std::function<std::vector<int>(const field::Quadtree&)>;
-/// A model of which only some leaves are kept (Field::keep_only), and its training state but
-/// for the floats.
+/// Reads a model and keeps only some of its leaves (Field::keep_only). Reads its training state
+/// without the floats.
 Model load_part(const std::filesystem::path& path, const ChooseLeaves& choose,
                 TrainingState& training);
-/// One of the floats of a training state, which are one a parameter, into `values`: of the leaves
-/// that `field` keeps alone. Throws Error if there is none or it has another size.
+/// Reads one array of floats of a training state, one a parameter, into `values`: only those of the
+/// leaves that `field` keeps. Throws Error if there is no such array or if it has another size.
 void load_floats(const std::filesystem::path& path, const std::string& name,
                  const field::Field& field, std::span<float> values);
 

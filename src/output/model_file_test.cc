@@ -32,7 +32,7 @@ using testing::uneven_model;
 
 TrainingState some_state() {
   TrainingState state;
-  // More than one piece of 1 MiB.
+  // This array is longer than one piece of 1 MiB.
   state.floats["adam m"] = std::vector<float>(300001, 0.5f);
   state.floats["adam m"].back() = -0.0f;
   state.floats["none"] = {};
@@ -76,7 +76,7 @@ std::string refusal(const std::filesystem::path& path) {
   return message_of<Error>([&] { load_model(path, &state); });
 }
 
-// A message that names the file and has `fact` in it.
+// Expects an error whose message names the file and has `fact` in it.
 void expect_refusal(const std::filesystem::path& path, const std::string& fact) {
   const std::string message = refusal(path);
   EXPECT_NE(message.find(path.filename().string()), std::string::npos) << message;
@@ -106,7 +106,7 @@ TEST(ModelFile, SomeLeavesComeBackWithTheirMoments) {
   const field::Field& field = *model.field;
   std::vector<float> moments(field.num_parameters());
   for (std::size_t i = 0; i < moments.size(); ++i) moments[i] = static_cast<float>(i) + 0.5f;
-  // As several processes write it: in pieces that know nothing of leaves.
+  // Hands out the floats as several processes do: in pieces that know nothing of leaves.
   const auto in_pieces = [](std::span<const float> values) {
     return FloatSource(values.size(), [values](const FloatSource::Sink& sink) {
       for (std::size_t at = 0; at < values.size(); at += 77)
@@ -167,8 +167,8 @@ TEST(ModelFile, TheSameModelIsTheSameBytes) {
   EXPECT_TRUE(read_whole_file(scratch / "a.h5") == read_whole_file(scratch / "b.h5"));
 }
 
-// Whether `path` is refused; if it is not, it must hold the same as before:
-// what was changed lies between items, where nothing refers to it.
+// Returns true if `path` is refused. Otherwise expects the same contents as before: the change was
+// between items, where nothing refers to it.
 bool is_refused(const std::filesystem::path& path, const Model& model, const TrainingState& state) {
   try {
     TrainingState loaded_state;
@@ -195,7 +195,7 @@ TEST(ModelFile, IsRefusedWhereverItIsCutOff) {
   for (std::size_t length = 0; length < whole.size(); length += 1 + random.below(400)) {
     scratch.write("torn.h5", whole.substr(0, length));
     EXPECT_TRUE(is_refused(scratch / "torn.h5", model, state)) << length << " of " << whole.size();
-    // A file system that kept the length and lost the contents.
+    // This file is what remains when a file system keeps the length and loses the contents.
     scratch.write("torn.h5", whole.substr(0, length) + std::string(whole.size() - length, '\0'));
     const bool is_same = whole.find_first_not_of('\0', length) == std::string::npos;
     EXPECT_NE(is_refused(scratch / "torn.h5", model, state), is_same)
@@ -246,7 +246,7 @@ TEST(ModelFile, RefusesANewerFormatAndNamesItsWriter) {
   expect_refusal(scratch / "newer.h5", "format 2");
 }
 
-// Edits models with h5py; the arrays' checksums are made right again.
+// Edits models with h5py and corrects the checksums of the arrays.
 constexpr const char* kEditor = R"(
 import h5py, numpy as np, shutil
 P1, P2, P3, P4, P5 = (0x9e3779b185ebca87, 0xc2b2ae3d27d4eb4f, 0x165667b19e3779f9,
@@ -340,8 +340,8 @@ TEST(ModelFile, ReplacesAModelAsAWholeOrNotAtAll) {
   EXPECT_THROW(save_model(scratch / "nowhere" / "model.h5", diverged), Error);
 }
 
-// The layout that docs/model-format.md promises, read by another program: it
-// evaluates eq. 4 at a point by itself.
+// Reads the layout of docs/model-format.md with another program, which evaluates equation 4 at a
+// point by itself.
 TEST(ModelFile, IsReadByH5py) {
   if (!python_has("h5py,numpy")) GTEST_SKIP() << "python3-h5py is not installed";
   const ScratchDirectory scratch;

@@ -8,12 +8,12 @@
 
 namespace tomofield::output {
 
-/// Every file that a series is read from.
+/// Returns every file that a series is read from.
 std::vector<std::filesystem::path> input_files(const tilt_series::TiltSeriesOptions& input);
 
-/// What stands in the way of writing the results of a series (io/output_files.h): none
-/// may replace a file that the series is read from. Pictures of slices (report/slices.h) are
-/// results too.
+/// Checks that the results of a series can be written (io/output_files.h) and that none replaces a
+/// file that the series is read from. Pictures of slices (report/slices.h) are results too. Throws
+/// Error, with `advice`, otherwise.
 void check_result_files(std::vector<std::filesystem::path> results,
                         const std::filesystem::path& picture_prefix,
                         const tilt_series::TiltSeriesOptions& input, bool may_replace,

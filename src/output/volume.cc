@@ -25,7 +25,7 @@ using field::Point;
 
 constexpr const char* kMadeBy = "density field";
 
-// To the first process.
+// Gathers the parameters on the first process.
 void gather_parameters(const VolumeShare& share, field::Field& field) {
   distributed::GatheredArrays arrays(share.processes, share.first_parameter, share.end_parameter);
   const std::size_t parameters = arrays.add(field.parameters());
@@ -39,7 +39,7 @@ void gather_parameters(const VolumeShare& share, field::Field& field) {
   });
 }
 
-// Where a box lies, turned or not.
+// The smallest upright box around a box, which may be turned.
 struct Bounds {
   Point low, high;
   explicit Bounds(const Box& box) {
@@ -58,7 +58,7 @@ struct Bounds {
   }
 };
 
-// Refuses a box that cannot meet the field: all of it would be zero.
+// Refuses a box that does not meet the field, because all its voxels would be zero.
 void require_inside(const field::Field& field, const Bounds& box) {
   const field::RootGrid& roots = field.tree().roots();
   const Point first{static_cast<double>(roots.x0), static_cast<double>(roots.y0), 0.0};
@@ -73,7 +73,8 @@ void require_inside(const field::Field& field, const Bounds& box) {
   }
 }
 
-// Beside the region of interest the field is a margin, which only some views see.
+// Warns of a box beyond the region of interest: there the field is a margin, which only some views
+// see.
 void warn_of_margin(const ModelInfo& info, const Bounds& box, double tolerance) {
   const geometry::Roi& roi = info.roi;
   const Point first{static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0};
@@ -89,13 +90,13 @@ void warn_of_margin(const ModelInfo& info, const Bounds& box, double tolerance) 
   }
 }
 
-// Corner of the box in Å from the view's corner, IMOD's sign.
+// Returns the corner of the box from the view's corner in Å, in IMOD's sign.
 std::array<double, 3> origin_A(const ModelInfo& info, const Box& box, VolumeAxes axes) {
   if (!box.is_aligned()) return {0.0, 0.0, 0.0};
   const auto [nx, ny, nz] = box.size;
   Point corner = box.position({0.0, 0.0, 0.0});
   if (axes == VolumeAxes::kXzy) {
-    // Rows run down from the upper face.
+    // Rows count down from the upper face.
     const double top = box.position({0.0, 0.0, static_cast<double>(nz)})[2];
     corner = {corner[0], info.geometry.thickness - top, corner[1]};
   }
@@ -115,7 +116,7 @@ float largest_density(const VoxelSource& source, const distributed::Communicator
   return static_cast<float>(processes.allreduce_max(static_cast<double>(largest)));
 }
 
-// Densities times `scale`, in the file's axes.
+// Writes densities times `scale` in the file's axes.
 class PartWriter {
  public:
   PartWriter(io::MrcWriter& file, const Box& box, VolumeAxes axes, double scale)
@@ -151,9 +152,9 @@ class PartWriter {
   float scale_;
 };
 
-// The fit sees the specimen after its x-axis tilt: p = Ry(tilt) Rx(alpha) (P − C)
-// (CONVENTIONS), so a box of the specimen is turned by Rx(alpha) about C in the
-// field. A mirrored Z turns the other way.
+// Turns a box of the specimen into the frame of the field. The fit sees the specimen after its
+// x-axis tilt, p = Ry(tilt) Rx(alpha) (P − C) (docs/geometry.md), so the box is turned by Rx(alpha)
+// about C. A mirrored Z turns the other way.
 void rotate_about_x(const ModelInfo& model, Box& box) {
   const geometry::TiltGeometry& g = model.geometry;
   const double alpha = g.hand * model.x_tilt_deg * std::numbers::pi / 180.0;

@@ -44,7 +44,7 @@ TEST(WriteVolume, WritesTheRegionOfInterestInTheInputsUnits) {
   const Written out = read(scratch / "out.mrc");
   EXPECT_EQ(out.header.nx, 100);
   EXPECT_EQ(out.header.ny, 116);
-  EXPECT_EQ(out.header.nz, 21);  // whole voxels of 21.5
+  EXPECT_EQ(out.header.nz, 21);  // 21.5 is rounded to whole voxels
   EXPECT_TRUE(out.header.is_volume);
   for (const double size_A : out.header.voxel_size_A) EXPECT_NEAR(size_A, 3.3725, 1e-6);
   EXPECT_NEAR(out.header.origin_A[0], -10 * 3.3725, 1e-4);
@@ -69,7 +69,7 @@ TEST(WriteVolume, KeepsOrInvertsTheContrastOfTheInput) {
   }
 }
 
-// trimvol -rx turns sections along Y into sections along Z: z = rows − 1 − row.
+// `trimvol -rx` turns sections along Y into sections along Z: z = rows − 1 − row.
 TEST(WriteVolume, AxesXzyTurnBackByImodsRotation) {
   const ScratchDirectory scratch;
   const auto model = uneven_model(FieldKind::kVm);
@@ -129,8 +129,8 @@ TEST(WriteVolume, RefusesWhatCannotBeWritten) {
   EXPECT_EQ(scratch.num_files(), 0u);
 }
 
-// CONVENTIONS: p = Ry(tilt) Rx(alpha) (P − C): a point P of the specimen lies at
-// C + Rx(alpha) (P − C) in the field, wherever the region of interest is.
+// A point P of the specimen lies at C + Rx(alpha) (P − C) in the field, wherever the region of
+// interest is, because p = Ry(tilt) Rx(alpha) (P − C) (docs/geometry.md).
 TEST(WriteVolume, TurnsTheSpecimenBackByItsXTilt) {
   auto model = uneven_model(FieldKind::kVm);
   const field::Box straight = region_box(model, 1.0);

@@ -9,20 +9,20 @@ namespace tomofield::report {
 
 using Colour = std::array<std::uint8_t, 3>;
 
-/// A picture in the making, x to the right and y upwards from the lower left.
+/// A picture that can be drawn on. x runs to the right and y upwards from the lower left corner.
 class Canvas {
  public:
   Canvas(std::int64_t width, std::int64_t height, const Colour& background);
 
-  /// Rectangle of pixels [x0, x1) × [y0, y1), cut to the canvas.
+  /// Fills the rectangle of pixels [x0, x1) × [y0, y1), cut to the canvas.
   void fill(std::int64_t x0, std::int64_t y0, std::int64_t x1, std::int64_t y1,
             const Colour& colour);
-  /// A straight line between two points, `thickness` pixels wide.
+  /// Draws a straight line between two points, `thickness` pixels wide.
   void draw_line(double x0, double y0, double x1, double y1, int thickness, const Colour& colour);
 
   std::int64_t width() const { return width_; }
   std::int64_t height() const { return height_; }
-  /// As PNG; replaces `path`. Throws Error.
+  /// Writes a PNG file and replaces `path`. Throws Error if it cannot be written.
   void write(const std::filesystem::path& path) const;
 
  private:

@@ -13,14 +13,14 @@
 namespace tomofield::report {
 namespace {
 
-// The drawing area in a picture of kWidth pixels; the legend is at its right.
+// The drawing area of a picture of kWidth pixels. The legend is at its right.
 constexpr int kWidth = 900, kLeastHeight = 360;
 constexpr double kLeft = 70, kRight = 660, kTop = 30, kBelow = 55;
-constexpr double kLine = 20;            // of the legend, from one to the next
-constexpr double kNames = kRight + 48;  // where they begin
+constexpr double kLine = 20;            // distance of two lines of the legend
+constexpr double kNames = kRight + 48;  // x at which the names begin
 constexpr double kNameWidth = kWidth - 4 - kNames;
 
-// The first eight are told apart by people who see colours differently (Okabe and Ito 2008).
+// People who see colours differently can tell the first eight apart (Okabe and Ito 2008).
 constexpr std::array<Colour, 12> kColours = {{{0x00, 0x72, 0xb2},
                                               {0xd5, 0x5e, 0x00},
                                               {0x00, 0x9e, 0x73},
@@ -63,7 +63,7 @@ std::vector<Tick> ticks_of(const std::vector<Tick>& wanted, const Range& range) 
 
 using Legend = std::vector<std::vector<std::string>>;  // lines of every name
 
-// A name in lines that fit into the legend, as far as its words do.
+// Breaks a name between words into lines that fit into the legend. A longer word keeps its line.
 template <typename Surface>
 std::vector<std::string> lines_of(const std::string& name) {
   std::vector<std::string> lines(1);
@@ -80,7 +80,7 @@ std::vector<std::string> lines_of(const std::string& name) {
   return lines;
 }
 
-// Of the picture, in pixels.
+// Returns the height of the picture in pixels.
 int height_for(const Legend& legend) {
   std::size_t lines = 0;
   for (const auto& name : legend) lines += name.size();
@@ -130,7 +130,7 @@ class Plot {
     surface_.draw_text({kLeft, kTop - 10}, Anchor::kStart, axes_.y_title);
   }
 
-  // Pieces between points that are not finite.
+  // Draws a curve in pieces between points that are not finite.
   void draw_curve(const Curve& curve, const Colour& colour) const {
     std::vector<Point> piece;
     const auto end_piece = [&] {
@@ -184,7 +184,7 @@ std::vector<double> round_ticks(double low, double high) {
     }
   }
   std::vector<double> ticks;
-  const double slack = 1e-9 * step;  // of ticks at the very ends
+  const double slack = 1e-9 * step;  // keeps ticks at the very ends
   for (double k = std::ceil((low - slack) / step); k * step <= high + slack; ++k)
     ticks.push_back(k * step + 0.0);  // no minus before a zero
   return ticks;

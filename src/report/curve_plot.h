@@ -19,25 +19,25 @@ struct Tick {
   std::string label;
 };
 
-/// What a plot shows; a range without extent is taken from the curves, and ticks that are not
-/// given stand at round numbers.
+/// The axes of a plot. A range without extent is taken from the curves. Ticks that are not given
+/// stand at round numbers.
 struct PlotAxes {
   std::string x_title, y_title;
   std::pair<double, double> x_range{0, 0}, y_range{0, 0};
   std::vector<Tick> x_ticks = {}, y_ticks = {};
 };
 
-/// The curves over common axes, with a grid line at every tick and a legend. Points that are not
-/// finite interrupt a curve; those beyond the ends of the y axis are drawn there. At most twelve
-/// curves have colours of their own. The legend has long names on several lines, and a picture
-/// whose legend is long is as high as it takes. As an SVG element that needs nothing else:
+/// Draws the curves over common axes, with a grid line at every tick and a legend. Returns an SVG
+/// element that needs nothing else. Points that are not finite interrupt a curve; points beyond the
+/// ends of the y axis are drawn at the ends. At most twelve curves have a colour of their own. A
+/// long name takes several lines of the legend, and the picture is as high as its legend needs.
 std::string curve_plot_svg(const PlotAxes& axes, const std::vector<Curve>& curves);
-/// The same as a PNG of 900 × 360 pixels (or higher), with letters as in report/text.h. Replaces
-/// `path`. Throws Error.
+/// Draws the same plot as a PNG of 900 × 360 pixels (or higher), with the letters of report/text.h.
+/// Replaces `path`. Throws Error if it cannot be written.
 void write_curve_plot(const PlotAxes& axes, const std::vector<Curve>& curves,
                       const std::filesystem::path& path);
 
-/// Round numbers (1, 2 or 5 times a power of ten apart) within a range, about five.
+/// Returns about five round numbers (1, 2 or 5 times a power of ten apart) within a range.
 std::vector<double> round_ticks(double low, double high);
 
 }  // namespace tomofield::report

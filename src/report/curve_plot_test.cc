@@ -34,7 +34,7 @@ TEST(CurvePlot, DrawsEveryCurveAndItsName) {
   EXPECT_NE(svg.find(">first</text>"), std::string::npos);
   EXPECT_NE(svg.find(">second</text>"), std::string::npos);
   EXPECT_NE(svg.find(">a &amp; b</text>"), std::string::npos);
-  // The first curve: from the lower left corner to the top and, past the hole, back down.
+  // The first curve runs from the lower left corner to the top and, past the hole, back down.
   EXPECT_NE(svg.find("d=\"M70.0 305.0 L217.5 30.0 \""), std::string::npos) << svg;
   EXPECT_NE(svg.find("d=\"M512.5 30.0 L660.0 305.0 \""), std::string::npos) << svg;
 }
@@ -49,7 +49,7 @@ TEST(CurvePlot, TwelveCurvesHaveColoursOfTheirOwn) {
   EXPECT_EQ(colours.size(), 12u + 1u);  // and the grid's
 }
 
-// Where the texts of the legend stand, and the height of the picture.
+// Returns the heights of the texts in the legend and the height of the picture.
 std::pair<std::vector<double>, double> legend_of(const std::vector<Curve>& curves) {
   const std::string svg = curve_plot_svg({.x_title = "x", .y_title = "y"}, curves);
   std::vector<double> heights;
@@ -103,7 +103,8 @@ TEST(CurvePlot, IsTheSameOnPixels) {
       ++drawn;
       EXPECT_TRUE(x <= 217 + 2 || x >= 512 - 2) << x << ", the gap";
       EXPECT_GE(y, 30 - 2) << "beyond the axis";
-      // Rising to the right along the diagonal, and from 0.75 to the end of the axis.
+      // The curve rises to the right along the diagonal, and again from 0.75 to the end of the
+      // axis.
       const double height = (305.0 - static_cast<double>(y)) / 275;
       const double along = (static_cast<double>(x) - 70) / 590;
       EXPECT_NEAR(height, along, 0.02) << x << " " << y;

@@ -7,16 +7,17 @@
 
 namespace tomofield::report {
 
-/// Axes of shell correlations over frequency, in 1/Å up to `highest`, labelled with resolutions:
-/// lines at 0, 0.143, 0.5 and 1.
+/// Returns the axes of shell correlations over frequency, in 1/Å up to `highest_frequency_per_A`,
+/// labelled with resolutions. There are lines at 0, 0.143, 0.5 and 1.
 PlotAxes fsc_axes(double highest_frequency_per_A);
 
-/// A correlation at each of these frequencies.
+/// Returns the curve of the correlation at each of these frequencies.
 Curve fsc_curve(std::string name, const std::vector<double>& frequency_per_A,
                 const std::vector<double>& correlation);
 
-/// A plot of the shell correlation (curve_plot.h): all Fourier voxels and, if they are told apart,
-/// those within the tilt range and those of the missing wedge. Replaces `path`. Throws Error.
+/// Draws the shell correlation (curve_plot.h): all Fourier voxels and, if the correlation has them,
+/// those inside the tilt range and those of the missing wedge. Replaces `path`. Throws Error if it
+/// cannot be written.
 void write_fsc_picture(const evaluate::Fsc& fsc, const std::filesystem::path& path);
 
 }  // namespace tomofield::report

@@ -7,7 +7,7 @@
 
 namespace tomofield::report {
 
-/// Text as HTML shows it literally.
+/// Returns a text with the special characters of HTML replaced.
 std::string html_text(std::string_view text);
 
 /// A cell of a table; `mark` is a class of the page's style sheet, or empty.
@@ -22,22 +22,23 @@ struct HtmlFigure {
   std::string caption;
 };
 
-/// A page that is one file: pictures, plots and style are in it, and it asks no network for
-/// anything. All texts are plain and become HTML here.
+/// A page in one file, which contains its pictures, plots and style and asks no network for
+/// anything. All texts are plain; the page turns them into HTML.
 class HtmlPage {
  public:
   explicit HtmlPage(std::string_view title);
   void add_heading(std::string_view text);
   void add_paragraph(std::string_view text);
-  /// Lines in a fixed-width font.
+  /// Adds lines in a fixed-width font.
   void add_listing(std::string_view text);
-  /// The first row is the head; numbers are set to the right, the first column to the left.
+  /// Adds a table. The first row is the head. The first column is aligned to the left, numbers to
+  /// the right.
   void add_table(const std::vector<std::vector<HtmlCell>>& rows);
-  /// Side by side, as many as fit. Throws Error if a picture cannot be read.
+  /// Adds figures side by side, as many as fit. Throws Error if a picture cannot be read.
   void add_figures(const std::vector<HtmlFigure>& figures);
-  /// An SVG element as it is (report/curve_plot.h).
+  /// Adds an SVG element without a change (report/curve_plot.h).
   void add_svg(std::string_view svg);
-  /// The whole document.
+  /// Returns the whole document.
   std::string document() const;
 
  private:

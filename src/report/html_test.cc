@@ -28,7 +28,7 @@ TEST(HtmlPage, ContainsItsPictures) {
     page.add_figures({{directory.path() / "picture.png", "caption"}});
     return page.document();
   };
-  // The test vectors of RFC 4648, section 10.
+  // These are test vectors of RFC 4648, section 10.
   EXPECT_NE(with_bytes("foobar").find("base64,Zm9vYmFy\""), std::string::npos);
   EXPECT_NE(with_bytes("fooba").find("base64,Zm9vYmE=\""), std::string::npos);
   EXPECT_NE(with_bytes("foob").find("base64,Zm9vYg==\""), std::string::npos);

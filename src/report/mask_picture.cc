@@ -23,7 +23,7 @@ std::size_t lowest_tilt(const tilt_series::TiltSeries& series) {
   return static_cast<std::size_t>(lowest - views.begin());
 }
 
-/// Grey values of measurements, the densest black; masked ones are not used.
+/// Returns the greys of an image, the densest black. Masked pixels do not affect the scale.
 std::vector<std::uint8_t> grey_values(const std::vector<float>& image,
                                       const std::vector<std::uint8_t>& valid) {
   std::vector<float> measured;
@@ -52,7 +52,7 @@ void write_mask_picture(const tilt_series::TiltSeries& series, const std::filesy
   std::vector<std::uint8_t> pixels;
   pixels.reserve(static_cast<std::size_t>(width * height * zoom * zoom * 3));
   for (std::int64_t row = 0; row < height * zoom; ++row) {
-    const std::int64_t y = height - 1 - row / zoom;  // the first row at the bottom
+    const std::int64_t y = height - 1 - row / zoom;  // the first row is at the bottom
     for (std::int64_t column = 0; column < width * zoom; ++column) {
       const auto at = static_cast<std::size_t>(y * width + column / zoom);
       const std::uint8_t red = valid[at] ? grey[at] : kMaskedRed;

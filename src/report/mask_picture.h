@@ -6,9 +6,9 @@
 
 namespace tomofield::report {
 
-/// A picture of the view of lowest tilt, dense parts dark, y upwards, with what
-/// is masked in it tinted red: one look tells whether beads and fill were
-/// found. Small views are enlarged, whole pixels a pixel. Replaces the file.
+/// Draws the view of lowest tilt with its masked pixels in red, so that one look tells whether
+/// beads and fill were found. Dense parts are dark; y runs upwards. Small views are enlarged by
+/// whole pixels. Replaces the file.
 void write_mask_picture(const tilt_series::TiltSeries& series, const std::filesystem::path& path);
 
 }  // namespace tomofield::report

@@ -12,7 +12,7 @@
 namespace tomofield::report {
 namespace {
 
-constexpr int kFontSize = 13;  // of SVG
+constexpr int kFontSize = 13;  // pixels, of SVG texts
 constexpr Colour kWhite{255, 255, 255}, kBlack{0, 0, 0};
 
 std::int64_t nearest(double value) { return std::lround(value); }
@@ -42,7 +42,7 @@ void SvgSurface::draw_text(Point at, Anchor anchor, std::string_view text) {
                       name, html_text(text));
 }
 
-// The letters are the browser's: on average a little over half as wide as they are high.
+// The browser chooses the letters: on average they are a little over half as wide as high.
 double SvgSurface::text_width(std::string_view text) {
   return 0.56 * kFontSize * static_cast<double>(text.size());
 }

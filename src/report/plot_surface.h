@@ -9,10 +9,10 @@
 
 namespace tomofield::report {
 
-/// Where on a text its position lies.
+/// The point of a text that lies at its position.
 enum class Anchor { kStart, kMiddle, kEnd };
 
-/// What a plot is drawn on: pixels, x to the right and y downwards from the upper left.
+/// A surface for plots, in pixels: x to the right and y downwards from the upper left.
 class PlotSurface {
  public:
   struct Point {
@@ -21,7 +21,7 @@ class PlotSurface {
 
   virtual ~PlotSurface() = default;
   virtual void draw_line(const std::vector<Point>& points, double width, const Colour& colour) = 0;
-  /// One line; `at` is on its base line.
+  /// Draws one line of text; `at` is on its base line.
   virtual void draw_text(Point at, Anchor anchor, std::string_view text) = 0;
 };
 
@@ -30,9 +30,9 @@ class SvgSurface : public PlotSurface {
   SvgSurface(int width, int height);
   void draw_line(const std::vector<Point>& points, double width, const Colour& colour) override;
   void draw_text(Point at, Anchor anchor, std::string_view text) override;
-  /// How wide a text becomes, about.
+  /// Returns the approximate width of a text.
   static double text_width(std::string_view text);
-  /// The SVG element.
+  /// Returns the SVG element.
   std::string element() const { return svg_ + "</svg>\n"; }
 
  private:
@@ -44,9 +44,9 @@ class PngSurface : public PlotSurface {
   PngSurface(int width, int height);
   void draw_line(const std::vector<Point>& points, double width, const Colour& colour) override;
   void draw_text(Point at, Anchor anchor, std::string_view text) override;
-  /// How wide a text becomes.
+  /// Returns the width of a text.
   static double text_width(std::string_view text);
-  /// Replaces `path`. Throws Error.
+  /// Writes a PNG file and replaces `path`. Throws Error if it cannot be written.
   void write(const std::filesystem::path& path) const { canvas_.write(path); }
 
  private:

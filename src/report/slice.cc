@@ -60,7 +60,7 @@ void write_slice_picture(const std::filesystem::path& path, const Slice& slice,
   const std::int64_t width = slice.width * zoom, height = slice.height * zoom;
   std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width * height));
   for (std::int64_t y = 0; y < height; ++y) {
-    const float* row = slice.row(slice.height - 1 - y / zoom);  // the first row at the bottom
+    const float* row = slice.row(slice.height - 1 - y / zoom);  // the first row is at the bottom
     for (std::int64_t x = 0; x < width; ++x)
       pixels[static_cast<std::size_t>(y * width + x)] =
           scale.grey(static_cast<double>(row[x / zoom]));

@@ -37,8 +37,8 @@ class SlicePictures : public ::testing::Test {
 };
 
 TEST_F(SlicePictures, ShowEachVoxelAtItsPlace) {
-  // One bright voxel where all three central planes meet, and one dim one in
-  // each plane alone, off every line of symmetry.
+  // One bright voxel lies where all three central planes meet. A dim one lies in each plane alone,
+  // off every line of symmetry.
   const std::int64_t nx = 40, ny = 24, nz = 10;
   std::vector<float> voxels(static_cast<std::size_t>(nx * ny * nz), -3.0f);
   const auto voxel = [&](std::int64_t x, std::int64_t y, std::int64_t z) -> float& {
@@ -72,7 +72,7 @@ TEST_F(SlicePictures, ShowEachVoxelAtItsPlace) {
   EXPECT_EQ(pixel(yz, 2, 1), 255);
   EXPECT_EQ(pixel(xy, 20, 12), 255);
   EXPECT_EQ(pixel(xy, 4, 4), 0);
-  EXPECT_EQ(pixel(xz, 3, 5), 0);  // in the XY plane only
+  EXPECT_EQ(pixel(xz, 3, 5), 0);  // it is in the XY plane only
   EXPECT_EQ(pixel(yz, 12, 8), 0);
 }
 
@@ -80,7 +80,7 @@ TEST_F(SlicePictures, GreysRunBetweenThePercentiles) {
   const std::int64_t n = 512;
   std::vector<float> voxels(static_cast<std::size_t>(n * n));
   for (std::size_t i = 0; i < voxels.size(); ++i) voxels[i] = static_cast<float>(i % 512);
-  voxels[0] = 1e9f;  // an outlier must not take the scale with it
+  voxels[0] = 1e9f;  // an outlier must not change the scale
   voxels[1] = std::numeric_limits<float>::quiet_NaN();
   write(n, n, 1, voxels);
   const testing::PngPicture xy =

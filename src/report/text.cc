@@ -10,7 +10,7 @@ namespace {
 constexpr std::int64_t kColumns = 5, kRows = 7;
 constexpr char kRing = '@';  // stands for Å, which is two bytes of UTF-8
 
-// Rows from the top, the lowest bit at the right.
+// The rows of a letter from the top; the lowest bit is at the right.
 struct Glyph {
   char letter;
   std::array<std::uint8_t, kRows> rows;
@@ -61,7 +61,7 @@ constexpr Glyph kGlyphs[] = {
     {'/', {0x01, 0x01, 0x02, 0x04, 0x08, 0x10, 0x10}},
 };
 
-// One glyph each letter; null for a blank.
+// Returns one glyph a letter; null is a blank.
 std::vector<const Glyph*> glyphs_of(std::string_view text) {
   std::vector<const Glyph*> glyphs;
   for (std::size_t i = 0; i < text.size(); ++i) {

@@ -32,7 +32,7 @@ TEST(Text, LettersAreWhereTheyBelong) {
   EXPECT_EQ(text_width("l?Å"), kDot * 17);
   canvas.write(directory / "text.png");
   const auto picture = testing::read_png(directory / "text.png", PNG_FORMAT_RGB);
-  // The L: a stem of 7 dots and a foot of 5; the unknown sign is blank; Å has 16 dots.
+  // The L has a stem of 7 dots and a foot of 5. The unknown sign is blank. Å has 16 dots.
   const auto red = pixels_of(picture, kRed);
   std::int64_t of_l = 0, of_ring = 0;
   for (const auto& [x, y] : red) {

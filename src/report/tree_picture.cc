@@ -13,7 +13,7 @@ namespace {
 
 constexpr Colour kBorder{255, 140, 0};
 
-// One voxel a pixel, halfway up: [y, x].
+// Returns the slice at half the thickness, one voxel a pixel: [y, x].
 std::vector<float> central_slice(const output::Model& model) {
   const geometry::Roi& roi = model.roi;
   field::Box box;
@@ -25,7 +25,7 @@ std::vector<float> central_slice(const output::Model& model) {
   return slice;
 }
 
-// The lower x and y faces of a leaf, `zoom` picture pixels a pixel.
+// Draws the lower x and y faces of a leaf. `zoom` is the picture pixels a pixel.
 void draw_border(const field::Square& square, const geometry::Roi& roi, std::int64_t zoom,
                  Canvas& canvas) {
   const std::int64_t x0 = (square.x0 - roi.x0) * zoom, y0 = (square.y0 - roi.y0) * zoom;

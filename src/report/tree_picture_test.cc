@@ -19,8 +19,8 @@ namespace {
 using Colour = std::array<int, 3>;
 constexpr Colour kOrange{255, 140, 0};
 
-// A cell of 64 px in quarters, the upper right one in quarters again; a ramp along x in the
-// density; a region of interest that starts inside the first leaf.
+// Returns a model of one cell of 64 px in quarters, the upper right one in quarters again. The
+// density is a ramp along x. The region of interest starts inside the first leaf.
 output::Model stepped_model() {
   field::Quadtree tree({.x0 = 0, .y0 = 0, .cell_size = 64, .columns = 1, .rows = 1},
                        {field::Region::kInterest});
@@ -69,7 +69,7 @@ TEST(TreePicture, DrawsLeafBordersOverTheSlice) {
                              {4.0, 20.5},
                              {20.5, 8.0}})
     EXPECT_NE(at(x, y), kOrange) << x << ' ' << y;
-  // Grey follows the density, which rises along x and is the same along y.
+  // The grey follows the density, which rises along x and is constant along y.
   const Colour left = at(10.5, 20.5), right = at(58.5, 20.5);
   EXPECT_EQ(left[0], left[1]);
   EXPECT_EQ(left[0], left[2]);

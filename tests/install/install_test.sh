@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs a build into a scratch prefix, then builds and runs a consumer that
-# knows nothing but that prefix.
+# knows only that prefix.
 #   install_test.sh BUILD_DIR CONSUMER_DIR SCRATCH_DIR EXPECTED_VERSION
 set -euo pipefail
 build=$1 consumer=$2 scratch=$3 version=$4

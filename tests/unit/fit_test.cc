@@ -44,7 +44,7 @@ struct Bead {
   }
 };
 
-// Its analytic projections in a geometry, with some noise.
+// Computes the analytic projections of a bead in a geometry, with some noise.
 class BeadSeries {
  public:
   BeadSeries(const geometry::TiltGeometry& geometry, const Bead& bead, std::uint64_t noise_seed)
@@ -110,7 +110,7 @@ FieldOptions field_options(FieldKind kind) {
   return options;
 }
 
-// Centre of mass of what is denser than a fifth of the densest: X, Y, Z in pixels.
+// Returns the centre of mass of all that is denser than a fifth of the maximum: X, Y, Z in pixels.
 std::array<double, 3> center_of_mass(const field::Field& field, const geometry::TiltGeometry& g) {
   const auto nz = static_cast<std::int64_t>(g.thickness);
   std::vector<double> volume;
@@ -180,14 +180,14 @@ TEST_P(FindsTheBead, WhereItIs) {
   Fit fit(series.measurement(), options, fit_options);
   fit.run([](const Fit&) { return true; });
   const auto found = center_of_mass(fit.field(), g);
-  // 0.2 is asked for; found within 0.03.
+  // The requirement is 0.2; the fit finds the centre within 0.03.
   for (std::size_t axis = 0; axis < 3; ++axis) {
     EXPECT_NEAR(found[axis], bead.center_of_mass(axis), 0.1) << "axis "
                                                              << "XYZ"[axis];
   }
 }
 
-// A small fit with everything in it; its parameters, bias and losses.
+// The parameters, the bias and the losses of a small fit with every term.
 struct Outcome {
   std::vector<float> parameters;
   std::vector<double> losses;
@@ -234,7 +234,7 @@ TEST_P(EachFittedField, SameBitsForAnyNumberOfThreads) {
   }
 }
 
-// A tree that starts with sixteen leaves of 32 px.
+// Returns a fit whose tree starts with sixteen leaves of 32 px.
 Fit adaptive_fit(const measurement::Measurement& measurement, FieldKind kind, int epochs,
                  int budget) {
   FieldOptions options = field_options(kind);
@@ -268,11 +268,11 @@ TEST_P(EachFittedField, AdaptiveTreeFollowsTheDensityWithinItsBudget) {
   const auto fit = run(1);
   const field::Quadtree& tree = fit->field().tree();
   EXPECT_LE(leaves_of_interest(tree), 13);
-  // Finest at the bead, and coarse in the empty corner across from it.
+  // The tree is finest at the bead and coarse in the empty corner across from it.
   EXPECT_EQ(tree.leaf(tree.find_leaf(40, 90)).square.size, 16);
   EXPECT_EQ(tree.leaf(tree.find_leaf(100, 20)).square.size, 64);
   for (int i = 0; i < tree.num_leaves(); ++i) EXPECT_EQ(fit->field().shape(i).nx, 9);
-  // It started with sixteen, was never above its budget, and then came to rest.
+  // It started with sixteen leaves, never exceeded its budget, and then stopped changing.
   const TreeProgress& progress = fit->progress().tree;
   ASSERT_GE(progress.updates.size(), 1u);
   EXPECT_EQ(progress.updates[0].epoch, 2);
@@ -307,14 +307,14 @@ TEST(Fit, EveryEpochUsesEachViewOnce) {
   FitOptions options;
   options.coarse_epochs = 0;
   options.epochs = 2;
-  options.subsets = 5;  // 13 views: subsets of 3 and 2
+  options.subsets = 5;  // the 13 views form subsets of 3 and 2
   Fit fit(series.measurement(), field_options(FieldKind::kGrid), options);
   EXPECT_EQ(fit.num_steps(), 10);
   int steps = 0;
   fit.run([&](const Fit& f) {
     EXPECT_EQ(f.progress().step, ++steps);
     if (steps % 5 == 4) {
-      // All but the last subset: its rays are still missing.
+      // All subsets but the last are done, so its rays are missing.
       double rays = 0;
       for (const measurement::ViewSums& s : f.progress().epoch_sums) {
         EXPECT_TRUE(s.n == 0 || s.n == 16 * 20);
@@ -328,7 +328,7 @@ TEST(Fit, EveryEpochUsesEachViewOnce) {
   EXPECT_EQ(fit.progress().data_loss.size(), 2u);
 }
 
-// 25 views of a bead, fitted in a coarse and a fine stage.
+// Fits 25 views of a bead in a coarse and a fine stage.
 class CoarseToFine : public ::testing::TestWithParam<FieldKind> {
  protected:
   static constexpr int kCoarseEpochs = 4, kEpochs = 3;
@@ -342,7 +342,7 @@ class CoarseToFine : public ::testing::TestWithParam<FieldKind> {
     options.fit_view_scale = true;
     return std::make_unique<Fit>(measurement_, field, options);
   }
-  // Root mean square of the density's deviation from the bead's.
+  // Returns the root mean square distance between the field's density and the bead's.
   double error_of(const Fit& fit) const {
     double squares = 0, n = 0;
     for (double z = 0.5; z < 24; ++z) {
@@ -375,7 +375,7 @@ TEST_P(CoarseToFine, StartsTheFineStageCloserToTheSpecimen) {
   both->run([&](const Fit& fit) {
     const std::int64_t step = fit.progress().step;
     if (step == 1) coarse_size = fit.field().num_parameters();
-    if (step == kCoarseEpochs * 5) coarse_error = error_of(fit);  // just refined
+    if (step == kCoarseEpochs * 5) coarse_error = error_of(fit);  // the field was just refined
     fine_size = fit.field().num_parameters();
     return true;
   });

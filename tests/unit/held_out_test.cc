@@ -21,9 +21,10 @@ namespace tomofield::fit {
 namespace {
 
 TEST(HeldOutViews, AreSpreadOverTheTiltsWithoutTheEnds) {
-  // In order of tilt: -50 … 50 in steps of 10, recorded from the middle outwards.
+  // In the order of tilts they run from -50 to 50 in steps of 10. They were recorded from the
+  // middle outwards.
   const std::vector<double> tilts = {0, 10, -10, 20, -20, 30, -30, 40, -40, 50, -50};
-  // Sorted positions 2 and 6 are -30 and 10; position 10, the last, is always fitted.
+  // The sorted positions 2 and 6 are -30 and 10. Position 10, the last, is always fitted.
   EXPECT_EQ(measurement::held_out_views(tilts, 4), (std::vector<int>{1, 6}));
   EXPECT_EQ(measurement::held_out_views(tilts, 2), (std::vector<int>{0, 3, 4, 7, 8}));
   EXPECT_EQ(measurement::held_out_views(tilts, 19), (std::vector<int>{7}));
@@ -33,7 +34,7 @@ TEST(HeldOutViews, AreSpreadOverTheTiltsWithoutTheEnds) {
   EXPECT_NE(message.find("11 views"), std::string::npos) << message;
 }
 
-// A random field, and views of itself with noise, gains and offsets.
+// Holds a random field and views of it with noise, gains and offsets.
 class KnownField : public ::testing::Test {
  protected:
   static constexpr std::int64_t kWidth = 48, kRows = 40;
@@ -57,7 +58,7 @@ class KnownField : public ::testing::Test {
     return options;
   }
 
-  // scale · A f + offset + noise; every 13th pixel is no measurement and far off.
+  // Measures scale · A f + offset + noise. Every 13th pixel is no measurement and far off.
   std::unique_ptr<measurement::SlabViews> measure(double scale, double offset) const {
     const auto num_views = static_cast<std::size_t>(geometry_.num_views());
     const measurement::SlabViews::Shape shape{num_views, kWidth, kRows, 0, kRows};
@@ -94,7 +95,8 @@ class KnownField : public ::testing::Test {
   std::unique_ptr<projection::SlabSampler> sampler_;
 };
 
-// 1772 rays a view: the mean of squares of standard normals is within 0.17 at five deviations.
+// A view has 1772 rays: the mean of squares of standard normals is within 0.17 of 1 at five
+// deviations.
 TEST_F(KnownField, PredictsItsOwnViewsToTheNoise) {
   const auto measured = measure(1.0, 0.0);
   const measurement::HeldOutError e = error(*measured, false);
@@ -138,9 +140,9 @@ class FitWithHeldOut : public ::testing::Test {
  protected:
   using Series = testing::SphereSeries;
 
-  // A fit of spheres; the views held out are multiplied by `gain`.
+  // Fits spheres. The held-out views are multiplied by `gain`.
   std::unique_ptr<Fit> fit(double gain, int epochs) {
-    base::set_thread_count(1);  // too small to share
+    base::set_thread_count(1);  // the work is too small for several
     const std::size_t num_views = Series().noise_sigma.size();
     Series::Options options;
     options.scale_of_view.assign(num_views, 1.0);

@@ -21,7 +21,7 @@ namespace {
 using projection::Ray;
 using testing::SphereSeries;
 
-// Its aligned views as if they were recorded so, with a little x tilt.
+// Returns the geometry of the aligned views as if they were recorded so, with a small x tilt.
 geometry::RayGeometry ray_geometry(const SphereSeries& series) {
   geometry::RayGeometry g;
   g.aligned = series.geometry;
@@ -81,7 +81,7 @@ TEST(RayDataTerm, AnEpochUsesEachRayOnceInRandomBatches) {
     if (subsets > 1) {
       EXPECT_NE(s.term.batch(0), s.term.batch(subsets));
     }
-    // Every step has its share of every view.
+    // Every step has its part of every view.
     std::map<int, int> of_view;
     for (const Ray& r : s.term.batch(subsets - 1)) ++of_view[r.view];
     EXPECT_EQ(of_view.size(), static_cast<std::size_t>(s.geometry.num_views()));
@@ -126,7 +126,7 @@ TEST(RayDataTerm, RaysThatMissTheRegionAreLeftOut) {
   }
 }
 
-// ½ Σ weight (scale p + offset − b)² of a step's rays, times the steps of an epoch.
+// The loss is ½ Σ weight (scale p + offset − b)² over a step's rays, times the steps of an epoch.
 TEST(RayDataTerm, GradientIsTheDerivativeOfTheLoss) {
   FitOptions options;
   options.subsets = 5;
@@ -150,7 +150,7 @@ TEST(RayDataTerm, GradientIsTheDerivativeOfTheLoss) {
   const objective::TermValue result =
       s.term.add_field({.number = kStep, .models = models}, gradient.data(), sums);
   const auto derivative = [&](float& p) { return testing::central_difference(p, 4e-3f, loss); };
-  base::set_thread_count(1);  // tiny pieces of work
+  base::set_thread_count(1);  // the work is too small for several
   EXPECT_NEAR(result.grad_bias / derivative(s.field->bias), 1.0, 1e-3);
   base::Random random(4);
   int moved = 0;

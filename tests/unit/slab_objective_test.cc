@@ -38,7 +38,7 @@ geometry::TiltGeometry tilted_geometry() {
   return g;
 }
 
-// Random images with some pixels that do not count.
+// Returns random images with some pixels that do not count.
 std::unique_ptr<SlabViews> random_views(int num_views) {
   const SlabViews::Shape shape{.num_views = static_cast<std::size_t>(num_views),
                                .width = kWidth,
@@ -130,7 +130,7 @@ class Problem {
     return result;
   }
 
-  // The same written out in double from decoded samples and predicted rays.
+  // Returns the data loss, written out in double from decoded samples and predicted rays.
   double data_loss() const {
     const SampleGrid& grid = projector_.grid();
     double loss = 0;
@@ -168,7 +168,7 @@ class Problem {
 
   field::Field& field() { return *field_; }
 
-  // Derivative of data_loss() + variation() by one float.
+  // Returns the derivative of data_loss() + variation() by one float.
   double derivative(float& parameter) const {
     return testing::central_difference(parameter, 4e-3f, [&] { return data_loss() + variation(); });
   }
@@ -184,7 +184,7 @@ class Problem {
     return tau > 0 ? tau * std::log1p(m / tau) : m;
   }
 
-  // One volume [row][z][x] of a segment, without slabs.
+  // Returns the variation of a segment as one volume [row][z][x], without slabs.
   double variation_of(std::size_t segment) const {
     const SampleSegment& s = projector_.grid().segments()[segment];
     const auto nx = static_cast<std::size_t>(s.nx), nz = static_cast<std::size_t>(s.nz);
@@ -226,7 +226,7 @@ class Problem {
   SlabSampler sampler_;
 };
 
-// Penalties whose curvature is mild at the scale of the finite differences.
+// Returns weights of penalties whose curvature is small at the scale of the finite differences.
 Weights weights_of(double density, double factor, double concavity) {
   Weights w;
   w.density_variation = density;
@@ -292,7 +292,7 @@ TEST_P(WholeObjective, GradientIsTheDerivative) {
   for (int n = 0; n < 60; ++n) {
     const int leaf = n % field.tree().num_leaves();
     std::size_t at = field.offset(leaf) + random.below(field.offset(leaf + 1) - field.offset(leaf));
-    // Every second one of the grid at the first or last row of a leaf: V [nx, nz, ny].
+    // Every second parameter of the grid is at the first or the last row of a leaf: V [nx, nz, ny].
     if (field.kind() == FieldKind::kGrid && n % 2 == 1) {
       const auto ny = static_cast<std::size_t>(field.shape(leaf).ny);
       at = field.offset(leaf) + (at - field.offset(leaf)) / ny * ny + (n % 4 == 1 ? 0 : ny - 1);
@@ -305,8 +305,8 @@ TEST_P(WholeObjective, GradientIsTheDerivative) {
   EXPECT_NEAR(result.grad_bias, bias, 1e-3 * std::abs(bias));
 }
 
-// The same leaves as two bands of root cells of 32 px and as one of 64 px: how
-// slabs are grouped must leave no trace.
+// Returns the same leaves as two bands of root cells of 32 px, or as one band of 64 px. The
+// grouping of slabs must not change any result.
 std::unique_ptr<field::Field> field_of_cells(std::int64_t cell_size) {
   const int cells = static_cast<int>(128 / cell_size);
   const field::RootGrid roots{

@@ -28,8 +28,8 @@ using geometry::TiltGeometry;
 using kernels::kLanes;
 using simulate::Ellipsoid;
 
-// The angles of DESIGN §2, where splatting projectors ripple, and both sides
-// of the change from rows to columns.
+// These angles are those where splatting projectors ripple, and both sides of the change from rows
+// to columns.
 const std::vector<double> kAngles = {0,     26.57, 44.99,  45,  45.01,  63.43, 70,
                                      71.57, 80,    -26.57, -45, -63.43, -80};
 
@@ -91,7 +91,7 @@ TEST_P(Adjoint, DotProductsAgree) {
   g.axis_z += c.shift_z;
   const SampleGrid grid = make_sample_grid(g, c.x0, c.x1, c.margin_spacing);
   const SlabProjector projector(g, grid);
-  // All views, and some of them in another order.
+  // The test takes all views, and some of them in another order.
   for (const std::vector<int>& views : {all_views(g), std::vector<int>{8, 0, 3, 11}}) {
     const auto random = testing::random_floats(grid.size(), 1);
     std::vector<float> samples(grid.size()), back(grid.size());
@@ -99,7 +99,7 @@ TEST_P(Adjoint, DotProductsAgree) {
     const auto rays = testing::random_floats(projector.detector_size(views.size()), 2);
     std::vector<float> projected(rays.size());
     projector.backward(rays.data(), views, back.data());
-    // What backward leaves in the padding would count as samples of the next slab.
+    // A value that backward leaves in the padding would count as a sample of the next slab.
     double inside = 0, scale = 0;
     for_each_sample(grid, [&](std::size_t at, auto&&...) {
       inside += static_cast<double>(samples[at]) * static_cast<double>(back[at]);
@@ -113,7 +113,7 @@ TEST_P(Adjoint, DotProductsAgree) {
   }
 }
 
-// Three slabs are a pair and one more; cut faces (margins) go another way than whole lines.
+// Three slabs are a pair and one more. Cut faces (margins) take another path than whole lines.
 TEST_P(Adjoint, SlabsTogetherAreEachAlone) {
   const AdjointCase& c = GetParam();
   const TiltGeometry g = centred_geometry(c.width, 3 * kLanes, c.thickness, kAngles);
@@ -149,7 +149,7 @@ TEST(SlabProjector, ForwardAddsToWhatIsThereAndBackwardReplacesIt) {
   projector.forward(samples.data(), views, once.data());
   projector.forward(samples.data(), views, added.data());
   for (std::size_t i = 0; i < added.size(); ++i) ASSERT_NEAR(added[i], before[i] + once[i], 1e-5);
-  // Of three slabs, from whatever was there and with the padding; without rays that are flat too.
+  // Backward replaces three slabs, with the padding, whatever was there, also without flat rays.
   for (const std::vector<int>& seen : {views, std::vector<int>{1}}) {
     const auto rays = testing::random_floats(3 * projector.detector_size(seen.size()), 4);
     std::vector<float> from_zeros(3 * grid.size()), from_noise(from_zeros.size(), NAN);
@@ -172,8 +172,8 @@ std::vector<float> constant_slab(const SampleGrid& grid, float density) {
   return samples;
 }
 
-// Lines beside the views, and the steepest view not the last: nothing past the rays may be touched.
-// Adding nothing to −0 would make it 0.
+// Some lines lie beside the views, and the steepest view is not the last. Nothing past the rays may
+// be touched: adding even 0 to −0 would make it 0.
 TEST(SlabProjector, ForwardKeepsToTheRays) {
   const TiltGeometry g = centred_geometry(65, kLanes, 40, {0, 60, 46});
   const SampleGrid grid = make_sample_grid(g, 10, 30, 4);
@@ -185,7 +185,8 @@ TEST(SlabProjector, ForwardKeepsToTheRays) {
     ASSERT_TRUE(std::signbit(rays[i])) << i;
 }
 
-// Worst deviation of a view from `expected(pixel)`, lane by lane, over pixels [first, end).
+// Returns the largest deviation of a view from `expected(pixel)`, lane by lane, over pixels [first,
+// end).
 template <typename Expected>
 double worst_error(const std::vector<float>& detector, const TiltGeometry& g, int view,
                    std::int64_t first, std::int64_t end, Expected&& expected) {
@@ -214,9 +215,9 @@ TEST_P(ExtendedSlab, EveryPixelSeesThicknessOverCosine) {
       for (int v = 0; v < g.num_views(); ++v) {
         const double path = 0.7 * thickness / g.cos_tilt(v);
         const double worst = worst_error(detector, g, v, 0, g.width, [&](auto) { return path; });
-        // Rows add up to the path exactly (measured: 2e-6). Columns sample the
-        // fade at both faces, one z sample wide, in steps below one sample:
-        // measured up to 0.11 samples, that is 0.35 % at spacing 2, 1.1 % at 4.
+        // Rows add up to the path exactly (measured: 2e-6). Columns sample the fade at both faces,
+        // one z sample wide, in steps below one sample. The measured maximum is 0.11 samples, or
+        // 0.35 % at spacing 2 and 1.1 % at 4.
         const double bound = g.is_flat(v) ? 5e-6 : 0.12 * grid.segments()[1].hz / thickness;
         EXPECT_LE(worst / path, bound) << "tilt " << g.tilt_deg[static_cast<std::size_t>(v)]
                                        << " thickness " << thickness << " shift " << shift;
@@ -225,8 +226,8 @@ TEST_P(ExtendedSlab, EveryPixelSeesThicknessOverCosine) {
   }
 }
 
-// Whatever way a ray meets the faces between the region of interest and the
-// margin, also along them, each piece of it counts once.
+// Each piece of a ray counts once, whatever way it meets the faces between the region of interest
+// and the margin, also along them.
 TEST_P(ExtendedSlab, HasNoSeamsHoweverRaysCrossTheFaces) {
   for (int step = 0; step <= 16; ++step) {
     TiltGeometry g = centred_geometry(40, kLanes, 24, {0, 0.01, 0.5, -3, 20, 45, -45});
@@ -243,10 +244,10 @@ TEST_P(ExtendedSlab, HasNoSeamsHoweverRaysCrossTheFaces) {
   }
 }
 
-// Length of a ray inside [x0, x1) × [0, thickness).
+// Returns the length of a ray inside [x0, x1) × [0, thickness).
 double box_chord(const TiltGeometry& g, int view, double u, double x0, double x1) {
   const double c = g.cos_tilt(view), s = g.signed_sin_tilt(view);
-  // Along the ray x = p − t s, z = q + t c.
+  // The ray is x = p − t s, z = q + t c.
   const double p = g.axis_x + (u - g.axis_x) * c, q = g.axis_z + (u - g.axis_x) * s;
   double low = -q / c, high = (g.thickness - q) / c;
   if (s != 0) {
@@ -270,8 +271,8 @@ TEST(BoundedSlab, EveryPixelSeesTheChordOfTheBox) {
       };
       double longest = 0;
       for (std::int64_t u = 0; u < width; ++u) longest = std::max(longest, chord(u));
-      // The sides fade over one sample. Measured: 0.85 % at 80°, where the fade
-      // in x hides a cut corner; at most 0.35 % elsewhere.
+      // The sides fade over one sample. The measured maximum is 0.85 % at 80°, where the fade in x
+      // hides a cut corner, and 0.35 % elsewhere.
       const double bound = std::abs(g.tilt_deg[static_cast<std::size_t>(v)]) > 75 ? 9e-3 : 4e-3;
       EXPECT_LE(worst_error(detector, g, v, 0, width, chord) / longest, bound)
           << "width " << width << " tilt " << g.tilt_deg[static_cast<std::size_t>(v)];
@@ -281,13 +282,13 @@ TEST(BoundedSlab, EveryPixelSeesTheChordOfTheBox) {
 
 // ----------------------------------------------------- analytic ellipsoids
 
-// Bodies in pixels of the view, centred in the 16 rows.
+// A scene of bodies in pixels of the view, centred in the 16 rows.
 struct Scene {
   TiltGeometry geometry;
   std::vector<Ellipsoid> bodies;  // positions relative to the axis, y to the middle row
 };
 
-// Length of [z0, z1] inside an ellipsoid with axes along X, Y, Z at (x, y).
+// Returns the length of [z0, z1] inside an ellipsoid with axes along X, Y, Z at (x, y).
 double z_overlap(const Ellipsoid& e, double x, double y, double z0, double z1) {
   const double dx = x - e.center[0], dy = y - e.center[1];
   const double rest = 1 - e.q[0] * dx * dx - e.q[1] * dy * dy;
@@ -296,7 +297,7 @@ double z_overlap(const Ellipsoid& e, double x, double y, double z0, double z1) {
   return std::max(0.0, std::min(z1, e.center[2] + half) - std::max(z0, e.center[2] - half));
 }
 
-// Densities averaged over each sample's cell in x and z.
+// Returns the densities averaged over each sample's cell in x and z.
 std::vector<float> sample_bodies(const Scene& scene, const SampleGrid& grid) {
   constexpr int kSub = 8;
   std::vector<float> samples(grid.size());
@@ -315,7 +316,7 @@ std::vector<float> sample_bodies(const Scene& scene, const SampleGrid& grid) {
   return samples;
 }
 
-// Exact integrals [pixel, lane] of a view, averaged over the width of a pixel.
+// Returns the exact integrals [pixel, lane] of a view, averaged over the width of a pixel.
 std::vector<double> exact_projection(const Scene& scene, int view) {
   constexpr int kSub = 8;
   const TiltGeometry& g = scene.geometry;
@@ -339,7 +340,7 @@ std::vector<double> exact_projection(const Scene& scene, int view) {
 
 struct Errors {
   double worst = 0, rms = 0;  // relative to the largest integral of the view
-  double sum = 0;             // of the view's sum, relative
+  double sum = 0;             // relative error of the view's sum
 };
 
 Errors errors_of_view(const Scene& scene, int view, const std::vector<float>& detector) {
@@ -357,9 +358,9 @@ Errors errors_of_view(const Scene& scene, int view, const std::vector<float>& de
           std::abs(sum / expected_sum - 1)};
 }
 
-// Errors come from the field's samples, which blur an edge by about one of
-// them; the bounds are what was measured over all angles and both hands, and a
-// fifth. A body in the margin is blurred by the margin's spacing.
+// Errors come from the field's samples, which blur an edge by about one of them. The bounds are the
+// measured maxima over all angles and both hands, and a fifth more. A body in the margin is blurred
+// by the margin's spacing.
 struct EllipsoidCase {
   const char* name;
   double roi_x0, roi_x1, margin_spacing;
@@ -400,8 +401,8 @@ TEST_P(Ellipsoids, ProjectToTheirAnalyticIntegrals) {
 
 // ------------------------------------- another group's simulated projections
 
-// 64³ truth [z, y, x] and its 41 linear projections [view, y, x]: of all
-// orders of axes this one alone correlates at every angle.
+// Reads a 64³ truth [z, y, x] and its 41 linear projections [view, y, x]. Of all orders of axes
+// only this one correlates at every angle.
 class ProjectorCheck : public ::testing::Test {
  protected:
   static constexpr std::int64_t kSize = 64;
@@ -428,7 +429,7 @@ class ProjectorCheck : public ::testing::Test {
     return volume;
   }
 
-  // Our projections [view, y, x].
+  // Returns our projections [view, y, x].
   Volume project_truth(const TiltGeometry& g) const {
     const SampleGrid grid = make_sample_grid(g, 0, kSize, 0);
     Volume images(projections_.size());
@@ -486,8 +487,8 @@ class ProjectorCheck : public ::testing::Test {
   std::vector<double> tilt_deg_;
 };
 
-// Their axis runs through voxel and pixel 32, whose centre is at 32.5, and
-// their x is X cos θ − Z sin θ.
+// Their axis runs through voxel and pixel 32, whose centre is at 32.5. Their x is X cos θ − Z sin
+// θ.
 TEST_F(ProjectorCheck, ReproducesEveryView) {
   const Volume ours = project_truth(geometry(-1, 32.5));
   for (std::size_t v = 0; v < tilt_deg_.size(); ++v) {

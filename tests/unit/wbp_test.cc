@@ -20,7 +20,7 @@ using testing::SphereSeries;
 
 const AfterIteration kNothing = [](const IterationReport&, const VoxelVolume&) {};
 
-// Noise-free views of a ball of density 0.7 off the middle, at any tilts.
+// Makes noise-free views, at any tilts, of a ball of density 0.7 off the middle.
 struct Ball {
   static constexpr std::int64_t kWidth = 64, kRows = 20;
   static constexpr int kThickness = 32;
@@ -54,7 +54,7 @@ struct Ball {
   std::unique_ptr<measurement::SlabViews> rays;
 };
 
-// Mean density in the core of the ball.
+// Returns the mean density in the core of the ball.
 double mean_inside(const VoxelVolume& volume) {
   double sum = 0, count = 0;
   testing::for_each_density(volume, [&](int x, int y, int z, float density) {
@@ -103,7 +103,8 @@ TEST_F(Wbp, GapsAreBridged) {
 }
 
 TEST_F(Wbp, ADensitySetAsideComesBack) {
-  // With all tilts the result does not depend on what was set aside (but for truncated rays).
+  // With all tilts the result does not depend on the density that was set aside, but for truncated
+  // rays.
   const Ball ball(half_circle(3));
   EXPECT_NEAR(mean_inside(ball.reconstructed({}, 0.1)), mean_inside(ball.reconstructed({})), 0.02);
 }

@@ -9,7 +9,7 @@ using kernels::kLanes;
 void bridge_gaps(const std::uint16_t* mask, std::int64_t width, float* rays) {
   for (int lane = 0; lane < kLanes; ++lane) {
     const auto ray = [&](std::int64_t x) -> float& { return rays[x * kLanes + lane]; };
-    std::int64_t last = -1;  // that counts
+    std::int64_t last = -1;  // the last ray that counts
     for (std::int64_t x = 0; x <= width; ++x) {
       const bool is_end = x == width;
       if (!is_end && (mask[x] >> lane & 1) == 0) continue;

@@ -12,7 +12,7 @@ namespace {
 
 using kernels::kLanes;
 
-// Bridges row `lane` alone; the other lanes count everywhere and hold 5.
+// Bridges row `lane` alone. The other lanes count everywhere and hold 5.
 std::vector<float> bridged(const std::vector<float>& row, const std::vector<bool>& counts,
                            int lane) {
   std::vector<float> rays(row.size() * kLanes, 5.0f);

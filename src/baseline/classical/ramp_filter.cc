@@ -20,7 +20,8 @@ constexpr double kPi = std::numbers::pi;
 
 void free_plan(kiss_fft_state* plan) { std::free(plan); }
 
-// Samples of the ramp's kernel, at index i and, from the end, at −i.
+// Returns the samples of the ramp's kernel: index i holds the sample i, and the i-th index from the
+// end the sample −i.
 std::vector<kiss_fft_cpx> ramp_kernel(int length) {
   std::vector<kiss_fft_cpx> kernel(static_cast<std::size_t>(length), {0.0f, 0.0f});
   kernel[0].r = 0.25f;
@@ -44,7 +45,7 @@ double roll_off(const RampFilterOptions& options, double f) {
 
 }  // namespace
 
-// Rows that are twice as long do not wrap around.
+// Pads rows to twice their length, so that the convolution does not wrap around.
 RampFilter::RampFilter(const RampFilterOptions& options, std::int64_t width)
     : width_(width),
       length_(2 * kiss_fft_next_fast_size(static_cast<int>(width))),
@@ -61,7 +62,8 @@ RampFilter::RampFilter(const RampFilterOptions& options, std::int64_t width)
   }
 }
 
-// Two rows at once, as real and imaginary parts: the response is real and even.
+// Filters two rows at once, as real and imaginary parts. The response is real and even, so they
+// stay apart.
 void RampFilter::apply(float* rays) const {
   const std::size_t length = static_cast<std::size_t>(length_);
   const std::size_t width = static_cast<std::size_t>(width_);

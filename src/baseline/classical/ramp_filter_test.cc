@@ -25,7 +25,7 @@ std::vector<float> random_rays() {
   return rays;
 }
 
-// Eq. 3.61 of Kak and Slaney for unit pixels.
+// Returns equation 3.61 of Kak and Slaney for unit pixels.
 double ramp_kernel(int n) {
   if (n == 0) return 0.25;
   return n % 2 == 0 ? 0.0 : -1.0 / std::pow(std::numbers::pi * n, 2);

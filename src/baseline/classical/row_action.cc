@@ -18,7 +18,7 @@ double weigh_rays_of_slab(const VoxelProblem& problem, std::span<const int> view
   double sum_of_all = 0.0;
   problem.for_each_ray(views,
                        [&](const measurement::ViewModel& model, float length, std::size_t at) {
-                         // The residuals carry the view's scale once, and A does too.
+                         // The residuals hold the view's scale once, and A does too.
                          const double weight = model.weight / (model.scale * model.scale);
                          const float factor = static_cast<float>(weight) / length;
                          float sum = 0.0f;

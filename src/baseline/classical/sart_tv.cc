@@ -12,10 +12,11 @@
 namespace tomofield::baseline {
 namespace {
 
-// By which the relaxation falls from pass to pass.
+// The factor between the relaxations of two passes.
 constexpr double kFall = 0.97;
 
-// In order of tilt every so-manieth view: each subset looks from all around.
+// Puts every Nth view, in the order of tilts, into one of N subsets, so that each subset sees the
+// specimen from all around.
 std::vector<std::vector<int>> interleaved_subsets(const VoxelProblem& problem, int num_subsets) {
   std::vector<int> by_tilt = problem.views();
   const std::vector<double>& tilts = problem.projector().geometry().tilt_deg;
@@ -35,8 +36,8 @@ class Sart {
         subsets_(interleaved_subsets(problem, options.subsets)),
         scratch_(problem, subsets_.front().size(), 3) {}
 
-  // A step with each subset. Rows do not depend on each other, so neither do slabs. Returns how far
-  // the densities moved.
+  // Takes a step with each subset. Rows do not depend on each other, so neither do slabs. Returns
+  // the distance that the densities moved.
   double pass(double relaxation, VoxelVolume& densities) {
     return std::sqrt(sum_over_pairs(problem_.num_slabs(), [&](const SlabPair& pair) {
       float *x = densities.slab(pair.first), *before = scratch_.samples(0);

@@ -92,7 +92,7 @@ TEST_F(SartTv, OneSubsetAndHardlyAnyVariationIsSirt) {
 }
 
 TEST_F(SartTv, ColumnSumsAreThoseOfRaysThatCount) {
-  // C⁻¹ = Aᵀ W 1, so that ⟨C⁻¹, x⟩ = ⟨W, A x⟩ over the rays that count; here x = 1.
+  // Because C⁻¹ = Aᵀ W 1, ⟨C⁻¹, x⟩ = ⟨W, A x⟩ over the rays that count; here x = 1.
   const SphereSeries series;
   const VoxelProblem problem = testing::voxel_problem(series);
   const std::vector<int> views = {3, 12, 30};

@@ -16,9 +16,10 @@ struct SirtOptions {
   nlohmann::json json() const;
 };
 
-/// Simultaneous iterative reconstruction (Gilbert 1972), weighted, from zero densities:
-/// the step of row_action.h with all views at once. It minimises ½ Σ (residual / σ)² / ray length,
-/// has no prior, and is therefore stopped before it has fitted the noise.
+/// Reconstructs by weighted simultaneous iterative reconstruction (Gilbert 1972) from zero
+/// densities. An iteration is the step of row_action.h with all views at once. It minimises
+///   ½ Σ (residual / σ)² / ray length.
+/// The method has no prior, and must therefore stop before it has fitted the noise.
 Solution reconstruct_sirt(VoxelProblem& problem, const SirtOptions& options,
                           const AfterIteration& after_iteration);
 

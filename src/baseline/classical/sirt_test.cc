@@ -59,7 +59,7 @@ TEST_F(Sirt, PixelsThatAreNoMeasurementsDoNotCount) {
 }
 
 TEST_F(Sirt, ViewsCountByTheirNoise) {
-  // A view of pure nonsense is harmless if it is known to be noisy.
+  // A view of pure noise is harmless if it is known to be noisy.
   SphereSeries::Options bad;
   bad.scale_of_view.assign(31, 1.0);
   bad.scale_of_view[15] = -5.0;

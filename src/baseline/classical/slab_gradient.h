@@ -9,27 +9,28 @@
 
 namespace tomofield::baseline {
 
-/// Factors of the forward differences K x of a slab's samples, one each axis:
-///   factor_x (x[i + 1] − x[i]), factor_y (x[row + 1] − x[row]), factor_z (x[k + 1] − x[k]),
-/// each zero past the last sample of its axis in a segment.
+/// The factors of the forward differences K x of a slab's samples, one an axis:
+///   factor_x (x[i + 1] − x[i]), factor_y (x[row + 1] − x[row]), factor_z (x[k + 1] − x[k]).
+/// Each difference is zero past the last sample of its axis in a segment.
 struct GradientFactors {
   float x = 1, y = 1, z = 1;
 };
 
-/// K x of z row k of a segment, as [x, lane] each to out_x, out_y and out_z. `samples` and
-/// `above` are buffers of this slab and of the next (null after the last); lanes from num_rows
-/// on are no voxels: their samples must be zero, and so are their differences.
+/// Computes K x of z row k of a segment and writes it to out_x, out_y and out_z, each [x, lane].
+/// `samples` and `above` are buffers of this slab and of the next (null after the last). Lanes from
+/// num_rows on are no voxels: their samples must be zero, and so are their differences.
 void gradient_of_row(const projection::SampleSegment& segment, int k, int num_rows,
                      const GradientFactors& factors, const float* samples, const float* above,
                      float* out_x, float* out_y, float* out_z);
 
-/// samples += Kᵀ p of z row k, for slab buffers p that are zero in the padding and wherever K x
-/// always is. `p_y_below` is the buffer of the slab before (null before the first).
+/// Adds Kᵀ p of z row k to `samples`. The slab buffers p must be zero in the padding and wherever K
+/// x is zero by definition. `p_y_below` is the buffer of the slab before (null before the first).
 void add_gradient_adjoint_of_row(const projection::SampleSegment& segment, int k,
                                  const GradientFactors& factors, const float* p_x, const float* p_y,
                                  const float* p_z, const float* p_y_below, float* samples);
 
-/// K x of one z row of a slab: `count` values each, of the samples from `row` on in a slab buffer.
+/// The K x of one z row of a slab: `count` values each, for the samples from `row` on in a slab
+/// buffer.
 struct GradientRow {
   GradientFactors factors;
   std::ptrdiff_t row = 0;
@@ -37,7 +38,7 @@ struct GradientRow {
   const float *x = nullptr, *y = nullptr, *z = nullptr;
 };
 
-/// Calls body(GradientRow) for each z row of a slab; factors_of(segment) are those of K.
+/// Calls body(GradientRow) for each z row of a slab. factors_of(segment) returns the factors of K.
 template <typename FactorsOf, typename Body>
 void for_each_gradient_row(const VoxelVolume& volume, int slab, FactorsOf&& factors_of,
                            Body&& body) {
@@ -56,7 +57,7 @@ void for_each_gradient_row(const VoxelVolume& volume, int slab, FactorsOf&& fact
   }
 }
 
-/// samples += Kᵀ p of a slab, for volumes p like those of add_gradient_adjoint_of_row.
+/// Adds Kᵀ p of a slab to `samples`. The volumes p are as in add_gradient_adjoint_of_row().
 template <typename FactorsOf>
 void add_gradient_adjoint(const VoxelVolume& p_x, const VoxelVolume& p_y, const VoxelVolume& p_z,
                           int slab, FactorsOf&& factors_of, float* samples) {

@@ -26,7 +26,7 @@ TEST(TiltWeights, AreTheSpacingOfEvenTilts) {
 }
 
 TEST(TiltWeights, AreHalfTheDistancesToBothNeighboursInAnyOrder) {
-  // In order -20, -10, 0, 4, 20 with a mean spacing of 10.
+  // The tilts in order are -20, -10, 0, 4, 20; the mean spacing is 10.
   expect_near(degrees({0, 4, -10, 20, -20}), {7, 10, 10, 13, 10});
 }
 
@@ -41,7 +41,7 @@ TEST(TiltWeights, AddUpToTheHalfCircle) {
     return std::accumulate(w.begin(), w.end(), 0.0);
   };
   EXPECT_NEAR(sum(tilt_weights(tilts)), std::numbers::pi, 1e-9);
-  tilts.push_back(90);  // the same view as at -90°
+  tilts.push_back(90);  // the view at 90° is the one at -90°
   EXPECT_NEAR(sum(tilt_weights(tilts)), std::numbers::pi, 1e-9);
 }
 

@@ -18,21 +18,21 @@ namespace {
 using kernels::kLanes;
 using projection::SampleSegment;
 
-// κ below: the result does not depend on it, the number of iterations does. Smaller favours
-// what the total variation decides alone (missing directions), larger the data. Between 1.5 and
-// 3 hardly differ on phantoms of 128 and 256 pixels, bounded and extended.
+// κ below. The result does not depend on it, but the number of iterations does. A smaller value
+// favours what the total variation alone decides (missing directions), a larger one the data.
+// Values between 1.5 and 3 hardly differ on phantoms of 128 and 256 pixels, bounded and extended.
 constexpr double kBalance = 2.0;
 
-// Over-relaxation, below 2: 1.9 needs two thirds of the iterations of 1.
+// The over-relaxation, below 2: 1.9 needs two thirds of the iterations of 1.
 constexpr float kRelaxation = 1.9f;
 
-// Over-relaxed densities swing about from one iteration to the next. Scales and offsets of views
-// that are fitted to each of them swing with them, and more and more; so they are fitted to few.
+// Over-relaxed densities swing from one iteration to the next. Scales and offsets of views that are
+// fitted to each of them swing too, more and more. They are therefore fitted every tenth iteration.
 constexpr int kViewFitInterval = 10;
 
-// Weights of the concave penalty: first taken after three tenths of the iterations, then so many
-// times in all, evenly spread. Until then they are what they are on an edge of 1 τ, so that what
-// the first ones are taken from is not too smooth.
+// The weights of the concave penalty are computed first after three tenths of the iterations, then
+// about eight times in all, evenly spread. Before, every weight is that of an edge of 1 τ, so that
+// the densities behind the first weights are not too smooth.
 constexpr int kReweightings = 8;
 constexpr float kFirstWeight = 0.5f;
 
@@ -44,7 +44,7 @@ bool takes_weights_after(int iteration, const TvOptions& options) {
          (iteration - first) % interval == 0;
 }
 
-// Those of κ λ h_x h_z ∇.
+// Returns the factors of κ λ h_x h_z ∇.
 struct ScaledFactors {
   double scale;  // κ λ
   GradientFactors operator()(const SampleSegment& segment) const {
@@ -54,9 +54,9 @@ struct ScaledFactors {
   }
 };
 
-// Σ κ λ h_x h_z φ(|∇x|) of a row of K x; τ = 0: smooth.
+// Returns Σ κ λ h_x h_z φ(|∇x|) of a row of K x; τ = 0 is the smooth penalty.
 double penalty_of_row(const GradientRow& row, double tau) {
-  // K x is κ λ h_x h_z ∇x, of which the factor in y is the scale: y has unit spacing.
+  // K x is κ λ h_x h_z ∇x. Its factor in y is the scale, because y has unit spacing.
   const float t = row.factors.y * static_cast<float>(tau);
   float sums[kLanes] = {};
   for (std::size_t at = 0; at < row.count; at += kLanes) {
@@ -71,24 +71,24 @@ double penalty_of_row(const GradientRow& row, double tau) {
   return sum;
 }
 
-// The saddle-point problem, in rows K = (κ A / σ_view ; κ λ h_x h_z ∇) of like size:
+// Solves the saddle-point problem with rows K = (κ A / σ_view ; κ λ h_x h_z ∇) of like size:
 //   min_x max_q,p  ⟨K x, (q, p)⟩ − κ² |q|² / 2 − κ ⟨q, b / σ⟩   with |p| <= w/κ, x >= 0.
-// An iteration, with relaxation ρ and y = (q, p):
+// An iteration, with relaxation ρ and y = (q, p), is
 //   y′ = prox(y + s K x);  y ← y + ρ (y′ − y);  x′ = prox(x − τ Kᵀ (2 y′ − y));  x ← x + ρ (x′ − x)
-// Dual first, so that A x of the current x, and with it the objective, comes for
-// free; Kᵀ is linear, so its extrapolation needs Kᵀ y before and after alone.
+// The dual step is first, because it gives A x of the current x, and with it the objective, at no
+// cost. Kᵀ is linear, so its extrapolation needs only Kᵀ y before and after.
 class ChambollePock {
  public:
   ChambollePock(VoxelProblem& problem, const TvOptions& options, double start);
 
-  // The step of q and p. Returns λ Σ h_x h_z φ(|∇x|) and, each pair's, the sums of the data term of
-  // x.
+  // Takes the step of q and p. Returns λ Σ h_x h_z φ(|∇x|). Writes the sums of the data term of x,
+  // one entry a pair.
   double step_duals(std::vector<std::vector<measurement::ViewSums>>& data_of_pair);
-  // The step of x. The last one is not relaxed: it ends where x >= 0 holds.
+  // Takes the step of x. The last one is not relaxed, so that x >= 0 holds at the end.
   void step_densities(bool is_last);
-  // Takes the weights w of the concave penalty from x.
+  // Computes the weights w of the concave penalty from x.
   void take_weights();
-  // τ from the views' scales as they are.
+  // Computes τ from the current scales of the views.
   void measure_steps();
   VoxelVolume& densities() { return x_; }
 
@@ -105,8 +105,8 @@ class ChambollePock {
   VoxelVolume x_;        // densities
   VoxelVolume adjoint_;  // Kᵀ y of the last duals
   VoxelVolume px_, py_, pz_;
-  double tau_of_penalty_ = 0;           // in density units, 0: smooth
-  std::optional<VoxelVolume> weights_;  // w; none: 1 everywhere
+  double tau_of_penalty_ = 0;           // τ of φ in density units; 0: smooth
+  std::optional<VoxelVolume> weights_;  // w; none: every weight is 1
   std::vector<base::AlignedBuffer<float>>
       q_;                   // κ q / σ_view, one buffer a pair: the residual / σ² at the optimum
   std::vector<float> tau_;  // steps of the densities [segment][z][x], the same in every row
@@ -136,7 +136,8 @@ void ChambollePock::begin_concave_penalty() {
     std::fill_n(weights_->slab(slab), problem_.grid().size(), kFirstWeight);
 }
 
-// τ, the inverse column sums of |K|. Masked rays are counted: steps may be smaller than need be.
+// Computes τ, the inverse column sums of |K|. Masked rays count, so steps may be smaller than
+// needed.
 void ChambollePock::measure_steps() {
   float* detector = scratch_.detector();
   problem_.for_each_ray(problem_.views(), [&](const auto& model, float, std::size_t at) {
@@ -171,7 +172,7 @@ double ChambollePock::step_duals(std::vector<std::vector<measurement::ViewSums>>
 
 void ChambollePock::step_ray_duals(const float* residuals, float* q_of_slab) {
   problem_.for_each_ray(problem_.views(), [&](const auto& model, float length, std::size_t at) {
-    // A of this view is scaled, so its row sums are too; so are residuals and q.
+    // A of this view is scaled, and so are its row sums, the residuals and q.
     const double per_sigma = std::sqrt(model.weight);
     const double step = kBalance / (model.scale * static_cast<double>(length));
     const float rate = static_cast<float>(step * per_sigma);

@@ -44,7 +44,7 @@ TEST_F(Tv, ConvergesToTheMinimum) {
   const Solution some = solve(testing::voxel_problem(series), options(150, 3));
   const Solution many = solve(testing::voxel_problem(series), options(600, 3));
   EXPECT_NEAR(some.objective.back(), many.objective.back(), 0.01 * many.objective.back());
-  // Another start, the same minimum.
+  // Another start leads to the same minimum.
   const Solution other = solve(testing::voxel_problem(series), options(600, 3), 1.0);
   EXPECT_NEAR(other.objective.back(), many.objective.back(), 1e-3 * many.objective.back());
   EXPECT_LT(some.objective.back(), 0.5 * some.objective[10]);
@@ -76,7 +76,7 @@ TEST_F(Tv, ObjectiveOfAConstantIsItsDataTerm) {
 TEST_F(Tv, AHugeWeightLeavesTheBestConstant) {
   const SphereSeries series;
   const VoxelProblem problem = testing::voxel_problem(series);
-  // Least squares of one number: Σ length · ray / Σ length².
+  // The least-squares constant is Σ length · ray / Σ length².
   double product = 0, square = 0;
   for (int slab = 0; slab < problem.num_slabs(); ++slab) {
     for (int view = 0; view < series.geometry.num_views(); ++view) {
@@ -94,7 +94,7 @@ TEST_F(Tv, AHugeWeightLeavesTheBestConstant) {
   testing::for_each_density(solution.densities, [&](int, int, int, float density) {
     worst = std::max(worst, std::abs(static_cast<double>(density) - product / square));
   });
-  EXPECT_LT(worst, 0.08 * product / square);  // the start was 46 % away
+  EXPECT_LT(worst, 0.08 * product / square);  // the start is 46 % away
 }
 
 TEST_F(Tv, MoreWeightMeansLessVariation) {
@@ -132,7 +132,7 @@ TEST_F(Tv, ConcavePenaltyOfHugeTauIsTheSmoothOne) {
 
 TEST_F(Tv, ConcavePenaltySparesEdges) {
   const SphereSeries series;
-  // Weights about the best one of each.
+  // The weights are near the best one of each penalty.
   const auto least_error = [&](const auto& options_of, const std::vector<double>& weights) {
     double least = testing::rms_truth();
     for (const double weight : weights) {
@@ -178,10 +178,10 @@ TEST_F(Tv, FittedScalesUndoTheGainsOfViews) {
   const Solution without = solve(testing::voxel_problem(series), options(150, 1));
   EXPECT_LT(solution.objective.back(), 0.5 * without.objective.back());
   EXPECT_NEAR(problem.view_model(14).scale / problem.view_model(15).scale, 1.3 / 0.7,
-              0.2);  // the prior draws to 1
+              0.2);  // the prior pulls the scales towards 1
 }
 
-// Steps of the rays' duals follow the scales: too long ones would let the objective explode.
+// Steps of the rays' duals follow the scales: longer ones would let the objective diverge.
 TEST_F(Tv, GreatGainsOfViewsStayFinite) {
   SphereSeries::Options gains;
   for (int view = 0; view < 31; ++view) gains.scale_of_view.push_back(view % 2 ? 0.2 : 5.0);

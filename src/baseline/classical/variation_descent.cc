@@ -14,12 +14,12 @@ using projection::SampleSegment;
 
 constexpr float kFloor = 1e-3f;  // ε, in density units a pixel
 
-// Those of ∇.
+// Returns the factors of ∇.
 GradientFactors per_spacing(const SampleSegment& segment) {
   return {static_cast<float>(1 / segment.hx), 1.0f, static_cast<float>(1 / segment.hz)};
 }
 
-// Σ h_x h_z value(i)² over a slab's samples.
+// Returns Σ h_x h_z value(i)² over a slab's samples.
 template <typename Value>
 double sum_of_squares(const projection::SampleGrid& grid, Value&& value) {
   double sum = 0.0;
@@ -81,7 +81,7 @@ double VariationDescent::measure_directions(const VoxelVolume& densities) {
   });
 }
 
-// Returns its length.
+// Computes the gradient of the variation and returns its length.
 double VariationDescent::measure_gradient() {
   return std::sqrt(sum_over_slabs(gradient_.num_slabs(), [&](int slab) {
     float* gradient = gradient_.slab(slab);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::int64_t kRows = 19;  // a slab and three rows
 
-// Random densities; with margins at a spacing of 2.
+// Returns random densities. The margins have a spacing of 2.
 VoxelVolume random_volume() {
   const auto geometry = geometry::centred_geometry(9, kRows, 6, {-40, 0, 40});
   VoxelVolume volume(projection::make_sample_grid(geometry, 0, 9, 2), kRows);
@@ -58,7 +58,8 @@ TEST_F(VariationDescentTest, NoOtherDirectionFallsAsSteeply) {
   const double fall = fall_along(steepest, length);
   EXPECT_GT(fall, 0);
 
-  // The fall along another direction is that of the steepest times the cosine between them.
+  // The fall along another direction is the steepest fall times the cosine of the angle between
+  // them.
   VoxelVolume tilted = random_volume();
   const VoxelVolume start = random_volume();
   base::Random random(8);

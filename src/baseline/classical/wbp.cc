@@ -21,7 +21,7 @@ std::vector<double> weights_of_views(const VoxelProblem& problem) {
   return tilt_weights(tilts);
 }
 
-// The part of A x₀ − b that is left out, of each view.
+// Returns the constant part of A x₀ − b that is left out of each view.
 std::vector<double> constants(const VoxelProblem& problem, VoxelVolume& densities) {
   std::vector<double> means;
   for (const measurement::ViewSums& s : view_sums(problem, problem.views(), densities))
@@ -29,7 +29,7 @@ std::vector<double> constants(const VoxelProblem& problem, VoxelVolume& densitie
   return means;
 }
 
-// samples += x − x₀
+// Adds x − x₀ to the samples.
 void add_backprojection(const projection::SampleGrid& grid, const float* backprojection,
                         float* samples) {
   for_each_sample_row(grid, [&](const projection::SampleSegment& segment, std::ptrdiff_t row) {

@@ -28,7 +28,7 @@ std::size_t DenseNetwork::num_parameters() const {
 std::size_t DenseNetwork::values_per_point() const {
   int values = 0, widest = 0;
   for (const Layer& layer : layers_) {
-    values += 2 * layer.inputs;  // with slopes
+    values += 2 * layer.inputs;  // values and slopes
     widest = std::max(widest, layer.inputs);
   }
   return static_cast<std::size_t>(values + 2 * widest);
@@ -111,7 +111,7 @@ std::span<const float> DenseNetwork::backward(std::span<const float> parameters,
   return batch.gradient;
 }
 
-// From batch.gradient, by a layer's sums, to batch.next_gradient, by its inputs.
+// Turns batch.gradient, by a layer's sums, into batch.next_gradient, by its inputs.
 void DenseNetwork::backward_layer(std::size_t index, std::span<const float> parameters,
                                   Batch& batch, std::span<float> grad_parameters) const {
   const auto [inputs, outputs, offset] = layers_[index];

@@ -7,37 +7,39 @@
 
 namespace tomofield::baseline {
 
-/// What a hidden layer makes of its affine sums. Sines (Sitzmann et al. 2020) are zero on
-/// average, so that no weight moves all outputs at once.
+/// The activation of the hidden layers. Sines (Sitzmann et al. 2020) are zero on average, so no
+/// weight moves all outputs at once.
 enum class Activation { kRectifier, kSine };
 
-/// A small multilayer perceptron: affine layers, an activation between them, one output. It holds
-/// no parameters; every call is given them: [layer][weights [input, output], biases [output]].
+/// A small multilayer perceptron: affine layers with an activation between them and one output. It
+/// holds no parameters. Every call receives them as
+///   [layer][weights [input, output], biases [output]].
 class DenseNetwork {
  public:
-  /// `widths`: number of inputs, then of neurons in each hidden layer.
+  /// Makes a network. `widths` is the number of inputs, then that of the neurons in each hidden
+  /// layer.
   DenseNetwork(std::vector<int> widths, Activation activation);
 
   int num_inputs() const { return layers_.front().inputs; }
   std::size_t num_parameters() const;
-  /// Floats that a batch holds a point, about.
+  /// Returns about how many floats a batch holds a point.
   std::size_t values_per_point() const;
-  /// Weights uniform in ± √(6 / inputs) (He et al. 2015), those of the last layer a tenth of it so
-  /// that outputs start near zero; biases zero.
+  /// Sets the weights to uniform random numbers in ± √(6 / inputs) (He et al. 2015) and the biases
+  /// to zero. Weights of the last layer are a tenth of that, so that outputs start near zero.
   void initialize(std::uint64_t seed, std::span<float> parameters) const;
 
-  /// A thread's buffers for a batch of points, kept between calls.
+  /// The buffers of a thread for a batch of points, kept between calls.
   struct Batch {
     std::vector<std::vector<float>> values;  ///< [layer][point, width], from the inputs on
-    std::vector<std::vector<float>> slopes;  ///< of the activations, [hidden layer][point, width]
+    std::vector<std::vector<float>> slopes;  ///< activations' slopes [hidden layer][point, width]
     std::vector<float> gradient, next_gradient, transposed;
   };
-  /// Makes room for the points and returns where their inputs go, [point, input].
+  /// Makes room for the points. Returns the place of their inputs, [point, input].
   float* inputs(int num_points, Batch& batch) const;
-  /// From the inputs to the outputs, one a point, which are returned.
+  /// Computes the outputs from the inputs and returns them, one a point.
   std::span<float> forward(std::span<const float> parameters, int num_points, Batch& batch) const;
-  /// After forward(): adds the gradient of Σ grad_outputs · outputs to grad_parameters, and
-  /// returns that by the inputs, [point, input].
+  /// Adds the gradient of Σ grad_outputs · outputs to grad_parameters. Returns the gradient by the
+  /// inputs, [point, input]. Call forward() first.
   std::span<const float> backward(std::span<const float> parameters,
                                   std::span<const float> grad_outputs, Batch& batch,
                                   std::span<float> grad_parameters) const;
@@ -45,7 +47,7 @@ class DenseNetwork {
  private:
   struct Layer {
     int inputs, outputs;
-    std::size_t offset;  ///< of its parameters
+    std::size_t offset;  ///< index of its first parameter
     std::size_t num_weights() const {
       return static_cast<std::size_t>(inputs) * static_cast<std::size_t>(outputs);
     }

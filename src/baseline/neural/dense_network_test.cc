@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kNumPoints = 7;
 
-// The same in the plainest way, in double.
+// Computes a network's output in the plainest way, in double.
 double evaluate(const std::vector<int>& widths, Activation activation,
                 const std::vector<float>& parameters, const float* inputs) {
   std::vector<double> values(inputs, inputs + widths[0]);

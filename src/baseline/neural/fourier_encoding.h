@@ -8,10 +8,11 @@
 
 namespace tomofield::baseline {
 
-/// Random Fourier features (Rahimi and Recht 2007; Tancik et al. 2020): plane waves
+/// Encodes a point by random Fourier features (Rahimi and Recht 2007; Tancik et al. 2020): plane
+/// waves
 ///   sin(2π (b · point + φ))
-/// of random phase φ and direction, whose frequency |b| is uniform up to 1 / `shortest` pixels.
-/// No parameters: the waves stay as they are.
+/// of random phase φ and random direction. The frequency |b| is uniform up to 1 / `shortest`
+/// pixels. The waves are fixed: there are no parameters.
 class FourierEncoding final : public PointEncoding {
  public:
   FourierEncoding(int num_features, double shortest, std::uint64_t seed);

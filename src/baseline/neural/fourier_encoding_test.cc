@@ -20,7 +20,7 @@ std::vector<float> encoded(const FourierEncoding& encoding, const Point& point) 
 
 TEST(FourierEncoding, IsOfPlaneWavesUpToAFrequencyInAllDirections) {
   const FourierEncoding encoding(kNumFeatures, kShortest, 3);
-  // A plane wave w has w(p + d) + w(p − d) = 2 cos(2π b · d) w(p), which gives |b| from short d.
+  // A plane wave w has w(p + d) + w(p − d) = 2 cos(2π b · d) w(p), so short steps d give |b|.
   const Point at = {61.3f, 40.7f, 22.9f};
   const std::vector<float> middle = encoded(encoding, at);
   std::vector<double> squared_frequency(middle.size());

@@ -9,12 +9,12 @@
 namespace tomofield::baseline {
 namespace {
 
-constexpr std::ptrdiff_t kFeatures = 2;  // of a vertex
+constexpr std::ptrdiff_t kFeatures = 2;  // features of a vertex
 constexpr unsigned kCorners = 8;
 
 }  // namespace
 
-// The vertices around a point: where their features lie, and how much they count.
+// The vertices around a point: the place of their features and their weights.
 struct HashGrid::Corners {
   std::array<std::size_t, kCorners> offset;
   std::array<float, kCorners> weight;
@@ -56,7 +56,8 @@ HashGrid::Corners HashGrid::corners_of(const Level& level, const Point& point) {
     low[axis] = std::min(static_cast<std::uint32_t>(at), level.cells[axis] - 1);
     part[axis] = std::min(at - static_cast<float>(low[axis]), 1.0f);
   }
-  // An index of the vertices, or the hash of Müller et al., eq. 4: both by axis.
+  // The entry is the index of the vertex or its hash (Müller et al., equation 4). Both have one
+  // factor an axis.
   const bool is_hashed = level.mask != 0;
   const std::uint32_t factor_y = is_hashed ? 2654435761u : level.cells[0] + 1;
   const std::uint32_t factor_z =
@@ -94,7 +95,7 @@ void HashGrid::encode(std::span<const Point> points, std::span<const float> para
 
 void HashGrid::accumulate(std::span<const Point> points, const float* grad_features,
                           std::span<float> grad_parameters) const {
-  // A level's entries belong to it alone: levels may run at once.
+  // The entries of a level belong to it alone, so levels may run at once.
   base::parallel_for(std::ssize(levels_), [&](std::int64_t l) {
     const float* g = grad_features + kFeatures * l;
     for (const Point& point : points) {

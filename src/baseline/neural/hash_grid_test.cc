@@ -11,7 +11,7 @@
 namespace tomofield::baseline {
 namespace {
 
-// Vertices every 2 pixels of a box of 8 × 6 × 5: 5 × 4 × 4 of them.
+// A box of 8 × 6 × 5 with vertices every 2 pixels has 5 × 4 × 4 of them.
 constexpr Point kBox = {8, 6, 5};
 constexpr HashGridOptions kOneLevel = {.levels = 1, .coarsest = 2, .finest = 2, .table_bits = 10};
 constexpr int kNumVertices = 5 * 4 * 4;
@@ -19,7 +19,7 @@ constexpr int kNumVertices = 5 * 4 * 4;
 TEST(HashGrid, InterpolatesBetweenItsVertices) {
   const HashGrid grid(kBox, kOneLevel);
   ASSERT_EQ(grid.num_parameters(), 2u * kNumVertices);
-  // Feature 0 is x + 2 y + 4 z at every vertex, which is linear; feature 1 its negative.
+  // Feature 0 is x + 2 y + 4 z at every vertex, which is linear. Feature 1 is its negative.
   std::vector<float> parameters;
   for (int v = 0; v < kNumVertices; ++v) {
     const float linear = static_cast<float>(2 * (v % 5) + 4 * (v / 5 % 4) + 8 * (v / 20));
@@ -46,7 +46,7 @@ TEST(HashGrid, SharesEntriesWhereItHasMoreVertices) {
   options.table_bits = 5;
   const HashGrid grid(kBox, options);
   ASSERT_EQ(grid.num_parameters(), 2u * 32);
-  // At a vertex one entry alone counts: all entries are used, and by several vertices each.
+  // At a vertex only one entry counts. All entries are used, each by several vertices.
   std::set<float> values;
   std::vector<float> parameters;
   for (int entry = 0; entry < 32; ++entry)

@@ -9,7 +9,7 @@ namespace tomofield::baseline {
 namespace {
 
 std::unique_ptr<PointEncoding> encoding_of(const ImplicitOptions& options) {
-  // The network has other streams of random numbers.
+  // This seed keeps the random numbers of the encoding apart from the network's.
   constexpr std::uint64_t kSeedStep = 1000003;
   return std::make_unique<FourierEncoding>(options.features, options.shortest,
                                            options.seed + kSeedStep);

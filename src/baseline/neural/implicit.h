@@ -4,16 +4,16 @@
 
 namespace tomofield::baseline {
 
-/// A network of coordinates alone, with sines as activations (Sitzmann et al. 2020), and the noise
-/// of each view learned along (after Kniesel et al. 2022).
+/// A network of coordinates alone, with sines as activations (Sitzmann et al. 2020). The noise of
+/// each view is learned with it (after Kniesel et al. 2022).
 struct ImplicitOptions : NetworkOptions {
   ImplicitOptions()
       : NetworkOptions{.hidden_layers = 2,
                        .width = 64,
                        .learning_rate = 0.006,
                        .activation = Activation::kSine} {}
-  int features = 128;      ///< plane waves that the network is given (fourier_encoding.h)
-  double shortest = 20.0;  ///< wavelength of them, pixels
+  int features = 128;      ///< plane waves at the network's input (fourier_encoding.h)
+  double shortest = 20.0;  ///< shortest wavelength of the plane waves, pixels
 
   MethodFacts facts() const {
     return {.name = "implicit",
@@ -26,7 +26,7 @@ struct ImplicitOptions : NetworkOptions {
   MethodSize size(const projection::SampleGrid& samples, std::int64_t num_rows) const;
 };
 
-/// See fit_network().
+/// Reconstructs with fit_network().
 Solution reconstruct_implicit(VoxelProblem& problem, const ImplicitOptions& options,
                               double mean_density, const AfterIteration& after_iteration);
 

@@ -20,7 +20,7 @@ struct IngpOptions : NetworkOptions {
   MethodSize size(const projection::SampleGrid& samples, std::int64_t num_rows) const;
 };
 
-/// See fit_network().
+/// Reconstructs with fit_network().
 Solution reconstruct_ingp(VoxelProblem& problem, const IngpOptions& options, double mean_density,
                           const AfterIteration& after_iteration);
 

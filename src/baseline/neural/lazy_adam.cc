@@ -8,8 +8,8 @@
 namespace tomofield::baseline {
 namespace {
 
-constexpr std::size_t kBlock = 64;            // parameters that are touched together
-constexpr std::size_t kBlocksOfThread = 256;  // at once
+constexpr std::size_t kBlock = 64;            // parameters that share the count of their steps
+constexpr std::size_t kBlocksOfThread = 256;  // blocks that a thread takes at once
 
 }  // namespace
 

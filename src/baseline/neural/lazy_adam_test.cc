@@ -30,7 +30,7 @@ TEST(LazyAdam, LeavesWhatHasNoGradientAloneWithItsMoments) {
   };
   for (int i = 0; i < 5; ++i) {
     step(adam, parameters, 0);
-    step(adam, parameters, kFar);  // between the steps of the other
+    step(adam, parameters, kFar);  // must not change the parameters at 0
     step(other, expected, 0);
   }
   EXPECT_EQ(parameters[0], expected[0]);

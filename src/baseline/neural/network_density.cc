@@ -15,14 +15,14 @@ namespace {
 
 using kernels::kLanes;
 
-// Columns that go through the network at once: few enough for the L2 cache.
+// The number of columns that go through the network at once: few enough for the L2 cache.
 constexpr int kChunk = 128;
 
-// β of softplus, per density unit: the main method's.
+// The sharpness β of softplus per density unit, as in the main method.
 constexpr float kSharpness = static_cast<float>(fit::FieldOptions{}.sharpness);
 
-// Parts of a slab whose gradients are summed apart: their order, not the threads', decides the
-// bits.
+// The number of parts of a slab whose gradients are summed separately. Their order, not the order
+// of the threads, decides the bits.
 constexpr std::size_t kParts = 16;
 
 DenseNetwork network_of(const PointEncoding& encoding, const NetworkDensity::Shape& shape) {
@@ -37,14 +37,14 @@ double lowest_x(const projection::SampleGrid& grid) {
   return low;
 }
 
-// What the network adds to.
+// Returns the bias that is added to the network's output.
 float bias_of(const NetworkDensity::Shape& shape) {
   return static_cast<float>(
       fit::bias_of_density(shape.mean_density, shape.non_negative ? kSharpness : 0));
 }
 
-// Calls body(i, sample) for the i-th point of some columns, `sample` of the z row that the first
-// column starts.
+// Calls body(i, sample) for the i-th point of some columns. `sample` is an index from the first
+// column on, within its z row.
 template <typename Body>
 void for_each_point(int num_columns, const RowSet& rows, Body&& body) {
   std::size_t i = 0;
@@ -159,7 +159,7 @@ std::span<Point> NetworkDensity::points_of(const Chunk& chunk, const RowSet& row
                                     static_cast<std::size_t>(chunk.size) * num_rows);
 }
 
-// What softplus is taken of.
+// Returns the arguments of softplus.
 std::span<float> NetworkDensity::evaluate(const Chunk& chunk, const RowSet& rows,
                                           DenseNetwork::Batch& batch) {
   const projection::SampleSegment& s = *chunk.segment;

@@ -13,25 +13,26 @@
 
 namespace tomofield::baseline {
 
-/// The box that all samples of a grid lie in, in pixels.
+/// Returns the size of the box that holds all samples of a grid, in pixels along x, y and z.
 Point box_of(const projection::SampleGrid& grid, std::int64_t num_rows);
 
-/// Rows of a slab that are computed together: lanes first, first + kStride, … up to the last row.
+/// The rows of a slab that are computed together: lanes first, first + kStride, … up to the last
+/// row.
 struct RowSet {
   static constexpr int kStride = 4;
   int slab = 0, first = 0;
   int num_rows = 0;
 
-  std::uint16_t lanes() const;  ///< a bit each
-  /// Of all slabs, none of them empty.
+  std::uint16_t lanes() const;  ///< the set's lanes, a bit each
+  /// Returns the row sets of all slabs. None of them is empty.
   static std::vector<RowSet> all(std::int64_t num_rows);
 };
 
-/// A density that a network computes from an encoded position, at the samples of slabs (the
-/// buffers of VoxelVolume):
-///   density = softplus(network + bias), or network + bias where densities may be negative,
-/// softplus as sharp as that of the main method's field.
-/// The bias is fixed: a network that says zero has the mean density.
+/// Computes densities with a network from encoded positions, at the samples of slabs (the buffers
+/// of VoxelVolume):
+///   density = softplus(network + bias), or network + bias where densities may be negative.
+/// The softplus is as sharp as that of the main method's field. The bias is fixed: a network that
+/// returns zero has the mean density.
 class NetworkDensity {
  public:
   struct Shape {
@@ -41,32 +42,32 @@ class NetworkDensity {
     double mean_density = 0;
     std::uint64_t seed = 1;
   };
-  /// `grid` must outlive it.
+  /// Makes a density for the samples of `grid`, which must outlive it.
   NetworkDensity(const projection::SampleGrid& grid, std::int64_t num_rows,
                  std::unique_ptr<PointEncoding> encoding, const Shape& shape);
 
-  /// Of the encoding, then of the network.
+  /// Returns the parameters of the encoding, followed by those of the network.
   std::span<float> parameters() { return parameters_; }
   std::size_t num_parameters() const { return parameters_.size(); }
-  /// The parameters of such a density, and what it and so many threads take: known before anything
-  /// is allocated.
+  /// Returns the number of parameters of such a density and the memory that it and its threads
+  /// take, before anything is allocated.
   static MethodSize size(const projection::SampleGrid& grid, std::int64_t num_rows,
                          const PointEncoding& encoding, const Shape& shape, int num_threads);
 
-  /// Densities of some rows of a slab's samples; the others stay as they are.
+  /// Writes the densities of some rows of a slab's samples. The other rows stay as they are.
   void decode(const RowSet& rows, float* samples);
   /// Adds the gradient of Σ grad_samples · samples of these rows by the parameters to `gradient`.
-  /// The same bits for any number of threads.
+  /// The result has the same bits for any number of threads.
   void accumulate(const RowSet& rows, const float* grad_samples, std::span<float> gradient);
 
  private:
-  // Columns of a z row, of a few samples each, that are computed at once.
+  // Columns of a z row that are computed at once; a column has a few samples.
   struct Chunk {
     const projection::SampleSegment* segment;
     int k, first, size;
-    std::size_t index;  ///< of the first column, among all
+    std::size_t index;  ///< index of the first column among all
   };
-  // How many values there are of each kind.
+  // The number of values of each kind.
   struct Counts {
     std::size_t parameters, points, grad_features, parts;
   };
@@ -87,10 +88,11 @@ class NetworkDensity {
   base::AlignedBuffer<float> parameters_;
   std::vector<Chunk> chunks_;
   std::size_t num_columns_ = 0;
-  // Of a set of rows: [column, row], and [column, row, feature] where the encoding is fitted.
+  // points_ is [column, row] of a set of rows. grad_features_ is [column, row, feature] where the
+  // encoding is fitted, and empty elsewhere.
   std::vector<Point> points_;
   std::vector<float> grad_features_;
-  std::vector<float> parts_;  // gradients of the network, summed apart
+  std::vector<float> parts_;  // gradients of the network by parts of a slab
 };
 
 }  // namespace tomofield::baseline

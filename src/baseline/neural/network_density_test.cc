@@ -33,7 +33,7 @@ projection::SampleGrid small_grid() {
 const projection::SampleGrid kGrid = small_grid();
 
 std::unique_ptr<PointEncoding> hash_grid() {
-  // The finest level has more vertices than its table: it is hashed.
+  // The finest level has more vertices than its table, so it is hashed.
   return std::make_unique<HashGrid>(
       box_of(kGrid, kNumRows),
       HashGridOptions{.levels = 3, .coarsest = 4, .finest = 1, .table_bits = 8});
@@ -48,7 +48,7 @@ NetworkDensity density_of(std::unique_ptr<PointEncoding> encoding, bool non_nega
                           .non_negative = non_negative,
                           .mean_density = 0.3,
                           .seed = 4});
-  // Features of vertices start near zero, where nothing would depend on position.
+  // Features of vertices start near zero, where nothing would depend on the position.
   base::Random random(9);
   for (float& p : density.parameters()) p += static_cast<float>(random.uniform(-0.2, 0.2));
   return density;
@@ -79,7 +79,7 @@ void expect_gradient(NetworkDensity density, const RowSet& rows) {
 }
 
 TEST(NetworkDensity, GradientIsThatOfFiniteDifferences) {
-  base::set_thread_count(1);  // there is little to do at once
+  base::set_thread_count(1);  // the work is too small for threads
   for (const RowSet& rows : {RowSet{0, 2, 4}, RowSet{1, 0, 2}}) {
     for (const bool non_negative : {true, false}) {
       expect_gradient(density_of(hash_grid(), non_negative), rows);
@@ -149,7 +149,7 @@ TEST(NetworkDensity, SizeIsKnownBeforeAnythingIsAllocated) {
   const HashGrid encoding({1e6f, 16.0f, 1e6f}, {.levels = 32, .finest = 1.0, .table_bits = 28});
   const projection::SampleGrid grid({huge});
   const MethodSize size = NetworkDensity::size(grid, 16, encoding, shape, 1);
-  // Four rows of points, of 12 bytes and 64 features each.
+  // There are four rows of points, of 12 bytes and 64 features each.
   const double points = 4 * std::exp2(40.0);
   EXPECT_GE(static_cast<double>(size.bytes), (12 + 4 * 64) * points);
   EXPECT_LT(static_cast<double>(size.bytes), 1.01 * (12 + 4 * 64) * points);

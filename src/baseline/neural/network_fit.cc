@@ -17,8 +17,8 @@
 namespace tomofield::baseline {
 namespace {
 
-constexpr double kRateFall = 0.1;   // of the learning rate, over all steps
-constexpr double kNoiseRate = 0.1;  // of the noise's levels, which falls likewise
+constexpr double kRateFall = 0.1;   // factor of the learning rate over all steps
+constexpr double kNoiseRate = 0.1;  // rate of the noise levels; it falls by the same factor
 
 NetworkDensity::Shape shape_of(const NetworkOptions& options, double mean_density) {
   return {options.hidden_layers, options.width, options.activation,
@@ -57,7 +57,7 @@ class NetworkFit {
   }
 
  private:
-  // The number of residuals of each view, and the sum of their squares.
+  // The number of residuals of each view and the sum of their squares.
   struct Squares {
     std::vector<double> counts, sums;
   };
@@ -79,7 +79,7 @@ class NetworkFit {
     return sigma;
   }
 
-  // Densities and residuals of a set of rows, as they are.
+  // Computes the densities and the residuals of a set of rows from the current parameters.
   void find_residuals(std::size_t set) {
     const RowSet& rows = row_sets_[set];
     float* samples = solution_.densities.slab(rows.slab);
@@ -108,7 +108,8 @@ class NetworkFit {
     noise_->step(squares.counts, squares.sums, kNoiseRate * fall);
   }
 
-  // By the sums of all rows, each as they were when their turn came.
+  // Ends a pass with the sums of all rows. Each set contributes its sums from the moment of its
+  // step.
   void finish_pass() {
     const std::vector<measurement::ViewSums> all = total(sums_);
     solution_.data_loss.push_back(problem_.data_loss(all));

@@ -59,7 +59,7 @@ TEST_F(NetworkFit, CoordinateNetworkFindsTheSpheresAndLearnsTheNoise) {
   const Solution solution = solve(series, implicit_options(60));
   EXPECT_LT(testing::rms_error(solution.densities), 0.6 * testing::rms_truth());
   ASSERT_EQ(solution.noise_sigma.size(), series.noise_sigma.size());
-  // Each is the root mean square residual of its view, so that together they have the data's loss.
+  // Each level is the root mean square residual of its view, so together they give the data loss.
   double squares = 0;
   for (const double sigma : solution.noise_sigma) squares += sigma * sigma / 31;
   const double known = std::pow(SphereSeries::Options().noise_sigma, 2);

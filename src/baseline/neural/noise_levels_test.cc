@@ -9,7 +9,7 @@ namespace tomofield::baseline {
 namespace {
 
 const std::vector<double> kCounts = {100, 400};
-const std::vector<double> kSquares = {100 * 4.0, 400 * 0.09};  // of noise 2 and 0.3
+const std::vector<double> kSquares = {100 * 4.0, 400 * 0.09};  // the noise is 2 and 0.3
 
 TEST(NoiseLevels, BecomeThoseOfTheResiduals) {
   NoiseLevels levels({1.0, 1.0});
@@ -28,7 +28,7 @@ TEST(NoiseLevels, ObjectiveIsTheDataTermAtTheStartAndFalls) {
     EXPECT_LT(levels.objective(kCounts, kSquares), last);
     last = levels.objective(kCounts, kSquares);
   }
-  // Σ squares / (2 σ²) + n log σ, less what it has of the start.
+  // The objective is Σ squares / (2 σ²) + n log σ, less n log σ of the start.
   double expected = 0;
   for (std::size_t v = 0; v < 2; ++v) {
     const double sigma = levels.sigma(v), from = v == 0 ? 1.0 : 0.5;

@@ -32,7 +32,7 @@ void cover_with_one_node(const geometry::Roi& roi, reconstruction::ReconstructOp
                     "{}: give a smaller --roi or a larger --bin",
                     roi.width(), roi.height(), kLargest));
   }
-  // So that slabs of the coarsest pixels end with it; of a small region fewer pixels are binned.
+  // Slabs of the coarsest pixels must end with the node. A small region bins fewer pixels.
   std::int64_t step = std::int64_t{base::kLanes} * options.fit.coarse_bin;
   while (step > base::kLanes && step > side) step /= 2;
   options.field.leaf_size = static_cast<int>((side + step - 1) / step * step);

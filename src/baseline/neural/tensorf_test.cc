@@ -38,7 +38,7 @@ TEST(Tensorf, StartsWithVerticesEightTimesAsFarApart) {
   const auto stages = fit::make_stages(options.field, options.fit);
   ASSERT_EQ(stages.size(), 4u);
   EXPECT_EQ(stages.front().bin, 8);
-  EXPECT_EQ(options_for(40, 40).field.leaf_size, 64);  // of which slabs of 2 pixels are a part
+  EXPECT_EQ(options_for(40, 40).field.leaf_size, 64);  // a multiple of slabs of pixels binned by 2
 }
 
 TEST(Tensorf, RegionsAreNotLargerThanANode) {
