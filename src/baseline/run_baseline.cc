@@ -21,7 +21,6 @@
 #include "projection/sample_grid.h"
 #include "reconstruct/options_json.h"
 #include "selection/trial_series.h"
-#include "selection/trials.h"
 #include "tomofield/error.h"
 
 namespace tomofield::baseline {

@@ -13,7 +13,7 @@
 #include "base/stopwatch.h"
 #include "baseline/held_out.h"
 #include "selection/trial_series.h"
-#include "selection/trials.h"
+#include "selection/scores.h"
 
 namespace tomofield::baseline {
 namespace {

@@ -9,7 +9,7 @@
 #include "baseline/method.h"
 #include "measurement/prepare.h"
 #include "projection/sample_grid.h"
-#include "selection/weight_search.h"
+#include "selection/scores.h"
 
 namespace tomofield::baseline {
 
@@ -48,7 +48,7 @@ struct TrialData {
 };
 
 /// Chooses the settings that best predict views held out from the trials. Its rules, rows and views
-/// are those of the main method's tuning (selection/trials.h, selection/trial_series.h).
+/// are those of the main method's tuning (reconstruct/tuning.h, selection/trial_series.h).
 ///
 /// It chooses the penalty if neither the penalty nor a weight is given: the views vote on both
 /// penalties with their usual weights. It chooses the weight by search_weight(). For methods that

@@ -86,8 +86,8 @@ std::string as_text(const std::vector<std::int64_t>& numbers) {
 }
 
 // The same bytes whenever a fit is made.
-nlohmann::json without_times(const selection::Tuned& tuned) {
-  nlohmann::json json = selection::tuning_json(tuned);
+nlohmann::json without_times(const TunedFit& tuned) {
+  nlohmann::json json = tuning_json(tuned);
   for (nlohmann::json& trial : json["trials"]) trial.erase("seconds");
   return json;
 }
@@ -206,14 +206,14 @@ void save_checkpoint(const std::filesystem::path& path, const fit::Fit& fit,
   save(path, fit, info, state, {{"adam_m", adam.m}, {"adam_v", adam.v}});
 }
 
-std::optional<selection::Tuned> stored_choice(const std::filesystem::path& path) {
+std::optional<TunedFit> stored_choice(const std::filesystem::path& path) {
   output::TrainingState state;
   output::load_part(
       path, [](const field::Quadtree&) { return std::vector<int>(); }, state);
   const auto tuning = state.integers.find("tuning");
   if (tuning == state.integers.end()) return std::nullopt;
   try {
-    return selection::tuned_from(nlohmann::json::parse(as_text(tuning->second)));
+    return tuned_from(nlohmann::json::parse(as_text(tuning->second)));
   } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("'{}' is damaged: its tuning ({})", path.string(), error.what()));
   }

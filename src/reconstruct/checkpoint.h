@@ -6,14 +6,14 @@
 
 #include "fit/fit.h"
 #include "output/model_file.h"
-#include "selection/trials.h"
+#include "reconstruct/tuning.h"
 
 namespace tomofield::reconstruction {
 
 /// What a fit was made from.
 struct FitOrigin {
-  std::string fingerprint;                ///< of the series and the options (JSON)
-  std::optional<selection::Tuned> tuned;  ///< by which some of the options were chosen
+  std::string fingerprint;        ///< of the series and the options (JSON)
+  std::optional<TunedFit> tuned;  ///< by which some of the options were chosen
 };
 
 /// How far a fit is, as the model file stores it: all that a finished fit leaves.
@@ -31,7 +31,7 @@ void save_checkpoint(const std::filesystem::path& path, const fit::Fit& fit,
 
 /// What the options of the fit in a checkpoint or model were chosen by. Throws Error if `path` is
 /// none.
-std::optional<selection::Tuned> stored_choice(const std::filesystem::path& path);
+std::optional<TunedFit> stored_choice(const std::filesystem::path& path);
 
 /// Puts a stored field and state into a fresh fit of the same options, on each process what it
 /// needs. Throws Error naming `path` if they belong to another series or other options, and what

@@ -4,7 +4,7 @@
 
 #include "base/faults.h"
 #include "output/result_files.h"
-#include "selection/search.h"
+#include "reconstruct/tuning.h"
 
 namespace tomofield::reconstruction {
 
@@ -21,8 +21,7 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
 int ReconstructOptions::num_trials(int num_fitted_views) const {
   constexpr int kFewestViews = 14;
   if (tune)
-    return selection::expected_trials(
-        {.penalty = choose_penalty, .rank = field.kind == FieldKind::kVm});
+    return expected_trials({.penalty = choose_penalty, .rank = field.kind == FieldKind::kVm});
   return choose_penalty && fit.engine == Engine::kSlab && num_fitted_views >= kFewestViews ? 2 : 0;
 }
 

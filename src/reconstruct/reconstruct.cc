@@ -13,7 +13,7 @@
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/fingerprint.h"
 #include "reconstruct/results.h"
-#include "selection/trials.h"
+#include "reconstruct/tuning.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
@@ -78,24 +78,21 @@ base::ProgressReport progress_report(const fit::Fit& fit, std::int64_t first_ste
 }
 
 // The settings that predict views held out from trials best. None if a stop was requested.
-std::optional<selection::Tuned> choose_settings(const measurement::PreparedSeries& series,
-                                                const measurement::Measurement& measurement,
-                                                const OutputPaths& paths,
-                                                const ReconstructHooks& hooks,
-                                                const ReconstructOptions& options) {
-  const selection::TuneHooks tune_hooks{.progress = hooks.tune_progress,
-                                        .stop_requested = hooks.stop_requested};
-  if (!options.tune)
-    return selection::tune_penalty(measurement, options.field, options.fit, tune_hooks);
+std::optional<TunedFit> choose_settings(const measurement::PreparedSeries& series,
+                                        const measurement::Measurement& measurement,
+                                        const OutputPaths& paths, const ReconstructHooks& hooks,
+                                        const ReconstructOptions& options) {
+  const TuneHooks tune_hooks{.progress = hooks.tune_progress,
+                             .stop_requested = hooks.stop_requested};
+  if (!options.tune) return tune_penalty(measurement, options.field, options.fit, tune_hooks);
   const distributed::Communicator& processes = *measurement.processes;
   const std::string fingerprint = fingerprint_of(options, series, processes);
   std::optional<selection::TrialFile> file;
   processes.run_collectively([&] { file.emplace(paths.trials, fingerprint, options.resume); });
-  return selection::tune(measurement, options.field, options.fit, options.choose_penalty, *file,
-                         tune_hooks);
+  return tune(measurement, options.field, options.fit, options.choose_penalty, *file, tune_hooks);
 }
 
-void apply(const selection::TrialSettings& settings, ReconstructOptions& options) {
+void apply(const TrialSettings& settings, ReconstructOptions& options) {
   options.fit.penalty = settings.penalty;
   options.fit.density_variation = settings.variation;
   options.fit.epochs = settings.epochs;
@@ -107,7 +104,7 @@ void apply(const selection::TrialSettings& settings, ReconstructOptions& options
 bool settle_options(const measurement::PreparedSeries& series,
                     const measurement::Measurement& measurement, const OutputPaths& paths,
                     const ReconstructHooks& hooks, ReconstructOptions& options,
-                    std::optional<selection::Tuned>& tuned) {
+                    std::optional<TunedFit>& tuned) {
   if (options.num_trials(measurement.num_fitted_views()) == 0) return true;
   if (options.resume && std::filesystem::exists(paths.model)) {
     measurement.processes->run_collectively(

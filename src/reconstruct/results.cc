@@ -67,8 +67,7 @@ void write_results(fit::Fit& fit, const measurement::PreparedSeries& series,
     figures["held_out"] = score_fit(fit, series, options.fit.patience > 0, paths.held_out_picture);
   }
   figures["processes"] = output::processes_json(fit, seconds);
-  figures["tuning"] =
-      origin.tuned ? selection::tuning_json(*origin.tuned) : nlohmann::json(nullptr);
+  figures["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
   save_fit(paths.model, fit, model_info(series, options), progress_state(fit, origin));
   const output::VolumeShare share = volume_share(fit, series);
   output::Model model{model_info(series, options), fit.take_field()};

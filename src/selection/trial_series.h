@@ -10,6 +10,10 @@
 
 namespace tomofield::selection {
 
+/// Rows of a trial, in the middle: enough for edges in every direction, few enough for a dozen
+/// fits.
+constexpr std::int64_t kTrialRows = 64;
+
 /// Views that trials of settings are made on, and which of them the trials predict.
 struct TrialViews {
   std::vector<int> fitted_or_predicted;  ///< of the series, ascending

@@ -1,71 +1,93 @@
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
+#include <algorithm>
+#include <cstddef>
 #include <functional>
-#include <nlohmann/json.hpp>
 #include <optional>
-#include <string>
+#include <utility>
 #include <vector>
 
-#include "base/progress.h"
-#include "fit/fit.h"
-#include "selection/search.h"
+#include "selection/scores.h"
 
 namespace tomofield::selection {
 
-/// Trials of a tuning that are done, kept in a file (JSON) so that a run that was
-/// interrupted need not repeat them.
-class TrialFile {
- public:
-  /// With `reuse`, reads the trials of an earlier run, if there are any. Throws
-  /// Error if they are of another `fingerprint` (series and options) or damaged.
-  TrialFile(std::filesystem::path path, std::string fingerprint, bool reuse);
+/// A short fit with some settings, and how well it predicts the held-out views. `Settings` is
+/// whatever a method lets a search choose.
+template <typename Settings>
+struct Trial {
+  Settings settings = {};
+  HeldOutScore score = {};
+  double seconds = 0;
+  /// Fall of the objective in the last tenth of an iterative method, as a part of it.
+  std::optional<double> last_decrease = {};
+};
 
-  std::optional<Trial> find(const TrialSettings& settings) const;
-  /// Adds a trial and writes the file anew.
-  void add(const Trial& trial);
+/// What a search chose, and all that it tried.
+template <typename Settings>
+struct Tuned {
+  Settings settings = {};
+  std::vector<Trial<Settings>> trials;  ///< in the order in which they were made
+  std::vector<int> predicted_views;     ///< held-out views that the choice rests on
+};
+
+/// Makes the trials of a search, none of them twice, and applies the rules by which settings are
+/// chosen. It knows no method: the caller hands it "run one trial" and "are these settings equal".
+template <typename Settings>
+class Trials {
+ public:
+  /// Fits with these settings; the same settings always give the same score.
+  using RunTrial = std::function<Trial<Settings>(const Settings&)>;
+  using AreEqual = std::function<bool(const Settings&, const Settings&)>;
+
+  Trials(RunTrial run, AreEqual are_equal)
+      : run_(std::move(run)), are_equal_(std::move(are_equal)) {}
+
+  /// Returns the trial with these settings, which it makes unless there is one. The reference
+  /// holds until the next trial is made.
+  const Trial<Settings>& trial(const Settings& settings) {
+    const auto known = std::ranges::find_if(
+        made_, [&](const Trial<Settings>& t) { return are_equal_(t.settings, settings); });
+    if (known != made_.end()) return *known;
+    made_.push_back(run_(settings));
+    return made_.back();
+  }
+
+  /// Returns `other` if most held-out views prefer it, else `usual`.
+  Settings preferred_by_most_views(const Settings& usual, const Settings& other) {
+    const HeldOutScore of_usual = trial(usual).score, of_other = trial(other).score;
+    return most_views_prefer(of_other, of_usual) ? other : usual;
+  }
+
+  /// Returns the first of these candidates, in order of preference, that the best one does not
+  /// beat by more than the standard error of their difference.
+  Settings first_as_good(const std::vector<Settings>& candidates) {
+    std::vector<HeldOutScore> scores;
+    for (const Settings& settings : candidates) scores.push_back(trial(settings).score);
+    return candidates[first_as_good_as_the_best(scores)];
+  }
+
+  /// Returns `settings` with the weight that search_weight() finds. set_weight(settings, weight)
+  /// changes the weight alone.
+  template <typename SetWeight>
+  Settings with_best_weight(Settings settings, double first, const SetWeight& set_weight) {
+    const double best = search_weight(first, [&](double weight) {
+      Settings tried = settings;
+      set_weight(tried, weight);
+      return trial(tried).score;
+    });
+    set_weight(settings, best);
+    return settings;
+  }
+
+  /// Adds a trial that was made elsewhere, such as one of several from one run.
+  void add(Trial<Settings> trial) { made_.push_back(std::move(trial)); }
+
+  const std::vector<Trial<Settings>>& made() const { return made_; }
 
  private:
-  std::filesystem::path path_;
-  std::string fingerprint_;
-  std::vector<Trial> trials_;
+  RunTrial run_;
+  AreEqual are_equal_;
+  std::vector<Trial<Settings>> made_;
 };
-
-/// Rows of a trial, in the middle: enough for edges in every direction, few enough for a dozen
-/// fits.
-constexpr std::int64_t kTrialRows = 64;
-
-struct TuneHooks {
-  base::ProgressSink progress;
-  std::function<bool()> stop_requested;  ///< asked after every step
-};
-
-struct Tuned {
-  TrialSettings settings;
-  std::vector<Trial> trials;
-  std::vector<int> predicted_views;  ///< by which they were chosen
-};
-
-/// What a tuning chose, and everything that it tried; tuned_from() reads it, with or without the
-/// seconds of the trials.
-nlohmann::json tuning_json(const Tuned& tuned);
-Tuned tuned_from(const nlohmann::json& tuning);
-
-/// Chooses settings by search_settings(), the penalty too if `tunes_penalty`. Trials are made on
-/// a strip of rows in the middle and without the views that `measurement` holds out to score the
-/// result (trial_series.h). Finished trials go to `file`, and those found there are not
-/// repeated. None if a stop was requested. Throws Error for too few views.
-std::optional<Tuned> tune(const measurement::Measurement& measurement,
-                          const fit::FieldOptions& field, const fit::FitOptions& fit,
-                          bool tunes_penalty, TrialFile& file, const TuneHooks& hooks);
-
-/// Chooses the penalty alone, by choose_penalty(): two trials on half as many rows, of plain
-/// vertices whatever the field, since which penalty is right is the specimen's affair and they
-/// converge in a fraction of the time: a few per cent of a fit of 256 rows. None if a stop was
-/// requested.
-std::optional<Tuned> tune_penalty(const measurement::Measurement& measurement,
-                                  const fit::FieldOptions& field, const fit::FitOptions& fit,
-                                  const TuneHooks& hooks);
 
 }  // namespace tomofield::selection

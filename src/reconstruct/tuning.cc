@@ -1,10 +1,9 @@
-#include "selection/trials.h"
+#include "reconstruct/tuning.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <functional>
 #include <memory>
 #include <utility>
@@ -12,16 +11,16 @@
 #include "base/enum_names.h"
 #include "base/log.h"
 #include "base/stopwatch.h"
-#include "io/json.h"
+#include "objective/options.h"
 #include "selection/trial_series.h"
 #include "tomofield/error.h"
 
-namespace tomofield::selection {
+namespace tomofield::reconstruction {
 namespace {
 
 using nlohmann::json;
 
-// Of those that compare penalties, which differ by more than weights do.
+// Trials that compare penalties need less, since penalties differ by more than weights do.
 constexpr std::int64_t kPenaltyRows = 32;
 constexpr double kPenaltyPart = 0.5;  // of the epochs that plain vertices need
 
@@ -39,34 +38,23 @@ TrialSettings settings_from(const json& entry) {
           .epochs = entry.at("epochs")};
 }
 
-Trial trial_from(const json& entry) {
+FitTrial trial_from(const json& entry) {
   return {.settings = settings_from(entry),
-          .score = {entry.at("held_out_error"), entry.at("held_out_error_by_view")},
+          .score = selection::score_from(entry),
           .seconds = entry.value("seconds", 0.0)};
 }
 
-json trials_json(const std::vector<Trial>& trials) {
-  json table = json::array();
-  for (const Trial& t : trials) {
-    table.push_back(settings_json(t.settings));
-    table.back().update({{"held_out_error", t.score.error},
-                         {"held_out_error_by_view", t.score.view_error},
-                         {"seconds", t.seconds}});
-  }
-  return table;
-}
-
-// What trials are made on.
+// The part of a measurement that trials are made on.
 struct Strip {
   double part = 1;  // of all rows
-  TrialSeries series;
+  selection::TrialSeries series;
   measurement::Measurement measurement;  // of `series`
 };
 
 Strip middle_strip(const measurement::Measurement& whole, std::int64_t most_rows) {
   const std::int64_t all_rows = whole.rays->shape().num_rows;
-  TrialSeries series = make_trial_series(whole.geometry, whole.noise_sigma, *whole.rays,
-                                         whole.held_out, most_rows, *whole.processes);
+  selection::TrialSeries series = selection::make_trial_series(
+      whole.geometry, whole.noise_sigma, *whole.rays, whole.held_out, most_rows, *whole.processes);
   const std::int64_t rows = series.rays->shape().num_rows;
   geometry::Roi roi = whole.roi;
   roi.y0 += (all_rows - rows) / 2;
@@ -95,27 +83,27 @@ class TrialFits {
         hooks_(hooks),
         num_expected_(num_expected) {}
 
-  Trial run(const TrialSettings& settings) {
-    Trial trial = fitted(settings);
+  FitTrial run(const TrialSettings& settings) {
+    FitTrial trial = fitted(settings);
     ++num_done_;
     return trial;
   }
 
-  // As run(), unless `file` has the trial already.
-  Trial run(const TrialSettings& settings, TrialFile& file) {
-    if (const std::optional<Trial> known = file.find(settings)) {
+  // Does as run() does, unless `file` has the trial already.
+  FitTrial run(const TrialSettings& settings, selection::TrialFile& file) {
+    if (const auto known = file.find(settings_json(settings))) {
       ++num_done_;
-      return *known;
+      return trial_from(*known);
     }
-    Trial trial = run(settings);
-    file.add(trial);
+    FitTrial trial = run(settings);
+    file.add(selection::trial_json(settings_json(settings), trial.score, trial.seconds));
     return trial;
   }
 
   const std::vector<int>& predicted_views() const { return strip_.series.views.predicted; }
 
  private:
-  Trial fitted(const TrialSettings& settings) {
+  FitTrial fitted(const TrialSettings& settings) {
     fit::FieldOptions field = field_;
     fit::FitOptions options = fit_;
     field.rank = settings.rank;
@@ -171,9 +159,9 @@ fit::FitOptions penalty_trial_options(const fit::FieldOptions& plain,
 
 // What the first process finds, on all of them: trials are too small to share. None if a stop was
 // requested.
-std::optional<Tuned> found_by_first(const distributed::Communicator& processes,
-                                    const std::function<Tuned()>& search) {
-  std::optional<Tuned> tuned;
+std::optional<TunedFit> found_by_first(const distributed::Communicator& processes,
+                                       const std::function<TunedFit()>& search) {
+  std::optional<TunedFit> tuned;
   json found = nullptr;
   processes.run_collectively([&] {
     if (!processes.is_first()) return;
@@ -189,8 +177,8 @@ std::optional<Tuned> found_by_first(const distributed::Communicator& processes,
   return tuned_from(found);
 }
 
-void log_trials(const std::vector<Trial>& trials) {
-  for (const Trial& t : trials) {
+void log_trials(const std::vector<FitTrial>& trials) {
+  for (const FitTrial& t : trials) {
     base::log_info(fmt::format("tried {} tv {:8.3f}  rank {:3}  epochs {:4}: held-out error {:.5f}",
                                base::name_of(t.settings.penalty), t.settings.variation,
                                t.settings.rank, t.settings.epochs, t.score.error));
@@ -199,66 +187,76 @@ void log_trials(const std::vector<Trial>& trials) {
 
 }  // namespace
 
-TrialFile::TrialFile(std::filesystem::path path, std::string fingerprint, bool reuse)
-    : path_(std::move(path)), fingerprint_(std::move(fingerprint)) {
-  if (!reuse || !std::filesystem::exists(path_)) return;
-  const char* advice = "give --overwrite instead of --resume to start over";
-  std::ifstream file(path_);
-  const json document = json::parse(file, nullptr, /*allow_exceptions=*/false);
-  try {
-    if (document.at("fingerprint").get<std::string>() != fingerprint_) {
-      throw Error(fmt::format(
-          "cannot resume: the trials in '{}' are of another series or of other options; {}",
-          path_.string(), advice));
+FitTrials make_trials(FitTrials::RunTrial run) {
+  constexpr double kRounding = 1e-9;
+  return {std::move(run), [](const TrialSettings& a, const TrialSettings& b) {
+            return a.penalty == b.penalty && a.rank == b.rank && a.epochs == b.epochs &&
+                   std::abs(a.variation / b.variation - 1) < kRounding;
+          }};
+}
+
+TrialSettings choose_penalty(const TrialSettings& start, FitTrials& trials) {
+  TrialSettings concave = start, smooth = start;
+  concave.penalty = Penalty::kConcave;
+  smooth.penalty = Penalty::kSmooth;
+  for (TrialSettings* settings : {&concave, &smooth})
+    settings->variation = objective::usual_variation(settings->penalty);
+  return trials.preferred_by_most_views(concave, smooth);
+}
+
+int expected_trials(const SearchSpace& space) {
+  return selection::kUsualWeights + 2 + (space.penalty ? 1 : 0) + (space.rank ? 2 : 0);
+}
+
+TrialSettings search_settings(const TrialSettings& start, const SearchSpace& space,
+                              FitTrials& trials) {
+  TrialSettings best = space.penalty ? choose_penalty(start, trials) : start;
+  best = trials.with_best_weight(best, best.variation, [](TrialSettings& settings, double weight) {
+    settings.variation = weight;
+  });
+  if (space.rank) {
+    std::vector<TrialSettings> candidates;
+    for (const int thirds : {1, 2, 3}) {
+      candidates.push_back(best);
+      candidates.back().rank = std::max(thirds * best.rank / 3, 1);
     }
-    for (const json& entry : document.at("trials")) trials_.push_back(trial_from(entry));
-  } catch (const json::exception& error) {
-    throw Error(fmt::format("cannot resume: '{}' is damaged ({}); {}", path_.string(), error.what(),
-                            advice));
+    best = trials.first_as_good(candidates);
   }
+  std::vector<TrialSettings> candidates;
+  for (const int epochs : {std::max(best.epochs / 2, 1), best.epochs, 2 * best.epochs}) {
+    candidates.push_back(best);
+    candidates.back().epochs = epochs;
+  }
+  return trials.first_as_good(candidates);
 }
 
-std::optional<Trial> TrialFile::find(const TrialSettings& settings) const {
-  const auto found = std::ranges::find(trials_, settings, &Trial::settings);
-  return found == trials_.end() ? std::nullopt : std::optional(*found);
-}
+json tuning_json(const TunedFit& tuned) { return selection::tuned_json(tuned, settings_json); }
 
-void TrialFile::add(const Trial& trial) {
-  trials_.push_back(trial);
-  io::write_json(path_, {{"fingerprint", fingerprint_}, {"trials", trials_json(trials_)}});
-}
-
-json tuning_json(const Tuned& tuned) {
-  return {{"predicted_views", tuned.predicted_views},
-          {"chosen", settings_json(tuned.settings)},
-          {"trials", trials_json(tuned.trials)}};
-}
-
-Tuned tuned_from(const json& tuning) {
-  Tuned tuned{.settings = settings_from(tuning.at("chosen")),
-              .trials = {},
-              .predicted_views = tuning.at("predicted_views")};
+TunedFit tuned_from(const json& tuning) {
+  TunedFit tuned{.settings = settings_from(tuning.at("chosen")),
+                 .trials = {},
+                 .predicted_views = tuning.at("predicted_views")};
   for (const json& trial : tuning.at("trials")) tuned.trials.push_back(trial_from(trial));
   return tuned;
 }
 
-std::optional<Tuned> tune(const measurement::Measurement& measurement,
-                          const fit::FieldOptions& field, const fit::FitOptions& fit,
-                          bool tunes_penalty, TrialFile& file, const TuneHooks& hooks) {
+std::optional<TunedFit> tune(const measurement::Measurement& measurement,
+                             const fit::FieldOptions& field, const fit::FitOptions& fit,
+                             bool tunes_penalty, selection::TrialFile& file,
+                             const TuneHooks& hooks) {
   const SearchSpace space{.penalty = tunes_penalty, .rank = field.kind == FieldKind::kVm};
-  TrialFits fits(measurement, kTrialRows, field, fit, hooks, expected_trials(space));
+  TrialFits fits(measurement, selection::kTrialRows, field, fit, hooks, expected_trials(space));
   // A run without total variation still needs a weight to search from.
   const double first =
       fit.density_variation > 0 ? fit.density_variation : objective::usual_variation(fit.penalty);
   const auto search = [&] {
-    Tuned tuned;
-    tuned.predicted_views = fits.predicted_views();
-    tuned.settings = search_settings(
-        {fit.penalty, first, field.rank, fit.epochs}, space,
-        [&](const TrialSettings& settings) { return fits.run(settings, file); }, tuned.trials);
-    return tuned;
+    FitTrials trials =
+        make_trials([&](const TrialSettings& settings) { return fits.run(settings, file); });
+    const TrialSettings found =
+        search_settings({fit.penalty, first, field.rank, fit.epochs}, space, trials);
+    return TunedFit{found, trials.made(), fits.predicted_views()};
   };
-  const std::optional<Tuned> tuned = found_by_first(*measurement.processes, search);
+  const std::optional<TunedFit> tuned = found_by_first(*measurement.processes, search);
   if (!tuned) return std::nullopt;
   log_trials(tuned->trials);
   base::log_info(fmt::format(
@@ -269,29 +267,25 @@ std::optional<Tuned> tune(const measurement::Measurement& measurement,
   return tuned;
 }
 
-std::optional<Tuned> tune_penalty(const measurement::Measurement& measurement,
-                                  const fit::FieldOptions& field, const fit::FitOptions& fit,
-                                  const TuneHooks& hooks) {
+std::optional<TunedFit> tune_penalty(const measurement::Measurement& measurement,
+                                     const fit::FieldOptions& field, const fit::FitOptions& fit,
+                                     const TuneHooks& hooks) {
   fit::FieldOptions plain = field;
   plain.kind = FieldKind::kGrid;
   const fit::FitOptions shorter = penalty_trial_options(plain, field, fit);
   TrialFits fits(measurement, kPenaltyRows, plain, shorter, hooks, 2);
   const auto search = [&] {
-    Tuned tuned;
-    tuned.predicted_views = fits.predicted_views();
-    tuned.settings =
-        choose_penalty({fit.penalty, fit.density_variation, field.rank, shorter.epochs},
-                       [&](const TrialSettings& settings) {
-                         tuned.trials.push_back(fits.run(settings));
-                         return tuned.trials.back();
-                       });
-    return tuned;
+    FitTrials trials =
+        make_trials([&](const TrialSettings& settings) { return fits.run(settings); });
+    const TrialSettings found =
+        choose_penalty({fit.penalty, fit.density_variation, field.rank, shorter.epochs}, trials);
+    return TunedFit{found, trials.made(), fits.predicted_views()};
   };
-  std::optional<Tuned> tuned = found_by_first(*measurement.processes, search);
+  std::optional<TunedFit> tuned = found_by_first(*measurement.processes, search);
   if (!tuned) return std::nullopt;
   log_trials(tuned->trials);
   tuned->settings.epochs = fit.epochs;
   return tuned;
 }
 
-}  // namespace tomofield::selection
+}  // namespace tomofield::reconstruction

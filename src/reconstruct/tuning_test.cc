@@ -1,4 +1,4 @@
-#include "selection/search.h"
+#include "reconstruct/tuning.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace tomofield::selection {
+namespace tomofield::reconstruction {
 namespace {
 
 // Errors of an imagined series: best at some weight, and better by `gain` a doubling of
@@ -21,7 +21,7 @@ struct ImaginedSeries {
   double smooth_error = 0.05;  // more of a smooth penalty at its own best weight
   int num_trials = 0;
 
-  Trial run(const TrialSettings& s) {
+  FitTrial run(const TrialSettings& s) {
     ++num_trials;
     const bool is_smooth = s.penalty == Penalty::kSmooth;
     const double best = is_smooth ? best_variation * objective::usual_variation(Penalty::kSmooth) /
@@ -31,7 +31,7 @@ struct ImaginedSeries {
     double error = 1 + (is_smooth ? smooth_error : 0) + 0.02 * doublings * doublings;
     error += gain * std::max(0.0, std::log2(static_cast<double>(needed_rank) / s.rank));
     error += gain * std::max(0.0, std::log2(static_cast<double>(needed_epochs) / s.epochs));
-    Trial trial{s, {error, {}}, 0};
+    FitTrial trial{s, {error, {}}};
     for (int view = 0; view < 12; ++view) {
       const double sign = (view + num_trials) % 2 == 0 ? 1 : -1;
       trial.score.view_error.push_back(error + 0.3 * view + sign * scatter);
@@ -40,21 +40,22 @@ struct ImaginedSeries {
   }
 };
 
-TrialSettings search(ImaginedSeries& series, std::vector<Trial>& trials,
+TrialSettings search(ImaginedSeries& series, std::vector<FitTrial>& trials,
                      const SearchSpace& space = {.penalty = false}) {
-  return search_settings(
-      {Penalty::kConcave, 9, 24, 30}, space, [&](const TrialSettings& s) { return series.run(s); },
-      trials);
+  FitTrials search_trials = make_trials([&](const TrialSettings& s) { return series.run(s); });
+  const TrialSettings found = search_settings({Penalty::kConcave, 9, 24, 30}, space, search_trials);
+  trials = search_trials.made();
+  return found;
 }
 
 TEST(SearchSettings, FindsTheWeightWithinAFactorOfRootTwo) {
   for (const double best : {0.2, 3.0, 9.0, 13.0, 100.0, 800.0}) {
     ImaginedSeries series{.best_variation = best};
-    std::vector<Trial> trials;
+    std::vector<FitTrial> trials;
     const TrialSettings found = search(series, trials);
     EXPECT_LE(std::abs(std::log2(found.variation / best)), 0.5) << best << " " << found.variation;
     std::set<std::tuple<double, int, int>> distinct;
-    for (const Trial& t : trials)
+    for (const FitTrial& t : trials)
       distinct.insert({t.settings.variation, t.settings.rank, t.settings.epochs});
     EXPECT_EQ(distinct.size(), trials.size()) << "tried twice";
     EXPECT_EQ(static_cast<int>(trials.size()), series.num_trials);
@@ -64,7 +65,7 @@ TEST(SearchSettings, FindsTheWeightWithinAFactorOfRootTwo) {
 TEST(SearchSettings, PaysForRankAndEpochsOnlyWhatHelps) {
   ImaginedSeries modest{.best_variation = 9, .needed_rank = 8, .needed_epochs = 15};
   ImaginedSeries demanding{.best_variation = 9, .needed_rank = 24, .needed_epochs = 60};
-  std::vector<Trial> trials;
+  std::vector<FitTrial> trials;
   TrialSettings found = search(modest, trials);
   EXPECT_EQ(std::pair(found.rank, found.epochs), std::pair(8, 15));
   trials.clear();
@@ -77,23 +78,22 @@ TEST(SearchSettings, PaysForRankAndEpochsOnlyWhatHelps) {
 TEST(SearchSettings, TakesThePenaltyThatPredictsBetterAndItsOwnWeight) {
   for (const double smooth_error : {0.05, -0.05}) {
     ImaginedSeries series{.best_variation = 28, .smooth_error = smooth_error};
-    std::vector<Trial> trials;
+    std::vector<FitTrial> trials;
     const TrialSettings found = search(series, trials, {});
     EXPECT_EQ(found.penalty, smooth_error > 0 ? Penalty::kConcave : Penalty::kSmooth);
     EXPECT_NEAR(found.variation, smooth_error > 0 ? 28 : 10, 1e-9);
-    EXPECT_EQ(choose_penalty({Penalty::kConcave, 3, 24, 30},
-                             [&](const TrialSettings& s) { return series.run(s); })
-                  .penalty,
-              found.penalty);
+    FitTrials two = make_trials([&](const TrialSettings& s) { return series.run(s); });
+    EXPECT_EQ(choose_penalty({Penalty::kConcave, 3, 24, 30}, two).penalty, found.penalty);
+    EXPECT_EQ(two.made().size(), 2u);
   }
 }
 
 TEST(SearchSettings, TakesTheSmoothestOfWhatCannotBeToldApart) {
   ImaginedSeries sure{.best_variation = 9}, unsure{.best_variation = 9, .scatter = 0.1};
-  std::vector<Trial> trials, unsure_trials;
+  std::vector<FitTrial> trials, unsure_trials;
   EXPECT_NEAR(search(sure, trials).variation, 9, 1e-9);
   EXPECT_GT(search(unsure, unsure_trials).variation, 9 * 1.4);
 }
 
 }  // namespace
-}  // namespace tomofield::selection
+}  // namespace tomofield::reconstruction

@@ -1,4 +1,4 @@
-#include "selection/weight_search.h"
+#include "selection/scores.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,71 @@
+#include "selection/trial_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <utility>
+
+#include "io/json.h"
+#include "tomofield/error.h"
+
+namespace tomofield::selection {
+namespace {
+
+using nlohmann::json;
+
+// Says whether a trial has all of these settings.
+bool has_settings(const json& trial, const json& settings) {
+  return std::ranges::all_of(settings.items(), [&](const auto& setting) {
+    const auto found = trial.find(setting.key());
+    return found != trial.end() && *found == setting.value();
+  });
+}
+
+}  // namespace
+
+json trial_json(json settings, const HeldOutScore& score, double seconds) {
+  settings.update({{"held_out_error", score.error},
+                   {"held_out_error_by_view", score.view_error},
+                   {"seconds", seconds}});
+  return settings;
+}
+
+HeldOutScore score_from(const json& trial) {
+  return {trial.at("held_out_error"), trial.at("held_out_error_by_view")};
+}
+
+TrialFile::TrialFile(std::filesystem::path path, std::string fingerprint, bool reuse)
+    : path_(std::move(path)), fingerprint_(std::move(fingerprint)) {
+  if (!reuse || !std::filesystem::exists(path_)) return;
+  const char* advice = "give --overwrite instead of --resume to start over";
+  std::ifstream file(path_);
+  const json document = json::parse(file, nullptr, /*allow_exceptions=*/false);
+  try {
+    if (document.at("fingerprint").get<std::string>() != fingerprint_) {
+      throw Error(fmt::format(
+          "cannot resume: the trials in '{}' are of another series or of other options; {}",
+          path_.string(), advice));
+    }
+    for (const json& trial : document.at("trials")) {
+      score_from(trial);  // throws if it is damaged
+      trials_.push_back(trial);
+    }
+  } catch (const json::exception& error) {
+    throw Error(fmt::format("cannot resume: '{}' is damaged ({}); {}", path_.string(), error.what(),
+                            advice));
+  }
+}
+
+std::optional<json> TrialFile::find(const json& settings) const {
+  const auto found = std::ranges::find_if(
+      trials_, [&](const json& trial) { return has_settings(trial, settings); });
+  return found == trials_.end() ? std::nullopt : std::optional<json>(*found);
+}
+
+void TrialFile::add(json trial) {
+  trials_.push_back(std::move(trial));
+  io::write_json(path_, {{"fingerprint", fingerprint_}, {"trials", trials_}});
+}
+
+}  // namespace tomofield::selection
