@@ -11,16 +11,31 @@ find_package(nlohmann_json REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(tomlplusplus REQUIRED)
 find_package(Eigen3 3.3 REQUIRED NO_MODULE)
-find_package(PkgConfig REQUIRED)
-pkg_check_modules(CBC REQUIRED IMPORTED_TARGET cbc)
-find_package(MPI REQUIRED COMPONENTS C)  # its C interface alone
 
-set(TOMOFIELD_LIBRARIES
-  OpenMP::OpenMP_CXX Threads::Threads hwy::hwy HDF5::HDF5 PNG::PNG kissfft::kissfft-float fmt::fmt
-  nlohmann_json::nlohmann_json $<BUILD_INTERFACE:Eigen3::Eigen> PkgConfig::CBC
-  MPI::MPI_C)
-set(TOMOFIELD_CLI_LIBRARIES CLI11::CLI11 tomlplusplus::tomlplusplus)
+# Every layer may use these; they are also what the common precompiled headers need.
+set(TOMOFIELD_COMMON_LIBRARIES
+  OpenMP::OpenMP_CXX Threads::Threads fmt::fmt nlohmann_json::nlohmann_json)
+
+# The layer of that name alone compiles against these.
+set(TOMOFIELD_io_LIBRARIES HDF5::HDF5 PNG::PNG)
+set(TOMOFIELD_kernels_LIBRARIES hwy::hwy)
+set(TOMOFIELD_field_LIBRARIES $<BUILD_INTERFACE:Eigen3::Eigen>)
+set(TOMOFIELD_objective_LIBRARIES kissfft::kissfft-float)
+set(TOMOFIELD_evaluate_LIBRARIES kissfft::kissfft-float)
+set(TOMOFIELD_baseline_LIBRARIES kissfft::kissfft-float)
+set(TOMOFIELD_cli_LIBRARIES CLI11::CLI11 tomlplusplus::tomlplusplus)
+
+if(TOMOFIELD_WITH_MPI)
+  find_package(MPI REQUIRED COMPONENTS C)  # its C interface alone
+  set(TOMOFIELD_distributed_LIBRARIES MPI::MPI_C)
+endif()
+if(TOMOFIELD_WITH_CBC)
+  find_package(PkgConfig REQUIRED)
+  pkg_check_modules(CBC REQUIRED IMPORTED_TARGET cbc)
+  set(TOMOFIELD_fit_LIBRARIES PkgConfig::CBC)
+endif()
 
 add_library(tomofield_warnings INTERFACE)
 target_compile_options(tomofield_warnings INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -fno-math-errno -ffp-contract=fast)
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+  $<$<BOOL:${TOMOFIELD_WERROR}>:-Werror> -fno-math-errno -ffp-contract=fast)

@@ -1,4 +1,4 @@
-# cmake --install: the program, the library, its headers and a CMake package.
+# cmake --install: the program, its man pages, the library, its headers and a CMake package.
 include(CMakePackageConfigHelpers)
 set(tomofield_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/tomofield)
 
@@ -8,6 +8,17 @@ install(TARGETS tomofield_library EXPORT TomofieldTargets
 install(DIRECTORY include/tomofield ${PROJECT_BINARY_DIR}/include/tomofield
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 install(EXPORT TomofieldTargets NAMESPACE tomofield:: DESTINATION ${tomofield_package_dir})
+
+# The program itself says what its man pages have to say, so a cross-compiled one has none.
+if(NOT CMAKE_CROSSCOMPILING)
+  set(man_dir ${PROJECT_BINARY_DIR}/man)
+  add_custom_command(OUTPUT ${man_dir}/tomofield.1
+    COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:tomofield> -DDIRECTORY=${man_dir}
+            -DVERSION=${PROJECT_VERSION} -P ${PROJECT_SOURCE_DIR}/cmake/WriteManPages.cmake
+    DEPENDS tomofield ${PROJECT_SOURCE_DIR}/cmake/WriteManPages.cmake VERBATIM)
+  add_custom_target(tomofield_man_pages ALL DEPENDS ${man_dir}/tomofield.1)
+  install(DIRECTORY ${man_dir}/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+endif()
 
 configure_package_config_file(cmake/TomofieldConfig.cmake.in
   ${PROJECT_BINARY_DIR}/cmake/tomofieldConfig.cmake

@@ -1,13 +1,15 @@
 # shellcheck shell=bash
-# Sourced by ./demo and ./test: installs the Debian packages that are missing
-# and builds the release preset. Reads nothing from standard input.
+# Sourced by ./demo, ./test and .ci/run: installs the Debian packages that are
+# missing and builds the release preset. Reads nothing from standard input.
 
 project_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
-# Prints the packages of packages.txt that are not installed, one a line.
+# Prints the packages in the first COUNT sections of packages.txt that are not
+# installed, one a line. An empty line ends a section, the title is the first one.
 missing_packages() {
   local package
-  sed -e 's/#.*//' -e '/^[[:space:]]*$/d' "$project_root/packages.txt" | while read -r package _; do
+  awk -v last="$(($1 + 1))" 'BEGIN { RS = "" } NR <= last' "$project_root/packages.txt" |
+    sed -e 's/#.*//' -e '/^[[:space:]]*$/d' | while read -r package _; do
     if [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" != installed ]; then
       echo "$package"
     fi
@@ -25,6 +27,7 @@ apt_get_as_root() {
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq "$@"
 }
 
+# Installs what is missing in the first COUNT sections of packages.txt.
 install_packages() {
   if ! command -v dpkg-query >/dev/null; then
     echo "setup: this is not a Debian system (no dpkg-query); install what packages.txt lists by other means, then run 'cmake --preset release' and 'cmake --build --preset release'." >&2
@@ -32,7 +35,7 @@ install_packages() {
   fi
   local missing
   local -a packages
-  missing=$(missing_packages)
+  missing=$(missing_packages "$1")
   [ -n "$missing" ] || return 0
   mapfile -t packages <<<"$missing"
   if [ "$(id -u)" -ne 0 ] && ! command -v sudo >/dev/null; then

@@ -24,6 +24,8 @@ CoinPackedMatrix matrix_of(const IntegerProgram& program) {
 
 }  // namespace
 
+bool can_solve_integer_programs() { return true; }
+
 std::vector<bool> solve(const IntegerProgram& program) {
   const std::size_t n = program.costs.size();
   std::vector<bool> solution(n);

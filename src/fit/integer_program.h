@@ -19,9 +19,12 @@ struct IntegerProgram {
   std::vector<Row> rows;
 };
 
-/// An optimal solution, the same one on every run (COIN-OR CBC; nothing is
-/// printed). x = 0 must be feasible or some other point be: a program without a
-/// solution is an error of the caller's.
+/// Returns false in a build without COIN-OR CBC (TOMOFIELD_WITH_CBC=OFF), where solve() must not be
+/// called.
+bool can_solve_integer_programs();
+
+/// Returns an optimal solution, the same one on every run (COIN-OR CBC; nothing is
+/// printed). The program must have a feasible point, such as x = 0.
 std::vector<bool> solve(const IntegerProgram& program);
 
 }  // namespace tomofield::fit

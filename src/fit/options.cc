@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/lanes.h"
+#include "fit/integer_program.h"
 #include "tomofield/error.h"
 
 namespace tomofield::fit {
@@ -44,6 +45,11 @@ constexpr double kMost = 1e9;  // of a count
 std::vector<std::string> FieldOptions::faults() const {
   constexpr int kLargestLeaf = 4096;
   Faults faults;
+  if (tree == TreeKind::kAdaptive && !can_solve_integer_programs()) {
+    faults.add(
+        "--tree adaptive needs COIN-OR CBC, and this tomofield was built without it: take --tree "
+        "uniform, or build tomofield with -DTOMOFIELD_WITH_CBC=ON");
+  }
   faults.require_between("--leaf-budget", leaf_budget, 0, kMost);
   if (leaf_budget > 0 && tree == TreeKind::kUniform)
     faults.add("--leaf-budget is for --tree adaptive alone");

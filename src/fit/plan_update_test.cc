@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/random.h"
+#include "fit/integer_program.h"
 
 namespace tomofield::fit {
 namespace {
@@ -102,7 +103,14 @@ class BruteForce {
   std::vector<double> best_;  // of each number of leaves
 };
 
-TEST(PlanUpdate, IsOptimalOnRandomTrees) {
+class PlanUpdate : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!can_solve_integer_programs()) GTEST_SKIP() << "this build is without COIN-OR CBC";
+  }
+};
+
+TEST_F(PlanUpdate, IsOptimalOnRandomTrees) {
   base::Random random(7);
   for (int n = 0; n < 120; ++n) {
     const Quadtree tree = random_tree(random, 4, static_cast<int>(random.below(4)));
@@ -133,7 +141,7 @@ Quadtree even_tree(int level) {
   return tree;
 }
 
-TEST(PlanUpdate, SpendsWhatFlatLeavesDoNotNeed) {
+TEST_F(PlanUpdate, SpendsWhatFlatLeavesDoNotNeed) {
   const Quadtree tree = even_tree(2);  // 16 leaves of 32 px
   std::vector<double> errors(17, 0.001);
   errors[5] = errors[6] = 1.0;
@@ -144,7 +152,7 @@ TEST(PlanUpdate, SpendsWhatFlatLeavesDoNotNeed) {
   EXPECT_NEAR(plan.predicted_error, 2 * 0.75 + 6 * 0.001 + 8 * 0.0011, 1e-12);
 }
 
-TEST(PlanUpdate, ChangesNothingWithoutAGain) {
+TEST_F(PlanUpdate, ChangesNothingWithoutAGain) {
   const Quadtree tree = even_tree(1);
   EXPECT_TRUE(plan_update(tree, std::vector<double>(5, 0.0), {.budget = 100}).edit.is_empty());
   EXPECT_TRUE(plan_update(tree, std::vector<double>(5, 1.0), {.budget = 4}).edit.is_empty());
@@ -153,7 +161,7 @@ TEST(PlanUpdate, ChangesNothingWithoutAGain) {
 }
 
 // Quarters of 24 px would straddle slabs.
-TEST(PlanUpdate, KeepsMultiplesOfASlab) {
+TEST_F(PlanUpdate, KeepsMultiplesOfASlab) {
   Quadtree tree(RootGrid{.x0 = 0, .y0 = 0, .cell_size = 96, .columns = 1, .rows = 1},
                 {Region::kInterest});
   EXPECT_EQ(plan_update(tree, {1.0}, {.budget = 100}).edit.split.size(), 1u);
@@ -161,7 +169,7 @@ TEST(PlanUpdate, KeepsMultiplesOfASlab) {
   EXPECT_TRUE(plan_update(tree, std::vector<double>(4, 1.0), {.budget = 100}).edit.is_empty());
 }
 
-TEST(PlanUpdate, ComesAsCloseToATightBudgetAsOneEditCan) {
+TEST_F(PlanUpdate, ComesAsCloseToATightBudgetAsOneEditCan) {
   const Quadtree tree = even_tree(2);
   const std::vector<double> errors(17, 1.0);
   const Plan plan = plan_update(tree, errors, {.budget = 1});
@@ -170,7 +178,7 @@ TEST(PlanUpdate, ComesAsCloseToATightBudgetAsOneEditCan) {
   EXPECT_TRUE(plan_update(tree, errors, {.budget = 1, .coarsest_level = 2}).edit.is_empty());
 }
 
-TEST(PlanUpdate, IsQuickForAThousandLeaves) {
+TEST_F(PlanUpdate, IsQuickForAThousandLeaves) {
   Quadtree tree(RootGrid{.x0 = 0, .y0 = 0, .cell_size = 64, .columns = 16, .rows = 16},
                 std::vector<Region>(256, Region::kInterest));
   tree.split_to_level(Region::kInterest, 1);

@@ -22,10 +22,10 @@ double SlabDataTerm::add_slabs(const Step& step, const SlabBatch& batch,
   for (int slab = batch.slabs.first; slab < batch.slabs.end; ++slab, rays += detector_size) {
     for (std::size_t v = 0; v < step.views.size(); ++v) {
       const int view = step.views[v];
-      view_sums[v] += measurement::data_term(
-          step.models[static_cast<std::size_t>(view)], step.multiplicity,
-          measured_.rays(slab, view), measured_.mask(slab, view), width,
-          rays + static_cast<std::ptrdiff_t>(v) * width * base::kLanes);
+      view_sums[v] +=
+          measurement::data_term(step.models[static_cast<std::size_t>(view)], step.multiplicity,
+                                 measured_.rays(slab, view), measured_.mask(slab, view), width,
+                                 rays + static_cast<std::ptrdiff_t>(v) * width * base::kLanes);
     }
     measured_.release(slab);
   }

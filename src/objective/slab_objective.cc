@@ -73,13 +73,11 @@ double SlabObjective::add_gradient(const Step& step, float* gradient,
   }
   double grad_bias = slab_grad_bias;
   for (const double of_term : term_grad_bias) grad_bias += of_term;
-  for (const auto& term : terms_)
-    grad_bias += term->add_field(step, gradient, view_sums).grad_bias;
+  for (const auto& term : terms_) grad_bias += term->add_field(step, gradient, view_sums).grad_bias;
   return grad_bias;
 }
 
-SlabObjective::BandSums SlabObjective::add_band(const Step& step, int band,
-                                                float* gradient) const {
+SlabObjective::BandSums SlabObjective::add_band(const Step& step, int band, float* gradient) const {
   thread_local Workspace w;
   w.fit(projector_.grid().size());
   BandSums sums;

@@ -39,8 +39,7 @@ class SlabObjective : public Objective {
   const std::vector<int>& own_leaves() const override { return own_leaves_; }
   measurement::HeldOutError held_out_error(std::span<const double> noise_weight,
                                            bool fit_view_scale) const override;
-  measurement::PredictedView predict(int view,
-                                     const measurement::ViewModel& model) const override;
+  measurement::PredictedView predict(int view, const measurement::ViewModel& model) const override;
 
   const projection::SlabSampler& sampler() const { return sampler_; }
 

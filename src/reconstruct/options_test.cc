@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/faults.h"
+#include "fit/integer_program.h"
 #include "fit/options.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -70,6 +71,7 @@ TEST(ReconstructOptions, LargeLeavesOfAUniformTreeAreRootCells) {
 }
 
 TEST(ReconstructOptions, OnlyFactorsOfAUniformTreeBeginAsVertices) {
+  if (!fit::can_solve_integer_programs()) GTEST_SKIP() << "this build is without COIN-OR CBC";
   const auto num_faults = [](FieldKind kind, TreeKind tree, Engine engine) {
     ReconstructOptions options = good_options();
     options.fit.vertex_epochs = 3;
@@ -85,6 +87,7 @@ TEST(ReconstructOptions, OnlyFactorsOfAUniformTreeBeginAsVertices) {
 }
 
 TEST(ReconstructOptions, ABudgetIsForAdaptiveTrees) {
+  if (!fit::can_solve_integer_programs()) GTEST_SKIP() << "this build is without COIN-OR CBC";
   fit::FieldOptions options;
   options.leaf_budget = 12;
   EXPECT_EQ(options.faults().size(), 1u);

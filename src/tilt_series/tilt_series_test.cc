@@ -13,6 +13,7 @@
 #include "io/mrc.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
+#include "shared_data.h"
 #include "tomofield/error.h"
 
 namespace tomofield::tilt_series {
@@ -444,7 +445,7 @@ TEST(TiltSeries, DarkFramesOfAreTomoAreLeftOut) {
 
 // --- real files --------------------------------------------------------------
 
-const std::filesystem::path kSharedData = std::filesystem::path(TOMOFIELD_SHARED_DATA) / "data";
+const std::filesystem::path kSharedData = testing::shared_data();
 
 struct RealSeries {
   const char* name;

@@ -17,6 +17,11 @@ cmake --install "$build" --prefix "$scratch/prefix" >"$scratch/install.log"
 "$scratch/prefix/bin/tomofield" --version | grep -qx "tomofield $version ([^()]\+)" ||
   fail "the installed program does not say that it is version $version and of which commit"
 
+man=$scratch/prefix/share/man/man1
+grep -q 'tomofield-reconstruct (1)' "$man/tomofield.1" || fail "tomofield.1 does not list the commands"
+grep -qF '\-\-thickness' "$man/tomofield-reconstruct.1" ||
+  fail "tomofield-reconstruct.1 does not list the options"
+
 # Nothing in the package may point back into the source or build tree.
 source_dir=$(cd "$consumer/../.." && pwd)
 if grep -rlF -e "$source_dir/" -e "$(cd "$build" && pwd)/" \

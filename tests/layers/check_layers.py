@@ -3,9 +3,9 @@
 
   check_layers.py PROJECT_DIR
 
-A folder of src/ includes itself, folders above it in LAYERS, and the public
-headers ("tomofield/..."); sub-folders count as their folder; unit tests may
-include helpers of tests/ as well. Public headers include each other and the
+A folder of src/ includes itself, the folders above it in src/layers.txt, and the
+public headers ("tomofield/..."); sub-folders count as their folder; unit tests
+may include helpers of tests/ as well. Public headers include each other and the
 standard library only. Prints every offence as
 FILE:LINE and exits with status 1 if there is one, 2 where it cannot check.
 """
@@ -13,32 +13,15 @@ import pathlib
 import re
 import sys
 
-# Each folder may include those listed before it: docs/architecture.md.
-LAYERS = [
-    "base",
-    "distributed",
-    "io",
-    "geometry",
-    "tilt_series",
-    "kernels",
-    "field",
-    "projection",
-    "measurement",
-    "objective",
-    "fit",
-    "selection",
-    "output",
-    "evaluate",
-    "reconstruct",
-    "baseline",
-    "simulate",
-    "report",
-    "compare",
-    "cli",
-]
 SOURCES = {".h", ".cc", ".cu", ".cuh"}
 QUOTED_INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"')
 ANY_INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
+
+
+def read_layers(path):
+    """Returns the names in layers.txt, lowest first; a line that begins with # is a comment."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
+    return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
 
 
 def source_files(folder):
@@ -53,12 +36,12 @@ def includes(path, pattern):
             yield number, match.group(1)
 
 
-def offences_in_src(src, tests):
-    rank = {name: i for i, name in enumerate(LAYERS)}
+def offences_in_src(src, tests, layers):
+    rank = {name: i for i, name in enumerate(layers)}
     for path in source_files(src):
         layer = path.relative_to(src).parts[0]
         if layer not in rank:
-            yield path, 1, f"folder '{layer}' has no place in LAYERS of check_layers.py"
+            yield path, 1, f"folder '{layer}' has no place in src/layers.txt"
             continue
         for number, included in includes(path, QUOTED_INCLUDE):
             top = included.split("/")[0]
@@ -90,7 +73,11 @@ def main():
     if num_files == 0:
         print(f"check_layers: no source file under {src}: is this the project?", file=sys.stderr)
         return 2
-    offences = [*offences_in_src(src, project / "tests"), *offences_in_public_headers(include)]
+    layers = read_layers(src / "layers.txt")
+    if not layers:
+        print(f"check_layers: {src / 'layers.txt'} does not list the layers", file=sys.stderr)
+        return 2
+    offences = [*offences_in_src(src, project / "tests", layers), *offences_in_public_headers(include)]
     for path, number, what in offences:
         print(f"{path.relative_to(project)}:{number}: {what}")
     print(f"check_layers: {num_files} files of src/, {len(offences)} offences")

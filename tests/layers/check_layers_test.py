@@ -8,12 +8,13 @@ import tempfile
 import unittest
 
 CHECKER = pathlib.Path(__file__).with_name("check_layers.py")
+LAYERS = "# lowest first\nbase\nio\nkernels\nfield\nprojection\ncli\n"
 
 
-def run_checker(files):
+def run_checker(files, layers=LAYERS):
     """Writes {path: text} into a scratch project; returns the exit status and the output."""
     with tempfile.TemporaryDirectory() as scratch:
-        for name, text in files.items():
+        for name, text in {**files, "src/layers.txt": layers}.items():
             path = pathlib.Path(scratch) / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
@@ -60,6 +61,12 @@ class CheckLayers(unittest.TestCase):
         self.assertEqual(run_checker(files)[0], 1)
         files["include/tomofield/a.h"] = '#include "io/mrc.h"\n'
         self.assertEqual(run_checker(files)[0], 1)
+
+    def test_the_order_of_the_list_decides(self):
+        files = {"src/io/a.cc": '#include "base/a.h"\n'}
+        self.assertEqual(run_checker(files, "base\nio\n")[0], 0)
+        self.assertEqual(run_checker(files, "io\nbase\n")[0], 1)
+        self.assertEqual(run_checker(files, "# none\n")[0], 2)
 
     def test_refuses_a_tree_without_sources(self):
         self.assertEqual(run_checker({"README.md": "nothing here\n"})[0], 2)

@@ -15,6 +15,7 @@
 #include "base/enum_names.h"
 #include "base/parallel.h"
 #include "base/random.h"
+#include "fit/integer_program.h"
 #include "kernels/lanes.h"
 #include "output/model_file.h"
 #include "reconstruct/checkpoint.h"
@@ -255,6 +256,7 @@ int leaves_of_interest(const field::Quadtree& tree) {
 }
 
 TEST_P(EachFittedField, AdaptiveTreeFollowsTheDensityWithinItsBudget) {
+  if (!can_solve_integer_programs()) GTEST_SKIP() << "this build is without COIN-OR CBC";
   const geometry::TiltGeometry g = geometry::centred_geometry(128, 128, 12, tilts(-48, 48, 8));
   const BeadSeries series(g, Bead({40, 90, 5}), 4);
   const measurement::Measurement measurement = series.measurement();

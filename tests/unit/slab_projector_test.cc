@@ -16,6 +16,7 @@
 #include "io/mrc.h"
 #include "kernels/lanes.h"
 #include "random_arrays.h"
+#include "shared_data.h"
 #include "simd_targets.h"
 #include "simulate/ellipsoid.h"
 #include "simulate/project_phantom.h"
@@ -409,7 +410,7 @@ class ProjectorCheck : public ::testing::Test {
   using Volume = std::vector<float>;
 
   void SetUp() override {
-    const std::filesystem::path folder = TOMOFIELD_SHARED_DATA "/data/projector_check";
+    const std::filesystem::path folder = testing::shared_data() / "projector_check";
     if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not here";
     truth_ = read(folder / "mg_ground_truth_amorphous_vol.mrc");
     projections_ = read(folder / "mg_sample_projections_amorphous.mrc");

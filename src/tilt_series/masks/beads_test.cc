@@ -9,6 +9,7 @@
 #include "bead_series.h"
 #include "io/alignment_files.h"
 #include "io/mrc.h"
+#include "shared_data.h"
 #include "tilt_series/masks/flat_fill.h"
 
 namespace tomofield::tilt_series {
@@ -156,7 +157,7 @@ struct SharedSeries {
   }
 
   static std::filesystem::path path_of(const std::string& name) {
-    return std::filesystem::path(TOMOFIELD_SHARED_DATA) / "data" / name;
+    return testing::shared_data() / name;
   }
 };
 

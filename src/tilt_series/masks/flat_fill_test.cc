@@ -10,6 +10,7 @@
 
 #include "base/random.h"
 #include "io/mrc.h"
+#include "shared_data.h"
 #include "tilt_series/masks/straight_fill.h"
 
 namespace tomofield::tilt_series {
@@ -195,7 +196,7 @@ MaskedImage read_section(const io::MrcReader& stack, std::int64_t section) {
   return image;
 }
 
-const std::filesystem::path kSharedData = std::filesystem::path(TOMOFIELD_SHARED_DATA) / "data";
+const std::filesystem::path kSharedData = testing::shared_data();
 
 TEST(StraightFill, EveryViewOfTheExosomeSeriesHasItsFill) {
   const auto path = kSharedData / "exosome_cryo" / "exosome_341x480.ali";
