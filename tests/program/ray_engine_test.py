@@ -2,14 +2,13 @@
 
 Gaussian beads, whose projections are analytic in any geometry, are written as the views that a
 microscope would record, with the alignment in IMOD's or AreTomo's files, and looked for in the
-volume: nothing here shares code with tomofield's geometry.
-
-usage: ray_engine_test.py TOMOFIELD SCRATCH_DIR"""
+volume: nothing here shares code with tomofield's geometry."""
 
 import os
 import signal
 
 import numpy as np
+import pytest
 
 import harness
 from harness import read_bytes, succeed, tomofield
@@ -103,9 +102,12 @@ def shifts_of(seed, spread=3.0):
     return np.random.default_rng(seed).uniform(-spread, spread, (len(TILTS), 2))
 
 
-general = RawSeries("general", rots=-83 + varied(2, 3), shifts=shifts_of(4),
-                    x_tilts=np.linspace(-12, 12, len(TILTS)) + varied(3, 3),
-                    raw_size=(HEIGHT, WIDTH))
+@pytest.fixture(scope="module")
+def general():
+    """Returns a series with rotations, shifts and x-axis tilts of every view."""
+    return RawSeries("general", rots=-83 + varied(2, 3), shifts=shifts_of(4),
+                     x_tilts=np.linspace(-12, 12, len(TILTS)) + varied(3, 3),
+                     raw_size=(HEIGHT, WIDTH))
 
 
 def centre_of_mass(volume, box):
@@ -130,14 +132,14 @@ def check_volume(name, volume, least_correlation):
     assert off < 0.2, (name, off)
 
 
-def test_slab_engine_refuses_and_names_the_ray_engine():
+def test_slab_engine_refuses_and_names_the_ray_engine(general):
     command = general.command("refused", general.with_xf(), "--engine", "slab")
     result = tomofield(*command)
     assert result.returncode == 2 and "--engine ray" in result.stderr, result
     assert "x-axis tilt" in result.stderr and not os.path.exists(general.results.volume_path)
 
 
-def test_rotation_shift_and_x_tilt_from_imod_files():
+def test_rotation_shift_and_x_tilt_from_imod_files(general):
     results = general.reconstruct("xf", general.with_xf(), "--no-margin")
     check_volume("xf", results.volume, 0.97)
     check_volume("xf, vm", general.reconstruct("vm", general.with_xf(), "--field", "vm", "--rank", 8,
@@ -145,12 +147,12 @@ def test_rotation_shift_and_x_tilt_from_imod_files():
     check_volume("xf, margin", general.reconstruct("margin", general.with_xf()).volume, 0.96)
 
 
-def test_alignment_of_aretomo():
+def test_alignment_of_aretomo(general):
     results = general.reconstruct("aln", general.with_aln(), "--no-margin")
     check_volume("aln", results.volume, 0.97)
 
 
-def test_an_alignment_that_is_left_out_is_missed():
+def test_an_alignment_that_is_left_out_is_missed(general):
     results = general.reconstruct("no_x_tilt", [*general.with_xf()[:3], *general.with_xf()[5:]],
                                   "--no-margin")
     correlation = np.corrcoef(results.volume.ravel(), truth().ravel())[0, 1]
@@ -165,7 +167,7 @@ def test_the_other_hand():
     check_volume("hand -1", results.volume, 0.96)
 
 
-def test_binned_views_and_a_region_of_interest():
+def test_binned_views_and_a_region_of_interest(general):
     results = general.reconstruct("roi", general.with_xf(), "--roi", "20,4,44,36")
     expected = truth()[:, 4:36, 20:44]
     correlation = np.corrcoef(results.volume.ravel(), expected.ravel())[0, 1]
@@ -178,7 +180,7 @@ def test_binned_views_and_a_region_of_interest():
     assert correlation > 0.93, correlation
 
 
-def test_masks_lie_where_beads_are_in_the_recorded_views():
+def test_masks_lie_where_beads_are_in_the_recorded_views(general):
     # Gold that is in one view each, so that only the list of fiducials tells of it.
     painted = general.views.copy()
     v, u = np.mgrid[:WIDTH, :HEIGHT] + 0.5
@@ -213,7 +215,7 @@ def test_both_engines_agree_on_an_aligned_series():
     assert correlation > 0.98, correlation
 
 
-def test_same_bits_for_any_threads_and_after_an_interruption():
+def test_same_bits_for_any_threads_and_after_an_interruption(general):
     options = ["--epochs", 4, "--rays-per-step", 3000, "--ray-samples", 20, "--view-scale", "on",
                "--no-margin", "--checkpoint-minutes", 0]
     one = general.reconstruct("one", general.with_xf(), *options, "--threads", 1)
@@ -239,6 +241,3 @@ def test_same_bits_for_any_threads_and_after_an_interruption():
     with open(general.path("raw.xf"), "wb") as file:
         file.write(shifted)
     assert refused.returncode == 2 and "alignment" in refused.stderr, refused
-
-
-harness.run_tests(globals())

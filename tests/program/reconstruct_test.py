@@ -1,6 +1,4 @@
-"""reconstruct from end to end: what it writes, and what its options do.
-
-usage: reconstruct_test.py TOMOFIELD SCRATCH_DIR"""
+"""reconstruct from end to end: what it writes, and what its options do."""
 
 import fcntl
 import io
@@ -16,16 +14,25 @@ import time
 import h5py
 import mrcfile
 import numpy as np
+import pytest
 import skimage.io
 
 import harness
 from harness import HEIGHT, PIXEL_SIZE, THICKNESS, TILTS, WIDTH, psnr, read_bytes, read_volume
 
-series = harness.Series("series")
-plain = series.reconstruct("plain")
+
+@pytest.fixture(scope="module")
+def series():
+    return harness.Series("series")
 
 
-def test_volume_is_an_mrc_file_that_others_read():
+@pytest.fixture(scope="module")
+def plain(series):
+    """Returns the results of QUICK options alone."""
+    return series.reconstruct("plain")
+
+
+def test_volume_is_an_mrc_file_that_others_read(plain):
     report = io.StringIO()
     assert mrcfile.validate(plain.volume_path, print_file=report), report.getvalue()
     with mrcfile.open(plain.volume_path) as file:
@@ -44,7 +51,7 @@ def test_volume_is_an_mrc_file_that_others_read():
         assert header.nlabl == 1 and header.label[0].startswith(b"tomofield"), header.label[0]
 
 
-def test_specimen_is_found():
+def test_specimen_is_found(series):
     flat = psnr(np.full_like(series.truth, series.truth.mean()), series.truth)
     for field in ("vm", "grid"):
         volume = series.reconstruct(field, "--field", field, "--epochs", 16).volume
@@ -54,7 +61,7 @@ def test_specimen_is_found():
         assert gain > 3 and correlation > 0.7, (field, gain, correlation)
 
 
-def test_json_has_figures_and_every_option():
+def test_json_has_figures_and_every_option(plain, series):
     record = json.load(open(plain.json_path))
     assert re.fullmatch(r"\d+\.\d+\.\d+", record["tomofield"])
     options, figures = record["options"], record["figures"]
@@ -71,7 +78,7 @@ def test_json_has_figures_and_every_option():
     np.testing.assert_allclose([view["tilt_deg"] for view in figures["views"]], TILTS)
 
 
-def test_model_is_readable_with_h5py():
+def test_model_is_readable_with_h5py(plain):
     with h5py.File(plain.model_path) as model:
         assert model.attrs["format"] == b"tomofield model"
         parameters = model["field/parameters"][:]
@@ -84,7 +91,7 @@ def test_model_is_readable_with_h5py():
         assert "adam_m" not in model["training/floats"]
 
 
-def test_pictures_show_the_slices():
+def test_pictures_show_the_slices(plain):
     volume = plain.volume
     slices = {"xy": volume[THICKNESS // 2], "xz": volume[:, HEIGHT // 2],
               "yz": volume[:, :, WIDTH // 2]}
@@ -99,7 +106,7 @@ def test_pictures_show_the_slices():
         assert np.corrcoef(pixels.ravel(), slices[plane].ravel())[0, 1] > 0.98, plane
 
 
-def test_same_seed_same_bytes_whatever_the_threads():
+def test_same_seed_same_bytes_whatever_the_threads(plain, series):
     def with_environment(name, threads, *options):
         env = dict(os.environ, OMP_NUM_THREADS=str(threads))
         return series.reconstruct(name, *options, env=env)
@@ -121,7 +128,7 @@ def test_same_seed_same_bytes_whatever_the_threads():
             assert result.returncode == 2 and "--threads" in result.stderr, result
 
 
-def test_dark_contrast_is_the_inverted_density():
+def test_dark_contrast_is_the_inverted_density(plain, series):
     dark = series.with_views("dark", 50 - series.views)
     dark_options = ["--contrast", "dark", "--view-scale", "off", "--activation", "softplus"]
     found = dark.reconstruct("dark", *dark_options).volume
@@ -135,7 +142,7 @@ def test_dark_contrast_is_the_inverted_density():
     assert np.corrcoef(fitted.ravel(), plain.volume.ravel())[0, 1] < -0.9
 
 
-def test_modes_of_the_file():
+def test_modes_of_the_file(plain, series):
     exact = plain.volume
     for mode, kind in ((1, np.int16), (12, np.float16)):
         results = series.reconstruct("mode", "--mode", mode)
@@ -151,13 +158,13 @@ def test_modes_of_the_file():
             np.testing.assert_allclose(stored, exact, rtol=6e-4, atol=1e-7)
 
 
-def test_axes():
+def test_axes(plain, series):
     xzy = series.reconstruct("xzy", "--axes", "xzy").volume
     # As IMOD's tilt writes: trimvol -rx turns rows (x, z) into sections from the last row on.
     np.testing.assert_array_equal(xzy[:, ::-1].transpose(1, 0, 2), plain.volume)
 
 
-def test_region_of_interest_has_its_size():
+def test_region_of_interest_has_its_size(series):
     results = series.reconstruct("roi", "--roi", "5,3,40,30")
     with mrcfile.open(results.volume_path) as file:
         assert file.data.shape == (THICKNESS, 27, 35)
@@ -167,7 +174,7 @@ def test_region_of_interest_has_its_size():
     assert json.load(open(results.json_path))["options"]["specimen"]["roi"] == [5, 3, 40, 30]
 
 
-def test_binning():
+def test_binning(series):
     for options in (["--bin", 2], ["--angpix", 2 * PIXEL_SIZE]):
         results = series.reconstruct("bin", *options)
         with mrcfile.open(results.volume_path) as file:
@@ -181,7 +188,7 @@ def test_binning():
         assert abs(binned.mean() / half.mean() / 2 - 1) < 0.1
 
 
-def test_excluded_views_do_not_count():
+def test_excluded_views_do_not_count(series):
     excluded = [0, 6, 7]
     views = series.views.copy()
     views[excluded] = np.nan
@@ -194,7 +201,7 @@ def test_excluded_views_do_not_count():
     np.testing.assert_array_equal(fewer.reconstruct("without").volume, results.volume)
 
 
-def test_config_file():
+def test_config_file(plain, series):
     directory = harness.fresh_directory("config")
 
     def write(text):
@@ -240,31 +247,35 @@ def test_config_file():
     assert sorted(os.listdir(directory)) == sorted(before)
 
 
-def test_dry_run_writes_nothing_and_knows_the_memory():
+def test_dry_run_writes_nothing_and_knows_the_memory(check_memory):
     check_memory("--rank", 256)
     # Plain vertices have most, in the first two stages.
     check_memory("--rank", 2, "--vertex-spacing", 0.25, "--vertex-epochs", 1)
 
 
-def check_memory(*field):
-    directory = harness.fresh_directory("dry")
-    options = harness.merge(harness.QUICK, ["--epochs", 1, "--subsets", 1, *field,
-                                            "--checkpoint-minutes", 0])
-    arguments = ["reconstruct", *series.input, "-o", os.path.join(directory, "out.mrc"), *options]
-    plan = harness.succeed(*arguments, "--dry-run").stdout
-    assert os.listdir(directory) == []
-    assert f"{len(TILTS)} views of {WIDTH} × {HEIGHT} pixels" in plan, plan
-    assert f"tomogram {WIDTH} × {HEIGHT} × {THICKNESS} voxels" in plan, plan
-    estimate = 1024 * float(re.search(r"about ([\d.]+) GiB of memory", plan)[1])
-    if harness.is_sanitized():
-        return
-    status, text, measured = harness.run_measured(*arguments)
-    assert status == 0, text
-    print(f"memory: {estimate:.0f} MiB estimated, {measured:.0f} MiB measured")
-    assert 0.8 < estimate / measured < 1.25, (estimate, measured)
+@pytest.fixture(scope="module", name="check_memory")
+def make_check_memory(series):
+    def check_memory(*field):
+        directory = harness.fresh_directory("dry")
+        options = harness.merge(harness.QUICK, ["--epochs", 1, "--subsets", 1, *field,
+                                                "--checkpoint-minutes", 0])
+        arguments = ["reconstruct", *series.input, "-o", os.path.join(directory, "out.mrc"), *options]
+        plan = harness.succeed(*arguments, "--dry-run").stdout
+        assert os.listdir(directory) == []
+        assert f"{len(TILTS)} views of {WIDTH} × {HEIGHT} pixels" in plan, plan
+        assert f"tomogram {WIDTH} × {HEIGHT} × {THICKNESS} voxels" in plan, plan
+        estimate = 1024 * float(re.search(r"about ([\d.]+) GiB of memory", plan)[1])
+        if harness.is_sanitized():
+            return
+        status, text, measured = harness.run_measured(*arguments)
+        assert status == 0, text
+        print(f"memory: {estimate:.0f} MiB estimated, {measured:.0f} MiB measured")
+        assert 0.8 < estimate / measured < 1.25, (estimate, measured)
+
+    return check_memory
 
 
-def test_plain_progress_lines_without_a_terminal():
+def test_plain_progress_lines_without_a_terminal(series):
     output = os.path.join(harness.fresh_directory("lines"), "out.mrc")
     run = harness.start("reconstruct", *series.input, "-o", output,
                         *harness.merge(harness.QUICK, ["--epochs", 100000, "--threads", 1]))
@@ -285,7 +296,7 @@ def test_plain_progress_lines_without_a_terminal():
                         r"  (\d+ h \d\d min|\d+ min \d\d s|\d+ s) left\n", lines[1]), lines[1]
 
 
-def test_bar_on_a_terminal():
+def test_bar_on_a_terminal(series):
     for columns in (100, 60, 20):
         output = os.path.join(harness.fresh_directory("bar"), "out.mrc")
         master, slave = pty.openpty()
@@ -314,6 +325,3 @@ def test_bar_on_a_terminal():
         if columns == 100:
             assert "[########################] 100 %" in draws[-1], draws[-1]
             assert "[......" in draws[0] and " loss " in draws[0] and " left" in draws[0], draws[0]
-
-
-harness.run_tests(globals())
