@@ -15,7 +15,7 @@ TESTS = pathlib.Path(__file__).resolve().parent
 PROJECT = TESTS.parent
 ALL_SKIPPED = 77
 
-sys.path.insert(0, str(TESTS / "program"))
+sys.path[:0] = [str(TESTS / "program"), str(TESTS / "docs")]
 sys.dont_write_bytecode = True  # the source tree stays as it is
 pytest.register_assert_rewrite("harness")
 
