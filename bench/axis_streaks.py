@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """Measures how much the Fourier axes of a tomogram's sections stand out.
 
-The ratio is the mean amplitude on the two axes over the mean of the rings of the same frequencies. It
-is taken over Hann-windowed central XY sections. 1 means that there are no streaks along X and Y.
+The ratio is the mean amplitude on the two axes over the mean of the rings of the same frequencies.
+It is taken over Hann-windowed central XY sections. 1 means that there are no streaks along X and Y.
 
 usage: axis_streaks.py TOMOGRAM.mrc [more.mrc ...]
 

@@ -1,8 +1,8 @@
 """Runs and keeps the rows of a quality benchmark.
 
 A row is one way to reconstruct. The bench runs it on one yardstick phantom (docs/index.md) with one
-seed, scores it against the truth and keeps it as one JSON file. A bench that was interrupted goes on
-with the next row. The seeds differ from those of the tests."""
+seed, scores it against the truth and keeps it as one JSON file. A bench that was interrupted goes
+on with the next row. The seeds differ from those of the tests."""
 
 import collections
 import json

@@ -1,7 +1,7 @@
 """Reads and writes run.json, which bench/run gathers and bench/regression compares.
 
-The file holds the machines, the commits, the date, and rows {group, name, arguments, figures: {figure:
-[one value for each repeat]}}."""
+The file holds the machines, the commits, the date, and rows {group, name, arguments, figures:
+{figure: [one value for each repeat]}}."""
 
 import json
 import math

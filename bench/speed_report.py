@@ -1,5 +1,5 @@
-"""Prints Markdown tables and plots of a run.json (run_file.py). Figures are medians over repeats, ± the
-median absolute deviation where it is not zero."""
+"""Prints Markdown tables and plots of a run.json (run_file.py). Figures are medians over repeats, ±
+the median absolute deviation where it is not zero."""
 
 import math
 import os
@@ -168,7 +168,8 @@ def draw_roofline(pyplot, rows):
 
 
 def draw_reconstructions(pyplot, rows):
-    """Draws PSNR at the best scale over core-seconds, one line for each method through its sizes."""
+    """Draws PSNR at the best scale over core-seconds, one line for each method through its
+    sizes."""
     drawing, panel = pyplot.subplots(figsize=(7, 4.5), constrained_layout=True)
     points = {}
     for row in rows:

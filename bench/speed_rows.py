@@ -1,7 +1,7 @@
 """Lists the rows of the speed bench, bench/run, and measures them.
 
-A row's measure(scratch folder) returns {row name: {figure: [values]}}. Most rows return one row with
-one value for each figure."""
+A row's measure(scratch folder) returns {row name: {figure: [values]}}. Most rows return one row
+with one value for each figure."""
 
 import dataclasses
 import functools
@@ -79,7 +79,8 @@ def all_rows(options, plan, programs):
 
 
 def measure_kernels(options, rounds, scratch):
-    """Runs bench_kernels. Returns one row for each case, and one row of ratios for each SIMD target."""
+    """Runs bench_kernels. Returns one row for each case, and one row of ratios for each SIMD
+    target."""
     if not os.path.exists(options.bench_kernels):
         sys.exit(f"there is no '{options.bench_kernels}': build the target bench_kernels, or choose "
                  "other rows with --only")
@@ -167,8 +168,8 @@ def wide_row(options, wide):
 def default_epochs(command):
     """Returns the default numbers of epochs at full resolution and of coarse epochs.
 
-    `command` is a reconstruct without either option. The numbers follow from the steps that dry runs
-    predict. The number at full resolution depends on whether there is a coarse stage."""
+    `command` is a reconstruct without either option. The numbers follow from the steps that dry
+    runs predict. The number at full resolution depends on whether there is a coarse stage."""
     def steps(*options):
         return quality_rows.dry_run([*command, *options])["steps"]
 

@@ -1,4 +1,5 @@
-"""Makes a band of rows of a wide tilt series, and a sparse stack of the size of the whole series."""
+"""Makes a band of rows of a wide tilt series, and a sparse stack of the size of the whole
+series."""
 
 import os
 import struct
@@ -36,8 +37,8 @@ def make_band_series(options, wide, folder):
 
 
 def read_header(file):
-    """Returns the header, columns, rows and sections of a stack of floats without an extended header,
-    which is what `tomofield simulate` writes."""
+    """Returns the header, columns, rows and sections of a stack of floats without an extended
+    header, which is what `tomofield simulate` writes."""
     header = bytearray(file.read(HEADER))
     columns, rows, sections, mode = struct.unpack_from("<4i", header)
     (extended,) = struct.unpack_from("<i", header, 92)

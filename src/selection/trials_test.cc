@@ -110,8 +110,8 @@ TEST_F(Trials, OfThePenaltyAreOneOfEachAndTheBetterWins) {
   EXPECT_NE(one.settings.penalty, other.settings.penalty);
   const bool prefers_one = most_views_prefer(one.score, other.score);
   const bool prefers_other = most_views_prefer(other.score, one.score);
-  if (prefers_one != prefers_other)
-    EXPECT_EQ(tuned->settings.penalty, (prefers_one ? one : other).settings.penalty);
+  ASSERT_NE(prefers_one, prefers_other) << "this series has an odd number of predicted views";
+  EXPECT_EQ(tuned->settings.penalty, (prefers_one ? one : other).settings.penalty);
   EXPECT_EQ(tuned->settings.epochs, fit_.epochs);
 }
 

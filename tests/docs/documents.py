@@ -1,4 +1,5 @@
-"""Finds what the documents claim about the repository and the program: links, paths, commands, options.
+"""Finds what the documents claim about the repository and the program: links, paths, commands,
+options.
 
 A document is a Markdown file. Code is a fenced or indented block, or a span in backticks."""
 
@@ -156,7 +157,8 @@ def missing_paths(text, project):
 
 
 def looks_like_path(span, project):
-    """Returns true for paths below a folder of the repository or of src/, and for files at its root."""
+    """Returns true for paths below a folder of the repository or of src/, and for files at its
+    root."""
     if not re.fullmatch(r"(\./)?[\w.-]+(/[\w.-]+)*/?", span):
         return False
     first, slash, _ = span.removeprefix("./").partition("/")

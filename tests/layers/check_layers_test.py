@@ -1,5 +1,5 @@
-"""Shows that check_layers.py catches wrong includes. Each tree below has one include that is allowed or
-not, and the checker has to agree."""
+"""Shows that check_layers.py catches wrong includes. Each tree below has one include that is
+allowed or not, and the checker has to agree."""
 import pathlib
 import subprocess
 import sys

@@ -1,4 +1,5 @@
-"""reconstruct --tree adaptive: the tree, its story in the JSON, its picture, and --resume."""
+"""Tests reconstruct --tree adaptive: the tree, its updates in the JSON, its picture and
+--resume."""
 
 import json
 import os
@@ -10,7 +11,7 @@ import pytest
 import harness
 
 SIZE, THICKNESS, EPOCHS = 128, 16, 10
-# Sixteen leaves of 32 px to begin with, each of 9 × 9 vertices.
+# The tree begins with sixteen leaves of 32 px, each of 9 × 9 vertices.
 OPTIONS = ["--thickness", THICKNESS, "--contrast", "bright", "--no-margin", "--tree", "adaptive",
            "--leaf-size", 32, "--vertex-spacing", 4, "--rank", 3, "--epochs", EPOCHS,
            "--subsets", 7]
@@ -45,7 +46,7 @@ def fresh_output(name):
 
 
 def leaves_of(output):
-    """[x0, y0, size] of each leaf."""
+    """Returns [x0, y0, size] of each leaf."""
     with h5py.File(output[:-4] + ".h5") as model:
         tree = model["field/tree"]
         nodes = np.array([tree["node_x0"][:], tree["node_y0"][:], tree["node_size"][:]]).T
@@ -53,7 +54,7 @@ def leaves_of(output):
 
 
 def read_png(path):
-    """Grey or colour picture [row, column, channel] by a reader that is not ours."""
+    """Reads a picture [row, column, channel] with an independent reader."""
     from skimage import io
     return io.imread(path)
 
@@ -112,7 +113,7 @@ def test_budget_is_kept(command):
 
 
 def test_interrupted_runs_end_alike(command, whole):
-    """Stopped after a different number of steps each time, before, between and after updates."""
+    """Every run stops after another number of steps: before, between and after updates."""
     output = fresh_output("resumed")
     stops = []
     harness.finish_with_stops(command(output, "--resume"), lambda: stops.append(1), most=40)

@@ -1,4 +1,4 @@
-"""What reconstruct refuses: status 2, one sentence with the facts, nothing written or changed."""
+"""Tests what reconstruct refuses: it exits with 2, says one sentence and writes nothing."""
 
 import os
 import re
@@ -55,7 +55,7 @@ def make_stack_file(path):
 @pytest.fixture(scope="module", name="patched_stack")
 def make_patched_stack(path, stack):
     def patched_stack(name, *patches):
-        """The good stack with other bytes at places of its header."""
+        """Writes the good stack with other bytes in its header."""
         contents = bytearray(read_bytes(stack))
         for at, value in patches:
             contents[at : at + len(value)] = value
@@ -110,7 +110,7 @@ def make_refuse(inputs):
         assert result.returncode == status, (arguments, result)
         complaints = [line for line in result.stderr.splitlines() if line.startswith("tomofield: ")]
         assert len(complaints) == 1 and complaints[0] == result.stderr.splitlines()[-1], result.stderr
-        # A sentence that a person can read, no number of three hundred digits.
+        # A person can read the sentence: it has no number of three hundred digits.
         assert len(complaints[0]) < 700 and not re.search(r"\d{25}", complaints[0]), complaints[0]
         for sign in ("terminate called", "internal error", "what()", "Traceback", "Aborted"):
             assert sign not in result.stderr, result.stderr
@@ -125,7 +125,7 @@ def make_refuse(inputs):
 @pytest.fixture(scope="module", name="refuse_series")
 def make_refuse_series(good, out, refuse, stack):
     def refuse_series(words, file=stack, *options):
-        """The same of a series, its options beside the good ones."""
+        """Checks the same for a series; its options replace the good ones."""
         refuse(words, "reconstruct", file, "-o", out, *harness.merge(good, options))
 
     return refuse_series
@@ -259,7 +259,7 @@ def test_options_that_make_no_sense(good, out, refuse, refuse_series, stack, tlt
     refuse(["stack"], "reconstruct", "-o", out, *good)
     refuse(["--help"])
     refuse(["reconstrct"], "reconstrct")
-    # Every mistake at once.
+    # Every mistake is named at once.
     refuse_series(["--tv", "--rank", "--leaf-size"], stack, "--tv", -1, "--rank", 0,
                   "--leaf-size", 1)
 
@@ -300,14 +300,15 @@ def test_outputs_that_exist_are_kept(good, refuse, refuse_output, stack):
         refuse(["good.mrc"], "baseline", method, stack, "-o", stack, *good, "--overwrite")
 
 
-def test_the_input_is_never_the_output(good, inputs, path, refuse, refuse_output, stack, text_file, tlt):
+def test_the_input_is_never_the_output(good, inputs, path, refuse, refuse_output, stack, text_file,
+                                       tlt):
     os.symlink(stack, path("link.mrc"))
     os.link(stack, path("same.mrc"))
     for output in (stack, os.path.join(inputs, ".", "good.mrc"), path("link.mrc"),
                    path("same.mrc"), os.path.relpath(stack)):
         for options in ([], ["--overwrite"], ["--resume"]):
             refuse_output(["input", stack], output, *options)
-    # Nor is it what lies beside the output: figures in place of the angles.
+    # The files beside the output are no inputs either: the JSON would replace the angles.
     angles = text_file("angles.json", open(tlt).read())
     refuse(["input", angles], "reconstruct", stack, "-o", path("angles.mrc"),
            *harness.merge(good, ["--tlt", angles]), "--overwrite")
@@ -327,7 +328,7 @@ def test_a_full_disk(good, refuse, stack):
 
 
 def test_memory_is_estimated_first(out, path, text_file):
-    # Views of 4096 × 4096 with something to see: the same tile all over.
+    # The views of 4096 × 4096 pixels repeat one tile.
     tile = np.random.default_rng(2).integers(0, 100, (256, 256), dtype=np.int8)
     large = path("large.mrc")
     with mrcfile.new_mmap(large, (2, 4096, 4096), mrc_mode=0) as file:
@@ -354,7 +355,7 @@ def test_memory_is_estimated_first(out, path, text_file):
 
 
 def test_a_stack_of_nothing_is_answered_in_little_memory(out, path, stack, text_file):
-    # 61 views of 4096 × 4096 floats that exist in the header alone.
+    # The header promises 61 views of 4096 × 4096 floats, and the file is sparse.
     header = bytearray(read_bytes(stack)[:1024])
     header[0:12] = struct.pack("<3i", 4096, 4096, 61)
     header[28:40] = struct.pack("<3i", 4096, 4096, 61)

@@ -1,4 +1,4 @@
-"""The baselines from end to end: the inputs, outputs and errors of reconstruct."""
+"""Tests the baselines from end to end: they have the inputs, outputs and errors of reconstruct."""
 
 import io
 import json
@@ -26,16 +26,19 @@ METHODS = {
 ITERATIVE = {method: options for method, options in METHODS.items() if options}
 NETWORKS = ["ingp", "implicit"]
 TUNED = ["wbp", "sirt", "sart-tv", "tv"]
-ONE_PASS = {method: ["--iterations", 1] for method in NETWORKS}  # where how well they fit is no matter
-WEAK = {"sart-tv": ["--weight", 0.1], "tv": ["--weight", 0.1]}  # not smoothed so much that nothing is negative
+# For tests that do not depend on how well the networks fit.
+ONE_PASS = {method: ["--iterations", 1] for method in NETWORKS}
+# A stronger weight would smooth every negative value away.
+WEAK = {"sart-tv": ["--weight", 0.1], "tv": ["--weight", 0.1]}
 
 @pytest.fixture(scope="module")
 def series():
+    """Returns a small simulated series."""
     return harness.Series("series")
 
 
 class Baseline(harness.Results):
-    """The files of a run: no model."""
+    """Names the files of a run, which has no model."""
 
     def __init__(self, output):
         super().__init__(output)
@@ -91,7 +94,7 @@ def test_densities_are_not_negative_unless_allowed(baseline, plain):
         assert plain[method].volume.min() >= 0
         free, _ = baseline(method, "free", "--non-negative", "off", *WEAK.get(method, []),
                            *ONE_PASS.get(method, []))
-        # Networks that have seen little stay above zero by themselves; see network_fit_test.cc.
+        # Networks that were hardly fitted stay above zero by themselves: network_fit_test.cc.
         assert method in NETWORKS or free.volume.min() < 0, method
         assert free.record["options"]["method"]["non_negative"] is False
 
@@ -126,10 +129,10 @@ def test_parameters_are_those_that_are_fitted(baseline, plain):
               for method, results in plain.items()}
     for method in set(METHODS) - set(NETWORKS):
         assert counts[method] == WIDTH * HEIGHT * THICKNESS
-    # 32 plane waves, two layers of 16, one output.
+    # The network has 32 plane waves, two layers of 16 and one output.
     assert counts["implicit"] == 33 * 16 + 17 * 16 + 17
     more, _ = baseline("ingp", "wider", "--width", 17, "--iterations", 1)
-    # Two features of four levels go in.
+    # The inputs are two features of each of four levels.
     assert more.record["figures"]["parameters"] - counts["ingp"] == 9 + 17 + 16 + 1 + 1
 
 
@@ -185,7 +188,8 @@ def test_concave_penalty_is_another_one(plain, series):
 
 
 def test_tuned_settings_are_better_than_bad_ones_and_used_for_all_views(baseline, series):
-    bad = {"sart-tv": ["--weight", 30, "--iterations", 3], "tv": ["--weight", 40], "sirt": ["--iterations", 3],
+    bad = {"sart-tv": ["--weight", 30, "--iterations", 3], "tv": ["--weight", 40],
+           "sirt": ["--iterations", 3],
            "wbp": ["--window", "ramp"]}
     noise = np.random.default_rng(1).normal(0, series.views.std(), series.views.shape)
     sources = {"wbp": series.with_views("noisy", series.views + noise)}
@@ -209,7 +213,8 @@ def test_tuned_settings_are_better_than_bad_ones_and_used_for_all_views(baseline
 
 
 def test_fitted_view_scales_do_not_upset_total_variation(shared_data):
-    # The dust's residuals are many times its noise: scales fitted to each of the first volumes grew.
+    # The dust's residuals are many times its noise. Scales that were fitted to each of the first
+    # volumes used to grow without bound.
     folder = shared_data / "idp_haadf"
     objective = {}
     for view_scale in ("off", "on"):
@@ -275,7 +280,7 @@ def test_dark_contrast_comes_out_dark(baseline, series):
 
 def test_axes_of_the_file(baseline, plain):
     swapped, _ = baseline("sirt", "xzy", "--axes", "xzy")
-    # Sections along y, rows down from the upper face.
+    # Sections lie along y, and rows run down from the upper face.
     np.testing.assert_array_equal(swapped.volume[:, ::-1].transpose(1, 0, 2),
                                   plain["sirt"].volume)
 
@@ -288,7 +293,8 @@ def test_threads_do_not_change_a_byte(baseline, plain):
 
 def test_dry_run_writes_nothing(baseline):
     results, run = baseline("tv", "dry", "--tune", "--dry-run")
-    assert "GiB" in run.stdout and "trials" in run.stdout and f"{WIDTH} × {HEIGHT} × {THICKNESS}" in run.stdout
+    for words in ("GiB", "trials", f"{WIDTH} × {HEIGHT} × {THICKNESS}"):
+        assert words in run.stdout, run.stdout
     assert not results.leftovers() and not os.path.exists(results.volume_path)
 
 

@@ -1,5 +1,5 @@
-"""bench/run, bench/regression, bench/methods and bench/scaling: rows are measured, kept and
-gathered; slower ones are found."""
+"""Tests bench/run, bench/regression, bench/methods and bench/scaling: they measure, keep and gather
+rows, and find those that got slower."""
 
 import argparse
 import glob
@@ -186,7 +186,7 @@ def test_a_band_has_the_middle_rows():
 
 
 def run_of(arguments="x", **figures):
-    """run.json of two rows; the arguments are the second's."""
+    """Returns a run.json of two rows; `arguments` are those of the second."""
     return json.dumps({"rows": [{"group": "sizes", "name": "a row", "arguments": "x",
                                  "figures": figures},
                                 {"group": "sizes", "name": "another", "arguments": arguments,
@@ -227,7 +227,7 @@ def test_regression_names_what_has_no_partner():
 
 
 def write_row(folder, size, iterations, psnr):
-    """A row of bench/methods of `baseline sirt`."""
+    """Writes a row of bench/methods of `baseline sirt`."""
     arguments = f"baseline sirt --iterations {iterations}"
     os.makedirs(os.path.join(folder, "methods"), exist_ok=True)
     write(os.path.join(folder, "methods",
@@ -244,7 +244,7 @@ def test_methods_go_on_from_settings_that_were_kept_off_the_usual_start():
     table = bench("methods", folder, "--size", 48, "--table", *only)
     assert "| sirt | iterations 80 | 22.00 | " in table.stdout, table
     assert "| – | 1.2e+03 | – |" in table.stdout, table.stdout  # of all three
-    # A climb from the usual start is what the table is about where there is one.
+    # Where there is a climb from the default start, the table shows it.
     write_row(folder, 48, 40, 19.0)
     table = bench("methods", folder, "--size", 48, "--table", *only)
     assert "| sirt | iterations 40 | 19.00 | " in table.stdout, table
@@ -271,8 +271,8 @@ echo '{json.dumps({"figures": figures})}' > "${{2%.mrc}}.json"
     write_program(os.path.join(folder, "mpirun"), "shift 2\nexec \"$@\"\n")
 
     def scaling(*options):
-        return bench("scaling", folder, "--program", os.path.join(folder, "tomofield"), "--only", "^grid 128", "--repeats", 1,
-                     *options, env={**os.environ, "PATH": f"{folder}:{os.environ['PATH']}"})
+        return bench("scaling", folder, "--program", os.path.join(folder, "tomofield"), "--only",
+                     "^grid 128", "--repeats", 1, *options, env={**os.environ, "PATH": f"{folder}:{os.environ['PATH']}"})
 
     write(broken, "")
     failed = scaling()

@@ -1,7 +1,8 @@
-"""A second implementation of the yardstick phantom in numpy, as a reference for `tomofield simulate`.
+"""A second implementation of the yardstick phantom in numpy, as a reference for `tomofield
+simulate`.
 
-The recipe is described in src/simulate/phantom.h. Lengths are voxels; positions are (X, Y, Z) about the
-centre of the volume."""
+The recipe is described in src/simulate/phantom.h. Lengths are voxels; positions are (X, Y, Z) about
+the centre of the volume."""
 
 import numpy as np
 
@@ -36,8 +37,8 @@ class Cell:
         return density
 
     def view(self, tilt_deg):
-        """Returns the line integrals [y, x] of one view. A ray through pixel (u, y) meets the points
-        (u cos - s sin, y, u sin + s cos) for every s."""
+        """Returns the line integrals [y, x] of one view. A ray through pixel (u, y) meets the
+        points (u cos - s sin, y, u sin + s cos) for every s."""
         angle = np.radians(tilt_deg)
         cos, sin = np.cos(angle), np.sin(angle)
         pixels = centres(self.size)
@@ -56,8 +57,8 @@ class Cell:
         return image
 
     def slab_lengths(self, pixels, cos, sin):
-        """Returns the length of each pixel's ray within the slab, which ends at the faces of the cube
-        unless the specimen is extended."""
+        """Returns the length of each pixel's ray within the slab, which ends at the faces of the
+        cube unless the specimen is extended."""
         if self.is_extended:
             return np.full(len(pixels), self.thickness / cos)
         first, last = np.full(len(pixels), -np.inf), np.full(len(pixels), np.inf)
@@ -93,7 +94,8 @@ def quadratic_form(q, points):
 
 
 def chord_lengths(q, start, direction, scale):
-    """Returns the lengths of the rays start + s * direction within the surface scaled by `scale`."""
+    """Returns the lengths of the rays start + s * direction within the surface scaled by
+    `scale`."""
     a = direction @ q @ direction
     b = start @ q @ direction
     discriminant = b**2 - a * (quadratic_form(q, start) - scale**2)
@@ -123,7 +125,8 @@ def draw_cell(size, thickness, is_extended, max_tilt_deg, seed):
 
 
 def draw_body(random, center, radius):
-    """Draws shape, orientation and densities of an ellipsoid whose longest semi-axis is `radius`."""
+    """Draws shape, orientation and densities of an ellipsoid whose longest semi-axis is
+    `radius`."""
     axes = random.uniform(0.7 * radius, radius, 3)
     axes[random.integers(3)] = radius
     turn = np.linalg.qr(random.normal(size=(3, 3)))[0]

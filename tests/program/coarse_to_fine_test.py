@@ -1,5 +1,5 @@
-"""reconstruct's stages, coarse pixels and plain vertices before factors: their options, the plan,
-and --resume in and after them."""
+"""Tests the stages of reconstruct, coarse pixels and plain vertices before factors: their options,
+the plan, and --resume in and after them."""
 
 import json
 import os
@@ -16,13 +16,15 @@ OPTIONS = harness.merge(harness.QUICK, ["--leaf-size", 32, "--rank", 3, "--coars
 
 @pytest.fixture(scope="module")
 def series():
+    """Returns a small simulated series."""
     return harness.Series("series")
 
 
 @pytest.fixture(scope="module", name="command")
 def make_command(series):
     def command(results, *options):
-        return ["reconstruct", *series.input, "-o", results.volume_path, *harness.merge(OPTIONS, options)]
+        return ["reconstruct", *series.input, "-o", results.volume_path,
+                *harness.merge(OPTIONS, options)]
 
     return command
 
@@ -83,8 +85,8 @@ def test_faulty_options_are_refused(command):
 @pytest.fixture(scope="module", name="stages_when_stopped")
 def make_stages_when_stopped(command):
     def stages_when_stopped(results, *options):
-        """(kind of field, vertices of a leaf's side) as often as a run was stopped and resumed until it
-        was done."""
+        """Stops and resumes a run until it is done, and returns (kind of field, vertices of a
+        leaf's side) of every checkpoint."""
         stages = set()
 
         def remember_stage():
@@ -145,7 +147,7 @@ def test_factors_begin_as_plain_vertices(command, psnr, with_vertices):
 def test_factors_go_on_where_vertices_were(with_vertices):
     found = residuals(with_vertices)
     last_of_vertices, first_of_factors = found[10 + 8 - 1], found[10 + 8]
-    # The optimiser starts anew; factors of rank 3, which lose most of the values, have 2.2 times.
+    # The optimiser starts anew. Factors of rank 3 would lose most of the values and have 2.2 times.
     assert first_of_factors < 1.5 * last_of_vertices, found
 
 

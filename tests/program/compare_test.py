@@ -1,4 +1,4 @@
-"""compare: what it runs, how it goes on, and the report that it writes."""
+"""Tests compare: the runs that it makes, how it goes on, and the report that it writes."""
 
 import csv
 import json
@@ -21,6 +21,7 @@ OURS = ("ours=reconstruct --leaf-size 16 --rank 4 --epochs {} --subsets 7 --tv-p
 
 @pytest.fixture(scope="module")
 def series():
+    """Returns a small simulated series."""
     return harness.Series("series")
 
 
@@ -277,7 +278,7 @@ def test_a_run_that_fails_is_named_and_its_costs_are_kept(compare):
 @pytest.fixture(scope="module", name="refuse")
 def make_refuse(series, truth):
     def refuse(folder, facts, *options):
-        """A mistake that is found before anything is made."""
+        """Checks that a mistake is found before anything is made."""
         words = harness.merge(["--methods", "sirt", "--truth", truth], options)
         result = harness.tomofield("compare", *series.input, *QUICK, "-o", folder, *words)
         assert result.returncode == 2, (options, result.stderr)

@@ -1,4 +1,4 @@
-"""`tomofield export` and `tomofield info` on a model of a small reconstruction.
+"""Tests `tomofield export` and `tomofield info` on a model of a small reconstruction.
 
 Volumes are read with mrcfile and compared with the reconstruction's own."""
 
@@ -178,7 +178,7 @@ def test_damaged_and_foreign_models_are_refused():
     expect_refusal(["foreign.h5", "no model"], "foreign.h5", "-o", "new.mrc")
     expect_refusal(["foreign.h5", "no model"], "foreign.h5", command="info")
 
-    # Metadata damaged in place: HDF5 itself must stay silent, too.
+    # HDF5 itself must stay silent about damaged metadata, too.
     damaged = bytearray(whole_model)
     damaged[whole_model.index(b"softplus_beta")] ^= 1
     pathlib.Path("damaged.h5").write_bytes(damaged)

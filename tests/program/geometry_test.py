@@ -1,4 +1,4 @@
-"""Beads come out of reconstruct where they went into the tilt series.
+"""Tests that beads come out of reconstruct where they went into the tilt series.
 
 A lopsided pair of Gaussian beads far from every centre, whose projections are
 analytic, is written with mrcfile, reconstructed by the program and looked for
@@ -22,14 +22,14 @@ FAR_BEAD = [((14.0, 45.0, 28.0), 2.2, 1.0)]
 
 
 def true_volume(gaussians):
-    """Densities [z, y, x] at voxel centres."""
+    """Returns the densities [z, y, x] at voxel centres."""
     z, y, x = np.indices((THICKNESS, HEIGHT, WIDTH)) + 0.5
     return sum(density * np.exp(-((x - X)**2 + (y - Y)**2 + (z - Z)**2) / (2 * sigma**2))
                for (X, Y, Z), sigma, density in gaussians)
 
 
 def project(gaussians, hand=1, center=(WIDTH / 2, THICKNESS / 2)):
-    """Views [tilt, y, x]: x − cx = (X − cx) cos + hand (Z − cz) sin, y = Y."""
+    """Returns the views [tilt, y, x]: x − cx = (X − cx) cos + hand (Z − cz) sin, y = Y."""
     y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
     views = np.random.default_rng(1).normal(0, NOISE, (len(TILTS), HEIGHT, WIDTH))
     for view, tilt in zip(views, np.deg2rad(TILTS)):
@@ -41,7 +41,7 @@ def project(gaussians, hand=1, center=(WIDTH / 2, THICKNESS / 2)):
 
 
 def reconstruct(name, views, *options, epochs=8):
-    """The volume [section, row, column] as the file has it."""
+    """Returns the volume [section, row, column] as the file has it."""
     directory = harness.fresh_directory(name)
     stack, tlt = os.path.join(directory, "series.mrc"), os.path.join(directory, "series.tlt")
     with mrcfile.new(stack) as file:
@@ -56,7 +56,7 @@ def reconstruct(name, views, *options, epochs=8):
 
 
 def find_bead(volume):
-    """Centre of mass (column, row, section) of what is denser than a fifth of the densest."""
+    """Returns the centre of mass (column, row, section) of voxels above a fifth of the peak."""
     weights = np.where(volume > 0.2 * volume.max(), volume, 0)
     total = weights.sum()
     sections, rows, columns = np.indices(volume.shape) + 0.5

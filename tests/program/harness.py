@@ -1,5 +1,5 @@
-"""Runs the program for the tests and makes a small series to run it on. tests/conftest.py sets which
-program runs and where the tests write."""
+"""Runs the program for the tests and makes a small series to run it on. tests/conftest.py sets
+which program runs and where the tests write."""
 
 import copy
 import glob
@@ -45,8 +45,8 @@ def succeed(*arguments, **keywords):
 
 
 def stop_after_a_step(run, number=signal.SIGTERM, timeout=None):
-    """Sends a run a signal after its first step and returns what it said after that. The run may have
-    ended before."""
+    """Sends a run a signal after its first step and returns what it said after that. The run may
+    have ended before."""
     for line in run.stderr:
         if line.startswith("reconstruct "):  # a step is done
             break
@@ -142,7 +142,8 @@ class Series:
         return other
 
     def reconstruct(self, name, *options, run=succeed, **keywords):
-        """Runs reconstruct with the QUICK options, which `options` replace, and returns its Results."""
+        """Runs reconstruct with the QUICK options, which `options` replace, and returns its
+        Results."""
         output = os.path.join(fresh_directory(name), "out.mrc")
         run("reconstruct", *self.input, "-o", output, *merge(QUICK, options), **keywords)
         return Results(output)
@@ -192,8 +193,8 @@ def psnr(volume, truth):
 
 
 def assert_same_tuning(one, other):
-    """Checks that two tunings made the same trials with the same errors. Sums over all views may round
-    differently."""
+    """Checks that two tunings made the same trials with the same errors. Sums over all views may
+    round differently."""
     assert one["predicted_views"] == other["predicted_views"] and one["chosen"] == other["chosen"]
     errors = [[t["held_out_error_by_view"] for t in tuning["trials"]] for tuning in (one, other)]
     np.testing.assert_allclose(*errors, rtol=1e-6)
@@ -208,8 +209,8 @@ def with_broken_views(source, every):
 
 
 def assert_scored_views_have_no_say(figures, scored):
-    """Checks the figures of a series and of the same series with broken scored views. Both tunings are
-    the same and did not use these views, and the broken views spoil the score."""
+    """Checks the figures of a series and of the same series with broken scored views. Both tunings
+    are the same and did not use these views, and the broken views spoil the score."""
     assert_same_tuning(*(f["tuning"] for f in figures))
     assert not set(figures[0]["tuning"]["predicted_views"]) & set(scored)
     assert [view["view"] for view in figures[0]["held_out"]["views"]] == scored

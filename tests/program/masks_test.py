@@ -1,4 +1,4 @@
-"""What is masked: beads that are found, a user's mask, fiducials, hot pixels; and what it changes."""
+"""Tests what is masked: beads that are found, a user's mask, fiducials and hot pixels."""
 
 import json
 import os
@@ -24,14 +24,14 @@ def directory():
 
 
 def bead_places(tilt):
-    """x, y of every bead in a view (the second axis of the array and its first)."""
+    """Returns x, y of every bead in a view."""
     angle = np.radians(tilt)
     return np.stack([WIDTH / 2 + BEADS[:, 0] * np.cos(angle) + BEADS[:, 2] * np.sin(angle),
                      BEADS[:, 1]], axis=1)
 
 
 def views_of(contrast, seed=1):
-    """Ice with a soft body, noise, and beads of this contrast; dense is dark."""
+    """Returns views of ice with a soft body, noise and beads of this contrast; dense is dark."""
     random = np.random.default_rng(seed)
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH] + 0.5
     views = []
@@ -76,7 +76,7 @@ def plain(write_series):
 
 
 def masked_pixels(results):
-    """Where the picture of the masks is red, [y, x] in the file's order."""
+    """Returns true where the picture of the masks is red, [y, x] in the file's order."""
     picture = skimage.io.imread(results.mask_picture)
     zoom = picture.shape[1] // WIDTH
     assert picture.shape == (HEIGHT * zoom, WIDTH * zoom, 3)

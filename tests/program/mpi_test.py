@@ -1,5 +1,5 @@
-"""Reconstruct on several processes that mpirun starts: the bytes of one process, checkpoints for any
-number of them, and what is said when something goes wrong."""
+"""Tests reconstruct on several processes that mpirun starts: it writes the bytes of one process,
+its checkpoints serve any number of processes, and it names faults once."""
 
 import glob
 import json
@@ -92,8 +92,8 @@ def figures(results):
     return found
 
 
-# Every sum over the bands is made in their order, whoever computed them, so the bytes are the same,
-# not just the values.
+# Sums over the bands are made in their order, whichever process computed them, so the bytes are the
+# same.
 def test_results_have_the_bytes_of_one_process(command):
     cases = {"vm": ([], (1, 2, 4)),
              "coarse": (["--field", "grid", "--leaf-size", 32, "--coarse-epochs", 3,
@@ -138,7 +138,7 @@ def test_a_turned_volume_is_the_same(command, series):
 
 
 def stop_after_a_step(run, number):
-    """What a run says that is stopped by a signal."""
+    """Stops a run by a signal and returns what it said."""
     errors = harness.stop_after_a_step(run, number, timeout=60)
     assert errors.count("tomofield: stopped") == 1 and "--resume" in errors, errors
     return errors
@@ -154,7 +154,7 @@ def test_checkpoints_go_on_with_any_number_of_processes(command):
     long = ["--epochs", 120]  # to be stopped in, three times
     harness.succeed(*command(undisturbed, *long))
     steps = []
-    # mpirun passes SIGUSR1 on; SIGTERM it answers itself, and ends the processes with it.
+    # mpirun passes SIGUSR1 on. It answers SIGTERM itself and ends the processes with it.
     for processes, number, status in ((4, signal.SIGUSR1, 128 + signal.SIGUSR1),
                                       (1, signal.SIGTERM, 128 + signal.SIGTERM),
                                       (2, signal.SIGTERM, 1)):
@@ -169,7 +169,7 @@ def test_checkpoints_go_on_with_any_number_of_processes(command):
 
 
 def processes_of(run):
-    """Process numbers of the program that an mpirun started."""
+    """Returns the process numbers of the programs that an mpirun started."""
     with open(f"/proc/{run.pid}/task/{run.pid}/children") as file:
         return [int(pid) for pid in file.read().split()]
 

@@ -1,4 +1,4 @@
-"""`tomofield info` on MRC files that mrcfile wrote, and on damaged ones."""
+"""Tests `tomofield info` on MRC files that mrcfile wrote, and on damaged ones."""
 
 import os
 

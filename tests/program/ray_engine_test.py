@@ -1,4 +1,4 @@
-"""reconstruct --engine ray on raw views with in-plane rotation, shifts and x-axis tilt.
+"""Tests reconstruct --engine ray on raw views with in-plane rotation, shifts and x-axis tilt.
 
 Gaussian beads, whose projections are analytic in any geometry, are written as the views that a
 microscope would record, with the alignment in IMOD's or AreTomo's files, and looked for in the
@@ -24,7 +24,7 @@ BEADS = [((30.3, 14.6, 8.2), 2.2, 1.0), ((33.9, 12.2, 11.4), 1.5, 1.0),
 
 
 def rotation(axis, degrees):
-    """Right-handed, of column vectors."""
+    """Returns the right-handed rotation of column vectors."""
     c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
     return {"x": np.array([[1, 0, 0], [0, c, -s], [0, s, c]]),
             "y": np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]),
@@ -32,14 +32,14 @@ def rotation(axis, degrees):
 
 
 def truth():
-    """Densities [z, y, x] at voxel centres."""
+    """Returns the densities [z, y, x] at voxel centres."""
     z, y, x = np.indices((THICKNESS, HEIGHT, WIDTH)) + 0.5
     return sum(density * np.exp(-((x - X)**2 + (y - Y)**2 + (z - Z)**2) / (2 * sigma**2))
                for (X, Y, Z), sigma, density in BEADS)
 
 
 class RawSeries:
-    """Recorded views: p_raw − c_raw = Rz(ROT) Ry(θ) Rx(α) diag(1, 1, hand) (P − C) + t."""
+    """Holds recorded views: p_raw − c_raw = Rz(ROT) Ry(θ) Rx(α) diag(1, 1, hand) (P − C) + t."""
 
     def __init__(self, name, rots, x_tilts, shifts, raw_size, hand=1):
         self.directory = harness.fresh_directory(name)
@@ -64,7 +64,7 @@ class RawSeries:
         return os.path.join(self.directory, name)
 
     def with_xf(self):
-        """raw → aligned: q = A (p − c_raw) + D with A = R(−ROT), D = −A t."""
+        """Writes raw → aligned transforms: q = A (p − c_raw) + D with A = R(−ROT), D = −A t."""
         rows = []
         for rot, shift in zip(self.rots, self.shifts):
             a = rotation("z", -rot)[:2, :2]
@@ -111,7 +111,8 @@ def general():
 
 
 def centre_of_mass(volume, box):
-    """(X, Y, Z) of what a box [x0, x1, y0, y1, z0, z1] holds above a fifth of its peak."""
+    """Returns (X, Y, Z) of the voxels of a box [x0, x1, y0, y1, z0, z1] above a fifth of its
+    peak."""
     x0, x1, y0, y1, z0, z1 = box
     part = volume[z0:z1, y0:y1, x0:x1]
     weights = np.where(part > 0.2 * part.max(), part, 0)
@@ -181,7 +182,7 @@ def test_binned_views_and_a_region_of_interest(general):
 
 
 def test_masks_lie_where_beads_are_in_the_recorded_views(general):
-    # Gold that is in one view each, so that only the list of fiducials tells of it.
+    # Each spot of gold is in one view only, so that only the list of fiducials names it.
     painted = general.views.copy()
     v, u = np.mgrid[:WIDTH, :HEIGHT] + 0.5
     spots = np.random.default_rng(8).uniform(6, 34, (len(TILTS), 2))
@@ -232,7 +233,7 @@ def test_same_bits_for_any_threads_and_after_an_interruption(general):
     resumed = succeed(*command, "--resume")
     assert "resuming" in resumed.stderr, resumed.stderr
     assert general.results.same_as(one)
-    # Another alignment is another series.
+    # A series with another alignment is another series.
     shifted = read_bytes(general.path("raw.xf"))
     np.savetxt(general.path("raw.xf"), np.loadtxt(general.path("raw.xf")) + [0, 0, 0, 0, 0.5, 0],
                fmt="%.7f")

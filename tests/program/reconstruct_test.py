@@ -1,4 +1,4 @@
-"""reconstruct from end to end: what it writes, and what its options do."""
+"""Tests reconstruct from end to end: the files that it writes and the effects of its options."""
 
 import fcntl
 import io
@@ -23,6 +23,7 @@ from harness import HEIGHT, PIXEL_SIZE, THICKNESS, TILTS, WIDTH, psnr, read_byte
 
 @pytest.fixture(scope="module")
 def series():
+    """Returns a small simulated series."""
     return harness.Series("series")
 
 
@@ -40,7 +41,7 @@ def test_volume_is_an_mrc_file_that_others_read(plain):
         assert data.shape == (THICKNESS, HEIGHT, WIDTH) and data.dtype == np.float32
         assert file.is_volume() and header.ispg == 1 and header.nsymbt == 0
         for axis, size in zip("xyz", (WIDTH, HEIGHT, THICKNESS)):
-            # Exact: the float32 next to the size in Å, not a rounded one.
+            # The size in Å is exact to float32.
             assert header.cella[axis] == np.float32(size * PIXEL_SIZE), (axis, header.cella)
             assert header["m" + axis] == size
         assert (header.mapc, header.mapr, header.maps) == (1, 2, 3)
@@ -87,7 +88,7 @@ def test_model_is_readable_with_h5py(plain):
         np.testing.assert_allclose(model["geometry/tilt_deg"][:], TILTS)
         options = json.loads(model.attrs["options_json"])
         assert options == json.load(open(plain.json_path))["options"]
-        # Finished: no optimiser's moments, which would triple the file.
+        # A finished model has no optimiser's moments, which would triple the file.
         assert "adam_m" not in model["training/floats"]
 
 
@@ -101,7 +102,7 @@ def test_pictures_show_the_slices(plain):
         zoom = picture.shape[1] // width
         assert picture.shape == (height * zoom, width * zoom), (plane, picture.shape)
         assert picture.std() > 20, (plane, picture.std())
-        # Upwards on the page is along the second axis.
+        # The second axis points upwards on the page.
         pixels = picture[zoom // 2 :: zoom, zoom // 2 :: zoom][::-1]
         assert np.corrcoef(pixels.ravel(), slices[plane].ravel())[0, 1] > 0.98, plane
 
@@ -132,12 +133,12 @@ def test_dark_contrast_is_the_inverted_density(plain, series):
     dark = series.with_views("dark", 50 - series.views)
     dark_options = ["--contrast", "dark", "--view-scale", "off", "--activation", "softplus"]
     found = dark.reconstruct("dark", *dark_options).volume
-    # Dense is low, and an empty region 0: the empty beam, which the cell leaves free, is found.
+    # Dense is low and empty regions are 0, because the cell leaves the empty beam free.
     np.testing.assert_allclose(-found, plain.volume, atol=0.03)
     inverted = dark.reconstruct("inverted", *dark_options, "--invert").volume
     np.testing.assert_array_equal(inverted, -found)
     np.testing.assert_array_equal(series.reconstruct("negative", "--invert").volume, -plain.volume)
-    # Per-view scales and offsets, which the data do not need, do little harm.
+    # The data need no per-view scales and offsets, and fitting them does little harm.
     fitted = dark.reconstruct("fitted", "--contrast", "dark").volume
     assert np.corrcoef(fitted.ravel(), plain.volume.ravel())[0, 1] < -0.9
 
@@ -160,7 +161,7 @@ def test_modes_of_the_file(plain, series):
 
 def test_axes(plain, series):
     xzy = series.reconstruct("xzy", "--axes", "xzy").volume
-    # As IMOD's tilt writes: trimvol -rx turns rows (x, z) into sections from the last row on.
+    # IMOD's tilt writes this order: trimvol -rx turns rows (x, z) into sections from the last row on.
     np.testing.assert_array_equal(xzy[:, ::-1].transpose(1, 0, 2), plain.volume)
 
 
@@ -168,7 +169,7 @@ def test_region_of_interest_has_its_size(series):
     results = series.reconstruct("roi", "--roi", "5,3,40,30")
     with mrcfile.open(results.volume_path) as file:
         assert file.data.shape == (THICKNESS, 27, 35)
-        # IMOD's sign: the corner of a subvolume has a negative origin.
+        # With IMOD's sign the corner of a subvolume has a negative origin.
         np.testing.assert_allclose(file.header.origin.tolist(),
                                    (-5 * PIXEL_SIZE, -3 * PIXEL_SIZE, 0), rtol=1e-6)
     assert json.load(open(results.json_path))["options"]["specimen"]["roi"] == [5, 3, 40, 30]
@@ -184,7 +185,7 @@ def test_binning(series):
         half = series.truth.reshape(THICKNESS // 2, 2, HEIGHT // 2, 2, WIDTH // 2, 2)
         half = half.mean((1, 3, 5))
         assert np.corrcoef(binned.ravel(), half.ravel())[0, 1] > 0.7
-        # Densities are a pixel's: twice as long a pixel, twice the value.
+        # A density counts per pixel, so a pixel of twice the length has twice the value.
         assert abs(binned.mean() / half.mean() / 2 - 1) < 0.1
 
 
@@ -216,7 +217,7 @@ def test_config_file(plain, series):
                    'overwrite = false\n')
     output = os.path.join(directory, "out.mrc")
     harness.succeed("reconstruct", *series.input, "-o", output, "--config", config, "--epochs", 8)
-    # The command line's epochs won; a whole region of interest is the default one.
+    # The command line's epochs win, and a region of the whole view is the default.
     np.testing.assert_array_equal(read_volume(output), plain.volume)
     before = {name: read_bytes(os.path.join(directory, name)) for name in os.listdir(directory)}
 
@@ -249,7 +250,7 @@ def test_config_file(plain, series):
 
 def test_dry_run_writes_nothing_and_knows_the_memory(check_memory):
     check_memory("--rank", 256)
-    # Plain vertices have most, in the first two stages.
+    # Plain vertices need most memory, in the first two stages.
     check_memory("--rank", 2, "--vertex-spacing", 0.25, "--vertex-epochs", 1)
 
 
@@ -291,7 +292,7 @@ def test_plain_progress_lines_without_a_terminal(series):
     assert 2 < times[1] - times[0] < 30, times
     for line in lines:
         assert "\r" not in line and "\033" not in line, line
-    # How far, the loss (none before the end of the first epoch), the rate, the time left.
+    # A line has progress, loss (after the first epoch), rate and time left.
     assert re.fullmatch(r"reconstruct +\d+ %  epoch \d+/100000  loss \d\.\d+  [\d.]+ steps/s"
                         r"  (\d+ h \d\d min|\d+ min \d\d s|\d+ s) left\n", lines[1]), lines[1]
 

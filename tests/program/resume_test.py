@@ -1,4 +1,4 @@
-"""Runs of reconstruct that are killed, stopped or damaged, and --resume after them."""
+"""Tests --resume after runs of reconstruct that were killed or stopped, and damaged checkpoints."""
 
 import glob
 import os
@@ -21,13 +21,15 @@ EVERY_STEP = ["--checkpoint-minutes", 0]
 
 @pytest.fixture(scope="module")
 def series():
+    """Returns a small simulated series."""
     return harness.Series("series")
 
 
 @pytest.fixture(scope="module", name="command")
 def make_command(series):
     def command(results, *options):
-        return ["reconstruct", *series.input, "-o", results.volume_path, *harness.merge(FIT, options)]
+        return ["reconstruct", *series.input, "-o", results.volume_path,
+                *harness.merge(FIT, options)]
 
     return command
 
@@ -48,7 +50,7 @@ def undisturbed(command):
 
 
 def wait_for(condition, run):
-    """Waits until a condition holds or the run ends; true if it still runs."""
+    """Waits until a condition holds or the run ends, and returns true if it still runs."""
     while run.poll() is None:
         if condition():
             return True
@@ -65,7 +67,7 @@ def kill(run):
 @pytest.fixture(scope="module", name="interrupted")
 def make_interrupted(command):
     def interrupted(results, kill_when, most=40):
-        """Starts the run, resumes it and kills it again until it ends; how often it was killed."""
+        """Starts a run, kills and resumes it until it ends, and returns how often it was killed."""
         kills = 0
         while kills < most:
             run = harness.start(*command(results, *EVERY_STEP, "--resume"))
@@ -104,7 +106,7 @@ def test_killed_in_the_middle_of_writing(interrupted, undisturbed):
         seen = set()
 
         def kill_when(kills):
-            # The file that proves the directory writable comes first, and is empty.
+            # An empty file comes first, which proves that the directory is writable.
             def being_written():
                 for path in glob.glob(pattern):
                     try:
@@ -127,8 +129,8 @@ def test_killed_in_the_middle_of_writing(interrupted, undisturbed):
 @pytest.fixture(scope="module", name="stopped_run")
 def make_stopped_run(command):
     def stopped_run(name, number=signal.SIGTERM, *options):
-        """Results that are only a checkpoint, the run that was stopped by a signal, and what it said.
-        No checkpoint falls due before the signal."""
+        """Returns results that are only a checkpoint, the run that a signal stopped, and what it
+        said. No checkpoint falls due before the signal."""
         for _ in range(10):
             results = fresh_results(name)
             run, errors = harness.stop_after_first_step(command(results, *options), number)
@@ -156,8 +158,9 @@ def test_signals_leave_a_checkpoint(command, stopped_run, undisturbed):
 @pytest.fixture(scope="module", name="refuse")
 def make_refuse(command, series):
     def refuse(results, words, *options, input=None):
-        """Resuming is refused for the words' reason, and the files stay as they are."""
-        before = {path: read_bytes(path) for path in glob.glob(os.path.dirname(results.model_path) + "/*")}
+        """Checks that resuming is refused for this reason and that the files stay as they are."""
+        folder = os.path.dirname(results.model_path)
+        before = {path: read_bytes(path) for path in glob.glob(folder + "/*")}
         arguments = command(results, "--resume", *options)
         if input:
             arguments[1 : 1 + len(series.input)] = input
@@ -166,7 +169,7 @@ def make_refuse(command, series):
         complaint = result.stderr.splitlines()[-1]
         for word in [results.model_path, "--overwrite", *words]:
             assert word in complaint, (word, complaint)
-        after = {path: read_bytes(path) for path in glob.glob(os.path.dirname(results.model_path) + "/*")}
+        after = {path: read_bytes(path) for path in glob.glob(folder + "/*")}
         assert after == before and not results.leftovers(), words
 
     return refuse
@@ -179,7 +182,7 @@ def test_torn_checkpoints_are_refused(command, refuse, stopped_run, undisturbed)
         with open(results.model_path, "wb") as file:
             file.write(whole[:length])
         refuse(results, [])
-    # As long as it was, but a page never reached the disk.
+    # The file has its length, but a page never reached the disk.
     middle = len(whole) // 2
     with open(results.model_path, "wb") as file:
         file.write(whole[:middle] + bytes(4096) + whole[middle + 4096 :])
@@ -203,7 +206,7 @@ def test_foreign_checkpoints_are_refused(command, refuse, series, stopped_run, u
     views = series.views.copy()
     views[5, 7, 9] += 0.01
     refuse(results, ["the tilt series"], input=series.with_views("changed", views).input)
-    # How the volume is written changes nothing of the fit; nor does another place for the series.
+    # The type of the volume's voxels and the place of the series do not change the fit.
     moved = series.with_views("moved", series.views)
     arguments = command(results, "--resume", "--mode", 12)
     arguments[1 : 1 + len(series.input)] = moved.input
@@ -227,7 +230,7 @@ def test_resume_without_a_checkpoint_starts_from_the_beginning(command, undistur
     result = harness.succeed(*command(results, "--resume"))
     assert "from the beginning" in result.stderr, result.stderr
     assert results.same_as(undisturbed)
-    # What somebody else put there is no result of a run to resume.
+    # A file that somebody else put there is no result of a run to resume.
     results = fresh_results("others")
     with open(results.volume_path, "w") as file:
         file.write("another volume")

@@ -1,10 +1,9 @@
-"""simulate against a reference in numpy, and its options against what they promise."""
+"""Tests simulate against a reference in numpy, and the effects of its options."""
 
 import filecmp
 import io
 import json
 import os
-import subprocess
 
 import mrcfile
 import numpy as np
@@ -16,11 +15,11 @@ import harness
 
 def run(*arguments, threads=None):
     env = dict(os.environ, **({"OMP_NUM_THREADS": str(threads)} if threads else {}))
-    return subprocess.run([harness.PROGRAM, *map(str, arguments)], env=env, capture_output=True, text=True)
+    return harness.tomofield(*arguments, env=env)
 
 
 def simulate(name, *options, threads=None):
-    """Runs simulate into a fresh directory of the scratch directory; returns its results."""
+    """Runs simulate into a new directory and returns its results."""
     directory = harness.fresh_directory(name)
     os.rmdir(directory)  # simulate makes it
     result = run("simulate", directory, *options, threads=threads)
@@ -131,15 +130,17 @@ def test_dose_gives_poisson_counts_of_the_attenuated_beam():
         counted = simulate("counted", *SMALL, "--dose", dose)
         clean, counts = counted.read("clean.mrc"), counted.read("tilt_series.mrc")
         absorption_per_px = counted.record["options"]["absorption_per_A"] * 10
-        np.testing.assert_allclose(clean, dose * np.exp(-absorption_per_px * plain.read("clean.mrc")), rtol=1e-5)
+        expected = dose * np.exp(-absorption_per_px * plain.read("clean.mrc"))
+        np.testing.assert_allclose(clean, expected, rtol=1e-5)
         assert (counts == np.round(counts)).all() and (counts >= 0).all()
         deviates = (counts - clean) / np.sqrt(clean)
         assert abs(deviates.mean()) < 5 / np.sqrt(deviates.size), deviates.mean()
-        assert abs(deviates.var() - 1) < 5 * np.sqrt((2 + 1 / clean.mean()) / deviates.size), deviates.var()
+        spread = np.sqrt((2 + 1 / clean.mean()) / deviates.size)
+        assert abs(deviates.var() - 1) < 5 * spread, deviates.var()
 
 
 def test_transforms_undo_the_shifts():
-    # Large enough for the membranes to be sampled well enough to interpolate.
+    # At this size the membranes are sampled well enough to interpolate.
     options = ["--size", 128, "--thickness", 90, "--tilts=-60:60:10", "--extended"]
     plain = simulate("plain", *options)
     shifted = simulate("shifted", *options, "--shifts", 3)
@@ -182,7 +183,7 @@ def test_existing_files_are_kept_unless_asked():
     assert result.returncode == 0, result.stderr
     assert "ellipsoids, 13 views, sigma" in result.stdout
     assert open(series.path("tilt_series.mrc"), "rb").read() != before
-    # What would belong to the series before is gone.
+    # The files of the earlier series are gone.
     assert sorted(os.listdir(series.directory)) == sorted(set(FILES) - {"truth.mrc"})
 
 

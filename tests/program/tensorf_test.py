@@ -1,4 +1,4 @@
-"""baseline tensorf: one node for all, by the machinery of reconstruct."""
+"""Tests baseline tensorf: one leaf holds everything, and the fit is that of reconstruct."""
 
 import json
 import os
@@ -15,6 +15,7 @@ QUICK = ["--thickness", THICKNESS, "--contrast", "bright", "--no-margin", "--ran
 
 @pytest.fixture(scope="module")
 def series():
+    """Returns a small simulated series."""
     return harness.Series("series")
 
 
@@ -53,7 +54,7 @@ def test_one_node_holds_everything(plain):
     assert options["field"]["leaf_size"] >= WIDTH and options["field"]["depth"] == 0
     assert options["fit"]["boundary"] == 0 and options["fit"]["penalty"] == "smooth"
     n, nz, rank = options["field"]["leaf_size"] + 1, THICKNESS, 10
-    # VX, VY, VZ and MYZ, MXZ, MXY; and the decoder.
+    # The parameters are VX, VY, VZ, MYZ, MXZ and MXY; the decoder has a few more.
     count = rank * (2 * n + nz + n * n + 2 * n * nz)
     assert 0 <= record["figures"]["parameters"] - count < 10, count
 

@@ -1,4 +1,5 @@
-"""reconstruct --hold-out, --early-stop and --tune: what they write and choose."""
+"""Tests reconstruct --hold-out, --early-stop and --tune: the files that they write and their
+choices."""
 
 import json
 import os
@@ -14,6 +15,7 @@ from harness import HEIGHT, TILTS, WIDTH, read_bytes
 
 @pytest.fixture(scope="module")
 def series():
+    """Returns a small simulated series."""
     return harness.Series("series")
 
 
@@ -92,7 +94,7 @@ def test_the_penalty_is_what_predicts_held_out_views_better(series):
 
 
 def test_what_trials_chose_is_in_the_checkpoint(series):
-    """A run that goes on makes no trials, and is refused at once if it is another one."""
+    """A resumed run makes no trials, and another run is refused at once."""
     auto = [option for option in harness.QUICK if option not in ("--tv-penalty", "concave")]
     for options in (auto, harness.merge(auto, ["--tune", "--epochs", 2])):
         folder = harness.fresh_directory("checkpoint")
@@ -149,7 +151,7 @@ def test_tune_chooses_what_predicts_best_then_fits_all_views(series):
                                  "--epochs", chosen["epochs"])
     assert read_bytes(by_hand.volume_path) == read_bytes(results.volume_path)
 
-    # Interrupted after some trials: those are not repeated, and the result is the same.
+    # A run that was interrupted after some trials does not repeat them and ends alike.
     path = stem(results, "_tune.json")
     stored = json.load(open(path))
     assert stored["trials"] == trials
