@@ -1,11 +1,13 @@
 #!/usr/bin/python3
-"""How much the Fourier axes of a tomogram's sections stand out: the mean amplitude on the two
-axes over the mean of the rings of the same frequencies, of Hann-windowed central XY sections.
-1 means no streaks along X and Y.
+"""Measures how much the Fourier axes of a tomogram's sections stand out.
+
+The ratio is the mean amplitude on the two axes over the mean of the rings of the same frequencies.
+It is taken over Hann-windowed central XY sections. 1 means that there are no streaks along X and Y.
 
 usage: axis_streaks.py TOMOGRAM.mrc [more.mrc ...]
 
-Prints a line of JSON a file: ratio, and the ratio on the axis of X (v = 0) and of Y (u = 0)."""
+Prints one line of JSON for each file: the ratio, and the ratios on the axis of X (v = 0) and on the
+axis of Y (u = 0)."""
 
 import json
 import sys
@@ -13,11 +15,11 @@ import sys
 import mrcfile
 import numpy as np
 
-LOWEST = 2  # cycles over the section: below, the window spreads the mean
+LOWEST = 2  # cycles over the section; at lower frequencies the window spreads the mean
 
 
 def mean_ratios(section):
-    """Axis amplitude over ring mean, averaged over frequencies: (u axis, v axis)."""
+    """Returns axis amplitude over ring mean, averaged over frequencies, for the u and v axes."""
     num_y, num_x = section.shape
     window = np.outer(np.hanning(num_y + 2)[1:-1], np.hanning(num_x + 2)[1:-1])
     section = section - (section * window).sum() / window.sum()

@@ -9,31 +9,33 @@
 
 namespace tomofield::bench {
 
-// Names that the report refers to.
+// The report looks these cases up by name.
 inline constexpr const char* kForward = "projection forward";
 inline constexpr const char* kAdjoint = "projection adjoint";
 inline constexpr const char* kForwardAlone = "projection forward, one slab";
 inline constexpr const char* kAdjointAlone = "projection adjoint, one slab";
 inline constexpr const char* kLoadL1 = "two loads and FMAs, L1";
 inline constexpr const char* kLoadL2 = "two loads and FMAs, L2";
-// A slab's share of a step, but for projection, which is that of a pair: "step: …" whatever the
-// field, "vm: …" and "grid: …" by field.
+// Cases "step: …" serve any field, cases "vm: …" and "grid: …" one field. Each case is the share of
+// one slab, but the projections are those of kSlabsTogether slabs.
 inline constexpr const char* kStepForward = "step: projection forward";
 inline constexpr const char* kStepAdjoint = "step: projection adjoint";
 
-/// Slabs that a fit projects together.
+/// The number of slabs that a fit projects together.
 inline constexpr int kSlabsTogether = projection::SlabProjector::kSlabsTogether;
 
-/// The projection of slabs of 256 × 16 × 64 voxels, 94 views, −70 … 69.5°: two together, and one.
+/// Returns the projections of slabs of 256 × 16 × 64 voxels in 94 views from −70° to 69.5°: of two
+/// slabs together and of one.
 std::vector<Case> projection_cases();
 
-/// Its loads and FMAs without any of the work around them, from L1 and from L2.
+/// Returns the loads and FMAs of a projection without the work around them, from L1 and from L2.
 std::vector<Case> load_bound_cases();
 
-/// A slab's share of an optimiser step on yardstick A (256 / 150, 94 views),
-/// default options: the projection, what else no field changes, and what
-/// depends on the kind of field.
+/// Returns the parts of an optimiser step that do not depend on the kind of field: a slab's share
+/// on yardstick A (256/150, 94 views) with default options.
 std::vector<Case> step_cases();
+
+/// Returns the parts of the same step that depend on the kind of field.
 std::vector<Case> field_cases(FieldKind kind);
 
 }  // namespace tomofield::bench

@@ -1,4 +1,4 @@
-// bench_kernels OUTPUT.json [ROUNDS [TARGET]]: speed of the slab kernels on one core.
+// Measures the speed of the slab kernels on one core: bench_kernels OUTPUT.json [ROUNDS [TARGET]].
 #include <fmt/core.h>
 #include <hwy/targets.h>
 
@@ -26,7 +26,7 @@ std::vector<Case> all_cases() {
   return cases;
 }
 
-// One target's timings and what they amount to.
+// Reports the timings of one SIMD target and the ratios that follow from them.
 class TargetReport {
  public:
   TargetReport(const std::vector<Case>& cases, const std::vector<Timing>& timings,
@@ -79,7 +79,7 @@ class TargetReport {
     throw std::logic_error("no case " + name);
   }
 
-  // Seconds of all cases whose name starts so.
+  // Returns the summed median seconds of all cases whose name starts with `prefix`.
   double seconds_of(const std::string& prefix) const {
     double sum = 0.0;
     for (const Timing* t : timings_)

@@ -3,7 +3,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bench/load_bound.cc"
 #include <hwy/foreach_target.h>
-// Highway's own order of includes: foreach_target first.
+// Highway requires that foreach_target.h is included before other headers.
 #include "kernels/cpu/slab_vector-inl.h"
 
 HWY_BEFORE_NAMESPACE();

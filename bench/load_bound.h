@@ -4,10 +4,10 @@
 
 namespace tomofield::bench {
 
-/// What no gather can beat: for each of `count` updates two slab samples (64
-/// bytes each) loaded from `samples`, `size` floats that are walked round and
-/// round, and multiplied into an accumulator that stays in registers.
-/// Returns a number that depends on all of them.
+/// Does the loads and FMAs of a gather and nothing else, so that no gather can be faster. Each of
+/// `count` updates loads two slab samples of 64 bytes from `samples` and multiplies them into an
+/// accumulator that stays in registers. `samples` has `size` floats and is walked repeatedly.
+/// Returns a number that depends on all loads, so that the compiler keeps them.
 float load_two_samples(const float* samples, std::size_t size, std::ptrdiff_t count);
 
 }  // namespace tomofield::bench

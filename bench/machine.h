@@ -4,7 +4,7 @@
 
 namespace tomofield::bench {
 
-/// "AMD EPYC 7763", from /proc/cpuinfo; empty where there is none.
+/// Returns the name of the processor from /proc/cpuinfo, as "AMD EPYC 7763", or an empty string.
 std::string cpu_model();
 
 }  // namespace tomofield::bench

@@ -8,7 +8,7 @@
 namespace tomofield::bench {
 namespace {
 
-// Of this thread alone: on a busy machine the clock on the wall also counts others.
+// Returns the CPU time of this thread. The clock on the wall would also count other processes.
 double cpu_seconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -21,7 +21,7 @@ double seconds_of(const std::function<void()>& run, int calls) {
   return (cpu_seconds() - start) / calls;
 }
 
-// Short turns are rarely interrupted on a busy machine.
+// A short turn is rarely interrupted on a busy machine.
 constexpr double kTurnSeconds = 4e-3;
 
 }  // namespace
@@ -44,7 +44,7 @@ std::vector<Timing> measure(const std::vector<Case>& cases,
     for (Timing& timing : timings) {
       hwy::SetSupportedTargetsForTest(timing.target);
       const auto& run = cases[timing.which].run;
-      const double once = seconds_of(run, 1);  // also warms up
+      const double once = seconds_of(run, 1);  // this call also warms up the caches
       const int calls = std::clamp(static_cast<int>(kTurnSeconds / once), 1, 1000);
       timing.seconds.push_back(seconds_of(run, calls));
     }

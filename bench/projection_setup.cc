@@ -10,9 +10,9 @@ namespace {
 
 constexpr int kWidth = 256;
 
-// Samples that a detector pixel of the views takes: what is left of the
-// nominal voxels × views when rays that miss the specimen are not counted and
-// columns are crossed less often than once a voxel.
+// Counts the samples that the detector pixels of the views take. This is less than the nominal
+// voxels × views, because some rays miss the specimen and steep rays cross a column less often than
+// once a voxel.
 double updates_done(const geometry::TiltGeometry& g, const std::vector<int>& views) {
   double count = 0.0;
   for (const int view : views) {

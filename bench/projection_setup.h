@@ -11,8 +11,8 @@
 
 namespace tomofield::bench {
 
-/// `num_slabs` slabs of 256 × 16 × thickness voxels under every `stride`-th of the 94
-/// views of the yardstick, −70 … 69.5°, and the buffers to project it.
+/// Holds `num_slabs` slabs of 256 × 16 × thickness voxels, every `stride`-th of the 94 views of
+/// yardstick A, and the buffers to project the slabs in these views.
 class ProjectionSetup {
  public:
   ProjectionSetup(int thickness, int stride, int num_slabs);
@@ -35,6 +35,7 @@ class ProjectionSetup {
   base::AlignedBuffer<float> samples_, gradient_, detector_;
 };
 
+/// Returns the geometry of yardstick A: 256 × 256 pixels, 94 views from −70° to 69.5°.
 geometry::TiltGeometry yardstick_geometry(int thickness);
 
 }  // namespace tomofield::bench

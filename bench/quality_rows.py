@@ -1,6 +1,8 @@
-"""Rows of a quality benchmark: a row is one way to reconstruct, run on one yardstick phantom
-(docs/index.md) with one seed, scored against the truth and kept as one JSON file, so that a bench
-that was interrupted goes on with the row after. Seeds are not those of the tests."""
+"""Runs and keeps the rows of a quality benchmark.
+
+A row is one way to reconstruct. The bench runs it on one yardstick phantom (docs/index.md) with one
+seed, scores it against the truth and keeps it as one JSON file. A bench that was interrupted goes
+on with the next row. The seeds differ from those of the tests."""
 
 import collections
 import json
@@ -18,11 +20,9 @@ PROJECT = os.path.dirname(HERE)
 
 
 def add_folder_arguments(parser):
-    """What every bench of rows has."""
+    """Adds the options that every bench of rows has."""
     parser.add_argument("out", help="folder for phantoms and rows; a second run adds what is missing")
     parser.add_argument("--program", default=os.path.join(PROJECT, "build/release/tomofield"))
-    parser.add_argument("--make-cell", help="make_cell.py, which makes the phantoms",
-                        default=os.path.join(PROJECT, "../shared/tools/make_cell.py"))
     parser.add_argument("--only", default="", help="rows whose name matches this expression")
     parser.add_argument("--table", action="store_true", help="run nothing; print the table")
 
@@ -34,25 +34,32 @@ def add_arguments(parser):
 
 
 def thickness_of(size):
-    return {128: 75, 256: 150, 512: 300}.get(size, round(size * 75 / 128))
+    """Returns the thickness of a yardstick of this size."""
+    return round(size * 75 / 128)
 
 
 def phantom(options, kind, size, noise, seed, thickness=None):
-    """Folder of the phantom, made on demand. Kind A ends in the field of view, B does not; the
-    thickness is the yardstick's unless given."""
+    """Returns the folder of a phantom and makes it with `tomofield simulate` if it is absent.
+
+    A phantom of kind A ends in the field of view, one of kind B does not. The thickness is the
+    yardstick's unless it is given."""
     thickness = thickness or thickness_of(size)
     shape = f"{size}" if thickness == thickness_of(size) else f"{size}x{thickness}"
     folder = os.path.join(options.out, "phantoms", f"{kind}{shape}_{noise}_{seed}")
-    if not os.path.exists(os.path.join(folder, "tilt_series.tlt")):
-        subprocess.run(["/usr/bin/python3", options.make_cell, folder, "--size", str(size),
-                        "--thickness", str(thickness), "--noise", str(noise),
-                        "--seed", str(seed)] + (["--extended"] if kind == "B" else []),
-                       check=True, stdout=subprocess.DEVNULL)
+    simulate(options, folder, "--yardstick", kind.lower(), "--size", size, "--thickness", thickness,
+             "--noise", noise, "--seed", seed)
     return folder
 
 
+def simulate(options, folder, *arguments):
+    """Simulates a series into a folder that has no complete one yet."""
+    if not os.path.exists(os.path.join(folder, "phantom.json")):  # simulate writes it last
+        subprocess.run([options.program, "simulate", folder, *map(str, arguments), "--overwrite"],
+                       check=True, stdout=subprocess.DEVNULL)
+
+
 def series_arguments(folder, thickness):
-    """What tells tomofield of the series in a folder of phantom() or of `tomofield simulate`."""
+    """Returns the arguments that describe the series in a folder of simulate() to tomofield."""
     return [os.path.join(folder, "tilt_series.mrc"), "--tlt",
             os.path.join(folder, "tilt_series.tlt"), "--thickness", str(thickness), "--contrast",
             "bright"]
@@ -62,9 +69,8 @@ Usage = collections.namedtuple("Usage", "core_seconds peak_MiB wall_seconds")
 
 
 def run_measured(command):
-    """Core-seconds, the largest memory in MiB, and seconds by the clock of a command and what it
-    started."""
-    # Threads that spin while they wait would count, the more the busier the machine is.
+    """Runs a command and returns its Usage, which includes the processes that it started."""
+    # Threads would spin while they wait, and the spinning would count as core-seconds.
     environment = {"OMP_WAIT_POLICY": "passive", **os.environ}
     start = time.monotonic()
     with tempfile.TemporaryFile("w+") as errors:
@@ -78,8 +84,10 @@ def run_measured(command):
 
 
 def dry_run(command):
-    """What a command of tomofield says that it would take: MiB, to 0.01 GiB (to 0.1 GiB where it
-    fails because this machine has less), and, where it has any, steps."""
+    """Returns the memory in MiB and, for a fit, the steps that --dry-run predicts for a command.
+
+    The program rounds the memory to 0.01 GiB, or to 0.1 GiB where the machine has less and the
+    command fails."""
     done = subprocess.run([*command, "--dry-run"], capture_output=True, text=True)
     said = done.stdout + done.stderr
     memory, steps = re.search(r"about ([\d.]+) GiB\s+of memory", said), re.search(r"(\d+) steps", said)
@@ -89,7 +97,7 @@ def dry_run(command):
 
 
 def measure(options, arguments, kind, noise, seed, scratch):
-    """Runs `tomofield ARGUMENTS…` on the phantom and scores what comes out."""
+    """Runs `tomofield ARGUMENTS…` on the phantom, scores the volume and returns the row."""
     folder = phantom(options, kind, options.size, noise, seed)
     volume = os.path.join(scratch, "volume.mrc")
     command = [options.program, *arguments.split(),
@@ -114,7 +122,7 @@ def measure(options, arguments, kind, noise, seed, scratch):
 
 
 def score(options, volume, truth, scratch):
-    """What `tomofield evaluate` says of a volume."""
+    """Returns the scores that `tomofield evaluate` gives a volume."""
     scores = os.path.join(scratch, "scores.json")
     run_measured([options.program, "evaluate", volume, truth, "--json", scores, "--overwrite"])
     with open(scores) as file:
@@ -128,7 +136,7 @@ def script_json(script, *arguments):
 
 
 def has_row(path, arguments):
-    """Whether the row is there, and of the same arguments: a row's name may get other ones."""
+    """Returns true if the row exists and was made with the same arguments."""
     if not os.path.exists(path):
         return False
     with open(path) as file:
@@ -136,7 +144,7 @@ def has_row(path, arguments):
 
 
 class Rows:
-    """The rows of a bench; within it (`with`) what is missing is measured."""
+    """Keeps the rows of a bench. A `with` statement gives it a scratch folder to measure in."""
 
     def __init__(self, options, bench):
         self.options = options
@@ -151,8 +159,10 @@ class Rows:
         subprocess.run(["rm", "-rf", self.scratch], check=True)
 
     def kept(self, name, arguments, make, may_make=True):
-        """The row of this name and these arguments; what is missing is made by make(scratch folder)
-        if it may be, else there is none."""
+        """Returns the row of this name and these arguments.
+
+        A missing row is made by make(scratch folder). The result is None if the row is missing and
+        must not be made."""
         path = os.path.join(self.folder, re.sub(r"[^\w.+-]+", "_", name) + ".json")
         if not has_row(path, arguments):
             if self.options.table or not may_make:
@@ -165,7 +175,8 @@ class Rows:
             return json.load(file)
 
     def row(self, name, arguments, kind, noise, seed):
-        """The row of this name and seed, measured if it must be; none if it may not (--table)."""
+        """Returns the row of this name and seed and measures it if it is missing. With --table
+        it returns None instead."""
 
         def make(scratch):
             row = measure(self.options, arguments, kind, noise, seed, scratch)
@@ -177,7 +188,7 @@ class Rows:
 
 
 def run_rows(options, bench, rows):
-    """rows: {name: (arguments, kind, noise)}. Returns {name: [row of each seed]}."""
+    """Measures rows, {name: (arguments, kind, noise)}, and returns {name: [row of each seed]}."""
     results = {}
     with Rows(options, bench) as measured:
         for name, (arguments, kind, noise) in rows.items():

@@ -1,5 +1,7 @@
-"""run.json, what bench/run gathers and bench/regression compares: the machines, the commits and dates
-of what was measured, and rows {group, name, arguments, figures: {figure: [a value a repeat]}}."""
+"""Reads and writes run.json, which bench/run gathers and bench/regression compares.
+
+The file holds the machines, the commits, the date, and rows {group, name, arguments, figures:
+{figure: [one value for each repeat]}}."""
 
 import json
 import math
@@ -7,11 +9,11 @@ import statistics
 
 
 class BadFile(Exception):
-    """A file that is no run.json; says why."""
+    """Says why a file is not a run.json."""
 
 
 def median_deviation(values):
-    """Median absolute deviation from the median: 0 of a single value."""
+    """Returns the median absolute deviation from the median, which is 0 for a single value."""
     middle = statistics.median(values)
     return statistics.median(abs(value - middle) for value in values)
 

@@ -1,14 +1,16 @@
 #!/usr/bin/python3
-"""Whether leaves can be seen in a tomogram: the mean jump of the density between voxels on
-either side of a leaf's face over that between neighbouring voxels inside leaves, along X and Y.
-1 means that no face is visible; the target is at most 1.1.
+"""Measures how visible the faces of leaves are in a tomogram.
+
+The ratio is the mean jump of the density between voxels on either side of a leaf's face, over the
+mean jump between neighbouring voxels inside leaves, along X and Y. 1 means that no face is visible;
+the target is at most 1.1.
 
 usage: seam.py TOMOGRAM.mrc [--model MODEL.h5] [--truth TRUTH.mrc]
 
-The model lies beside the tomogram by default. Prints JSON: jump_across, jump_inside (data
-units), ratio, and the ratio along each axis. Faces are few and content is not even, so the
-truth of a phantom has a ratio other than 1 at the same places: with --truth that is printed
-too, and the ratio of both."""
+By default the model lies beside the tomogram. Prints JSON: jump_across and jump_inside in data
+units, ratio, and the ratio along each axis. There are few faces and the content is not even, so the
+truth of a phantom has a ratio other than 1 at the same places. With --truth the script prints that
+ratio too, and the quotient of both."""
 
 import argparse
 import json
@@ -21,7 +23,8 @@ import numpy as np
 
 
 def face_masks(model_path, shape):
-    """For pairs of voxels along X and Y, [y, x]: whether a leaf's face lies between the two."""
+    """Returns, for pairs of voxels along X and along Y, [y, x], true where a leaf's face lies
+    between the two."""
     num_y, num_x = shape
     across_x = np.zeros((num_y, num_x - 1), bool)
     across_y = np.zeros((num_y - 1, num_x), bool)
@@ -50,7 +53,7 @@ def mean_jump(jumps, selected):
 
 
 def read_jumps(path):
-    """Mean over Z of the jumps along X and Y, [y, x] each."""
+    """Returns the means over Z of the jumps along X and along Y, each [y, x]."""
     with mrcfile.open(path, permissive=True) as file:
         volume = file.data.astype("f4")
     return [np.abs(np.diff(volume, axis=axis)).mean(axis=0) for axis in (2, 1)]

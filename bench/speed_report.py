@@ -1,5 +1,5 @@
-"""Markdown tables and plots of a run.json (run_file.py): medians over repeats, ± the median absolute
-deviation where there is one."""
+"""Prints Markdown tables and plots of a run.json (run_file.py). Figures are medians over repeats, ±
+the median absolute deviation where it is not zero."""
 
 import math
 import os
@@ -25,7 +25,7 @@ def figure(row, name):
 
 
 def ratios(row, reference, name):
-    """Ratios of a figure to another row's, repeat by repeat."""
+    """Returns the ratios of a figure to another row's, repeat by repeat."""
     return [ours / other for ours, other in zip(figure(row, name), figure(reference, name))
             if other > 0]
 
@@ -74,7 +74,7 @@ def estimate_over_peak(row):
 
 
 def print_reconstructions(rows):
-    """Ratios are to the first method of a size, tomofield's default."""
+    """Prints whole reconstructions, with ratios to the default method of the same size."""
     print("\n## Whole reconstructions, yardstick A, noise 0.05")
     lines, references = [], {}
     for row in rows:
@@ -103,7 +103,7 @@ AXES = ("views", "pixels", "thickness", "rank")
 
 
 def along(rows, axis):
-    """Rows that differ from each other in one size only, by that size: the longest such series."""
+    """Returns the longest list of rows that differ along one axis only, sorted along that axis."""
     series = {}
     for row in rows:
         others = tuple(statistics.median(figure(row, name)) for name in AXES if name != axis)
@@ -113,7 +113,7 @@ def along(rows, axis):
 
 
 def exponent(rows, axis):
-    """Slope of log(core-seconds) over log(size), by least squares."""
+    """Returns the slope of log(core-seconds) over log(size), by least squares."""
     x = [math.log(figure(row, axis)[0]) for row in rows]
     y = [math.log(statistics.median(figure(row, "core_seconds"))) for row in rows]
     return statistics.linear_regression(x, y).slope
@@ -147,7 +147,7 @@ def plot(run, folder):
 
 
 def draw_roofline(pyplot, rows):
-    """GFLOP/s over FLOPs a byte, of the first (widest) target, under its load bounds."""
+    """Draws GFLOP/s over FLOPs a byte for the first (widest) target, under its load bounds."""
     target = next(row["name"] for row in rows if ": " not in row["name"])
     drawing, panel = pyplot.subplots(figsize=(8, 5), constrained_layout=True)
     cases = [row for row in rows if row["name"].startswith(target + ": ")]
@@ -168,7 +168,8 @@ def draw_roofline(pyplot, rows):
 
 
 def draw_reconstructions(pyplot, rows):
-    """PSNR (at the best scale) over core-seconds, a line a method through its sizes."""
+    """Draws PSNR at the best scale over core-seconds, one line for each method through its
+    sizes."""
     drawing, panel = pyplot.subplots(figsize=(7, 4.5), constrained_layout=True)
     points = {}
     for row in rows:
@@ -182,7 +183,7 @@ def draw_reconstructions(pyplot, rows):
     panel.set(xscale="log", xlabel="core-seconds", ylabel="PSNR at best scale, dB")
     panel.grid(alpha=0.3)
     panel.legend(fontsize=8)
-    panel.margins(x=0.1)  # room for the names of the last
+    panel.margins(x=0.1)  # leaves room for the names of the last points
     return drawing
 
 

@@ -1,5 +1,7 @@
-"""Rows of the speed bench, bench/run: what to measure and how. A row's measure(scratch folder)
-returns {row name: {figure: [values]}}, as a rule of one row and one value."""
+"""Lists the rows of the speed bench, bench/run, and measures them.
+
+A row's measure(scratch folder) returns {row name: {figure: [values]}}. Most rows return one row
+with one value for each figure."""
 
 import dataclasses
 import functools
@@ -22,28 +24,29 @@ KERNELS_FILE = "kernels.json"
 class Row:
     group: str
     name: str
-    arguments: str  # a kept row of the same name and other arguments is measured again
+    arguments: str  # the row is measured again when its arguments have changed
     measure: typing.Callable
-    commit: typing.Callable = None  # (scratch folder) of what was measured, if not options.program
+    # Takes the scratch folder and returns the commit that was measured; None: options.program's.
+    commit: typing.Callable = None
 
 
 @dataclasses.dataclass(frozen=True)
 class WideSeries:
-    """A series too large for a bench: of `rows` of its rows, whole leaves, epochs are timed. The
-    field is one that fits 10 GiB with the whole series."""
+    """Describes a series that is too large for a bench. The bench times epochs of a band of `rows`
+    detector rows, which are whole leaves. With this field the whole series fits into 10 GiB."""
 
     width: int = 4096
     thickness: int = 1024
-    tilt_step: float = 2  # -60 to 60: 61 views
+    tilt_step: float = 2  # from -60 to 60 degrees, 61 views
     rows: int = 256
     field: str = "--leaf-size 256 --vertex-spacing 2.5 --rank 16 --margin-spacing 8"
-    timed_epochs: int = 2  # of full resolution; of the coarse stage
+    timed_epochs: int = 2  # at full resolution
     timed_coarse_epochs: int = 4
 
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Everything that a run measures."""
+    """Lists everything that a run measures."""
 
     shapes: tuple = ((256, 150), (512, 300), (1024, 300))  # pixels, thickness of yardstick A
     methods: tuple = (("default", "reconstruct"), ("grid", "reconstruct --field grid"),
@@ -68,7 +71,7 @@ QUICK = Plan(shapes=((64, 38),),
 
 
 def all_rows(options, plan, programs):
-    """programs: {name: command with placeholders}, of other programs."""
+    """Returns all rows. `programs` maps names of other programs to commands with placeholders."""
     return [Row("kernels", "kernels", f"{plan.kernel_rounds} rounds",
                 functools.partial(measure_kernels, options, plan.kernel_rounds), kernels_commit),
             *reconstruction_rows(options, plan, programs),
@@ -76,7 +79,8 @@ def all_rows(options, plan, programs):
 
 
 def measure_kernels(options, rounds, scratch):
-    """Every case of bench_kernels as a row, and one row a SIMD target of what they amount to."""
+    """Runs bench_kernels. Returns one row for each case, and one row of ratios for each SIMD
+    target."""
     if not os.path.exists(options.bench_kernels):
         sys.exit(f"there is no '{options.bench_kernels}': build the target bench_kernels, or choose "
                  "other rows with --only")
@@ -140,7 +144,8 @@ def measure_ours(options, shape, name, arguments, scratch):
 
 
 def measure_other(options, shape, name, command, scratch):
-    """Another program, which is scored with the best scale and offset: its units are its own."""
+    """Runs another program and scores its volume at the best scale and offset, because the program
+    may have other units."""
     folder, volume = yardstick(options, shape), os.path.join(scratch, "other.mrc")
     if os.path.exists(volume):
         os.remove(volume)
@@ -161,20 +166,25 @@ def wide_row(options, wide):
 
 
 def default_epochs(command):
-    """(at full resolution, coarse): of a command of reconstruct without either option, by what dry
-    runs say of steps. The former depend on whether there are any of the latter."""
+    """Returns the default numbers of epochs at full resolution and of coarse epochs.
+
+    `command` is a reconstruct without either option. The numbers follow from the steps that dry
+    runs predict. The number at full resolution depends on whether there is a coarse stage."""
     def steps(*options):
         return quality_rows.dry_run([*command, *options])["steps"]
 
     an_epoch = steps("--epochs", "1", "--coarse-epochs", "0")
     usual, after_one = steps() // an_epoch, steps("--coarse-epochs", "1") // an_epoch
-    full = after_one if after_one == usual else after_one - 1  # no coarse stage, whatever is asked
+    # Equal numbers mean that there is no coarse stage, whatever --coarse-epochs says.
+    full = after_one if after_one == usual else after_one - 1
     return full, usual - full
 
 
 def measure_wide(options, wide, name, scratch):
-    """Core-hours of the whole series from the band: a run is a start, so many epochs of full
-    resolution and so many coarse ones, each as long as the band is high."""
+    """Extrapolates the core-hours of the whole series from runs of the band.
+
+    A run costs its start, its epochs at full resolution and its coarse epochs. All of them are
+    proportional to the number of rows."""
     folder = wide_band.band_series(options, wide)
     command = [options.program, "reconstruct", *wide.field.split(), "--vertex-epochs", "0",
                "--tv-penalty", "concave",
@@ -227,14 +237,12 @@ def size_name(size):
 
 
 def simulated(options, size):
-    """Folder of a simulated series −60 … 60° of a specimen that ends in the field of view."""
+    """Returns the folder of a simulated series, −60 to 60°, of a specimen that ends in the field of
+    view."""
     folder = os.path.join(options.out, "phantoms",
                           f"s{size['pixels']}x{size['thickness']}_{size['tilt step']}")
-    if not os.path.exists(os.path.join(folder, "tilt_series.tlt")):
-        subprocess.run([options.program, "simulate", folder, "--size", str(size["pixels"]),
-                        "--thickness", str(size["thickness"]),
-                        f"--tilts=-60:60:{size['tilt step']}", "--no-truth", "--overwrite"],
-                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    quality_rows.simulate(options, folder, "--size", size["pixels"], "--thickness",
+                          size["thickness"], f"--tilts=-60:60:{size['tilt step']}", "--no-truth")
     return folder
 
 

@@ -23,7 +23,7 @@ namespace {
 using kernels::kLanes;
 
 constexpr int kThickness = 150;
-constexpr int kBand = 2;  // somewhere in the middle
+constexpr int kBand = 2;  // a band away from the edges
 
 fit::FieldOptions field_options(FieldKind kind) {
   fit::FieldOptions options;
@@ -34,7 +34,7 @@ fit::FieldOptions field_options(FieldKind kind) {
   return options;
 }
 
-// Everything that a step works on, with the buffers of one slab.
+// Holds everything that a step works on, with the buffers of one slab.
 struct StepSetup {
   geometry::TiltGeometry geometry = yardstick_geometry(kThickness);
   fit::Domain domain;
@@ -78,7 +78,7 @@ struct StepSetup {
   double num_samples() const { return static_cast<double>(geometry.width) * kThickness * kLanes; }
 };
 
-// The decoding of one leaf of the slab, times the leaves that a slab crosses.
+// Holds the decoding of one leaf of the slab. The cases repeat it for every leaf of the slab.
 struct LeafDecoding {
   std::vector<int> lower_x, lower_z;
   std::vector<float> fraction_x, fraction_z;
@@ -203,14 +203,14 @@ std::vector<Case> step_cases() {
 std::vector<Case> field_cases(FieldKind kind) {
   const auto s = std::make_shared<StepSetup>(kind);
   const field::LeafShape& shape = s->domain.shapes[0];
-  // FMAs a vertex and lane: three ranks of VM; 16 rows from so many vertices of the grid.
+  // FMAs for each vertex and lane: VM contracts three ranks, a grid interpolates rows of vertices.
   const double fmas = kind == FieldKind::kVm
                           ? shape.rank_x + shape.rank_y + shape.rank_z
                           : 16.0 * (shape.ny - 1) / field_options(kind).leaf_size + 1;
   std::size_t parameters = 0;
   for (const int leaf : s->leaves)
     parameters += s->field->offset(leaf + 1) - s->field->offset(leaf);
-  // A leaf's step of Adam serves all slabs that cross it.
+  // All slabs that cross a leaf share its step of Adam.
   const double share = static_cast<double>(kLanes) / field_options(kind).leaf_size;
   const double stepped = share * static_cast<double>(parameters);
   const Case values{.name = base::name_of(kind) + std::string(": vertex values"),

@@ -1,4 +1,5 @@
-"""A band of rows of a wide tilt series, and a stack of the whole series' size that holds no disk."""
+"""Makes a band of rows of a wide tilt series, and a sparse stack of the size of the whole
+series."""
 
 import os
 import struct
@@ -10,7 +11,8 @@ HEADER = 1024  # bytes of an MRC header
 
 
 def band_series(options, wide):
-    """Folder of the band of a WideSeries, made on demand: tilt_series.mrc and .tlt, and full.mrc."""
+    """Returns the folder of the band of a WideSeries and makes it if it is absent. It holds
+    tilt_series.mrc, tilt_series.tlt and the sparse full.mrc."""
     name = f"wide{wide.width}x{wide.thickness}_{wide.rows}_{wide.tilt_step}"
     folder = os.path.join(options.out, "phantoms", name)
     if not os.path.exists(os.path.join(folder, "tilt_series.tlt")):
@@ -19,7 +21,8 @@ def band_series(options, wide):
 
 
 def make_band_series(options, wide, folder):
-    """Simulates the whole series (in 2 × width² × views × 4 bytes, for the while), keeps the band."""
+    """Simulates the whole series and keeps the band. The whole series takes 2 × width² × views × 4
+    bytes of disk until then."""
     whole = folder + ".whole"
     subprocess.run([options.program, "simulate", whole, "--size", str(wide.width), "--thickness",
                     str(wide.thickness), "--extended", f"--tilts=-60:60:{wide.tilt_step}",
@@ -34,8 +37,8 @@ def make_band_series(options, wide, folder):
 
 
 def read_header(file):
-    """(header, columns, rows, sections) of a stack of floats without an extended header, such as
-    `tomofield simulate` writes."""
+    """Returns the header, columns, rows and sections of a stack of floats without an extended
+    header, which is what `tomofield simulate` writes."""
     header = bytearray(file.read(HEADER))
     columns, rows, sections, mode = struct.unpack_from("<4i", header)
     (extended,) = struct.unpack_from("<i", header, 92)
@@ -59,8 +62,8 @@ def cut_band(source, target, num_rows):
 
 
 def write_hollow_copy(source, target):
-    """A stack of the same size that is a hole in the file system but for each section's first rows:
-    enough for a dry run, which checks that no section is constant."""
+    """Writes a sparse stack of the same size that holds the first row of each section alone. A dry
+    run needs no more: it checks that no section is constant."""
     with open(source, "rb") as whole, open(target, "wb") as hollow:
         header, columns, rows, sections = read_header(whole)
         hollow.write(header)
@@ -73,7 +76,7 @@ def write_hollow_copy(source, target):
 
 
 def estimate_of_whole(options, wide, folder):
-    """MiB that a dry run of the whole series asks for."""
+    """Returns the memory in MiB that a dry run of the whole series predicts."""
     series = quality_rows.series_arguments(folder, wide.thickness)
     series[0] = os.path.join(folder, "full.mrc")
     return quality_rows.dry_run([options.program, "reconstruct", *wide.field.split(),

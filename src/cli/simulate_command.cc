@@ -18,6 +18,8 @@ namespace {
 struct SimulateArguments {
   std::string directory;
   simulate::SimulationOptions options;
+  std::optional<std::string> yardstick;
+  std::optional<std::int64_t> thickness_px;
   std::optional<std::string> tilts;
   std::optional<std::string> contrast;
   std::optional<double> noise;
@@ -54,7 +56,21 @@ Contrast resolve_contrast(const SimulateArguments& arguments) {
   return has_dose || arguments.contrast == "dark" ? Contrast::kDark : Contrast::kBright;
 }
 
-// What reconstruct has to be told of the series.
+/// Sets the specimen's kind, thickness and tilts from the yardstick and from the options that were
+/// given; a thickness that was given wins over the yardstick's.
+void resolve_specimen(SimulateArguments& arguments) {
+  simulate::SimulationOptions& options = arguments.options;
+  if (arguments.yardstick) {
+    simulate::apply_yardstick(
+        arguments.yardstick == "a" ? simulate::Yardstick::kA : simulate::Yardstick::kB, options);
+  } else {
+    options.tilts = arguments.tilts ? parse_tilts(*arguments.tilts)
+                                    : simulate::default_tilts(options.cell.is_extended);
+  }
+  options.cell.thickness_px = arguments.thickness_px.value_or(options.cell.thickness_px);
+}
+
+/// Returns the command that reconstructs the series.
 std::string how_to_reconstruct(const std::filesystem::path& directory,
                                const simulate::SimulationOptions& options) {
   const auto file = [&](const char* name) { return (directory / name).string(); };
@@ -71,8 +87,7 @@ void run_simulate(SimulateArguments& arguments) {
   simulate::SimulationOptions& options = arguments.options;
   if (arguments.noise && options.dose)
     throw Error("--noise and --dose are two kinds of noise: give one of them");
-  options.tilts = arguments.tilts ? parse_tilts(*arguments.tilts)
-                                  : simulate::default_tilts(options.cell.is_extended);
+  resolve_specimen(arguments);
   options.contrast = resolve_contrast(arguments);
   options.noise = arguments.noise.value_or(options.noise);
   options.write_truth = !arguments.without_truth;
@@ -99,15 +114,23 @@ void add_simulate_command(CLI::App& program) {
       ->required();
   command->add_option("--size", options.cell.size_px, "Width and height in pixels")
       ->capture_default_str();
-  command->add_option("--thickness", options.cell.thickness_px, "Thickness in voxels")
-      ->capture_default_str();
+  command->add_option("--thickness", arguments->thickness_px,
+                      "Thickness in voxels [150, of a yardstick 75/128 of --size]");
   command->add_option("--seed", options.cell.seed, "Seed of everything random")
       ->check(seed_check())
       ->capture_default_str();
-  command->add_flag("--extended", options.cell.is_extended,
-                    "The specimen leaves the field of view, as in a microscope");
-  command->add_option("--tilts", arguments->tilts,
-                      "first:last:step in degrees [-70:69.5:1.5, extended -60:60:2]");
+  CLI::Option* extended =
+      command->add_flag("--extended", options.cell.is_extended,
+                        "The specimen leaves the field of view, as in a microscope");
+  CLI::Option* tilts = command->add_option(
+      "--tilts", arguments->tilts, "first:last:step in degrees [-70:69.5:1.5, extended -60:60:2]");
+  command
+      ->add_option("--yardstick", arguments->yardstick,
+                   "Phantom of the project's scores. a: a cell that ends in the field of view, 94 "
+                   "views from -70 to 69.5 degrees; b: an extended specimen, 61 views from -60 to "
+                   "60 degrees")
+      ->check(CLI::IsMember({"a", "b"}))
+      ->excludes(extended, tilts);
   command->add_option("--voxel-size", options.voxel_size_A, "Å")->capture_default_str();
   command->add_option("--noise", arguments->noise,
                       "Gaussian noise as a fraction of the range of the view at 0° [0.05]");

@@ -48,6 +48,14 @@ TiltRange default_tilts(bool is_extended) {
   return {};
 }
 
+void apply_yardstick(Yardstick yardstick, SimulationOptions& options) {
+  constexpr double kThicknessOfSize = 75.0 / 128.0;
+  CellOptions& cell = options.cell;
+  cell.is_extended = yardstick == Yardstick::kB;
+  cell.thickness_px = std::llround(kThicknessOfSize * static_cast<double>(cell.size_px));
+  options.tilts = default_tilts(cell.is_extended);
+}
+
 std::vector<std::string> SimulationOptions::validate() const {
   std::vector<std::string> faults;
   const auto require = [&](bool holds, const char* name, double value, const std::string& range) {

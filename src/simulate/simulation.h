@@ -18,6 +18,12 @@ struct TiltRange {
 };
 TiltRange default_tilts(bool is_extended);
 
+/// Names the two phantoms that every score of the project refers to (docs/index.md).
+enum class Yardstick {
+  kA,  ///< a cell that ends in the field of view, in 94 views from −70° to 69.5°
+  kB,  ///< a specimen that goes on outside it, in 61 views from −60° to 60°
+};
+
 /// What a simulated tilt series shall be.
 struct SimulationOptions {
   CellOptions cell;  ///< max_tilt_deg is taken from `tilts`, whatever it says
@@ -40,6 +46,10 @@ struct SimulationOptions {
   /// Everything that is wrong, one sentence each; empty if nothing is.
   std::vector<std::string> validate() const;
 };
+
+/// Turns `options` into those of a yardstick. It sets the kind of specimen, the tilts, and the
+/// thickness, which is 75/128 of cell.size_px. It leaves noise, seed and all else as they are.
+void apply_yardstick(Yardstick yardstick, SimulationOptions& options);
 
 /// What befell one view.
 struct SimulatedView {

@@ -1,11 +1,9 @@
-#!/usr/bin/python3
-"""Shows that check_layers.py catches what it is for: each tree below has one include that is
+"""Shows that check_layers.py catches wrong includes. Each tree below has one include that is
 allowed or not, and the checker has to agree."""
 import pathlib
 import subprocess
 import sys
 import tempfile
-import unittest
 
 CHECKER = pathlib.Path(__file__).with_name("check_layers.py")
 LAYERS = "# lowest first\nbase\nio\nkernels\nfield\nprojection\ncli\n"
@@ -22,55 +20,58 @@ def run_checker(files, layers=LAYERS):
         return done.returncode, done.stdout + done.stderr
 
 
-class CheckLayers(unittest.TestCase):
-    def test_allows_own_lower_and_public_includes(self):
-        text = '#include <vector>\n#include "field/a.h"\n#include "base/b.h"\n#include "tomofield/error.h"\n'
-        status, output = run_checker({"src/field/a.cc": text})
-        self.assertEqual(status, 0, output)
-
-    def test_catches_an_include_of_a_higher_folder(self):
-        status, output = run_checker({"src/io/a.cc": '#include "io/a.h"\n#include "field/b.h"\n'})
-        self.assertEqual(status, 1, output)
-        self.assertIn("src/io/a.cc:2: ", output)
-
-    def test_catches_it_with_spaces_and_in_headers(self):
-        status, output = run_checker({"src/base/a.h": '  #  include   "cli/b.h"\n'})
-        self.assertEqual(status, 1, output)
-
-    def test_subfolders_count_as_their_folder(self):
-        status, output = run_checker({"src/kernels/cpu/a.cc": '#include "kernels/reference/a.h"\n'})
-        self.assertEqual(status, 0, output)
-        status, output = run_checker({"src/kernels/cpu/a.cc": '#include "projection/a.h"\n'})
-        self.assertEqual(status, 1, output)
-
-    def test_catches_relative_includes_and_unknown_folders(self):
-        self.assertEqual(run_checker({"src/io/a.cc": '#include "../cli/b.h"\n'})[0], 1)
-        self.assertEqual(run_checker({"src/io/a.cc": '#include "b.h"\n'})[0], 1)
-        self.assertEqual(run_checker({"src/novel/a.cc": "int a;\n"})[0], 1)
-
-    def test_only_unit_tests_include_test_helpers(self):
-        files = {"tests/support/a.h": "", "src/io/a_test.cc": '#include "support/a.h"\n'}
-        self.assertEqual(run_checker(files)[0], 0)
-        files["src/io/a.cc"] = '#include "support/a.h"\n'
-        self.assertEqual(run_checker(files)[0], 1)
-
-    def test_public_headers_stay_free_of_other_libraries(self):
-        files = {"src/base/a.cc": "int a;\n", "include/tomofield/a.h": "#include <vector>\n"}
-        self.assertEqual(run_checker(files)[0], 0)
-        files["include/tomofield/a.h"] = "#include <hwy/highway.h>\n"
-        self.assertEqual(run_checker(files)[0], 1)
-        files["include/tomofield/a.h"] = '#include "io/mrc.h"\n'
-        self.assertEqual(run_checker(files)[0], 1)
-
-    def test_the_order_of_the_list_decides(self):
-        files = {"src/io/a.cc": '#include "base/a.h"\n'}
-        self.assertEqual(run_checker(files, "base\nio\n")[0], 0)
-        self.assertEqual(run_checker(files, "io\nbase\n")[0], 1)
-        self.assertEqual(run_checker(files, "# none\n")[0], 2)
-
-    def test_refuses_a_tree_without_sources(self):
-        self.assertEqual(run_checker({"README.md": "nothing here\n"})[0], 2)
+def test_allows_own_lower_and_public_includes():
+    text = '#include <vector>\n#include "field/a.h"\n#include "base/b.h"\n#include "tomofield/error.h"\n'
+    status, output = run_checker({"src/field/a.cc": text})
+    assert status == 0, output
 
 
-if __name__ == "__main__":
-    unittest.main()
+def test_the_order_of_the_list_decides():
+    files = {"src/io/a.cc": '#include "base/a.h"\n'}
+    assert run_checker(files, "base\nio\n")[0] == 0
+    assert run_checker(files, "io\nbase\n")[0] == 1
+    assert run_checker(files, "# none\n")[0] == 2
+
+
+def test_catches_an_include_of_a_higher_folder():
+    status, output = run_checker({"src/io/a.cc": '#include "io/a.h"\n#include "field/b.h"\n'})
+    assert status == 1, output
+    assert "src/io/a.cc:2: " in output, output
+
+
+def test_catches_it_with_spaces_and_in_headers():
+    status, output = run_checker({"src/base/a.h": '  #  include   "cli/b.h"\n'})
+    assert status == 1, output
+
+
+def test_subfolders_count_as_their_folder():
+    status, output = run_checker({"src/kernels/cpu/a.cc": '#include "kernels/reference/a.h"\n'})
+    assert status == 0, output
+    status, output = run_checker({"src/kernels/cpu/a.cc": '#include "projection/a.h"\n'})
+    assert status == 1, output
+
+
+def test_catches_relative_includes_and_unknown_folders():
+    assert run_checker({"src/io/a.cc": '#include "../cli/b.h"\n'})[0] == 1
+    assert run_checker({"src/io/a.cc": '#include "b.h"\n'})[0] == 1
+    assert run_checker({"src/novel/a.cc": "int a;\n"})[0] == 1
+
+
+def test_only_unit_tests_include_test_helpers():
+    files = {"tests/support/a.h": "", "src/io/a_test.cc": '#include "support/a.h"\n'}
+    assert run_checker(files)[0] == 0
+    files["src/io/a.cc"] = '#include "support/a.h"\n'
+    assert run_checker(files)[0] == 1
+
+
+def test_public_headers_stay_free_of_other_libraries():
+    files = {"src/base/a.cc": "int a;\n", "include/tomofield/a.h": "#include <vector>\n"}
+    assert run_checker(files)[0] == 0
+    files["include/tomofield/a.h"] = "#include <hwy/highway.h>\n"
+    assert run_checker(files)[0] == 1
+    files["include/tomofield/a.h"] = '#include "io/mrc.h"\n'
+    assert run_checker(files)[0] == 1
+
+
+def test_refuses_a_tree_without_sources():
+    assert run_checker({"README.md": "nothing here\n"})[0] == 2

@@ -1,6 +1,4 @@
-"""What reconstruct refuses: status 2, one sentence with the facts, nothing written or changed.
-
-usage: bad_input_test.py TOMOFIELD SCRATCH_DIR"""
+"""Tests what reconstruct refuses: it exits with 2, says one sentence and writes nothing."""
 
 import os
 import re
@@ -10,6 +8,7 @@ import struct
 
 import mrcfile
 import numpy as np
+import pytest
 
 import harness
 from harness import fresh_directory, is_sanitized, read_bytes, run_measured, write_stack
@@ -17,74 +16,122 @@ from harness import fresh_directory, is_sanitized, read_bytes, run_measured, wri
 NX, NY, NUM_VIEWS = 40, 33, 7
 TILTS = np.linspace(-60, 60, NUM_VIEWS)
 
-inputs = fresh_directory("inputs")
 views = np.random.default_rng(1).normal(10, 1, (NUM_VIEWS, NY, NX)).astype(np.float32)
 
 
-def path(name):
-    return os.path.join(inputs, name)
+@pytest.fixture(scope="module")
+def inputs():
+    """Returns the folder of all input files."""
+    return fresh_directory("inputs")
 
 
-def text_file(name, text):
-    with open(path(name), "w") as file:
-        file.write(text)
-    return path(name)
+@pytest.fixture(scope="module", name="path")
+def make_path(inputs):
+    def path(name):
+        return os.path.join(inputs, name)
+
+    return path
 
 
-def stack_file(name, values=views):
-    write_stack(path(name), values, 10)
-    return path(name)
+@pytest.fixture(scope="module", name="text_file")
+def make_text_file(path):
+    def text_file(name, text):
+        with open(path(name), "w") as file:
+            file.write(text)
+        return path(name)
+
+    return text_file
 
 
-def patched_stack(name, *patches):
-    """The good stack with other bytes at places of its header."""
-    contents = bytearray(read_bytes(stack))
-    for at, value in patches:
-        contents[at : at + len(value)] = value
-    with open(path(name), "wb") as file:
-        file.write(contents)
-    return path(name)
+@pytest.fixture(scope="module", name="stack_file")
+def make_stack_file(path):
+    def stack_file(name, values=views):
+        write_stack(path(name), values, 10)
+        return path(name)
+
+    return stack_file
 
 
-stack = stack_file("good.mrc")
-tlt = text_file("good.tlt", "".join(f"{tilt:.1f}\n" for tilt in TILTS))
-GOOD = ["--tlt", tlt, "--thickness", 20, "--contrast", "bright"]
+@pytest.fixture(scope="module", name="patched_stack")
+def make_patched_stack(path, stack):
+    def patched_stack(name, *patches):
+        """Writes the good stack with other bytes in its header."""
+        contents = bytearray(read_bytes(stack))
+        for at, value in patches:
+            contents[at : at + len(value)] = value
+        with open(path(name), "wb") as file:
+            file.write(contents)
+        return path(name)
+
+    return patched_stack
 
 
-def snapshot(directory):
+@pytest.fixture(scope="module")
+def stack(stack_file):
+    """Returns the path of a stack that is as it should be."""
+    return stack_file("good.mrc")
+
+
+@pytest.fixture(scope="module")
+def tlt(text_file):
+    """Returns the path of the stack's tilts."""
+    return text_file("good.tlt", "".join(f"{tilt:.1f}\n" for tilt in TILTS))
+
+
+@pytest.fixture(scope="module")
+def good(tlt):
+    """Returns options that are right for the stack."""
+    return ["--tlt", tlt, "--thickness", 20, "--contrast", "bright"]
+
+
+@pytest.fixture(scope="module")
+def out():
+    """Returns the path of a volume that nothing may write."""
+    return os.path.join(fresh_directory("results"), "out.mrc")
+
+
+def snapshot(*directories):
+    """Returns the bytes of every file in some directories."""
     found = {}
-    for folder, _, names in os.walk(directory):
-        for name in names:
-            found[os.path.join(folder, name)] = read_bytes(os.path.join(folder, name))
+    for directory in directories:
+        for folder, _, names in os.walk(directory):
+            for name in names:
+                found[os.path.join(folder, name)] = read_bytes(os.path.join(folder, name))
     return found
 
 
-def refuse(words, *arguments, status=2, **keywords):
-    """Checks that the program refuses these arguments for a reason that has these words."""
-    before = snapshot(harness.SCRATCH)
-    result = harness.tomofield(*arguments, **keywords)
-    assert result.returncode == status, (arguments, result)
-    complaints = [line for line in result.stderr.splitlines() if line.startswith("tomofield: ")]
-    assert len(complaints) == 1 and complaints[0] == result.stderr.splitlines()[-1], result.stderr
-    # A sentence that a person can read, no number of three hundred digits.
-    assert len(complaints[0]) < 700 and not re.search(r"\d{25}", complaints[0]), complaints[0]
-    for sign in ("terminate called", "internal error", "what()", "Traceback", "Aborted"):
-        assert sign not in result.stderr, result.stderr
-    for word in words:
-        assert str(word) in complaints[0], (word, complaints[0])
-    assert snapshot(harness.SCRATCH) == before, arguments
-    return complaints[0]
+@pytest.fixture(scope="module", name="refuse")
+def make_refuse(inputs):
+    def refuse(words, *arguments, status=2, **keywords):
+        """Checks that the program refuses these arguments for a reason that has these words."""
+        watched = os.path.dirname(inputs), harness.SCRATCH
+        before = snapshot(*watched)
+        result = harness.tomofield(*arguments, **keywords)
+        assert result.returncode == status, (arguments, result)
+        complaints = [line for line in result.stderr.splitlines() if line.startswith("tomofield: ")]
+        assert len(complaints) == 1 and complaints[0] == result.stderr.splitlines()[-1], result.stderr
+        # A person can read the sentence: it has no number of three hundred digits.
+        assert len(complaints[0]) < 700 and not re.search(r"\d{25}", complaints[0]), complaints[0]
+        for sign in ("terminate called", "internal error", "what()", "Traceback", "Aborted"):
+            assert sign not in result.stderr, result.stderr
+        for word in words:
+            assert str(word) in complaints[0], (word, complaints[0])
+        assert snapshot(*watched) == before, arguments
+        return complaints[0]
+
+    return refuse
 
 
-out = os.path.join(fresh_directory("results"), "out.mrc")
+@pytest.fixture(scope="module", name="refuse_series")
+def make_refuse_series(good, out, refuse, stack):
+    def refuse_series(words, file=stack, *options):
+        """Checks the same for a series; its options replace the good ones."""
+        refuse(words, "reconstruct", file, "-o", out, *harness.merge(good, options))
+
+    return refuse_series
 
 
-def refuse_series(words, file=stack, *options):
-    """The same of a series, its options beside the good ones."""
-    refuse(words, "reconstruct", file, "-o", out, *harness.merge(GOOD, options))
-
-
-def test_counts_that_differ():
+def test_counts_that_differ(refuse_series, stack, text_file):
     short = text_file("short.tlt", "0\n1\n2\n")
     refuse_series([short, stack, 3, NUM_VIEWS], stack, "--tlt", short)
     long = text_file("long.tlt", "1\n" * (NUM_VIEWS + 1))
@@ -97,7 +144,7 @@ def test_counts_that_differ():
     refuse_series([empty, 0, NUM_VIEWS], stack, "--tlt", empty)
 
 
-def test_angles_that_are_none():
+def test_angles_that_are_none(out, refuse, refuse_series, stack, text_file):
     for line, word in (("twelve", "twelve"), ("nan", "nan"), ("inf", "inf"), ("80.5", "80.5"),
                        ("-81", "-81"), ("1e400", "1e400"), ("3,5", "3,5")):
         name = text_file("angles.tlt", "0\n1\n" + line + "\n3\n4\n5\n6\n")
@@ -110,7 +157,7 @@ def test_angles_that_are_none():
     refuse_series([bad], stack, "--aln", bad)
 
 
-def test_files_that_are_missing_or_something_else():
+def test_files_that_are_missing_or_something_else(inputs, path, refuse_series, stack, tlt):
     absent = path("absent")
     refuse_series([absent], absent)
     for option in ("--tlt", "--xf", "--xtilt", "--aln", "--mdoc"):
@@ -122,7 +169,7 @@ def test_files_that_are_missing_or_something_else():
     refuse_series(["x" * 20], "x" * 300)  # longer than a file's name may be
 
 
-def test_damaged_stacks():
+def test_damaged_stacks(patched_stack, path, refuse_series, stack):
     whole = read_bytes(stack)
     for length in (0, 500, 1024, len(whole) - 1):
         with open(path("torn.mrc"), "wb") as file:
@@ -143,7 +190,7 @@ def test_damaged_stacks():
         refuse_series([name], name)
 
 
-def test_pixels_that_are_no_measurements():
+def test_pixels_that_are_no_measurements(good, out, refuse_series, stack, stack_file, text_file):
     for value in (np.nan, np.inf, -np.inf):
         values = views.copy()
         values[4, :2] = value  # 80 of 1320: 6 %
@@ -152,13 +199,13 @@ def test_pixels_that_are_no_measurements():
     values = views.copy()
     values[4, 3, :4] = [np.nan, np.inf, -np.inf, np.nan]
     name = stack_file("four.mrc", values)
-    result = harness.succeed("reconstruct", name, "-o", out, *GOOD, "--dry-run")
+    result = harness.succeed("reconstruct", name, "-o", out, *good, "--dry-run")
     assert re.search("warning: .*section 5.* 4 NaN or infinite", result.stderr), result.stderr
     values = views.copy()
     values[2] = 7
     name = stack_file("constant.mrc", values)
     refuse_series([name, "section 3", "constant", "--exclude 3"], name)
-    harness.succeed("reconstruct", name, "-o", out, *GOOD, "--dry-run", "--exclude", 3)
+    harness.succeed("reconstruct", name, "-o", out, *good, "--dry-run", "--exclude", 3)
     refuse_series(["8", "1 to 7"], stack, "--exclude", 8)
     refuse_series(["two"], stack, "--exclude", "two")
     refuse_series([stack], stack, "--exclude", f"1-{NUM_VIEWS}")  # none is left
@@ -169,7 +216,7 @@ def test_pixels_that_are_no_measurements():
     refuse_series([stack, "section 1"], stack, "--xf", away)
 
 
-def test_options_that_make_no_sense():
+def test_options_that_make_no_sense(good, out, refuse, refuse_series, stack, tlt):
     for option, values in {
         "--thickness": [0, -5, "nan", "inf", 1e12, "thick", ""],
         "--leaf-size": [0, -16, 17, 8, 1 << 20, 32.5],
@@ -208,11 +255,11 @@ def test_options_that_make_no_sense():
     refuse_series(["--bin", "--angpix"], stack, "--bin", 2, "--angpix", 20)
     refuse_series(["--overwrite", "--resume"], stack, "--overwrite", "--resume")
     refuse(["--thickness"], "reconstruct", stack, "-o", out, "--tlt", tlt)
-    refuse(["-o", "--output"][1:], "reconstruct", stack, *GOOD)
-    refuse(["stack"], "reconstruct", "-o", out, *GOOD)
+    refuse(["-o", "--output"][1:], "reconstruct", stack, *good)
+    refuse(["stack"], "reconstruct", "-o", out, *good)
     refuse(["--help"])
     refuse(["reconstrct"], "reconstrct")
-    # Every mistake at once.
+    # Every mistake is named at once.
     refuse_series(["--tv", "--rank", "--leaf-size"], stack, "--tv", -1, "--rank", 0,
                   "--leaf-size", 1)
 
@@ -223,11 +270,15 @@ def test_usage_is_what_is_typed():
         assert usage in harness.succeed(*words, "--help").stdout, usage
 
 
-def refuse_output(words, output, *options):
-    refuse(words, "reconstruct", stack, "-o", output, *GOOD, *options)
+@pytest.fixture(scope="module", name="refuse_output")
+def make_refuse_output(good, refuse, stack):
+    def refuse_output(words, output, *options):
+        refuse(words, "reconstruct", stack, "-o", output, *good, *options)
+
+    return refuse_output
 
 
-def test_outputs_that_cannot_be_written():
+def test_outputs_that_cannot_be_written(inputs, path, refuse_output, stack):
     for output in (os.path.join(inputs, "no", "out.mrc"), os.path.join(stack, "out.mrc"),
                    "/proc/nowhere/out.mrc", "/dev/full", inputs, inputs + "/", "",
                    os.path.join(inputs, "x" * 300)):
@@ -236,7 +287,7 @@ def test_outputs_that_cannot_be_written():
     refuse_output(["out.json", ".mrc"], path("out.json"))
 
 
-def test_outputs_that_exist_are_kept():
+def test_outputs_that_exist_are_kept(good, refuse, refuse_output, stack):
     directory = fresh_directory("existing")
     for name in ("out.mrc", "out.h5", "out.json", "out_xy.png", "out_yz.png"):
         existing = os.path.join(directory, name)
@@ -246,23 +297,24 @@ def test_outputs_that_exist_are_kept():
         refuse_output([existing, "--overwrite"], os.path.join(directory, "out.mrc"), "--dry-run")
         os.remove(existing)
     for method in ("sirt", "tv"):
-        refuse(["good.mrc"], "baseline", method, stack, "-o", stack, *GOOD, "--overwrite")
+        refuse(["good.mrc"], "baseline", method, stack, "-o", stack, *good, "--overwrite")
 
 
-def test_the_input_is_never_the_output():
+def test_the_input_is_never_the_output(good, inputs, path, refuse, refuse_output, stack, text_file,
+                                       tlt):
     os.symlink(stack, path("link.mrc"))
     os.link(stack, path("same.mrc"))
     for output in (stack, os.path.join(inputs, ".", "good.mrc"), path("link.mrc"),
                    path("same.mrc"), os.path.relpath(stack)):
         for options in ([], ["--overwrite"], ["--resume"]):
             refuse_output(["input", stack], output, *options)
-    # Nor is it what lies beside the output: figures in place of the angles.
+    # The files beside the output are no inputs either: the JSON would replace the angles.
     angles = text_file("angles.json", open(tlt).read())
     refuse(["input", angles], "reconstruct", stack, "-o", path("angles.mrc"),
-           *harness.merge(GOOD, ["--tlt", angles]), "--overwrite")
+           *harness.merge(good, ["--tlt", angles]), "--overwrite")
 
 
-def test_a_full_disk():
+def test_a_full_disk(good, refuse, stack):
     def with_little_room():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
@@ -270,13 +322,13 @@ def test_a_full_disk():
     for name, options in (("model", []), ("checkpoint", ["--checkpoint-minutes", 0])):
         directory = fresh_directory("full")
         refuse([directory], "reconstruct", stack, "-o", os.path.join(directory, "out.mrc"),
-               *GOOD, "--no-margin", "--epochs", 1, *options,
+               *good, "--no-margin", "--epochs", 1, *options,
                preexec_fn=with_little_room, restore_signals=False)
         assert os.listdir(directory) == []
 
 
-def test_memory_is_estimated_first():
-    # Views of 4096 × 4096 with something to see: the same tile all over.
+def test_memory_is_estimated_first(out, path, text_file):
+    # The views of 4096 × 4096 pixels repeat one tile.
     tile = np.random.default_rng(2).integers(0, 100, (256, 256), dtype=np.int8)
     large = path("large.mrc")
     with mrcfile.new_mmap(large, (2, 4096, 4096), mrc_mode=0) as file:
@@ -302,8 +354,8 @@ def test_memory_is_estimated_first():
     os.remove(large)
 
 
-def test_a_stack_of_nothing_is_answered_in_little_memory():
-    # 61 views of 4096 × 4096 floats that exist in the header alone.
+def test_a_stack_of_nothing_is_answered_in_little_memory(out, path, stack, text_file):
+    # The header promises 61 views of 4096 × 4096 floats, and the file is sparse.
     header = bytearray(read_bytes(stack)[:1024])
     header[0:12] = struct.pack("<3i", 4096, 4096, 61)
     header[28:40] = struct.pack("<3i", 4096, 4096, 61)
@@ -317,6 +369,3 @@ def test_a_stack_of_nothing_is_answered_in_little_memory():
     assert status == 2 and "section 1" in text and "constant" in text, text
     assert (mebibytes < 1024 or is_sanitized()), mebibytes
     os.remove(empty)
-
-
-harness.run_tests(globals())

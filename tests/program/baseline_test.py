@@ -1,6 +1,4 @@
-"""The baselines from end to end: the inputs, outputs and errors of reconstruct.
-
-usage: baseline_test.py TOMOFIELD SCRATCH_DIR"""
+"""Tests the baselines from end to end: they have the inputs, outputs and errors of reconstruct."""
 
 import io
 import json
@@ -9,12 +7,12 @@ import shutil
 
 import mrcfile
 import numpy as np
+import pytest
 import skimage.io
 
 import harness
 from harness import HEIGHT, PIXEL_SIZE, THICKNESS, TILTS, WIDTH, psnr, read_bytes
 
-SHARED = os.environ.get("TOMOFIELD_SHARED", "")
 EMPTY_BEAM = 500.0
 DEFAULTS = ["--thickness", THICKNESS, "--contrast", "bright", "--no-margin", "--threads", 1]
 METHODS = {
@@ -28,14 +26,19 @@ METHODS = {
 ITERATIVE = {method: options for method, options in METHODS.items() if options}
 NETWORKS = ["ingp", "implicit"]
 TUNED = ["wbp", "sirt", "sart-tv", "tv"]
-ONE_PASS = {method: ["--iterations", 1] for method in NETWORKS}  # where how well they fit is no matter
-WEAK = {"sart-tv": ["--weight", 0.1], "tv": ["--weight", 0.1]}  # not smoothed so much that nothing is negative
+# For tests that do not depend on how well the networks fit.
+ONE_PASS = {method: ["--iterations", 1] for method in NETWORKS}
+# A stronger weight would smooth every negative value away.
+WEAK = {"sart-tv": ["--weight", 0.1], "tv": ["--weight", 0.1]}
 
-series = harness.Series("series")
+@pytest.fixture(scope="module")
+def series():
+    """Returns a small simulated series."""
+    return harness.Series("series")
 
 
 class Baseline(harness.Results):
-    """The files of a run: no model."""
+    """Names the files of a run, which has no model."""
 
     def __init__(self, output):
         super().__init__(output)
@@ -46,17 +49,24 @@ class Baseline(harness.Results):
         return json.load(open(self.json_path))
 
 
-def baseline(method, name, *options, source=series, run=harness.succeed, **keywords):
-    output = os.path.join(harness.fresh_directory(f"{method}-{name}"), "out.mrc")
-    options = harness.merge([*DEFAULTS, *METHODS[method]], options)
-    result = run("baseline", method, *source.input, "-o", output, *options, **keywords)
-    return Baseline(output), result
+@pytest.fixture(scope="module", name="baseline")
+def make_baseline(series):
+    def baseline(method, name, *options, source=series, run=harness.succeed, **keywords):
+        output = os.path.join(harness.fresh_directory(f"{method}-{name}"), "out.mrc")
+        options = harness.merge([*DEFAULTS, *METHODS[method]], options)
+        result = run("baseline", method, *source.input, "-o", output, *options, **keywords)
+        return Baseline(output), result
+
+    return baseline
 
 
-plain = {method: baseline(method, "plain")[0] for method in METHODS}
+@pytest.fixture(scope="module")
+def plain(baseline):
+    """Returns the results of every method with its DEFAULTS."""
+    return {method: baseline(method, "plain")[0] for method in METHODS}
 
 
-def test_volume_is_an_mrc_file_that_others_read():
+def test_volume_is_an_mrc_file_that_others_read(plain):
     for results in plain.values():
         report = io.StringIO()
         assert mrcfile.validate(results.volume_path, print_file=report), report.getvalue()
@@ -70,7 +80,7 @@ def test_volume_is_an_mrc_file_that_others_read():
         assert not results.leftovers()
 
 
-def test_specimen_is_found_and_tv_is_the_better_one():
+def test_specimen_is_found_and_tv_is_the_better_one(plain, series):
     flat = psnr(np.full_like(series.truth, series.truth.mean()), series.truth)
     gain = {method: psnr(plain[method].volume, series.truth) - flat for method in METHODS}
     print({method: f"{value:.2f} dB" for method, value in gain.items()}, "above a flat volume")
@@ -79,17 +89,17 @@ def test_specimen_is_found_and_tv_is_the_better_one():
     assert gain["ingp"] > 1.8, gain  # implicit: see network_fit_test.cc
 
 
-def test_densities_are_not_negative_unless_allowed():
+def test_densities_are_not_negative_unless_allowed(baseline, plain):
     for method in ITERATIVE:
         assert plain[method].volume.min() >= 0
         free, _ = baseline(method, "free", "--non-negative", "off", *WEAK.get(method, []),
                            *ONE_PASS.get(method, []))
-        # Networks that have seen little stay above zero by themselves; see network_fit_test.cc.
+        # Networks that were hardly fitted stay above zero by themselves: network_fit_test.cc.
         assert method in NETWORKS or free.volume.min() < 0, method
         assert free.record["options"]["method"]["non_negative"] is False
 
 
-def test_json_has_figures_and_every_option():
+def test_json_has_figures_and_every_option(plain, series):
     for method, results in plain.items():
         options, figures = results.record["options"], results.record["figures"]
         assert options["input"]["stack"] == series.stack
@@ -114,19 +124,19 @@ def test_json_has_figures_and_every_option():
     assert plain["implicit"].record["options"]["method"]["shortest"] == 20
 
 
-def test_parameters_are_those_that_are_fitted():
+def test_parameters_are_those_that_are_fitted(baseline, plain):
     counts = {method: results.record["figures"]["parameters"]
               for method, results in plain.items()}
     for method in set(METHODS) - set(NETWORKS):
         assert counts[method] == WIDTH * HEIGHT * THICKNESS
-    # 32 plane waves, two layers of 16, one output.
+    # The network has 32 plane waves, two layers of 16 and one output.
     assert counts["implicit"] == 33 * 16 + 17 * 16 + 17
     more, _ = baseline("ingp", "wider", "--width", 17, "--iterations", 1)
-    # Two features of four levels go in.
+    # The inputs are two features of each of four levels.
     assert more.record["figures"]["parameters"] - counts["ingp"] == 9 + 17 + 16 + 1 + 1
 
 
-def test_implicit_learns_the_noise_of_each_view():
+def test_implicit_learns_the_noise_of_each_view(baseline, plain, series):
     noisy = series.views.copy()
     noisy[5] += np.random.default_rng(1).normal(0, 3 * series.views.std(), noisy[5].shape)
     results, _ = baseline("implicit", "noisy", source=series.with_views("noisy", noisy))
@@ -136,14 +146,14 @@ def test_implicit_learns_the_noise_of_each_view():
     assert "learned_noise_sigma" not in plain["ingp"].record["figures"]["views"][0]
 
 
-def test_a_network_begins_where_its_seed_says():
+def test_a_network_begins_where_its_seed_says(baseline):
     for method in NETWORKS:
         one, other = (baseline(method, f"seed{seed}", "--seed", seed, *ONE_PASS[method])[0]
                       for seed in (1, 2))
         assert read_bytes(other.volume_path) != read_bytes(one.volume_path)
 
 
-def test_held_out_views_are_predicted_and_not_fitted():
+def test_held_out_views_are_predicted_and_not_fitted(baseline, series):
     every = 4
     held_out = list(range(every // 2, len(TILTS) - 1, every))
     broken = series.views.copy()
@@ -166,7 +176,7 @@ def test_held_out_views_are_predicted_and_not_fitted():
         np.testing.assert_array_equal(other.volume, results.volume)
 
 
-def test_concave_penalty_is_another_one():
+def test_concave_penalty_is_another_one(plain, series):
     output = os.path.join(harness.fresh_directory("tv-concave"), "out.mrc")
     harness.succeed("baseline", "tv", *series.input, *DEFAULTS, "-o", output, "--iterations", 60,
                     "--penalty", "concave")
@@ -177,8 +187,9 @@ def test_concave_penalty_is_another_one():
     assert read_bytes(results.volume_path) != read_bytes(plain["tv"].volume_path)
 
 
-def test_tuned_settings_are_better_than_bad_ones_and_used_for_all_views():
-    bad = {"sart-tv": ["--weight", 30, "--iterations", 3], "tv": ["--weight", 40], "sirt": ["--iterations", 3],
+def test_tuned_settings_are_better_than_bad_ones_and_used_for_all_views(baseline, series):
+    bad = {"sart-tv": ["--weight", 30, "--iterations", 3], "tv": ["--weight", 40],
+           "sirt": ["--iterations", 3],
            "wbp": ["--window", "ramp"]}
     noise = np.random.default_rng(1).normal(0, series.views.std(), series.views.shape)
     sources = {"wbp": series.with_views("noisy", series.views + noise)}
@@ -201,12 +212,10 @@ def test_tuned_settings_are_better_than_bad_ones_and_used_for_all_views():
         assert read_bytes(by_hand.volume_path) == read_bytes(results.volume_path)
 
 
-def test_fitted_view_scales_do_not_upset_total_variation():
-    # The dust's residuals are many times its noise: scales fitted to each of the first volumes grew.
-    folder = os.path.join(SHARED, "data/idp_haadf")
-    if not os.path.exists(folder):
-        print("skipped: there is no ../shared/data/idp_haadf")
-        return
+def test_fitted_view_scales_do_not_upset_total_variation(shared_data):
+    # The dust's residuals are many times its noise. Scales that were fitted to each of the first
+    # volumes used to grow without bound.
+    folder = shared_data / "idp_haadf"
     objective = {}
     for view_scale in ("off", "on"):
         output = os.path.join(harness.fresh_directory(f"dust-{view_scale}"), "out.mrc")
@@ -217,7 +226,7 @@ def test_fitted_view_scales_do_not_upset_total_variation():
     assert objective["on"] < 1.5 * objective["off"], objective
 
 
-def test_views_that_score_the_result_have_no_say_in_its_settings():
+def test_views_that_score_the_result_have_no_say_in_its_settings(baseline, series):
     every = 4
     scored, broken = harness.with_broken_views(series, every)
     for method in TUNED:
@@ -227,7 +236,7 @@ def test_views_that_score_the_result_have_no_say_in_its_settings():
         assert figures[0]["held_out"]["independent"] is True
 
 
-def test_wider_roll_off_smooths_along_x():
+def test_wider_roll_off_smooths_along_x(baseline, plain):
     def roughness(volume):
         return np.mean(np.diff(volume, axis=2) ** 2)
 
@@ -237,7 +246,7 @@ def test_wider_roll_off_smooths_along_x():
     assert rough[1] > 1.2 * rough[0] and rough[2] < 0.8 * rough[1], rough
 
 
-def test_region_of_interest_is_a_part_of_the_whole():
+def test_region_of_interest_is_a_part_of_the_whole(baseline, plain):
     x0, y0, x1, y1 = 10, 5, 41, 30
     for method in METHODS:
         part, _ = baseline(method, "part", "--roi", f"{x0},{y0},{x1},{y1}", "--margin-spacing", 1,
@@ -255,12 +264,12 @@ def with_margin(*arguments, **keywords):
     return harness.succeed(*[word for word in arguments if word != "--no-margin"], **keywords)
 
 
-def test_hand_mirrors_the_volume():
+def test_hand_mirrors_the_volume(baseline, plain):
     other, _ = baseline("sirt", "hand", "--hand", -1)
     np.testing.assert_allclose(other.volume[::-1], plain["sirt"].volume, atol=2e-3)
 
 
-def test_dark_contrast_comes_out_dark():
+def test_dark_contrast_comes_out_dark(baseline, series):
     dark = series.with_views("dark", EMPTY_BEAM - series.views)
     results, _ = baseline("tv", "dark", "--contrast", "dark", "--view-scale", "off", source=dark)
     assert np.corrcoef(results.volume.ravel(), -series.truth.ravel())[0, 1] > 0.7
@@ -269,26 +278,27 @@ def test_dark_contrast_comes_out_dark():
     np.testing.assert_array_equal(inverted.volume, -results.volume)
 
 
-def test_axes_of_the_file():
+def test_axes_of_the_file(baseline, plain):
     swapped, _ = baseline("sirt", "xzy", "--axes", "xzy")
-    # Sections along y, rows down from the upper face.
+    # Sections lie along y, and rows run down from the upper face.
     np.testing.assert_array_equal(swapped.volume[:, ::-1].transpose(1, 0, 2),
                                   plain["sirt"].volume)
 
 
-def test_threads_do_not_change_a_byte():
+def test_threads_do_not_change_a_byte(baseline, plain):
     for method in METHODS:
         results, _ = baseline(method, "threads", "--threads", 2)  # one elsewhere
         assert read_bytes(results.volume_path) == read_bytes(plain[method].volume_path)
 
 
-def test_dry_run_writes_nothing():
+def test_dry_run_writes_nothing(baseline):
     results, run = baseline("tv", "dry", "--tune", "--dry-run")
-    assert "GiB" in run.stdout and "trials" in run.stdout and f"{WIDTH} × {HEIGHT} × {THICKNESS}" in run.stdout
+    for words in ("GiB", "trials", f"{WIDTH} × {HEIGHT} × {THICKNESS}"):
+        assert words in run.stdout, run.stdout
     assert not results.leftovers() and not os.path.exists(results.volume_path)
 
 
-def test_existing_results_are_kept_unless_overwritten():
+def test_existing_results_are_kept_unless_overwritten(plain, series):
     for method, results in plain.items():
         before = read_bytes(results.volume_path)
         command = ["baseline", method, *series.input, *DEFAULTS, "-o", results.volume_path]
@@ -303,7 +313,7 @@ def test_existing_results_are_kept_unless_overwritten():
         assert read_bytes(command[-1]) != before
 
 
-def test_bad_input_gets_a_sentence_and_nothing_is_written():
+def test_bad_input_gets_a_sentence_and_nothing_is_written(baseline, series):
     short = series.with_views("short", series.views[:-1])
     xtilt = os.path.join(series.directory, "five.xtilt")
     np.savetxt(xtilt, np.full(len(TILTS), 5.0))
@@ -342,10 +352,7 @@ def test_bad_input_gets_a_sentence_and_nothing_is_written():
         assert not results.leftovers() and not os.path.exists(results.volume_path)
 
 
-def test_a_method_has_to_be_named():
+def test_a_method_has_to_be_named(series):
     for arguments in (["baseline"], ["baseline", "art", *series.input]):
         run = harness.tomofield(*arguments)
         assert run.returncode == 2 and run.stderr, (arguments, run.stderr)
-
-
-harness.run_tests(globals())

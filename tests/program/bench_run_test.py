@@ -1,7 +1,5 @@
-"""bench/run, bench/regression, bench/methods and bench/scaling: rows are measured, kept and
-gathered; slower ones are found.
-
-usage: bench_run_test.py TOMOFIELD SCRATCH_DIR"""
+"""Tests bench/run, bench/regression, bench/methods and bench/scaling: they measure, keep and gather
+rows, and find those that got slower."""
 
 import argparse
 import glob
@@ -22,9 +20,6 @@ import quality_rows  # pylint: disable=wrong-import-position
 import speed_rows  # pylint: disable=wrong-import-position
 import wide_band  # pylint: disable=wrong-import-position
 
-SHARED = os.environ.get("TOMOFIELD_SHARED", "")
-MAKE_CELL = os.path.join(SHARED, "tools/make_cell.py")
-
 
 def bench(name, *arguments, **keywords):
     return subprocess.run(["/usr/bin/python3", os.path.join(BENCH, name), *map(str, arguments)],
@@ -32,8 +27,7 @@ def bench(name, *arguments, **keywords):
 
 
 def bench_run(folder, *arguments):
-    return bench("run", folder, "--program", harness.PROGRAM, "--make-cell", MAKE_CELL, "--quick",
-                 *arguments)
+    return bench("run", folder, "--program", harness.PROGRAM, "--quick", *arguments)
 
 
 def read_json(path):
@@ -79,9 +73,6 @@ def test_rows_are_measured_once_and_gathered():
 
 
 def test_another_program_is_run_beside_ours():
-    if not os.path.exists(MAKE_CELL):
-        print("skipped: there is no make_cell.py")
-        return
     folder = harness.fresh_directory("programs")
     config = os.path.join(folder, "programs.toml")
     write(config, f"[programs]\nwbp = \"{harness.PROGRAM} baseline wbp {{stack}} --tlt {{tlt}} "
@@ -150,7 +141,7 @@ def option_of(command, option, default):
     return int(command[command.index(option) + 1]) if option in command else default
 
 
-def test_a_wide_series_is_the_sum_of_its_parts():
+def test_a_wide_series_is_the_sum_of_its_parts(monkeypatch):
     wide = speed_rows.WideSeries(width=64, rows=16, timed_epochs=2, timed_coarse_epochs=4)
 
     def epochs(command, full=25, coarse=60):  # as defaults of reconstruct
@@ -161,19 +152,13 @@ def test_a_wide_series_is_the_sum_of_its_parts():
         return quality_rows.Usage(7 + 3 * full + 0.5 * coarse, 100 + full,
                                   15 + 6 * full + coarse)
 
-    replaced = {(speed_rows, "run_measured"): run_measured,
-                (quality_rows, "dry_run"): lambda c: {"MiB": 300, "steps": 11 * sum(epochs(c))},
-                (wide_band, "band_series"): lambda *_: "folder",
-                (wide_band, "estimate_of_whole"): lambda *_: 900}
-    kept = {place: getattr(*place) for place in replaced}
-    try:
-        for (module, name), stub in replaced.items():
-            setattr(module, name, stub)
-        options = argparse.Namespace(program="tomofield")
-        rows = speed_rows.measure_wide(options, wide, "wide", "scratch")["wide"]
-    finally:
-        for (module, name), function in kept.items():
-            setattr(module, name, function)
+    monkeypatch.setattr(speed_rows, "run_measured", run_measured)
+    monkeypatch.setattr(quality_rows, "dry_run",
+                        lambda command: {"MiB": 300, "steps": 11 * sum(epochs(command))})
+    monkeypatch.setattr(wide_band, "band_series", lambda *_: "folder")
+    monkeypatch.setattr(wide_band, "estimate_of_whole", lambda *_: 900)
+    options = argparse.Namespace(program="tomofield")
+    rows = speed_rows.measure_wide(options, wide, "wide", "scratch")["wide"]
     hours = 4 / 3600  # of as many bands
     expected = {"peak_of_band_MiB": 103, "estimated_of_band_MiB": 300, "estimated_of_whole_MiB": 900,
                 "epoch_of_band_core_s": 3, "coarse_epoch_of_band_core_s": 0.5,
@@ -201,7 +186,7 @@ def test_a_band_has_the_middle_rows():
 
 
 def run_of(arguments="x", **figures):
-    """run.json of two rows; the arguments are the second's."""
+    """Returns a run.json of two rows; `arguments` are those of the second."""
     return json.dumps({"rows": [{"group": "sizes", "name": "a row", "arguments": "x",
                                  "figures": figures},
                                 {"group": "sizes", "name": "another", "arguments": arguments,
@@ -242,7 +227,7 @@ def test_regression_names_what_has_no_partner():
 
 
 def write_row(folder, size, iterations, psnr):
-    """A row of bench/methods of `baseline sirt`."""
+    """Writes a row of bench/methods of `baseline sirt`."""
     arguments = f"baseline sirt --iterations {iterations}"
     os.makedirs(os.path.join(folder, "methods"), exist_ok=True)
     write(os.path.join(folder, "methods",
@@ -259,17 +244,16 @@ def test_methods_go_on_from_settings_that_were_kept_off_the_usual_start():
     table = bench("methods", folder, "--size", 48, "--table", *only)
     assert "| sirt | iterations 80 | 22.00 | " in table.stdout, table
     assert "| – | 1.2e+03 | – |" in table.stdout, table.stdout  # of all three
-    # A climb from the usual start is what the table is about where there is one.
+    # Where there is a climb from the default start, the table shows it.
     write_row(folder, 48, 40, 19.0)
     table = bench("methods", folder, "--size", 48, "--table", *only)
     assert "| sirt | iterations 40 | 19.00 | " in table.stdout, table
-    if os.path.exists(MAKE_CELL):
-        run = bench("methods", folder, "--size", 32, "--start-from", 48, "--program", harness.PROGRAM,
-                    "--make-cell", MAKE_CELL, *only)
-        assert run.returncode == 0, run.stderr
-        rows = glob.glob(os.path.join(folder, "methods/*_32_101.json"))
-        assert [os.path.basename(row) for row in rows] == [
-            "A_0.01_sirt_baseline_sirt_--iterations_80_32_101.json"], rows
+    run = bench("methods", folder, "--size", 32, "--start-from", 48, "--program", harness.PROGRAM,
+                *only)
+    assert run.returncode == 0, run.stderr
+    rows = glob.glob(os.path.join(folder, "methods/*_32_101.json"))
+    assert [os.path.basename(row) for row in rows] == [
+        "A_0.01_sirt_baseline_sirt_--iterations_80_32_101.json"], rows
 
 
 def test_scaling_keeps_whole_rows_of_the_same_arguments():
@@ -278,18 +262,17 @@ def test_scaling_keeps_whole_rows_of_the_same_arguments():
     figures = {"steps": 16, "views": 96 * [0], "parameters": 1, "processes": 4 * [process]}
     runs, broken = os.path.join(folder, "runs"), os.path.join(folder, "broken")
     write_program(os.path.join(folder, "tomofield"), f"""
+[ "$1" = simulate ] && exit
 [ -e {broken} ] && echo 'there is no memory' >&2 && exit 2
 echo >> {runs}
 while [ "$1" != -o ]; do shift; done
 echo '{json.dumps({"figures": figures})}' > "${{2%.mrc}}.json"
 """)
     write_program(os.path.join(folder, "mpirun"), "shift 2\nexec \"$@\"\n")
-    write(os.path.join(folder, "make_cell.py"), "")
 
     def scaling(*options):
-        return bench("scaling", folder, "--program", os.path.join(folder, "tomofield"), "--make-cell",
-                     os.path.join(folder, "make_cell.py"), "--only", "^grid 128", "--repeats", 1,
-                     *options, env={**os.environ, "PATH": f"{folder}:{os.environ['PATH']}"})
+        return bench("scaling", folder, "--program", os.path.join(folder, "tomofield"), "--only",
+                     "^grid 128", "--repeats", 1, *options, env={**os.environ, "PATH": f"{folder}:{os.environ['PATH']}"})
 
     write(broken, "")
     failed = scaling()
@@ -321,6 +304,3 @@ def test_regression_names_a_damaged_file():
         assert "Traceback" not in found.stderr
     missing = bench("regression", old, os.path.join(folder, "none.json"))
     assert missing.returncode == 2 and "cannot read" in missing.stderr, missing.stderr
-
-
-harness.run_tests(globals())

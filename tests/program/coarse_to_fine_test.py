@@ -1,38 +1,55 @@
-"""reconstruct's stages, coarse pixels and plain vertices before factors: their options, the plan,
-and --resume in and after them.
-
-usage: coarse_to_fine_test.py TOMOFIELD SCRATCH_DIR"""
+"""Tests the stages of reconstruct, coarse pixels and plain vertices before factors: their options,
+the plan, and --resume in and after them."""
 
 import json
 import os
 
 import h5py
+import pytest
 
 import harness
 
 COARSE, FINE, SUBSETS = 40, 3, 7
 OPTIONS = harness.merge(harness.QUICK, ["--leaf-size", 32, "--rank", 3, "--coarse-epochs", COARSE,
                                         "--epochs", FINE, "--subsets", SUBSETS])
-series = harness.Series("series")
 
 
-def command(results, *options):
-    return ["reconstruct", *series.input, "-o", results.volume_path, *harness.merge(OPTIONS, options)]
+@pytest.fixture(scope="module")
+def series():
+    """Returns a small simulated series."""
+    return harness.Series("series")
+
+
+@pytest.fixture(scope="module", name="command")
+def make_command(series):
+    def command(results, *options):
+        return ["reconstruct", *series.input, "-o", results.volume_path,
+                *harness.merge(OPTIONS, options)]
+
+    return command
 
 
 def fresh_results(name):
     return harness.Results(os.path.join(harness.fresh_directory(name), "out.mrc"))
 
 
-def psnr(results):
-    return harness.psnr(results.volume, series.truth)
+@pytest.fixture(scope="module", name="psnr")
+def make_psnr(series):
+    def psnr(results):
+        return harness.psnr(results.volume, series.truth)
+
+    return psnr
 
 
-whole = fresh_results("whole")
-harness.succeed(*command(whole))
+@pytest.fixture(scope="module")
+def whole(command):
+    """Returns the results of an undisturbed run."""
+    results = fresh_results("whole")
+    harness.succeed(*command(results))
+    return results
 
 
-def test_plan_and_figures_count_both_stages():
+def test_plan_and_figures_count_both_stages(command, whole):
     plan = harness.succeed(*command(fresh_results("plan"), "--dry-run")).stdout
     assert f"{(COARSE + FINE) * SUBSETS} steps" in plan, plan
     assert f"epochs: {COARSE} of pixels 2 x 2, {FINE} at full resolution\n" in plan, plan
@@ -44,43 +61,47 @@ def test_plan_and_figures_count_both_stages():
     assert len(document["figures"]["mean_squared_residual_per_noise_variance"]) == COARSE + FINE
 
 
-def test_the_coarse_stage_helps():
+def test_the_coarse_stage_helps(command, psnr, whole):
     alone = fresh_results("alone")
     harness.succeed(*command(alone, "--coarse-epochs", 0))
     print(f"PSNR {psnr(whole):.2f} dB, {psnr(alone):.2f} dB without")
     assert psnr(whole) > psnr(alone)
 
 
-def test_leaves_too_small_have_no_coarse_stage():
+def test_leaves_too_small_have_no_coarse_stage(command):
     result = harness.succeed(*command(fresh_results("small"), "--leaf-size", 16))
     assert "no coarse stage" in result.stderr and "--leaf-size" in result.stderr, result.stderr
     result = harness.succeed(*command(fresh_results("off"), "--coarse-epochs", 0))
     assert "no coarse stage" not in result.stderr, result.stderr
 
 
-def test_faulty_options_are_refused():
+def test_faulty_options_are_refused(command):
     for option, value in (("--coarse-epochs", -1), ("--vertex-epochs", -1), ("--coarse-bin", 1),
                           ("--coarse-bin", 65)):
         result = harness.tomofield(*command(fresh_results("faulty"), option, value))
         assert result.returncode == 2 and option in result.stderr, result
 
 
-def stages_when_stopped(results, *options):
-    """(kind of field, vertices of a leaf's side) as often as a run was stopped and resumed until it
-    was done."""
-    stages = set()
+@pytest.fixture(scope="module", name="stages_when_stopped")
+def make_stages_when_stopped(command):
+    def stages_when_stopped(results, *options):
+        """Stops and resumes a run until it is done, and returns (kind of field, vertices of a
+        leaf's side) of every checkpoint."""
+        stages = set()
 
-    def remember_stage():
-        with h5py.File(results.model_path) as model:
-            field = model["field"]
-            stages.add((field.attrs["kind"].decode(), int(field["leaves/nx"][0])))
+        def remember_stage():
+            with h5py.File(results.model_path) as model:
+                field = model["field"]
+                stages.add((field.attrs["kind"].decode(), int(field["leaves/nx"][0])))
 
-    harness.finish_with_stops(command(results, "--resume", "--threads", 1, *options),
-                              remember_stage, most=60)
-    return stages
+        harness.finish_with_stops(command(results, "--resume", "--threads", 1, *options),
+                                  remember_stage, most=60)
+        return stages
+
+    return stages_when_stopped
 
 
-def test_runs_stopped_in_either_stage_end_alike():
+def test_runs_stopped_in_either_stage_end_alike(stages_when_stopped, whole):
     results = fresh_results("resumed")
     stages = stages_when_stopped(results)
     assert ("vm", 17) in stages, f"no run was caught in the coarse stage: {stages}"
@@ -88,8 +109,14 @@ def test_runs_stopped_in_either_stage_end_alike():
 
 
 VERTICES_FIRST = ["--rank", 20, "--vertex-epochs", 8, "--coarse-epochs", 10, "--epochs", 6]
-with_vertices = fresh_results("vertices")
-harness.succeed(*command(with_vertices, *VERTICES_FIRST))
+
+
+@pytest.fixture(scope="module")
+def with_vertices(command):
+    """Returns the results of an undisturbed run that begins with plain vertices."""
+    results = fresh_results("vertices")
+    harness.succeed(*command(results, *VERTICES_FIRST))
+    return results
 
 
 def figures(results):
@@ -101,7 +128,7 @@ def residuals(results):
     return figures(results)["mean_squared_residual_per_noise_variance"]
 
 
-def test_factors_begin_as_plain_vertices():
+def test_factors_begin_as_plain_vertices(command, psnr, with_vertices):
     plan = harness.succeed(*command(fresh_results("plan"), *VERTICES_FIRST, "--dry-run")).stdout
     assert "epochs: 10 of pixels 2 x 2 with plain vertices, 8 at full resolution with plain " \
         "vertices, 6 at full resolution\n" in plan, plan
@@ -117,21 +144,21 @@ def test_factors_begin_as_plain_vertices():
     assert psnr(with_vertices) > psnr(of_factors)
 
 
-def test_factors_go_on_where_vertices_were():
+def test_factors_go_on_where_vertices_were(with_vertices):
     found = residuals(with_vertices)
     last_of_vertices, first_of_factors = found[10 + 8 - 1], found[10 + 8]
-    # The optimiser starts anew; factors of rank 3, which lose most of the values, have 2.2 times.
+    # The optimiser starts anew. Factors of rank 3 would lose most of the values and have 2.2 times.
     assert first_of_factors < 1.5 * last_of_vertices, found
 
 
-def test_held_out_views_are_predicted_in_every_stage():
+def test_held_out_views_are_predicted_in_every_stage(command):
     results = fresh_results("held")
     harness.succeed(*command(results, *VERTICES_FIRST, "--hold-out", 4))
     curve = figures(results)["held_out"]["error_by_epoch"]
     assert len(curve) == 24 and curve[-1] == min(curve), curve
 
 
-def test_an_early_stop_is_one_of_factors():
+def test_an_early_stop_is_one_of_factors(command):
     results = fresh_results("early")
     stopping = ["--hold-out", 4, "--tv", 0, "--epochs", 90, "--early-stop", 2]
     harness.succeed(*command(results, *harness.merge(VERTICES_FIRST, stopping)))
@@ -141,7 +168,7 @@ def test_an_early_stop_is_one_of_factors():
     assert 3 <= len(of_factors) == 3 + of_factors.index(min(of_factors)) < 90, curve
 
 
-def test_trials_of_the_penalty_are_the_same_whatever_factors_begin_with():
+def test_trials_of_the_penalty_are_the_same_whatever_factors_begin_with(command):
     def trials(name, *options):
         results = fresh_results(name)
         harness.succeed(*command(results, "--rank", 20, "--tv-penalty", "auto", *options))
@@ -153,7 +180,7 @@ def test_trials_of_the_penalty_are_the_same_whatever_factors_begin_with():
     assert trials("trials", *vertices) == trials("trials_of_factors", *factors)
 
 
-def test_the_usual_factors_begin_as_vertices():
+def test_the_usual_factors_begin_as_vertices(series):
     def epochs(*options):
         plan = harness.succeed("reconstruct", *series.input, "-o",
                                fresh_results("plan").volume_path, "--thickness", harness.THICKNESS,
@@ -170,21 +197,21 @@ def test_the_usual_factors_begin_as_vertices():
         == f"epochs: 80 of pixels 2 x 2{vertices}, 3{factors}{vertices}, 10{factors}"
 
 
-def test_vertices_have_no_variation_of_factors():
+def test_vertices_have_no_variation_of_factors(command, with_vertices):
     results = fresh_results("factor_variation")
     harness.succeed(*command(results, *VERTICES_FIRST, "--tv-factors", 5))
     assert residuals(results)[:18] == residuals(with_vertices)[:18]
     assert residuals(results)[18:] != residuals(with_vertices)[18:]
 
 
-def test_runs_stopped_before_there_are_factors_end_alike():
+def test_runs_stopped_before_there_are_factors_end_alike(stages_when_stopped, with_vertices):
     results = fresh_results("vertices_resumed")
     stages = stages_when_stopped(results, *VERTICES_FIRST)
     assert stages & {("grid", 17), ("grid", 33)}, f"no run was caught with vertices: {stages}"
     assert results.same_as(with_vertices)
 
 
-def test_leaves_of_a_grid_are_fitted_at_a_quarter_of_the_width_first():
+def test_leaves_of_a_grid_are_fitted_at_a_quarter_of_the_width_first(series, stages_when_stopped):
     grid = ["--field", "grid", "--coarse-epochs", 2 * COARSE]
     options = [word for word in harness.merge(OPTIONS, grid) if word not in ("--leaf-size", 32)]
     undisturbed = fresh_results("grid")
@@ -199,6 +226,3 @@ def test_leaves_of_a_grid_are_fitted_at_a_quarter_of_the_width_first():
     stages = stages_when_stopped(results, *grid, "--leaf-size", 64)
     assert stages & {("grid", 17), ("grid", 33)}, f"no run was caught in a coarse stage: {stages}"
     assert results.same_as(undisturbed)
-
-
-harness.run_tests(globals())

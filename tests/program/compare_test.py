@@ -1,6 +1,4 @@
-"""compare: what it runs, how it goes on, and the report that it writes.
-
-usage: compare_test.py TOMOFIELD SCRATCH_DIR"""
+"""Tests compare: the runs that it makes, how it goes on, and the report that it writes."""
 
 import csv
 import json
@@ -12,20 +10,36 @@ import subprocess
 import time
 
 import numpy as np
+import pytest
 import skimage.io
 
 import harness
 
-series = harness.Series("series")
-TRUTH = os.path.join(series.directory, "truth.mrc")
-harness.write_stack(TRUTH, series.truth.astype("f4"))
 QUICK = ["--thickness", harness.THICKNESS, "--contrast", "bright", "--no-margin"]
 OURS = ("ours=reconstruct --leaf-size 16 --rank 4 --epochs {} --subsets 7 --tv-penalty concave")
 
 
-def compare(folder, *options, epochs=4, run=harness.succeed):
-    return run("compare", *series.input, *QUICK, "-o", folder, "--methods", "sirt",
-               "--also", OURS.format(epochs), "--truth", TRUTH, *options)
+@pytest.fixture(scope="module")
+def series():
+    """Returns a small simulated series."""
+    return harness.Series("series")
+
+
+@pytest.fixture(scope="module")
+def truth(series):
+    """Returns the path of the series' truth."""
+    path = os.path.join(series.directory, "truth.mrc")
+    harness.write_stack(path, series.truth.astype("f4"))
+    return path
+
+
+@pytest.fixture(scope="module", name="compare")
+def make_compare(series, truth):
+    def compare(folder, *options, epochs=4, run=harness.succeed):
+        return run("compare", *series.input, *QUICK, "-o", folder, "--methods", "sirt",
+                   "--also", OURS.format(epochs), "--truth", truth, *options)
+
+    return compare
 
 
 def read(folder, name):
@@ -33,7 +47,7 @@ def read(folder, name):
         return file.read()
 
 
-def test_every_method_is_run_scored_and_shown():
+def test_every_method_is_run_scored_and_shown(compare, truth):
     folder = harness.fresh_directory("all")
     compare(folder, "--center", "24,12")
     rows = json.loads(read(folder, "comparison.json"))["methods"]
@@ -41,7 +55,7 @@ def test_every_method_is_run_scored_and_shown():
     for row in rows:
         assert row["core_seconds"] > 0 and row["peak_MiB"] > 5, row
         scores = os.path.join(folder, "scores.json")
-        harness.succeed("evaluate", row["volume"], TRUTH, "--json", scores, "--overwrite")
+        harness.succeed("evaluate", row["volume"], truth, "--json", scores, "--overwrite")
         with open(scores) as file:
             assert json.load(file)["psnr_raw_dB"] == row["psnr_dB"], row
         again = os.path.join(folder, "by_hand.mrc")
@@ -63,7 +77,7 @@ def test_every_method_is_run_scored_and_shown():
     assert abs(shades[0] - shades[1]) < 40, shades
 
 
-def test_halves_and_held_out_views_give_figures_without_a_truth():
+def test_halves_and_held_out_views_give_figures_without_a_truth(compare):
     folder = harness.fresh_directory("halves")
     compare(folder, "--halves", "--hold-out", 4, "--exclude", "3")
     rows = json.loads(read(folder, "comparison.json"))["methods"]
@@ -84,7 +98,7 @@ def test_halves_and_held_out_views_give_figures_without_a_truth():
     assert "Shell correlation of odd and even views" in read(folder, "report.html")
 
 
-def test_every_method_that_can_be_is_tuned():
+def test_every_method_that_can_be_is_tuned(series):
     folder = harness.fresh_directory("tuned")
     harness.succeed("compare", *series.input, *QUICK, "-o", folder, "--tune", "--methods", "wbp",
                     "--also", "s=baseline sirt --iterations 5", "--also",
@@ -140,7 +154,7 @@ def remove(folder, *names):
         os.remove(os.path.join(folder, name))
 
 
-def test_it_goes_on_where_it_stopped():
+def test_it_goes_on_where_it_stopped(series):
     folder = harness.fresh_directory("resumed")
     often = ["--also", OURS.format(4000) + " --checkpoint-minutes 0"]
     command = ["compare", *series.input, *QUICK, "-o", folder, "--methods", "sirt", *often]
@@ -162,7 +176,7 @@ def test_it_goes_on_where_it_stopped():
         assert later[cost] > stopped[cost] + 0.01, (stopped, later)
 
 
-def test_what_a_run_has_cost_stays_with_it():
+def test_what_a_run_has_cost_stays_with_it(compare):
     folder = harness.fresh_directory("costs")
     compare(folder)
     rows = {name: row_of(folder, name) for name in ("sirt", "ours")}
@@ -183,7 +197,7 @@ def test_what_a_run_has_cost_stays_with_it():
     assert both["core_seconds"] > killed["core_seconds"] and both["progress"] == "finished"
 
 
-def test_a_stopped_tuning_keeps_its_trials():
+def test_a_stopped_tuning_keeps_its_trials(compare):
     folder = harness.fresh_directory("stopped_tuning")
     trials = os.path.join(folder, "ours_tune.json")
     run = compare(folder, "--tune", epochs=60, run=harness.start)
@@ -198,7 +212,7 @@ def test_a_stopped_tuning_keeps_its_trials():
     assert row_of(folder, "ours")["core_seconds"] > costs["core_seconds"] > 0
 
 
-def test_overwrite_leaves_nothing_old():
+def test_overwrite_leaves_nothing_old(compare):
     folder = harness.fresh_directory("overwritten")
     compare(folder)
     run = compare(folder, "--overwrite", run=harness.start)
@@ -211,7 +225,7 @@ def test_overwrite_leaves_nothing_old():
     assert "sirt: running" in said and "ours: running" in said, said
 
 
-def test_what_a_row_was_made_from_is_watched():
+def test_what_a_row_was_made_from_is_watched(series):
     folder, files = harness.fresh_directory("changed"), harness.fresh_directory("changed_files")
     tlt, config = os.path.join(files, "copy.tlt"), os.path.join(files, "sirt.toml")
     shutil.copyfile(series.tlt, tlt)
@@ -248,7 +262,7 @@ def test_what_a_row_was_made_from_is_watched():
     assert os.path.exists(os.path.join(folder, "few.mrc"))
 
 
-def test_a_run_that_fails_is_named_and_its_costs_are_kept():
+def test_a_run_that_fails_is_named_and_its_costs_are_kept(compare):
     folder = harness.fresh_directory("failing")
     run = compare(folder, epochs=20000, run=harness.start)
     wait_until(lambda: os.path.exists(os.path.join(folder, "ours.log")))
@@ -261,17 +275,21 @@ def test_a_run_that_fails_is_named_and_its_costs_are_kept():
     assert row_of(folder, "sirt")["progress"] == "finished", "what is finished stays"
 
 
-def refuse(folder, facts, *options):
-    """A mistake that is found before anything is made."""
-    words = harness.merge(["--methods", "sirt", "--truth", TRUTH], options)
-    result = harness.tomofield("compare", *series.input, *QUICK, "-o", folder, *words)
-    assert result.returncode == 2, (options, result.stderr)
-    for fact in facts:
-        assert fact in result.stderr, (fact, options, result.stderr)
-    assert not os.listdir(os.path.dirname(folder)), (options, os.listdir(os.path.dirname(folder)))
+@pytest.fixture(scope="module", name="refuse")
+def make_refuse(series, truth):
+    def refuse(folder, facts, *options):
+        """Checks that a mistake is found before anything is made."""
+        words = harness.merge(["--methods", "sirt", "--truth", truth], options)
+        result = harness.tomofield("compare", *series.input, *QUICK, "-o", folder, *words)
+        assert result.returncode == 2, (options, result.stderr)
+        for fact in facts:
+            assert fact in result.stderr, (fact, options, result.stderr)
+        assert not os.listdir(os.path.dirname(folder)), (options, os.listdir(os.path.dirname(folder)))
+
+    return refuse
 
 
-def test_mistakes_are_named_before_anything_is_made():
+def test_mistakes_are_named_before_anything_is_made(compare, refuse, series):
     parent = harness.fresh_directory("mistakes")
     folder = os.path.join(parent, "new", "folder")
     os.makedirs(os.path.dirname(folder))
@@ -289,18 +307,18 @@ def test_mistakes_are_named_before_anything_is_made():
            "--also", "part=baseline sirt --roi 0,0,24,24")
     refuse(folder, ["turned", "48 × 24 × 36", "sirt", "48 × 36 × 24"],
            "--also", "turned=baseline sirt --axes xzy")
-    truth = os.path.join(series.directory, "other_truth.mrc")
+    other = os.path.join(series.directory, "other_truth.mrc")
     for values, voxel in ((series.truth, 2 * harness.PIXEL_SIZE),
                           (np.repeat(series.truth, 3, axis=1), harness.PIXEL_SIZE)):
-        harness.write_stack(truth, values.astype("f4"), voxel)
-        refuse(folder, ["other_truth.mrc", "sirt", "48 × 36 × 24"], "--truth", truth)
+        harness.write_stack(other, values.astype("f4"), voxel)
+        refuse(folder, ["other_truth.mrc", "sirt", "48 × 36 × 24"], "--truth", other)
     file = os.path.join(parent, "file")
     open(file, "w").close()
     result = compare(os.path.join(file, "folder"), run=harness.tomofield)
     assert result.returncode == 2 and "cannot be made" in result.stderr, result.stderr
 
 
-def test_own_options_may_have_several_values():
+def test_own_options_may_have_several_values(series):
     folder = harness.fresh_directory("several_values")
     harness.succeed("compare", *series.input, *QUICK, "-o", folder, "--methods", "wbp", "--also",
                     "whole=baseline wbp --roi 0,0,48,36")
@@ -308,7 +326,7 @@ def test_own_options_may_have_several_values():
         os.path.join(folder, "wbp.mrc"))
 
 
-def test_no_volume_of_another_size_is_compared():
+def test_no_volume_of_another_size_is_compared(compare):
     folder = harness.fresh_directory("sizes")
     compare(folder)
     report = read(folder, "report.html")
@@ -320,10 +338,9 @@ def test_no_volume_of_another_size_is_compared():
     assert read(folder, "report.html") == report
 
 
-def test_chromium_shows_every_picture_without_errors():
+def test_chromium_shows_every_picture_without_errors(compare):
     if not shutil.which("chromium"):
-        print("skipped: there is no chromium")
-        return
+        pytest.skip("there is no chromium")
     folder = harness.fresh_directory("shown")
     compare(folder)
     script = ("<script>onload = () => { document.title = [...document.images].filter("
@@ -336,6 +353,3 @@ def test_chromium_shows_every_picture_without_errors():
                             "file://" + page], capture_output=True, text=True, timeout=120)
     assert "<title>12 shown</title>" in shown.stdout, shown.stdout[:2000]
     assert "CONSOLE" not in shown.stderr, shown.stderr
-
-
-harness.run_tests(globals())

@@ -1,40 +1,55 @@
-"""`tomofield export` and `tomofield info` on a model of a small reconstruction.
+"""Tests `tomofield export` and `tomofield info` on a model of a small reconstruction.
 
-Volumes are read with mrcfile and compared with the reconstruction's own.
+Volumes are read with mrcfile and compared with the reconstruction's own."""
 
-usage: export_test.py TOMOFIELD SCRATCH_DIRECTORY"""
+import collections
 import io
 import os
 import pathlib
 import shutil
-import subprocess
-import sys
 
-try:
-    import h5py
-    import mrcfile
-    import numpy as np
-except ImportError as missing:
-    print(f"SKIPPED: {missing}")
-    sys.exit(77)
+import h5py
+import mrcfile
+import numpy as np
+import pytest
 
-tomofield, scratch = sys.argv[1:3]
-shutil.rmtree(scratch, ignore_errors=True)
-os.makedirs(scratch)
-os.chdir(scratch)
+import harness
 
 PIXEL_A = 7.3
 X0, Y0, WIDTH, HEIGHT, THICKNESS = 6, 4, 41, 37, 30
+PART = (slice(5, 16), slice(8, 28), slice(3, 33))  # of the volume, [z, y, x]
+
+Reconstruction = collections.namedtuple("Reconstruction", "folder volume")
 
 
-def run(*arguments):
-    return subprocess.run([tomofield, *map(str, arguments)], capture_output=True, text=True)
+@pytest.fixture(scope="module")
+def reconstruction():
+    """Returns the folder of volume.mrc and model.h5, and the values of the volume."""
+    folder = harness.fresh_directory("reconstruction")
+    series, output = os.path.join(folder, "series"), os.path.join(folder, "volume.mrc")
+    harness.succeed("simulate", series, "--size", 56, "--thickness", THICKNESS, "--voxel-size",
+                    PIXEL_A, "--tilts", "-60:60:10")
+    harness.succeed("reconstruct", series + "/tilt_series.mrc", "--tlt", series + "/tilt_series.tlt",
+                    "--contrast", "bright", "--thickness", THICKNESS, "--roi",
+                    f"{X0},{Y0},{X0 + WIDTH},{Y0 + HEIGHT}", "--epochs", 1, "-o", output)
+    os.rename(os.path.join(folder, "volume.h5"), os.path.join(folder, "model.h5"))
+    volume = read(output)[0]
+    assert volume.shape == (THICKNESS, HEIGHT, WIDTH)
+    assert np.ptp(volume) > 0
+    return Reconstruction(folder, volume)
 
 
-def succeed(*arguments):
-    result = run(*arguments)
-    assert result.returncode == 0, (arguments, result.stderr)
-    return result.stdout
+@pytest.fixture(autouse=True)
+def in_scratch(reconstruction, scratch, monkeypatch):
+    """Runs every test in its own folder, with copies of the model and the volume."""
+    monkeypatch.chdir(scratch)
+    for name in ("model.h5", "volume.mrc"):
+        shutil.copy(os.path.join(reconstruction.folder, name), scratch)
+
+
+@pytest.fixture
+def whole(reconstruction):
+    return reconstruction.volume
 
 
 def read(path):
@@ -46,81 +61,81 @@ def read(path):
 
 def export(*arguments):
     """Exports to box.mrc and returns its values, voxel size and origin."""
-    succeed("export", "model.h5", "-o", "box.mrc", "--overwrite", *arguments)
+    harness.succeed("export", "model.h5", "-o", "box.mrc", "--overwrite", *arguments)
     return read("box.mrc")
 
 
-def close(found, expected):
+def check_close(found, expected, whole):
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-6 * np.abs(whole).max())
 
 
-succeed("simulate", "series", "--size", 56, "--thickness", THICKNESS, "--voxel-size", PIXEL_A,
-        "--tilts", "-60:60:10")
-succeed("reconstruct", "series/tilt_series.mrc", "--tlt", "series/tilt_series.tlt", "--contrast",
-        "bright", "--thickness", THICKNESS, "--roi", f"{X0},{Y0},{X0 + WIDTH},{Y0 + HEIGHT}",
-        "--epochs", 1, "-o", "volume.mrc")
-os.rename("volume.h5", "model.h5")
-whole, voxel_size, origin = read("volume.mrc")
-assert whole.shape == (THICKNESS, HEIGHT, WIDTH)
-assert np.ptp(whole) > 0
+def test_by_default_it_is_the_volume_of_reconstruct():
+    export()
+    assert pathlib.Path("box.mrc").read_bytes() == pathlib.Path("volume.mrc").read_bytes()
 
-# By default the reconstruction's own volume, header and all.
-export()
-assert pathlib.Path("box.mrc").read_bytes() == pathlib.Path("volume.mrc").read_bytes()
 
-# A part of it, by corners and by centre, knows where it lies.
-part = whole[5:16, 8:28, 3:33]
-for box in (["--box", f"{X0 + 3},{Y0 + 8},5,{X0 + 33},{Y0 + 28},16"],
-            ["--center", f"{X0 + 18},{Y0 + 18},10.5", "--size", "30,20,11"]):
+@pytest.mark.parametrize("box", (
+    ["--box", f"{X0 + 3},{Y0 + 8},5,{X0 + 33},{Y0 + 28},16"],
+    ["--center", f"{X0 + 18},{Y0 + 18},10.5", "--size", "30,20,11"]))
+def test_a_part_knows_where_it_lies(whole, box):
     values, voxel_size, origin = export(*box)
-    close(values, part)
+    check_close(values, whole[PART], whole)
     np.testing.assert_allclose(origin, np.array([X0 + 3, Y0 + 8, 5]) * -PIXEL_A, atol=1e-4)
     np.testing.assert_allclose(voxel_size.tolist(), PIXEL_A, rtol=1e-7)
 
-# Beside the region of interest: a warning, and none where the box ends at its face.
-for x1, words in ((X0 + WIDTH, False), (X0 + WIDTH + 3, True)):
-    result = run("export", "model.h5", "-o", "box.mrc", "--overwrite", "--box",
-                 f"{X0 + 3},{Y0 + 8},0,{x1},{Y0 + 10},5")
-    assert ("reaches outside" in result.stderr) == words, result.stderr
 
-# Two pixels a voxel: means, with the exact size; the odd last column and row stay out,
-# half a pixel on either side.
-values, voxel_size, origin = export("--bin", 2, "--box", f"{X0 + 3},{Y0 + 8},5,{X0 + 33},{Y0 + 28},15")
-close(values, part[:10].reshape(5, 2, 10, 2, 15, 2).mean(axis=(1, 3, 5)))
-np.testing.assert_allclose(voxel_size.tolist(), 2 * PIXEL_A, rtol=1e-7)
-values, voxel_size, origin = export("--voxel-size", 2 * PIXEL_A)
-assert values.shape == (15, 18, 20)
-np.testing.assert_allclose(origin, np.array([X0 + 0.5, Y0 + 0.5, 0]) * -PIXEL_A, atol=1e-4)
+def test_a_box_outside_the_region_of_interest_has_a_warning():
+    for x1, is_outside in ((X0 + WIDTH, False), (X0 + WIDTH + 3, True)):
+        result = harness.tomofield("export", "model.h5", "-o", "box.mrc", "--overwrite", "--box",
+                                   f"{X0 + 3},{Y0 + 8},0,{x1},{Y0 + 10},5")
+        assert ("reaches outside" in result.stderr) == is_outside, result.stderr
 
-# IMOD's axes; trimvol -rx turns the sections back: z = rows - 1 - row.
-values = export("--axes", "xzy")[0]
-close(values[:, ::-1].transpose(1, 0, 2), whole)
 
-# A quarter turn about z (RELION's rot): the box's x lies along -y of the tomogram.
-values = export("--center", f"{X0 + 18},{Y0 + 18},10.5", "--size", "20,30,11", "--rotate", "90,0,0")[0]
-close(values, part[:, ::-1, :].transpose(0, 2, 1))
+def test_binned_voxels_are_means(whole):
+    values, voxel_size, _ = export("--bin", 2, "--box",
+                                   f"{X0 + 3},{Y0 + 8},5,{X0 + 33},{Y0 + 28},15")
+    means = whole[PART][:10].reshape(5, 2, 10, 2, 15, 2).mean(axis=(1, 3, 5))
+    check_close(values, means, whole)
+    np.testing.assert_allclose(voxel_size.tolist(), 2 * PIXEL_A, rtol=1e-7)
+    # The odd last column and row stay out, half a pixel on either side.
+    values, _, origin = export("--voxel-size", 2 * PIXEL_A)
+    assert values.shape == (15, 18, 20)
+    np.testing.assert_allclose(origin, np.array([X0 + 0.5, Y0 + 0.5, 0]) * -PIXEL_A, atol=1e-4)
 
-close(export("--invert")[0], -whole)
-halves = export("--mode", 12)[0]
-assert halves.dtype == np.float16
-np.testing.assert_allclose(halves, whole, rtol=1e-3, atol=1e-6)
-integers = export("--mode", 1)[0]
-assert integers.dtype == np.int16 and np.abs(integers).max() == 32000
-step = np.abs(whole).max() / 32000
-np.testing.assert_allclose(integers * step, whole, rtol=0, atol=0.51 * step)
 
-# What info says of the model.
-text = succeed("info", "model.h5")
-with h5py.File("model.h5") as model:
-    num_parameters = model["field/parameters"].size
-for fact in ("7.3 Å", f"{WIDTH} × {HEIGHT} px from {X0},{Y0}", "13 views from -60° to 60°", "bright",
-             f"{num_parameters} parameters", "root cells", "margin", '"epochs":1'):
-    assert fact in text, (fact, text)
+def test_axes_rotation_and_sign(whole):
+    # With IMOD's axes, trimvol -rx turns the sections back: z = rows - 1 - row.
+    values = export("--axes", "xzy")[0]
+    check_close(values[:, ::-1].transpose(1, 0, 2), whole, whole)
+    # After a quarter turn about z (RELION's rot) the box's x lies along -y of the tomogram.
+    values = export("--center", f"{X0 + 18},{Y0 + 18},10.5", "--size", "20,30,11", "--rotate",
+                    "90,0,0")[0]
+    check_close(values, whole[PART][:, ::-1, :].transpose(0, 2, 1), whole)
+    check_close(export("--invert")[0], -whole, whole)
+
+
+def test_modes_of_the_file(whole):
+    halves = export("--mode", 12)[0]
+    assert halves.dtype == np.float16
+    np.testing.assert_allclose(halves, whole, rtol=1e-3, atol=1e-6)
+    integers = export("--mode", 1)[0]
+    assert integers.dtype == np.int16 and np.abs(integers).max() == 32000
+    step = np.abs(whole).max() / 32000
+    np.testing.assert_allclose(integers * step, whole, rtol=0, atol=0.51 * step)
+
+
+def test_info_describes_the_model():
+    text = harness.succeed("info", "model.h5").stdout
+    with h5py.File("model.h5") as model:
+        num_parameters = model["field/parameters"].size
+    for fact in ("7.3 Å", f"{WIDTH} × {HEIGHT} px from {X0},{Y0}", "13 views from -60° to 60°",
+                 "bright", f"{num_parameters} parameters", "root cells", "margin", '"epochs":1'):
+        assert fact in text, (fact, text)
 
 
 def expect_refusal(facts, *arguments, command="export"):
     before = {path: path.stat().st_mtime_ns for path in pathlib.Path(".").rglob("*")}
-    result = run(command, *arguments)
+    result = harness.tomofield(command, *arguments)
     assert result.returncode == 2, (arguments, result.returncode, result.stdout, result.stderr)
     for fact in facts:
         assert fact in result.stderr, (arguments, fact, result.stderr)
@@ -130,37 +145,41 @@ def expect_refusal(facts, *arguments, command="export"):
     assert all(path.is_dir() or before[path] == after[path] for path in before), arguments
 
 
-expect_refusal(["box.mrc", "--overwrite"], "model.h5", "-o", "box.mrc")
-expect_refusal(["nowhere"], "model.h5", "-o", "nowhere/new.mrc")
-expect_refusal(["model.h5"], "model.h5", "-o", "./model.h5", "--overwrite")
-expect_refusal(["absent.h5"], "absent.h5", "-o", "new.mrc")
-expect_refusal(["volume.mrc", "HDF5"], "volume.mrc", "-o", "new.mrc")
-expect_refusal(["outside", "z runs"], "model.h5", "-o", "new.mrc", "--box", "0,0,100,9,9,110")
-expect_refusal(["--box", "y from 9 to 0"], "model.h5", "-o", "new.mrc", "--box", "0,9,0,9,0,9")
-expect_refusal(["--box"], "model.h5", "-o", "new.mrc", "--box", "0,0,0,9,9")
-expect_refusal(["nan"], "model.h5", "-o", "new.mrc", "--center", "1,nan,1", "--size", "3,3,3")
-expect_refusal(["--size"], "model.h5", "-o", "new.mrc", "--center", "1,1,1")
-expect_refusal(["--size"], "model.h5", "-o", "new.mrc", "--center", "1,1,1", "--size", "0,3,3")
-expect_refusal(["--voxel-size"], "model.h5", "-o", "new.mrc", "--voxel-size", "0")
-expect_refusal(["--bin"], "model.h5", "-o", "new.mrc", "--voxel-size", "9", "--bin", "2")
-expect_refusal(["--mode"], "model.h5", "-o", "new.mrc", "--mode", "4")
+def test_options_that_make_no_sense_are_refused():
+    export()
+    expect_refusal(["box.mrc", "--overwrite"], "model.h5", "-o", "box.mrc")
+    expect_refusal(["nowhere"], "model.h5", "-o", "nowhere/new.mrc")
+    expect_refusal(["model.h5"], "model.h5", "-o", "./model.h5", "--overwrite")
+    expect_refusal(["absent.h5"], "absent.h5", "-o", "new.mrc")
+    expect_refusal(["volume.mrc", "HDF5"], "volume.mrc", "-o", "new.mrc")
+    expect_refusal(["outside", "z runs"], "model.h5", "-o", "new.mrc", "--box", "0,0,100,9,9,110")
+    expect_refusal(["--box", "y from 9 to 0"], "model.h5", "-o", "new.mrc", "--box", "0,9,0,9,0,9")
+    expect_refusal(["--box"], "model.h5", "-o", "new.mrc", "--box", "0,0,0,9,9")
+    expect_refusal(["nan"], "model.h5", "-o", "new.mrc", "--center", "1,nan,1", "--size", "3,3,3")
+    expect_refusal(["--size"], "model.h5", "-o", "new.mrc", "--center", "1,1,1")
+    expect_refusal(["--size"], "model.h5", "-o", "new.mrc", "--center", "1,1,1", "--size", "0,3,3")
+    expect_refusal(["--voxel-size"], "model.h5", "-o", "new.mrc", "--voxel-size", "0")
+    expect_refusal(["--bin"], "model.h5", "-o", "new.mrc", "--voxel-size", "9", "--bin", "2")
+    expect_refusal(["--mode"], "model.h5", "-o", "new.mrc", "--mode", "4")
 
-whole_model = pathlib.Path("model.h5").read_bytes()
-for length in (9, 400, len(whole_model) // 2, len(whole_model) - 1):
-    pathlib.Path("torn.h5").write_bytes(whole_model[:length])
-    expect_refusal(["torn.h5"], "torn.h5", "-o", "new.mrc")
-    expect_refusal(["torn.h5"], "torn.h5", command="info")
-zeroed = bytearray(whole_model)
-zeroed[len(zeroed) // 2:len(zeroed) // 2 + 4096] = bytes(4096)
-pathlib.Path("zeroed.h5").write_bytes(zeroed)
-expect_refusal(["zeroed.h5", "checksum"], "zeroed.h5", "-o", "new.mrc")
-with h5py.File("foreign.h5", "w") as foreign:
-    foreign["voltage"] = 300.0
-expect_refusal(["foreign.h5", "no model"], "foreign.h5", "-o", "new.mrc")
-expect_refusal(["foreign.h5", "no model"], "foreign.h5", command="info")
 
-# Metadata damaged in place: HDF5 itself must stay silent, too.
-damaged = bytearray(whole_model)
-damaged[whole_model.index(b"softplus_beta")] ^= 1
-pathlib.Path("damaged.h5").write_bytes(damaged)
-expect_refusal(["damaged.h5"], "damaged.h5", "-o", "new.mrc")
+def test_damaged_and_foreign_models_are_refused():
+    whole_model = pathlib.Path("model.h5").read_bytes()
+    for length in (9, 400, len(whole_model) // 2, len(whole_model) - 1):
+        pathlib.Path("torn.h5").write_bytes(whole_model[:length])
+        expect_refusal(["torn.h5"], "torn.h5", "-o", "new.mrc")
+        expect_refusal(["torn.h5"], "torn.h5", command="info")
+    zeroed = bytearray(whole_model)
+    zeroed[len(zeroed) // 2:len(zeroed) // 2 + 4096] = bytes(4096)
+    pathlib.Path("zeroed.h5").write_bytes(zeroed)
+    expect_refusal(["zeroed.h5", "checksum"], "zeroed.h5", "-o", "new.mrc")
+    with h5py.File("foreign.h5", "w") as foreign:
+        foreign["voltage"] = 300.0
+    expect_refusal(["foreign.h5", "no model"], "foreign.h5", "-o", "new.mrc")
+    expect_refusal(["foreign.h5", "no model"], "foreign.h5", command="info")
+
+    # HDF5 itself must stay silent about damaged metadata, too.
+    damaged = bytearray(whole_model)
+    damaged[whole_model.index(b"softplus_beta")] ^= 1
+    pathlib.Path("damaged.h5").write_bytes(damaged)
+    expect_refusal(["damaged.h5"], "damaged.h5", "-o", "new.mrc")

@@ -1,20 +1,16 @@
-"""Beads come out of reconstruct where they went into the tilt series.
+"""Tests that beads come out of reconstruct where they went into the tilt series.
 
 A lopsided pair of Gaussian beads far from every centre, whose projections are
 analytic, is written with mrcfile, reconstructed by the program and looked for
-in the output file's own axes, for every option that moves or turns the volume.
-
-usage: geometry_test.py TOMOFIELD SCRATCH_DIR"""
+in the output file's own axes, for every option that moves or turns the volume."""
 
 import os
-import shutil
-import subprocess
-import sys
 
 import mrcfile
 import numpy as np
 
-PROGRAM, SCRATCH = sys.argv[1], sys.argv[2]
+import harness
+
 TOLERANCE = 0.2  # voxels of the output
 WIDTH, HEIGHT, THICKNESS = 70, 58, 40  # pixels of the view, of the slab
 TILTS = np.arange(-60, 61, 4.0)
@@ -26,14 +22,14 @@ FAR_BEAD = [((14.0, 45.0, 28.0), 2.2, 1.0)]
 
 
 def true_volume(gaussians):
-    """Densities [z, y, x] at voxel centres."""
+    """Returns the densities [z, y, x] at voxel centres."""
     z, y, x = np.indices((THICKNESS, HEIGHT, WIDTH)) + 0.5
     return sum(density * np.exp(-((x - X)**2 + (y - Y)**2 + (z - Z)**2) / (2 * sigma**2))
                for (X, Y, Z), sigma, density in gaussians)
 
 
 def project(gaussians, hand=1, center=(WIDTH / 2, THICKNESS / 2)):
-    """Views [tilt, y, x]: x − cx = (X − cx) cos + hand (Z − cz) sin, y = Y."""
+    """Returns the views [tilt, y, x]: x − cx = (X − cx) cos + hand (Z − cz) sin, y = Y."""
     y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
     views = np.random.default_rng(1).normal(0, NOISE, (len(TILTS), HEIGHT, WIDTH))
     for view, tilt in zip(views, np.deg2rad(TILTS)):
@@ -45,27 +41,22 @@ def project(gaussians, hand=1, center=(WIDTH / 2, THICKNESS / 2)):
 
 
 def reconstruct(name, views, *options, epochs=8):
-    """The volume [section, row, column] as the file has it."""
-    directory = os.path.join(SCRATCH, name)
-    shutil.rmtree(directory, ignore_errors=True)
-    os.makedirs(directory)
+    """Returns the volume [section, row, column] as the file has it."""
+    directory = harness.fresh_directory(name)
     stack, tlt = os.path.join(directory, "series.mrc"), os.path.join(directory, "series.tlt")
     with mrcfile.new(stack) as file:
         file.set_data(views)
         file.voxel_size = 5.0
     np.savetxt(tlt, TILTS, fmt="%.2f")
     output = os.path.join(directory, "out.mrc")
-    command = [PROGRAM, "reconstruct", stack, "--tlt", tlt, "-o", output, "--contrast", "bright",
-               "--thickness", str(THICKNESS), "--epochs", str(epochs), "--rank", "6",
-               *map(str, options)]
-    result = subprocess.run(command, capture_output=True, text=True)
-    assert result.returncode == 0, f"{name}: {result.stderr}"
+    harness.succeed("reconstruct", stack, "--tlt", tlt, "-o", output, "--contrast", "bright",
+                    "--thickness", THICKNESS, "--epochs", epochs, "--rank", 6, *options)
     with mrcfile.open(output) as file:
         return file.data.astype(np.float64)
 
 
 def find_bead(volume):
-    """Centre of mass (column, row, section) of what is denser than a fifth of the densest."""
+    """Returns the centre of mass (column, row, section) of voxels above a fifth of the peak."""
     weights = np.where(volume > 0.2 * volume.max(), volume, 0)
     total = weights.sum()
     sections, rows, columns = np.indices(volume.shape) + 0.5
@@ -80,45 +71,58 @@ def check(name, volume, shape, expected):
     assert off.max() < TOLERANCE, f"{name}: off by {off}"
 
 
-def main():
-    X, Y, Z = find_bead(true_volume(BEAD))
-    whole = (THICKNESS, HEIGHT, WIDTH)
+PLACE = find_bead(true_volume(BEAD))
+WHOLE = (THICKNESS, HEIGHT, WIDTH)
+
+
+def test_every_field_finds_the_bead():
     plain = project(BEAD)
+    check("default", reconstruct("default", plain, "--no-margin"), WHOLE, PLACE)
+    check("grid", reconstruct("grid", plain, "--no-margin", "--field", "grid", epochs=16), WHOLE,
+          PLACE)
+    check("margin", reconstruct("margin", plain), WHOLE, PLACE)
 
-    check("default", reconstruct("default", plain, "--no-margin"), whole, (X, Y, Z))
-    check("grid", reconstruct("grid", plain, "--no-margin", "--field", "grid", epochs=16), whole,
-          (X, Y, Z))
-    check("margin", reconstruct("margin", plain), whole, (X, Y, Z))
 
+def test_the_wrong_hand_mirrors_the_volume_in_z():
+    X, Y, Z = PLACE
     mirrored = project(BEAD, hand=-1)
-    check("hand -1", reconstruct("hand", mirrored, "--no-margin", "--hand", -1), whole, (X, Y, Z))
-    # The wrong hand mirrors the volume in Z about the axis.
-    check("wrong hand", reconstruct("wrong_hand", mirrored, "--no-margin"), whole,
+    check("hand -1", reconstruct("hand", mirrored, "--no-margin", "--hand", -1), WHOLE, (X, Y, Z))
+    check("wrong hand", reconstruct("wrong_hand", mirrored, "--no-margin"), WHOLE,
           (X, Y, THICKNESS - Z))
 
-    center = (31.7, 23.5)
-    shifted = project(BEAD, center=center)
+
+def test_the_tilt_axis_lies_where_center_says():
+    shifted = project(BEAD, center=(31.7, 23.5))
     check("center x,z", reconstruct("center", shifted, "--no-margin", "--center", "31.7,23.5"),
-          whole, (X, Y, Z))
+          WHOLE, PLACE)
     shifted = project(BEAD, center=(31.7, THICKNESS / 2))
     check("center x", reconstruct("center_x", shifted, "--no-margin", "--center", "31.7",
-                                  "--axes", "xyz"), whole, (X, Y, Z))
+                                  "--axes", "xyz"), WHOLE, PLACE)
 
-    # IMOD's order (X, thickness, Y): trimvol -rx makes Z = thickness − 1 − row of it.
-    check("axes xzy", reconstruct("xzy", plain, "--no-margin", "--axes", "xzy"),
+
+def test_axes_of_imod():
+    X, Y, Z = PLACE
+    # IMOD's order is (X, thickness, Y): trimvol -rx makes Z = thickness - 1 - row of it.
+    check("axes xzy", reconstruct("xzy", project(BEAD), "--no-margin", "--axes", "xzy"),
           (HEIGHT, THICKNESS, WIDTH), (X, THICKNESS - Z, Y))
 
-    # A region of interest, with a bead outside it that the margin has to take.
+
+def test_a_region_of_interest():
+    X, Y, Z = PLACE
+    # The margin has to take a bead that lies outside the region.
     both = project(BEAD + FAR_BEAD)
     check("roi", reconstruct("roi", both, "--roi", "27,5,66,38"), (THICKNESS, 33, 39),
           (X - 27, Y - 5, Z))
 
-    check("bin 2", reconstruct("bin", plain, "--no-margin", "--bin", 2),
-          (THICKNESS // 2, HEIGHT // 2, WIDTH // 2), (X / 2, Y / 2, Z / 2))
+
+def test_binned_views():
+    check("bin 2", reconstruct("bin", project(BEAD), "--no-margin", "--bin", 2),
+          (THICKNESS // 2, HEIGHT // 2, WIDTH // 2), PLACE / 2)
+
+
+def test_all_of_it_together():
+    X, Y, Z = PLACE
     check("bin 2, roi, center, hand -1, xzy",
-          reconstruct("all", project(BEAD + FAR_BEAD, hand=-1, center=center), "--bin", 2, "--roi",
-                      "28,6,66,38", "--center", "31.7,23.5", "--hand", -1, "--axes", "xzy"),
+          reconstruct("all", project(BEAD + FAR_BEAD, hand=-1, center=(31.7, 23.5)), "--bin", 2,
+                      "--roi", "28,6,66,38", "--center", "31.7,23.5", "--hand", -1, "--axes", "xzy"),
           (16, THICKNESS // 2, 19), ((X - 28) / 2, (THICKNESS - Z) / 2, (Y - 6) / 2))
-
-
-main()

@@ -1,4 +1,5 @@
-"""What the program tests of reconstruct share: running it, and a small series to run it on."""
+"""Runs the program for the tests and makes a small series to run it on. tests/conftest.py sets
+which program runs and where the tests write."""
 
 import copy
 import glob
@@ -6,18 +7,15 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
-import warnings
 
 import mrcfile
 import numpy as np
 
-warnings.filterwarnings("ignore", category=RuntimeWarning)  # of NaN pixels, which are meant
+PROGRAM = os.environ["TOMOFIELD_PROGRAM"]
+SCRATCH = None  # a folder of the running test, or of its module while a module's fixture is made
 
-PROGRAM, SCRATCH = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
-
-# Threads that wait would spin: on small data, beside other tests, that is most of the time.
+# Threads would spin while they wait, which takes most of the time of small runs beside other tests.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 WIDTH, HEIGHT, THICKNESS = 48, 36, 24
@@ -47,7 +45,8 @@ def succeed(*arguments, **keywords):
 
 
 def stop_after_a_step(run, number=signal.SIGTERM, timeout=None):
-    """What a run says after its first step, when it gets a signal (it may have been quicker)."""
+    """Sends a run a signal after its first step and returns what it said after that. The run may
+    have ended before."""
     for line in run.stderr:
         if line.startswith("reconstruct "):  # a step is done
             break
@@ -57,7 +56,7 @@ def stop_after_a_step(run, number=signal.SIGTERM, timeout=None):
 
 
 def stop_after_first_step(command, number=signal.SIGTERM):
-    """The ended run of a command, and what it said after its first step."""
+    """Runs a command, stops it after its first step and returns the run and what it said since."""
     run = start(*command)
     return run, stop_after_a_step(run, number)
 
@@ -75,7 +74,7 @@ def finish_with_stops(command, after_stop, most):
 
 
 def run_measured(*arguments):
-    """Exit status, all output, and the largest resident size in MiB of a run."""
+    """Runs the program and returns its exit status, all output and its peak memory in MiB."""
     with tempfile.TemporaryFile("w+") as output:
         run = subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=output, stderr=output)
         _, status, usage = os.wait4(run.pid, 0)
@@ -85,11 +84,12 @@ def run_measured(*arguments):
 
 
 def is_sanitized():
-    """Whether sanitizers watch the program, whose memory is then not the program's own."""
+    """Returns true if the program runs under sanitizers, which use memory of their own."""
     return b"__asan_init" in read_bytes(PROGRAM) or b"__tsan_init" in read_bytes(PROGRAM)
 
 
 def fresh_directory(name):
+    """Returns an empty directory of this name in the scratch folder."""
     directory = os.path.join(SCRATCH, name)
     shutil.rmtree(directory, ignore_errors=True)
     os.makedirs(directory)
@@ -114,8 +114,8 @@ def read_bytes(path):
 
 
 class Series:
-    """Views [tilt, y, x] of a simulated cell that are wider than high, its truth [z, y, x],
-    and the options that hand it to reconstruct."""
+    """Holds the views [tilt, y, x] of a simulated cell, which are wider than high, its truth
+    [z, y, x], and the arguments that hand the series to reconstruct."""
 
     def __init__(self, name, seed=3):
         self.directory = fresh_directory(name)
@@ -135,21 +135,22 @@ class Series:
         self.input = [self.stack, "--tlt", self.tlt]
 
     def with_views(self, name, views, tilts=TILTS):
-        """The series with other images and tilts, in files of its own."""
+        """Returns the series with other images and tilts, in files of its own."""
         other = copy.copy(self)
         other.views = views
         other.write(name, tilts)
         return other
 
     def reconstruct(self, name, *options, run=succeed, **keywords):
-        """Runs it with QUICK options, which later ones replace; returns where its results are."""
+        """Runs reconstruct with the QUICK options, which `options` replace, and returns its
+        Results."""
         output = os.path.join(fresh_directory(name), "out.mrc")
         run("reconstruct", *self.input, "-o", output, *merge(QUICK, options), **keywords)
         return Results(output)
 
 
 def merge(defaults, options):
-    """The defaults without those that options give again, then the options."""
+    """Returns the defaults that `options` do not give again, and then the options."""
     given = {str(option).split("=")[0] for option in options if str(option).startswith("--")}
     kept = []
     for i, word in enumerate(defaults):
@@ -160,7 +161,7 @@ def merge(defaults, options):
 
 
 class Results:
-    """The files of a reconstruction."""
+    """Names and reads the files of a reconstruction."""
 
     def __init__(self, output):
         self.volume_path = output
@@ -176,12 +177,12 @@ class Results:
         return read_volume(self.volume_path)
 
     def same_as(self, other):
-        """Whether volume and model have the same bytes as another run's."""
+        """Returns true if volume and model have the same bytes as another run's."""
         return (read_bytes(self.volume_path) == read_bytes(other.volume_path)
                 and read_bytes(self.model_path) == read_bytes(other.model_path))
 
     def leftovers(self):
-        """Files of the directory that are no results."""
+        """Returns the files of the directory that are no results."""
         return set(glob.glob(os.path.join(glob.escape(os.path.dirname(self.volume_path)), "*"))
                    + glob.glob(os.path.join(glob.escape(os.path.dirname(self.volume_path)), ".*"))
                    ) - set(self.all_paths)
@@ -192,14 +193,15 @@ def psnr(volume, truth):
 
 
 def assert_same_tuning(one, other):
-    """The same trials gave the same errors, but for what sums over all views have lost."""
+    """Checks that two tunings made the same trials with the same errors. Sums over all views may
+    round differently."""
     assert one["predicted_views"] == other["predicted_views"] and one["chosen"] == other["chosen"]
     errors = [[t["held_out_error_by_view"] for t in tuning["trials"]] for tuning in (one, other)]
     np.testing.assert_allclose(*errors, rtol=1e-6)
 
 
 def with_broken_views(source, every):
-    """Which views --hold-out EVERY scores, and the series with these turned upside down."""
+    """Returns the views that --hold-out EVERY scores, and the series with these views mirrored."""
     scored = list(range(every // 2, len(source.views) - 1, every))
     views = source.views.copy()
     views[scored] = views[scored, :, ::-1]
@@ -207,19 +209,9 @@ def with_broken_views(source, every):
 
 
 def assert_scored_views_have_no_say(figures, scored):
-    """`figures` of a series and of one whose scored views are broken: the same tuning, which did not
-    use them, and a score that they spoil."""
+    """Checks the figures of a series and of the same series with broken scored views. Both tunings
+    are the same and did not use these views, and the broken views spoil the score."""
     assert_same_tuning(*(f["tuning"] for f in figures))
     assert not set(figures[0]["tuning"]["predicted_views"]) & set(scored)
     assert [view["view"] for view in figures[0]["held_out"]["views"]] == scored
     assert figures[1]["held_out"]["error"] > 2 * figures[0]["held_out"]["error"]
-
-
-def run_tests(tests):
-    """Runs every test_ function of a script and removes what they wrote."""
-    for name, test in list(tests.items()):
-        if not name.startswith("test_"):
-            continue
-        test()
-        print("passed ", name, flush=True)
-    shutil.rmtree(SCRATCH)

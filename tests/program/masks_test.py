@@ -1,11 +1,10 @@
-"""What is masked: beads that are found, a user's mask, fiducials, hot pixels; and what it changes.
-
-usage: masks_test.py TOMOFIELD SCRATCH_DIR"""
+"""Tests what is masked: beads that are found, a user's mask, fiducials and hot pixels."""
 
 import json
 import os
 
 import numpy as np
+import pytest
 import skimage.io
 
 import harness
@@ -15,19 +14,24 @@ WIDTH, HEIGHT = 96, 80
 TILTS = np.arange(-60, 61, 6.0)
 DIAMETER = 4.0  # pixels of 10 Å
 BEADS = np.array([[-30, 12, 4], [-12, 60, -8], [5, 30, 6], [18, 66, 0], [33, 20, -5], [-25, 40, 9]])
-DIRECTORY = harness.fresh_directory("masks")
 QUICK = ["--thickness", 24, "--no-margin", "--leaf-size", 16, "--field", "grid", "--epochs", 2]
 
 
+@pytest.fixture(scope="module")
+def directory():
+    """Returns the folder of all series and masks."""
+    return harness.fresh_directory("masks")
+
+
 def bead_places(tilt):
-    """x, y of every bead in a view (the second axis of the array and its first)."""
+    """Returns x, y of every bead in a view."""
     angle = np.radians(tilt)
     return np.stack([WIDTH / 2 + BEADS[:, 0] * np.cos(angle) + BEADS[:, 2] * np.sin(angle),
                      BEADS[:, 1]], axis=1)
 
 
 def views_of(contrast, seed=1):
-    """Ice with a soft body, noise, and beads of this contrast; dense is dark."""
+    """Returns views of ice with a soft body, noise and beads of this contrast; dense is dark."""
     random = np.random.default_rng(seed)
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH] + 0.5
     views = []
@@ -40,11 +44,15 @@ def views_of(contrast, seed=1):
     return np.array(views, dtype=np.float32)
 
 
-def write_series(name, views):
-    stack, tlt = (os.path.join(DIRECTORY, name + end) for end in (".st", ".tlt"))
-    harness.write_stack(stack, views, pixel_size=10.0)
-    np.savetxt(tlt, TILTS, fmt="%.1f")
-    return [stack, "--tlt", tlt]
+@pytest.fixture(scope="module", name="write_series")
+def make_write_series(directory):
+    def write_series(name, views):
+        stack, tlt = (os.path.join(directory, name + end) for end in (".st", ".tlt"))
+        harness.write_stack(stack, views, pixel_size=10.0)
+        np.savetxt(tlt, TILTS, fmt="%.1f")
+        return [stack, "--tlt", tlt]
+
+    return write_series
 
 
 def reconstruct(name, series, *options, command=("reconstruct",), quick=QUICK):
@@ -55,12 +63,20 @@ def reconstruct(name, series, *options, command=("reconstruct",), quick=QUICK):
     return results, record["figures"]["mask"], run
 
 
-beads = write_series("beads", views_of(14))
-plain = write_series("plain", views_of(0))
+@pytest.fixture(scope="module")
+def beads(write_series):
+    """Returns the arguments of a series with beads."""
+    return write_series("beads", views_of(14))
+
+
+@pytest.fixture(scope="module")
+def plain(write_series):
+    """Returns the arguments of a series without beads."""
+    return write_series("plain", views_of(0))
 
 
 def masked_pixels(results):
-    """Where the picture of the masks is red, [y, x] in the file's order."""
+    """Returns true where the picture of the masks is red, [y, x] in the file's order."""
     picture = skimage.io.imread(results.mask_picture)
     zoom = picture.shape[1] // WIDTH
     assert picture.shape == (HEIGHT * zoom, WIDTH * zoom, 3)
@@ -68,7 +84,7 @@ def masked_pixels(results):
     return red[zoom // 2 :: zoom, zoom // 2 :: zoom]
 
 
-def test_beads_are_found_reported_and_shown():
+def test_beads_are_found_reported_and_shown(beads):
     results, mask, run = reconstruct("found", beads)
     assert mask["beads"] == len(BEADS), mask
     assert 0.8 * DIAMETER < mask["bead_diameter_nm"] < 1.1 * DIAMETER, mask["bead_diameter_nm"]
@@ -83,18 +99,18 @@ def test_beads_are_found_reported_and_shown():
     np.testing.assert_allclose(lowest["masked_part"], masked.mean(), atol=1e-9)
 
 
-def test_voxel_baselines_mask_beads_too():
+def test_voxel_baselines_mask_beads_too(beads):
     _, mask, _ = reconstruct("sirt", beads, command=("baseline", "sirt"),
                              quick=["--thickness", 24, "--iterations", 2])
     assert mask["beads"] == len(BEADS)
 
 
-def test_beads_are_not_looked_for_when_told_so():
+def test_beads_are_not_looked_for_when_told_so(beads):
     results, mask, _ = reconstruct("off", beads, "--bead-diameter", 0)
     assert mask["beads"] == 0 and mask["masked_part"] == 0 and not masked_pixels(results).any()
 
 
-def test_nothing_is_found_where_there_are_none():
+def test_nothing_is_found_where_there_are_none(plain):
     _, mask, _ = reconstruct("none", plain)
     assert mask["beads"] == 0 and mask["masked_part"] == 0
     cell = harness.Series("cell")
@@ -103,11 +119,11 @@ def test_nothing_is_found_where_there_are_none():
     assert figures["figures"]["mask"]["beads"] == 0
 
 
-def test_masked_pixels_carry_no_loss():
+def test_masked_pixels_carry_no_loss(directory, plain, write_series):
     views = views_of(0)
     counts = np.ones_like(views, dtype=np.int16)
     counts[:, 30:44, 10:31] = 0
-    mask = os.path.join(DIRECTORY, "mask.mrc")
+    mask = os.path.join(directory, "mask.mrc")
     harness.write_stack(mask, counts)
     spoilt = views.copy()
     spoilt[:, 30:44, 10:31] = np.random.default_rng(5).normal(100, 40, (len(TILTS), 14, 21))
@@ -117,12 +133,12 @@ def test_masked_pixels_carry_no_loss():
     np.testing.assert_array_equal(first.volume, second.volume)
 
 
-def test_fiducials_and_hot_pixels_are_masked():
+def test_fiducials_and_hot_pixels_are_masked(directory, write_series):
     views = views_of(0)
     views[3, 50, 60] = 1e6
     places = [(section, *place) for section, tilt in enumerate(TILTS)
               for place in bead_places(tilt)]
-    model = os.path.join(DIRECTORY, "model.txt")
+    model = os.path.join(directory, "model.txt")
     with open(model, "w") as file:
         file.writelines(f"  1 {i} {x:10.2f} {y:10.2f} {section:8.2f}\n"
                         for i, (section, x, y) in enumerate(places))
@@ -132,10 +148,10 @@ def test_fiducials_and_hot_pixels_are_masked():
     assert [view["beads_masked"] for view in mask["views"]] == [len(BEADS)] * len(TILTS)
 
 
-def test_what_cannot_be_is_refused():
-    small = os.path.join(DIRECTORY, "small.mrc")
+def test_what_cannot_be_is_refused(directory, plain):
+    small = os.path.join(directory, "small.mrc")
     harness.write_stack(small, np.ones((2, HEIGHT, WIDTH), dtype=np.int16))
-    text = os.path.join(DIRECTORY, "bad.txt")
+    text = os.path.join(directory, "bad.txt")
     with open(text, "w") as file:
         file.write("10 20 0\n10 twenty 0\n")
     output = os.path.join(harness.fresh_directory("refused"), "out.mrc")
@@ -148,6 +164,3 @@ def test_what_cannot_be_is_refused():
         assert run.returncode == 2, (options, run.returncode, run.stderr)
         assert all(part in run.stderr for part in parts), (options, run.stderr)
         assert not os.path.exists(output)
-
-
-harness.run_tests(globals())

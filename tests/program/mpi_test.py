@@ -1,32 +1,45 @@
-"""Reconstruct on several processes that mpirun starts: the bytes of one process, checkpoints for any
-number of them, and what is said when something goes wrong.
-
-usage: mpi_test.py TOMOFIELD SCRATCH_DIR"""
+"""Tests reconstruct on several processes that mpirun starts: it writes the bytes of one process,
+its checkpoints serve any number of processes, and it names faults once."""
 
 import glob
 import json
 import os
+import shutil
 import signal
 import subprocess
 import time
 
 import h5py
 import numpy as np
+import pytest
 
 import harness
 from harness import read_bytes
 
-# On one machine, whose cores the processes share, and in containers, which may forbid the rest.
-os.environ.update(OMP_NUM_THREADS="1", OMPI_ALLOW_RUN_AS_ROOT="1",
-                  OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1",
-                  OMPI_MCA_btl_vader_single_copy_mechanism="none")
+# Processes share the cores of one machine, and a container may forbid what the last line turns off.
+MPI = {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+       "OMPI_MCA_rmaps_base_oversubscribe": "1",
+       "OMPI_MCA_btl_vader_single_copy_mechanism": "none"}
 ROWS, COLUMNS, THICKNESS = 120, 40, 16  # rows end in the middle of a slab and of a root cell
 PRIORS = ["--tv-factors", 0.5, "--bcc", 5, "--ifp", 0.2]
 NUM_STEPS = 4 * 7
 FIT = harness.merge(harness.QUICK, ["--thickness", THICKNESS, "--rank", 3, "--epochs", 4, *PRIORS])
 
 
-def make_series():
+@pytest.fixture(scope="module", autouse=True)
+def mpi():
+    """Sets the environment of mpirun, or skips every test where there is no mpirun."""
+    if shutil.which("mpirun") is None:
+        pytest.skip("there is no mpirun")
+    with pytest.MonkeyPatch.context() as environment:
+        for name, value in MPI.items():
+            environment.setenv(name, value)
+        yield
+
+
+@pytest.fixture(scope="module")
+def series():
+    """Writes a series of ROWS rows and returns the arguments that hand it to reconstruct."""
     directory = harness.fresh_directory("series")
     cell = os.path.join(directory, "cell")
     harness.succeed("simulate", cell, "--size", 128, "--thickness", THICKNESS, "--seed", 3,
@@ -38,11 +51,12 @@ def make_series():
     return [stack, "--tlt", tlt]
 
 
-series = make_series()
+@pytest.fixture(scope="module", name="command")
+def make_command(series):
+    def command(results, *options, input=series, fit=FIT):
+        return ["reconstruct", *input, "-o", results.volume_path, *harness.merge(fit, options)]
 
-
-def command(results, *options, input=series, fit=FIT):
-    return ["reconstruct", *input, "-o", results.volume_path, *harness.merge(fit, options)]
+    return command
 
 
 def fresh_results(name):
@@ -78,9 +92,9 @@ def figures(results):
     return found
 
 
-# Every sum over the bands is made in their order, whoever computed them, so the bytes are the same,
-# not just the values.
-def test_results_have_the_bytes_of_one_process():
+# Sums over the bands are made in their order, whichever process computed them, so the bytes are the
+# same.
+def test_results_have_the_bytes_of_one_process(command):
     cases = {"vm": ([], (1, 2, 4)),
              "coarse": (["--field", "grid", "--leaf-size", 32, "--coarse-epochs", 3,
                          "--tv-penalty", "auto", "--mode", 1], (2,)),
@@ -102,7 +116,7 @@ def test_results_have_the_bytes_of_one_process():
                 == set(map(os.path.basename, glob.glob(os.path.dirname(alone.volume_path) + "/*")))
 
 
-def test_each_process_has_its_part():
+def test_each_process_has_its_part(command):
     results = fresh_results("parts")
     succeed(3, *command(results))
     with open(results.json_path) as file:
@@ -114,7 +128,7 @@ def test_each_process_has_its_part():
     assert first == last < middle, processes
 
 
-def test_a_turned_volume_is_the_same():
+def test_a_turned_volume_is_the_same(command, series):
     xtilt = os.path.join(os.path.dirname(series[0]), "x.xtilt")
     np.savetxt(xtilt, np.full(len(harness.TILTS), 4.0), fmt="%.1f")
     alone, shared = fresh_results("turned"), fresh_results("turned2")
@@ -124,7 +138,7 @@ def test_a_turned_volume_is_the_same():
 
 
 def stop_after_a_step(run, number):
-    """What a run says that is stopped by a signal."""
+    """Stops a run by a signal and returns what it said."""
     errors = harness.stop_after_a_step(run, number, timeout=60)
     assert errors.count("tomofield: stopped") == 1 and "--resume" in errors, errors
     return errors
@@ -135,12 +149,12 @@ def step_of(results):
         return int(model["training/integers/step"][0])
 
 
-def test_checkpoints_go_on_with_any_number_of_processes():
+def test_checkpoints_go_on_with_any_number_of_processes(command):
     undisturbed, results = fresh_results("undisturbed"), fresh_results("resumed")
     long = ["--epochs", 120]  # to be stopped in, three times
     harness.succeed(*command(undisturbed, *long))
     steps = []
-    # mpirun passes SIGUSR1 on; SIGTERM it answers itself, and ends the processes with it.
+    # mpirun passes SIGUSR1 on. It answers SIGTERM itself and ends the processes with it.
     for processes, number, status in ((4, signal.SIGUSR1, 128 + signal.SIGUSR1),
                                       (1, signal.SIGTERM, 128 + signal.SIGTERM),
                                       (2, signal.SIGTERM, 1)):
@@ -155,12 +169,12 @@ def test_checkpoints_go_on_with_any_number_of_processes():
 
 
 def processes_of(run):
-    """Process numbers of the program that an mpirun started."""
+    """Returns the process numbers of the programs that an mpirun started."""
     with open(f"/proc/{run.pid}/task/{run.pid}/children") as file:
         return [int(pid) for pid in file.read().split()]
 
 
-def test_a_process_that_dies_ends_the_job_and_leaves_a_checkpoint():
+def test_a_process_that_dies_ends_the_job_and_leaves_a_checkpoint(command):
     undisturbed, results = fresh_results("alive"), fresh_results("killed")
     long = ["--epochs", 12, "--checkpoint-minutes", 0]
     harness.succeed(*command(undisturbed, *long))
@@ -184,7 +198,7 @@ def refuse(words, processes, *arguments):
     assert len(complaints) == 1 and all(word in complaints[0] for word in words), result.stderr
 
 
-def test_faults_are_told_once():
+def test_faults_are_told_once(command, series):
     results = fresh_results("faults")
     refuse(["nowhere.mrc", "No such file"], 3, *command(results, input=["nowhere.mrc", *series[1:]]))
     refuse(["--no-such-option"], 2, *command(results, "--no-such-option", 3))
@@ -199,14 +213,10 @@ def test_faults_are_told_once():
     refuse([results.model_path, "--seed"], 2, *command(results, "--resume", "--seed", 9))
 
 
-def test_a_fault_of_one_process_is_told_by_the_first():
+def test_a_fault_of_one_process_is_told_by_the_first(command, series):
     results = fresh_results("fault_of_one")
     other = command(results, input=["not_here.mrc", *series[1:]])
     refuse(["not_here.mrc", "No such file"], 2, *command(results), ":", "-np", 1,
            harness.PROGRAM, *other)
     assert not os.listdir(os.path.dirname(results.volume_path))
 
-
-if subprocess.run(["mpirun", "--version"], capture_output=True).returncode != 0:
-    raise SystemExit(77)
-harness.run_tests(globals())

@@ -1,15 +1,14 @@
-"""reconstruct --engine ray on raw views with in-plane rotation, shifts and x-axis tilt.
+"""Tests reconstruct --engine ray on raw views with in-plane rotation, shifts and x-axis tilt.
 
 Gaussian beads, whose projections are analytic in any geometry, are written as the views that a
 microscope would record, with the alignment in IMOD's or AreTomo's files, and looked for in the
-volume: nothing here shares code with tomofield's geometry.
-
-usage: ray_engine_test.py TOMOFIELD SCRATCH_DIR"""
+volume: nothing here shares code with tomofield's geometry."""
 
 import os
 import signal
 
 import numpy as np
+import pytest
 
 import harness
 from harness import read_bytes, succeed, tomofield
@@ -25,7 +24,7 @@ BEADS = [((30.3, 14.6, 8.2), 2.2, 1.0), ((33.9, 12.2, 11.4), 1.5, 1.0),
 
 
 def rotation(axis, degrees):
-    """Right-handed, of column vectors."""
+    """Returns the right-handed rotation of column vectors."""
     c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
     return {"x": np.array([[1, 0, 0], [0, c, -s], [0, s, c]]),
             "y": np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]),
@@ -33,14 +32,14 @@ def rotation(axis, degrees):
 
 
 def truth():
-    """Densities [z, y, x] at voxel centres."""
+    """Returns the densities [z, y, x] at voxel centres."""
     z, y, x = np.indices((THICKNESS, HEIGHT, WIDTH)) + 0.5
     return sum(density * np.exp(-((x - X)**2 + (y - Y)**2 + (z - Z)**2) / (2 * sigma**2))
                for (X, Y, Z), sigma, density in BEADS)
 
 
 class RawSeries:
-    """Recorded views: p_raw − c_raw = Rz(ROT) Ry(θ) Rx(α) diag(1, 1, hand) (P − C) + t."""
+    """Holds recorded views: p_raw − c_raw = Rz(ROT) Ry(θ) Rx(α) diag(1, 1, hand) (P − C) + t."""
 
     def __init__(self, name, rots, x_tilts, shifts, raw_size, hand=1):
         self.directory = harness.fresh_directory(name)
@@ -65,7 +64,7 @@ class RawSeries:
         return os.path.join(self.directory, name)
 
     def with_xf(self):
-        """raw → aligned: q = A (p − c_raw) + D with A = R(−ROT), D = −A t."""
+        """Writes raw → aligned transforms: q = A (p − c_raw) + D with A = R(−ROT), D = −A t."""
         rows = []
         for rot, shift in zip(self.rots, self.shifts):
             a = rotation("z", -rot)[:2, :2]
@@ -103,13 +102,17 @@ def shifts_of(seed, spread=3.0):
     return np.random.default_rng(seed).uniform(-spread, spread, (len(TILTS), 2))
 
 
-general = RawSeries("general", rots=-83 + varied(2, 3), shifts=shifts_of(4),
-                    x_tilts=np.linspace(-12, 12, len(TILTS)) + varied(3, 3),
-                    raw_size=(HEIGHT, WIDTH))
+@pytest.fixture(scope="module")
+def general():
+    """Returns a series with rotations, shifts and x-axis tilts of every view."""
+    return RawSeries("general", rots=-83 + varied(2, 3), shifts=shifts_of(4),
+                     x_tilts=np.linspace(-12, 12, len(TILTS)) + varied(3, 3),
+                     raw_size=(HEIGHT, WIDTH))
 
 
 def centre_of_mass(volume, box):
-    """(X, Y, Z) of what a box [x0, x1, y0, y1, z0, z1] holds above a fifth of its peak."""
+    """Returns (X, Y, Z) of the voxels of a box [x0, x1, y0, y1, z0, z1] above a fifth of its
+    peak."""
     x0, x1, y0, y1, z0, z1 = box
     part = volume[z0:z1, y0:y1, x0:x1]
     weights = np.where(part > 0.2 * part.max(), part, 0)
@@ -130,14 +133,14 @@ def check_volume(name, volume, least_correlation):
     assert off < 0.2, (name, off)
 
 
-def test_slab_engine_refuses_and_names_the_ray_engine():
+def test_slab_engine_refuses_and_names_the_ray_engine(general):
     command = general.command("refused", general.with_xf(), "--engine", "slab")
     result = tomofield(*command)
     assert result.returncode == 2 and "--engine ray" in result.stderr, result
     assert "x-axis tilt" in result.stderr and not os.path.exists(general.results.volume_path)
 
 
-def test_rotation_shift_and_x_tilt_from_imod_files():
+def test_rotation_shift_and_x_tilt_from_imod_files(general):
     results = general.reconstruct("xf", general.with_xf(), "--no-margin")
     check_volume("xf", results.volume, 0.97)
     check_volume("xf, vm", general.reconstruct("vm", general.with_xf(), "--field", "vm", "--rank", 8,
@@ -145,12 +148,12 @@ def test_rotation_shift_and_x_tilt_from_imod_files():
     check_volume("xf, margin", general.reconstruct("margin", general.with_xf()).volume, 0.96)
 
 
-def test_alignment_of_aretomo():
+def test_alignment_of_aretomo(general):
     results = general.reconstruct("aln", general.with_aln(), "--no-margin")
     check_volume("aln", results.volume, 0.97)
 
 
-def test_an_alignment_that_is_left_out_is_missed():
+def test_an_alignment_that_is_left_out_is_missed(general):
     results = general.reconstruct("no_x_tilt", [*general.with_xf()[:3], *general.with_xf()[5:]],
                                   "--no-margin")
     correlation = np.corrcoef(results.volume.ravel(), truth().ravel())[0, 1]
@@ -165,7 +168,7 @@ def test_the_other_hand():
     check_volume("hand -1", results.volume, 0.96)
 
 
-def test_binned_views_and_a_region_of_interest():
+def test_binned_views_and_a_region_of_interest(general):
     results = general.reconstruct("roi", general.with_xf(), "--roi", "20,4,44,36")
     expected = truth()[:, 4:36, 20:44]
     correlation = np.corrcoef(results.volume.ravel(), expected.ravel())[0, 1]
@@ -178,8 +181,8 @@ def test_binned_views_and_a_region_of_interest():
     assert correlation > 0.93, correlation
 
 
-def test_masks_lie_where_beads_are_in_the_recorded_views():
-    # Gold that is in one view each, so that only the list of fiducials tells of it.
+def test_masks_lie_where_beads_are_in_the_recorded_views(general):
+    # Each spot of gold is in one view only, so that only the list of fiducials names it.
     painted = general.views.copy()
     v, u = np.mgrid[:WIDTH, :HEIGHT] + 0.5
     spots = np.random.default_rng(8).uniform(6, 34, (len(TILTS), 2))
@@ -213,7 +216,7 @@ def test_both_engines_agree_on_an_aligned_series():
     assert correlation > 0.98, correlation
 
 
-def test_same_bits_for_any_threads_and_after_an_interruption():
+def test_same_bits_for_any_threads_and_after_an_interruption(general):
     options = ["--epochs", 4, "--rays-per-step", 3000, "--ray-samples", 20, "--view-scale", "on",
                "--no-margin", "--checkpoint-minutes", 0]
     one = general.reconstruct("one", general.with_xf(), *options, "--threads", 1)
@@ -230,7 +233,7 @@ def test_same_bits_for_any_threads_and_after_an_interruption():
     resumed = succeed(*command, "--resume")
     assert "resuming" in resumed.stderr, resumed.stderr
     assert general.results.same_as(one)
-    # Another alignment is another series.
+    # A series with another alignment is another series.
     shifted = read_bytes(general.path("raw.xf"))
     np.savetxt(general.path("raw.xf"), np.loadtxt(general.path("raw.xf")) + [0, 0, 0, 0, 0.5, 0],
                fmt="%.7f")
@@ -239,6 +242,3 @@ def test_same_bits_for_any_threads_and_after_an_interruption():
     with open(general.path("raw.xf"), "wb") as file:
         file.write(shifted)
     assert refused.returncode == 2 and "alignment" in refused.stderr, refused
-
-
-harness.run_tests(globals())

@@ -1,6 +1,4 @@
-"""reconstruct from end to end: what it writes, and what its options do.
-
-usage: reconstruct_test.py TOMOFIELD SCRATCH_DIR"""
+"""Tests reconstruct from end to end: the files that it writes and the effects of its options."""
 
 import fcntl
 import io
@@ -16,16 +14,26 @@ import time
 import h5py
 import mrcfile
 import numpy as np
+import pytest
 import skimage.io
 
 import harness
 from harness import HEIGHT, PIXEL_SIZE, THICKNESS, TILTS, WIDTH, psnr, read_bytes, read_volume
 
-series = harness.Series("series")
-plain = series.reconstruct("plain")
+
+@pytest.fixture(scope="module")
+def series():
+    """Returns a small simulated series."""
+    return harness.Series("series")
 
 
-def test_volume_is_an_mrc_file_that_others_read():
+@pytest.fixture(scope="module")
+def plain(series):
+    """Returns the results of QUICK options alone."""
+    return series.reconstruct("plain")
+
+
+def test_volume_is_an_mrc_file_that_others_read(plain):
     report = io.StringIO()
     assert mrcfile.validate(plain.volume_path, print_file=report), report.getvalue()
     with mrcfile.open(plain.volume_path) as file:
@@ -33,7 +41,7 @@ def test_volume_is_an_mrc_file_that_others_read():
         assert data.shape == (THICKNESS, HEIGHT, WIDTH) and data.dtype == np.float32
         assert file.is_volume() and header.ispg == 1 and header.nsymbt == 0
         for axis, size in zip("xyz", (WIDTH, HEIGHT, THICKNESS)):
-            # Exact: the float32 next to the size in Å, not a rounded one.
+            # The size in Å is exact to float32.
             assert header.cella[axis] == np.float32(size * PIXEL_SIZE), (axis, header.cella)
             assert header["m" + axis] == size
         assert (header.mapc, header.mapr, header.maps) == (1, 2, 3)
@@ -44,7 +52,7 @@ def test_volume_is_an_mrc_file_that_others_read():
         assert header.nlabl == 1 and header.label[0].startswith(b"tomofield"), header.label[0]
 
 
-def test_specimen_is_found():
+def test_specimen_is_found(series):
     flat = psnr(np.full_like(series.truth, series.truth.mean()), series.truth)
     for field in ("vm", "grid"):
         volume = series.reconstruct(field, "--field", field, "--epochs", 16).volume
@@ -54,7 +62,7 @@ def test_specimen_is_found():
         assert gain > 3 and correlation > 0.7, (field, gain, correlation)
 
 
-def test_json_has_figures_and_every_option():
+def test_json_has_figures_and_every_option(plain, series):
     record = json.load(open(plain.json_path))
     assert re.fullmatch(r"\d+\.\d+\.\d+", record["tomofield"])
     options, figures = record["options"], record["figures"]
@@ -71,7 +79,7 @@ def test_json_has_figures_and_every_option():
     np.testing.assert_allclose([view["tilt_deg"] for view in figures["views"]], TILTS)
 
 
-def test_model_is_readable_with_h5py():
+def test_model_is_readable_with_h5py(plain):
     with h5py.File(plain.model_path) as model:
         assert model.attrs["format"] == b"tomofield model"
         parameters = model["field/parameters"][:]
@@ -80,11 +88,11 @@ def test_model_is_readable_with_h5py():
         np.testing.assert_allclose(model["geometry/tilt_deg"][:], TILTS)
         options = json.loads(model.attrs["options_json"])
         assert options == json.load(open(plain.json_path))["options"]
-        # Finished: no optimiser's moments, which would triple the file.
+        # A finished model has no optimiser's moments, which would triple the file.
         assert "adam_m" not in model["training/floats"]
 
 
-def test_pictures_show_the_slices():
+def test_pictures_show_the_slices(plain):
     volume = plain.volume
     slices = {"xy": volume[THICKNESS // 2], "xz": volume[:, HEIGHT // 2],
               "yz": volume[:, :, WIDTH // 2]}
@@ -94,12 +102,12 @@ def test_pictures_show_the_slices():
         zoom = picture.shape[1] // width
         assert picture.shape == (height * zoom, width * zoom), (plane, picture.shape)
         assert picture.std() > 20, (plane, picture.std())
-        # Upwards on the page is along the second axis.
+        # The second axis points upwards on the page.
         pixels = picture[zoom // 2 :: zoom, zoom // 2 :: zoom][::-1]
         assert np.corrcoef(pixels.ravel(), slices[plane].ravel())[0, 1] > 0.98, plane
 
 
-def test_same_seed_same_bytes_whatever_the_threads():
+def test_same_seed_same_bytes_whatever_the_threads(plain, series):
     def with_environment(name, threads, *options):
         env = dict(os.environ, OMP_NUM_THREADS=str(threads))
         return series.reconstruct(name, *options, env=env)
@@ -121,21 +129,21 @@ def test_same_seed_same_bytes_whatever_the_threads():
             assert result.returncode == 2 and "--threads" in result.stderr, result
 
 
-def test_dark_contrast_is_the_inverted_density():
+def test_dark_contrast_is_the_inverted_density(plain, series):
     dark = series.with_views("dark", 50 - series.views)
     dark_options = ["--contrast", "dark", "--view-scale", "off", "--activation", "softplus"]
     found = dark.reconstruct("dark", *dark_options).volume
-    # Dense is low, and an empty region 0: the empty beam, which the cell leaves free, is found.
+    # Dense is low and empty regions are 0, because the cell leaves the empty beam free.
     np.testing.assert_allclose(-found, plain.volume, atol=0.03)
     inverted = dark.reconstruct("inverted", *dark_options, "--invert").volume
     np.testing.assert_array_equal(inverted, -found)
     np.testing.assert_array_equal(series.reconstruct("negative", "--invert").volume, -plain.volume)
-    # Per-view scales and offsets, which the data do not need, do little harm.
+    # The data need no per-view scales and offsets, and fitting them does little harm.
     fitted = dark.reconstruct("fitted", "--contrast", "dark").volume
     assert np.corrcoef(fitted.ravel(), plain.volume.ravel())[0, 1] < -0.9
 
 
-def test_modes_of_the_file():
+def test_modes_of_the_file(plain, series):
     exact = plain.volume
     for mode, kind in ((1, np.int16), (12, np.float16)):
         results = series.reconstruct("mode", "--mode", mode)
@@ -151,23 +159,23 @@ def test_modes_of_the_file():
             np.testing.assert_allclose(stored, exact, rtol=6e-4, atol=1e-7)
 
 
-def test_axes():
+def test_axes(plain, series):
     xzy = series.reconstruct("xzy", "--axes", "xzy").volume
-    # As IMOD's tilt writes: trimvol -rx turns rows (x, z) into sections from the last row on.
+    # IMOD's tilt writes this order: trimvol -rx turns rows (x, z) into sections from the last row on.
     np.testing.assert_array_equal(xzy[:, ::-1].transpose(1, 0, 2), plain.volume)
 
 
-def test_region_of_interest_has_its_size():
+def test_region_of_interest_has_its_size(series):
     results = series.reconstruct("roi", "--roi", "5,3,40,30")
     with mrcfile.open(results.volume_path) as file:
         assert file.data.shape == (THICKNESS, 27, 35)
-        # IMOD's sign: the corner of a subvolume has a negative origin.
+        # With IMOD's sign the corner of a subvolume has a negative origin.
         np.testing.assert_allclose(file.header.origin.tolist(),
                                    (-5 * PIXEL_SIZE, -3 * PIXEL_SIZE, 0), rtol=1e-6)
     assert json.load(open(results.json_path))["options"]["specimen"]["roi"] == [5, 3, 40, 30]
 
 
-def test_binning():
+def test_binning(series):
     for options in (["--bin", 2], ["--angpix", 2 * PIXEL_SIZE]):
         results = series.reconstruct("bin", *options)
         with mrcfile.open(results.volume_path) as file:
@@ -177,11 +185,11 @@ def test_binning():
         half = series.truth.reshape(THICKNESS // 2, 2, HEIGHT // 2, 2, WIDTH // 2, 2)
         half = half.mean((1, 3, 5))
         assert np.corrcoef(binned.ravel(), half.ravel())[0, 1] > 0.7
-        # Densities are a pixel's: twice as long a pixel, twice the value.
+        # A density counts per pixel, so a pixel of twice the length has twice the value.
         assert abs(binned.mean() / half.mean() / 2 - 1) < 0.1
 
 
-def test_excluded_views_do_not_count():
+def test_excluded_views_do_not_count(series):
     excluded = [0, 6, 7]
     views = series.views.copy()
     views[excluded] = np.nan
@@ -194,7 +202,7 @@ def test_excluded_views_do_not_count():
     np.testing.assert_array_equal(fewer.reconstruct("without").volume, results.volume)
 
 
-def test_config_file():
+def test_config_file(plain, series):
     directory = harness.fresh_directory("config")
 
     def write(text):
@@ -209,7 +217,7 @@ def test_config_file():
                    'overwrite = false\n')
     output = os.path.join(directory, "out.mrc")
     harness.succeed("reconstruct", *series.input, "-o", output, "--config", config, "--epochs", 8)
-    # The command line's epochs won; a whole region of interest is the default one.
+    # The command line's epochs win, and a region of the whole view is the default.
     np.testing.assert_array_equal(read_volume(output), plain.volume)
     before = {name: read_bytes(os.path.join(directory, name)) for name in os.listdir(directory)}
 
@@ -240,31 +248,35 @@ def test_config_file():
     assert sorted(os.listdir(directory)) == sorted(before)
 
 
-def test_dry_run_writes_nothing_and_knows_the_memory():
+def test_dry_run_writes_nothing_and_knows_the_memory(check_memory):
     check_memory("--rank", 256)
-    # Plain vertices have most, in the first two stages.
+    # Plain vertices need most memory, in the first two stages.
     check_memory("--rank", 2, "--vertex-spacing", 0.25, "--vertex-epochs", 1)
 
 
-def check_memory(*field):
-    directory = harness.fresh_directory("dry")
-    options = harness.merge(harness.QUICK, ["--epochs", 1, "--subsets", 1, *field,
-                                            "--checkpoint-minutes", 0])
-    arguments = ["reconstruct", *series.input, "-o", os.path.join(directory, "out.mrc"), *options]
-    plan = harness.succeed(*arguments, "--dry-run").stdout
-    assert os.listdir(directory) == []
-    assert f"{len(TILTS)} views of {WIDTH} × {HEIGHT} pixels" in plan, plan
-    assert f"tomogram {WIDTH} × {HEIGHT} × {THICKNESS} voxels" in plan, plan
-    estimate = 1024 * float(re.search(r"about ([\d.]+) GiB of memory", plan)[1])
-    if harness.is_sanitized():
-        return
-    status, text, measured = harness.run_measured(*arguments)
-    assert status == 0, text
-    print(f"memory: {estimate:.0f} MiB estimated, {measured:.0f} MiB measured")
-    assert 0.8 < estimate / measured < 1.25, (estimate, measured)
+@pytest.fixture(scope="module", name="check_memory")
+def make_check_memory(series):
+    def check_memory(*field):
+        directory = harness.fresh_directory("dry")
+        options = harness.merge(harness.QUICK, ["--epochs", 1, "--subsets", 1, *field,
+                                                "--checkpoint-minutes", 0])
+        arguments = ["reconstruct", *series.input, "-o", os.path.join(directory, "out.mrc"), *options]
+        plan = harness.succeed(*arguments, "--dry-run").stdout
+        assert os.listdir(directory) == []
+        assert f"{len(TILTS)} views of {WIDTH} × {HEIGHT} pixels" in plan, plan
+        assert f"tomogram {WIDTH} × {HEIGHT} × {THICKNESS} voxels" in plan, plan
+        estimate = 1024 * float(re.search(r"about ([\d.]+) GiB of memory", plan)[1])
+        if harness.is_sanitized():
+            return
+        status, text, measured = harness.run_measured(*arguments)
+        assert status == 0, text
+        print(f"memory: {estimate:.0f} MiB estimated, {measured:.0f} MiB measured")
+        assert 0.8 < estimate / measured < 1.25, (estimate, measured)
+
+    return check_memory
 
 
-def test_plain_progress_lines_without_a_terminal():
+def test_plain_progress_lines_without_a_terminal(series):
     output = os.path.join(harness.fresh_directory("lines"), "out.mrc")
     run = harness.start("reconstruct", *series.input, "-o", output,
                         *harness.merge(harness.QUICK, ["--epochs", 100000, "--threads", 1]))
@@ -280,12 +292,12 @@ def test_plain_progress_lines_without_a_terminal():
     assert 2 < times[1] - times[0] < 30, times
     for line in lines:
         assert "\r" not in line and "\033" not in line, line
-    # How far, the loss (none before the end of the first epoch), the rate, the time left.
+    # A line has progress, loss (after the first epoch), rate and time left.
     assert re.fullmatch(r"reconstruct +\d+ %  epoch \d+/100000  loss \d\.\d+  [\d.]+ steps/s"
                         r"  (\d+ h \d\d min|\d+ min \d\d s|\d+ s) left\n", lines[1]), lines[1]
 
 
-def test_bar_on_a_terminal():
+def test_bar_on_a_terminal(series):
     for columns in (100, 60, 20):
         output = os.path.join(harness.fresh_directory("bar"), "out.mrc")
         master, slave = pty.openpty()
@@ -314,6 +326,3 @@ def test_bar_on_a_terminal():
         if columns == 100:
             assert "[########################] 100 %" in draws[-1], draws[-1]
             assert "[......" in draws[0] and " loss " in draws[0] and " left" in draws[0], draws[0]
-
-
-harness.run_tests(globals())

@@ -1,6 +1,4 @@
-"""Runs of reconstruct that are killed, stopped or damaged, and --resume after them.
-
-usage: resume_test.py TOMOFIELD SCRATCH_DIR"""
+"""Tests --resume after runs of reconstruct that were killed or stopped, and damaged checkpoints."""
 
 import glob
 import os
@@ -10,34 +8,49 @@ import time
 
 import h5py
 import numpy as np
+import pytest
 
 import harness
 from harness import read_bytes
 
-series = harness.Series("series")
 PRIORS = ["--tv-factors", 0.5, "--bcc", 5, "--ifp", 0.2]  # beside the default
 FIT = harness.merge(harness.QUICK, ["--rank", 3, "--epochs", 5, *PRIORS])
 NUM_STEPS = 5 * 7
 EVERY_STEP = ["--checkpoint-minutes", 0]
 
 
-def command(results, *options):
-    return ["reconstruct", *series.input, "-o", results.volume_path, *harness.merge(FIT, options)]
+@pytest.fixture(scope="module")
+def series():
+    """Returns a small simulated series."""
+    return harness.Series("series")
+
+
+@pytest.fixture(scope="module", name="command")
+def make_command(series):
+    def command(results, *options):
+        return ["reconstruct", *series.input, "-o", results.volume_path,
+                *harness.merge(FIT, options)]
+
+    return command
 
 
 def fresh_results(name):
     return harness.Results(os.path.join(harness.fresh_directory(name), "out.mrc"))
 
 
-undisturbed = fresh_results("undisturbed")
-began = time.monotonic()
-harness.succeed(*command(undisturbed, *EVERY_STEP))
-duration = time.monotonic() - began
-assert not undisturbed.leftovers(), undisturbed.leftovers()
+@pytest.fixture(scope="module")
+def undisturbed(command):
+    """Returns the results of an undisturbed run, and in `duration` the seconds that it took."""
+    results = fresh_results("undisturbed")
+    began = time.monotonic()
+    harness.succeed(*command(results, *EVERY_STEP))
+    results.duration = time.monotonic() - began
+    assert not results.leftovers(), results.leftovers()
+    return results
 
 
 def wait_for(condition, run):
-    """Waits until a condition holds or the run ends; true if it still runs."""
+    """Waits until a condition holds or the run ends, and returns true if it still runs."""
     while run.poll() is None:
         if condition():
             return True
@@ -51,26 +64,30 @@ def kill(run):
     return run.returncode == -signal.SIGKILL
 
 
-def interrupted(results, kill_when, most=40):
-    """Starts the run, resumes it and kills it again until it ends; how often it was killed."""
-    kills = 0
-    while kills < most:
-        run = harness.start(*command(results, *EVERY_STEP, "--resume"))
-        if wait_for(kill_when(kills), run) and kill(run):
-            kills += 1
-            continue
-        _, errors = run.communicate()
-        assert run.returncode == 0, errors
+@pytest.fixture(scope="module", name="interrupted")
+def make_interrupted(command):
+    def interrupted(results, kill_when, most=40):
+        """Starts a run, kills and resumes it until it ends, and returns how often it was killed."""
+        kills = 0
+        while kills < most:
+            run = harness.start(*command(results, *EVERY_STEP, "--resume"))
+            if wait_for(kill_when(kills), run) and kill(run):
+                kills += 1
+                continue
+            _, errors = run.communicate()
+            assert run.returncode == 0, errors
+            return kills
+        harness.succeed(*command(results, *EVERY_STEP, "--resume"))
         return kills
-    harness.succeed(*command(results, *EVERY_STEP, "--resume"))
-    return kills
+
+    return interrupted
 
 
-def test_killed_at_random_moments():
+def test_killed_at_random_moments(interrupted, undisturbed):
     chance = random.Random(5)
 
     def kill_when(kills):
-        moment = time.monotonic() + chance.uniform(0.05, 0.5) * duration
+        moment = time.monotonic() + chance.uniform(0.05, 0.5) * undisturbed.duration
         return lambda: time.monotonic() > moment
 
     for _ in range(5):  # a run may be much quicker than the one that was timed
@@ -82,14 +99,14 @@ def test_killed_at_random_moments():
     assert not results.leftovers(), results.leftovers()
 
 
-def test_killed_in_the_middle_of_writing():
+def test_killed_in_the_middle_of_writing(interrupted, undisturbed):
     for written in ("out.h5", "out.mrc", "out.json", "out_xz.png"):
         results = fresh_results("writing")
         pattern = os.path.join(os.path.dirname(results.volume_path), f".{written}.tmp-*")
         seen = set()
 
         def kill_when(kills):
-            # The file that proves the directory writable comes first, and is empty.
+            # An empty file comes first, which proves that the directory is writable.
             def being_written():
                 for path in glob.glob(pattern):
                     try:
@@ -109,18 +126,22 @@ def test_killed_in_the_middle_of_writing():
             assert kills > 0, "no moment was caught"
 
 
-def stopped_run(name, number=signal.SIGTERM, *options):
-    """Results that are only a checkpoint, the run that was stopped by a signal, and what it said.
-    No checkpoint falls due before the signal."""
-    for _ in range(10):
-        results = fresh_results(name)
-        run, errors = harness.stop_after_first_step(command(results, *options), number)
-        if run.returncode != 0:  # else it was too quick for us
-            return results, run, errors
-    raise AssertionError("every run ended before its signal")
+@pytest.fixture(scope="module", name="stopped_run")
+def make_stopped_run(command):
+    def stopped_run(name, number=signal.SIGTERM, *options):
+        """Returns results that are only a checkpoint, the run that a signal stopped, and what it
+        said. No checkpoint falls due before the signal."""
+        for _ in range(10):
+            results = fresh_results(name)
+            run, errors = harness.stop_after_first_step(command(results, *options), number)
+            if run.returncode != 0:  # else it was too quick for us
+                return results, run, errors
+        raise AssertionError("every run ended before its signal")
+
+    return stopped_run
 
 
-def test_signals_leave_a_checkpoint():
+def test_signals_leave_a_checkpoint(command, stopped_run, undisturbed):
     for number, status in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
         results, run, errors = stopped_run("signal", number)
         assert run.returncode == status, (run.returncode, errors)
@@ -134,29 +155,34 @@ def test_signals_leave_a_checkpoint():
         assert results.same_as(undisturbed)
 
 
-def refuse(results, words, *options, input=None):
-    """Resuming is refused for the words' reason, and the files stay as they are."""
-    before = {path: read_bytes(path) for path in glob.glob(os.path.dirname(results.model_path) + "/*")}
-    arguments = command(results, "--resume", *options)
-    if input:
-        arguments[1 : 1 + len(series.input)] = input
-    result = harness.tomofield(*arguments)
-    assert result.returncode == 2, (words, result)
-    complaint = result.stderr.splitlines()[-1]
-    for word in [results.model_path, "--overwrite", *words]:
-        assert word in complaint, (word, complaint)
-    after = {path: read_bytes(path) for path in glob.glob(os.path.dirname(results.model_path) + "/*")}
-    assert after == before and not results.leftovers(), words
+@pytest.fixture(scope="module", name="refuse")
+def make_refuse(command, series):
+    def refuse(results, words, *options, input=None):
+        """Checks that resuming is refused for this reason and that the files stay as they are."""
+        folder = os.path.dirname(results.model_path)
+        before = {path: read_bytes(path) for path in glob.glob(folder + "/*")}
+        arguments = command(results, "--resume", *options)
+        if input:
+            arguments[1 : 1 + len(series.input)] = input
+        result = harness.tomofield(*arguments)
+        assert result.returncode == 2, (words, result)
+        complaint = result.stderr.splitlines()[-1]
+        for word in [results.model_path, "--overwrite", *words]:
+            assert word in complaint, (word, complaint)
+        after = {path: read_bytes(path) for path in glob.glob(folder + "/*")}
+        assert after == before and not results.leftovers(), words
+
+    return refuse
 
 
-def test_torn_checkpoints_are_refused():
+def test_torn_checkpoints_are_refused(command, refuse, stopped_run, undisturbed):
     results, _, _ = stopped_run("torn")
     whole = read_bytes(results.model_path)
     for length in (0, 5, 100, 2048, len(whole) // 3, len(whole) - 4096, len(whole) - 1):
         with open(results.model_path, "wb") as file:
             file.write(whole[:length])
         refuse(results, [])
-    # As long as it was, but a page never reached the disk.
+    # The file has its length, but a page never reached the disk.
     middle = len(whole) // 2
     with open(results.model_path, "wb") as file:
         file.write(whole[:middle] + bytes(4096) + whole[middle + 4096 :])
@@ -167,7 +193,7 @@ def test_torn_checkpoints_are_refused():
     assert results.same_as(undisturbed)
 
 
-def test_foreign_checkpoints_are_refused():
+def test_foreign_checkpoints_are_refused(command, refuse, series, stopped_run, undisturbed):
     results, _, _ = stopped_run("foreign")
     refuse(results, ["--seed"], "--seed", 2)
     refuse(results, ["--thickness"], "--thickness", 22)
@@ -180,7 +206,7 @@ def test_foreign_checkpoints_are_refused():
     views = series.views.copy()
     views[5, 7, 9] += 0.01
     refuse(results, ["the tilt series"], input=series.with_views("changed", views).input)
-    # How the volume is written changes nothing of the fit; nor does another place for the series.
+    # The type of the volume's voxels and the place of the series do not change the fit.
     moved = series.with_views("moved", series.views)
     arguments = command(results, "--resume", "--mode", 12)
     arguments[1 : 1 + len(series.input)] = moved.input
@@ -199,12 +225,12 @@ def test_foreign_checkpoints_are_refused():
     assert result.returncode == 2 and results.model_path in result.stderr, result
 
 
-def test_resume_without_a_checkpoint_starts_from_the_beginning():
+def test_resume_without_a_checkpoint_starts_from_the_beginning(command, undisturbed):
     results = fresh_results("beginning")
     result = harness.succeed(*command(results, "--resume"))
     assert "from the beginning" in result.stderr, result.stderr
     assert results.same_as(undisturbed)
-    # What somebody else put there is no result of a run to resume.
+    # A file that somebody else put there is no result of a run to resume.
     results = fresh_results("others")
     with open(results.volume_path, "w") as file:
         file.write("another volume")
@@ -213,7 +239,7 @@ def test_resume_without_a_checkpoint_starts_from_the_beginning():
     assert read_bytes(results.volume_path) == b"another volume"
 
 
-def test_resume_of_a_finished_run_writes_the_same_results():
+def test_resume_of_a_finished_run_writes_the_same_results(command, undisturbed):
     results = fresh_results("finished")
     harness.succeed(*command(results))
     os.remove(results.volume_path)
@@ -224,9 +250,6 @@ def test_resume_of_a_finished_run_writes_the_same_results():
     assert all(os.path.exists(path) for path in results.all_paths) and not results.leftovers()
 
 
-def test_stopping_is_told_to_go_on_without_overwrite():
+def test_stopping_is_told_to_go_on_without_overwrite(stopped_run):
     results, run, errors = stopped_run("replaced", signal.SIGINT, "--overwrite")
     assert run.returncode == 130 and "--resume instead of --overwrite" in errors, errors
-
-
-harness.run_tests(globals())

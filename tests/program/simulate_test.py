@@ -1,34 +1,27 @@
-"""simulate against the yardstick script, and its options against what they promise.
+"""Tests simulate against a reference in numpy, and the effects of its options."""
 
-usage: simulate_test.py TOMOFIELD SCRATCH_DIR"""
-
-import contextlib
 import filecmp
 import io
 import json
 import os
-import shutil
-import subprocess
-import sys
 
 import mrcfile
 import numpy as np
 import scipy.ndimage
 
-PROGRAM, SCRATCH = sys.argv[1], sys.argv[2]
-SCRIPT = os.path.join(os.environ.get("TOMOFIELD_SHARED", "/nonexistent"), "tools", "make_cell.py")
-MAX_DENSITY = 1.18  # by which the script divides; phantom.json has divided densities
+import cell_reference
+import harness
 
 
 def run(*arguments, threads=None):
     env = dict(os.environ, **({"OMP_NUM_THREADS": str(threads)} if threads else {}))
-    return subprocess.run([PROGRAM, *map(str, arguments)], env=env, capture_output=True, text=True)
+    return harness.tomofield(*arguments, env=env)
 
 
 def simulate(name, *options, threads=None):
-    """Runs simulate into a fresh directory of the scratch directory; returns its results."""
-    directory = os.path.join(SCRATCH, name)
-    shutil.rmtree(directory, ignore_errors=True)
+    """Runs simulate into a new directory and returns its results."""
+    directory = harness.fresh_directory(name)
+    os.rmdir(directory)  # simulate makes it
     result = run("simulate", directory, *options, threads=threads)
     assert result.returncode == 0, result.stderr
     return Series(directory)
@@ -48,72 +41,60 @@ class Series:
             return file.data.astype(np.float64)
 
 
-def run_script(directory, options, objects=None):
-    """Runs the yardstick script, with these objects instead of its own if given; its variables."""
-    source = open(SCRIPT).read()
-    placement = "place(125,.15,.4); place(2000,.05,.25)"
-    assert source.count(placement) == 1, "the script has changed: adapt this test"
-    if objects is not None:
-        source = source.replace(placement, "obj=list(given)")
-    variables = {"given": objects, "__name__": "__main__"}
-    arguments, sys.argv = sys.argv, ["make_cell.py", directory, *map(str, options)]
-    try:
-        with contextlib.redirect_stdout(io.StringIO()):
-            exec(compile(source, SCRIPT, "exec"), variables)
-    finally:
-        sys.argv = arguments
-    return variables
-
-
-def test_same_objects_give_the_scripts_truth_and_projections():
-    for options in (
-        ["--size", 64, "--thickness", 40, "--tilts=-70:69.5:15.5"],
-        ["--size", 65, "--thickness", 33, "--tilts=-60:60:12", "--extended"],
+def test_truth_and_projections_are_those_of_the_recorded_ellipsoids():
+    for size, thickness, is_extended, options in (
+        (64, 40, False, ["--tilts=-70:69.5:15.5"]),
+        (65, 33, True, ["--tilts=-60:60:12", "--extended"]),
     ):
-        ours = simulate("same", *options)
-        objects = [
-            (
-                np.array(e["center_px"]),
-                e["radius_px"],
-                np.array(e["q"]),
-                e["inner_to_outer_ratio"],
-                e["wall_density"] * MAX_DENSITY,
-                e["inside_density"] * MAX_DENSITY,
-            )
-            for e in ours.record["ellipsoids"]
-        ]
-        assert len(objects) > 20
-        theirs = run_script(os.path.join(SCRATCH, "script"), options, objects)
-        np.testing.assert_allclose(ours.read("truth.mrc"), theirs["truth"], atol=1e-6)
-        np.testing.assert_allclose(ours.read("clean.mrc"), theirs["clean"], atol=2e-5, rtol=1e-6)
-        np.testing.assert_allclose(ours.record["noise_sigma"], theirs["sigma"], rtol=1e-5)
+        ours = simulate("same", "--size", size, "--thickness", thickness, *options)
+        assert len(ours.record["ellipsoids"]) > 20
+        reference = cell_reference.Cell(size, thickness, is_extended, ours.record["ellipsoids"])
         tilts = np.loadtxt(ours.path("tilt_series.tlt"))
-        np.testing.assert_allclose(tilts, theirs["tilts"], atol=1e-4)
+        first, last, step = map(float, options[0].split("=")[1].split(":"))
+        np.testing.assert_allclose(tilts, np.arange(first, last + 1e-6, step), atol=1e-4)
+        views = reference.views(tilts)
+        sigma = reference.noise_sigma(0.05, tilts)
+        np.testing.assert_allclose(ours.read("truth.mrc"), reference.truth(), atol=1e-6)
+        np.testing.assert_allclose(ours.read("clean.mrc"), views, atol=2e-5, rtol=1e-6)
+        np.testing.assert_allclose(ours.record["noise_sigma"], sigma, rtol=1e-5)
         noise = ours.read("tilt_series.mrc") - ours.read("clean.mrc")
-        assert abs(noise.std() / theirs["sigma"] - 1) < 0.02 and abs(noise.mean()) < 0.02 * noise.std()
+        assert abs(noise.std() / sigma - 1) < 0.02 and abs(noise.mean()) < 0.02 * noise.std()
         for name, group in (("truth.mrc", 1), ("clean.mrc", 0), ("tilt_series.mrc", 0)):
             assert mrcfile.validate(ours.path(name), print_file=io.StringIO()), name
             with mrcfile.open(ours.path(name)) as file:
                 assert int(file.header.ispg) == group and abs(file.voxel_size.x - 10) < 1e-5, name
 
 
-def test_seeds_have_the_scripts_statistics():
-    seeds = 12
-    for extended in ([], ["--extended"]):
+def test_seeds_have_the_statistics_of_the_recipe():
+    seeds, size, thickness, tilts = 12, 64, 40, [0.0, 60.0]
+    for is_extended in (False, True):
         figures = {"ours": [], "theirs": []}
         for seed in range(seeds):
-            options = ["--size", 64, "--thickness", 40, "--tilts=0:60:60", "--seed", seed, *extended]
-            ours = simulate("statistics", *options)
+            ours = simulate("statistics", "--size", size, "--thickness", thickness,
+                            "--tilts=0:60:60", "--seed", seed, *["--extended"] * is_extended)
             truth = ours.read("truth.mrc")
             count = len(ours.record["ellipsoids"])
             figures["ours"].append([count, truth.mean(), truth.std(), ours.record["noise_sigma"]])
-            theirs = run_script(os.path.join(SCRATCH, "script"), options)
-            truth = theirs["truth"]
-            figures["theirs"].append([len(theirs["obj"]), truth.mean(), truth.std(), theirs["sigma"]])
+            theirs = cell_reference.draw_cell(size, thickness, is_extended, max(tilts), seed)
+            truth = theirs.truth()
+            figures["theirs"].append([len(theirs.bodies), truth.mean(), truth.std(),
+                                      theirs.noise_sigma(0.05, tilts)])
         ours, theirs = np.array(figures["ours"]), np.array(figures["theirs"])
         error = np.sqrt((ours.var(0, ddof=1) + theirs.var(0, ddof=1)) / seeds)
         deviation = (ours.mean(0) - theirs.mean(0)) / error
-        assert (abs(deviation) < 4).all(), (extended, ours.mean(0), theirs.mean(0), error)
+        assert (abs(deviation) < 4).all(), (is_extended, ours.mean(0), theirs.mean(0), error)
+
+
+def test_yardsticks_are_cells_with_the_projects_views_and_thickness():
+    for yardstick, options, views in (("a", ["--tilts=-70:69.5:1.5"], 94),
+                                      ("b", ["--extended", "--tilts=-60:60:2"], 61)):
+        ours = simulate("yardstick", "--yardstick", yardstick, "--size", 32, "--seed", 3)
+        by_hand = simulate("by_hand", *options, "--size", 32, "--thickness", 19, "--seed", 3)
+        assert len(ours.views) == views
+        for name in FILES:
+            assert filecmp.cmp(ours.path(name), by_hand.path(name), shallow=False), name
+    other = simulate("other_thickness", "--yardstick", "b", "--size", 32, "--thickness", 12)
+    assert other.read("truth.mrc").shape == (12, 32, 32)
 
 
 SMALL = ["--size", 48, "--thickness", 30, "--tilts", "-60:60:10"]
@@ -149,15 +130,17 @@ def test_dose_gives_poisson_counts_of_the_attenuated_beam():
         counted = simulate("counted", *SMALL, "--dose", dose)
         clean, counts = counted.read("clean.mrc"), counted.read("tilt_series.mrc")
         absorption_per_px = counted.record["options"]["absorption_per_A"] * 10
-        np.testing.assert_allclose(clean, dose * np.exp(-absorption_per_px * plain.read("clean.mrc")), rtol=1e-5)
+        expected = dose * np.exp(-absorption_per_px * plain.read("clean.mrc"))
+        np.testing.assert_allclose(clean, expected, rtol=1e-5)
         assert (counts == np.round(counts)).all() and (counts >= 0).all()
         deviates = (counts - clean) / np.sqrt(clean)
         assert abs(deviates.mean()) < 5 / np.sqrt(deviates.size), deviates.mean()
-        assert abs(deviates.var() - 1) < 5 * np.sqrt((2 + 1 / clean.mean()) / deviates.size), deviates.var()
+        spread = np.sqrt((2 + 1 / clean.mean()) / deviates.size)
+        assert abs(deviates.var() - 1) < 5 * spread, deviates.var()
 
 
 def test_transforms_undo_the_shifts():
-    # Large enough for the membranes to be sampled well enough to interpolate.
+    # At this size the membranes are sampled well enough to interpolate.
     options = ["--size", 128, "--thickness", 90, "--tilts=-60:60:10", "--extended"]
     plain = simulate("plain", *options)
     shifted = simulate("shifted", *options, "--shifts", 3)
@@ -200,12 +183,12 @@ def test_existing_files_are_kept_unless_asked():
     assert result.returncode == 0, result.stderr
     assert "ellipsoids, 13 views, sigma" in result.stdout
     assert open(series.path("tilt_series.mrc"), "rb").read() != before
-    # What would belong to the series before is gone.
+    # The files of the earlier series are gone.
     assert sorted(os.listdir(series.directory)) == sorted(set(FILES) - {"truth.mrc"})
 
 
 def test_bad_options_are_named_and_nothing_is_written():
-    directory = os.path.join(SCRATCH, "bad")
+    directory = os.path.join(harness.SCRATCH, "bad")
     for options, words in (
         (["--tilts", "-60:60"], "first:last:step"),
         (["--tilts", "-60:nan:2"], "range"),
@@ -220,6 +203,9 @@ def test_bad_options_are_named_and_nothing_is_written():
         (["--dose", "5", "--contrast", "bright"], "contrast"),
         (["--voxel-size", "0"], "voxel size"),
         (["--gold", "5", "--gold-diameter", "1e6"], "diameter"),
+        (["--yardstick", "c"], "yardstick"),
+        (["--yardstick", "a", "--extended"], "--extended"),
+        (["--yardstick", "b", "--tilts", "-60:60:3"], "--tilts"),
     ):
         result = run("simulate", directory, *options)
         assert result.returncode == 2, (options, result)
@@ -227,22 +213,3 @@ def test_bad_options_are_named_and_nothing_is_written():
         assert not os.path.exists(directory), options
     result = run("simulate", "/proc/nowhere/cell", *SMALL)
     assert result.returncode == 2 and "/proc/nowhere/cell" in result.stderr
-
-
-def main():
-    shutil.rmtree(SCRATCH, ignore_errors=True)  # of an earlier run that failed
-    os.makedirs(SCRATCH)
-    tests = [value for name, value in globals().items() if name.startswith("test_")]
-    has_script = os.path.exists(SCRIPT)
-    for test in tests:
-        if "script" in test.__name__ and not has_script:
-            print("SKIPPED", test.__name__, "(no", SCRIPT + ")")
-            continue
-        test()
-        print("passed ", test.__name__)
-    shutil.rmtree(SCRATCH)
-    return 0 if has_script else 77
-
-
-if __name__ == "__main__":
-    sys.exit(main())

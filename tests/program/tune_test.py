@@ -1,18 +1,22 @@
-"""reconstruct --hold-out, --early-stop and --tune: what they write and choose.
-
-usage: tune_test.py TOMOFIELD SCRATCH_DIR"""
+"""Tests reconstruct --hold-out, --early-stop and --tune: the files that they write and their
+choices."""
 
 import json
 import os
 import signal
 
 import numpy as np
+import pytest
 import skimage.io
 
 import harness
 from harness import HEIGHT, TILTS, WIDTH, read_bytes
 
-series = harness.Series("series")
+
+@pytest.fixture(scope="module")
+def series():
+    """Returns a small simulated series."""
+    return harness.Series("series")
 
 
 def record(results):
@@ -23,7 +27,7 @@ def stem(results, suffix):
     return results.volume_path[: -len(".mrc")] + suffix
 
 
-def test_hold_out_reports_the_error_of_every_fourth_view():
+def test_hold_out_reports_the_error_of_every_fourth_view(series):
     results = series.reconstruct("held", "--hold-out", 4)
     held_out = record(results)["figures"]["held_out"]
     curve = held_out["error_by_epoch"]
@@ -36,7 +40,7 @@ def test_hold_out_reports_the_error_of_every_fourth_view():
     assert not results.same_as(series.reconstruct("all")), "held-out views were fitted"
 
 
-def test_picture_shows_measured_predicted_and_what_is_left():
+def test_picture_shows_measured_predicted_and_what_is_left(series):
     results = series.reconstruct("picture", "--hold-out", 4, "--epochs", 16)
     picture = skimage.io.imread(stem(results, "_held_out.png")).astype(float)
     assert picture.shape == (HEIGHT, 3 * WIDTH + 8), picture.shape
@@ -48,7 +52,7 @@ def test_picture_shows_measured_predicted_and_what_is_left():
     np.testing.assert_allclose((measured - predicted)[inside], (left - 127.5)[inside], atol=2)
 
 
-def test_early_stop_ends_the_fit_and_resumes_as_finished():
+def test_early_stop_ends_the_fit_and_resumes_as_finished(series):
     options = ["--hold-out", 4, "--tv", 0, "--epochs", 200, "--early-stop", 2]
     results = series.reconstruct("early", *options)
     curve = record(results)["figures"]["held_out"]["error_by_epoch"]
@@ -60,7 +64,7 @@ def test_early_stop_ends_the_fit_and_resumes_as_finished():
     assert read_bytes(results.volume_path) == before
 
 
-def test_the_penalty_is_what_predicts_held_out_views_better():
+def test_the_penalty_is_what_predicts_held_out_views_better(series):
     options = [option for option in harness.QUICK if option not in ("--tv-penalty", "concave")]
     command = ["reconstruct", *series.input, "-o"]
     output = os.path.join(harness.fresh_directory("penalty"), "out.mrc")
@@ -89,8 +93,8 @@ def test_the_penalty_is_what_predicts_held_out_views_better():
     assert read_bytes(by_hand) == read_bytes(output)
 
 
-def test_what_trials_chose_is_in_the_checkpoint():
-    """A run that goes on makes no trials, and is refused at once if it is another one."""
+def test_what_trials_chose_is_in_the_checkpoint(series):
+    """A resumed run makes no trials, and another run is refused at once."""
     auto = [option for option in harness.QUICK if option not in ("--tv-penalty", "concave")]
     for options in (auto, harness.merge(auto, ["--tune", "--epochs", 2])):
         folder = harness.fresh_directory("checkpoint")
@@ -114,7 +118,7 @@ def test_what_trials_chose_is_in_the_checkpoint():
                                      for results in (whole, stopped)))
 
 
-def test_views_that_score_the_result_have_no_say_in_its_settings():
+def test_views_that_score_the_result_have_no_say_in_its_settings(series):
     every = 4
     scored, broken = harness.with_broken_views(series, every)
     auto = [option for option in harness.QUICK if option not in ("--tv-penalty", "concave")]
@@ -131,7 +135,7 @@ def test_views_that_score_the_result_have_no_say_in_its_settings():
 TUNE = harness.merge(harness.QUICK, ["--epochs", 4, "--tune"])
 
 
-def test_tune_chooses_what_predicts_best_then_fits_all_views():
+def test_tune_chooses_what_predicts_best_then_fits_all_views(series):
     results = series.reconstruct("tuned", "--epochs", 4, "--tune", "--tv", 500)
     written = record(results)
     tuning = written["figures"]["tuning"]
@@ -147,7 +151,7 @@ def test_tune_chooses_what_predicts_best_then_fits_all_views():
                                  "--epochs", chosen["epochs"])
     assert read_bytes(by_hand.volume_path) == read_bytes(results.volume_path)
 
-    # Interrupted after some trials: those are not repeated, and the result is the same.
+    # A run that was interrupted after some trials does not repeat them and ends alike.
     path = stem(results, "_tune.json")
     stored = json.load(open(path))
     assert stored["trials"] == trials
@@ -172,7 +176,7 @@ def test_tune_chooses_what_predicts_best_then_fits_all_views():
     assert damaged.returncode == 2 and "damaged" in damaged.stderr, damaged.stderr
 
 
-def test_options_that_do_not_fit_are_refused():
+def test_options_that_do_not_fit_are_refused(series):
     for options, fact in ((["--hold-out", 1], "--hold-out"), (["--hold-out", 300], "21 views"),
                           (["--early-stop", 3], "--hold-out"),
                           (["--hold-out", 4, "--engine", "ray"], "--engine slab"),
@@ -183,6 +187,3 @@ def test_options_that_do_not_fit_are_refused():
                                    *harness.merge(harness.QUICK, options))
         assert result.returncode == 2 and fact in result.stderr, (options, result.stderr)
         assert not os.listdir(os.path.dirname(output)), options
-
-
-harness.run_tests(globals())

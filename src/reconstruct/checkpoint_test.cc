@@ -1,0 +1,157 @@
+#include "reconstruct/checkpoint.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "scratch_directory.h"
+#include "sphere_series.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+using testing::message_of;
+using testing::SphereSeries;
+
+constexpr const char* kFingerprint = R"({"fit":{"seed":1},"rays":12})";
+
+// Makes fits of a small series and keeps them in a file.
+class Checkpoint : public ::testing::Test {
+ protected:
+  Checkpoint() {
+    info_.geometry = series_.geometry;
+    info_.roi = measurement_.roi;
+    field_.leaf_size = 16;
+    field_.rank = 2;
+    field_.with_margin = false;
+    fit_.epochs = 3;
+    fit_.subsets = 4;
+  }
+
+  std::unique_ptr<fit::Fit> make_fit() const {
+    return std::make_unique<fit::Fit>(measurement_, field_, fit_);
+  }
+  // Returns a fit that was stopped after some steps.
+  std::unique_ptr<fit::Fit> stopped_fit(std::int64_t steps) const {
+    auto fit = make_fit();
+    fit->run([&](const fit::Fit& f) { return f.progress().step != steps; });
+    EXPECT_EQ(fit->progress().step, steps);
+    return fit;
+  }
+  static std::vector<float> parameters(const fit::Fit& fit) {
+    return {fit.field().parameters().begin(), fit.field().parameters().end()};
+  }
+  static selection::Tuned tuned() {
+    const selection::TrialSettings chosen{Penalty::kSmooth, 2.5, 8, 20};
+    return {.settings = chosen,
+            .trials = {{chosen, {1.25, {1.0, 1.5}}, 3.0}},
+            .predicted_views = {4, 12}};
+  }
+
+  SphereSeries series_;
+  measurement::Measurement measurement_{.geometry = series_.geometry,
+                                        .roi = {0, 0, SphereSeries::kWidth, SphereSeries::kRows},
+                                        .rays = series_.rays.get(),
+                                        .noise_sigma = series_.noise_sigma,
+                                        .mean_density = 0.1};
+  fit::FieldOptions field_;
+  fit::FitOptions fit_;
+  output::ModelInfo info_;
+  testing::ScratchDirectory scratch_;
+  std::filesystem::path file_ = scratch_ / "fit.h5";
+};
+
+TEST_F(Checkpoint, RestoresTheSameBitsAndGoesOnToTheSameBits) {
+  const auto whole = make_fit();
+  whole->run([](const fit::Fit&) { return true; });
+  for (const std::int64_t steps : {1, 4, 7}) {  // in the first epoch, between two, in the second
+    const auto stopped = stopped_fit(steps);
+    save_checkpoint(file_, *stopped, info_, {.fingerprint = kFingerprint, .tuned = {}});
+    const auto restored = make_fit();
+    restore_fit(file_, kFingerprint, *restored);
+    EXPECT_EQ(restored->progress().step, steps);
+    EXPECT_EQ(parameters(*restored), parameters(*stopped));
+    EXPECT_EQ(restored->progress().data_loss, stopped->progress().data_loss);
+    restored->run([](const fit::Fit&) { return true; });
+    EXPECT_EQ(parameters(*restored), parameters(*whole)) << steps;
+    EXPECT_EQ(restored->progress().data_loss, whole->progress().data_loss);
+  }
+}
+
+TEST_F(Checkpoint, AFinishedModelNeedsNoOptimiserState) {
+  const auto whole = make_fit();
+  whole->run([](const fit::Fit&) { return true; });
+  save_fit(file_, *whole, info_, progress_state(*whole, {kFingerprint, {}}));
+  const auto restored = make_fit();
+  restore_fit(file_, kFingerprint, *restored);
+  EXPECT_TRUE(restored->is_done());
+  EXPECT_EQ(parameters(*restored), parameters(*whole));
+}
+
+TEST_F(Checkpoint, AModelBetweenTwoStepsIsNone) {
+  const auto stopped = stopped_fit(5);
+  save_fit(file_, *stopped, info_, progress_state(*stopped, {kFingerprint, {}}));
+  const auto restored = make_fit();
+  const std::string message =
+      message_of<Error>([&] { restore_fit(file_, kFingerprint, *restored); });
+  EXPECT_NE(message.find(file_.string()), std::string::npos) << message;
+}
+
+TEST_F(Checkpoint, AnotherFingerprintIsRefusedAndWhatDiffersIsNamed) {
+  const auto stopped = stopped_fit(2);
+  save_checkpoint(file_, *stopped, info_, {.fingerprint = kFingerprint, .tuned = {}});
+  const auto complaint = [&](const std::string& fingerprint) {
+    const auto fit = make_fit();
+    const auto before = parameters(*fit);
+    const std::string message = message_of<Error>([&] { restore_fit(file_, fingerprint, *fit); });
+    EXPECT_EQ(parameters(*fit), before) << "a refused checkpoint leaves the fit as it is";
+    return message;
+  };
+  const std::string seed = complaint(R"({"fit":{"seed":2},"rays":12})");
+  EXPECT_NE(seed.find(file_.string()), std::string::npos) << seed;
+  EXPECT_NE(seed.find("--seed"), std::string::npos) << seed;
+  EXPECT_EQ(seed.find("the tilt series"), std::string::npos) << seed;
+  const std::string rays = complaint(R"({"fit":{"seed":1},"rays":13})");
+  EXPECT_NE(rays.find("the tilt series"), std::string::npos) << rays;
+  EXPECT_EQ(rays.find("--seed"), std::string::npos) << rays;
+}
+
+TEST_F(Checkpoint, KeepsWhatTheOptionsWereChosenBy) {
+  const auto stopped = stopped_fit(2);
+  save_checkpoint(file_, *stopped, info_, {.fingerprint = kFingerprint, .tuned = {}});
+  EXPECT_FALSE(stored_choice(file_).has_value());
+  save_checkpoint(file_, *stopped, info_, {.fingerprint = kFingerprint, .tuned = tuned()});
+  const auto stored = stored_choice(file_);
+  ASSERT_TRUE(stored.has_value());
+  EXPECT_EQ(stored->settings, tuned().settings);
+  EXPECT_EQ(stored->predicted_views, tuned().predicted_views);
+  ASSERT_EQ(stored->trials.size(), 1u);
+  EXPECT_EQ(stored->trials[0].settings, tuned().trials[0].settings);
+  EXPECT_EQ(stored->trials[0].score.view_error, tuned().trials[0].score.view_error);
+}
+
+TEST_F(Checkpoint, TheSameFitGivesTheSameBytesWheneverItIsMade) {
+  selection::Tuned slower = tuned();
+  slower.trials[0].seconds = 99;
+  const auto stopped = stopped_fit(2);
+  save_checkpoint(file_, *stopped, info_, {kFingerprint, tuned()});
+  save_checkpoint(scratch_ / "again.h5", *stopped, info_, {kFingerprint, slower});
+  EXPECT_EQ(testing::read_whole_file(file_), testing::read_whole_file(scratch_ / "again.h5"));
+}
+
+TEST_F(Checkpoint, ATornFileIsRefused) {
+  const auto stopped = stopped_fit(2);
+  save_checkpoint(file_, *stopped, info_, {.fingerprint = kFingerprint, .tuned = {}});
+  std::filesystem::resize_file(file_, std::filesystem::file_size(file_) / 2);
+  const auto fit = make_fit();
+  const std::string message = message_of<Error>([&] { restore_fit(file_, kFingerprint, *fit); });
+  EXPECT_NE(message.find(file_.string()), std::string::npos) << message;
+}
+
+}  // namespace
+}  // namespace tomofield::reconstruction
