@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "io/mrc.h"
+#include "io/image_stack.h"
 #include "tilt_series/align_image.h"
 #include "tilt_series/tilt_series.h"
 
@@ -30,6 +30,6 @@ struct SeriesPlan {
 
 /// Brings the options, the files that they name and the stack together.
 /// Throws Error where they do not fit each other or cannot be right.
-SeriesPlan plan_series(const TiltSeriesOptions& options, const io::MrcReader& stack);
+SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& stack);
 
 }  // namespace tomofield::tilt_series

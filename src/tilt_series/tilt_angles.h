@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "io/alignment_files.h"
-#include "io/mrc.h"
+#include "io/image_stack.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::tilt_series {
@@ -27,13 +27,13 @@ struct TiltAngles {
 /// The tilt angles from the first of: .tlt or .rawtlt, AreTomo's .aln, the
 /// .mdoc, the stack's extended header (an explicit file always wins). Throws
 /// Error if there is none, or if their number is not the stack's.
-TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::MrcReader& stack,
+TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::ImageStack& stack,
                             const std::optional<AreTomoSections>& aretomo,
                             const std::optional<io::Mdoc>& mdoc);
 
 /// Throws Error with both numbers and both files unless they are equal.
 void require_count(std::size_t found, const std::filesystem::path& file, const char* what,
-                   const io::MrcReader& stack);
+                   const io::ImageStack& stack);
 
 /// Throws Error (file, line, value) for an angle that is missing or beyond ±80°.
 double require_usable_tilt(const TiltAngles& angles, std::int64_t section);

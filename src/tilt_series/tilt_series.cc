@@ -10,6 +10,7 @@
 
 #include "base/check.h"
 #include "base/log.h"
+#include "io/image_stack.h"
 #include "io/mrc.h"
 #include "tilt_series/align_image.h"
 #include "tilt_series/binning.h"
@@ -97,7 +98,7 @@ constexpr double kMostNotFinite = 0.01;
 
 struct TiltSeries::Impl {
   TiltSeriesOptions options;
-  io::MrcReader stack;
+  std::shared_ptr<const io::ImageStack> stack;
   std::optional<io::MrcReader> mask;
   SeriesPlan plan;
   std::vector<View> views;
@@ -108,11 +109,13 @@ struct TiltSeries::Impl {
   BeadMasks beads;  // none while they are looked for
 
   explicit Impl(const TiltSeriesOptions& given)
-      : options(given), stack(given.stack), plan(plan_series(given, stack)) {
-    if (options.mask) mask.emplace(open_mask(*options.mask, stack));
+      : options(given),
+        stack(given.images ? given.images : io::open_image_stack(given.stack)),
+        plan(plan_series(given, *stack)) {
+    if (options.mask) mask.emplace(open_mask(*options.mask, *stack));
     for (const PlannedView& planned : plan.views) views.push_back(planned.view);
     beads.discs.resize(views.size());
-    const io::MrcHeader& header = stack.header();
+    const io::MrcHeader& header = stack->header();
     width = reduced_size(options.resample ? plan.aligned_width : header.nx, plan.bin_factor);
     height = reduced_size(options.resample ? plan.aligned_height : header.ny, plan.bin_factor);
   }
@@ -124,7 +127,7 @@ struct TiltSeries::Impl {
     base::log_info(
         fmt::format("'{}': {} of {} sections, tilts {:.1f}° to {:.1f}° from {}, views of {} × {} "
                     "pixels of {:.6g} Å",
-                    options.stack.string(), views.size(), stack.header().nz,
+                    stack->name(), views.size(), stack->header().nz,
                     std::min_element(views.begin(), views.end(), by_tilt)->tilt_deg,
                     std::max_element(views.begin(), views.end(), by_tilt)->tilt_deg,
                     plan.angle_source, width, height, plan.pixel_size_A * plan.bin_factor));
@@ -134,7 +137,7 @@ struct TiltSeries::Impl {
 
   std::string describe(std::size_t view) const {
     return fmt::format("section {} (tilt {}°) of '{}'", views[view].section + 1,
-                       views[view].tilt_deg, options.stack.string());
+                       views[view].tilt_deg, stack->name());
   }
 
   /// The binned intensities of a view, as stored, in the frame that the options ask for.
@@ -143,9 +146,9 @@ struct TiltSeries::Impl {
   }
 
   MaskedImage load(std::size_t view, bool aligned, PixelCensus* census) const {
-    const io::MrcHeader& header = stack.header();
+    const io::MrcHeader& header = stack->header();
     MaskedImage image(header.nx, header.ny);
-    stack.read_section(views[view].section, image.values);
+    stack->read_section(views[view].section, image.values);
     *census = mask_not_finite(&image);
     if (!plan.is_raw) mask_flat_fill(options.contrast, &image);
     if (mask) apply_mask(*mask, views[view].section, &image);
@@ -179,7 +182,7 @@ struct TiltSeries::Impl {
   }
 
   void require_measurements(std::size_t view, const PixelCensus& census) const {
-    const auto num_pixels = static_cast<double>(stack.header().nx * stack.header().ny);
+    const auto num_pixels = static_cast<double>(stack->header().nx * stack->header().ny);
     const double part = static_cast<double>(census.num_not_finite) / num_pixels;
     if (part > kMostNotFinite) {
       throw Error(fmt::format(
@@ -264,7 +267,7 @@ struct TiltSeries::Impl {
       return image;
     };
     const std::int64_t num_bad_pixels = beads.figures.num_bad_pixels;
-    beads = find_bead_masks(options, plan, stack, bead_views);
+    beads = find_bead_masks(options, plan, *stack, bead_views);
     beads.figures.num_bad_pixels = num_bad_pixels;
     if (options.resample) return;
     for (std::size_t view = 0; view < views.size(); ++view) {
@@ -291,7 +294,7 @@ struct TiltSeries::Impl {
           fmt::format("--log needs positive intensities, but the empty beam of '{}' is "
                       "found at {}; the data may be normalised or line integrals already: "
                       "leave --log out",
-                      options.stack.string(), empty_beam));
+                      stack->name(), empty_beam));
     }
     std::int64_t num_raised = 0;
     for_own_views(processes, [&](std::size_t view) {
@@ -306,7 +309,7 @@ struct TiltSeries::Impl {
     base::log_warning(fmt::format(
         "{} pixels of '{}' ({:.3g} %) are zero, negative or below a thousandth of the empty beam "
         "({}); they are raised to it before the logarithm",
-        num_raised, options.stack.string(),
+        num_raised, stack->name(),
         100.0 * static_cast<double>(num_raised) /
             static_cast<double>(width * height * static_cast<std::int64_t>(views.size())),
         empty_beam));

@@ -10,13 +10,15 @@
 
 #include "distributed/communicator.h"
 #include "geometry/raw_from_aligned.h"
+#include "io/image_stack.h"
 #include "tomofield/options.h"
 
 namespace tomofield::tilt_series {
 
 /// Where a tilt series is and how its intensities are to be read.
 struct TiltSeriesOptions {
-  std::filesystem::path stack;                 ///< MRC stack, raw or aligned
+  std::filesystem::path stack;                   ///< MRC stack, raw or aligned
+  std::shared_ptr<const io::ImageStack> images;  ///< views in memory, in place of `stack`
   std::optional<std::filesystem::path> tlt;    ///< .tlt or .rawtlt, one angle in degrees a section
   std::optional<std::filesystem::path> xf;     ///< IMOD raw → aligned transforms
   std::optional<std::filesystem::path> xtilt;  ///< IMOD x-axis tilt, degrees a section
@@ -55,7 +57,7 @@ struct View {
 
 /// An aligned tilt series: views whose tilt axis is the +Y direction through
 /// the image centre, dense specimen high, ready to be fitted. Images stay in
-/// the file and are read a view at a time: aligned (unless `resample` is off),
+/// their stack and are read a view at a time: aligned (unless `resample` is off),
 /// binned, converted.
 class TiltSeries {
  public:

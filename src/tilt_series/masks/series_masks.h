@@ -4,6 +4,7 @@
 #include <functional>
 #include <vector>
 
+#include "io/image_stack.h"
 #include "io/mrc.h"
 #include "tilt_series/masks/beads.h"
 #include "tilt_series/series_plan.h"
@@ -18,7 +19,7 @@ struct BeadMasks {
 };
 
 /// Opens the user's mask (--mask). Throws Error if it is not as large as the stack.
-io::MrcReader open_mask(const std::filesystem::path& mask, const io::MrcReader& stack);
+io::MrcReader open_mask(const std::filesystem::path& mask, const io::ImageStack& stack);
 
 /// Marks what is 0 in the mask's section as no measurement.
 void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* image);
@@ -27,6 +28,6 @@ void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* im
 /// parts high. Throws Error for a diameter that cannot be, or a fiducial file
 /// that does not fit the stack.
 BeadMasks find_bead_masks(const TiltSeriesOptions& options, const SeriesPlan& plan,
-                          const io::MrcReader& stack, const BeadViews& views);
+                          const io::ImageStack& stack, const BeadViews& views);
 
 }  // namespace tomofield::tilt_series
