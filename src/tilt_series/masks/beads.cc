@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "base/parallel.h"
 #include "tilt_series/masks/bead_profile.h"
 #include "tilt_series/masks/bead_tracks.h"
 #include "tilt_series/masks/spots.h"
+#include "tilt_series/view_owner.h"
 
 namespace tomofield::tilt_series {
 namespace {
@@ -58,13 +60,16 @@ std::vector<Spot> strongest_spots(const MaskedImage& image, double diameter) {
   return spots;
 }
 
-SearchedViews search_views(const BeadViews& views, double diameter) {
+/// Looks for spots in the views that this process owns.
+SearchedViews search_own_views(const BeadViews& views, double diameter,
+                               const distributed::Communicator& processes) {
   SearchedViews searched;
   const std::size_t num_views = views.tilt_deg.size();
   searched.spots.resize(num_views);
   searched.is_valid.resize(num_views);
   base::parallel_for(static_cast<std::int64_t>(num_views), [&](std::int64_t v) {
     const auto view = static_cast<std::size_t>(v);
+    if (!is_own_view(view, processes)) return;
     const MaskedImage image = views.read(view);
     searched.spots[view] = strongest_spots(image, diameter);
     searched.is_valid[view].assign(image.valid.begin(), image.valid.end());
@@ -73,6 +78,52 @@ SearchedViews search_views(const BeadViews& views, double diameter) {
     searched.height = image.height;
   });
   return searched;
+}
+
+/// Hands what was found in a view from its owner to all.
+void broadcast_view(std::size_t view, const distributed::Communicator& processes,
+                    SearchedViews* searched) {
+  const int owner = owner_of_view(view, processes);
+  std::vector<Spot>& spots = searched->spots[view];
+  std::int64_t num_spots = is_own_view(view, processes) ? std::ssize(spots) : 0;
+  processes.allreduce_sum(std::span(&num_spots, 1));
+  spots.resize(static_cast<std::size_t>(num_spots));
+  processes.broadcast(std::as_writable_bytes(std::span(spots)), owner);
+  std::vector<bool>& is_valid = searched->is_valid[view];
+  std::vector<std::uint8_t> valid(is_valid.begin(), is_valid.end());
+  valid.resize(static_cast<std::size_t>(searched->width * searched->height));
+  processes.broadcast(std::as_writable_bytes(std::span(valid)), owner);
+  is_valid.assign(valid.begin(), valid.end());
+}
+
+SearchedViews search_views(const BeadViews& views, double diameter,
+                           const distributed::Communicator& processes) {
+  SearchedViews searched;
+  processes.run_collectively([&] { searched = search_own_views(views, diameter, processes); });
+  if (processes.size() == 1) return searched;
+  // Both sizes are 0 but on the owner of the first view.
+  processes.allreduce_sum(std::span(&searched, 1), &SearchedViews::width, &SearchedViews::height);
+  for (std::size_t view = 0; view < views.tilt_deg.size(); ++view)
+    broadcast_view(view, processes, &searched);
+  return searched;
+}
+
+/// Returns a view on every process.
+MaskedImage read_on_all(const BeadViews& views, std::size_t view,
+                        const distributed::Communicator& processes) {
+  MaskedImage image;
+  processes.run_collectively([&] {
+    if (is_own_view(view, processes)) image = views.read(view);
+  });
+  if (processes.size() == 1) return image;
+  processes.allreduce_sum(std::span(&image, 1), &MaskedImage::width, &MaskedImage::height);
+  const auto size = static_cast<std::size_t>(image.width * image.height);
+  image.values.resize(size);
+  image.valid.resize(size);
+  const int owner = owner_of_view(view, processes);
+  processes.broadcast(std::as_writable_bytes(std::span(image.values)), owner);
+  processes.broadcast(std::as_writable_bytes(std::span(image.valid)), owner);
+  return image;
 }
 
 /// The views of lowest tilt.
@@ -94,13 +145,14 @@ struct SizeTrial {
 };
 
 /// Diameter of the spots that stand out most; nothing if none does.
-std::optional<double> estimate_diameter(const BeadViews& views, const BeadSearchOptions& options) {
+std::optional<double> estimate_diameter(const BeadViews& views, const BeadSearchOptions& options,
+                                        const distributed::Communicator& processes) {
   std::vector<SizeTrial> trials;
   for (double about = options.smallest_px; about <= options.largest_px; about *= kDiameterStep) {
     trials.push_back({about, BeadProfile(about)});
   }
   for (const std::size_t view : lowest_tilts(views)) {
-    const MaskedImage image = views.read(view);
+    const MaskedImage image = read_on_all(views, view, processes);
     base::parallel_for(static_cast<std::int64_t>(trials.size()), [&](std::int64_t i) {
       SizeTrial& trial = trials[static_cast<std::size_t>(i)];
       const std::vector<Spot> spots = find_spots(image, trial.about_px, kStrong);
@@ -221,15 +273,16 @@ std::vector<MaskDisc> predict_discs(const std::vector<BeadTrack>& tracks,
 
 }  // namespace
 
-BeadSearch find_beads(const BeadViews& views, const BeadSearchOptions& options) {
+BeadSearch find_beads(const BeadViews& views, const BeadSearchOptions& options,
+                      const distributed::Communicator& processes) {
   BeadSearch result;
   const std::size_t num_views = views.tilt_deg.size();
   result.num_found.assign(num_views, 0);
   result.discs.resize(num_views);
   const auto diameter =
-      options.diameter_px ? options.diameter_px : estimate_diameter(views, options);
+      options.diameter_px ? options.diameter_px : estimate_diameter(views, options, processes);
   if (!diameter) return result;
-  const SearchedViews searched = search_views(views, *diameter);
+  const SearchedViews searched = search_views(views, *diameter, processes);
   const double tolerance_px = std::max(kLeastTolerance_px, *diameter / 2);
   const std::vector<BeadTrack> tracks =
       find_bead_tracks(searched, views.tilt_deg, tolerance_px, !options.diameter_px);

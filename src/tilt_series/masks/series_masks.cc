@@ -53,7 +53,7 @@ BeadSearchOptions search_options(const TiltSeriesOptions& options, const SeriesP
   return search;
 }
 
-/// Where a point of a section is in its aligned, binned view.
+/// Returns where a point of a section is in its aligned, binned view.
 MaskDisc place_in_view(const io::FiducialPoint& point, const RawFromAligned& transform,
                        const SeriesPlan& plan, const io::MrcHeader& header) {
   const double px = point.x_px - static_cast<double>(header.nx) / 2 - transform.shift_x_px;
@@ -84,7 +84,7 @@ void require_in_stack(const io::FiducialPoint& point, const std::filesystem::pat
       header.ny, header.nz - 1));
 }
 
-/// The fiducials of every view, their radius still 0.
+/// Returns the fiducials of every view; their radius is still 0.
 std::vector<std::vector<MaskDisc>> place_fiducials(const std::filesystem::path& file,
                                                    const SeriesPlan& plan,
                                                    const io::ImageStack& stack) {
@@ -142,21 +142,27 @@ void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* im
   }
 }
 
+bool searches_beads(const TiltSeriesOptions& options) {
+  return options.bead_diameter_nm ? *options.bead_diameter_nm != 0.0
+                                  : options.contrast == Contrast::kDark;
+}
+
 BeadMasks find_bead_masks(const TiltSeriesOptions& options, const SeriesPlan& plan,
-                          const io::ImageStack& stack, const BeadViews& views) {
+                          const io::ImageStack& stack, const BeadViews& views,
+                          const distributed::Communicator& processes) {
   BeadMasks masks;
   masks.discs.resize(plan.views.size());
   masks.figures.beads_found.assign(plan.views.size(), 0);
-  const bool is_wanted = options.bead_diameter_nm ? *options.bead_diameter_nm != 0.0
-                                                  : options.contrast == Contrast::kDark;
-  if (is_wanted) {
-    BeadSearch search = find_beads(views, search_options(options, plan));
+  if (searches_beads(options)) {
+    BeadSearchOptions how;
+    processes.run_collectively([&] { how = search_options(options, plan); });
+    BeadSearch search = find_beads(views, how, processes);
     masks.discs = std::move(search.discs);
     masks.figures.beads_found = std::move(search.num_found);
     masks.figures.num_beads = search.num_beads;
     masks.figures.bead_diameter_A = search.diameter_px * binned_pixel_A(plan);
   }
-  add_fiducials(options, plan, stack, &masks);
+  processes.run_collectively([&] { add_fiducials(options, plan, stack, &masks); });
   for (const auto& discs : masks.discs) masks.figures.beads_masked.push_back(discs.size());
   return masks;
 }
