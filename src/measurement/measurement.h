@@ -19,8 +19,8 @@ namespace tomofield::measurement {
 /// 0.07 to 0.08.
 constexpr double kContrastPerThickness = 0.075;
 
-/// What is fitted: the rays, how they look at the specimen, and their noise. Lengths are in binned
-/// pixels, densities in density units. Copies share the rays.
+/// A measurement to be fitted: rays, how they look at the specimen, their noise. Lengths are in
+/// binned pixels, densities in density units. Copies share the rays.
 ///
 /// `geometry` is that of the aligned views. In a series that is not resampled, the rays are the
 /// views as recorded, and `ray_geometry` says how they look at the specimen.

@@ -113,28 +113,19 @@ ViewBrightness view_brightness(std::span<const float> image, std::span<const std
   return {mean, std::sqrt(std::max(variance - noise * noise, 1e-4 * variance))};
 }
 
-// Hands out views in order, on all processes alike: each process reads the views that it owns and
-// broadcasts them. A view that was handed out is forgotten.
-class SharedViews {
- public:
-  SharedViews(const tilt_series::TiltSeries& series, const distributed::Communicator& processes)
-      : series_(series), processes_(processes) {}
-
-  void read(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
-    processes_.run_collectively([&] {
-      if (!tilt_series::is_own_view(view, processes_)) return;
-      series_.read_view(view, image, valid);
-      series_.forget_view(view);
-    });
-    const int owner = tilt_series::owner_of_view(view, processes_);
-    processes_.broadcast(std::as_writable_bytes(image), owner);
-    processes_.broadcast(std::as_writable_bytes(valid), owner);
-  }
-
- private:
-  const tilt_series::TiltSeries& series_;
-  const distributed::Communicator& processes_;
-};
+// Gives a view to all processes: its owner reads, forgets and broadcasts it.
+void take_view(const tilt_series::TiltSeries& series, std::size_t view,
+               const distributed::Communicator& processes, std::span<float> image,
+               std::span<std::uint8_t> valid) {
+  processes.run_collectively([&] {
+    if (!tilt_series::is_own_view(view, processes)) return;
+    series.read_view(view, image, valid);
+    series.forget_view(view);
+  });
+  const int owner = tilt_series::owner_of_view(view, processes);
+  processes.broadcast(std::as_writable_bytes(image), owner);
+  processes.broadcast(std::as_writable_bytes(valid), owner);
+}
 
 // Measures the brightness of every view; each process measures the views that it owns.
 std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& series,
@@ -269,11 +260,10 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
     prepared.noise_sigma.push_back(sigma / prepared.unit);
   const distributed::Range slabs =
       slabs_of_bands(own_bands(shape.num_rows, band_rows, processes), band_rows, shape.num_rows);
-  SharedViews views(series, processes);
   prepared.rays = std::make_shared<SlabViews>(
       shape, slabs, prepared.unit,
       [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
-        views.read(view, image, valid);
+        take_view(series, view, processes, image, valid);
       },
       scratch_dir);
   prepared.masks = series.mask_figures();

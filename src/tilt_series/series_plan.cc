@@ -16,12 +16,12 @@
 namespace tomofield::tilt_series {
 namespace {
 
-/// In-plane transform of each section, and the rotation of the tilt axis that it undoes.
+/// The in-plane transform of each section, and the rotation of the tilt axis that it undoes.
 struct InPlaneAlignment {
   std::vector<std::optional<RawFromAligned>> of_section;  ///< none: not aligned (dark frame)
   double sum_cos = 0.0, sum_sin = 0.0;                    ///< over the sections, of the rotation
 
-  /// Whether the aligned images are as wide as the raw ones are high.
+  /// Tells whether the aligned images are as wide as the raw ones are high.
   bool swaps_sizes() const { return std::fabs(sum_sin) > std::fabs(sum_cos); }
 };
 
@@ -93,7 +93,7 @@ InPlaneAlignment alignment_of_aretomo(const AreTomoSections& aretomo) {
   return alignment;
 }
 
-/// Å an unbinned pixel: --pixel-size, else the header's, else the mdoc's.
+/// Returns the size of an unbinned pixel in Å: --pixel-size, else the header's, else the mdoc's.
 double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& stack,
                        const std::optional<io::Mdoc>& mdoc) {
   if (options.pixel_size_A) {

@@ -16,8 +16,7 @@ struct PlannedView {
   RawFromAligned raw_from_aligned;
 };
 
-/// Everything about a series that follows from the small files and the
-/// stack's header, before any pixel is read.
+/// A series as the small files and the stack's header describe it, before any pixel is read.
 struct SeriesPlan {
   std::vector<PlannedView> views;  ///< in the stack's order
   bool is_raw = false;             ///< images are resampled; else the stack is aligned already

@@ -9,7 +9,7 @@
 namespace tomofield::tilt_series {
 namespace {
 
-// Beyond it a ray crosses several times the specimen's thickness, and the
+// At a larger tilt a ray crosses several times the specimen's thickness, and the
 // margin that it would need grows without bound.
 constexpr double kLargestTilt_deg = 80.0;
 

@@ -27,7 +27,7 @@ namespace {
 
 constexpr double kMaxPartNotFinite = 0.01;
 
-/// What is checked in a view; integers, to be summed over processes.
+/// Facts that are checked in a view; integers, to be summed over processes.
 struct ViewCheck {
   std::int64_t num_not_finite = 0;
   std::int64_t num_bad = 0;

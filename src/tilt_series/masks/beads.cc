@@ -15,7 +15,7 @@ namespace tomofield::tilt_series {
 namespace {
 
 // Strengths of spots. Structure reaches 5 in the series that we know (simulated
-// cells, dark-field films and particles), beads in vitreous ice 6 to 20.
+// cells, dark-field films and particles); beads in vitreous ice reach 6 to 20.
 constexpr double kStrong = 6.0;
 constexpr double kLikely = 4.5;  // enough for a seed once it is known that there are beads
 constexpr double kWeak = 3.5;    // enough where a track says that a bead is there
@@ -23,21 +23,21 @@ constexpr double kWeak = 3.5;    // enough where a track says that a bead is the
 constexpr std::size_t kDiameterViews = 5;  // the lowest tilts, which the diameter is measured in
 constexpr double kDiameterStep = 1.4142135623730951;  // between the diameters that are tried
 
-// Clear evidence: this many beads, each with spots in this part of all views.
-constexpr std::size_t kFewestBeads = 3;
+// It is clear evidence if so many beads have spots in this part of all views each.
+constexpr std::size_t kMinBeads = 3;
 constexpr double kPartOfViews = 0.5;
 
-// Spots of a view that are followed: more beads than anybody adds, and the
+// So many spots of a view are followed. Nobody adds more beads, and the
 // tracks of a view full of ice crystals are still found in seconds.
-constexpr std::size_t kMostSpots = 1000;
+constexpr std::size_t kMaxSpots = 1000;
 
-// How far from a track its spots may be, at least: alignment is no better.
-constexpr double kLeastTolerance_px = 2.0;
+// Spots may always be this far from their track, since alignment is no better.
+constexpr double kMinTolerance_px = 2.0;
 
 // A spot without a track is a bead's if it has this part of their median contrast in its view.
 constexpr double kPartOfContrast = 0.5;
 
-/// Spots of every view, and which of its pixels were measured.
+/// The spots of every view, and which of its pixels were measured.
 struct SearchedViews {
   std::vector<std::vector<Spot>> spots;
   std::vector<std::vector<bool>> is_valid;
@@ -51,12 +51,12 @@ struct SearchedViews {
   }
 };
 
-/// The strongest spots of a view.
+/// Returns the strongest spots of a view.
 std::vector<Spot> strongest_spots(const MaskedImage& image, double diameter) {
   std::vector<Spot> spots = find_spots(image, diameter, kWeak);
   std::stable_sort(spots.begin(), spots.end(),
                    [](const Spot& a, const Spot& b) { return a.strength > b.strength; });
-  spots.resize(std::min(spots.size(), kMostSpots));
+  spots.resize(std::min(spots.size(), kMaxSpots));
   return spots;
 }
 
@@ -80,7 +80,7 @@ SearchedViews search_own_views(const BeadViews& views, double diameter,
   return searched;
 }
 
-/// Hands what was found in a view from its owner to all.
+/// Broadcasts what the owner of a view found in it.
 void broadcast_view(std::size_t view, const distributed::Communicator& processes,
                     SearchedViews* searched) {
   const int owner = owner_of_view(view, processes);
@@ -101,7 +101,7 @@ SearchedViews search_views(const BeadViews& views, double diameter,
   SearchedViews searched;
   processes.run_collectively([&] { searched = search_own_views(views, diameter, processes); });
   if (processes.size() == 1) return searched;
-  // Both sizes are 0 but on the owner of the first view.
+  // Only the owner of the first view has set them.
   processes.allreduce_sum(std::span(&searched, 1), &SearchedViews::width, &SearchedViews::height);
   for (std::size_t view = 0; view < views.tilt_deg.size(); ++view)
     broadcast_view(view, processes, &searched);
@@ -126,7 +126,7 @@ MaskedImage read_on_all(const BeadViews& views, std::size_t view,
   return image;
 }
 
-/// The views of lowest tilt.
+/// Returns the views of lowest tilt.
 std::vector<std::size_t> lowest_tilts(const BeadViews& views) {
   std::vector<std::size_t> order(views.tilt_deg.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -144,7 +144,7 @@ struct SizeTrial {
   double strength = 0.0;  ///< of all spots together
 };
 
-/// Diameter of the spots that stand out most; nothing if none does.
+/// Returns the diameter of the spots that stand out most; nothing if none does.
 std::optional<double> estimate_diameter(const BeadViews& views, const BeadSearchOptions& options,
                                         const distributed::Communicator& processes) {
   std::vector<SizeTrial> trials;
@@ -171,16 +171,16 @@ bool is_evident(const std::vector<BeadTrack>& tracks, std::size_t num_views) {
   const auto num_clear = std::count_if(tracks.begin(), tracks.end(), [&](const BeadTrack& track) {
     return static_cast<double>(track.num_found) >= kPartOfViews * static_cast<double>(num_views);
   });
-  return num_clear >= static_cast<std::ptrdiff_t>(kFewestBeads);
+  return num_clear >= static_cast<std::ptrdiff_t>(kMinBeads);
 }
 
-/// Tracks of beads; none if evidence is wanted and there is not enough.
+/// Returns tracks of beads; none if evidence is wanted and there is not enough.
 std::vector<BeadTrack> find_bead_tracks(const SearchedViews& searched,
                                         const std::vector<double>& tilt_deg, double tolerance_px,
                                         bool wants_evidence) {
   TrackRules rules;
   rules.tolerance_px = tolerance_px;
-  rules.largest_z_px = static_cast<double>(searched.width) / 2;
+  rules.max_z_px = static_cast<double>(searched.width) / 2;
   rules.seed_strength = kStrong;
   const TrackedViews tracked{
       tilt_deg, static_cast<double>(searched.width) / 2,
@@ -196,7 +196,7 @@ double distance_between(const Spot& spot, const MaskDisc& disc) {
   return std::hypot(spot.x_px - disc.x_px, spot.y_px - disc.y_px);
 }
 
-/// The spot of each disc: the nearest within `tolerance`, unless another disc
+/// Returns the index of the spot of each disc: the nearest within `tolerance`, unless another disc
 /// shares it (two beads that overlap); spots.size() where there is none.
 std::vector<std::size_t> match_spots(const std::vector<MaskDisc>& discs,
                                      const std::vector<Spot>& spots, double tolerance) {
@@ -216,7 +216,7 @@ std::vector<std::size_t> match_spots(const std::vector<MaskDisc>& discs,
   return match;
 }
 
-/// Places of strong spots that no track has: beads that few views see.
+/// Returns discs on strong spots that no track has: they are beads that few views see.
 std::vector<MaskDisc> loose_discs(const std::vector<Spot>& spots, const std::vector<bool>& is_taken,
                                   std::vector<double> bead_contrasts, double radius) {
   std::vector<MaskDisc> discs;
@@ -259,7 +259,7 @@ std::size_t settle_discs(const std::vector<Spot>& spots, double tolerance, doubl
   return contrasts.size();
 }
 
-/// Where the tracks pass a view, if that is within it.
+/// Returns discs where the tracks pass a view, if that is within it.
 std::vector<MaskDisc> predict_discs(const std::vector<BeadTrack>& tracks,
                                     const SearchedViews& searched, double tilt_deg, double radius) {
   std::vector<MaskDisc> discs;
@@ -283,7 +283,7 @@ BeadSearch find_beads(const BeadViews& views, const BeadSearchOptions& options,
       options.diameter_px ? options.diameter_px : estimate_diameter(views, options, processes);
   if (!diameter) return result;
   const SearchedViews searched = search_views(views, *diameter, processes);
-  const double tolerance_px = std::max(kLeastTolerance_px, *diameter / 2);
+  const double tolerance_px = std::max(kMinTolerance_px, *diameter / 2);
   const std::vector<BeadTrack> tracks =
       find_bead_tracks(searched, views.tilt_deg, tolerance_px, !options.diameter_px);
   if (tracks.empty() && !options.diameter_px) return result;

@@ -31,7 +31,7 @@ struct BeadSearchOptions {
   double largest_px = 64.0;
 };
 
-/// What a search found; without beads there are no discs.
+/// The result of a search; without beads there are no discs.
 struct BeadSearch {
   double diameter_px = 0.0;                  ///< given or estimated; 0: none
   std::size_t num_beads = 0;                 ///< with one position in the specimen

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kAngstromsANanometre = 10.0;
 
-// Diameters that are tried where none is given: gold markers have 3 to 30 nm,
+// Diameters in this range are tried where none is given: gold markers have 3 to 30 nm,
 // and blurred ones look larger. Smaller spots are atoms or noise.
 constexpr double kSmallest_nm = 2.0, kLargest_nm = 40.0;
 constexpr double kSmallest_px = 3.0;       // below it spots look like noise
