@@ -30,7 +30,7 @@ class SphereSeries {
     for (double tilt = -60; tilt <= 60; tilt += 4) tilts.push_back(tilt);
     geometry = geometry::centred_geometry(kWidth, kRows, kThickness, tilts);
     noise_sigma.assign(tilts.size(), options_.noise_sigma);
-    rays = std::make_unique<measurement::SlabViews>(
+    rays = std::make_shared<measurement::SlabViews>(
         measurement::SlabViews::Shape{.num_views = tilts.size(),
                                       .width = kWidth,
                                       .height = kRows,
@@ -56,7 +56,7 @@ class SphereSeries {
 
   geometry::TiltGeometry geometry;
   std::vector<double> noise_sigma;
-  std::unique_ptr<measurement::SlabViews> rays;
+  std::shared_ptr<const measurement::SlabViews> rays;
 
  private:
   static std::vector<simulate::Ellipsoid> spheres() {

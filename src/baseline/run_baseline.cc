@@ -14,13 +14,14 @@
 #include "baseline/tune.h"
 #include "baseline/voxel_problem.h"
 #include "io/json.h"
+#include "io/scratch_memory.h"
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
 #include "output/mask_metrics.h"
 #include "output/result_files.h"
 #include "projection/sample_grid.h"
 #include "reconstruct/options_json.h"
-#include "selection/trial_series.h"
+#include "selection/trial_measurement.h"
 #include "tomofield/error.h"
 
 namespace tomofield::baseline {
@@ -28,7 +29,7 @@ namespace {
 
 using kernels::kLanes;
 
-projection::SampleGrid grid_of(const measurement::PreparedSeries& series,
+projection::SampleGrid grid_of(const measurement::Measurement& series,
                                const BaselineOptions& options) {
   return projection::make_sample_grid(series.geometry, static_cast<double>(series.roi.x0),
                                       static_cast<double>(series.roi.x1),
@@ -37,9 +38,9 @@ projection::SampleGrid grid_of(const measurement::PreparedSeries& series,
 
 // Estimates the memory: the volumes and detectors of the method, and a pair of slabs and its rays
 // for each thread. A tuning holds copies of the rays of its rows.
-std::size_t estimate_memory(const measurement::PreparedSeries& plan,
+std::size_t estimate_memory(const measurement::Measurement& plan,
                             const projection::SampleGrid& grid, const MethodFacts& method,
-                            const MethodSize& size, bool tunes) {
+                            const MethodSize& size, std::size_t stored_views, bool tunes) {
   constexpr std::size_t kTrialSlabs = selection::kTrialRows / kLanes;
   constexpr std::size_t kFixed = std::size_t{24} << 20;  // program and libraries
   const std::size_t slabs = static_cast<std::size_t>((plan.roi.height() + kLanes - 1) / kLanes);
@@ -54,7 +55,9 @@ std::size_t estimate_memory(const measurement::PreparedSeries& plan,
       size.bytes +
       sizeof(float) * (slabs * values_of_slab + copied_slabs * rays +
                        static_cast<std::size_t>(base::thread_count()) * values_of_thread);
-  return kFixed + std::max(running, reading_memory(plan) + sizeof(float) * slabs * rays);
+  // The stored views make room for the rays one by one.
+  return kFixed + std::max(running, decoding_memory(plan) +
+                                        std::max(sizeof(float) * slabs * rays, stored_views));
 }
 
 base::ProgressReport progress_report(const IterationReport& report, int num_iterations,
@@ -86,7 +89,7 @@ output::VoxelSource voxels_of(const VoxelVolume& densities) {
   };
 }
 
-output::ModelInfo volume_info(const measurement::PreparedSeries& series,
+output::ModelInfo volume_info(const measurement::Measurement& series,
                               const BaselineOptions& options) {
   output::ModelInfo info;
   info.geometry = series.geometry;
@@ -117,7 +120,7 @@ nlohmann::json held_out_json(const VoxelProblem& problem, const std::vector<int>
 }
 
 nlohmann::json figures_json(const Solution& solution, const VoxelProblem& problem,
-                            const measurement::PreparedSeries& series, std::size_t num_parameters,
+                            const measurement::Measurement& series, std::size_t num_parameters,
                             double seconds) {
   nlohmann::json views = nlohmann::json::array();
   for (const int view : problem.views()) {
@@ -153,7 +156,7 @@ AfterIteration report_to(const base::ProgressSink& progress, const MethodFacts& 
   };
 }
 
-void write_results(const Solution& solution, const measurement::PreparedSeries& series,
+void write_results(const Solution& solution, const measurement::Measurement& series,
                    const BaselineOptions& options, const nlohmann::json& figures,
                    const BaselinePaths& paths) {
   const output::ModelInfo info = volume_info(series, options);
@@ -185,7 +188,7 @@ void check_outputs(const BaselineOptions& options) {
 }
 
 BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {
-  const measurement::PreparedSeries planned = plan_series(series, options.specimen);
+  const measurement::Measurement planned = plan_measurement(series, options.specimen);
   if (planned.x_tilt_deg != 0.0) {
     throw Error(fmt::format(
         "the series has an x-axis tilt of {}°, which this baseline does not turn back: leave "
@@ -205,7 +208,9 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
   plan.num_voxels = num_voxels(grid, planned.roi.height());
   const MethodSize size = size_of(options.method, grid, planned.roi.height());
   plan.num_parameters = size.num_parameters;
-  plan.memory_bytes = estimate_memory(planned, grid, facts_of(options.method), size, options.tune);
+  plan.memory_bytes =
+      estimate_memory(planned, grid, facts_of(options.method), size,
+                      series.stored_memory(distributed::Communicator::alone()), options.tune);
   const std::string advice = fmt::format(
       "use a larger --bin or --margin-spacing, a smaller --roi or --thickness, or fewer "
       "--threads{}",
@@ -218,9 +223,8 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
                              const BaselineOptions& requested, const BaselineProgress& progress) {
   BaselineOptions options = requested;
   const BaselinePaths paths = baseline_paths(options.output);
-  const measurement::PreparedSeries series =
-      prepare_series(tilt_series, options.specimen,
-                     paths.volume.has_parent_path() ? paths.volume.parent_path() : ".");
+  const measurement::Measurement series =
+      prepare_measurement(tilt_series, options.specimen, io::scratch_directory(paths.volume));
   const std::vector<int> held_out =
       measurement::held_out_views(series.geometry.tilt_deg, options.hold_out);
   nlohmann::json tuning = nullptr;

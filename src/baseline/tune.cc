@@ -12,8 +12,8 @@
 #include "base/log.h"
 #include "base/stopwatch.h"
 #include "baseline/held_out.h"
-#include "selection/trial_series.h"
 #include "selection/scores.h"
+#include "selection/trial_measurement.h"
 
 namespace tomofield::baseline {
 namespace {
@@ -50,9 +50,9 @@ class Trials {
   Trials(const TrialData& data, const base::ProgressSink& progress)
       : data_(data),
         progress_(progress),
-        series_(selection::make_trial_series(data.series.geometry, data.series.noise_sigma,
-                                             *data.series.rays, data.scored,
-                                             selection::kTrialRows)) {}
+        views_(selection::trial_views(data.measurement.geometry.tilt_deg, data.scored)),
+        measurement_(
+            selection::trial_measurement(data.measurement, views_, selection::kTrialRows)) {}
 
   const Trial& trial(const Method& method) {
     const nlohmann::json settings = json_of(method);
@@ -88,7 +88,7 @@ class Trials {
   }
 
   Tuned take(const Method& chosen) {
-    return {chosen, std::move(trials_), std::move(series_.views.predicted)};
+    return {chosen, std::move(trials_), std::move(views_.predicted)};
   }
 
  private:
@@ -96,8 +96,8 @@ class Trials {
   // the fall of the objective at the end.
   template <typename TrialAfter>
   std::optional<double> run(const Method& method, TrialAfter trial_after) {
-    VoxelProblem problem(series_.geometry, data_.grid, *series_.rays, series_.noise_sigma,
-                         {series_.held_out, data_.fit_view_scale});
+    VoxelProblem problem(measurement_.geometry, data_.grid, *measurement_.rays,
+                         measurement_.noise_sigma, {measurement_.held_out, data_.fit_view_scale});
     const base::Stopwatch running;
     const AfterIteration after_iteration = [&](const IterationReport& report,
                                                VoxelVolume& densities) {
@@ -105,13 +105,13 @@ class Trials {
       const std::optional<Method> tried = trial_after(report.iteration);
       if (!tried) return;
       const measurement::ViewErrors errors =
-          held_out_errors(problem, series_.held_out, data_.fit_view_scale, densities);
+          held_out_errors(problem, measurement_.held_out, data_.fit_view_scale, densities);
       trials_.push_back({*tried, {errors.total, errors.view_error}, running.seconds(), {}});
       base::log_info(
           fmt::format("tried{}: held-out error {:.5f}", settings_text(*tried), errors.total));
     };
     const Solution solution =
-        reconstruct(problem, method, data_.series.mean_density, after_iteration);
+        reconstruct(problem, method, measurement_.mean_density, after_iteration);
     ++num_runs_;
     iterations_done_ += facts_of(method).iterations;
     return last_decrease(solution);
@@ -129,7 +129,8 @@ class Trials {
 
   const TrialData& data_;
   const base::ProgressSink& progress_;
-  selection::TrialSeries series_;
+  selection::TrialViews views_;
+  measurement::Measurement measurement_;
   base::Stopwatch running_;
   std::vector<Trial> trials_;
   int num_runs_ = 0, expected_runs_ = 0;

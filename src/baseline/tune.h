@@ -41,14 +41,14 @@ struct Tuned {
 
 /// The data of the trials.
 struct TrialData {
-  const measurement::PreparedSeries& series;
+  const measurement::Measurement& measurement;
   projection::SampleGrid grid;
   std::vector<int> scored;  ///< views that score the result: no trial sees them; ascending
   bool fit_view_scale = false;
 };
 
 /// Chooses the settings that best predict views held out from the trials. Its rules, rows and views
-/// are those of the main method's tuning (reconstruct/tuning.h, selection/trial_series.h).
+/// are those of the main method's tuning (reconstruct/tuning.h, selection/trial_measurement.h).
 ///
 /// It chooses the penalty if neither the penalty nor a weight is given: the views vote on both
 /// penalties with their usual weights. It chooses the weight by search_weight(). For methods that

@@ -25,7 +25,7 @@ class BaselineTune : public testing::OneThread {
     series_.geometry = spheres.geometry;
     series_.roi = {0, 0, SphereSeries::kWidth, SphereSeries::kRows};
     series_.noise_sigma = spheres.noise_sigma;
-    series_.rays = std::move(spheres.rays);
+    series_.rays = spheres.rays;
     series_.mean_density = 0.1;
   }
 
@@ -45,7 +45,7 @@ class BaselineTune : public testing::OneThread {
         }).densities);
   }
 
-  measurement::PreparedSeries series_;
+  measurement::Measurement series_;
   base::ProgressSink progress_;
 };
 

@@ -20,6 +20,7 @@
 #include "cli/tensorf_command.h"
 #include "cli/volume_options.h"
 #include "fit/options.h"
+#include "io/scratch_memory.h"
 
 namespace tomofield::cli {
 namespace {
@@ -64,6 +65,8 @@ void run(Arguments<Method>& arguments) {
   options.method = method;
   base::require_no_faults(options.specimen.faults());
   baseline::check_outputs(options);
+  options.input.scratch_dir = io::scratch_directory(options.output);
+  options.input.keep_views = !arguments.dry_run;
   const tilt_series::TiltSeries series(options.input);
   print_plan(baseline::plan_baseline(series, options), method.facts(), options.volume.axes);
   if (options.tune) fmt::print("short trials first, that choose settings by held-out views\n");

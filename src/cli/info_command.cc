@@ -109,7 +109,10 @@ void add_info_command(CLI::App& program) {
       "tilt series and list its views");
   auto options = std::make_shared<tilt_series::TiltSeriesOptions>();
   add_input_options(*command, *options);
-  command->callback([options] { print_info(*options); });
+  command->callback([options] {
+    options->keep_views = false;
+    print_info(*options);
+  });
 }
 
 }  // namespace tomofield::cli

@@ -13,6 +13,7 @@
 #include "cli/specimen_options.h"
 #include "cli/volume_options.h"
 #include "fit/stages.h"
+#include "io/scratch_memory.h"
 #include "reconstruct/reconstruct.h"
 
 namespace tomofield::cli {
@@ -206,6 +207,8 @@ void run(Arguments& arguments, const distributed::Communicator& processes) {
     options.field.activation = Activation::kIdentity;
   options.input.resample = options.fit.engine == Engine::kSlab;
   processes.run_collectively([&] { reconstruction::check_options(options); });
+  options.input.scratch_dir = io::scratch_directory(options.output);
+  options.input.keep_views = !arguments.dry_run;
   const tilt_series::TiltSeries series(options.input, processes);
   run_reconstruction(series, options, arguments.dry_run, processes);
 }

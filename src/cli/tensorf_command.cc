@@ -11,6 +11,7 @@
 #include "cli/run_reconstruction.h"
 #include "cli/specimen_options.h"
 #include "cli/volume_options.h"
+#include "io/scratch_memory.h"
 
 namespace tomofield::cli {
 namespace {
@@ -71,8 +72,10 @@ void run(Arguments& arguments) {
       is_on(arguments.non_negative, !is_dark) ? Activation::kSoftplus : Activation::kIdentity;
   options.field.with_margin = options.specimen.with_margin;
   reconstruction::check_options(options);
+  options.input.scratch_dir = io::scratch_directory(options.output);
+  options.input.keep_views = !arguments.dry_run;
   const tilt_series::TiltSeries series(options.input);
-  baseline::cover_with_one_node(plan_series(series, options.specimen).roi, options);
+  baseline::cover_with_one_node(plan_measurement(series, options.specimen).roi, options);
   run_reconstruction(series, options, arguments.dry_run);
 }
 

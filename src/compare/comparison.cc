@@ -136,7 +136,9 @@ void check_comparison(const CompareOptions& options) {
 }
 
 Outcome compare_methods(const CompareOptions& options, const RunHooks& hooks) {
-  const tilt_series::TiltSeries series(options.input);
+  tilt_series::TiltSeriesOptions checked = options.input;
+  checked.keep_views = false;  // the runs read them
+  const tilt_series::TiltSeries series(checked);
   const PlannedRuns plan = plan_runs(options, series);
   std::vector<Row> rows = options.overwrite ? new_rows(plan.runs, options.folder)
                                             : stored_rows(plan.runs, options.folder);

@@ -6,7 +6,7 @@
 #include "base/volume.h"
 #include "geometry/tilt_geometry.h"
 #include "measurement/slab_views.h"
-#include "measurement/view_errors.h"
+#include "measurement/view_residuals.h"
 
 namespace tomofield::evaluate {
 

@@ -13,7 +13,7 @@
 namespace tomofield::evaluate {
 namespace {
 
-void check_volume(const base::Volume& volume, const measurement::PreparedSeries& series,
+void check_volume(const base::Volume& volume, const measurement::Measurement& series,
                   const std::filesystem::path& path) {
   if (series.x_tilt_deg != 0.0) {
     throw Error(fmt::format(
@@ -49,9 +49,9 @@ VolumeScore score_volume(const VolumeScoreOptions& options) {
   const tilt_series::TiltSeries series(options.input);
   measurement::SpecimenOptions specimen = options.specimen;
   specimen.thickness = static_cast<double>(volume.shape.nz) * series.bin_factor();
-  check_volume(volume, measurement::plan_series(series, specimen), options.volume);
-  const measurement::PreparedSeries prepared =
-      measurement::prepare_series(series, specimen, std::filesystem::temp_directory_path());
+  check_volume(volume, measurement::plan_measurement(series, specimen), options.volume);
+  const measurement::Measurement prepared =
+      measurement::prepare_measurement(series, specimen, std::filesystem::temp_directory_path());
   std::vector<double> noise_weight;
   for (const double sigma : prepared.noise_sigma) noise_weight.push_back(1.0 / (sigma * sigma));
   VolumeScore score;

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "measurement/prepare.h"
-#include "measurement/view_errors.h"
+#include "measurement/view_residuals.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::evaluate {

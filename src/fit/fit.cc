@@ -11,7 +11,6 @@
 #include "base/random.h"
 #include "base/shuffle.h"
 #include "field/vm/factorise.h"
-#include "measurement/bands.h"
 #include "objective/ray_data_term.h"
 #include "objective/slab_objective.h"
 #include "objective/terms.h"
@@ -77,16 +76,16 @@ TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
 }  // namespace
 
 Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_options,
-         const FitOptions& options)
+         const FitOptions& options, const distributed::Communicator& processes)
     : measurement_(measurement),
+      processes_(processes),
       options_(with_at_most_one_subset_a_view(options, measurement.num_fitted_views())),
       stages_(make_stages(field_options, options_)),
       domain_(domain_of(measurement, field_options)),
-      bands_(measurement::own_bands(domain_.num_rows, domain_.tree.roots().cell_size,
-                                    *measurement.processes)),
+      bands_(measurement::own_bands(domain_.num_rows, domain_.tree.roots().cell_size, processes)),
       field_(make_initial_field(domain_, measurement.geometry.thickness, measurement.mean_density,
                                 of_kind(field_options, stages_.front().field_kind), options.seed,
-                                leaves_to_keep(*measurement.processes, domain_.tree, bands_))),
+                                leaves_to_keep(processes, domain_.tree, bands_))),
       optimizer_(*field_, AdamOptions{}),
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())),
       fitted_views_(views_but(measurement.geometry.num_views(), measurement.held_out)),
@@ -112,7 +111,7 @@ const Stage& Fit::stage() const {
 void Fit::enter_stage() {
   objective_.reset();
   binned_.reset();  // before its successor needs memory
-  binned_ = std::make_unique<measurement::BinnedMeasurement>(measurement_, stage().bin);
+  binned_ = std::make_unique<measurement::Measurement>(binned(measurement_, stage().bin));
   projector_ = std::make_unique<projection::SlabProjector>(
       binned_->geometry, sample_grid(domain_, measurement_.geometry.thickness, stage().bin));
 }
@@ -160,7 +159,8 @@ void Fit::follow_tree() {
       .has_factors = stage().field_kind == stages_.back().field_kind,
       .own_bands = bands_,
       .own_leaves = own_leaves(),
-      .options = options_});
+      .options = options_,
+      .processes = processes_});
   halo_.emplace(*field_, bands_, stage().bin, processes());
 }
 
@@ -201,7 +201,7 @@ bool Fit::is_done() const {
   return fine.end() - std::ranges::min_element(fine) > options_.patience;
 }
 
-measurement::HeldOutError Fit::held_out_error() const {
+measurement::ViewErrors Fit::held_out_error() const {
   std::vector<double> weights;
   for (const measurement::ViewModel& view : progress_.views) weights.push_back(view.weight);
   return objective_->held_out_error(weights, options_.fit_view_scale);
@@ -263,7 +263,7 @@ void Fit::take_step() {
 }
 
 void Fit::score_held_out() {
-  const measurement::HeldOutError error = held_out_error();
+  const measurement::ViewErrors error = held_out_error();
   for (std::size_t i = 0; i < error.views.size(); ++i)
     progress_.views[static_cast<std::size_t>(error.views[i])] = error.models[i];
   progress_.held_out_error.push_back(error.total);

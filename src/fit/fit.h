@@ -44,9 +44,10 @@ struct Progress {
 /// same bits for any number of processes.
 class Fit {
  public:
-  /// `measurement` must outlive the fit.
+  /// `measurement` and `processes` must outlive the fit.
   Fit(const measurement::Measurement& measurement, const FieldOptions& field_options,
-      const FitOptions& options);
+      const FitOptions& options,
+      const distributed::Communicator& processes = distributed::Communicator::alone());
 
   /// Called after every step; returning false stops the fit there.
   using AfterStep = std::function<bool(const Fit&)>;
@@ -69,7 +70,7 @@ class Fit {
   /// Returns how many times its usual weight the density's variation has (objective/terms.h).
   double variation_gain() const;
   /// Scores the field as it is on the held-out views, of which there must be some.
-  measurement::HeldOutError held_out_error() const;
+  measurement::ViewErrors held_out_error() const;
   measurement::PredictedView predict_held_out(int view, const measurement::ViewModel& model) const;
 
   const field::Field& field() const { return *field_; }
@@ -79,7 +80,7 @@ class Fit {
   const Adam& optimizer() const { return optimizer_; }
   Adam& optimizer() { return optimizer_; }
 
-  const distributed::Communicator& processes() const { return *measurement_.processes; }
+  const distributed::Communicator& processes() const { return processes_; }
   /// Returns the bands that this process works on: all of them, if it is alone.
   distributed::Range own_bands() const { return bands_; }
   distributed::Range own_leaves() const { return leaves_of_bands(field_->tree(), bands_); }
@@ -104,6 +105,7 @@ class Fit {
   void follow_tree();
 
   const measurement::Measurement& measurement_;
+  const distributed::Communicator& processes_;
   FitOptions options_;
   std::vector<Stage> stages_;
   Domain domain_;
@@ -117,7 +119,7 @@ class Fit {
 
   // Belongs to one stage or one tree. The objective refers to the first two, so they keep their
   // place when a fit is moved.
-  std::unique_ptr<measurement::BinnedMeasurement> binned_;
+  std::unique_ptr<measurement::Measurement> binned_;
   std::unique_ptr<projection::SlabProjector> projector_;
   std::unique_ptr<objective::Objective> objective_;
   base::AlignedBuffer<float> gradient_;

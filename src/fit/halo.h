@@ -7,7 +7,7 @@
 #include "distributed/communicator.h"
 #include "distributed/partition.h"
 #include "field/field.h"
-#include "measurement/bands.h"
+#include "measurement/slab_views.h"
 
 namespace tomofield::fit {
 

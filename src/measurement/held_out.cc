@@ -20,7 +20,7 @@ namespace {
 
 using kernels::kLanes;
 
-// Line integrals of a slab: [view, x, lane].
+// Returns line integrals of a slab: [view, x, lane].
 base::AlignedBuffer<float> predict(const projection::SlabSampler& sampler,
                                    const projection::SlabProjector& projector,
                                    std::span<const int> views, int slab) {
@@ -78,15 +78,15 @@ std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every) 
   return views;
 }
 
-HeldOutError held_out_error(const projection::SlabSampler& sampler,
-                            const projection::SlabProjector& projector, const SlabViews& measured,
-                            std::vector<int> views, std::span<const double> noise_weight,
-                            bool fit_view_scale, const distributed::Communicator& processes) {
+ViewErrors held_out_error(const projection::SlabSampler& sampler,
+                          const projection::SlabProjector& projector, const SlabViews& measured,
+                          std::vector<int> views, std::span<const double> noise_weight,
+                          bool fit_view_scale, const distributed::Communicator& processes) {
   const SlabSums sums = sums_of_slabs(sampler, projector, measured, views, processes);
   return view_errors(std::move(views), sums, noise_weight, fit_view_scale);
 }
 
-nlohmann::json report_held_out(const HeldOutError& error, const std::vector<double>& tilt_deg,
+nlohmann::json report_held_out(const ViewErrors& error, const std::vector<double>& tilt_deg,
                                bool stopped_by_them) {
   base::log_info(fmt::format(
       "held out: {} views, error {:.4f}{}", error.views.size(), error.total,

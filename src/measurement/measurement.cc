@@ -1,18 +1,65 @@
 #include "measurement/measurement.h"
 
+#include <algorithm>
+
+#include "base/check.h"
+
 namespace tomofield::measurement {
+namespace {
+
+template <typename T>
+std::vector<T> chosen(const std::vector<T>& values, std::span<const int> indices) {
+  std::vector<T> result;
+  if (values.empty()) return result;  // not known of this measurement
+  for (const int i : indices) result.push_back(values[static_cast<std::size_t>(i)]);
+  return result;
+}
+
+}  // namespace
+
+SlabViews::Shape Measurement::rays_shape() const {
+  const auto num_views = static_cast<std::size_t>(geometry.num_views());
+  if (ray_geometry) {
+    return {num_views, ray_geometry->raw_width, ray_geometry->raw_height, 0,
+            ray_geometry->raw_height};
+  }
+  return {num_views, geometry.width, geometry.height, roi.y0, roi.height()};
+}
 
 // A mean over bin² pixels has a bin-th of their noise, and rays are a bin-th as long.
-BinnedMeasurement::BinnedMeasurement(const Measurement& fine, int bin) : Measurement(fine) {
-  if (bin == 1) return;
-  own_rays_ = fine.rays->binned(bin);
-  rays = own_rays_.get();
-  geometry.width = rays->shape().width;
-  geometry.height = rays->shape().height;
-  geometry.thickness /= bin;
-  geometry.axis_x /= bin;
-  geometry.axis_z /= bin;
-  for (double& sigma : noise_sigma) sigma /= bin * bin;
+Measurement binned(const Measurement& fine, int bin) {
+  Measurement coarse = fine;
+  if (bin == 1) return coarse;
+  coarse.rays = fine.rays->binned(bin);
+  coarse.geometry.width = coarse.rays->shape().width;
+  coarse.geometry.height = coarse.rays->shape().height;
+  coarse.geometry.thickness /= bin;
+  coarse.geometry.axis_x /= bin;
+  coarse.geometry.axis_z /= bin;
+  for (double& sigma : coarse.noise_sigma) sigma /= bin * bin;
+  return coarse;
+}
+
+Measurement middle_rows(const Measurement& whole, std::int64_t max_rows, std::span<const int> views,
+                        const distributed::Communicator& processes) {
+  TOMOFIELD_CHECK(!whole.ray_geometry, "rays of views as recorded do not stay in their row");
+  Measurement part = whole;
+  part.rays = whole.rays->middle_rows(max_rows, views, processes);
+  const std::int64_t all_rows = whole.rays->shape().num_rows;
+  const std::int64_t rows = part.rays->shape().num_rows;
+  part.roi.y0 += (all_rows - rows) / 2;
+  part.roi.y1 = part.roi.y0 + rows;
+  part.geometry.tilt_deg = chosen(whole.geometry.tilt_deg, views);
+  part.noise_sigma = chosen(whole.noise_sigma, views);
+  part.masks.beads_found = chosen(whole.masks.beads_found, views);
+  part.masks.beads_masked = chosen(whole.masks.beads_masked, views);
+  part.masked_part = chosen(whole.masked_part, views);
+  part.held_out.clear();
+  for (int v = 0; v < static_cast<int>(views.size()); ++v) {
+    if (std::ranges::binary_search(whole.held_out, views[static_cast<std::size_t>(v)]))
+      part.held_out.push_back(v);
+  }
+  return part;
 }
 
 }  // namespace tomofield::measurement

@@ -1,13 +1,16 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "distributed/communicator.h"
 #include "geometry/ray_geometry.h"
 #include "geometry/tilt_geometry.h"
 #include "measurement/slab_views.h"
+#include "tilt_series/tilt_series.h"
 
 namespace tomofield::measurement {
 
@@ -16,34 +19,48 @@ namespace tomofield::measurement {
 /// 0.07 to 0.08.
 constexpr double kContrastPerThickness = 0.075;
 
-/// What is fitted: the geometry, the measured rays (divided by the density
-/// unit) and the noise of each view in the same units.
+/// A measurement to be fitted: rays, how they look at the specimen, their noise. Lengths are in
+/// binned pixels, densities in density units. Copies share the rays.
+///
+/// `geometry` is that of the aligned views. In a series that is not resampled, the rays are the
+/// views as recorded, and `ray_geometry` says how they look at the specimen.
 struct Measurement {
   geometry::TiltGeometry geometry;
   geometry::Roi roi;
-  const SlabViews* rays = nullptr;
-  std::vector<double> noise_sigma;
+  std::shared_ptr<const SlabViews> rays = nullptr;  ///< divided by the unit; null in a plan
+  std::vector<double> noise_sigma = {};             ///< [view]
   double mean_density = 0.0;
-  /// For the ray engine: how `rays`, which are then the views as recorded, look at the specimen.
   std::optional<geometry::RayGeometry> ray_geometry = std::nullopt;
-  /// Views that carry no loss and only tell how well the others predict them (slab engine).
+  /// Views that carry no loss: they only tell how well the others predict them. Ascending.
   std::vector<int> held_out = {};
-  /// Who share the fit. Each holds the slabs of its own_bands() in `rays`.
-  const distributed::Communicator* processes = &distributed::Communicator::alone();
 
-  /// Of the views near zero tilt (standard deviation over their pixels), in density units times
-  /// pixels: what defines the unit.
+  // Where it comes from.
+  double unit = 1.0;  ///< data units a density unit
+  double pixel_size_A = 1.0;
+  double bin_factor = 1.0;  ///< of `pixel_size_A` to the stack's
+  double x_tilt_deg = 0.0;  ///< the same for every view: a rotation of the volume about X
+  double empty_beam = 0.0;  ///< I0 in data units (dark contrast)
+  tilt_series::MaskFigures masks = {};
+  std::vector<double> masked_part = {};  ///< [view]: the part of the rays that carries no loss
+
+  /// Returns the contrast of the views near zero tilt, in density units times pixels: the standard
+  /// deviation over their pixels that defines the unit.
   double contrast() const { return kContrastPerThickness * geometry.thickness; }
   int num_fitted_views() const { return geometry.num_views() - static_cast<int>(held_out.size()); }
+  /// Returns the views' size and which of their rows are fitted: those of the region of interest,
+  /// or all rows of views as recorded.
+  SlabViews::Shape rays_shape() const;
 };
 
-/// A measurement in pixels `bin` times as wide, of which a density unit stays what it
-/// is: for coarse stages. `roi` stays in fine pixels, as the field does.
-struct BinnedMeasurement : Measurement {
-  BinnedMeasurement(const Measurement& fine, int bin);
+/// Returns the measurement in pixels `bin` times as wide, for coarse stages. A density unit stays
+/// what it is. `roi` stays in fine pixels, as the field does.
+Measurement binned(const Measurement& fine, int bin);
 
- private:
-  std::unique_ptr<SlabViews> own_rays_;
-};
+/// Returns the measurement of these views alone (ascending), on at most `max_rows` rows in the
+/// middle, on every process. Views are counted anew, from 0; of the views held out, those that are
+/// left stay held out. It must be of resampled views, whose rays stay in their row.
+Measurement middle_rows(
+    const Measurement& whole, std::int64_t max_rows, std::span<const int> views,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
 
 }  // namespace tomofield::measurement

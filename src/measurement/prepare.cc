@@ -11,21 +11,20 @@
 
 #include "base/faults.h"
 #include "base/log.h"
-#include "measurement/bands.h"
-#include "measurement/measurement.h"
+#include "tilt_series/view_owner.h"
 #include "tomofield/error.h"
 
 namespace tomofield::measurement {
 namespace {
 
-// Largest shift in y, in pixels at the slab's faces, that a varying x-axis tilt
+// The largest shift in y, in pixels at the slab's faces, that a varying x-axis tilt
 // may cause before single-axis slabs are no longer the geometry.
 constexpr double kMaxRowShift = 0.5;
 
-// Far beyond any specimen, and small enough to be counted in ints.
-constexpr double kLargestThickness = 1e6;
+// This is far beyond any specimen, and small enough to be counted in ints.
+constexpr double kMaxThickness = 1e6;
 
-// The views nearest to zero tilt that contrast is measured in: tilted ones of a
+// Contrast is measured in this many views nearest to zero tilt: tilted views of a
 // specimen that ends in the field of view mostly show its faces.
 constexpr std::size_t kContrastViews = 5;
 
@@ -64,7 +63,7 @@ void check_roi(const geometry::Roi& roi, const geometry::TiltGeometry& g, double
   }
 }
 
-// An axis further away is a slip, and needs a domain of any size.
+// Refuses an axis that is far away: it is a slip, and would need a domain of any size.
 void check_axis(const geometry::TiltGeometry& g, double factor) {
   const double reach = 4 * std::max(static_cast<double>(g.width), g.thickness);
   for (const double offset :
@@ -77,7 +76,7 @@ void check_axis(const geometry::TiltGeometry& g, double factor) {
   }
 }
 
-// How the views as recorded look at the specimen.
+// Returns how the views as recorded look at the specimen.
 geometry::RayGeometry ray_geometry(const tilt_series::TiltSeries& series,
                                    const geometry::TiltGeometry& aligned) {
   geometry::RayGeometry g;
@@ -91,8 +90,8 @@ geometry::RayGeometry ray_geometry(const tilt_series::TiltSeries& series,
   return g;
 }
 
-// Mean and noise-free standard deviation of the valid pixels of a view's rows in the region of
-// interest.
+// Mean and noise-free standard deviation of the valid pixels of a view, in the rows that are
+// fitted.
 struct ViewBrightness {
   double mean = 0;
   double contrast = 0;
@@ -114,53 +113,31 @@ ViewBrightness view_brightness(std::span<const float> image, std::span<const std
   return {mean, std::sqrt(std::max(variance - noise * noise, 1e-4 * variance))};
 }
 
-// Reads views one after another, on all processes alike: each opens every so-manieth and hands it
-// to the others.
-class SharedViews {
- public:
-  SharedViews(const tilt_series::TiltSeries& series, const distributed::Communicator& processes)
-      : series_(series), processes_(processes) {}
+// Gives a view to all processes: its owner reads, forgets and broadcasts it.
+void take_view(const tilt_series::TiltSeries& series, std::size_t view,
+               const distributed::Communicator& processes, std::span<float> image,
+               std::span<std::uint8_t> valid) {
+  processes.run_collectively([&] {
+    if (!tilt_series::is_own_view(view, processes)) return;
+    series.read_view(view, image, valid);
+    series.forget_view(view);
+  });
+  const int owner = tilt_series::owner_of_view(view, processes);
+  processes.broadcast(std::as_writable_bytes(image), owner);
+  processes.broadcast(std::as_writable_bytes(valid), owner);
+}
 
-  void read(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
-    if (processes_.size() == 1) return series_.read_view(view, image, valid);
-    const int owner = static_cast<int>(view) % processes_.size();
-    if (owner == 0) read_own(view + static_cast<std::size_t>(processes_.rank()), image.size());
-    if (owner == processes_.rank()) {
-      std::ranges::copy(own_image_, image.begin());
-      std::ranges::copy(own_valid_, valid.begin());
-    }
-    processes_.broadcast(std::as_writable_bytes(image), owner);
-    processes_.broadcast(std::as_writable_bytes(valid), owner);
-  }
-
- private:
-  void read_own(std::size_t view, std::size_t size) {
-    own_image_.resize(size);
-    own_valid_.resize(size);
-    processes_.run_collectively([&] {
-      if (view < series_.views().size()) series_.read_view(view, own_image_, own_valid_);
-    });
-  }
-
-  const tilt_series::TiltSeries& series_;
-  const distributed::Communicator& processes_;
-  std::vector<float> own_image_;
-  std::vector<std::uint8_t> own_valid_;
-};
-
-// Of every view; each process measures some.
+// Measures the brightness of every view; each process measures the views that it owns.
 std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& series,
-                                                const PreparedSeries& prepared,
+                                                const SlabViews::Shape& shape,
                                                 const distributed::Communicator& processes) {
-  const SlabViews::Shape shape = prepared.rays_shape();
   const std::size_t first = static_cast<std::size_t>(shape.first_row * shape.width);
   const std::size_t count = static_cast<std::size_t>(shape.num_rows * shape.width);
   std::vector<float> image(static_cast<std::size_t>(shape.width * shape.height));
   std::vector<std::uint8_t> valid(image.size());
-  const std::size_t num_views = series.views().size();
-  std::vector<ViewBrightness> views(num_views);
-  for (std::size_t view = static_cast<std::size_t>(processes.rank()); view < num_views;
-       view += static_cast<std::size_t>(processes.size())) {
+  std::vector<ViewBrightness> views(shape.num_views);
+  for (std::size_t view = 0; view < views.size(); ++view) {
+    if (!tilt_series::is_own_view(view, processes)) continue;
     series.read_view(view, image, valid);
     views[view] =
         view_brightness(std::span(image).subspan(first, count),
@@ -171,7 +148,7 @@ std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& s
 }
 
 // Sets the density unit and the mean density from the series' brightness.
-void measure_brightness(const std::vector<ViewBrightness>& views, PreparedSeries& prepared) {
+void set_unit(const std::vector<ViewBrightness>& views, Measurement& prepared) {
   const geometry::TiltGeometry& g = prepared.geometry;
   std::vector<std::pair<double, double>> contrast_by_tilt;
   double mean_density = 0;
@@ -202,7 +179,7 @@ std::vector<double> masked_parts(const SlabViews& rays,
   return masked;
 }
 
-void log_masks(const PreparedSeries& prepared) {
+void log_masks(const Measurement& prepared) {
   const tilt_series::MaskFigures& masks = prepared.masks;
   double masked = 0;
   const int num_views = prepared.geometry.num_views();
@@ -220,24 +197,15 @@ void log_masks(const PreparedSeries& prepared) {
 
 std::vector<std::string> SpecimenOptions::faults() const {
   std::vector<std::string> found;
-  if (!(thickness >= 1 && thickness <= kLargestThickness)) {
-    found.push_back(fmt::format("--thickness must be from 1 to {} pixels, not {}",
-                                kLargestThickness, thickness));
+  if (!(thickness >= 1 && thickness <= kMaxThickness)) {
+    found.push_back(
+        fmt::format("--thickness must be from 1 to {} pixels, not {}", kMaxThickness, thickness));
   }
   if (hand != 1 && hand != -1) found.push_back(fmt::format("--hand must be 1 or -1, not {}", hand));
   return found;
 }
 
-SlabViews::Shape PreparedSeries::rays_shape() const {
-  const auto num_views = static_cast<std::size_t>(geometry.num_views());
-  if (ray_geometry) {
-    return {num_views, ray_geometry->raw_width, ray_geometry->raw_height, 0,
-            ray_geometry->raw_height};
-  }
-  return {num_views, geometry.width, geometry.height, roi.y0, roi.height()};
-}
-
-std::size_t reading_memory(const PreparedSeries& plan) {
+std::size_t decoding_memory(const Measurement& plan) {
   constexpr double kBytesPerPixel = 5;
   constexpr double kCopies = 3;
   const double binned = static_cast<double>(plan.geometry.width * plan.geometry.height);
@@ -245,9 +213,10 @@ std::size_t reading_memory(const PreparedSeries& plan) {
   return static_cast<std::size_t>(kCopies * kBytesPerPixel * (raw + binned));
 }
 
-PreparedSeries plan_series(const tilt_series::TiltSeries& series, const SpecimenOptions& specimen) {
+Measurement plan_measurement(const tilt_series::TiltSeries& series,
+                             const SpecimenOptions& specimen) {
   base::require_no_faults(specimen.faults());
-  PreparedSeries plan;
+  Measurement plan;
   plan.bin_factor = series.bin_factor();
   plan.pixel_size_A = series.pixel_size_A();
   plan.empty_beam = series.empty_beam();
@@ -271,30 +240,30 @@ PreparedSeries plan_series(const tilt_series::TiltSeries& series, const Specimen
   return plan;
 }
 
-PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
-                              const SpecimenOptions& specimen,
-                              const std::filesystem::path& scratch_dir) {
+Measurement prepare_measurement(const tilt_series::TiltSeries& series,
+                                const SpecimenOptions& specimen,
+                                const std::filesystem::path& scratch_dir) {
   // All rows in one band.
-  return prepare_series(series, specimen, scratch_dir, series.height() + series.aligned_height(),
-                        distributed::Communicator::alone());
+  return prepare_measurement(series, specimen, scratch_dir,
+                             series.height() + series.aligned_height(),
+                             distributed::Communicator::alone());
 }
 
-PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
-                              const SpecimenOptions& specimen,
-                              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
-                              const distributed::Communicator& processes) {
-  PreparedSeries prepared = plan_series(series, specimen);
-  measure_brightness(brightness_of_views(series, prepared, processes), prepared);
+Measurement prepare_measurement(const tilt_series::TiltSeries& series,
+                                const SpecimenOptions& specimen,
+                                const std::filesystem::path& scratch_dir, std::int64_t band_rows,
+                                const distributed::Communicator& processes) {
+  Measurement prepared = plan_measurement(series, specimen);
+  const SlabViews::Shape shape = prepared.rays_shape();
+  set_unit(brightness_of_views(series, shape, processes), prepared);
   for (const double sigma : series.noise_sigma())
     prepared.noise_sigma.push_back(sigma / prepared.unit);
-  const SlabViews::Shape shape = prepared.rays_shape();
   const distributed::Range slabs =
       slabs_of_bands(own_bands(shape.num_rows, band_rows, processes), band_rows, shape.num_rows);
-  SharedViews views(series, processes);
-  prepared.rays = std::make_unique<SlabViews>(
+  prepared.rays = std::make_shared<SlabViews>(
       shape, slabs, prepared.unit,
       [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
-        views.read(view, image, valid);
+        take_view(series, view, processes, image, valid);
       },
       scratch_dir);
   prepared.masks = series.mask_figures();

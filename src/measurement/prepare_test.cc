@@ -53,8 +53,8 @@ class SeriesFiles {
     return (x + 3 * y + view) % 9 == 0;
   }
 
-  PreparedSeries prepared(const SpecimenOptions& specimen) const {
-    return prepare_series(tilt_series::TiltSeries(options_), specimen, scratch_.path());
+  Measurement prepared(const SpecimenOptions& specimen) const {
+    return prepare_measurement(tilt_series::TiltSeries(options_), specimen, scratch_.path());
   }
 
   tilt_series::TiltSeriesOptions& options() { return options_; }
@@ -75,7 +75,7 @@ TEST(PrepareSeries, RaysAreTheViewsOverTheUnitAndMaskedPixelsCarryNoLoss) {
   SeriesFiles files;
   files.options().mask = files.write_mask();
   const tilt_series::TiltSeries series(files.options());
-  const PreparedSeries prepared = files.prepared(specimen());
+  const Measurement prepared = files.prepared(specimen());
   ASSERT_GT(prepared.unit, 0.0);
   std::vector<float> image(static_cast<std::size_t>(kWidth * kHeight));
   std::vector<std::uint8_t> valid(image.size());
@@ -101,9 +101,9 @@ TEST(PrepareSeries, RaysAreTheViewsOverTheUnitAndMaskedPixelsCarryNoLoss) {
 
 TEST(PrepareSeries, TheUnitOfTheDataDoesNotMatter) {
   SeriesFiles files;
-  const PreparedSeries one = files.prepared(specimen());
+  const Measurement one = files.prepared(specimen());
   files.options().stack = files.write_views("doubled.mrc", 2.0);
-  const PreparedSeries two = files.prepared(specimen());
+  const Measurement two = files.prepared(specimen());
   EXPECT_NEAR(two.unit / one.unit, 2.0, 1e-6);
   EXPECT_NEAR(two.mean_density, one.mean_density, 1e-6 * one.mean_density);
   for (int view = 0; view < kNumViews; ++view) {
@@ -117,7 +117,7 @@ TEST(PrepareSeries, AThickerSpecimenOfTheSameMeanIsThinner) {
   const SeriesFiles files;
   SpecimenOptions thick = specimen();
   thick.thickness = 2 * kThickness;
-  const PreparedSeries one = files.prepared(specimen()), two = files.prepared(thick);
+  const Measurement one = files.prepared(specimen()), two = files.prepared(thick);
   // A density unit is a contrast for each pixel of thickness, so the rays grow with the thickness.
   EXPECT_NEAR(two.unit, one.unit / 2, 1e-9);
   EXPECT_NEAR(two.mean_density, one.mean_density, 1e-9);
@@ -127,10 +127,10 @@ TEST(PrepareSeries, ARegionOfInterestHasItsRowsAlone) {
   const SeriesFiles files;
   SpecimenOptions part = specimen();
   part.roi = geometry::Roi{4, 5, 30, 29};
-  const PreparedSeries prepared = files.prepared(part);
+  const Measurement prepared = files.prepared(part);
   EXPECT_EQ(prepared.rays->shape().first_row, 5);
   EXPECT_EQ(prepared.rays->shape().num_rows, 24);
-  const PreparedSeries whole = files.prepared(specimen());
+  const Measurement whole = files.prepared(specimen());
   for (const std::int64_t x : {0, 21, 39}) {  // rays outside the region see it in tilted views
     EXPECT_NEAR(prepared.rays->ray(2, x, 3) * prepared.unit, whole.rays->ray(2, x, 8) * whole.unit,
                 1e-3);
@@ -143,7 +143,7 @@ TEST(PrepareSeries, BinnedViewsHaveABinnedGeometry) {
   SpecimenOptions options = specimen();
   options.axis_x = 15.0;
   options.roi = geometry::Roi{4, 6, 30, 28};
-  const PreparedSeries prepared = files.prepared(options);
+  const Measurement prepared = files.prepared(options);
   EXPECT_EQ(prepared.geometry.width, kWidth / 2);
   EXPECT_EQ(prepared.geometry.height, kHeight / 2);
   EXPECT_EQ(prepared.geometry.thickness, kThickness / 2);

@@ -1,15 +1,9 @@
 #include "measurement/slab_views.h"
 
-#include <fcntl.h>
-#include <fmt/core.h>
-#include <sys/mman.h>
-#include <unistd.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
-#include <cstring>
-#include <string>
 #include <vector>
 
 #include "base/check.h"
@@ -17,38 +11,16 @@
 #include "tomofield/error.h"
 
 namespace tomofield::measurement {
-namespace {
 
 using base::kLanes;
+using distributed::Range;
 
-void* map_scratch_file(const std::filesystem::path& dir, std::size_t bytes) {
-  std::string name = (dir / "tomofield-rays-XXXXXX").string();
-  const int fd = mkstemp(name.data());
-  if (fd < 0) {
-    throw Error(
-        fmt::format("cannot make a scratch file in {} ({}): the prepared rays need {} bytes there",
-                    dir.string(), std::strerror(errno), bytes));
-  }
-  unlink(name.c_str());
-  void* memory = MAP_FAILED;
-  int code = posix_fallocate(fd, 0, static_cast<off_t>(bytes));
-  if (code == 0) {
-    memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
-    code = errno;
-  }
-  close(fd);
-  if (memory == MAP_FAILED) {
-    throw Error(fmt::format(
-        "cannot reserve {} bytes for the prepared rays in {} ({}): free some space there", bytes,
-        dir.string(), std::strerror(code)));
-  }
-  return memory;
-}
+namespace {
+
+// Bytes of a line: the pixels of a slab's rows with one x.
+constexpr std::size_t kRayBytes = kLanes * sizeof(float), kMaskBytes = sizeof(std::uint16_t);
 
 }  // namespace
-
-// Of a line: the pixels of a slab's rows with one x.
-constexpr std::size_t kRayBytes = kLanes * sizeof(float), kMaskBytes = sizeof(std::uint16_t);
 
 std::size_t SlabViews::bytes(const Shape& shape) {
   const std::size_t slabs = static_cast<std::size_t>((shape.num_rows + kLanes - 1) / kLanes);
@@ -58,7 +30,7 @@ std::size_t SlabViews::bytes(const Shape& shape) {
 
 std::size_t SlabViews::resident_memory(const Shape& shape, int slabs_in_use) {
   const std::size_t all = bytes(shape);
-  if (all <= kInMemoryBytes) return all;
+  if (all <= io::ScratchMemory::kInMemoryBytes) return all;
   Shape used = shape;
   used.num_rows = std::min<std::int64_t>(shape.num_rows, std::int64_t{slabs_in_use} * kLanes);
   return bytes(used);
@@ -70,27 +42,15 @@ SlabViews::Slabs SlabViews::all_slabs(const Shape& shape) {
 
 SlabViews::SlabViews(const Shape& shape, Slabs held, double unit, const ReadView& read_view,
                      const std::filesystem::path& scratch_dir, std::size_t in_memory_bytes)
-    : shape_(shape), scratch_dir_(scratch_dir), held_(held) {
-  bytes_ = num_lines() * (kRayBytes + kMaskBytes);
-  is_in_file_ = bytes_ > in_memory_bytes;
-  if (!is_in_file_) {
-    memory_ = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    if (memory_ == MAP_FAILED)
-      throw Error(fmt::format("not enough memory for the rays: {} bytes", bytes_));
-  } else {
-    memory_ = map_scratch_file(scratch_dir, bytes_);
-  }
-  rays_ = static_cast<float*>(memory_);
-  mask_ = reinterpret_cast<std::uint16_t*>(rays_ + num_lines() * kLanes);
-  try {
-    fill(unit, read_view);
-  } catch (...) {
-    munmap(memory_, bytes_);
-    throw;
-  }
+    : shape_(shape),
+      scratch_dir_(scratch_dir),
+      held_(held),
+      memory_(num_lines() * (kRayBytes + kMaskBytes), "the prepared rays", scratch_dir,
+              in_memory_bytes),
+      rays_(reinterpret_cast<float*>(memory_.data())),
+      mask_(reinterpret_cast<std::uint16_t*>(rays_ + num_lines() * kLanes)) {
+  fill(unit, read_view);
 }
-
-SlabViews::~SlabViews() { munmap(memory_, bytes_); }
 
 std::size_t SlabViews::num_lines() const {
   return static_cast<std::size_t>(held_.size()) * shape_.num_views *
@@ -111,19 +71,10 @@ std::size_t SlabViews::line(int slab, int view) const {
 const float* SlabViews::rays(int slab, int view) const { return rays_ + line(slab, view) * kLanes; }
 const std::uint16_t* SlabViews::mask(int slab, int view) const { return mask_ + line(slab, view); }
 
-// Pages of the file stay in the kernel's cache as long as there is memory for them. What is not
-// whole pages stays.
-void SlabViews::release_bytes(std::size_t first, std::size_t count) const {
-  if (!is_in_file_) return;
-  const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
-  const std::size_t begin = (first + page - 1) / page * page, end = (first + count) / page * page;
-  if (end > begin) madvise(static_cast<char*>(memory_) + begin, end - begin, MADV_DONTNEED);
-}
-
 void SlabViews::release(int slab) const {
   const std::size_t first = line(slab, 0), count = line(slab + 1, 0) - first;
-  release_bytes(first * kRayBytes, count * kRayBytes);
-  release_bytes(num_lines() * kRayBytes + first * kMaskBytes, count * kMaskBytes);
+  memory_.release(first * kRayBytes, count * kRayBytes);
+  memory_.release(num_lines() * kRayBytes + first * kMaskBytes, count * kMaskBytes);
 }
 
 void SlabViews::fill(double unit, const ReadView& read_view) {
@@ -144,7 +95,7 @@ void SlabViews::fill(double unit, const ReadView& read_view) {
         mask_[to + x] = static_cast<std::uint16_t>(mask_[to + x] | 1u << lane);
       }
     }
-    release_bytes(0, bytes_);
+    memory_.release(0, memory_.size());
   }
 }
 
@@ -167,15 +118,15 @@ std::unique_ptr<SlabViews> SlabViews::binned(int bin) const {
         image[at] = valid[at] ? static_cast<float>(sum / count) : 0.0f;
       }
     }
-    release_bytes(0, bytes_);
+    memory_.release(0, memory_.size());
   };
   return std::make_unique<SlabViews>(coarse, held, bin, read_view, scratch_dir_);
 }
 
 std::unique_ptr<SlabViews> SlabViews::middle_rows(
-    std::int64_t most_rows, std::span<const int> views,
+    std::int64_t max_rows, std::span<const int> views,
     const distributed::Communicator& processes) const {
-  const std::int64_t rows = std::min(most_rows, shape_.num_rows);
+  const std::int64_t rows = std::min(max_rows, shape_.num_rows);
   const std::int64_t first = (shape_.num_rows - rows) / 2;
   const auto read_view = [&](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
     const int view = views[v];
@@ -197,7 +148,7 @@ std::unique_ptr<SlabViews> SlabViews::middle_rows(
   return std::make_unique<SlabViews>(shape, 1.0, read_view, scratch_dir_);
 }
 
-// Over the rays that count in a box, and how many do.
+// Returns the sum of the rays that count in a box, and how many do.
 std::pair<double, int> SlabViews::box_sum(int view, std::int64_t x0, std::int64_t y0,
                                           int size) const {
   double sum = 0.0;
@@ -225,10 +176,10 @@ void SlabViews::add_words(std::size_t first, std::size_t count, std::uint64_t& h
   constexpr std::size_t kBlock = std::size_t{16} << 20;
   for (std::size_t at = first; at < first + count; at += kBlock) {
     const std::size_t size = std::min(kBlock, first + count - at);
-    const auto* words = reinterpret_cast<const std::uint32_t*>(static_cast<char*>(memory_) + at);
+    const auto* words = reinterpret_cast<const std::uint32_t*>(memory_.data() + at);
     for (std::size_t i = 0; i < size / sizeof(std::uint32_t); ++i)
       hash = (hash ^ words[i]) * 0x100000001b3ULL;
-    release_bytes(at, size);
+    memory_.release(at, size);
   }
 }
 
@@ -250,8 +201,31 @@ std::uint64_t SlabViews::checksum(const distributed::Communicator& processes) co
   };
   const std::size_t ray_bytes = num_lines() * kRayBytes;
   add_all(0, ray_bytes);
-  add_all(ray_bytes, bytes_ - ray_bytes);
+  add_all(ray_bytes, num_lines() * kMaskBytes);
   return hash;
+}
+
+Range own_bands(std::int64_t num_rows, std::int64_t band_rows,
+                const distributed::Communicator& processes) {
+  std::vector<double> rows_of_band;
+  for (std::int64_t row = 0; row < num_rows; row += band_rows)
+    rows_of_band.push_back(static_cast<double>(std::min(band_rows, num_rows - row)));
+  const std::ptrdiff_t num_bands = std::ssize(rows_of_band);
+  if (num_bands < processes.size()) {
+    throw Error(fmt::format(
+        "{} processes cannot share {} rows of root cells ({} rows of pixels each): start at most "
+        "{}, or give --leaf-size 16, whose root cells have 32 rows",
+        processes.size(), num_bands, band_rows, num_bands));
+  }
+  return distributed::part_of(rows_of_band, processes.rank(), processes.size());
+}
+
+Range slabs_of_bands(Range bands, std::int64_t band_rows, std::int64_t num_rows) {
+  const auto slab_at = [&](int band) {
+    const std::int64_t row = std::min(band * band_rows, num_rows);
+    return static_cast<int>((row + kLanes - 1) / kLanes);
+  };
+  return {slab_at(bands.begin), slab_at(bands.end)};
 }
 
 }  // namespace tomofield::measurement

@@ -11,19 +11,19 @@
 #include "base/lanes.h"
 #include "distributed/communicator.h"
 #include "distributed/partition.h"
+#include "io/scratch_memory.h"
 
 namespace tomofield::measurement {
 
-/// Reads a view as height × width floats and which pixels are measurements. Called for the views
-/// in order.
+/// Copies a view as height × width floats, and which pixels are measurements. It is called for the
+/// views in order.
 using ReadView =
     std::function<void(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid)>;
 
 /// The measured rays in the order in which slabs use them: [slab, view, x, lane]
 /// with 16 rows a slab, and a bit mask [slab, view, x] of the rays that count
-/// (rows past the last one are masked). Large series lie in an unlinked file
-/// in `scratch_dir` that the kernel pages; small ones in memory. Of a job of several
-/// processes each holds some of the slabs alone.
+/// (rows past the last one are masked). Small series lie in memory, large ones in a scratch file
+/// (io/scratch_memory.h). Of a job of several processes each holds some of the slabs alone.
 class SlabViews {
  public:
   using Slabs = distributed::Range;
@@ -32,34 +32,34 @@ class SlabViews {
     std::int64_t width = 0, height = 0;        ///< of a view
     std::int64_t first_row = 0, num_rows = 0;  ///< rows of the view that slabs cover
   };
-  /// Up to here a series is kept in memory: a 1K series of 60 views is 250 MB.
-  static constexpr std::size_t kInMemoryBytes = std::size_t{1} << 30;
-  /// Memory that they take while so many slabs are in use: of large series, what has not been
-  /// released.
+  /// Returns the memory that views take while so many slabs are in use. Of a series in a scratch
+  /// file, only what has not been released takes memory.
   static std::size_t resident_memory(const Shape& shape, int slabs_in_use);
   static Slabs all_slabs(const Shape& shape);
 
-  /// Intensities are divided by `unit`. Throws Error if the scratch file cannot be made.
+  /// Reads every view and divides its intensities by `unit`. Throws Error if the scratch file
+  /// cannot be made.
   SlabViews(const Shape& shape, double unit, const ReadView& read_view,
-            const std::filesystem::path& scratch_dir, std::size_t in_memory_bytes = kInMemoryBytes)
+            const std::filesystem::path& scratch_dir,
+            std::size_t in_memory_bytes = io::ScratchMemory::kInMemoryBytes)
       : SlabViews(shape, all_slabs(shape), unit, read_view, scratch_dir, in_memory_bytes) {}
-  /// Some slabs of it, at least one; others must not be asked for.
+  /// Holds some of the slabs, at least one; others must not be asked for.
   SlabViews(const Shape& shape, Slabs held, double unit, const ReadView& read_view,
-            const std::filesystem::path& scratch_dir, std::size_t in_memory_bytes = kInMemoryBytes);
-  ~SlabViews();
+            const std::filesystem::path& scratch_dir,
+            std::size_t in_memory_bytes = io::ScratchMemory::kInMemoryBytes);
   SlabViews(const SlabViews&) = delete;
   SlabViews& operator=(const SlabViews&) = delete;
 
-  /// Means over bin × bin pixels, from the first column and row on, in units `bin` times
-  /// as large, as rays count pixels; coarse pixels that at least half of their pixels
-  /// count for count. Columns and rows of fewer than `bin` are coarse ones too.
+  /// Returns means over bin × bin pixels, from the first column and row on, in units `bin` times
+  /// as large, as rays count pixels. A coarse pixel counts if at least half of its pixels do.
+  /// Columns and rows of fewer than `bin` pixels are coarse ones too.
   std::unique_ptr<SlabViews> binned(int bin) const;
-  /// A copy of so many rows in the middle, or of all if there are fewer, of these views, on every
-  /// process: each of those that hold some of the slabs contributes what it has.
+  /// Returns a copy of at most `max_rows` rows in the middle, of these views, on every process.
+  /// Each process contributes the slabs that it holds.
   std::unique_ptr<SlabViews> middle_rows(
-      std::int64_t most_rows, std::span<const int> views,
+      std::int64_t max_rows, std::span<const int> views,
       const distributed::Communicator& processes = distributed::Communicator::alone()) const;
-  /// The shape of `binned` ones.
+  /// Returns the shape of binned views.
   static Shape binned_shape(const Shape& shape, int bin);
 
   const Shape& shape() const { return shape_; }
@@ -67,19 +67,20 @@ class SlabViews {
   Slabs held() const { return held_; }
   const float* rays(int slab, int view) const;          ///< [x, lane]
   const std::uint16_t* mask(int slab, int view) const;  ///< [x], bit = lane
-  /// Those of a large series leave the process's memory until they are used again.
+  /// Removes a slab in a scratch file from the process's memory until it is used again.
   void release(int slab) const;
-  /// Whether the ray of a pixel counts, and its value; y is counted from the first row.
+  /// Tells whether the ray of a pixel counts; y is counted from the first row.
   bool counts(int view, std::int64_t x, std::int64_t y) const {
     return mask(static_cast<int>(y / kRows), view)[x] >> (y % kRows) & 1;
   }
+  /// Returns the ray of a pixel; y is counted from the first row.
   float ray(int view, std::int64_t x, std::int64_t y) const {
     return rays(static_cast<int>(y / kRows), view)[x * kRows + y % kRows];
   }
-  /// Rays that count in a view, of the slabs that are held.
+  /// Counts the rays of a view that count, in the slabs that are held.
   std::int64_t num_valid(int view) const;
-  /// 64-bit FNV-1a over rays and masks, of all slabs, each held by one of the processes in
-  /// order: tells one series from another.
+  /// Returns the 64-bit FNV-1a hash of rays and masks of all slabs, which tells one series from
+  /// another. The processes hold the slabs in order of ranks.
   std::uint64_t checksum(
       const distributed::Communicator& processes = distributed::Communicator::alone()) const;
 
@@ -88,20 +89,27 @@ class SlabViews {
   std::pair<double, int> box_sum(int view, std::int64_t x0, std::int64_t y0, int size) const;
   static std::size_t bytes(const Shape& shape);
   void fill(double unit, const ReadView& read_view);
-  void release_bytes(std::size_t first, std::size_t count) const;
   void add_words(std::size_t first, std::size_t count, std::uint64_t& hash) const;
   std::size_t line(int slab, int view) const;
-  std::size_t num_lines() const;  // of a pixel in x: rays of a slab
+  std::size_t num_lines() const;  // each has one x of a slab and a view
   distributed::Range held_rows() const;
 
   Shape shape_;
   std::filesystem::path scratch_dir_;
   Slabs held_;
-  std::size_t bytes_ = 0;
-  bool is_in_file_ = false;
-  void* memory_ = nullptr;
-  float* rays_ = nullptr;
-  std::uint16_t* mask_ = nullptr;
+  io::ScratchMemory memory_;
+  float* rays_;
+  std::uint16_t* mask_;
 };
+
+/// Returns the bands (rows of root cells, `band_rows` rows each but for the last) that a process
+/// works on: consecutive ones, as many rows as others have, in order of ranks. Throws Error if
+/// there are fewer bands than processes.
+distributed::Range own_bands(std::int64_t num_rows, std::int64_t band_rows,
+                             const distributed::Communicator& processes);
+
+/// Returns the slabs of those bands, 16 rows each, of `num_rows` rows in all.
+distributed::Range slabs_of_bands(distributed::Range bands, std::int64_t band_rows,
+                                  std::int64_t num_rows);
 
 }  // namespace tomofield::measurement

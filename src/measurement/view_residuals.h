@@ -8,7 +8,7 @@
 
 namespace tomofield::measurement {
 
-/// How a view's measurement relates to the predicted line integrals p:
+/// The relation of a view's measurement to the predicted line integrals p:
 /// measured ≈ scale · p + offset, with noise of variance 1 / weight.
 struct ViewModel {
   double scale = 1.0;
@@ -16,30 +16,30 @@ struct ViewModel {
   double weight = 1.0;
 };
 
-/// Sums over the rays of a view that count, p predicted and b measured: what
-/// the loss is reported from and the closed-form nuisances are solved from.
+/// Sums over the rays of a view that count, p predicted and b measured. The loss is reported
+/// from them, and the closed-form nuisances are solved from them.
 struct ViewSums {
   double n = 0, p = 0, b = 0, pp = 0, pb = 0, bb = 0;
   ViewSums& operator+=(const ViewSums& other);
-  /// Σ (scale p + offset − b)².
+  /// Returns Σ (scale p + offset − b)².
   double squared_residual(const ViewModel& model) const;
 };
-/// Completes sums of which every one is of one process, as Communicator::allreduce_sum.
+/// Completes sums on all processes (Communicator::allreduce_sum); each element is nonzero on one.
 void allreduce_sum(const distributed::Communicator& processes, std::span<ViewSums> sums);
 
-/// Eq. 2 for one view of a slab: ½ · weight · Σ mask (scale p + offset − b)².
+/// Differentiates the data loss of one view of a slab, ½ · weight · Σ mask (scale p + offset − b)².
 /// `rays` holds p [x, lane] and is overwritten by multiplicity · dL/dp;
 /// multiplicity scales a subset of the views up to all of them. Masked rays
 /// get 0. Returns the sums.
 ViewSums data_term(const ViewModel& model, double multiplicity, const float* measured,
                    const std::uint16_t* mask, std::int64_t width, float* rays);
 
-/// The same for a single ray that counts: adds it to the sums of its view and
+/// Does the same for a single ray that counts: adds it to the sums of its view and
 /// returns multiplicity · dL/dp.
 double ray_data_term(const ViewModel& model, double multiplicity, double measured, double predicted,
                      ViewSums& sums);
 
-/// Per-view scale and offset in closed form: least squares with a shrinkage
+/// Per-view scale and offset follow in closed form from least squares with a shrinkage
 /// prior worth `shrinkage` times the view's own rays,
 ///
 ///   min  w Σ (a p + o − b)² + shrinkage · w (Σ p² (a − 1)² + n o²).
@@ -52,5 +52,23 @@ struct NuisancePrior {
 };
 void fit_nuisances(const NuisancePrior& prior, const std::vector<ViewSums>& sums,
                    std::vector<ViewModel>& views);
+
+/// How well a field predicts views.
+struct ViewErrors {
+  std::vector<int> views;
+  std::vector<ViewModel> models;   ///< [i]: the model that views[i] was scored with
+  std::vector<double> view_error;  ///< [i]: mean squared residual over the noise variance
+  double total = 0;                ///< the same over all of their rays
+};
+
+/// Sums of some views over the rays of each slab: [slab][view].
+using SlabSums = std::vector<std::vector<ViewSums>>;
+
+/// Returns the errors of `views` from sums over their rays, added in order of the slabs;
+/// `noise_weight` holds 1 / variance of the noise of each view of the series. With
+/// `fit_view_scale`, a view's scale and offset are least squares on that view
+/// alone: they are nuisances of its exposure, which no other view tells.
+ViewErrors view_errors(std::vector<int> views, const SlabSums& sums,
+                       std::span<const double> noise_weight, bool fit_view_scale);
 
 }  // namespace tomofield::measurement

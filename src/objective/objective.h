@@ -26,8 +26,8 @@ class Objective {
 
   /// Scores the field on views that it was not fitted to; `noise_weight` is 1 / variance of the
   /// noise of every view.
-  virtual measurement::HeldOutError held_out_error(std::span<const double> noise_weight,
-                                                   bool fit_view_scale) const = 0;
+  virtual measurement::ViewErrors held_out_error(std::span<const double> noise_weight,
+                                                 bool fit_view_scale) const = 0;
   /// Predicts a view, beside what was measured.
   virtual measurement::PredictedView predict(int view,
                                              const measurement::ViewModel& model) const = 0;

@@ -17,8 +17,8 @@ projection::SlabSampler make_sampler(const SlabObjectiveContext& c) {
 }
 
 TermContext term_context(const SlabObjectiveContext& c, const projection::SlabSampler& sampler) {
-  return {c.field,   sampler,       c.measured,   c.full,   c.bin,
-          c.support, c.has_factors, c.own_leaves, c.options};
+  return {c.field,   sampler,       c.measured,   c.full,    c.bin,
+          c.support, c.has_factors, c.own_leaves, c.options, c.processes};
 }
 
 }  // namespace
@@ -44,6 +44,7 @@ SlabObjective::SlabObjective(const SlabObjectiveContext& context,
     : projector_(context.projector),
       measured_(context.measured),
       sampler_(make_sampler(context)),
+      processes_(context.processes),
       own_bands_(context.own_bands),
       terms_(std::move(terms)) {
   for (int band = own_bands_.begin; band < own_bands_.end; ++band)
@@ -119,8 +120,7 @@ void SlabObjective::add_batch(const Step& step, const SlabBatch& batch, float* g
 
 // Gives every process the sums of the others' bands, in one message.
 void SlabObjective::share(std::vector<BandSums>& bands) const {
-  const distributed::Communicator& processes = *measured_.processes;
-  if (processes.size() == 1) return;
+  if (processes_.size() == 1) return;
   std::vector<double> numbers;
   const auto for_each_number = [&](const auto& body) {
     for (BandSums& band : bands) {
@@ -131,21 +131,21 @@ void SlabObjective::share(std::vector<BandSums>& bands) const {
     }
   };
   for_each_number([&](double& number) { numbers.push_back(number); });
-  processes.allreduce_sum(std::span(numbers));
+  processes_.allreduce_sum(std::span(numbers));
   auto next = numbers.begin();
   for_each_number([&](double& number) { number = *next++; });
 }
 
-measurement::HeldOutError SlabObjective::held_out_error(std::span<const double> noise_weight,
-                                                        bool fit_view_scale) const {
+measurement::ViewErrors SlabObjective::held_out_error(std::span<const double> noise_weight,
+                                                      bool fit_view_scale) const {
   return measurement::held_out_error(sampler_, projector_, *measured_.rays, measured_.held_out,
-                                     noise_weight, fit_view_scale, *measured_.processes);
+                                     noise_weight, fit_view_scale, processes_);
 }
 
 measurement::PredictedView SlabObjective::predict(int view,
                                                   const measurement::ViewModel& model) const {
   return measurement::predicted_view(sampler_, projector_, *measured_.rays, view, model,
-                                     *measured_.processes);
+                                     processes_);
 }
 
 }  // namespace tomofield::objective

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "base/aligned_buffer.h"
+#include "distributed/communicator.h"
 #include "distributed/partition.h"
 #include "objective/objective.h"
 
@@ -22,6 +23,7 @@ struct SlabObjectiveContext {
   distributed::Range own_bands;                ///< bands of this process
   distributed::Range own_leaves;               ///< and their leaves
   const ObjectiveOptions& options;
+  const distributed::Communicator& processes = distributed::Communicator::alone();
 };
 
 /// Evaluates the terms over batches of slabs on this machine's cores: a band (one row of root
@@ -37,8 +39,8 @@ class SlabObjective : public Objective {
   double add_gradient(const Step& step, float* gradient,
                       std::span<measurement::ViewSums> view_sums) const override;
   const std::vector<int>& own_leaves() const override { return own_leaves_; }
-  measurement::HeldOutError held_out_error(std::span<const double> noise_weight,
-                                           bool fit_view_scale) const override;
+  measurement::ViewErrors held_out_error(std::span<const double> noise_weight,
+                                         bool fit_view_scale) const override;
   measurement::PredictedView predict(int view, const measurement::ViewModel& model) const override;
 
   const projection::SlabSampler& sampler() const { return sampler_; }
@@ -60,6 +62,7 @@ class SlabObjective : public Objective {
   const projection::SlabProjector& projector_;
   const measurement::Measurement& measured_;
   projection::SlabSampler sampler_;
+  const distributed::Communicator& processes_;
   distributed::Range own_bands_;
   std::vector<int> own_leaves_;
   std::vector<std::unique_ptr<Term>> terms_;

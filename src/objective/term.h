@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "distributed/communicator.h"
 #include "field/field.h"
 #include "geometry/ray_geometry.h"
 #include "measurement/measurement.h"
@@ -89,6 +90,7 @@ struct TermContext {
   bool has_factors = true;                   ///< the field has the factors that were asked for
   distributed::Range own_leaves;             ///< leaves of this process
   const ObjectiveOptions& options;
+  const distributed::Communicator& processes = distributed::Communicator::alone();
 };
 
 }  // namespace tomofield::objective

@@ -64,7 +64,7 @@ std::vector<std::unique_ptr<Term>> make_terms(const TermContext& c) {
   terms.push_back(std::make_unique<BoundaryConsistency>(c.field, leaves_of_bands(c.sampler),
                                                         boundary_options(c, noise)));
   terms.push_back(std::make_unique<FourierPrior>(c.field, c.full.roi, fourier_options(c, noise),
-                                                 *c.full.processes, c.own_leaves));
+                                                 c.processes, c.own_leaves));
   if (has_rays)
     terms.push_back(std::make_unique<RayDataTerm>(*c.full.ray_geometry, *c.full.rays, c.field,
                                                   RayRegion{c.full.roi, c.support}, c.options));

@@ -2,7 +2,7 @@
 
 namespace tomofield::output {
 
-nlohmann::json mask_json(const measurement::PreparedSeries& series) {
+nlohmann::json mask_json(const measurement::Measurement& series) {
   const tilt_series::MaskFigures& masks = series.masks;
   nlohmann::json views = nlohmann::json::array();
   const int num_views = series.geometry.num_views();

@@ -39,7 +39,7 @@ nlohmann::json stages_json(const std::vector<fit::Stage>& stages) {
 
 }  // namespace
 
-nlohmann::json figures_json(const fit::Fit& fit, const measurement::PreparedSeries& series,
+nlohmann::json figures_json(const fit::Fit& fit, const measurement::Measurement& series,
                             double seconds) {
   const fit::Progress& progress = fit.progress();
   nlohmann::json views = nlohmann::json::array();

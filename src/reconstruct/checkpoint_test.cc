@@ -56,7 +56,7 @@ class Checkpoint : public ::testing::Test {
   SphereSeries series_;
   measurement::Measurement measurement_{.geometry = series_.geometry,
                                         .roi = {0, 0, SphereSeries::kWidth, SphereSeries::kRows},
-                                        .rays = series_.rays.get(),
+                                        .rays = series_.rays,
                                         .noise_sigma = series_.noise_sigma,
                                         .mean_density = 0.1};
   fit::FieldOptions field_;

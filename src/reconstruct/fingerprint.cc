@@ -18,7 +18,7 @@ nlohmann::json alignment_json(const geometry::RayGeometry& g) {
 }  // namespace
 
 std::string fingerprint_of(const ReconstructOptions& options,
-                           const measurement::PreparedSeries& series,
+                           const measurement::Measurement& series,
                            const distributed::Communicator& processes) {
   nlohmann::json json = options_json(options);
   json.erase("input");

@@ -11,7 +11,7 @@ namespace tomofield::reconstruction {
 /// What decides the bits of a fit: the options, the geometry and the rays themselves (JSON). The
 /// same on all processes that share the rays.
 std::string fingerprint_of(const ReconstructOptions& options,
-                           const measurement::PreparedSeries& series,
+                           const measurement::Measurement& series,
                            const distributed::Communicator& processes);
 
 }  // namespace tomofield::reconstruction

@@ -18,7 +18,7 @@
 #include "objective/ray_data_term.h"
 #include "projection/slab_projector.h"
 #include "reconstruct/reconstruct.h"
-#include "selection/trial_series.h"
+#include "selection/trial_measurement.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
@@ -31,7 +31,7 @@ constexpr int kSlabsOfThread = projection::SlabProjector::kSlabsTogether;
 
 // What each thread works on: a pair of slabs with their gradient and the views of a step, rows for
 // the total variation, a leaf's vertices; and then a part of the volume.
-std::size_t thread_memory(const measurement::PreparedSeries& plan, const fit::Domain& domain,
+std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domain& domain,
                           int views_a_step) {
   constexpr std::size_t kRow = base::kLanes * sizeof(float);
   const std::size_t slab = domain.grid.size() * sizeof(float);
@@ -47,12 +47,12 @@ std::size_t thread_memory(const measurement::PreparedSeries& plan, const fit::Do
   return kSlabsOfThread * (2 * slab + views) + 2 * slab / base::kLanes + leaf + written;
 }
 
-int num_fitted_views(const measurement::PreparedSeries& plan, const fit::FitOptions& options) {
+int num_fitted_views(const measurement::Measurement& plan, const fit::FitOptions& options) {
   const auto held_out = measurement::held_out_views(plan.geometry.tilt_deg, options.hold_out);
   return plan.geometry.num_views() - static_cast<int>(held_out.size());
 }
 
-int steps_an_epoch(const measurement::PreparedSeries& plan, const fit::FitOptions& options) {
+int steps_an_epoch(const measurement::Measurement& plan, const fit::FitOptions& options) {
   if (plan.ray_geometry) return objective::ray_steps_per_epoch(options, plan.rays_shape());
   return std::min(options.subsets, num_fitted_views(plan, options));
 }
@@ -126,10 +126,10 @@ measurement::SlabViews::Shape own_part(measurement::SlabViews::Shape shape,
   return shape;
 }
 
-// Peak of a process.
-std::size_t estimate_memory(const measurement::PreparedSeries& plan, const fit::Domain& domain,
+// Returns the peak memory of a process.
+std::size_t estimate_memory(const measurement::Measurement& plan, const fit::Domain& domain,
                             const RunPlan& run, const ReconstructOptions& options,
-                            const distributed::Communicator& processes) {
+                            std::size_t stored_views, const distributed::Communicator& processes) {
   using measurement::SlabViews;
   const auto parameters =
       static_cast<std::size_t>(fitted_bytes(domain, run, options.field, processes));
@@ -153,8 +153,11 @@ std::size_t estimate_memory(const measurement::PreparedSeries& plan, const fit::
                                                                  options.fit, plan.rays_shape())
                         : 0;
   const std::size_t program = kProgram + (processes.size() > 1 ? kMpi : 0);
-  return program + rays + coarse_rays +
-         std::max({fitting + tracing, factorising, measurement::reading_memory(plan)});
+  const std::size_t decoding = measurement::decoding_memory(plan);
+  // The stored views make room for the rays one by one.
+  return program +
+         std::max(stored_views + decoding,
+                  rays + coarse_rays + std::max({fitting + tracing, factorising, decoding}));
 }
 
 }  // namespace
@@ -162,7 +165,7 @@ std::size_t estimate_memory(const measurement::PreparedSeries& plan, const fit::
 RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
                  const distributed::Communicator& processes) {
   if (processes.size() > 1) base::require_no_faults(options.faults_of_job());
-  const measurement::PreparedSeries plan = measurement::plan_series(series, options.specimen);
+  const measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
   const fit::Domain domain = plan.ray_geometry
                                  ? fit::make_domain(*plan.ray_geometry, plan.roi, options.field)
                                  : fit::make_domain(plan.geometry, plan.roi, options.field);
@@ -183,7 +186,8 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
         plan.geometry.tilt_deg,
         measurement::held_out_views(plan.geometry.tilt_deg, options.fit.hold_out));
   run.num_steps = (last.first_epoch + last.epochs) * steps_an_epoch(plan, options.fit);
-  run.memory_bytes = estimate_memory(plan, domain, run, options, processes);
+  run.memory_bytes =
+      estimate_memory(plan, domain, run, options, series.stored_memory(processes), processes);
   base::require_memory(run.memory_bytes * static_cast<std::size_t>(processes.size_on_machine()),
                        "this reconstruction",
                        "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, or "

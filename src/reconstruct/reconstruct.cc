@@ -10,6 +10,8 @@
 #include "base/log.h"
 #include "base/stopwatch.h"
 #include "fit/fit.h"
+#include "io/scratch_memory.h"
+#include "measurement/held_out.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/fingerprint.h"
 #include "reconstruct/results.h"
@@ -18,19 +20,6 @@
 
 namespace tomofield::reconstruction {
 namespace {
-
-measurement::Measurement measurement_of(const measurement::PreparedSeries& series,
-                                        const fit::FitOptions& options,
-                                        const distributed::Communicator& processes) {
-  return {.geometry = series.geometry,
-          .roi = series.roi,
-          .rays = series.rays.get(),
-          .noise_sigma = series.noise_sigma,
-          .mean_density = series.mean_density,
-          .ray_geometry = series.ray_geometry,
-          .held_out = measurement::held_out_views(series.geometry.tilt_deg, options.hold_out),
-          .processes = &processes};
-}
 
 // Calls what reads the checkpoint.
 void resuming(const std::function<void()>& read) {
@@ -54,10 +43,6 @@ void resume(const OutputPaths& paths, const std::string& fingerprint, fit::Fit& 
                              fit.progress().step, fit.num_steps()));
 }
 
-std::filesystem::path directory_of(const std::filesystem::path& file) {
-  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-}
-
 base::ProgressReport progress_report(const fit::Fit& fit, std::int64_t first_step,
                                      const base::Stopwatch& running) {
   base::ProgressReport report;
@@ -78,18 +63,19 @@ base::ProgressReport progress_report(const fit::Fit& fit, std::int64_t first_ste
 }
 
 // The settings that predict views held out from trials best. None if a stop was requested.
-std::optional<TunedFit> choose_settings(const measurement::PreparedSeries& series,
-                                        const measurement::Measurement& measurement,
+std::optional<TunedFit> choose_settings(const measurement::Measurement& measurement,
                                         const OutputPaths& paths, const ReconstructHooks& hooks,
-                                        const ReconstructOptions& options) {
+                                        const ReconstructOptions& options,
+                                        const distributed::Communicator& processes) {
   const TuneHooks tune_hooks{.progress = hooks.tune_progress,
                              .stop_requested = hooks.stop_requested};
-  if (!options.tune) return tune_penalty(measurement, options.field, options.fit, tune_hooks);
-  const distributed::Communicator& processes = *measurement.processes;
-  const std::string fingerprint = fingerprint_of(options, series, processes);
+  if (!options.tune)
+    return tune_penalty(measurement, options.field, options.fit, tune_hooks, processes);
+  const std::string fingerprint = fingerprint_of(options, measurement, processes);
   std::optional<selection::TrialFile> file;
   processes.run_collectively([&] { file.emplace(paths.trials, fingerprint, options.resume); });
-  return tune(measurement, options.field, options.fit, options.choose_penalty, *file, tune_hooks);
+  return tune(measurement, options.field, options.fit, options.choose_penalty, *file, tune_hooks,
+              processes);
 }
 
 void apply(const TrialSettings& settings, ReconstructOptions& options) {
@@ -101,16 +87,14 @@ void apply(const TrialSettings& settings, ReconstructOptions& options) {
 
 // Chooses what `options` leave to trials, or takes what the run that is resumed has chosen; false
 // if a stop was requested.
-bool settle_options(const measurement::PreparedSeries& series,
-                    const measurement::Measurement& measurement, const OutputPaths& paths,
-                    const ReconstructHooks& hooks, ReconstructOptions& options,
-                    std::optional<TunedFit>& tuned) {
+bool settle_options(const measurement::Measurement& measurement, const OutputPaths& paths,
+                    const ReconstructHooks& hooks, const distributed::Communicator& processes,
+                    ReconstructOptions& options, std::optional<TunedFit>& tuned) {
   if (options.num_trials(measurement.num_fitted_views()) == 0) return true;
   if (options.resume && std::filesystem::exists(paths.model)) {
-    measurement.processes->run_collectively(
-        [&] { resuming([&] { tuned = stored_choice(paths.model); }); });
+    processes.run_collectively([&] { resuming([&] { tuned = stored_choice(paths.model); }); });
   } else {
-    tuned = choose_settings(series, measurement, paths, hooks, options);
+    tuned = choose_settings(measurement, paths, hooks, options, processes);
     if (!tuned) return false;
   }
   if (tuned) apply(tuned->settings, options);
@@ -147,21 +131,24 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
                     const ReconstructHooks& hooks, const distributed::Communicator& processes) {
   ReconstructOptions options = requested;
   const OutputPaths paths = output_paths(options.output);
-  const measurement::PreparedSeries series =
-      measurement::prepare_series(tilt_series, options.specimen, directory_of(paths.volume),
-                                  fit::band_rows(options.field), processes);
-  const measurement::Measurement measurement = measurement_of(series, options.fit, processes);
+  measurement::Measurement measurement = measurement::prepare_measurement(
+      tilt_series, options.specimen, io::scratch_directory(paths.volume),
+      fit::band_rows(options.field), processes);
+  measurement.held_out =
+      measurement::held_out_views(measurement.geometry.tilt_deg, options.fit.hold_out);
   FitOrigin origin;
-  if (!settle_options(series, measurement, paths, hooks, options, origin.tuned))
+  if (!settle_options(measurement, paths, hooks, processes, options, origin.tuned))
     return Outcome::kStoppedTuning;
-  origin.fingerprint = fingerprint_of(options, series, processes);
-  fit::Fit fit(measurement, options.field, options.fit);
+  origin.fingerprint = fingerprint_of(options, measurement, processes);
+  fit::Fit fit(measurement, options.field, options.fit, processes);
   if (options.resume) processes.run_collectively([&] { resume(paths, origin.fingerprint, fit); });
 
   const base::Stopwatch running;
-  const auto save = [&] { save_checkpoint(paths.model, fit, model_info(series, options), origin); };
+  const auto save = [&] {
+    save_checkpoint(paths.model, fit, model_info(measurement, options), origin);
+  };
   if (!run_with_checkpoints(fit, options.checkpoint_minutes, hooks, save)) return Outcome::kStopped;
-  write_results(fit, series, options, origin, paths, running.seconds());
+  write_results(fit, measurement, options, origin, paths, running.seconds());
   return Outcome::kFinished;
 }
 

@@ -15,9 +15,9 @@ namespace tomofield::reconstruction {
 namespace {
 
 // The error of the views held out, and a picture of the one nearest to zero tilt.
-nlohmann::json score_fit(const fit::Fit& fit, const measurement::PreparedSeries& series,
+nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& series,
                          bool stopped_by_them, const std::filesystem::path& picture) {
-  const measurement::HeldOutError error = fit.held_out_error();
+  const measurement::ViewErrors error = fit.held_out_error();
   const auto nearest = std::ranges::min_element(error.views, {}, [&](int view) {
     return std::abs(series.geometry.tilt_deg[static_cast<std::size_t>(view)]);
   });
@@ -32,7 +32,7 @@ nlohmann::json score_fit(const fit::Fit& fit, const measurement::PreparedSeries&
   return json;
 }
 
-output::VolumeShare volume_share(const fit::Fit& fit, const measurement::PreparedSeries& series) {
+output::VolumeShare volume_share(const fit::Fit& fit, const measurement::Measurement& series) {
   const distributed::Range slabs = series.rays->held();
   const auto end_row =
       std::min<std::int64_t>(std::int64_t{slabs.end} * base::kLanes, series.roi.height());
@@ -45,7 +45,7 @@ output::VolumeShare volume_share(const fit::Fit& fit, const measurement::Prepare
 
 }  // namespace
 
-output::ModelInfo model_info(const measurement::PreparedSeries& series,
+output::ModelInfo model_info(const measurement::Measurement& series,
                              const ReconstructOptions& options) {
   output::ModelInfo info;
   info.geometry = series.geometry;
@@ -58,7 +58,7 @@ output::ModelInfo model_info(const measurement::PreparedSeries& series,
   return info;
 }
 
-void write_results(fit::Fit& fit, const measurement::PreparedSeries& series,
+void write_results(fit::Fit& fit, const measurement::Measurement& series,
                    const ReconstructOptions& options, const FitOrigin& origin,
                    const OutputPaths& paths, double seconds) {
   nlohmann::json figures = output::figures_json(fit, series, seconds);

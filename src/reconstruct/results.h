@@ -9,12 +9,12 @@
 namespace tomofield::reconstruction {
 
 /// What the field of a fit means.
-output::ModelInfo model_info(const measurement::PreparedSeries& series,
+output::ModelInfo model_info(const measurement::Measurement& series,
                              const ReconstructOptions& options);
 
 /// Writes what a finished fit leaves: model, volume, figures, and of views that were held out a
 /// picture. The fit's field is gone then. Every process calls it.
-void write_results(fit::Fit& fit, const measurement::PreparedSeries& series,
+void write_results(fit::Fit& fit, const measurement::Measurement& series,
                    const ReconstructOptions& options, const FitOrigin& origin,
                    const OutputPaths& paths, double seconds);
 

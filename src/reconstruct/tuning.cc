@@ -12,7 +12,7 @@
 #include "base/log.h"
 #include "base/stopwatch.h"
 #include "objective/options.h"
-#include "selection/trial_series.h"
+#include "selection/trial_measurement.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
@@ -46,27 +46,19 @@ FitTrial trial_from(const json& entry) {
 
 // The part of a measurement that trials are made on.
 struct Strip {
+  selection::TrialViews views;
+  measurement::Measurement measurement;
   double part = 1;  // of all rows
-  selection::TrialSeries series;
-  measurement::Measurement measurement;  // of `series`
 };
 
-Strip middle_strip(const measurement::Measurement& whole, std::int64_t most_rows) {
-  const std::int64_t all_rows = whole.rays->shape().num_rows;
-  selection::TrialSeries series = selection::make_trial_series(
-      whole.geometry, whole.noise_sigma, *whole.rays, whole.held_out, most_rows, *whole.processes);
-  const std::int64_t rows = series.rays->shape().num_rows;
-  geometry::Roi roi = whole.roi;
-  roi.y0 += (all_rows - rows) / 2;
-  roi.y1 = roi.y0 + rows;
-  measurement::Measurement measurement{.geometry = series.geometry,
-                                       .roi = roi,
-                                       .rays = series.rays.get(),
-                                       .noise_sigma = series.noise_sigma,
-                                       .mean_density = whole.mean_density,
-                                       .held_out = series.held_out};
-  return {static_cast<double>(rows) / static_cast<double>(all_rows), std::move(series),
-          std::move(measurement)};
+Strip middle_strip(const measurement::Measurement& whole, std::int64_t max_rows,
+                   const distributed::Communicator& processes) {
+  Strip strip{.views = selection::trial_views(whole.geometry.tilt_deg, whole.held_out),
+              .measurement = {}};
+  strip.measurement = selection::trial_measurement(whole, strip.views, max_rows, processes);
+  strip.part = static_cast<double>(strip.measurement.rays->shape().num_rows) /
+               static_cast<double>(whole.rays->shape().num_rows);
+  return strip;
 }
 
 struct StopRequested {};
@@ -76,8 +68,8 @@ class TrialFits {
  public:
   TrialFits(const measurement::Measurement& measurement, std::int64_t rows,
             const fit::FieldOptions& field, const fit::FitOptions& fit, const TuneHooks& hooks,
-            int num_expected)
-      : strip_(middle_strip(measurement, rows)),
+            int num_expected, const distributed::Communicator& processes)
+      : strip_(middle_strip(measurement, rows, processes)),
         field_(field),
         fit_(fit),
         hooks_(hooks),
@@ -100,7 +92,7 @@ class TrialFits {
     return trial;
   }
 
-  const std::vector<int>& predicted_views() const { return strip_.series.views.predicted; }
+  const std::vector<int>& predicted_views() const { return strip_.views.predicted; }
 
  private:
   FitTrial fitted(const TrialSettings& settings) {
@@ -119,7 +111,7 @@ class TrialFits {
       if (hooks_.progress) hooks_.progress(report(fit, settings));
       return true;
     });
-    const measurement::HeldOutError error = fit.held_out_error();
+    const measurement::ViewErrors error = fit.held_out_error();
     return {settings, {error.total, error.view_error}, running.seconds()};
   }
 
@@ -242,10 +234,11 @@ TunedFit tuned_from(const json& tuning) {
 
 std::optional<TunedFit> tune(const measurement::Measurement& measurement,
                              const fit::FieldOptions& field, const fit::FitOptions& fit,
-                             bool tunes_penalty, selection::TrialFile& file,
-                             const TuneHooks& hooks) {
+                             bool tunes_penalty, selection::TrialFile& file, const TuneHooks& hooks,
+                             const distributed::Communicator& processes) {
   const SearchSpace space{.penalty = tunes_penalty, .rank = field.kind == FieldKind::kVm};
-  TrialFits fits(measurement, selection::kTrialRows, field, fit, hooks, expected_trials(space));
+  TrialFits fits(measurement, selection::kTrialRows, field, fit, hooks, expected_trials(space),
+                 processes);
   // A run without total variation still needs a weight to search from.
   const double first =
       fit.density_variation > 0 ? fit.density_variation : objective::usual_variation(fit.penalty);
@@ -256,7 +249,7 @@ std::optional<TunedFit> tune(const measurement::Measurement& measurement,
         search_settings({fit.penalty, first, field.rank, fit.epochs}, space, trials);
     return TunedFit{found, trials.made(), fits.predicted_views()};
   };
-  const std::optional<TunedFit> tuned = found_by_first(*measurement.processes, search);
+  const std::optional<TunedFit> tuned = found_by_first(processes, search);
   if (!tuned) return std::nullopt;
   log_trials(tuned->trials);
   base::log_info(fmt::format(
@@ -269,11 +262,12 @@ std::optional<TunedFit> tune(const measurement::Measurement& measurement,
 
 std::optional<TunedFit> tune_penalty(const measurement::Measurement& measurement,
                                      const fit::FieldOptions& field, const fit::FitOptions& fit,
-                                     const TuneHooks& hooks) {
+                                     const TuneHooks& hooks,
+                                     const distributed::Communicator& processes) {
   fit::FieldOptions plain = field;
   plain.kind = FieldKind::kGrid;
   const fit::FitOptions shorter = penalty_trial_options(plain, field, fit);
-  TrialFits fits(measurement, kPenaltyRows, plain, shorter, hooks, 2);
+  TrialFits fits(measurement, kPenaltyRows, plain, shorter, hooks, 2, processes);
   const auto search = [&] {
     FitTrials trials =
         make_trials([&](const TrialSettings& settings) { return fits.run(settings); });
@@ -281,7 +275,7 @@ std::optional<TunedFit> tune_penalty(const measurement::Measurement& measurement
         choose_penalty({fit.penalty, fit.density_variation, field.rank, shorter.epochs}, trials);
     return TunedFit{found, trials.made(), fits.predicted_views()};
   };
-  std::optional<TunedFit> tuned = found_by_first(*measurement.processes, search);
+  std::optional<TunedFit> tuned = found_by_first(processes, search);
   if (!tuned) return std::nullopt;
   log_trials(tuned->trials);
   tuned->settings.epochs = fit.epochs;

@@ -63,17 +63,19 @@ TunedFit tuned_from(const nlohmann::json& tuning);
 /// some rows in the middle, without the views that `measurement` holds out to score the result.
 /// Finished trials go to `file`; those found there are not repeated. Returns nothing if a stop
 /// was requested. Throws Error for too few views.
-std::optional<TunedFit> tune(const measurement::Measurement& measurement,
-                             const fit::FieldOptions& field, const fit::FitOptions& fit,
-                             bool tunes_penalty, selection::TrialFile& file,
-                             const TuneHooks& hooks);
+std::optional<TunedFit> tune(
+    const measurement::Measurement& measurement, const fit::FieldOptions& field,
+    const fit::FitOptions& fit, bool tunes_penalty, selection::TrialFile& file,
+    const TuneHooks& hooks,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
 
 /// Chooses the penalty alone, by choose_penalty(): two trials on half as many rows with plain
 /// vertices, whatever the field. Which penalty is right depends on the specimen, and plain vertices
 /// converge in a fraction of the time: a few per cent of a fit of 256 rows. Returns nothing if a
 /// stop was requested.
-std::optional<TunedFit> tune_penalty(const measurement::Measurement& measurement,
-                                     const fit::FieldOptions& field, const fit::FitOptions& fit,
-                                     const TuneHooks& hooks);
+std::optional<TunedFit> tune_penalty(
+    const measurement::Measurement& measurement, const fit::FieldOptions& field,
+    const fit::FitOptions& fit, const TuneHooks& hooks,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
 
 }  // namespace tomofield::reconstruction

@@ -9,7 +9,7 @@
 namespace tomofield::tilt_series {
 namespace {
 
-/// The up to four pixels that a position takes its value from, along one axis.
+/// The pixels (up to four) along one axis that a position takes its value from.
 struct Taps {
   std::int64_t first = 0;
   int count = 0;

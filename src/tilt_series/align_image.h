@@ -7,7 +7,7 @@ namespace tomofield::tilt_series {
 
 using geometry::RawFromAligned;
 
-/// The raw image resampled onto width × height aligned pixels by cubic
+/// Resamples the raw image onto width × height aligned pixels by cubic
 /// convolution (Keys 1981, a = −1/2: Catmull–Rom), linear in the outermost
 /// pixel of the raw image. Pixels whose centre lies outside the centres of
 /// the raw image's outermost pixels, or that need a pixel which is no

@@ -6,8 +6,8 @@
 
 namespace tomofield::tilt_series {
 
-/// Sizes that reduce_image gives: floor(size / factor), where a quotient that
-/// misses an integer by rounding alone counts as that integer.
+/// Returns a size of an image after reduce_image: floor(size / factor). A quotient that misses an
+/// integer by rounding alone counts as that integer.
 std::int64_t reduced_size(std::int64_t size, double factor);
 
 /// Reduces an image by any factor >= 1: each output pixel is the mean of the

@@ -6,7 +6,7 @@
 
 namespace tomofield::tilt_series {
 
-/// One image [y, x] and which of its pixels are measurements; the others are 0.
+/// An image [y, x] and which of its pixels are measurements; the others are 0.
 struct MaskedImage {
   std::int64_t width = 0;
   std::int64_t height = 0;

@@ -10,8 +10,9 @@
 namespace tomofield::tilt_series {
 namespace {
 
-constexpr std::size_t kFewestDifferences = 64;
-// Of more, rows are left out: so many have the median of their sizes within a part in a thousand.
+constexpr std::size_t kMinDifferences = 64;
+// Rows of larger images are left out: the median of so many sizes is right within a part in a
+// thousand.
 constexpr std::int64_t kEnoughDifferences = 1 << 20;
 
 double median_in_place(std::vector<float>& values) {
@@ -20,7 +21,8 @@ double median_in_place(std::vector<float>& values) {
   return *middle;
 }
 
-/// From mixed second differences at the image's own scale; 0 if there are too few.
+/// Returns the estimate from mixed second differences at the image's own scale; 0 if there are too
+/// few.
 double sigma_of_differences(const MaskedImage& image) {
   const std::int64_t row_step =
       std::max<std::int64_t>(1, image.width * image.height / kEnoughDifferences);
@@ -36,7 +38,7 @@ double sigma_of_differences(const MaskedImage& image) {
                             image.values[above + 1]);
     }
   }
-  if (differences.size() < kFewestDifferences) return 0.0;
+  if (differences.size() < kMinDifferences) return 0.0;
   const auto median = static_cast<float>(median_in_place(differences));
   for (float& value : differences) value = std::fabs(value - median);
   constexpr double kSigmaOfMad = 1.4826;  // for a normal distribution

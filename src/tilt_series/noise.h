@@ -4,21 +4,21 @@
 
 namespace tomofield::tilt_series {
 
-/// Standard deviation of the noise of a view, estimated from the view alone.
+/// Estimates the standard deviation of the noise of a view from the view alone.
 ///
 /// The mixed second difference v(x,y) − v(x+1,y) − v(x,y+1) + v(x+1,y+1)
 /// cancels whatever varies slowly and has four times the variance of white
 /// noise; its median absolute deviation ignores edges and beads (Donoho and
 /// Johnstone 1994 do the same with the finest wavelets). Interpolated images
 /// have noise that is correlated over a pixel or two, which looks too small at
-/// this scale but not after averaging 2 × 2 pixels: the result is therefore a
-/// white-noise equivalent, the larger of the estimates at one and at two
+/// this scale but not after averaging 2 × 2 pixels. The result is therefore a
+/// white-noise equivalent: the larger of the estimates at one and at two
 /// pixels (the latter times two). Structure also grows with the scale, but
-/// faster and faster, while correlated noise levels off: so the second scale
+/// faster and faster, while correlated noise levels off. The second scale therefore
 /// counts only if the step to four pixels is no larger than the one before.
 ///
-/// Never below 1e-3 of the view's own standard deviation (noise-free data
-/// would get infinite weight), and always positive.
+/// The result is always positive, and at least 1e-3 of the view's own standard deviation, since
+/// noise-free data would get infinite weight.
 double estimate_noise_sigma(const MaskedImage& view);
 
 }  // namespace tomofield::tilt_series

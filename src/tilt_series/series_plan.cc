@@ -16,12 +16,12 @@
 namespace tomofield::tilt_series {
 namespace {
 
-/// In-plane transform of each section, and the rotation of the tilt axis that it undoes.
+/// The in-plane transform of each section, and the rotation of the tilt axis that it undoes.
 struct InPlaneAlignment {
   std::vector<std::optional<RawFromAligned>> of_section;  ///< none: not aligned (dark frame)
   double sum_cos = 0.0, sum_sin = 0.0;                    ///< over the sections, of the rotation
 
-  /// Whether the aligned images are as wide as the raw ones are high.
+  /// Tells whether the aligned images are as wide as the raw ones are high.
   bool swaps_sizes() const { return std::fabs(sum_sin) > std::fabs(sum_cos); }
 };
 
@@ -37,7 +37,7 @@ RawFromAligned invert(const io::ImodTransform& t) {
   return inverse;
 }
 
-InPlaneAlignment alignment_of_imod(const std::filesystem::path& path, const io::MrcReader& stack) {
+InPlaneAlignment alignment_of_imod(const std::filesystem::path& path, const io::ImageStack& stack) {
   const auto transforms = io::read_imod_transforms(path);
   require_count(transforms.size(), path, "transforms", stack);
   InPlaneAlignment alignment;
@@ -53,19 +53,18 @@ InPlaneAlignment alignment_of_imod(const std::filesystem::path& path, const io::
   return alignment;
 }
 
-AreTomoSections read_aretomo(const std::filesystem::path& path, const io::MrcReader& stack) {
+AreTomoSections read_aretomo(const std::filesystem::path& path, const io::ImageStack& stack) {
   AreTomoSections aretomo{io::read_aretomo_alignment(path), {}};
   const io::MrcHeader& header = stack.header();
   const auto& raw_size = aretomo.alignment.raw_size;
   if (raw_size && ((*raw_size)[0] != header.nx || (*raw_size)[1] != header.ny)) {
-    throw Error(
-        fmt::format("'{}' aligns images of {} × {} pixels but '{}' has {} × {}; give the "
-                    "stack that AreTomo aligned, unbinned",
-                    path.string(), (*raw_size)[0], (*raw_size)[1], stack.path().string(), header.nx,
-                    header.ny));
+    throw Error(fmt::format(
+        "'{}' aligns images of {} × {} pixels but '{}' has {} × {}; give the "
+        "stack that AreTomo aligned, unbinned",
+        path.string(), (*raw_size)[0], (*raw_size)[1], stack.name(), header.nx, header.ny));
   }
   const auto sections =
-      io::assign_aretomo_sections(aretomo.alignment, path, header.nz, stack.path());
+      io::assign_aretomo_sections(aretomo.alignment, path, header.nz, stack.name());
   aretomo.row_of_section.resize(static_cast<std::size_t>(header.nz));
   for (std::size_t row = 0; row < sections.size(); ++row) {
     aretomo.row_of_section[static_cast<std::size_t>(sections[row])] = row;
@@ -94,8 +93,8 @@ InPlaneAlignment alignment_of_aretomo(const AreTomoSections& aretomo) {
   return alignment;
 }
 
-/// Å an unbinned pixel: --pixel-size, else the header's, else the mdoc's.
-double find_pixel_size(const TiltSeriesOptions& options, const io::MrcReader& stack,
+/// Returns the size of an unbinned pixel in Å: --pixel-size, else the header's, else the mdoc's.
+double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& stack,
                        const std::optional<io::Mdoc>& mdoc) {
   if (options.pixel_size_A) {
     if (std::isfinite(*options.pixel_size_A) && *options.pixel_size_A > 0) {
@@ -108,7 +107,7 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::MrcReader& st
   if (is_default && mdoc && mdoc->pixel_spacing_A.value_or(0.0) > 0) return *mdoc->pixel_spacing_A;
   if (in_header_A > 0.0) return in_header_A;
   base::log_warning(fmt::format(
-      "'{}' has no pixel size; 1 Å is assumed (give it with --pixel-size)", stack.path().string()));
+      "'{}' has no pixel size; 1 Å is assumed (give it with --pixel-size)", stack.name()));
   return 1.0;
 }
 
@@ -132,7 +131,7 @@ double find_bin_factor(const TiltSeriesOptions& options, const SeriesPlan& plan)
 }
 
 std::vector<io::NumberLine> read_x_tilts(const TiltSeriesOptions& options,
-                                         const io::MrcReader& stack) {
+                                         const io::ImageStack& stack) {
   if (!options.xtilt) {
     return std::vector<io::NumberLine>(static_cast<std::size_t>(stack.header().nz));
   }
@@ -153,7 +152,7 @@ void require_compatible(const TiltSeriesOptions& options) {
 
 }  // namespace
 
-SeriesPlan plan_series(const TiltSeriesOptions& options, const io::MrcReader& stack) {
+SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& stack) {
   require_compatible(options);
   const io::MrcHeader& header = stack.header();
   const auto mdoc = options.mdoc ? std::optional(io::read_mdoc(*options.mdoc)) : std::nullopt;
@@ -162,8 +161,8 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::MrcReader& st
   const TiltAngles angles = find_tilt_angles(options, stack, aretomo, mdoc);
   if (mdoc && std::ssize(mdoc->sections) != header.nz) {
     base::log_warning(fmt::format("'{}' has {} sections and '{}' {}: are they of one series?",
-                                  options.mdoc->string(), mdoc->sections.size(),
-                                  options.stack.string(), header.nz));
+                                  options.mdoc->string(), mdoc->sections.size(), stack.name(),
+                                  header.nz));
   }
   const std::vector<io::NumberLine> x_tilts = read_x_tilts(options, stack);
   const auto excluded = io::parse_section_list(options.exclude, header.nz);
@@ -190,8 +189,8 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::MrcReader& st
     plan.views.push_back(planned);
   }
   if (plan.views.empty()) {
-    throw Error(fmt::format("no section of '{}' is left to reconstruct from; exclude fewer",
-                            stack.path().string()));
+    throw Error(
+        fmt::format("no section of '{}' is left to reconstruct from; exclude fewer", stack.name()));
   }
   return plan;
 }

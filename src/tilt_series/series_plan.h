@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "io/mrc.h"
+#include "io/image_stack.h"
 #include "tilt_series/align_image.h"
 #include "tilt_series/tilt_series.h"
 
@@ -16,8 +16,7 @@ struct PlannedView {
   RawFromAligned raw_from_aligned;
 };
 
-/// Everything about a series that follows from the small files and the
-/// stack's header, before any pixel is read.
+/// A series as the small files and the stack's header describe it, before any pixel is read.
 struct SeriesPlan {
   std::vector<PlannedView> views;  ///< in the stack's order
   bool is_raw = false;             ///< images are resampled; else the stack is aligned already
@@ -30,6 +29,6 @@ struct SeriesPlan {
 
 /// Brings the options, the files that they name and the stack together.
 /// Throws Error where they do not fit each other or cannot be right.
-SeriesPlan plan_series(const TiltSeriesOptions& options, const io::MrcReader& stack);
+SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& stack);
 
 }  // namespace tomofield::tilt_series

@@ -9,22 +9,21 @@
 namespace tomofield::tilt_series {
 namespace {
 
-// Beyond it a ray crosses several times the specimen's thickness, and the
+// At a larger tilt a ray crosses several times the specimen's thickness, and the
 // margin that it would need grows without bound.
 constexpr double kLargestTilt_deg = 80.0;
 
 TiltAngles angles_of_mdoc(const io::Mdoc& mdoc, const std::filesystem::path& path,
-                          const io::MrcReader& stack) {
+                          const io::ImageStack& stack) {
   require_count(mdoc.sections.size(), path, "sections", stack);
   TiltAngles angles{path.string(), {}};
   for (std::size_t i = 0; i < mdoc.sections.size(); ++i) {
     const io::MdocSection& section = mdoc.sections[i];
     if (section.section != static_cast<std::int64_t>(i)) {
-      throw Error(
-          fmt::format("'{}', line {}: after {} sections comes [ZValue = {}]; the sections "
-                      "must be numbered 0 to {} as those of '{}'",
-                      path.string(), section.line, i, section.section, mdoc.sections.size() - 1,
-                      stack.path().string()));
+      throw Error(fmt::format(
+          "'{}', line {}: after {} sections comes [ZValue = {}]; the sections "
+          "must be numbered 0 to {} as those of '{}'",
+          path.string(), section.line, i, section.section, mdoc.sections.size() - 1, stack.name()));
     }
     angles.of_section.emplace_back();
     if (section.tilt_deg) angles.of_section.back() = {*section.tilt_deg, section.line};
@@ -46,15 +45,15 @@ TiltAngles angles_of_aretomo(const AreTomoSections& aretomo, const std::filesyst
 }  // namespace
 
 void require_count(std::size_t found, const std::filesystem::path& file, const char* what,
-                   const io::MrcReader& stack) {
+                   const io::ImageStack& stack) {
   if (static_cast<std::int64_t>(found) == stack.header().nz) return;
   throw Error(
       fmt::format("'{}' has {} {} but the stack '{}' has {} sections; give the file that "
                   "belongs to this stack (sections are left out with --exclude alone)",
-                  file.string(), found, what, stack.path().string(), stack.header().nz));
+                  file.string(), found, what, stack.name(), stack.header().nz));
 }
 
-TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::MrcReader& stack,
+TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::ImageStack& stack,
                             const std::optional<AreTomoSections>& aretomo,
                             const std::optional<io::Mdoc>& mdoc) {
   if (options.tlt) {
@@ -69,9 +68,9 @@ TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::MrcReade
     throw Error(
         fmt::format("no tilt angles for '{}': its header has none, so give them with --tlt FILE "
                     "(.tlt or .rawtlt), --aln FILE (AreTomo) or --mdoc FILE (SerialEM)",
-                    stack.path().string()));
+                    stack.name()));
   }
-  TiltAngles angles{fmt::format("extended header of {}", stack.path().string()), {}};
+  TiltAngles angles{fmt::format("extended header of {}", stack.name()), {}};
   for (const double tilt_deg : extended) angles.of_section.push_back(io::NumberLine{tilt_deg, 0});
   return angles;
 }

@@ -7,33 +7,33 @@
 #include <vector>
 
 #include "io/alignment_files.h"
-#include "io/mrc.h"
+#include "io/image_stack.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::tilt_series {
 
-/// An AreTomo alignment whose rows know their sections of the stack.
+/// An AreTomo alignment, with the section of the stack of each of its rows.
 struct AreTomoSections {
   io::AreTomoAlignment alignment;
   std::vector<std::optional<std::size_t>> row_of_section;  ///< none: a dark frame
 };
 
-/// A tilt angle for each section of the stack, where there is one.
+/// The tilt angles of the sections of a stack.
 struct TiltAngles {
   std::string source;  ///< a file name, or the stack's extended header
   std::vector<std::optional<io::NumberLine>> of_section;
 };
 
-/// The tilt angles from the first of: .tlt or .rawtlt, AreTomo's .aln, the
+/// Returns the tilt angles from the first of: .tlt or .rawtlt, AreTomo's .aln, the
 /// .mdoc, the stack's extended header (an explicit file always wins). Throws
 /// Error if there is none, or if their number is not the stack's.
-TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::MrcReader& stack,
+TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::ImageStack& stack,
                             const std::optional<AreTomoSections>& aretomo,
                             const std::optional<io::Mdoc>& mdoc);
 
 /// Throws Error with both numbers and both files unless they are equal.
 void require_count(std::size_t found, const std::filesystem::path& file, const char* what,
-                   const io::MrcReader& stack);
+                   const io::ImageStack& stack);
 
 /// Throws Error (file, line, value) for an angle that is missing or beyond ±80°.
 double require_usable_tilt(const TiltAngles& angles, std::int64_t section);

@@ -10,13 +10,15 @@
 
 #include "distributed/communicator.h"
 #include "geometry/raw_from_aligned.h"
+#include "io/image_stack.h"
 #include "tomofield/options.h"
 
 namespace tomofield::tilt_series {
 
 /// Where a tilt series is and how its intensities are to be read.
 struct TiltSeriesOptions {
-  std::filesystem::path stack;                 ///< MRC stack, raw or aligned
+  std::filesystem::path stack;                   ///< MRC stack, raw or aligned
+  std::shared_ptr<const io::ImageStack> images;  ///< views in memory, in place of `stack`
   std::optional<std::filesystem::path> tlt;    ///< .tlt or .rawtlt, one angle in degrees a section
   std::optional<std::filesystem::path> xf;     ///< IMOD raw → aligned transforms
   std::optional<std::filesystem::path> xtilt;  ///< IMOD x-axis tilt, degrees a section
@@ -29,21 +31,25 @@ struct TiltSeriesOptions {
   Contrast contrast = Contrast::kDark;
   bool take_log = false;  ///< −ln(I / I0) instead of I0 − I; dark only
   bool resample = true;   ///< false: views stay as they were recorded, with their alignment beside
+  /// False: decoded views are given up as soon as they have been checked and measured.
+  bool keep_views = true;
+  /// Takes decoded views that do not fit in memory; empty: the system's folder for such files.
+  std::filesystem::path scratch_dir = {};
 
   std::optional<std::filesystem::path> mask;       ///< MRC as the stack: 0 is no measurement
   std::optional<std::filesystem::path> fiducials;  ///< text of model2point, stack coordinates
-  /// Gold beads are looked for and masked; 0: they are not. None: of dark
-  /// series the diameter is estimated, of bright ones nothing is looked for.
+  /// Diameter of the gold beads that are looked for and masked; 0: none are. Without it, the
+  /// diameter is estimated in dark series, and nothing is looked for in bright ones.
   std::optional<double> bead_diameter_nm;
 };
 
-/// What was masked beside the fill of rotated images.
+/// Counts of what was masked beside the fill of rotated images.
 struct MaskFigures {
-  std::size_t num_beads = 0;              ///< with one position in the specimen
+  std::size_t num_beads = 0;              ///< beads with one position in the specimen
   double bead_diameter_A = 0.0;           ///< given or estimated; 0: no beads
-  std::vector<std::size_t> beads_found;   ///< of each view: with a spot of their own
-  std::vector<std::size_t> beads_masked;  ///< of each view: discs, by tracks and --fiducials too
-  std::int64_t num_bad_pixels = 0;        ///< of all sections: hot, dead
+  std::vector<std::size_t> beads_found;   ///< [view]: beads with a spot of their own
+  std::vector<std::size_t> beads_masked;  ///< [view]: discs, also from tracks and --fiducials
+  std::int64_t num_bad_pixels = 0;        ///< hot and dead pixels of all sections
 };
 
 /// One view of the series.
@@ -54,16 +60,18 @@ struct View {
 };
 
 /// An aligned tilt series: views whose tilt axis is the +Y direction through
-/// the image centre, dense specimen high, ready to be fitted. Images stay in
-/// the file and are read a view at a time: aligned (unless `resample` is off),
-/// binned, converted.
+/// the image centre, dense specimen high, ready to be fitted.
+///
+/// Each view is decoded once: masked, aligned (unless `resample` is off), binned and put into a
+/// store (view_store.h), on which everything is measured that needs more than one look. Of a job of
+/// several processes each decodes and stores the views that it owns (view_owner.h).
 class TiltSeries {
  public:
-  /// Opens and checks everything: counts, angles, sizes, every pixel of every
-  /// view once. Throws Error as docs/errors.md lists; warnings go to base/log.h.
+  /// Opens the files, decodes every view, and checks counts, angles, sizes and all pixels.
+  /// Throws Error as docs/errors.md lists; warnings go to base/log.h.
   explicit TiltSeries(const TiltSeriesOptions& options)
       : TiltSeries(options, distributed::Communicator::alone()) {}
-  /// The same by several processes, of which each checks some of the views.
+  /// Does the same with several processes, each of which decodes some of the views.
   TiltSeries(const TiltSeriesOptions& options, const distributed::Communicator& processes);
   ~TiltSeries();
   TiltSeries(TiltSeries&&) noexcept;
@@ -73,24 +81,29 @@ class TiltSeries {
   std::int64_t height() const;
   std::int64_t aligned_width() const;  ///< pixels of an aligned, binned view
   std::int64_t aligned_height() const;
-  /// Whether read_view gives aligned views, and where their pixels else come from
-  /// in the views as recorded, in binned pixels.
-  bool is_resampled() const;
+  bool is_resampled() const;  ///< whether read_view gives aligned views
+  /// Returns where the pixels of an aligned view come from in the view as recorded, binned pixels.
   geometry::RawFromAligned raw_from_aligned(std::size_t view) const;
   double pixel_size_A() const;  ///< of an aligned, binned view
   double bin_factor() const;    ///< unbinned pixels a pixel, exact
 
-  /// View `view` (an index into views()) as height × width line integrals in
+  /// Copies view `view` (an index into views()) as height × width line integrals in
   /// the data's units (I0 − I, −ln(I/I0), or as stored), and which pixels are
   /// measurements: false for NaN, infinity, hot and dead pixels, fill outside a
   /// rotated image, beads, fiducials and what the user's mask leaves out.
-  /// Pixels that are not measurements are 0. Thread-safe.
+  /// Pixels that are not measurements are 0. A view that is not in this process's store is
+  /// decoded anew. Thread-safe.
   void read_view(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) const;
 
-  /// Standard deviation of the noise of each view, in the units of read_view.
+  /// Gives up the stored pixels of a view that will not be read soon, to make room.
+  void forget_view(std::size_t view) const;
+  /// Returns the memory that the stored views take at most, in a job of so many processes.
+  std::size_t stored_memory(const distributed::Communicator& processes) const;
+
+  /// Returns the standard deviation of each view's noise, in the units of read_view.
   const std::vector<double>& noise_sigma() const;
 
-  /// Intensity that stands for an empty beam (I0), in the stack's units; for
+  /// Returns the intensity of an empty beam (I0), in the stack's units; for
   /// kBright 0, where none is needed.
   double empty_beam() const;
 

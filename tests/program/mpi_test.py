@@ -116,6 +116,24 @@ def test_results_have_the_bytes_of_one_process(command):
                 == set(map(os.path.basename, glob.glob(os.path.dirname(alone.volume_path) + "/*")))
 
 
+# Each process looks for spots in its own views, and all must find the same tracks.
+def test_processes_find_the_beads_together(command):
+    cell = os.path.join(harness.fresh_directory("gold"), "cell")
+    harness.succeed("simulate", cell, "--size", 96, "--thickness", 32, "--seed", 3, "--noise", 0.05,
+                    "--tilts=-60:60:6", "--contrast", "dark", "--gold", 10, "--gold-diameter", 80)
+    stack = os.path.join(cell, "tilt_series.mrc")
+    gold = [stack, "--tlt", os.path.join(cell, "tilt_series.tlt")]
+    options = ["--contrast", "dark", "--epochs", 2]
+    for extra in ([], ["--log"]):
+        alone = fresh_results("beads")
+        harness.succeed(*command(alone, *options, *extra, input=gold))
+        assert figures(alone)["mask"]["beads"] >= 5, figures(alone)["mask"]
+        shared = fresh_results("beads3")
+        succeed(3, *command(shared, *options, *extra, input=gold))
+        assert shared.same_as(alone), extra
+        assert figures(shared) == figures(alone), extra
+
+
 def test_each_process_has_its_part(command):
     results = fresh_results("parts")
     succeed(3, *command(results))

@@ -56,7 +56,7 @@ class BeadSeries {
         .height = geometry.height,
         .first_row = 0,
         .num_rows = geometry.height};
-    rays_ = std::make_unique<measurement::SlabViews>(
+    const auto rays = std::make_shared<measurement::SlabViews>(
         shape, 1.0,
         [this](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
           read(v, image);
@@ -65,7 +65,7 @@ class BeadSeries {
         "/tmp");
     measurement_ = {.geometry = geometry,
                     .roi = {0, 0, geometry.width, geometry.height},
-                    .rays = rays_.get(),
+                    .rays = rays,
                     .noise_sigma = std::vector<double>(shape.num_views, kSigma),
                     .mean_density = 0.005};
   }
@@ -93,7 +93,6 @@ class BeadSeries {
   geometry::TiltGeometry geometry_;
   Bead bead_;
   std::uint64_t noise_seed_;
-  std::unique_ptr<measurement::SlabViews> rays_;
   measurement::Measurement measurement_;
 };
 

@@ -80,8 +80,7 @@ class KnownField : public ::testing::Test {
   }
   static double sigma(int view) { return 0.1 * (1 + view); }
 
-  measurement::HeldOutError error(const measurement::SlabViews& measured,
-                                  bool fit_view_scale) const {
+  measurement::ViewErrors error(const measurement::SlabViews& measured, bool fit_view_scale) const {
     std::vector<double> weights;
     for (int v = 0; v < geometry_.num_views(); ++v) weights.push_back(1 / (sigma(v) * sigma(v)));
     return measurement::held_out_error(*sampler_, projector_, measured, {1, 4}, weights,
@@ -99,7 +98,7 @@ class KnownField : public ::testing::Test {
 // deviations.
 TEST_F(KnownField, PredictsItsOwnViewsToTheNoise) {
   const auto measured = measure(1.0, 0.0);
-  const measurement::HeldOutError e = error(*measured, false);
+  const measurement::ViewErrors e = error(*measured, false);
   EXPECT_NEAR(e.total, 1.0, 0.12);
   ASSERT_EQ(e.view_error.size(), 2u);
   for (const double view : e.view_error) EXPECT_NEAR(view, 1.0, 0.17);
@@ -111,7 +110,7 @@ TEST_F(KnownField, PredictsItsOwnViewsToTheNoise) {
 
 TEST_F(KnownField, ScaleAndOffsetOfAViewAreNoError) {
   const auto measured = measure(1.7, -3.0);
-  const measurement::HeldOutError with = error(*measured, true);
+  const measurement::ViewErrors with = error(*measured, true);
   EXPECT_NEAR(with.total, 1.0, 0.12);
   for (const measurement::ViewModel& model : with.models) {
     EXPECT_NEAR(model.scale, 1.7, 0.1);
@@ -151,7 +150,7 @@ class FitWithHeldOut : public ::testing::Test {
     series_ = std::make_unique<Series>(options);
     measurement_ = {.geometry = series_->geometry,
                     .roi = {0, 0, Series::kWidth, Series::kRows},
-                    .rays = series_->rays.get(),
+                    .rays = series_->rays,
                     .noise_sigma = series_->noise_sigma,
                     .mean_density = 0.05,
                     .ray_geometry = {},

@@ -90,7 +90,7 @@ class Problem {
         projector_(geometry_, grid),
         sampler_(*field_, grid, 0, kRows) {
     measured_.geometry = geometry_;
-    measured_.rays = rays_.get();
+    measured_.rays = rays_;
   }
 
   struct Result {
@@ -218,7 +218,7 @@ class Problem {
 
   geometry::TiltGeometry geometry_;
   std::unique_ptr<field::Field> field_;
-  std::unique_ptr<SlabViews> rays_;
+  std::shared_ptr<const SlabViews> rays_;
   measurement::Measurement measured_;
   std::vector<measurement::ViewModel> models_;
   Weights weights_;

@@ -34,7 +34,7 @@ Moments moments_of(const MaskedImage& image) {
   return {mean, std::sqrt(squares / count)};
 }
 
-/// Whether the pixel stands alone among the measured ones around it.
+/// Tells whether the pixel stands alone among the measured pixels around it.
 bool is_isolated(const MaskedImage& image, std::int64_t x, std::int64_t y) {
   std::array<float, 24> around;
   std::size_t count = 0;
@@ -53,7 +53,7 @@ bool is_isolated(const MaskedImage& image, std::int64_t x, std::int64_t y) {
   return value > high + reach || value < low - reach;
 }
 
-/// One pass; the bad pixels it finds no longer count for the deviation of the next.
+/// Makes one pass. The bad pixels that it finds no longer count for the deviation of the next.
 std::int64_t mask_outliers(MaskedImage* image) {
   const Moments moments = moments_of(*image);
   std::vector<std::size_t> bad;

@@ -8,20 +8,21 @@
 
 namespace tomofield::tilt_series {
 
-/// Mean radial profile of spots, summed over images.
+/// The mean radial profile of spots, summed over images.
 class BeadProfile {
  public:
-  /// Of spots about this wide; the profile reaches three diameters far.
+  /// Begins the profile of spots about this wide; it reaches three diameters far.
   explicit BeadProfile(double about_px);
 
   /// Adds the measurements around the spots of an image.
   void add(const MaskedImage& image, const std::vector<Spot>& spots);
 
-  /// Height over the surroundings (two to three diameters away) at a distance
-  /// in pixels from the centre, that of the centre being 1.
+  /// Returns the height over the surroundings (two to three diameters away) at a distance
+  /// in pixels from the centre, relative to the height of the centre.
   double height_at(double radius_px) const;
 
-  /// Where the height falls below one half, times two; nothing if there is no peak.
+  /// Returns twice the distance at which the height falls below one half; nothing if there is no
+  /// peak.
   std::optional<double> diameter_px() const;
 
  private:

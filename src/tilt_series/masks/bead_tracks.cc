@@ -11,13 +11,13 @@
 namespace tomofield::tilt_series {
 namespace {
 
-// Tilts between two views that suggest tracks: far enough apart to tell z, and
-// near enough for a bead to be in both.
+// Two views whose tilts differ by this much suggest tracks: they are far enough apart to tell z,
+// and near enough for a bead to be in both.
 constexpr double kNearestTilt_deg = 8.0, kFarthestTilt_deg = 24.0;
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
-/// The spots of all views, by y in each, and which belong to a track already.
+/// The spots of all views, sorted by y in each, and which of them belong to a track already.
 class SpotIndex {
  public:
   explicit SpotIndex(const std::vector<std::vector<Spot>>& spots) : spots_(spots) {
@@ -37,7 +37,7 @@ class SpotIndex {
     return static_cast<std::size_t>(found - of.begin());
   }
 
-  /// The nearest free spot within `tolerance` of a place.
+  /// Returns the nearest free spot within `tolerance` of a place.
   std::optional<std::size_t> nearest(std::size_t view, double x, double y, double tolerance) const {
     std::optional<std::size_t> best;
     double least = tolerance;
@@ -59,7 +59,7 @@ class SpotIndex {
   std::vector<std::vector<std::uint8_t>> is_taken_;
 };
 
-/// Sums of the least squares x − x0 = x cos θ + z sin θ, y = y.
+/// The sums of the least-squares problem x − x0 = x cos θ + z sin θ, y = y.
 struct TrackFit {
   double cc = 0, cs = 0, ss = 0, cx = 0, sx = 0, y = 0, n = 0;
 
@@ -68,7 +68,7 @@ struct TrackFit {
     cc += c * c, cs += c * s, ss += s * s, cx += c * x, sx += s * x, y += spot_y, n += 1;
   }
 
-  /// Nothing if the views are too alike.
+  /// Returns the solution; nothing if the views are too alike.
   std::optional<BeadTrack> solve() const {
     const double determinant = cc * ss - cs * cs;
     if (!(determinant > 1e-6 * n)) return std::nullopt;
@@ -105,9 +105,9 @@ class TrackFinder {
 
  private:
   bool stands(const BeadTrack& track) const {
-    return track.num_found >= rules_.fewest_views && std::fabs(track.z_px) <= rules_.largest_z_px &&
+    return track.num_found >= rules_.min_views && std::fabs(track.z_px) <= rules_.max_z_px &&
            static_cast<double>(track.num_found) >=
-               rules_.part_of_visible * static_cast<double>(track.num_visible);
+               rules_.min_part_of_visible * static_cast<double>(track.num_visible);
   }
 
   std::optional<std::size_t> spot_of(const BeadTrack& track, std::size_t view) const {
@@ -125,7 +125,7 @@ class TrackFinder {
     }
   }
 
-  /// Least squares over the spots along the track, until these no longer change.
+  /// Repeats least squares over the spots along the track until these no longer change.
   std::optional<BeadTrack> refine(BeadTrack track) const {
     constexpr int kRounds = 3;
     for (int round = 0; round < kRounds; ++round) {
@@ -144,7 +144,7 @@ class TrackFinder {
     return track;
   }
 
-  /// Places that two strong spots fix and that other views support.
+  /// Returns the places that two strong spots fix and that other views support.
   std::vector<BeadTrack> suggest() const {
     std::vector<BeadTrack> candidates;
     const std::size_t num_views = views_.tilt_deg.size();
@@ -171,9 +171,9 @@ class TrackFinder {
         fit.add(radians(views_.tilt_deg[second]), others[i].x_px - views_.middle_x_px,
                 others[i].y_px);
         auto track = fit.solve();
-        if (!track || std::fabs(track->z_px) > rules_.largest_z_px) continue;
+        if (!track || std::fabs(track->z_px) > rules_.max_z_px) continue;
         count(&*track);
-        if (track->num_found >= std::min<std::size_t>(3, rules_.fewest_views)) {
+        if (track->num_found >= std::min<std::size_t>(3, rules_.min_views)) {
           candidates->push_back(*track);
         }
       }

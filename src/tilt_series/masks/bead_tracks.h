@@ -16,26 +16,27 @@ struct BeadTrack {
   std::size_t num_found = 0;    ///< of these, where a spot was found there
 };
 
-/// What is known of the views, in the order of their spots.
+/// The views that tracks are looked for in, in the order of their spots.
 struct TrackedViews {
   std::vector<double> tilt_deg;
   double middle_x_px = 0.0;
-  /// Whether a view measured what is at this place.
+  /// Tells whether a view has a measurement at this place.
   std::function<bool(std::size_t view, double x_px, double y_px)> is_measured;
 };
 
 struct TrackRules {
-  double tolerance_px = 2.0;     ///< a spot this near to the track's place belongs to it
-  double largest_z_px = 0.0;     ///< |z| of a bead
-  double seed_strength = 6.0;    ///< of the two spots that suggest a track
-  double part_of_visible = 0.6;  ///< fewest views with a spot, of those that see its place
-  std::size_t fewest_views = 4;  ///< and in all
+  double tolerance_px = 2.0;   ///< a spot this near to the track's place belongs to it
+  double max_z_px = 0.0;       ///< |z| of a bead
+  double seed_strength = 6.0;  ///< of both spots that suggest a track
+  double min_part_of_visible =
+      0.6;                    ///< at least this part of the views that see its place have a spot
+  std::size_t min_views = 4;  ///< and at least so many views
 };
 
-/// Where a track is in a view.
+/// Returns the x of a track in a view.
 double track_x(const BeadTrack& track, double middle_x_px, double tilt_deg);
 
-/// Tracks of beads through spots[view], best first. Two strong spots at the
+/// Returns tracks of beads through spots[view], best first. Two strong spots at the
 /// same y in views some 15° apart fix a place; it stands if most views that
 /// measure it have a spot there (of any strength). A spot belongs to one track.
 /// No sign of the tilt and no position of the axis along z is assumed: both

@@ -3,17 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "base/parallel.h"
 #include "tilt_series/masks/bead_profile.h"
 #include "tilt_series/masks/bead_tracks.h"
 #include "tilt_series/masks/spots.h"
+#include "tilt_series/view_owner.h"
 
 namespace tomofield::tilt_series {
 namespace {
 
 // Strengths of spots. Structure reaches 5 in the series that we know (simulated
-// cells, dark-field films and particles), beads in vitreous ice 6 to 20.
+// cells, dark-field films and particles); beads in vitreous ice reach 6 to 20.
 constexpr double kStrong = 6.0;
 constexpr double kLikely = 4.5;  // enough for a seed once it is known that there are beads
 constexpr double kWeak = 3.5;    // enough where a track says that a bead is there
@@ -21,21 +23,21 @@ constexpr double kWeak = 3.5;    // enough where a track says that a bead is the
 constexpr std::size_t kDiameterViews = 5;  // the lowest tilts, which the diameter is measured in
 constexpr double kDiameterStep = 1.4142135623730951;  // between the diameters that are tried
 
-// Clear evidence: this many beads, each with spots in this part of all views.
-constexpr std::size_t kFewestBeads = 3;
+// It is clear evidence if so many beads have spots in this part of all views each.
+constexpr std::size_t kMinBeads = 3;
 constexpr double kPartOfViews = 0.5;
 
-// Spots of a view that are followed: more beads than anybody adds, and the
+// So many spots of a view are followed. Nobody adds more beads, and the
 // tracks of a view full of ice crystals are still found in seconds.
-constexpr std::size_t kMostSpots = 1000;
+constexpr std::size_t kMaxSpots = 1000;
 
-// How far from a track its spots may be, at least: alignment is no better.
-constexpr double kLeastTolerance_px = 2.0;
+// Spots may always be this far from their track, since alignment is no better.
+constexpr double kMinTolerance_px = 2.0;
 
 // A spot without a track is a bead's if it has this part of their median contrast in its view.
 constexpr double kPartOfContrast = 0.5;
 
-/// Spots of every view, and which of its pixels were measured.
+/// The spots of every view, and which of its pixels were measured.
 struct SearchedViews {
   std::vector<std::vector<Spot>> spots;
   std::vector<std::vector<bool>> is_valid;
@@ -49,22 +51,25 @@ struct SearchedViews {
   }
 };
 
-/// The strongest spots of a view.
+/// Returns the strongest spots of a view.
 std::vector<Spot> strongest_spots(const MaskedImage& image, double diameter) {
   std::vector<Spot> spots = find_spots(image, diameter, kWeak);
   std::stable_sort(spots.begin(), spots.end(),
                    [](const Spot& a, const Spot& b) { return a.strength > b.strength; });
-  spots.resize(std::min(spots.size(), kMostSpots));
+  spots.resize(std::min(spots.size(), kMaxSpots));
   return spots;
 }
 
-SearchedViews search_views(const BeadViews& views, double diameter) {
+/// Looks for spots in the views that this process owns.
+SearchedViews search_own_views(const BeadViews& views, double diameter,
+                               const distributed::Communicator& processes) {
   SearchedViews searched;
   const std::size_t num_views = views.tilt_deg.size();
   searched.spots.resize(num_views);
   searched.is_valid.resize(num_views);
   base::parallel_for(static_cast<std::int64_t>(num_views), [&](std::int64_t v) {
     const auto view = static_cast<std::size_t>(v);
+    if (!is_own_view(view, processes)) return;
     const MaskedImage image = views.read(view);
     searched.spots[view] = strongest_spots(image, diameter);
     searched.is_valid[view].assign(image.valid.begin(), image.valid.end());
@@ -75,7 +80,53 @@ SearchedViews search_views(const BeadViews& views, double diameter) {
   return searched;
 }
 
-/// The views of lowest tilt.
+/// Broadcasts what the owner of a view found in it.
+void broadcast_view(std::size_t view, const distributed::Communicator& processes,
+                    SearchedViews* searched) {
+  const int owner = owner_of_view(view, processes);
+  std::vector<Spot>& spots = searched->spots[view];
+  std::int64_t num_spots = is_own_view(view, processes) ? std::ssize(spots) : 0;
+  processes.allreduce_sum(std::span(&num_spots, 1));
+  spots.resize(static_cast<std::size_t>(num_spots));
+  processes.broadcast(std::as_writable_bytes(std::span(spots)), owner);
+  std::vector<bool>& is_valid = searched->is_valid[view];
+  std::vector<std::uint8_t> valid(is_valid.begin(), is_valid.end());
+  valid.resize(static_cast<std::size_t>(searched->width * searched->height));
+  processes.broadcast(std::as_writable_bytes(std::span(valid)), owner);
+  is_valid.assign(valid.begin(), valid.end());
+}
+
+SearchedViews search_views(const BeadViews& views, double diameter,
+                           const distributed::Communicator& processes) {
+  SearchedViews searched;
+  processes.run_collectively([&] { searched = search_own_views(views, diameter, processes); });
+  if (processes.size() == 1) return searched;
+  // Only the owner of the first view has set them.
+  processes.allreduce_sum(std::span(&searched, 1), &SearchedViews::width, &SearchedViews::height);
+  for (std::size_t view = 0; view < views.tilt_deg.size(); ++view)
+    broadcast_view(view, processes, &searched);
+  return searched;
+}
+
+/// Returns a view on every process.
+MaskedImage read_on_all(const BeadViews& views, std::size_t view,
+                        const distributed::Communicator& processes) {
+  MaskedImage image;
+  processes.run_collectively([&] {
+    if (is_own_view(view, processes)) image = views.read(view);
+  });
+  if (processes.size() == 1) return image;
+  processes.allreduce_sum(std::span(&image, 1), &MaskedImage::width, &MaskedImage::height);
+  const auto size = static_cast<std::size_t>(image.width * image.height);
+  image.values.resize(size);
+  image.valid.resize(size);
+  const int owner = owner_of_view(view, processes);
+  processes.broadcast(std::as_writable_bytes(std::span(image.values)), owner);
+  processes.broadcast(std::as_writable_bytes(std::span(image.valid)), owner);
+  return image;
+}
+
+/// Returns the views of lowest tilt.
 std::vector<std::size_t> lowest_tilts(const BeadViews& views) {
   std::vector<std::size_t> order(views.tilt_deg.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -93,14 +144,15 @@ struct SizeTrial {
   double strength = 0.0;  ///< of all spots together
 };
 
-/// Diameter of the spots that stand out most; nothing if none does.
-std::optional<double> estimate_diameter(const BeadViews& views, const BeadSearchOptions& options) {
+/// Returns the diameter of the spots that stand out most; nothing if none does.
+std::optional<double> estimate_diameter(const BeadViews& views, const BeadSearchOptions& options,
+                                        const distributed::Communicator& processes) {
   std::vector<SizeTrial> trials;
   for (double about = options.smallest_px; about <= options.largest_px; about *= kDiameterStep) {
     trials.push_back({about, BeadProfile(about)});
   }
   for (const std::size_t view : lowest_tilts(views)) {
-    const MaskedImage image = views.read(view);
+    const MaskedImage image = read_on_all(views, view, processes);
     base::parallel_for(static_cast<std::int64_t>(trials.size()), [&](std::int64_t i) {
       SizeTrial& trial = trials[static_cast<std::size_t>(i)];
       const std::vector<Spot> spots = find_spots(image, trial.about_px, kStrong);
@@ -119,16 +171,16 @@ bool is_evident(const std::vector<BeadTrack>& tracks, std::size_t num_views) {
   const auto num_clear = std::count_if(tracks.begin(), tracks.end(), [&](const BeadTrack& track) {
     return static_cast<double>(track.num_found) >= kPartOfViews * static_cast<double>(num_views);
   });
-  return num_clear >= static_cast<std::ptrdiff_t>(kFewestBeads);
+  return num_clear >= static_cast<std::ptrdiff_t>(kMinBeads);
 }
 
-/// Tracks of beads; none if evidence is wanted and there is not enough.
+/// Returns tracks of beads; none if evidence is wanted and there is not enough.
 std::vector<BeadTrack> find_bead_tracks(const SearchedViews& searched,
                                         const std::vector<double>& tilt_deg, double tolerance_px,
                                         bool wants_evidence) {
   TrackRules rules;
   rules.tolerance_px = tolerance_px;
-  rules.largest_z_px = static_cast<double>(searched.width) / 2;
+  rules.max_z_px = static_cast<double>(searched.width) / 2;
   rules.seed_strength = kStrong;
   const TrackedViews tracked{
       tilt_deg, static_cast<double>(searched.width) / 2,
@@ -144,7 +196,7 @@ double distance_between(const Spot& spot, const MaskDisc& disc) {
   return std::hypot(spot.x_px - disc.x_px, spot.y_px - disc.y_px);
 }
 
-/// The spot of each disc: the nearest within `tolerance`, unless another disc
+/// Returns the index of the spot of each disc: the nearest within `tolerance`, unless another disc
 /// shares it (two beads that overlap); spots.size() where there is none.
 std::vector<std::size_t> match_spots(const std::vector<MaskDisc>& discs,
                                      const std::vector<Spot>& spots, double tolerance) {
@@ -164,7 +216,7 @@ std::vector<std::size_t> match_spots(const std::vector<MaskDisc>& discs,
   return match;
 }
 
-/// Places of strong spots that no track has: beads that few views see.
+/// Returns discs on strong spots that no track has: they are beads that few views see.
 std::vector<MaskDisc> loose_discs(const std::vector<Spot>& spots, const std::vector<bool>& is_taken,
                                   std::vector<double> bead_contrasts, double radius) {
   std::vector<MaskDisc> discs;
@@ -207,7 +259,7 @@ std::size_t settle_discs(const std::vector<Spot>& spots, double tolerance, doubl
   return contrasts.size();
 }
 
-/// Where the tracks pass a view, if that is within it.
+/// Returns discs where the tracks pass a view, if that is within it.
 std::vector<MaskDisc> predict_discs(const std::vector<BeadTrack>& tracks,
                                     const SearchedViews& searched, double tilt_deg, double radius) {
   std::vector<MaskDisc> discs;
@@ -221,16 +273,17 @@ std::vector<MaskDisc> predict_discs(const std::vector<BeadTrack>& tracks,
 
 }  // namespace
 
-BeadSearch find_beads(const BeadViews& views, const BeadSearchOptions& options) {
+BeadSearch find_beads(const BeadViews& views, const BeadSearchOptions& options,
+                      const distributed::Communicator& processes) {
   BeadSearch result;
   const std::size_t num_views = views.tilt_deg.size();
   result.num_found.assign(num_views, 0);
   result.discs.resize(num_views);
   const auto diameter =
-      options.diameter_px ? options.diameter_px : estimate_diameter(views, options);
+      options.diameter_px ? options.diameter_px : estimate_diameter(views, options, processes);
   if (!diameter) return result;
-  const SearchedViews searched = search_views(views, *diameter);
-  const double tolerance_px = std::max(kLeastTolerance_px, *diameter / 2);
+  const SearchedViews searched = search_views(views, *diameter, processes);
+  const double tolerance_px = std::max(kMinTolerance_px, *diameter / 2);
   const std::vector<BeadTrack> tracks =
       find_bead_tracks(searched, views.tilt_deg, tolerance_px, !options.diameter_px);
   if (tracks.empty() && !options.diameter_px) return result;

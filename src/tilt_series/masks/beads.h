@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "distributed/communicator.h"
 #include "tilt_series/image.h"
 
 namespace tomofield::tilt_series {
@@ -17,10 +18,11 @@ struct MaskDisc {
   double radius_px = 0.0;
 };
 
-/// A series to be searched: tilts and images, dense parts high.
+/// A series to be searched: tilts and images of one size, dense parts high.
 struct BeadViews {
   std::vector<double> tilt_deg;
-  std::function<MaskedImage(std::size_t view)> read;  ///< thread-safe
+  /// Returns the image of a view that this process owns (view_owner.h). Thread-safe.
+  std::function<MaskedImage(std::size_t view)> read;
 };
 
 struct BeadSearchOptions {
@@ -29,7 +31,7 @@ struct BeadSearchOptions {
   double largest_px = 64.0;
 };
 
-/// What a search found; without beads there are no discs.
+/// The result of a search; without beads there are no discs.
 struct BeadSearch {
   double diameter_px = 0.0;                  ///< given or estimated; 0: none
   std::size_t num_beads = 0;                 ///< with one position in the specimen
@@ -46,7 +48,11 @@ struct BeadSearch {
 /// Without a diameter it is estimated from the views of lowest tilt, and beads
 /// are believed in only if at least three have a spot far beyond noise and
 /// specimen in most views.
-BeadSearch find_beads(const BeadViews& views, const BeadSearchOptions& options);
+///
+/// Each process looks for spots in the views that it owns; all get the same result.
+BeadSearch find_beads(
+    const BeadViews& views, const BeadSearchOptions& options,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
 
 /// The disc that hides a bead and the fringe around it.
 double mask_radius_px(double diameter_px);

@@ -7,14 +7,14 @@
 namespace tomofield::tilt_series {
 namespace {
 
-constexpr std::size_t kFewestFillPixels = 64;
+constexpr std::size_t kMinFillPixels = 64;
 
-/// Regions of equal value, each pixel visited once.
+/// Finds regions of equal value and visits each pixel once.
 class RegionFinder {
  public:
   explicit RegionFinder(const MaskedImage& image) : image_(image), seen_(image.valid.size()) {}
 
-  /// The pixels 4-connected to `seed` that have its value; empty if it was visited before.
+  /// Returns the pixels 4-connected to `seed` that have its value; empty if it was visited before.
   const std::vector<std::size_t>& region_of(std::size_t seed) {
     region_.clear();
     visit(seed, image_.values[seed]);
@@ -42,7 +42,7 @@ class RegionFinder {
   std::vector<std::size_t> region_;
 };
 
-/// The value of space without specimen, were there no noise.
+/// Returns the value that space without specimen has where there is no noise.
 float empty_value(Contrast contrast, const MaskedImage& image) {
   const bool is_bright = contrast == Contrast::kBright;
   float empty = std::numeric_limits<float>::infinity() * (is_bright ? 1.0f : -1.0f);
@@ -62,7 +62,7 @@ struct Line {
   std::size_t at(std::int64_t i) const { return start + static_cast<std::size_t>(i) * stride; }
 };
 
-/// The row or column `depth` pixels within one of the four edges.
+/// Returns the row or column `depth` pixels within one of the four edges.
 Line line_within(const MaskedImage& image, bool is_row, bool from_end, std::int64_t depth) {
   const std::int64_t num_lines = is_row ? image.height : image.width;
   const std::int64_t position = from_end ? num_lines - 1 - depth : depth;
@@ -77,7 +77,7 @@ bool is_constant(const MaskedImage& image, const Line& line, float value) {
   return true;
 }
 
-/// Whether most neighbours in a line differ, as they do in measurements.
+/// Tells whether most neighbours in a line differ, as they do in measurements.
 bool varies(const MaskedImage& image, const Line& line) {
   std::int64_t num_equal = 0;
   for (std::int64_t i = 1; i < line.count; ++i) {
@@ -86,8 +86,8 @@ bool varies(const MaskedImage& image, const Line& line) {
   return 2 * num_equal < line.count;
 }
 
-/// Appends the lines at one edge that are all `value`, if the next one varies:
-/// an edge that no specimen in empty space without noise has.
+/// Appends the lines at one edge that are all `value`, if the next one varies.
+/// A specimen in empty space without noise has no such edge.
 void append_strip(const MaskedImage& image, float value, bool is_rows, bool from_end,
                   std::vector<std::size_t>* fill) {
   const std::int64_t num_lines = is_rows ? image.height : image.width;
@@ -114,7 +114,7 @@ std::int64_t mask_constant_fill(Contrast contrast, MaskedImage* image) {
       const std::size_t corner = image->index(x, y);
       if (image->values[corner] == empty) continue;
       const auto& region = finder.region_of(corner);
-      if (region.size() >= kFewestFillPixels) fill.insert(fill.end(), region.begin(), region.end());
+      if (region.size() >= kMinFillPixels) fill.insert(fill.end(), region.begin(), region.end());
     }
   }
   for (const bool is_rows : {false, true}) {

@@ -8,8 +8,8 @@
 namespace tomofield::tilt_series {
 
 /// Marks fill of exactly one value as no measurement: connected regions of
-/// equal pixels that hold a corner of the image (what lies outside a rotated or
-/// shifted image always does) and have at least 64 pixels.
+/// at least 64 equal pixels that hold a corner of the image. The area outside a rotated or
+/// shifted image always holds one.
 ///
 /// Space without specimen looks the same where there is no noise. A region at
 /// its value (the smallest of a bright image, the largest of a dark one) is

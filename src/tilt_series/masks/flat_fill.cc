@@ -10,13 +10,12 @@
 namespace tomofield::tilt_series {
 namespace {
 
-// The sides are where 5 × 5 means stop being flat, 2 px before the fill ends,
-// and found to about 1 px; then 2 px of blur.
+// Sides are found where 5 × 5 means stop being flat, 2 px before the fill ends,
+// to about 1 px; 2 px of blur come on top.
 constexpr double kEdge_px = 2.0 + 1.0 + 2.0;
 constexpr std::int64_t kRim_px = 2;
 
-/// Pixels of the image, counted from its lower left one, with
-/// x·along_x + y·along_y < offset.
+/// The pixels with x·along_x + y·along_y < offset, where x and y count from the lower left pixel.
 struct HalfPlane {
   double along_x = 0.0;
   double along_y = 0.0;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kAngstromsANanometre = 10.0;
 
-// Diameters that are tried where none is given: gold markers have 3 to 30 nm,
+// Diameters in this range are tried where none is given: gold markers have 3 to 30 nm,
 // and blurred ones look larger. Smaller spots are atoms or noise.
 constexpr double kSmallest_nm = 2.0, kLargest_nm = 40.0;
 constexpr double kSmallest_px = 3.0;       // below it spots look like noise
@@ -53,7 +53,7 @@ BeadSearchOptions search_options(const TiltSeriesOptions& options, const SeriesP
   return search;
 }
 
-/// Where a point of a section is in its aligned, binned view.
+/// Returns where a point of a section is in its aligned, binned view.
 MaskDisc place_in_view(const io::FiducialPoint& point, const RawFromAligned& transform,
                        const SeriesPlan& plan, const io::MrcHeader& header) {
   const double px = point.x_px - static_cast<double>(header.nx) / 2 - transform.shift_x_px;
@@ -69,7 +69,7 @@ MaskDisc place_in_view(const io::FiducialPoint& point, const RawFromAligned& tra
 }
 
 void require_in_stack(const io::FiducialPoint& point, const std::filesystem::path& file,
-                      const io::MrcReader& stack) {
+                      const io::ImageStack& stack) {
   const io::MrcHeader& header = stack.header();
   const auto section = std::llround(point.section);
   if (section >= 0 && section < header.nz && point.x_px >= 0 && point.y_px >= 0 &&
@@ -80,14 +80,14 @@ void require_in_stack(const io::FiducialPoint& point, const std::filesystem::pat
   throw Error(fmt::format(
       "'{}', line {}: the point {:g}, {:g} of section {:g} lies outside '{}', which has {} × {} "
       "pixels and sections 0 to {}; give a model that was made on this stack",
-      file.string(), point.line, point.x_px, point.y_px, point.section, stack.path().string(),
-      header.nx, header.ny, header.nz - 1));
+      file.string(), point.line, point.x_px, point.y_px, point.section, stack.name(), header.nx,
+      header.ny, header.nz - 1));
 }
 
-/// The fiducials of every view, their radius still 0.
+/// Returns the fiducials of every view; their radius is still 0.
 std::vector<std::vector<MaskDisc>> place_fiducials(const std::filesystem::path& file,
                                                    const SeriesPlan& plan,
-                                                   const io::MrcReader& stack) {
+                                                   const io::ImageStack& stack) {
   std::vector<std::vector<MaskDisc>> places(plan.views.size());
   for (const io::FiducialPoint& point : io::read_fiducial_points(file)) {
     require_in_stack(point, file, stack);
@@ -101,7 +101,7 @@ std::vector<std::vector<MaskDisc>> place_fiducials(const std::filesystem::path& 
 }
 
 void add_fiducials(const TiltSeriesOptions& options, const SeriesPlan& plan,
-                   const io::MrcReader& stack, BeadMasks* masks) {
+                   const io::ImageStack& stack, BeadMasks* masks) {
   if (!options.fiducials) return;
   const double diameter_px = masks->figures.bead_diameter_A / binned_pixel_A(plan);
   auto places = place_fiducials(*options.fiducials, plan, stack);
@@ -121,7 +121,7 @@ void add_fiducials(const TiltSeriesOptions& options, const SeriesPlan& plan,
 
 }  // namespace
 
-io::MrcReader open_mask(const std::filesystem::path& mask, const io::MrcReader& stack) {
+io::MrcReader open_mask(const std::filesystem::path& mask, const io::ImageStack& stack) {
   io::MrcReader reader(mask);
   const io::MrcHeader &have = reader.header(), &want = stack.header();
   if (have.nx == want.nx && have.ny == want.ny && have.nz == want.nz) return reader;
@@ -129,7 +129,7 @@ io::MrcReader open_mask(const std::filesystem::path& mask, const io::MrcReader& 
       "the mask '{}' has {} × {} pixels and {} sections, the stack '{}' has {} × {} and {}: a mask "
       "must have a section for every section of the stack, of the same size (0 is left out, all "
       "else counts)",
-      mask.string(), have.nx, have.ny, have.nz, stack.path().string(), want.nx, want.ny, want.nz));
+      mask.string(), have.nx, have.ny, have.nz, stack.name(), want.nx, want.ny, want.nz));
 }
 
 void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* image) {
@@ -142,21 +142,27 @@ void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* im
   }
 }
 
+bool searches_beads(const TiltSeriesOptions& options) {
+  return options.bead_diameter_nm ? *options.bead_diameter_nm != 0.0
+                                  : options.contrast == Contrast::kDark;
+}
+
 BeadMasks find_bead_masks(const TiltSeriesOptions& options, const SeriesPlan& plan,
-                          const io::MrcReader& stack, const BeadViews& views) {
+                          const io::ImageStack& stack, const BeadViews& views,
+                          const distributed::Communicator& processes) {
   BeadMasks masks;
   masks.discs.resize(plan.views.size());
   masks.figures.beads_found.assign(plan.views.size(), 0);
-  const bool is_wanted = options.bead_diameter_nm ? *options.bead_diameter_nm != 0.0
-                                                  : options.contrast == Contrast::kDark;
-  if (is_wanted) {
-    BeadSearch search = find_beads(views, search_options(options, plan));
+  if (searches_beads(options)) {
+    BeadSearchOptions how;
+    processes.run_collectively([&] { how = search_options(options, plan); });
+    BeadSearch search = find_beads(views, how, processes);
     masks.discs = std::move(search.discs);
     masks.figures.beads_found = std::move(search.num_found);
     masks.figures.num_beads = search.num_beads;
     masks.figures.bead_diameter_A = search.diameter_px * binned_pixel_A(plan);
   }
-  add_fiducials(options, plan, stack, &masks);
+  processes.run_collectively([&] { add_fiducials(options, plan, stack, &masks); });
   for (const auto& discs : masks.discs) masks.figures.beads_masked.push_back(discs.size());
   return masks;
 }

@@ -4,6 +4,7 @@
 #include <functional>
 #include <vector>
 
+#include "io/image_stack.h"
 #include "io/mrc.h"
 #include "tilt_series/masks/beads.h"
 #include "tilt_series/series_plan.h"
@@ -11,22 +12,25 @@
 
 namespace tomofield::tilt_series {
 
-/// Discs of every view that hide beads and fiducials, in its aligned, binned pixels.
+/// Discs that hide beads and fiducials, in the aligned, binned pixels of each view.
 struct BeadMasks {
   std::vector<std::vector<MaskDisc>> discs;
   MaskFigures figures;  ///< of the beads
 };
 
 /// Opens the user's mask (--mask). Throws Error if it is not as large as the stack.
-io::MrcReader open_mask(const std::filesystem::path& mask, const io::MrcReader& stack);
+io::MrcReader open_mask(const std::filesystem::path& mask, const io::ImageStack& stack);
 
-/// Marks what is 0 in the mask's section as no measurement.
+/// Marks the pixels that are 0 in the mask's section as no measurements.
 void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* image);
 
-/// Beads that the options ask for, and fiducials. `read` gives a view, dense
-/// parts high. Throws Error for a diameter that cannot be, or a fiducial file
-/// that does not fit the stack.
+/// Tells whether the options ask for a search for beads.
+bool searches_beads(const TiltSeriesOptions& options);
+
+/// Finds the beads that the options ask for in the aligned `views`, and adds the user's fiducials.
+/// Throws Error for a diameter that cannot be, or a fiducial file that does not fit the stack.
 BeadMasks find_bead_masks(const TiltSeriesOptions& options, const SeriesPlan& plan,
-                          const io::MrcReader& stack, const BeadViews& views);
+                          const io::ImageStack& stack, const BeadViews& views,
+                          const distributed::Communicator& processes);
 
 }  // namespace tomofield::tilt_series

@@ -11,21 +11,21 @@
 namespace tomofield::tilt_series {
 namespace {
 
-// Diameter in pixels that larger spots are reduced to: beyond it a finer image shows no more.
+// Larger spots are reduced to this diameter in pixels: a finer image shows no more.
 constexpr double kSearchDiameter = 5.0;
 
 constexpr int kDirections = 16;
-constexpr int kIgnoredDirections = 2;    // as many as a close neighbour takes
-constexpr int kFewestDirections = 8;     // at the image's edge
-constexpr double kDistance = 1.25;       // of the discs that are compared, in diameters
-constexpr float kFewestMeasured = 0.6f;  // part of a disc
+constexpr int kIgnoredDirections = 2;  // as many as a close neighbour takes
+constexpr int kMinDirections = 8;      // at the image's edge
+constexpr double kDistance = 1.25;     // of the discs that are compared, in diameters
+constexpr float kMinMeasured = 0.6f;   // part of a disc
 
-// Least spread, in standard deviations of the contrast: of images without noise.
-constexpr double kLeastSpread = 0.5;
+// The spread is at least so many standard deviations of the contrast, for images without noise.
+constexpr double kMinSpread = 0.5;
 
 constexpr float kUnknown = -std::numeric_limits<float>::infinity();
 
-/// Pixels of a disc around the origin and the part of each that counts.
+/// The pixels of a disc around the origin and the part of each that counts.
 struct Disc {
   struct Pixel {
     std::int64_t x, y;
@@ -48,7 +48,7 @@ struct Disc {
   }
 };
 
-/// Means of the disc around every pixel [y, x]; kUnknown where little was measured.
+/// Returns means of the disc around every pixel [y, x]; kUnknown where little was measured.
 std::vector<float> disc_means(const MaskedImage& image, const Disc& disc) {
   std::vector<float> means(image.values.size(), kUnknown);
   for (std::int64_t y = 0; y < image.height; ++y) {
@@ -62,13 +62,13 @@ std::vector<float> disc_means(const MaskedImage& image, const Disc& disc) {
         sum += pixel.weight * image.values[at];
         weight += pixel.weight;
       }
-      if (weight >= kFewestMeasured * disc.total) means[image.index(x, y)] = sum / weight;
+      if (weight >= kMinMeasured * disc.total) means[image.index(x, y)] = sum / weight;
     }
   }
   return means;
 }
 
-/// Contrast of every pixel [y, x], or kUnknown.
+/// Returns the contrast of every pixel [y, x], or kUnknown.
 std::vector<float> contrasts(const MaskedImage& image, double diameter) {
   const std::vector<float> means = disc_means(image, Disc(diameter / 2));
   std::array<std::int64_t, kDirections> dx, dy;
@@ -90,7 +90,7 @@ std::vector<float> contrasts(const MaskedImage& image, double diameter) {
         const float mean = means[image.index(px, py)];
         if (mean != kUnknown) differences[count++] = centre - mean;
       }
-      if (count < kFewestDirections) continue;
+      if (count < kMinDirections) continue;
       const auto third = differences.begin() + kIgnoredDirections;
       std::nth_element(differences.begin(), third,
                        differences.begin() + static_cast<std::ptrdiff_t>(count));
@@ -106,7 +106,7 @@ double median_in_place(std::vector<float>& values) {
   return static_cast<double>(*middle);
 }
 
-/// Spread of the known contrasts; 0 where nothing varies.
+/// Returns the spread of the known contrasts; 0 where nothing varies.
 double spread_of(const std::vector<float>& contrast) {
   std::vector<float> known;
   double sum = 0.0, squares = 0.0;
@@ -122,10 +122,10 @@ double spread_of(const std::vector<float>& contrast) {
   const auto median = static_cast<float>(median_in_place(known));
   for (float& value : known) value = std::fabs(value - median);
   constexpr double kSigmaOfMad = 1.4826;  // for a normal distribution
-  return std::max(kSigmaOfMad * median_in_place(known), kLeastSpread * deviation);
+  return std::max(kSigmaOfMad * median_in_place(known), kMinSpread * deviation);
 }
 
-/// Whether no pixel within `radius` is higher; of equal ones the first counts.
+/// Tells whether no pixel within `radius` is higher; the first of equal pixels counts.
 bool is_peak(const MaskedImage& image, const std::vector<float>& contrast, std::int64_t x,
              std::int64_t y, std::int64_t radius) {
   const std::size_t here = image.index(x, y);
@@ -142,7 +142,7 @@ bool is_peak(const MaskedImage& image, const std::vector<float>& contrast, std::
   return true;
 }
 
-/// Where the parabola through three neighbouring values has its peak: −1/2…1/2.
+/// Returns the peak of the parabola through three neighbouring values: −1/2…1/2.
 double peak_shift(float before, float here, float after) {
   const double curvature =
       static_cast<double>(before) - 2 * static_cast<double>(here) + static_cast<double>(after);
@@ -152,7 +152,7 @@ double peak_shift(float before, float here, float after) {
 
 }  // namespace
 
-std::vector<Spot> find_spots(const MaskedImage& image, double diameter_px, double least_strength) {
+std::vector<Spot> find_spots(const MaskedImage& image, double diameter_px, double min_strength) {
   const double factor = std::max(1.0, diameter_px / kSearchDiameter);
   const MaskedImage reduced = factor > 1.0 ? reduce_image(image, factor) : image;
   const double diameter = diameter_px / factor;
@@ -160,7 +160,7 @@ std::vector<Spot> find_spots(const MaskedImage& image, double diameter_px, doubl
   const double spread = spread_of(contrast);
   std::vector<Spot> spots;
   if (!(spread > 0.0)) return spots;
-  const auto threshold = static_cast<float>(least_strength * spread);
+  const auto threshold = static_cast<float>(min_strength * spread);
   const std::int64_t radius = std::max<std::int64_t>(1, std::lround(diameter / 2));
   const double centre_x = static_cast<double>(reduced.width) / 2,
                centre_y = static_cast<double>(reduced.height) / 2;

@@ -14,17 +14,17 @@ struct Spot {
   double strength = 0.0;  ///< the same over the spread of all places of the image
 };
 
-/// Round spots of about this diameter (pixels, >= 2) in an image whose dense
-/// parts are high, those with strength >= `least_strength`, in rows from the
+/// Finds round spots of about this diameter (pixels, >= 2) in an image whose dense
+/// parts are high. Returns those with strength >= `min_strength`, in rows from the
 /// lowest, left to right.
 ///
 /// The contrast of a place is the mean of a disc there less the mean of an
-/// equal disc one and a quarter diameters away; of 16 directions the third
-/// lowest difference counts, so that edges, ridges and lines have none but a
-/// spot with a close neighbour has. Spread is the median absolute deviation of
-/// the contrast, which structure and noise make and few spots do not change.
-/// Large spots are looked for in a reduced image. Discs need most of their
+/// equal disc one and a quarter diameters away. The third lowest difference of 16 directions
+/// counts, so that edges, ridges and lines have no contrast and a
+/// spot with a close neighbour has one. Spread is the median absolute deviation of
+/// the contrast; structure and noise determine it, and few spots do not change it.
+/// Large spots are found in a reduced image. Discs need most of their
 /// pixels to be measurements.
-std::vector<Spot> find_spots(const MaskedImage& image, double diameter_px, double least_strength);
+std::vector<Spot> find_spots(const MaskedImage& image, double diameter_px, double min_strength);
 
 }  // namespace tomofield::tilt_series

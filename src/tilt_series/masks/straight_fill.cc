@@ -11,20 +11,20 @@ constexpr std::int64_t kSmallestImage_px = 64;
 constexpr std::int64_t kBoxRadius_px = 2;
 constexpr std::int64_t kRim_px = 2;  // often blurred, never looked at
 constexpr std::int64_t kCorner_px = 8;
-constexpr std::int64_t kMostSamples = 512;  // a side
+constexpr std::int64_t kMaxSamples = 512;  // a side
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kMostRotation_deg = 15.0;
-constexpr int kPenalty = 10;           // so fill is strips with > 10/11 of it
-constexpr double kMostSpread = 0.3;    // of a corner, in standard deviations of the image
-constexpr double kLeastDarker = 0.05;  // part of a bright image that is darker than fill
-constexpr double kLeastLength = 0.9;   // of all sides, relative to the shorter one of the image
-constexpr double kMostAlikeWithin = 0.4;
-constexpr double kMostAlikeOneSide = 0.85;  // beside others that are clear
-constexpr double kMostRoughness = 0.85;     // relative to the rest of the image
+constexpr double kMaxRotation_deg = 15.0;
+constexpr int kPenalty = 10;         // so fill is strips with > 10/11 of it
+constexpr double kMaxSpread = 0.3;   // of a corner, in standard deviations of the image
+constexpr double kMinDarker = 0.05;  // part of a bright image that is darker than fill
+constexpr double kMinLength = 0.9;   // of all sides, relative to the shorter one of the image
+constexpr double kMaxAlikeWithin = 0.4;
+constexpr double kMaxAlikeOneSide = 0.85;   // beside others that are clear
+constexpr double kMaxRoughness = 0.85;      // relative to the rest of the image
 constexpr std::int64_t kBlurredStrips = 4;  // between fill and what is judged within
 constexpr std::int64_t kJudgedStrips = 8;
 
-/// Box means of an image on a grid of pixels.
+/// The box means of an image on a grid of pixels.
 struct Samples {
   std::int64_t columns = 0;
   std::int64_t rows = 0;
@@ -42,7 +42,7 @@ struct Statistics {
   std::int64_t num_invalid = 0;
 };
 
-/// Of the pixels in the box of `size` × `size` from (x0, y0).
+/// Returns the moments of the pixels in the box of `size` × `size` from (x0, y0).
 Statistics box_statistics(const MaskedImage& image, std::int64_t x0, std::int64_t y0,
                           std::int64_t size) {
   Statistics result;
@@ -68,7 +68,7 @@ Samples take_samples(const MaskedImage& image) {
   constexpr std::int64_t box_px = 2 * kBoxRadius_px + 1;
   const std::int64_t width = image.width - 2 * kRim_px - box_px;
   const std::int64_t height = image.height - 2 * kRim_px - box_px;
-  samples.step_px = std::max<std::int64_t>(1, (std::max(width, height) - 1) / kMostSamples + 1);
+  samples.step_px = std::max<std::int64_t>(1, (std::max(width, height) - 1) / kMaxSamples + 1);
   samples.columns = width / samples.step_px + 1;
   samples.rows = height / samples.step_px + 1;
   const std::int64_t x0 = (image.width - box_px - (samples.columns - 1) * samples.step_px) / 2;
@@ -92,7 +92,7 @@ double standard_deviation(const std::vector<float>& values) {
   return std::sqrt(sum_squares / static_cast<double>(values.size()));
 }
 
-/// Whether one of the image's outermost rows and columns has one value only.
+/// Tells whether one of the image's outermost rows and columns has one value only.
 bool has_constant_edge(const MaskedImage& image) {
   const auto is_constant = [&](std::int64_t x, std::int64_t y, bool is_row) {
     const float first = image.values[image.index(x, y)];
@@ -105,15 +105,15 @@ bool has_constant_edge(const MaskedImage& image) {
          is_constant(0, 0, false) || is_constant(image.width - 1, 0, false);
 }
 
-/// Whether a corner is one of the darkest places of the image.
+/// Tells whether a corner is one of the darkest places of the image.
 bool is_darkest(const Samples& samples, const Statistics& corner) {
   const auto num_darker =
       std::count_if(samples.means.begin(), samples.means.end(),
                     [&](float mean) { return mean < corner.mean - corner.deviation; });
-  return static_cast<double>(num_darker) < kLeastDarker * static_cast<double>(samples.means.size());
+  return static_cast<double>(num_darker) < kMinDarker * static_cast<double>(samples.means.size());
 }
 
-/// The corners of the image that can be fill.
+/// Returns the corners of the image that can be fill.
 std::vector<Statistics> flat_corners(Contrast contrast, const MaskedImage& image,
                                      const Samples& samples) {
   std::vector<Statistics> corners;
@@ -121,7 +121,7 @@ std::vector<Statistics> flat_corners(Contrast contrast, const MaskedImage& image
   for (const std::int64_t y : {kRim_px, image.height - kRim_px - kCorner_px}) {
     for (const std::int64_t x : {kRim_px, image.width - kRim_px - kCorner_px}) {
       const Statistics corner = box_statistics(image, x, y, kCorner_px);
-      if (corner.num_invalid > 0 || corner.deviation > kMostSpread * image_deviation) continue;
+      if (corner.num_invalid > 0 || corner.deviation > kMaxSpread * image_deviation) continue;
       if (contrast == Contrast::kBright && is_darkest(samples, corner)) continue;
       corners.push_back(corner);
     }
@@ -129,8 +129,8 @@ std::vector<Statistics> flat_corners(Contrast contrast, const MaskedImage& image
   return corners;
 }
 
-/// For each sample 1 if it is like one of the corners that agree with
-/// `corner`, −kPenalty if not, 0 if unknown.
+/// Returns a vote of each sample: 1 if it is like one of the corners that agree with
+/// `corner`, −kPenalty if not, 0 if it is unknown.
 std::vector<int> vote(const Samples& samples, const std::vector<Statistics>& corners,
                       const Statistics& corner) {
   std::vector<int> votes(samples.means.size(), -kPenalty);
@@ -150,8 +150,8 @@ std::int64_t num_strips(const Samples& samples) {
   return static_cast<std::int64_t>(std::hypot(samples.columns, samples.rows)) + 3;
 }
 
-/// Calls visit(index of the sample, its strip): strips one step wide, the
-/// first at the far end of the direction opposite to `angle_rad`.
+/// Calls visit(index of the sample, its strip). Strips are one step wide; the
+/// first is at the far end of the direction opposite to `angle_rad`.
 template <typename Visit>
 void visit_strips(const Samples& samples, double angle_rad, const Visit& visit) {
   const auto along_x = static_cast<float>(std::cos(angle_rad));
@@ -167,7 +167,7 @@ void visit_strips(const Samples& samples, double angle_rad, const Visit& visit) 
   }
 }
 
-/// The largest sum of a beginning of a sequence, and its length.
+/// The largest sum over the first elements of a sequence, and how many these are.
 struct Beginning {
   std::int64_t sum = 0;
   std::int64_t length = 0;
@@ -185,7 +185,7 @@ Beginning best_beginning(Iterator first, Iterator last) {
   return best;
 }
 
-/// The votes for a rectangle at this rotation with the best four offsets.
+/// Counts the votes for a rectangle at this rotation with the best four offsets.
 std::int64_t score_rotation(const Samples& samples, const std::vector<int>& votes,
                             double rotation_rad) {
   std::int64_t score = 0;
@@ -214,7 +214,7 @@ Rotation best_rotation(const Samples& samples, const std::vector<int>& votes) {
       if (score > best.score) best = {angle_rad, score};
     }
   };
-  try_around(0.0, kMostRotation_deg * kDegree, 1.0 * kDegree);
+  try_around(0.0, kMaxRotation_deg * kDegree, 1.0 * kDegree);
   try_around(best.angle_rad, 0.9 * kDegree, 0.1 * kDegree);
   return best;
 }
@@ -257,7 +257,7 @@ double median_or_zero(std::vector<float>* values) {
   return *middle;
 }
 
-/// How much neighbouring, separate boxes differ in the fill, relative to
+/// Returns how much neighbouring, separate boxes differ in the fill, relative to
 /// elsewhere.
 double roughness_of_fill(const Samples& samples, const std::vector<FoundSide>& sides) {
   std::vector<std::uint8_t> is_fill(samples.means.size());
@@ -283,22 +283,21 @@ double roughness_of_fill(const Samples& samples, const std::vector<FoundSide>& s
   return rest > 0.0 ? median_or_zero(&in_fill) / rest : 1.0;
 }
 
-/// The sides of the rectangle that are clear, or none if they convince too
-/// little together.
+/// Returns the sides of the rectangle that are clear, or none if together they are too short.
 std::vector<FoundSide> convincing_sides(const Samples& samples, const std::vector<int>& votes,
                                         double rotation_rad) {
   std::vector<FoundSide> sides;
   double length = 0.0, alike = 0.0;
   for (const double quarter_deg : {0.0, 90.0, 180.0, 270.0}) {
     const FoundSide side = find_side(samples, votes, rotation_rad + quarter_deg * kDegree);
-    if (side.depth == 0 || side.alike_within > kMostAlikeOneSide) continue;
+    if (side.depth == 0 || side.alike_within > kMaxAlikeOneSide) continue;
     sides.push_back(side);
     length += side.length;
     alike += side.length * side.alike_within;
   }
   const auto shorter = static_cast<double>(std::min(samples.columns, samples.rows));
-  if (length < kLeastLength * shorter || alike > kMostAlikeWithin * length) return {};
-  if (roughness_of_fill(samples, sides) > kMostRoughness) return {};
+  if (length < kMinLength * shorter || alike > kMaxAlikeWithin * length) return {};
+  if (roughness_of_fill(samples, sides) > kMaxRoughness) return {};
   return sides;
 }
 

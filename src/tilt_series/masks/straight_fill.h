@@ -7,30 +7,30 @@
 
 namespace tomofield::tilt_series {
 
-/// One straight side of a rotated image: fill is where, in pixels from the
-/// centre of the pixel grid, x·cos(angle) + y·sin(angle) < offset.
+/// One straight side of a rotated image. Pixels with x·cos(angle) + y·sin(angle) < offset are fill,
+/// with x and y in pixels from the centre of the pixel grid.
 struct FillSide {
   double angle_rad = 0.0;
   double offset_px = 0.0;
 };
 
 /// Finds fill that is flat but not constant, as dither, lossy compression or
-/// filtering after the alignment leave it: up to four wedges along the sides
+/// filtering after the alignment leave it. There are up to four wedges along the sides
 /// of one rotated, shifted rectangle (rotation at most 15° either way), each
 /// of which holds a corner of the image.
 ///
-/// Box means are compared with the values in the flat corners; every strip
-/// parallel to a side of the rectangle counts for fill by what it holds that
-/// is alike and, ten times as much, against it by what is not; one rotation
-/// and four offsets make the count largest. The result stands only if its
+/// Box means are compared with the values in the flat corners. Every strip
+/// parallel to a side of the rectangle counts for fill by the samples that
+/// are alike and, ten times as much, against it by those that are not. The rotation
+/// and the four offsets with the largest count are taken. The result stands only if its
 /// sides are together nearly as long as the image's shorter one (those of a
 /// rotated image are, whatever its shift), most pixels just within them are
 /// unlike the fill, and the fill is smoother than the rest of the image.
 ///
 /// The darkest places of a bright image are space without specimen and never
 /// fill. An image with a whole edge of one value has constant fill or no noise
-/// and is left to constant_fill.h. Empty if there is no fill; offsets are of
-/// the flat part, whose blurred rim a mask must add. Images below 64 pixels a
+/// and is left to constant_fill.h. The result is empty if there is no fill. Offsets are of
+/// the flat part; a mask must add its blurred rim. Images below 64 pixels a
 /// side have none.
 std::vector<FillSide> find_straight_fill(Contrast contrast, const MaskedImage& image);
 

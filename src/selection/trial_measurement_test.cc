@@ -1,4 +1,4 @@
-#include "selection/trial_series.h"
+#include "selection/trial_measurement.h"
 
 #include <gtest/gtest.h>
 
@@ -50,16 +50,25 @@ TEST(TrialViews, OfTooFewThereAreNone) {
   EXPECT_NE(message.find("--hold-out"), std::string::npos) << message;
 }
 
-TEST(TrialSeries, HasTheRaysOfItsViews) {
-  const SphereSeries whole;
-  std::vector<double> sigma(31);
-  for (std::size_t v = 0; v < sigma.size(); ++v) sigma[v] = 1.0 + static_cast<double>(v);
-  const TrialSeries trial = make_trial_series(whole.geometry, sigma, *whole.rays, {3, 12}, 16);
+TEST(TrialMeasurement, HasTheRaysOfItsViews) {
+  const SphereSeries spheres;
+  measurement::Measurement whole{.geometry = spheres.geometry,
+                                 .roi = {2, 5, 30, 5 + SphereSeries::kRows},
+                                 .rays = spheres.rays};
+  for (int v = 0; v < 31; ++v) whole.noise_sigma.push_back(1.0 + v);
+  whole.mean_density = 0.25;
+  whole.held_out = {3, 12};
+  const TrialViews views = trial_views(whole.geometry.tilt_deg, whole.held_out);
+  const measurement::Measurement trial = trial_measurement(whole, views, 16);
   ASSERT_EQ(trial.rays->shape().num_views, 29u);
   ASSERT_EQ(trial.rays->shape().num_rows, 16);
   const std::int64_t first = (SphereSeries::kRows - 16) / 2;
+  EXPECT_EQ(trial.roi.x0, 2);
+  EXPECT_EQ(trial.roi.y0, 5 + first);
+  EXPECT_EQ(trial.roi.height(), 16);
+  EXPECT_EQ(trial.mean_density, 0.25);
   for (std::size_t v = 0; v < 29; ++v) {
-    const int from = trial.views.fitted_or_predicted[v];
+    const int from = views.fitted_or_predicted[v];
     EXPECT_EQ(trial.geometry.tilt_deg[v], whole.geometry.tilt_deg[static_cast<std::size_t>(from)]);
     EXPECT_EQ(trial.noise_sigma[v], 1.0 + from);
     for (std::int64_t x = 0; x < SphereSeries::kWidth; ++x) {
@@ -68,10 +77,10 @@ TEST(TrialSeries, HasTheRaysOfItsViews) {
       ASSERT_EQ(trial.rays->ray(static_cast<int>(v), x, 7), whole.rays->ray(from, x, 7 + first));
     }
   }
-  ASSERT_EQ(trial.held_out.size(), trial.views.predicted.size());
+  ASSERT_EQ(trial.held_out.size(), views.predicted.size());
   for (std::size_t i = 0; i < trial.held_out.size(); ++i) {
     const auto at = static_cast<std::size_t>(trial.held_out[i]);
-    EXPECT_EQ(trial.views.fitted_or_predicted[at], trial.views.predicted[i]);
+    EXPECT_EQ(views.fitted_or_predicted[at], views.predicted[i]);
   }
 }
 

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/mrc.h"
+
+namespace tomofield::io {
+
+/// A stack of images of one size, wherever it lies: in an MRC file or in memory. Reading is
+/// thread-safe.
+class ImageStack {
+ public:
+  virtual ~ImageStack() = default;
+
+  /// Returns sizes, pixel size and tilt angles, as the header of an MRC file states them.
+  virtual const MrcHeader& header() const = 0;
+  /// Returns what messages call the stack: its path, or a description.
+  virtual std::string name() const = 0;
+  /// Copies section `section` into `out`, ny × nx floats.
+  virtual void read_section(std::int64_t section, std::span<float> out) const = 0;
+};
+
+/// Opens an MRC file. Throws Error as MrcReader does.
+std::shared_ptr<const ImageStack> open_image_stack(const std::filesystem::path& path);
+
+/// Wraps images [section, y, x], x fastest, with an angle a section (degrees about +Y) and the
+/// pixel size in Å. Throws Error if the sizes do not agree.
+std::shared_ptr<const ImageStack> image_stack_in_memory(std::vector<float> values,
+                                                        std::int64_t width, std::int64_t height,
+                                                        std::vector<double> tilt_deg,
+                                                        double pixel_size_A);
+
+}  // namespace tomofield::io

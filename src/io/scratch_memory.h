@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+
+namespace tomofield::io {
+
+/// Returns the folder for scratch files of a run that writes `output`: the folder of the output,
+/// which has room, or that of the system if no file is written.
+std::filesystem::path scratch_directory(const std::filesystem::path& output);
+
+/// Zeroed bytes for what is needed during one run. A small array lies in memory, a large one in an
+/// unlinked file that the kernel pages, so that it may be larger than the memory.
+class ScratchMemory {
+ public:
+  /// Up to here an array is kept in memory: a 1K series of 60 views takes 250 MB.
+  static constexpr std::size_t kInMemoryBytes = std::size_t{1} << 30;
+
+  /// Makes the file in `directory` if `bytes` are more than `in_memory_bytes`. Throws Error if
+  /// there is no room; `noun` names the array in its message, in the plural.
+  ScratchMemory(std::size_t bytes, const char* noun, const std::filesystem::path& directory,
+                std::size_t in_memory_bytes = kInMemoryBytes);
+  ~ScratchMemory();
+  ScratchMemory(ScratchMemory&& other) noexcept;
+  ScratchMemory& operator=(ScratchMemory&&) = delete;
+
+  std::byte* data() const { return data_; }
+  std::size_t size() const { return size_; }
+
+  /// Removes a part that lies in a file from this process's memory; it keeps its values and comes
+  /// back when it is used. Only whole pages are removed.
+  void release(std::size_t first, std::size_t count) const;
+  /// Gives up the values of a part and returns its memory, or its place in the file where the file
+  /// system can do that. Only whole pages are returned.
+  void discard(std::size_t first, std::size_t count) const;
+
+ private:
+  void advise(std::size_t first, std::size_t count, int advice) const;
+
+  std::size_t size_ = 0;
+  bool is_in_file_ = false;
+  std::byte* data_ = nullptr;
+};
+
+}  // namespace tomofield::io

@@ -1,0 +1,145 @@
+#include "measurement/prepare.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bead_series.h"
+#include "io/image_stack.h"
+#include "scratch_directory.h"
+
+namespace tomofield::measurement {
+namespace {
+
+using testing::BeadScene;
+using tilt_series::TiltSeries;
+using tilt_series::TiltSeriesOptions;
+
+// Counts how often each section is read.
+class CountingStack : public io::ImageStack {
+ public:
+  explicit CountingStack(std::shared_ptr<const io::ImageStack> images)
+      : images_(std::move(images)), reads_(static_cast<std::size_t>(images_->header().nz)) {}
+  const io::MrcHeader& header() const override { return images_->header(); }
+  std::string name() const override { return images_->name(); }
+  void read_section(std::int64_t section, std::span<float> out) const override {
+    ++reads_[static_cast<std::size_t>(section)];
+    images_->read_section(section, out);
+  }
+  std::vector<int> reads() const { return {reads_.begin(), reads_.end()}; }
+
+ private:
+  std::shared_ptr<const io::ImageStack> images_;
+  mutable std::vector<std::atomic<int>> reads_;
+};
+
+constexpr double kEmptyBeam = 50;
+
+// A stack of the views of a scene, dense parts low in dark contrast.
+std::shared_ptr<CountingStack> stack_of(const BeadScene& scene, Contrast contrast) {
+  std::vector<float> values;
+  for (std::size_t view = 0; view < scene.tilt_deg.size(); ++view) {
+    for (const float value : scene.view(view).values)
+      values.push_back(contrast == Contrast::kDark ? static_cast<float>(kEmptyBeam) - value
+                                                   : value);
+  }
+  return std::make_shared<CountingStack>(io::image_stack_in_memory(
+      std::move(values), scene.width, scene.height, scene.tilt_deg, /*pixel_size_A=*/20.0));
+}
+
+struct Case {
+  const char* name;
+  Contrast contrast;
+  bool take_log;
+  bool resample;
+  bool has_beads;
+};
+
+class EachViewOnce : public ::testing::TestWithParam<Case> {};
+
+TEST_P(EachViewOnce, IsDecoded) {
+  const Case& c = GetParam();
+  BeadScene scene;
+  if (c.has_beads) scene.scatter_beads(12, 5);
+  const auto stack = stack_of(scene, c.contrast);
+  const std::size_t num_views = scene.tilt_deg.size();
+  TiltSeriesOptions input;
+  input.images = stack;
+  input.contrast = c.contrast;
+  input.take_log = c.take_log;
+  input.resample = c.resample;
+  if (c.contrast == Contrast::kBright && c.has_beads) input.bead_diameter_nm = 10.0;
+  const TiltSeries series(input);
+  EXPECT_EQ(series.mask_figures().num_beads > 0, c.has_beads);
+  const testing::ScratchDirectory scratch;
+  SpecimenOptions specimen;
+  specimen.thickness = 40;
+  const Measurement measured = prepare_measurement(series, specimen, scratch.path());
+  EXPECT_EQ(measured.rays->shape().num_views, num_views);
+  EXPECT_EQ(stack->reads(), std::vector<int>(num_views, 1));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Series, EachViewOnce,
+    ::testing::Values(Case{"bright", Contrast::kBright, false, true, false},
+                      Case{"bright_with_beads", Contrast::kBright, false, true, true},
+                      Case{"dark", Contrast::kDark, false, true, false},
+                      Case{"dark_with_beads", Contrast::kDark, false, true, true},
+                      Case{"logarithm", Contrast::kDark, true, true, true},
+                      Case{"as_recorded", Contrast::kDark, false, false, true},
+                      Case{"as_recorded_bright", Contrast::kBright, false, false, false}),
+    [](const auto& series) { return std::string(series.param.name); });
+
+TEST(StoredViews, GivesTheRaysThatAViewDecodedAnewWouldGive) {
+  BeadScene scene;
+  scene.scatter_beads(12, 5);
+  TiltSeriesOptions input;
+  input.images = stack_of(scene, Contrast::kDark);
+  const TiltSeries series(input);
+  SpecimenOptions specimen;
+  specimen.thickness = 40;
+  specimen.roi = geometry::Roi{0, 30, scene.width, 110};
+  const Measurement measured = prepare_measurement(series, specimen, "/tmp");
+  // Its views were forgotten, so that the series decodes this one again.
+  constexpr std::size_t kView = 11;
+  const auto size = static_cast<std::size_t>(scene.width * scene.height);
+  std::vector<float> image(size);
+  std::vector<std::uint8_t> valid(size);
+  series.read_view(kView, image, valid);
+  EXPECT_GT(std::ranges::count(valid, 0), 100) << "beads are masked";
+  const float per_unit = static_cast<float>(1.0 / measured.unit);
+  for (std::int64_t y = 0; y < measured.roi.height(); ++y) {
+    for (std::int64_t x = 0; x < scene.width; ++x) {
+      const auto at = static_cast<std::size_t>((y + 30) * scene.width + x);
+      ASSERT_EQ(measured.rays->counts(kView, x, y), valid[at] != 0);
+      if (valid[at]) {
+        ASSERT_EQ(measured.rays->ray(kView, x, y), image[at] * per_unit);
+      }
+    }
+  }
+}
+
+TEST(StoredViews, SeriesThatKeepNoViewsAreReadOnceMore) {
+  BeadScene scene;
+  const auto stack = stack_of(scene, Contrast::kBright);
+  TiltSeriesOptions input;
+  input.images = stack;
+  input.contrast = Contrast::kBright;
+  input.keep_views = false;
+  const TiltSeries series(input);
+  EXPECT_EQ(stack->reads(), std::vector<int>(scene.tilt_deg.size(), 1));
+  const auto size = static_cast<std::size_t>(scene.width * scene.height);
+  std::vector<float> image(size);
+  std::vector<std::uint8_t> valid(size);
+  series.read_view(3, image, valid);
+  EXPECT_EQ(image, scene.view(3).values);
+  EXPECT_EQ(stack->reads()[3], 2);
+}
+
+}  // namespace
+}  // namespace tomofield::measurement

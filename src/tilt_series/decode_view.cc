@@ -1,0 +1,77 @@
+#include "tilt_series/decode_view.h"
+
+#include <cmath>
+#include <utility>
+
+#include "tilt_series/align_image.h"
+#include "tilt_series/binning.h"
+#include "tilt_series/masks/bad_pixels.h"
+#include "tilt_series/masks/flat_fill.h"
+#include "tilt_series/masks/series_masks.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+/// Marks pixels that are NaN or infinite as no measurements, and counts them.
+PixelCensus mask_not_finite(MaskedImage* image) {
+  PixelCensus census;
+  const float* first_finite = nullptr;
+  for (std::size_t i = 0; i < image->values.size(); ++i) {
+    if (!std::isfinite(image->values[i])) {
+      image->valid[i] = 0;
+      image->values[i] = 0.0f;
+      ++census.num_not_finite;
+      continue;
+    }
+    if (first_finite == nullptr) first_finite = &image->values[i];
+    if (image->values[i] != *first_finite) census.is_constant = 0;
+  }
+  return census;
+}
+
+}  // namespace
+
+ViewDecoder::ViewDecoder(const io::ImageStack& stack, const SeriesPlan& plan, Contrast contrast,
+                         std::optional<io::MrcReader> mask)
+    : stack_(stack), plan_(plan), contrast_(contrast), mask_(std::move(mask)) {}
+
+std::int64_t ViewDecoder::recorded_width() const {
+  return reduced_size(stack_.header().nx, plan_.bin_factor);
+}
+std::int64_t ViewDecoder::recorded_height() const {
+  return reduced_size(stack_.header().ny, plan_.bin_factor);
+}
+std::int64_t ViewDecoder::aligned_width() const {
+  return reduced_size(plan_.aligned_width, plan_.bin_factor);
+}
+std::int64_t ViewDecoder::aligned_height() const {
+  return reduced_size(plan_.aligned_height, plan_.bin_factor);
+}
+
+DecodedView ViewDecoder::decode(std::size_t view, Frames frames) const {
+  const std::int64_t section = plan_.views[view].view.section;
+  MaskedImage image(stack_.header().nx, stack_.header().ny);
+  stack_.read_section(section, image.values);
+  DecodedView decoded;
+  decoded.census = mask_not_finite(&image);
+  if (!plan_.is_raw) mask_flat_fill(contrast_, &image);
+  if (mask_) apply_mask(*mask_, section, &image);
+  decoded.census.num_bad = mask_bad_pixels(&image);
+  if (frames.recorded) decoded.recorded = frames.aligned ? binned(image) : binned(std::move(image));
+  if (frames.aligned) decoded.aligned = binned(aligned(std::move(image), view));
+  return decoded;
+}
+
+MaskedImage ViewDecoder::aligned(MaskedImage recorded, std::size_t view) const {
+  const RawFromAligned& transform = plan_.views[view].raw_from_aligned;
+  const bool keeps_sizes =
+      plan_.aligned_width == recorded.width && plan_.aligned_height == recorded.height;
+  if (transform.is_identity() && keeps_sizes) return recorded;
+  return align_image(recorded, transform, plan_.aligned_width, plan_.aligned_height);
+}
+
+MaskedImage ViewDecoder::binned(MaskedImage image) const {
+  return plan_.bin_factor == 1.0 ? std::move(image) : reduce_image(image, plan_.bin_factor);
+}
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "io/image_stack.h"
+#include "io/mrc.h"
+#include "tilt_series/image.h"
+#include "tilt_series/series_plan.h"
+#include "tomofield/options.h"
+
+namespace tomofield::tilt_series {
+
+/// Counts of the raw pixels of a section.
+struct PixelCensus {
+  std::int64_t num_not_finite = 0;
+  std::int64_t num_bad = 0;      ///< hot or dead pixels
+  std::int64_t is_constant = 1;  ///< 0 or 1, an integer as the other members, to be summed
+};
+
+/// Frames in which a view is wanted.
+struct Frames {
+  bool recorded = false;  ///< as the stack has it
+  bool aligned = true;    ///< with the tilt axis along +Y through the centre
+};
+
+/// A view as stored intensities, binned; images that were not wanted are empty.
+struct DecodedView {
+  PixelCensus census;
+  MaskedImage recorded;
+  MaskedImage aligned;
+};
+
+/// Makes images of views from sections of a stack. Thread-safe.
+class ViewDecoder {
+ public:
+  /// The stack and the plan must outlive the decoder; `mask` is the user's, with a section for
+  /// every section of the stack.
+  ViewDecoder(const io::ImageStack& stack, const SeriesPlan& plan, Contrast contrast,
+              std::optional<io::MrcReader> mask);
+
+  /// Reads the section of a view, masks what is no measurement (NaN, infinity, fill, the user's
+  /// mask, hot and dead pixels), aligns and bins it. Throws Error if the stack cannot be read.
+  DecodedView decode(std::size_t view, Frames frames) const;
+
+  /// Returns the size of a binned image in one of the frames.
+  std::int64_t recorded_width() const;
+  std::int64_t recorded_height() const;
+  std::int64_t aligned_width() const;
+  std::int64_t aligned_height() const;
+
+ private:
+  MaskedImage aligned(MaskedImage recorded, std::size_t view) const;
+  MaskedImage binned(MaskedImage image) const;
+
+  const io::ImageStack& stack_;
+  const SeriesPlan& plan_;
+  Contrast contrast_;
+  std::optional<io::MrcReader> mask_;
+};
+
+}  // namespace tomofield::tilt_series
