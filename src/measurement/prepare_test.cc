@@ -157,7 +157,7 @@ TEST(PrepareSeries, OptionsThatDoNotFitTheSeriesAreRefused) {
   SeriesFiles files;
   const auto complaint = [&](const SpecimenOptions& options) {
     return testing::message_of<Error>(
-        [&] { plan_series(tilt_series::TiltSeries(files.options()), options); });
+        [&] { plan_measurement(tilt_series::TiltSeries(files.options()), options); });
   };
   EXPECT_EQ(complaint(specimen()), "");
   SpecimenOptions options = specimen();
