@@ -46,6 +46,44 @@ TEST(PublicModel, TurnsBoxesByEulerAngles) {
     EXPECT_NEAR(values[x], 40.0 * inner.field->density(30, 42 - static_cast<double>(x), 10), 1e-4);
 }
 
+TEST(PublicModel, SamplesPoints) {
+  const testing::ScratchDirectory scratch;
+  auto inner = testing::uneven_model(FieldKind::kVm);
+  inner.is_dark = true;
+  output::save_model(scratch / "model.h5", inner);
+  const Model model(scratch / "model.h5");
+  std::vector<Point> points{{-1000, 0, 0}};
+  for (int i = 1; i < 3000; ++i)
+    points.push_back({10 + 0.03 * i, 4 + 0.035 * i, std::fmod(0.7 * i, 21.5)});
+  const auto values = model.sample_points(points);
+  ASSERT_EQ(values.size(), points.size());
+  EXPECT_EQ(values[0], 0.0f);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const auto [x, y, z] = points[i];
+    ASSERT_NEAR(values[i], -40.0 * inner.field->density(x, y, z), 1e-4) << i;
+  }
+  EXPECT_TRUE(model.sample_points({}).empty());
+  points[5][2] = std::nan("");
+  EXPECT_THROW(model.sample_points(points), Error);
+}
+
+TEST(PublicModel, TheRegionTurnsWithAnXAxisTilt) {
+  const testing::ScratchDirectory scratch;
+  auto inner = testing::uneven_model(FieldKind::kVm);
+  inner.x_tilt_deg = 7.0;
+  output::save_model(scratch / "model.h5", inner);
+  output::write_volume(inner, {}, scratch / "volume.mrc");
+  const Model model(scratch / "model.h5");
+  const auto values = model.sample(model.region());
+  const io::MrcReader volume(scratch / "volume.mrc");
+  std::vector<float> section(100 * 116);
+  for (std::int64_t z = 0; z < 21; ++z) {
+    volume.read_section(z, section);
+    for (std::size_t i = 0; i < section.size(); ++i)
+      ASSERT_NEAR(section[i], values[static_cast<std::size_t>(z) * section.size() + i], 1e-3);
+  }
+}
+
 TEST(PublicModel, RefusesBoxesThatCannotBeSampled) {
   const testing::ScratchDirectory scratch;
   output::save_model(scratch / "model.h5", testing::uneven_model(FieldKind::kGrid));
