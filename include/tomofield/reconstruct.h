@@ -81,8 +81,8 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
 /// or else every core. Results have the same bits for any number.
 void set_thread_count(int count);
 
-/// Resolves the options that are chosen from the data or from other options, as reconstruct()
-/// does, but for those that trials choose.
-Options resolve_options(const TiltSeries& series, const Options& options);
+/// Fills in the options that follow from other options, as reconstruct() does. The penalty and its
+/// weight stay empty if neither is given, since trials on the data choose them.
+Options resolve_options(const Options& options);
 
 }  // namespace tomofield

@@ -1,3 +1,5 @@
+#include "tomofield/evaluate.h"
+
 #include <fmt/format.h>
 
 #include <utility>
@@ -5,7 +7,6 @@
 #include "evaluate/compare.h"
 #include "evaluate/fsc.h"
 #include "tomofield/error.h"
-#include "tomofield/evaluate.h"
 
 namespace tomofield {
 namespace {

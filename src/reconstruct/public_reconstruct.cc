@@ -1,4 +1,5 @@
-#include <filesystem>
+#include "tomofield/reconstruct.h"
+
 #include <mutex>
 #include <utility>
 
@@ -10,7 +11,6 @@
 #include "reconstruct/public_model.h"
 #include "reconstruct/reconstruct.h"
 #include "reconstruct/resolve.h"
-#include "tomofield/reconstruct.h"
 
 namespace tomofield {
 
@@ -28,7 +28,7 @@ namespace {
 reconstruction::ReconstructOptions internal_options(const TiltSeries& series,
                                                     const Options& options) {
   const auto& input = TiltSeriesAccess::impl(series);
-  auto internal = reconstruction::resolve(input.files, options);
+  auto internal = reconstruction::run_options(input.files, options);
   internal.input.images = input.images;
   return internal;
 }
@@ -104,6 +104,8 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
   made.model = ModelAccess::make(std::move(run.results->model));
   return made;
 }
+
+Options resolve_options(const Options& options) { return reconstruction::resolve(options); }
 
 void set_thread_count(int count) { base::set_thread_count(count); }
 

@@ -96,7 +96,23 @@ output::VolumeOptions volume_of(const Options& o) {
 
 }  // namespace
 
-ReconstructOptions resolve(const SeriesFiles& files, const Options& o) {
+Options resolve(const Options& requested) {
+  const ReconstructOptions run = run_options({}, requested);
+  Options options = requested;
+  options.leaf_size = run.field.leaf_size;
+  options.activation = run.field.activation;
+  options.epochs = run.fit.epochs;
+  options.vertex_epochs = run.fit.vertex_epochs;
+  options.coarse_epochs = run.fit.coarse_epochs;
+  options.learning_rate = run.fit.learning_rate;
+  options.fit_view_scale = run.fit.fit_view_scale;
+  if (run.choose_penalty) return options;
+  options.penalty = run.fit.penalty;
+  options.density_variation = run.fit.density_variation;
+  return options;
+}
+
+ReconstructOptions run_options(const SeriesFiles& files, const Options& o) {
   ReconstructOptions options;
   options.input = input_of(files, o);
   options.specimen = specimen_of(o);

@@ -5,8 +5,11 @@
 
 namespace tomofield::reconstruction {
 
-/// Returns what a reconstruction is made from, with the defaults of everything that the options
-/// leave open.
-ReconstructOptions resolve(const SeriesFiles& files, const Options& options);
+/// Fills in the options that are to be chosen from other options. The penalty and its weight stay
+/// empty if neither is given: trials choose them.
+Options resolve(const Options& requested);
+
+/// Resolves the options and hands them to the rooms below.
+ReconstructOptions run_options(const SeriesFiles& files, const Options& requested);
 
 }  // namespace tomofield::reconstruction

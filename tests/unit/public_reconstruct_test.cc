@@ -172,6 +172,29 @@ TEST(PublicReconstruct, RunsInAnyThreadWithTheSameBits) {
   EXPECT_EQ(there[1], here);
 }
 
+TEST(PublicReconstruct, ResolvedOptionsGiveTheSameBits) {
+  Options options;
+  options.thickness = 16;
+  options.contrast = Contrast::kBright;
+  options.epochs = 4;
+  const Options resolved = resolve_options(options);
+  EXPECT_EQ(resolved.epochs, 4);
+  EXPECT_EQ(resolved.leaf_size, 32);
+  EXPECT_EQ(resolved.activation, Activation::kSoftplus);
+  EXPECT_EQ(resolved.fit_view_scale, false);
+  EXPECT_TRUE(resolved.vertex_epochs && resolved.coarse_epochs && resolved.learning_rate);
+  EXPECT_FALSE(resolved.penalty || resolved.density_variation);
+  const TiltSeries series = TiltSeries::from_images(spheres());
+  EXPECT_EQ(reconstruct(series, options).tomogram->values,
+            reconstruct(series, resolved).tomogram->values);
+  options.penalty = Penalty::kSmooth;
+  options.contrast = Contrast::kDark;
+  const Options dark = resolve_options(options);
+  EXPECT_EQ(dark.density_variation, 5.0);
+  EXPECT_EQ(dark.activation, Activation::kIdentity);
+  EXPECT_EQ(dark.fit_view_scale, true);
+}
+
 TEST(PublicReconstruct, RefusesWhatCannotBeUsed) {
   const TiltSeries series = TiltSeries::from_images(spheres());
   const auto refusal = [&](const Options& options) {
