@@ -6,6 +6,7 @@
 #include <pybind11/stl/filesystem.h>
 #include <tomofield/error.h>
 #include <tomofield/evaluate.h>
+#include <tomofield/messages.h>
 #include <tomofield/model.h>
 #include <tomofield/reconstruct.h>
 #include <tomofield/version.h>
@@ -15,6 +16,8 @@
 #include <exception>
 #include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -135,6 +138,20 @@ py::array_t<float> sample_points(const Model& model, const PointArray& points) {
   return to_array(std::move(values), {points.shape(0)});
 }
 
+// Passes messages to the logger "tomofield". Whatever says something runs without the interpreter's
+// lock, which is taken here: else two threads could wait for each other.
+void log(MessageKind kind, std::string_view text) {
+  const py::gil_scoped_acquire locked;
+  try {
+    const auto message = py::reinterpret_steal<py::object>(
+        PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "replace"));
+    const py::object logger = py::module_::import("logging").attr("getLogger")("tomofield");
+    logger.attr(kind == MessageKind::kWarning ? "warning" : "info")(message);
+  } catch (py::error_already_set& error) {
+    error.discard_as_unraisable("tomofield's logger");
+  }
+}
+
 void add_reconstruct(py::module_& module) {
   py::class_<TiltSeries>(module, "TiltSeries")
       .def_static("from_files", &TiltSeries::from_files)
@@ -161,7 +178,7 @@ void add_model(py::module_& module) {
       .def_readonly("voxel_px", &SampleBox::voxel_px)
       .def_readonly("euler_deg", &SampleBox::euler_deg);
   py::class_<Model>(module, "Model")
-      .def(py::init<const std::filesystem::path&>())
+      .def(py::init<const std::filesystem::path&>(), py::call_guard<py::gil_scoped_release>())
       .def("pixel_size_A", &Model::pixel_size_A)
       .def("region", &Model::region)
       .def("sample", &sample)
@@ -206,6 +223,7 @@ PYBIND11_MODULE(_core, module) {
   using namespace tomofield;
   pybind11::register_exception<Error>(module, "Error", PyExc_RuntimeError);
   module.attr("__version__") = library_version();
+  set_message_handler(python::log);
   python::add_options(module);
   python::add_reconstruct(module);
   python::add_model(module);

@@ -63,8 +63,8 @@ struct Reconstruction {
 /// `tomofield reconstruct`, with the same defaults and the same bits.
 ///
 /// With Options::output, writes the tomogram, the model (.h5) and the metrics (.json) there and
-/// leaves the tomogram out of the result. The pictures are drawn by the command line alone. A run
-/// that the callback stops leaves a checkpoint, from which Options::resume continues.
+/// leaves the tomogram out of the result. Only the command line draws pictures of slices, masks and
+/// trees. A run that the callback stops leaves a checkpoint, from which Options::resume continues.
 ///
 /// Without Options::output, writes nothing but a scratch file in the temporary folder for views
 /// that do not fit in memory. Options::voxel_type, axes, overwrite and checkpoint_minutes have no

@@ -2,7 +2,8 @@
 
 Arrays are [z, y, x] or [view, y, x], float32, with x the fastest axis. Functions raise
 tomofield.Error, in one sentence, for files, arrays and options that cannot be used. The results
-have the same bits as those of the command line, for any number of threads.
+have the same bits as those of the command line, for any number of threads. Messages go to the
+logger "tomofield".
 """
 
 import json

@@ -3,6 +3,7 @@
 #include <mutex>
 #include <utility>
 
+#include "base/log.h"
 #include "base/parallel.h"
 #include "field/sampling/sample_box.h"
 #include "io/image_stack.h"
@@ -11,6 +12,8 @@
 #include "reconstruct/public_model.h"
 #include "reconstruct/reconstruct.h"
 #include "reconstruct/resolve.h"
+#include "tomofield/error.h"
+#include "tomofield/messages.h"
 
 namespace tomofield {
 
@@ -70,6 +73,28 @@ class Listener {
   bool wants_stop_ = false;
 };
 
+// Waits until no other thread reconstructs. Throws Error in a callback, which would wait for
+// itself.
+class OneAtATime {
+ public:
+  OneAtATime() {
+    if (is_reconstructing_)
+      throw Error("a callback cannot start another reconstruction: start it when this one is done");
+    mutex_.lock();
+    is_reconstructing_ = true;
+  }
+  ~OneAtATime() {
+    is_reconstructing_ = false;
+    mutex_.unlock();
+  }
+  OneAtATime(const OneAtATime&) = delete;
+  OneAtATime& operator=(const OneAtATime&) = delete;
+
+ private:
+  static inline std::mutex mutex_;
+  static inline thread_local bool is_reconstructing_ = false;
+};
+
 }  // namespace
 
 TiltSeries::TiltSeries(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
@@ -87,8 +112,7 @@ TiltSeries TiltSeries::from_images(ViewImages images) {
 
 Reconstruction reconstruct(const TiltSeries& series, const Options& options,
                            const ProgressCallback& progress) {
-  static std::mutex one_at_a_time;
-  const std::lock_guard lock(one_at_a_time);
+  const OneAtATime turn;
   const reconstruction::ReconstructOptions internal = internal_options(series, options);
   reconstruction::check_options(internal);
   const tilt_series::TiltSeries views(internal.input);
@@ -106,6 +130,13 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
 }
 
 Options resolve_options(const Options& options) { return reconstruction::resolve(options); }
+
+void set_message_handler(MessageHandler handler) {
+  if (!handler) return base::set_log_sink({});
+  base::set_log_sink([handler = std::move(handler)](base::LogLevel level, std::string_view text) {
+    handler(level == base::LogLevel::kWarning ? MessageKind::kWarning : MessageKind::kInfo, text);
+  });
+}
 
 void set_thread_count(int count) { base::set_thread_count(count); }
 

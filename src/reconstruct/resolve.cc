@@ -66,7 +66,7 @@ fit::FitOptions fit_of(const Options& o, const fit::FieldOptions& field) {
   fit.fourier = o.fourier;
   fit.fourier_ring = o.fourier_ring;
   fit.penalty = o.penalty.value_or(fit.penalty);
-  fit.density_variation = o.density_variation.value_or(fit::usual_variation(fit.penalty));
+  fit.density_variation = o.density_variation.value_or(objective::usual_variation(fit.penalty));
   fit.fit_view_scale = o.fit_view_scale.value_or(o.contrast == Contrast::kDark);
   fit.seed = o.seed;
   fit.hold_out = o.hold_out;

@@ -81,6 +81,16 @@ def test_ctrl_c_stops_it_and_leaves_a_checkpoint(series, quick, tmp_path):
     assert (tmp_path / "t.h5").exists() and not (tmp_path / "t.mrc").exists()
 
 
+def test_messages_go_to_the_logger(series, quick, caplog):
+    views = series.views.copy()
+    views[2, 5, 7] = np.nan
+    with caplog.at_level("INFO", logger="tomofield"):
+        tomofield.reconstruct(views, series.tilt_deg, **quick)
+    levels = {record.levelname: record.getMessage() for record in caplog.records}
+    assert "1 NaN" in levels["WARNING"] and "section 3" in levels["WARNING"]
+    assert "INFO" in levels
+
+
 def test_other_threads_run_meanwhile(series, quick):
     """They wait for the step in which the callback runs: with the interpreter locked, for ever."""
     has_begun, has_run = threading.Event(), threading.Event()

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <thread>
@@ -10,6 +11,7 @@
 #include "scratch_directory.h"
 #include "simulate/project_phantom.h"
 #include "tomofield/error.h"
+#include "tomofield/messages.h"
 #include "tomofield/reconstruct.h"
 
 namespace tomofield {
@@ -158,6 +160,32 @@ TEST(PublicReconstruct, AnExceptionOfTheCallbackLeavesIt) {
   EXPECT_EQ(message_of<std::runtime_error>([&] { reconstruct(series, quick_options(), fail); }),
             "of the callback");
   EXPECT_TRUE(reconstruct(series, quick_options()).is_finished);
+}
+
+TEST(PublicReconstruct, ACallbackCannotStartAnother) {
+  const TiltSeries series = TiltSeries::from_images(spheres());
+  const auto nested = [&](const Progress&) {
+    return reconstruct(series, quick_options()).is_finished;
+  };
+  const std::string message =
+      message_of<Error>([&] { reconstruct(series, quick_options(), nested); });
+  EXPECT_NE(message.find("callback"), std::string::npos) << message;
+}
+
+TEST(PublicReconstruct, HandsItsMessagesOver) {
+  ViewImages images = spheres();
+  images.values[17] = std::nanf("");
+  std::vector<std::string> infos, warnings;
+  set_message_handler([&](MessageKind kind, std::string_view text) {
+    (kind == MessageKind::kWarning ? warnings : infos).emplace_back(text);
+  });
+  reconstruct(TiltSeries::from_images(images), quick_options());
+  set_message_handler({});
+  EXPECT_FALSE(infos.empty());
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("1 NaN"), std::string::npos) << warnings[0];
+  reconstruct(TiltSeries::from_images(images), quick_options());
+  EXPECT_EQ(warnings.size(), 1u);
 }
 
 TEST(PublicReconstruct, RunsInAnyThreadWithTheSameBits) {
