@@ -8,7 +8,6 @@ import subprocess
 
 import pytest
 
-import conftest
 import tomofield
 
 PROJECT = pathlib.Path(__file__).parents[2]
@@ -21,9 +20,9 @@ def snippets(language):
     return found
 
 
-def test_python_snippets_run(tmp_path, monkeypatch):
+def test_python_snippets_run(program, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    subprocess.run([conftest.PROGRAM, "simulate", ".", "--size", "32", "--thickness", "75",
+    subprocess.run([program, "simulate", ".", "--size", "32", "--thickness", "75",
                     "--noise", "0.05", "--seed", "1"], check=True, capture_output=True)
     names = {}
     for snippet in snippets("python"):
