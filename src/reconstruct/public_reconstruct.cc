@@ -8,6 +8,7 @@
 #include "field/sampling/sample_box.h"
 #include "io/image_stack.h"
 #include "io/json.h"
+#include "io/scratch_memory.h"
 #include "output/volume.h"
 #include "reconstruct/public_model.h"
 #include "reconstruct/reconstruct.h"
@@ -33,6 +34,7 @@ reconstruction::ReconstructOptions internal_options(const TiltSeries& series,
   const auto& input = TiltSeriesAccess::impl(series);
   auto internal = reconstruction::run_options(input.files, options);
   internal.input.images = input.images;
+  internal.input.scratch_dir = io::scratch_directory(options.output);
   return internal;
 }
 
