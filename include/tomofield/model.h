@@ -4,15 +4,18 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <vector>
 
 namespace tomofield {
 
-/// Cubic voxels anywhere in a model. Positions are pixels of the model: of the
-/// aligned, binned view at zero tilt, whose pixel i covers [i, i + 1); z runs
-/// from 0 to the thickness, towards the source.
+/// A position in a model: x, y, z in pixels of the aligned, binned view at zero tilt, whose pixel i
+/// covers [i, i + 1); z runs from 0 to the thickness, towards the source.
+using Point = std::array<double, 3>;
+
+/// Cubic voxels anywhere in a model. A tilted plane is a box with one voxel in z.
 struct SampleBox {
-  std::array<double, 3> centre_px{};   ///< x, y, z of the box's geometric centre
+  Point centre_px{};                   ///< the box's geometric centre
   std::array<std::int64_t, 3> size{};  ///< voxels in x, y, z
   double voxel_px = 1.0;               ///< side of a voxel
   /// rot, tilt, psi as RELION's rlnAngleRot, rlnAngleTilt, rlnAnglePsi: turned
@@ -20,27 +23,36 @@ struct SampleBox {
   std::array<double, 3> euler_deg{};
 };
 
-/// A density field that `tomofield reconstruct` fitted, read from its model
-/// file (.h5). Cheap to copy; a copy shares the field. Everything is const and may
-/// be called from several threads, but for the constructor: one file at a time.
+/// A density field that reconstruct() fitted, in memory or read from a model file (.h5). Cheap to
+/// copy; a copy shares the field. Everything is const and may be called from several threads,
+/// except the constructor, which reads one file at a time.
+///
+/// Values are in the units and the contrast of the tilt series (dark series: dense is low), and 0
+/// outside of the model.
 class Model {
  public:
   /// Throws tomofield::Error, naming the file and the reason, for anything but
   /// a whole model of a version that this library knows.
   explicit Model(const std::filesystem::path& path);
 
+  /// Returns the size in Å of the pixels that positions count.
   double pixel_size_A() const;
-  /// The region of interest, of whole voxels of `voxel_px` pixels.
+  /// Returns the region of interest, in whole voxels of `voxel_px` pixels. Its angles are 0 unless
+  /// the views have an x-axis tilt, which turns the specimen in the model.
   SampleBox region(double voxel_px = 1.0) const;
 
-  /// Values of a box, [z, y, x] with x fastest, in the units and the contrast of
-  /// the tilt series (dark series: dense is low), as `tomofield export` writes
-  /// them; 0 outside of the model. Voxels larger than a pixel are means. Throws
-  /// Error for sizes below 1 and for numbers that are not finite.
+  /// Returns the values of a box, [z, y, x] with x fastest, as `tomofield export` writes them.
+  /// Voxels larger than a pixel are means. Throws Error for sizes below 1 and for numbers that are
+  /// not finite.
   std::vector<float> sample(const SampleBox& box) const;
 
+  /// Returns the value at each point. Throws Error for numbers that are not finite.
+  std::vector<float> sample_points(std::span<const Point> points) const;
+
  private:
+  friend struct ModelAccess;
   struct Impl;
+  explicit Model(std::shared_ptr<const Impl> impl);
   std::shared_ptr<const Impl> impl_;
 };
 

@@ -2,7 +2,8 @@
 
 #include <tomofield/model.h>
 #include <tomofield/options.h>
-#include <array>
+#include <tomofield/tomogram.h>
+
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -44,33 +45,44 @@ struct Progress {
   std::string detail;     ///< a few words: epoch, loss, steps a second
 };
 
-/// Receives progress after every step. Returns false to stop the reconstruction.
+/// Receives progress after every step, in the thread that called reconstruct(). Returns false to
+/// stop the reconstruction. May throw: the exception leaves reconstruct(), and nothing is saved.
 using ProgressCallback = std::function<bool(const Progress&)>;
-
-/// A tomogram in memory: [z, y, x] with x fastest, in the units and the contrast of the views.
-struct Tomogram {
-  std::array<std::int64_t, 3> size{};  ///< voxels in x, y, z
-  double voxel_size_A = 1.0;
-  std::vector<float> values;
-};
 
 /// What reconstruct() made.
 struct Reconstruction {
-  bool is_finished = false;          ///< false: the callback stopped it
-  std::optional<Tomogram> tomogram;  ///< only if Options::output is empty
-  std::optional<Model> model;        ///< of a finished run
+  bool is_finished = false;  ///< false: the callback stopped it, and the rest is empty
+  /// In the units and the contrast of the views, or the other contrast with Options::invert. Only
+  /// if Options::output is empty.
+  std::optional<Tomogram> tomogram;
+  std::optional<Model> model;
   std::string metrics;  ///< JSON: what `tomofield reconstruct` writes beside the volume
 };
 
 /// Fits a density field to a tilt series and samples it as a tomogram: the whole job of
-/// `tomofield reconstruct`, with the same defaults and the same bits. With Options::output, writes
-/// the tomogram, the model (.h5) and the metrics (.json) there and leaves the tomogram out of
-/// the result; without it, writes nothing. Throws Error for options or files that cannot be used.
+/// `tomofield reconstruct`, with the same defaults and the same bits.
+///
+/// With Options::output, writes the tomogram, the model (.h5) and the metrics (.json) there and
+/// leaves the tomogram out of the result. Only the command line draws pictures of slices, masks and
+/// trees. A run that the callback stops leaves a checkpoint, from which Options::resume continues.
+///
+/// Without Options::output, writes nothing but a scratch file in the temporary folder for views
+/// that do not fit in memory. Options::voxel_type, axes, overwrite and checkpoint_minutes have no
+/// effect then.
+///
+/// Works on all threads (set_thread_count()). Calls from several threads run one after another.
+/// No Model may be opened from a file at the same time, since HDF5 is not thread-safe.
+///
+/// Throws Error for options or files that cannot be used, and for too little memory.
 Reconstruction reconstruct(const TiltSeries& series, const Options& options,
                            const ProgressCallback& progress = {});
 
-/// Resolves the options that are chosen from the data or from other options, as reconstruct()
-/// does, but for those that trials choose.
-Options resolve_options(const TiltSeries& series, const Options& options);
+/// Sets the number of threads that the library computes with. 0, the default, means OMP_NUM_THREADS
+/// or else every core. Results have the same bits for any number.
+void set_thread_count(int count);
+
+/// Fills in the options that follow from other options, as reconstruct() does. The penalty and its
+/// weight stay empty if neither is given, since trials on the data choose them.
+Options resolve_options(const Options& options);
 
 }  // namespace tomofield

@@ -128,7 +128,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
     hooks.progress = make_progress_bar("reconstruct");
     hooks.tune_progress = make_progress_bar("tune");
   }
-  switch (reconstruction::reconstruct(series, options, hooks, processes)) {
+  switch (reconstruction::reconstruct(series, options, hooks, processes).outcome) {
     case reconstruction::Outcome::kFinished:
       break;
     case reconstruction::Outcome::kStopped:

@@ -40,6 +40,8 @@ std::vector<std::string> ReconstructOptions::faults() const {
   if (!(checkpoint_minutes >= 0))
     all.push_back(
         fmt::format("--checkpoint-minutes must be 0 or more, not {:g}", checkpoint_minutes));
+  if (resume && output.empty())
+    all.emplace_back("--resume continues from the files of an interrupted run: give their output");
   return all;
 }
 
@@ -56,6 +58,7 @@ std::vector<std::string> ReconstructOptions::faults_of_job() const {
 
 void check_options(const ReconstructOptions& options) {
   base::require_no_faults(options.faults());
+  if (options.output.empty()) return;
   const OutputPaths paths = output_paths(options.output);
   // Without a checkpoint there is nothing to resume, and what else is there is not this run's.
   const bool resumes = options.resume && (std::filesystem::exists(paths.model) ||

@@ -21,7 +21,8 @@ struct ReconstructOptions {
   bool choose_penalty = false;  ///< of total variation, by held-out error, in place of fit.penalty
   bool tune = false;  ///< choose the weight, rank and epochs by held-out error too (tune.h)
   output::VolumeOptions volume;
-  std::filesystem::path output;  ///< the volume; model, JSON and pictures lie beside it
+  std::filesystem::path output;  ///< the volume; model, JSON and pictures lie beside it;
+                                 ///< empty: results stay in memory
   bool overwrite = false;
   bool resume = false;  ///< continue from the model file, if there is one
   double checkpoint_minutes = 5;

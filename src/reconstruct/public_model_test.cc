@@ -3,6 +3,7 @@
 #include <cmath>
 #include <vector>
 
+#include "field/sampling/sample_box.h"
 #include "io/mrc.h"
 #include "output/model_file.h"
 #include "output/volume.h"
@@ -44,6 +45,41 @@ TEST(PublicModel, TurnsBoxesByEulerAngles) {
       {.centre_px = {30, 40, 10}, .size = {5, 1, 1}, .voxel_px = 1.0, .euler_deg = {90, 0, 0}});
   for (std::size_t x = 0; x < 5; ++x)
     EXPECT_NEAR(values[x], 40.0 * inner.field->density(30, 42 - static_cast<double>(x), 10), 1e-4);
+}
+
+TEST(PublicModel, SamplesPoints) {
+  const testing::ScratchDirectory scratch;
+  auto inner = testing::uneven_model(FieldKind::kVm);
+  inner.is_dark = true;
+  output::save_model(scratch / "model.h5", inner);
+  const Model model(scratch / "model.h5");
+  std::vector<Point> points{{-1000, 0, 0}};
+  for (int i = 1; i < 3000; ++i)
+    points.push_back({10 + 0.03 * i, 4 + 0.035 * i, std::fmod(0.7 * i, 21.5)});
+  const auto values = model.sample_points(points);
+  ASSERT_EQ(values.size(), points.size());
+  EXPECT_EQ(values[0], 0.0f);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const auto [x, y, z] = points[i];
+    ASSERT_NEAR(values[i], -40.0 * inner.field->density(x, y, z), 1e-4) << i;
+  }
+  EXPECT_TRUE(model.sample_points({}).empty());
+  points[5][2] = std::nan("");
+  EXPECT_THROW(model.sample_points(points), Error);
+}
+
+TEST(PublicModel, TheRegionTurnsWithAnXAxisTilt) {
+  const testing::ScratchDirectory scratch;
+  auto inner = testing::uneven_model(FieldKind::kVm);
+  inner.x_tilt_deg = 7.0;
+  output::save_model(scratch / "model.h5", inner);
+  const Model model(scratch / "model.h5");
+  constexpr double kVoxel = 0.9;
+  const auto values = model.sample(model.region(kVoxel));
+  const auto expected = field::sample_box(*inner.field, output::region_box(inner, kVoxel));
+  ASSERT_EQ(values.size(), expected.size());
+  for (std::size_t i = 0; i < values.size(); ++i)
+    ASSERT_NEAR(values[i], 40.0f * expected[i], 1e-3) << i;
 }
 
 TEST(PublicModel, RefusesBoxesThatCannotBeSampled) {

@@ -73,7 +73,9 @@ std::optional<TunedFit> choose_settings(const measurement::Measurement& measurem
     return tune_penalty(measurement, options.field, options.fit, tune_hooks, processes);
   const std::string fingerprint = fingerprint_of(options, measurement, processes);
   std::optional<selection::TrialFile> file;
-  processes.run_collectively([&] { file.emplace(paths.trials, fingerprint, options.resume); });
+  const std::filesystem::path trials =
+      options.output.empty() ? std::filesystem::path() : paths.trials;
+  processes.run_collectively([&] { file.emplace(trials, fingerprint, options.resume); });
   return tune(measurement, options.field, options.fit, options.choose_penalty, *file, tune_hooks,
               processes);
 }
@@ -101,7 +103,8 @@ bool settle_options(const measurement::Measurement& measurement, const OutputPat
   return true;
 }
 
-// Fits, and calls save() when a checkpoint is due; false if it was stopped, after one.
+// Fits, and calls save(), if there is one, when a checkpoint is due; false if it was stopped, after
+// one.
 bool run_with_checkpoints(fit::Fit& fit, double checkpoint_minutes, const ReconstructHooks& hooks,
                           const std::function<void()>& save) {
   const base::Stopwatch running;
@@ -116,7 +119,7 @@ bool run_with_checkpoints(fit::Fit& fit, double checkpoint_minutes, const Recons
     // One that must stop stops all; when it is time for a checkpoint is up to the first.
     const double wanted = fit.processes().allreduce_max(stop ? 2.0 : is_due ? 1.0 : 0.0);
     stopped = wanted == 2.0;
-    if (wanted > 0.0) {
+    if (wanted > 0.0 && save) {
       save();
       since_checkpoint.restart();
     }
@@ -127,29 +130,31 @@ bool run_with_checkpoints(fit::Fit& fit, double checkpoint_minutes, const Recons
 
 }  // namespace
 
-Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& requested,
-                    const ReconstructHooks& hooks, const distributed::Communicator& processes) {
+RunResult reconstruct(const tilt_series::TiltSeries& tilt_series,
+                      const ReconstructOptions& requested, const ReconstructHooks& hooks,
+                      const distributed::Communicator& processes) {
   ReconstructOptions options = requested;
   const OutputPaths paths = output_paths(options.output);
   measurement::Measurement measurement = measurement::prepare_measurement(
-      tilt_series, options.specimen, io::scratch_directory(paths.volume),
+      tilt_series, options.specimen, io::scratch_directory(options.output),
       fit::band_rows(options.field), processes);
   measurement.held_out =
       measurement::held_out_views(measurement.geometry.tilt_deg, options.fit.hold_out);
   FitOrigin origin;
   if (!settle_options(measurement, paths, hooks, processes, options, origin.tuned))
-    return Outcome::kStoppedTuning;
+    return {.outcome = Outcome::kStoppedTuning, .results = {}};
   origin.fingerprint = fingerprint_of(options, measurement, processes);
   fit::Fit fit(measurement, options.field, options.fit, processes);
   if (options.resume) processes.run_collectively([&] { resume(paths, origin.fingerprint, fit); });
 
   const base::Stopwatch running;
-  const auto save = [&] {
-    save_checkpoint(paths.model, fit, model_info(measurement, options), origin);
-  };
-  if (!run_with_checkpoints(fit, options.checkpoint_minutes, hooks, save)) return Outcome::kStopped;
-  write_results(fit, measurement, options, origin, paths, running.seconds());
-  return Outcome::kFinished;
+  std::function<void()> save;
+  if (!options.output.empty())
+    save = [&] { save_checkpoint(paths.model, fit, model_info(measurement, options), origin); };
+  if (!run_with_checkpoints(fit, options.checkpoint_minutes, hooks, save))
+    return {.outcome = Outcome::kStopped, .results = {}};
+  return {.outcome = Outcome::kFinished,
+          .results = finish(fit, measurement, options, origin, running.seconds())};
 }
 
 }  // namespace tomofield::reconstruction

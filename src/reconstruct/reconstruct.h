@@ -3,12 +3,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "base/progress.h"
 #include "distributed/communicator.h"
 #include "fit/stages.h"
 #include "reconstruct/options.h"
+#include "reconstruct/results.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::reconstruction {
@@ -23,14 +25,20 @@ struct ReconstructHooks {
 
 enum class Outcome { kFinished, kStopped, kStoppedTuning };
 
-/// The main job: fits a field to the series and writes the volume (MRC), the
+/// What a run made.
+struct RunResult {
+  Outcome outcome = Outcome::kFinished;
+  std::optional<Results> results;  ///< of a finished run
+};
+
+/// Does the main job: fits a field to the series and writes the volume (MRC), the
 /// model (HDF5, also the checkpoint while it runs), and the figures and resolved
-/// options (JSON). Call check_options() and
-/// plan_run() first: this starts at once.
+/// options (JSON). Without ReconstructOptions::output, writes none of them and saves no checkpoint.
+/// Call check_options() and plan_run() first: this starts at once.
 ///
 /// Processes share the work if all of them call it: the results have the same bits as those of
 /// one, which the first puts in place.
-Outcome reconstruct(
+RunResult reconstruct(
     const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& options,
     const ReconstructHooks& hooks,
     const distributed::Communicator& processes = distributed::Communicator::alone());

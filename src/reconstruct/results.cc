@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "base/lanes.h"
 #include "io/json.h"
@@ -14,10 +15,9 @@
 namespace tomofield::reconstruction {
 namespace {
 
-// The error of the views held out, and a picture of the one nearest to zero tilt.
-nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& series,
-                         bool stopped_by_them, const std::filesystem::path& picture) {
-  const measurement::ViewErrors error = fit.held_out_error();
+// Draws the view nearest to zero tilt of those held out.
+void write_picture(const fit::Fit& fit, const measurement::Measurement& series,
+                   const measurement::ViewErrors& error, const std::filesystem::path& picture) {
   const auto nearest = std::ranges::min_element(error.views, {}, [&](int view) {
     return std::abs(series.geometry.tilt_deg[static_cast<std::size_t>(view)]);
   });
@@ -26,8 +26,16 @@ nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& se
   fit.processes().run_collectively([&] {
     if (fit.processes().is_first()) output::write_held_out_picture(picture, view);
   });
+}
+
+// Returns the error of the views held out, and draws one of them if the run writes files.
+nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& series,
+                         const ReconstructOptions& options) {
+  const measurement::ViewErrors error = fit.held_out_error();
+  if (!options.output.empty())
+    write_picture(fit, series, error, output_paths(options.output).held_out_picture);
   nlohmann::json json =
-      measurement::report_held_out(error, series.geometry.tilt_deg, stopped_by_them);
+      measurement::report_held_out(error, series.geometry.tilt_deg, options.fit.patience > 0);
   json["error_by_epoch"] = fit.progress().held_out_error;
   return json;
 }
@@ -58,26 +66,28 @@ output::ModelInfo model_info(const measurement::Measurement& series,
   return info;
 }
 
-void write_results(fit::Fit& fit, const measurement::Measurement& series,
-                   const ReconstructOptions& options, const FitOrigin& origin,
-                   const OutputPaths& paths, double seconds) {
+Results finish(fit::Fit& fit, const measurement::Measurement& series,
+               const ReconstructOptions& options, const FitOrigin& origin, double seconds) {
   nlohmann::json figures = output::figures_json(fit, series, seconds);
   figures["held_out"] = nullptr;
-  if (options.fit.hold_out > 0) {
-    figures["held_out"] = score_fit(fit, series, options.fit.patience > 0, paths.held_out_picture);
-  }
+  if (options.fit.hold_out > 0) figures["held_out"] = score_fit(fit, series, options);
   figures["processes"] = output::processes_json(fit, seconds);
   figures["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
-  save_fit(paths.model, fit, model_info(series, options), progress_state(fit, origin));
+  const output::ModelInfo info = model_info(series, options);
   const output::VolumeShare share = volume_share(fit, series);
-  output::Model model{model_info(series, options), fit.take_field()};
-  output::write_volume(model, options.volume, paths.volume, share);
+  const bool writes_files = !options.output.empty();
+  const OutputPaths paths = output_paths(options.output);
+  if (writes_files) save_fit(paths.model, fit, info, progress_state(fit, origin));
+  Results results{.model = {info, fit.take_field()},
+                  .metrics = {{"tomofield", TOMOFIELD_VERSION},
+                              {"options", options_json(options)},
+                              {"figures", std::move(figures)}}};
+  if (!writes_files) return results;
+  output::write_volume(results.model, options.volume, paths.volume, share);
   share.processes.run_collectively([&] {
-    if (!share.processes.is_first()) return;
-    io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
-                                {"options", options_json(options)},
-                                {"figures", figures}});
+    if (share.processes.is_first()) io::write_json(paths.json, results.metrics);
   });
+  return results;
 }
 
 }  // namespace tomofield::reconstruction

@@ -65,6 +65,7 @@ std::optional<json> TrialFile::find(const json& settings) const {
 
 void TrialFile::add(json trial) {
   trials_.push_back(std::move(trial));
+  if (path_.empty()) return;
   io::write_json(path_, {{"fingerprint", fingerprint_}, {"trials", trials_}});
 }
 

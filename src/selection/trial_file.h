@@ -38,7 +38,8 @@ nlohmann::json tuned_json(const Tuned<Settings>& tuned, const SettingsJson& sett
 class TrialFile {
  public:
   /// With `reuse`, reads the trials of an earlier run, if there are any. Throws Error if they
-  /// belong to another `fingerprint` (series and options) or are damaged.
+  /// belong to another `fingerprint` (series and options) or are damaged. An empty path keeps the
+  /// trials in memory.
   TrialFile(std::filesystem::path path, std::string fingerprint, bool reuse);
 
   /// Returns the trial that was made with these settings, if there is one.

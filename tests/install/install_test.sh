@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs a build into a scratch prefix, then builds and runs a consumer that
-# knows only that prefix.
+# knows only that prefix, and the examples.
 #   install_test.sh BUILD_DIR CONSUMER_DIR SCRATCH_DIR EXPECTED_VERSION
 set -euo pipefail
 build=$1 consumer=$2 scratch=$3 version=$4
@@ -37,3 +37,27 @@ output=$("$scratch/consumer/consumer") || fail "the consumer failed"
 echo "$output"
 grep -qx "tomofield $version" <<<"$output" || fail "the consumer linked another version"
 grep -q '^caught ' <<<"$output" || fail "the consumer did not catch tomofield::Error"
+
+# The examples, built against the package, reconstruct to the same bytes as the program.
+cmake -S "$source_dir/examples" -B "$scratch/examples" -G Ninja -DCMAKE_BUILD_TYPE=Release \
+  -DCMAKE_PREFIX_PATH="$scratch/prefix" -DCMAKE_FIND_PACKAGE_NO_PACKAGE_REGISTRY=ON
+cmake --build "$scratch/examples"
+program=$scratch/prefix/bin/tomofield
+export OMP_WAIT_POLICY=passive
+cd "$scratch"
+"$program" simulate cell --size 32 --thickness 16 --noise 0.05 --seed 1 >/dev/null
+"$program" reconstruct cell/tilt_series.mrc --tlt cell/tilt_series.tlt --thickness 16 \
+  --contrast bright --no-margin -o program.mrc >/dev/null
+"$scratch/examples/reconstruct_stack" cell/tilt_series.mrc cell/tilt_series.tlt 16 example.mrc ||
+  fail "examples/reconstruct_stack failed"
+cmp program.mrc example.mrc || fail "examples/reconstruct_stack gives another tomogram"
+"$scratch/examples/query_plane" example.h5 30 plane.pgm | grep -q '^32 x 32 values from ' ||
+  fail "examples/query_plane failed"
+[ "$(wc -c <plane.pgm)" -eq $((32 * 32 + 13)) ] || fail "plane.pgm has another size"
+
+python_package=("$scratch"/prefix/lib/python3*/dist-packages)
+if [ -d "${python_package[0]}" ]; then
+  PYTHONPATH=${python_package[0]} /usr/bin/python3 "$source_dir/examples/reconstruct.py" \
+    cell/tilt_series.mrc cell/tilt_series.tlt 16 python.mrc || fail "examples/reconstruct.py failed"
+  cmp program.mrc python.mrc || fail "examples/reconstruct.py gives another tomogram"
+fi

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace tomofield {
+
+/// A volume in memory: [z, y, x] with x fastest.
+struct Tomogram {
+  std::array<std::int64_t, 3> size{};  ///< voxels in x, y, z
+  double voxel_size_A = 1.0;
+  std::vector<float> values;
+};
+
+}  // namespace tomofield

@@ -1,0 +1,231 @@
+// tomofield._core: the C++ library as it is; tomofield/__init__.py makes it convenient.
+#include <pybind11/functional.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+#include <tomofield/error.h>
+#include <tomofield/evaluate.h>
+#include <tomofield/messages.h>
+#include <tomofield/model.h>
+#include <tomofield/reconstruct.h>
+#include <tomofield/version.h>
+
+#include <array>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "options.h"
+
+namespace tomofield::python {
+namespace {
+
+namespace py = pybind11;
+using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
+using PointArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+// Hands a vector over to numpy without a copy.
+py::array_t<float> to_array(std::vector<float> values, std::vector<py::ssize_t> shape) {
+  auto owner = std::make_unique<std::vector<float>>(std::move(values));
+  float* data = owner->data();
+  const py::capsule free_it(owner.release(),
+                            [](void* held) { delete static_cast<std::vector<float>*>(held); });
+  return py::array_t<float>(std::move(shape), data, free_it);
+}
+
+py::array_t<float> to_volume(std::vector<float> values, const std::array<std::int64_t, 3>& size) {
+  return to_array(std::move(values), {size[2], size[1], size[0]});
+}
+
+void require_dimensions(const py::array& array, py::ssize_t wanted, const char* what) {
+  if (array.ndim() != wanted)
+    throw Error(std::string(what) + ", not of " + std::to_string(array.ndim()) + " dimensions");
+}
+
+std::vector<float> values_of(const FloatArray& array) {
+  return {array.data(), array.data() + array.size()};
+}
+
+Tomogram to_tomogram(const FloatArray& array, double voxel_size_A) {
+  require_dimensions(array, 3, "a volume is an array [z, y, x]");
+  return {.size = {array.shape(2), array.shape(1), array.shape(0)},
+          .voxel_size_A = voxel_size_A,
+          .values = values_of(array)};
+}
+
+TiltSeries series_of(const FloatArray& images, std::vector<double> tilt_deg) {
+  require_dimensions(images, 3, "a tilt series is an array [view, y, x]");
+  return TiltSeries::from_images({.values = values_of(images),
+                                  .width = images.shape(2),
+                                  .height = images.shape(1),
+                                  .tilt_deg = std::move(tilt_deg)});
+}
+
+// Calls Python after every step: the user's callback, if any, and the handlers of signals. Keeps
+// the exception that they raise until the reconstruction has ended in order.
+class Listener {
+ public:
+  explicit Listener(py::object callback) : callback_(std::move(callback)) {}
+
+  bool operator()(const Progress& progress) {
+    const py::gil_scoped_acquire locked;
+    try {
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      if (callback_.is_none()) return true;
+      const py::object answer = callback_(progress);
+      return answer.is_none() || answer.cast<bool>();
+    } catch (...) {
+      raised_ = std::current_exception();
+      return false;
+    }
+  }
+
+  void rethrow() const {
+    if (raised_) std::rethrow_exception(raised_);
+  }
+
+ private:
+  py::object callback_;
+  std::exception_ptr raised_;
+};
+
+py::dict run(const TiltSeries& series, const Options& options, py::object callback) {
+  Listener listener(std::move(callback));
+  Reconstruction made;
+  {
+    const py::gil_scoped_release unlocked;
+    made =
+        reconstruct(series, options, [&](const Progress& progress) { return listener(progress); });
+  }
+  listener.rethrow();
+  py::dict result;
+  result["is_finished"] = made.is_finished;
+  result["metrics"] = made.metrics;
+  result["model"] = made.model;
+  result["tomogram"] = py::none();
+  if (made.tomogram)
+    result["tomogram"] = to_volume(std::move(made.tomogram->values), made.tomogram->size);
+  return result;
+}
+
+py::array_t<float> sample(const Model& model, const SampleBox& box) {
+  std::vector<float> values;
+  {
+    const py::gil_scoped_release unlocked;
+    values = model.sample(box);
+  }
+  return to_volume(std::move(values), box.size);
+}
+
+py::array_t<float> sample_points(const Model& model, const PointArray& points) {
+  if (points.ndim() != 2 || points.shape(1) != 3)
+    throw Error("points are an array of N rows with x, y and z");
+  std::vector<Point> list(static_cast<std::size_t>(points.shape(0)));
+  for (std::size_t i = 0; i < list.size(); ++i)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      list[i][axis] = points.at(static_cast<py::ssize_t>(i), static_cast<py::ssize_t>(axis));
+  std::vector<float> values;
+  {
+    const py::gil_scoped_release unlocked;
+    values = model.sample_points(list);
+  }
+  return to_array(std::move(values), {points.shape(0)});
+}
+
+// Passes messages to the logger "tomofield". Whatever says something runs without the interpreter's
+// lock, which is taken here: else two threads could wait for each other.
+void log(MessageKind kind, std::string_view text) {
+  const py::gil_scoped_acquire locked;
+  try {
+    const auto message = py::reinterpret_steal<py::object>(
+        PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "replace"));
+    const py::object logger = py::module_::import("logging").attr("getLogger")("tomofield");
+    logger.attr(kind == MessageKind::kWarning ? "warning" : "info")(message);
+  } catch (py::error_already_set& error) {
+    error.discard_as_unraisable("tomofield's logger");
+  }
+}
+
+void add_reconstruct(py::module_& module) {
+  py::class_<TiltSeries>(module, "TiltSeries")
+      .def_static("from_files", &TiltSeries::from_files)
+      .def_static("from_images", &series_of);
+  py::class_<Progress>(module, "Progress", "How far a reconstruction is.")
+      .def_readonly("fraction_done", &Progress::fraction_done, "from 0 to 1")
+      .def_readonly("seconds_elapsed", &Progress::seconds_elapsed)
+      .def_readonly("seconds_left", &Progress::seconds_left)
+      .def_readonly("is_trial", &Progress::is_trial,
+                    "True for trials that choose settings before the fit")
+      .def_readonly("detail", &Progress::detail, "a few words: epoch, loss, steps a second");
+  module.def("reconstruct", &run);
+  module.def("set_thread_count", &set_thread_count);
+}
+
+void add_model(py::module_& module) {
+  py::class_<SampleBox>(module, "SampleBox")
+      .def(py::init([](const Point& centre_px, const std::array<std::int64_t, 3>& size,
+                       double voxel_px, const std::array<double, 3>& euler_deg) {
+        return SampleBox{centre_px, size, voxel_px, euler_deg};
+      }))
+      .def_readonly("centre_px", &SampleBox::centre_px)
+      .def_readonly("size", &SampleBox::size)
+      .def_readonly("voxel_px", &SampleBox::voxel_px)
+      .def_readonly("euler_deg", &SampleBox::euler_deg);
+  py::class_<Model>(module, "Model")
+      .def(py::init<const std::filesystem::path&>(), py::call_guard<py::gil_scoped_release>())
+      .def("pixel_size_A", &Model::pixel_size_A)
+      .def("region", &Model::region)
+      .def("sample", &sample)
+      .def("sample_points", &sample_points);
+}
+
+void add_evaluate(py::module_& module) {
+  py::class_<VolumeScores>(module, "VolumeScores", "How alike a volume is to the truth.")
+      .def_readonly("psnr_raw_dB", &VolumeScores::psnr_raw_dB)
+      .def_readonly("psnr_affine_dB", &VolumeScores::psnr_affine_dB,
+                    "after the best scale and offset")
+      .def_readonly("ssim_raw", &VolumeScores::ssim_raw)
+      .def_readonly("ssim_affine", &VolumeScores::ssim_affine)
+      .def_readonly("correlation", &VolumeScores::correlation)
+      .def_readonly("scale", &VolumeScores::scale)
+      .def_readonly("offset", &VolumeScores::offset)
+      .def_readonly("peak", &VolumeScores::peak);
+  py::class_<ShellCorrelation>(module, "ShellCorrelation", "Fourier shell correlation, by shell.")
+      .def_readonly("frequency_per_A", &ShellCorrelation::frequency_per_A)
+      .def_readonly("correlation", &ShellCorrelation::correlation)
+      .def_readonly("voxels", &ShellCorrelation::voxels)
+      .def("resolution_A", &resolution_A, py::arg("threshold") = 0.143,
+           "Return where the correlation first falls below a threshold, in Å, or None.");
+  module.def("score_volume", [](const FloatArray& volume, const FloatArray& truth) {
+    const Tomogram a = to_tomogram(volume, 1.0), b = to_tomogram(truth, 1.0);
+    const py::gil_scoped_release unlocked;
+    return score_volume(a, b);
+  });
+  module.def("correlate_shells",
+             [](const FloatArray& first, const FloatArray& second, double voxel_size_A) {
+               const Tomogram a = to_tomogram(first, voxel_size_A);
+               const Tomogram b = to_tomogram(second, voxel_size_A);
+               const py::gil_scoped_release unlocked;
+               return correlate_shells(a, b);
+             });
+}
+
+}  // namespace
+}  // namespace tomofield::python
+
+PYBIND11_MODULE(_core, module) {
+  using namespace tomofield;
+  pybind11::register_exception<Error>(module, "Error", PyExc_RuntimeError);
+  module.attr("__version__") = library_version();
+  set_message_handler(python::log);
+  python::add_options(module);
+  python::add_reconstruct(module);
+  python::add_model(module);
+  python::add_evaluate(module);
+}

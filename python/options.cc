@@ -1,0 +1,158 @@
+#include "options.h"
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+#include <tomofield/error.h>
+#include <tomofield/options.h>
+
+#include <array>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "base/enum_names.h"
+
+namespace tomofield::base {
+
+template <>
+struct EnumNames<VoxelType> {
+  static constexpr std::array kNames{std::pair{VoxelType::kFloat32, "float32"},
+                                     std::pair{VoxelType::kFloat16, "float16"},
+                                     std::pair{VoxelType::kInt16, "int16"}};
+};
+
+}  // namespace tomofield::base
+
+namespace tomofield::python {
+namespace {
+
+namespace py = pybind11;
+using Class = py::class_<Options>;
+
+template <typename Enum>
+Enum value_named(const char* option, const std::string& name) {
+  if (const auto value = base::enum_named<Enum>(name)) return *value;
+  std::string choices;
+  for (const auto& [value, choice] : base::EnumNames<Enum>::kNames)
+    choices += (choices.empty() ? "'" : ", '") + std::string(choice) + "'";
+  throw Error(std::string("the option ") + option + " is one of " + choices + ", not '" + name +
+              "'");
+}
+
+template <typename Enum>
+void add_choice(Class& options, const char* name, Enum Options::*member) {
+  options.def_property(
+      name, [member](const Options& o) { return std::string(base::name_of(o.*member)); },
+      [name, member](Options& o, const std::string& word) {
+        o.*member = value_named<Enum>(name, word);
+      });
+}
+
+template <typename Enum>
+void add_choice(Class& options, const char* name, std::optional<Enum> Options::*member) {
+  options.def_property(
+      name,
+      [member](const Options& o) {
+        return o.*member ? std::optional<std::string>(base::name_of(*(o.*member))) : std::nullopt;
+      },
+      [name, member](Options& o, const std::optional<std::string>& word) {
+        o.*member = word ? std::optional(value_named<Enum>(name, *word)) : std::nullopt;
+      });
+}
+
+// x0, y0, x1, y1
+void add_rectangle(Class& options) {
+  using Corners = std::array<std::int64_t, 4>;
+  options.def_property(
+      "roi",
+      [](const Options& o) {
+        return o.roi ? std::optional(Corners{o.roi->x0, o.roi->y0, o.roi->x1, o.roi->y1})
+                     : std::nullopt;
+      },
+      [](Options& o, const std::optional<Corners>& c) {
+        o.roi = c ? std::optional(Rectangle{(*c)[0], (*c)[1], (*c)[2], (*c)[3]}) : std::nullopt;
+      });
+}
+
+void add_files(py::module_& module) {
+  py::class_<SeriesFiles>(module, "SeriesFiles")
+      .def(py::init())
+      .def_readwrite("stack", &SeriesFiles::stack)
+      .def_readwrite("tlt", &SeriesFiles::tlt)
+      .def_readwrite("xf", &SeriesFiles::xf)
+      .def_readwrite("xtilt", &SeriesFiles::xtilt)
+      .def_readwrite("aln", &SeriesFiles::aln)
+      .def_readwrite("mdoc", &SeriesFiles::mdoc)
+      .def_readwrite("mask", &SeriesFiles::mask)
+      .def_readwrite("fiducials", &SeriesFiles::fiducials);
+}
+
+void add_views_and_specimen(Class& options) {
+  options.def_readwrite("exclude", &Options::exclude)
+      .def_readwrite("bin", &Options::bin)
+      .def_readwrite("angpix", &Options::angpix)
+      .def_readwrite("pixel_size_A", &Options::pixel_size_A)
+      .def_readwrite("take_log", &Options::take_log)
+      .def_readwrite("bead_diameter_nm", &Options::bead_diameter_nm)
+      .def_readwrite("thickness", &Options::thickness)
+      .def_readwrite("hand", &Options::hand)
+      .def_readwrite("axis_x", &Options::axis_x)
+      .def_readwrite("axis_z", &Options::axis_z)
+      .def_readwrite("with_margin", &Options::with_margin);
+  add_choice(options, "contrast", &Options::contrast);
+  add_rectangle(options);
+}
+
+void add_field_and_fit(Class& options) {
+  options.def_readwrite("leaf_size", &Options::leaf_size)
+      .def_readwrite("leaf_budget", &Options::leaf_budget)
+      .def_readwrite("vertex_spacing", &Options::vertex_spacing)
+      .def_readwrite("rank", &Options::rank)
+      .def_readwrite("margin_spacing", &Options::margin_spacing)
+      .def_readwrite("epochs", &Options::epochs)
+      .def_readwrite("vertex_epochs", &Options::vertex_epochs)
+      .def_readwrite("coarse_epochs", &Options::coarse_epochs)
+      .def_readwrite("coarse_bin", &Options::coarse_bin)
+      .def_readwrite("subsets", &Options::subsets)
+      .def_readwrite("ray_samples", &Options::ray_samples)
+      .def_readwrite("rays_per_step", &Options::rays_per_step)
+      .def_readwrite("learning_rate", &Options::learning_rate)
+      .def_readwrite("density_variation", &Options::density_variation)
+      .def_readwrite("factor_variation", &Options::factor_variation)
+      .def_readwrite("boundary", &Options::boundary)
+      .def_readwrite("fourier", &Options::fourier)
+      .def_readwrite("fit_view_scale", &Options::fit_view_scale)
+      .def_readwrite("hold_out", &Options::hold_out)
+      .def_readwrite("tune", &Options::tune)
+      .def_readwrite("patience", &Options::patience)
+      .def_readwrite("seed", &Options::seed);
+  add_choice(options, "field", &Options::field);
+  add_choice(options, "tree", &Options::tree);
+  add_choice(options, "activation", &Options::activation);
+  add_choice(options, "engine", &Options::engine);
+  add_choice(options, "penalty", &Options::penalty);
+  add_choice(options, "fourier_ring", &Options::fourier_ring);
+}
+
+void add_volume_and_run(Class& options) {
+  options.def_readwrite("invert", &Options::invert)
+      .def_readwrite("output", &Options::output)
+      .def_readwrite("overwrite", &Options::overwrite)
+      .def_readwrite("resume", &Options::resume)
+      .def_readwrite("checkpoint_minutes", &Options::checkpoint_minutes);
+  add_choice(options, "voxel_type", &Options::voxel_type);
+  add_choice(options, "axes", &Options::axes);
+}
+
+}  // namespace
+
+void add_options(py::module_& module) {
+  add_files(module);
+  Class options(module, "Options");
+  options.def(py::init());
+  add_views_and_specimen(options);
+  add_field_and_fit(options);
+  add_volume_and_run(options);
+}
+
+}  // namespace tomofield::python

@@ -1,0 +1,72 @@
+"""The options of a reconstruction, as keyword arguments of tomofield.reconstruct()."""
+
+import os
+from typing import Literal, Optional, Tuple, TypedDict, Union
+
+_Path = Union[str, "os.PathLike[str]"]
+
+
+class Options(TypedDict, total=False):
+    """Everything that a user can choose; docs/options.md lists units, ranges and defaults.
+
+    Options that may be None are chosen from the data or from the other options. Lengths on the
+    specimen are unbinned pixels of the aligned view; lengths of the field are binned pixels.
+    """
+
+    # Views
+    exclude: str
+    bin: float
+    angpix: Optional[float]
+    pixel_size_A: Optional[float]
+    contrast: Literal["dark", "bright"]
+    take_log: bool
+    bead_diameter_nm: Optional[float]
+
+    # Specimen
+    thickness: float
+    roi: Optional[Tuple[int, int, int, int]]  # x0, y0, x1, y1
+    hand: Literal[1, -1]
+    axis_x: Optional[float]
+    axis_z: Optional[float]
+    with_margin: bool
+
+    # Field
+    field: Literal["vm", "grid"]
+    leaf_size: Optional[int]
+    tree: Literal["uniform", "adaptive"]
+    leaf_budget: int
+    vertex_spacing: float
+    rank: int
+    activation: Optional[Literal["softplus", "identity"]]
+    margin_spacing: float
+
+    # Fit
+    epochs: Optional[int]
+    vertex_epochs: Optional[int]
+    coarse_epochs: Optional[int]
+    coarse_bin: int
+    subsets: int
+    engine: Literal["slab", "ray"]
+    ray_samples: int
+    rays_per_step: int
+    learning_rate: Optional[float]
+    density_variation: Optional[float]
+    factor_variation: float
+    penalty: Optional[Literal["concave", "smooth"]]
+    boundary: float
+    fourier: float
+    fourier_ring: Literal["mean", "max"]
+    fit_view_scale: Optional[bool]
+    hold_out: int
+    tune: bool
+    patience: int
+    seed: int
+
+    # Volume and run
+    voxel_type: Literal["float32", "float16", "int16"]
+    axes: Literal["xyz", "xzy"]
+    invert: bool
+    output: _Path
+    overwrite: bool
+    resume: bool
+    checkpoint_minutes: float

@@ -1,0 +1,74 @@
+#include "tomofield/evaluate.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "evaluate/compare.h"
+#include "evaluate/fsc.h"
+#include "tomofield/error.h"
+
+namespace tomofield {
+namespace {
+
+base::Volume volume_of(const Tomogram& tomogram, const char* name) {
+  const auto [nx, ny, nz] = tomogram.size;
+  constexpr std::int64_t kLargestSide = std::int64_t{1} << 20;
+  const auto is_side = [](std::int64_t n) { return n >= 1 && n <= kLargestSide; };
+  const bool has_sides = is_side(nx) && is_side(ny) && is_side(nz);
+  if (!has_sides || tomogram.values.size() != base::Shape3{nx, ny, nz}.voxels())
+    throw Error(fmt::format("the {} has {} values for {} × {} × {} voxels: give one a voxel", name,
+                            tomogram.values.size(), nx, ny, nz));
+  base::Volume volume;
+  volume.shape = {nx, ny, nz};
+  volume.voxel_size_A = tomogram.voxel_size_A;
+  volume.data = tomogram.values;
+  return volume;
+}
+
+evaluate::VolumePair pair_of(const Tomogram& first, const char* first_name, const Tomogram& second,
+                             const char* second_name) {
+  evaluate::VolumePair pair{
+      .first = volume_of(first, first_name), .second = volume_of(second, second_name), .box = {}};
+  if (first.size != second.size)
+    throw Error(
+        fmt::format("the {} has {} × {} × {} voxels and the {} {} × {} × {}: cut both to one size",
+                    first_name, first.size[0], first.size[1], first.size[2], second_name,
+                    second.size[0], second.size[1], second.size[2]));
+  return pair;
+}
+
+}  // namespace
+
+VolumeScores score_volume(const Tomogram& volume, const Tomogram& truth) {
+  const evaluate::Comparison score = evaluate::compare(pair_of(volume, "volume", truth, "truth"));
+  return {.psnr_raw_dB = score.psnr.raw_dB,
+          .psnr_affine_dB = score.psnr.affine_dB,
+          .ssim_raw = score.ssim.raw,
+          .ssim_affine = score.ssim.affine,
+          .correlation = score.psnr.correlation,
+          .scale = score.psnr.scale,
+          .offset = score.psnr.offset,
+          .peak = score.psnr.peak};
+}
+
+ShellCorrelation correlate_shells(const Tomogram& first, const Tomogram& second) {
+  const auto pair = pair_of(first, "first volume", second, "second volume");
+  if (!(second.voxel_size_A > 0.0))
+    throw Error(
+        fmt::format("the second volume's voxel size of {} Å is not a positive number, so its "
+                    "frequencies have no scale",
+                    second.voxel_size_A));
+  evaluate::Fsc fsc = evaluate::fourier_shell_correlation(
+      pair.first, pair.second, evaluate::edge_window(pair.second.shape), std::nullopt);
+  return {.frequency_per_A = std::move(fsc.frequency_per_A),
+          .correlation = std::move(fsc.all.correlation),
+          .voxels = std::move(fsc.all.voxels)};
+}
+
+std::optional<double> resolution_A(const ShellCorrelation& curve, double threshold) {
+  return evaluate::crossing_A(
+      curve.frequency_per_A, {.correlation = curve.correlation, .voxels = curve.voxels}, threshold);
+}
+
+}  // namespace tomofield

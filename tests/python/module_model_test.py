@@ -1,0 +1,59 @@
+"""tomofield.Model gives points, boxes and tilted planes, as `tomofield export` does."""
+
+import mrcfile
+import numpy as np
+import pytest
+
+import tomofield
+
+
+@pytest.fixture(scope="module")
+def model(series):
+    return tomofield.Model(series.folder / "tomogram.h5")
+
+
+def test_the_region_is_the_tomogram(series, model):
+    region = model.region()
+    assert region == tomofield.Box((16.0, 16.0, 8.0), (32, 32, 16))
+    np.testing.assert_array_equal(model.sample(region), series.tomogram)
+    voxel_A = float(mrcfile.open(series.folder / "tomogram.mrc").voxel_size.x)
+    assert model.pixel_size_A == pytest.approx(voxel_A)
+
+
+def test_points_are_voxels(series, model):
+    z, y, x = np.mgrid[0:16, 0:32, 0:32]
+    points = np.stack([x, y, z], axis=-1).reshape(-1, 3) + 0.5
+    np.testing.assert_allclose(model.sample_points(points).reshape(16, 32, 32), series.tomogram,
+                               atol=1e-5 * np.abs(series.tomogram).max())
+    assert model.sample_points([[-1000, 0, 0]]) == [0]
+    assert model.sample_points(np.empty((0, 3))).shape == (0,)
+
+
+def test_a_tilted_plane_is_a_box_of_one_voxel(model):
+    plane = tomofield.Box((16, 16, 8), (11, 9, 1), euler_deg=(0, 30, 0))
+    values = model.sample(plane)
+    assert values.shape == (1, 9, 11)
+    # About y: the box's x runs along cos x + sin z of the model.
+    c, s = np.cos(np.radians(30)), np.sin(np.radians(30))
+    along = np.arange(11) - 5.0
+    points = [(16 + c * u, 16 + v, 8 + s * u) for v in np.arange(9) - 4.0 for u in along]
+    np.testing.assert_allclose(values[0].ravel(), model.sample_points(points),
+                               atol=1e-5 * np.abs(values).max())
+
+
+def test_a_turned_box_is_what_export_writes(series, model):
+    series.run("export", "tomogram.h5", "-o", "box.mrc", "--voxel-size",
+               float(2 * model.pixel_size_A))
+    box = model.region(voxel_px=2.0)
+    np.testing.assert_array_equal(model.sample(box), mrcfile.read(series.folder / "box.mrc"))
+
+
+def test_bad_input_is_refused_in_a_sentence(series, model):
+    with pytest.raises(tomofield.Error, match="absent.h5"):
+        tomofield.Model("absent.h5")
+    with pytest.raises(tomofield.Error, match="box of 0"):
+        model.sample(tomofield.Box((0, 0, 0), (0, 1, 1)))
+    with pytest.raises(tomofield.Error, match="N rows"):
+        model.sample_points([1, 2, 3])
+    with pytest.raises(tomofield.Error, match="finite"):
+        model.sample_points([[1, 2, np.nan]])

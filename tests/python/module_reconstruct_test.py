@@ -1,0 +1,160 @@
+"""tomofield.reconstruct() gives what the program gives, and stops when it is told to."""
+
+import _thread
+import json
+import os
+import threading
+
+import numpy as np
+import pytest
+
+import tomofield
+
+
+def test_arrays_with_the_defaults_give_the_bits_of_the_program(series):
+    reports = []
+    made = tomofield.reconstruct(series.views, series.tilt_deg, thickness=16, contrast="bright",
+                                 with_margin=False, progress=reports.append)
+    assert made.is_finished
+    assert made.tomogram.dtype == np.float32
+    np.testing.assert_array_equal(made.tomogram, series.tomogram)
+    np.testing.assert_array_equal(made.model.sample(made.model.region()), series.tomogram)
+    assert reports[-1].fraction_done == 1.0 and {r.is_trial for r in reports} == {True, False}
+    assert made.metrics["options"]["fit"] == read_json(series, "tomogram.json")["options"]["fit"]
+
+
+def test_files_with_the_defaults_give_the_bytes_of_the_program(series, tmp_path):
+    made = tomofield.reconstruct(series.folder / "s.mrc", tlt=str(series.folder / "s.tlt"),
+                                 thickness=16, contrast="bright", with_margin=False,
+                                 output=tmp_path / "t.mrc")
+    assert made.tomogram is None
+    assert (tmp_path / "t.mrc").read_bytes() == (series.folder / "tomogram.mrc").read_bytes()
+    assert made.metrics == tomofield.read_metrics(tmp_path / "t.mrc")
+    assert made.metrics == tomofield.read_metrics(tmp_path / "t.json")
+    assert sorted(os.listdir(tmp_path)) == ["t.h5", "t.json", "t.mrc"]
+
+
+def read_json(series, name):
+    return json.loads((series.folder / name).read_text())
+
+
+def test_layouts_and_types_of_arrays_do_not_matter(series, quick):
+    usual = tomofield.reconstruct(series.views, series.tilt_deg, **quick).tomogram
+    flipped = np.asfortranarray(series.views.astype(np.float64))
+    again = tomofield.reconstruct(flipped, list(series.tilt_deg), **quick).tomogram
+    np.testing.assert_array_equal(usual, again)
+
+
+def test_the_callback_stops_it_and_resume_goes_on(series, quick, tmp_path):
+    whole = tomofield.reconstruct(series.views, series.tilt_deg, **quick).tomogram
+    stopped = tomofield.reconstruct(series.views, series.tilt_deg, **quick,
+                                    progress=lambda p: p.fraction_done < 0.5)
+    assert not stopped.is_finished
+    assert (stopped.tomogram, stopped.model, stopped.metrics) == (None, None, {})
+    output = tmp_path / "t.mrc"
+    assert not tomofield.reconstruct(series.views, series.tilt_deg, **quick, output=output,
+                                     progress=lambda p: False).is_finished
+    assert not output.exists()
+    resumed = tomofield.reconstruct(series.views, series.tilt_deg, **quick, output=output,
+                                    resume=True)
+    np.testing.assert_array_equal(resumed.model.sample(resumed.model.region()), whole)
+
+
+def test_an_exception_of_the_callback_comes_back(series, quick):
+    def fail(progress):
+        raise ZeroDivisionError("of the callback")
+    with pytest.raises(ZeroDivisionError, match="of the callback"):
+        tomofield.reconstruct(series.views, series.tilt_deg, **quick, progress=fail)
+
+
+def test_ctrl_c_stops_it_and_leaves_a_checkpoint(series, quick, tmp_path):
+    steps = []
+
+    def interrupt(progress):
+        steps.append(progress)
+        if len(steps) == 3:
+            _thread.interrupt_main()
+    with pytest.raises(KeyboardInterrupt):
+        tomofield.reconstruct(series.views, series.tilt_deg, **{**quick, "epochs": 50},
+                              progress=interrupt, output=tmp_path / "t.mrc")
+    assert len(steps) == 3
+    assert (tmp_path / "t.h5").exists() and not (tmp_path / "t.mrc").exists()
+
+
+def test_messages_go_to_the_logger(series, quick, caplog):
+    views = series.views.copy()
+    views[2, 5, 7] = np.nan
+    with caplog.at_level("INFO", logger="tomofield"):
+        tomofield.reconstruct(views, series.tilt_deg, **quick)
+    levels = {record.levelname: record.getMessage() for record in caplog.records}
+    assert "1 NaN" in levels["WARNING"] and "section 3" in levels["WARNING"]
+    assert "INFO" in levels
+
+
+def test_other_threads_run_meanwhile(series, quick):
+    """They wait for the step in which the callback runs: with the interpreter locked, for ever."""
+    has_begun, has_run = threading.Event(), threading.Event()
+
+    def other():
+        has_begun.wait()
+        has_run.set()
+    thread = threading.Thread(target=other)
+    thread.start()
+    tomofield.reconstruct(series.views, series.tilt_deg, **{**quick, "epochs": 200},
+                          progress=lambda p: has_begun.set() or not has_run.is_set())
+    assert has_run.is_set()
+    thread.join()
+
+
+def test_it_runs_in_any_thread(series, quick):
+    here = tomofield.reconstruct(series.views, series.tilt_deg, **quick).tomogram
+    made = []
+    threads = [threading.Thread(target=lambda: made.append(
+        tomofield.reconstruct(series.views, series.tilt_deg, **quick).tomogram)) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(made) == 2
+    for there in made:
+        np.testing.assert_array_equal(here, there)
+
+
+def test_bad_input_is_refused_in_a_sentence(series, quick):
+    views, tilts = series.views, series.tilt_deg
+    with pytest.raises(tomofield.Error, match="absent.mrc"):
+        tomofield.reconstruct("absent.mrc", **quick)
+    with pytest.raises(tomofield.Error, match="images of 32 × 32 pixels"):
+        tomofield.reconstruct(views, tilts[:-1], **quick)
+    with pytest.raises(tomofield.Error, match="2 dimensions"):
+        tomofield.reconstruct(views[0], tilts, **quick)
+    with pytest.raises(tomofield.Error, match="tilt_deg"):
+        tomofield.reconstruct(views, **quick)
+    with pytest.raises(tomofield.Error, match="xf"):
+        tomofield.reconstruct(views, tilts, xf="a.xf", **quick)
+    with pytest.raises(tomofield.Error, match="thickness"):
+        tomofield.reconstruct(views, tilts, **{**quick, "thickness": -3})
+    with pytest.raises(tomofield.Error, match="contrast is one of 'dark', 'bright', not 'grey'"):
+        tomofield.reconstruct(views, tilts, **{**quick, "contrast": "grey"})
+    with pytest.raises(TypeError, match="rank cannot be 'many'"):
+        tomofield.reconstruct(views, tilts, **{**quick, "rank": "many"})
+    with pytest.raises(TypeError, match="no option 'ranks'"):
+        tomofield.reconstruct(views, tilts, **quick, ranks=3)
+    with pytest.raises(tomofield.Error, match="cannot read 'absent.json'"):
+        tomofield.read_metrics("absent.mrc")
+
+
+def test_every_option_of_the_library_is_a_typed_keyword():
+    core = {name for name in dir(tomofield._core.Options) if not name.startswith("_")}
+    assert core == set(tomofield.Options.__annotations__)
+
+
+def test_options_keep_what_they_are_set_to():
+    values = {"contrast": "bright", "penalty": "smooth", "roi": (1, 2, 3, 4), "leaf_size": 64,
+              "voxel_type": "int16", "seed": 2**63 + 1, "take_log": True, "exclude": "1-3"}
+    core = tomofield._options(values)
+    for name, value in values.items():
+        found = getattr(core, name)
+        assert (tuple(found) if name == "roi" else found) == value
+    core.penalty = core.roi = core.leaf_size = None
+    assert core.penalty is None and core.roi is None and core.leaf_size is None
