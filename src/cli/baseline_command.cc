@@ -2,9 +2,9 @@
 
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 
-#include "base/faults.h"
 #include "base/parallel.h"
 #include "baseline/run_baseline.h"
 #include "baseline/tune.h"
@@ -12,24 +12,24 @@
 #include "cli/common_options.h"
 #include "cli/enum_option.h"
 #include "cli/fit_options.h"
-#include "cli/input_options.h"
+#include "cli/help_formatter.h"
 #include "cli/number_checks.h"
 #include "cli/pictures.h"
 #include "cli/progress_bar.h"
-#include "cli/specimen_options.h"
+#include "cli/table_options.h"
 #include "cli/tensorf_command.h"
-#include "cli/volume_options.h"
-#include "fit/options.h"
+#include "output/shared_options.h"
 
 namespace tomofield::cli {
 namespace {
 
+using option_table::Group;
+
 template <typename Method>
 struct Arguments {
-  baseline::BaselineOptions options;
+  option_table::Choices choices;
   Method method;
-  std::string view_scale = "auto";
-  std::string non_negative = "auto";
+  std::optional<bool> non_negative;
   bool dry_run = false;
 };
 
@@ -55,46 +55,41 @@ void print_summary(const baseline::BaselineSummary& summary) {
 
 template <typename Method>
 void run(Arguments<Method>& arguments) {
-  baseline::BaselineOptions& options = arguments.options;
+  const Options& shared = arguments.choices.options;
   Method& method = arguments.method;
-  const bool is_dark = options.input.contrast == Contrast::kDark;
-  options.fit_view_scale = is_on(arguments.view_scale, is_dark);
   if constexpr (requires { method.non_negative; })
-    method.non_negative = is_on(arguments.non_negative, !is_dark);
-  options.method = method;
-  base::require_no_faults(options.specimen.faults());
-  baseline::check_outputs(options);
-  const tilt_series::TiltSeries series(options.input);
-  print_plan(baseline::plan_baseline(series, options), method.facts(), options.volume.axes);
-  if (options.tune) fmt::print("short trials first, that choose settings by held-out views\n");
+    method.non_negative = arguments.non_negative.value_or(shared.contrast != Contrast::kDark);
+  const baseline::BaselineOptions options{arguments.choices.files, shared, method};
+  baseline::check_options(options);
+  const tilt_series::TiltSeries series(output::series_options(options.files, shared));
+  print_plan(baseline::plan_baseline(series, options), method.facts(), shared.axes);
+  if (shared.tune) fmt::print("short trials first, that choose settings by held-out views\n");
   std::fflush(stdout);  // before what comes of the run, in a file too
   if (arguments.dry_run) return;
   print_summary(baseline::run_baseline(series, options,
                                        {make_progress_bar("tune"), make_progress_bar("baseline")}));
-  const baseline::BaselinePaths paths = baseline::baseline_paths(options.output);
+  const baseline::BaselinePaths paths = baseline::baseline_paths(shared.output);
   fmt::print("tomogram  {}\nfigures   {}\n", paths.volume.string(), paths.json.string());
   write_pictures(paths.volume, series, paths.picture_prefix);
 }
 
-// Of every method.
+// Registers the options of every method.
 template <typename Method>
 void add_fit_options(CLI::App& command, Arguments<Method>& arguments) {
-  baseline::BaselineOptions& options = arguments.options;
-  add_shared_fit_options(command, {options.margin_spacing, options.hold_out, arguments.view_scale});
+  add_shared_fit_options(command, arguments.choices);
   if constexpr (baseline::Tunable<Method>) {
     command
-        .add_flag("--tune", options.tune,
-                  "choose the weight, or what else regularises, by how well short trials predict "
-                  "every 8th view, then reconstruct from all views with it (but those of "
-                  "--hold-out, which no trial sees)")
+        .add_flag("--tune", arguments.choices.options.tune,
+                  "Choose the weight, or what else regularises, by short trials that predict every "
+                  "8th view, then reconstruct from all views. No trial sees those of --hold-out")
         ->group("Fit");
   }
 }
 
-// Of those that iterate.
+// Registers the options of methods that iterate.
 template <typename Method>
 void add_iteration_options(CLI::App& command, Arguments<Method>& arguments) {
-  command.add_option("--iterations", arguments.method.iterations, "passes over all views")
+  command.add_option("--iterations", arguments.method.iterations, "Passes over all views")
       ->check(number_above(0))
       ->capture_default_str()
       ->group("Method");
@@ -103,31 +98,26 @@ void add_iteration_options(CLI::App& command, Arguments<Method>& arguments) {
 
 template <typename Method>
 void add_run_options(CLI::App& command, Arguments<Method>& arguments) {
-  const char* group = "Running";
-  command
-      .add_option("-o,--output", arguments.options.output,
-                  "the tomogram; figures (.json) and pictures go beside it")
-      ->required()
-      ->group(group);
-  command.add_flag("--overwrite", arguments.options.overwrite, "replace existing results")
-      ->group(group);
+  for (const char* key : {"running.output", "running.overwrite"})
+    add_row(command, key, arguments.choices);
   command
       .add_flag("--dry-run", arguments.dry_run,
-                "check everything, print what would be done and the memory it needs")
-      ->group(group);
+                "Check everything and print the plan and the memory it needs")
+      ->group(std::string(title_of(Group::kRun)));
 }
 
 template <typename Method>
 std::shared_ptr<Arguments<Method>> add_method(CLI::App& command) {
   auto arguments = std::make_shared<Arguments<Method>>();
-  add_input_options(command, arguments->options.input);
-  add_specimen_options(command, arguments->options.specimen);
+  add_input_options(command, arguments->choices);
+  add_groups(command, arguments->choices, {Group::kSpecimen});
   if constexpr (requires { arguments->method.iterations; })
     add_iteration_options(command, *arguments);
   add_fit_options(command, *arguments);
-  add_volume_options(command, arguments->options.volume);
+  add_groups(command, arguments->choices, {Group::kVolume});
   add_run_options(command, *arguments);
   add_common_options(command);
+  add_help_all(command);
   command.callback([arguments] { run(*arguments); });
   return arguments;
 }

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "cli/input_options.h"
+#include "base/faults.h"
 #include "cli/number_checks.h"
-#include "cli/specimen_options.h"
+#include "cli/table_options.h"
 #include "io/output_files.h"
 #include "output/result_files.h"
 #include "tomofield/error.h"
@@ -163,8 +163,8 @@ void add_reprojection_options(CLI::App& command, EvaluateArguments& arguments) {
       ->check(number_above(0))
       ->type_name("N")
       ->group(group);
-  add_series_options(command, arguments.input);
-  add_place_options(command, arguments.specimen);
+  add_series_options(command, arguments.choices);
+  add_place_options(command, arguments.choices);
   const std::vector<CLI::Option*> options = command.get_options();
   for (std::size_t i = first; i < options.size(); ++i) options[i]->needs(series);
 }
@@ -179,7 +179,10 @@ void EvaluateArguments::check() const {
         fmt::format("--tilt-range must be from a lower to a higher tilt, not from {:g}° to "
                     "{:g}°",
                     tilts->low_deg, tilts->high_deg));
-  std::vector<std::filesystem::path> inputs = output::input_files(input), outputs;
+  Options series_options = choices.options;
+  series_options.thickness = 1;  // the volume has its own
+  base::require_no_faults(option_table::range_faults(series_options));
+  std::vector<std::filesystem::path> inputs = output::input_files(choices.files), outputs;
   inputs.push_back(volume);
   for (const auto& file : {truth, fsc_with, fsc_mask, series})
     if (file) inputs.push_back(*file);

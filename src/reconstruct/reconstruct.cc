@@ -84,19 +84,22 @@ std::optional<TunedFit> choose_settings(const measurement::PreparedSeries& serie
                                         const ReconstructOptions& options) {
   const TuneHooks tune_hooks{.progress = hooks.tune_progress,
                              .stop_requested = hooks.stop_requested};
-  if (!options.tune) return tune_penalty(measurement, options.field, options.fit, tune_hooks);
+  if (!options.resolved.tune)
+    return tune_penalty(measurement, options.field, options.fit, tune_hooks);
   const distributed::Communicator& processes = *measurement.processes;
   const std::string fingerprint = fingerprint_of(options, series, processes);
   std::optional<selection::TrialFile> file;
-  processes.run_collectively([&] { file.emplace(paths.trials, fingerprint, options.resume); });
+  processes.run_collectively(
+      [&] { file.emplace(paths.trials, fingerprint, options.resolved.resume); });
   return tune(measurement, options.field, options.fit, options.choose_penalty, *file, tune_hooks);
 }
 
 void apply(const TrialSettings& settings, ReconstructOptions& options) {
-  options.fit.penalty = settings.penalty;
-  options.fit.density_variation = settings.variation;
-  options.fit.epochs = settings.epochs;
-  options.field.rank = settings.rank;
+  Options& resolved = options.resolved;
+  resolved.penalty = options.fit.penalty = settings.penalty;
+  resolved.density_variation = options.fit.density_variation = settings.variation;
+  resolved.epochs = options.fit.epochs = settings.epochs;
+  resolved.rank = options.field.rank = settings.rank;
 }
 
 // Chooses what `options` leave to trials, or takes what the run that is resumed has chosen; false
@@ -106,7 +109,7 @@ bool settle_options(const measurement::PreparedSeries& series,
                     const ReconstructHooks& hooks, ReconstructOptions& options,
                     std::optional<TunedFit>& tuned) {
   if (options.num_trials(measurement.num_fitted_views()) == 0) return true;
-  if (options.resume && std::filesystem::exists(paths.model)) {
+  if (options.resolved.resume && std::filesystem::exists(paths.model)) {
     measurement.processes->run_collectively(
         [&] { resuming([&] { tuned = stored_choice(paths.model); }); });
   } else {
@@ -146,7 +149,7 @@ bool run_with_checkpoints(fit::Fit& fit, double checkpoint_minutes, const Recons
 Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& requested,
                     const ReconstructHooks& hooks, const distributed::Communicator& processes) {
   ReconstructOptions options = requested;
-  const OutputPaths paths = output_paths(options.output);
+  const OutputPaths paths = output_paths(options.resolved.output);
   const measurement::PreparedSeries series =
       measurement::prepare_series(tilt_series, options.specimen, directory_of(paths.volume),
                                   fit::band_rows(options.field), processes);
@@ -156,11 +159,13 @@ Outcome reconstruct(const tilt_series::TiltSeries& tilt_series, const Reconstruc
     return Outcome::kStoppedTuning;
   origin.fingerprint = fingerprint_of(options, series, processes);
   fit::Fit fit(measurement, options.field, options.fit);
-  if (options.resume) processes.run_collectively([&] { resume(paths, origin.fingerprint, fit); });
+  if (options.resolved.resume)
+    processes.run_collectively([&] { resume(paths, origin.fingerprint, fit); });
 
   const base::Stopwatch running;
   const auto save = [&] { save_checkpoint(paths.model, fit, model_info(series, options), origin); };
-  if (!run_with_checkpoints(fit, options.checkpoint_minutes, hooks, save)) return Outcome::kStopped;
+  if (!run_with_checkpoints(fit, options.resolved.checkpoint_minutes, hooks, save))
+    return Outcome::kStopped;
   write_results(fit, series, options, origin, paths, running.seconds());
   return Outcome::kFinished;
 }
