@@ -18,22 +18,24 @@ io::MrcMode mrc_mode(VoxelType type) {
 }  // namespace
 
 tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Options& options) {
-  return {.stack = files.stack,
-          .tlt = files.tlt,
-          .xf = files.xf,
-          .xtilt = files.xtilt,
-          .aln = files.aln,
-          .mdoc = files.mdoc,
-          .exclude = options.exclude,
-          .bin = options.bin,
-          .angpix = options.angpix,
-          .pixel_size_A = options.pixel_size_A,
-          .contrast = options.contrast,
-          .take_log = options.take_log,
-          .resample = options.engine == Engine::kSlab,
-          .mask = files.mask,
-          .fiducials = files.fiducials,
-          .bead_diameter_nm = options.bead_diameter_nm};
+  tilt_series::TiltSeriesOptions series;
+  series.stack = files.stack;
+  series.tlt = files.tlt;
+  series.xf = files.xf;
+  series.xtilt = files.xtilt;
+  series.aln = files.aln;
+  series.mdoc = files.mdoc;
+  series.mask = files.mask;
+  series.fiducials = files.fiducials;
+  series.exclude = options.exclude;
+  series.bin = options.bin;
+  series.angpix = options.angpix;
+  series.pixel_size_A = options.pixel_size_A;
+  series.contrast = options.contrast;
+  series.take_log = options.take_log;
+  series.bead_diameter_nm = options.bead_diameter_nm;
+  series.resample = options.engine == Engine::kSlab;
+  return series;
 }
 
 measurement::SpecimenOptions specimen_options(const Options& options) {
