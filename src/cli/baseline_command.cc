@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "base/enum_names.h"
 #include "base/parallel.h"
 #include "baseline/run_baseline.h"
 #include "baseline/tune.h"
@@ -124,23 +125,23 @@ std::shared_ptr<Arguments<Method>> add_method(CLI::App& command) {
 
 void add_wbp(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
-      "wbp", "weighted (filtered) back-projection: a ramp with a roll-off");
+      "wbp", "Weighted (filtered) back-projection: a ramp filter with a roll-off");
   const auto arguments = add_method<baseline::WbpOptions>(command);
   baseline::RampFilterOptions& filter = arguments->method.filter;
   const char* group = "Method";
-  command.add_option("--window", filter.window, "factor of the ramp: ramp (none), cosine or hann")
-      ->check(CLI::IsMember({"ramp", "cosine", "hann"}))
-      ->capture_default_str()
+  add_enum_option<baseline::RampWindow>(command, "--window", filter.window,
+                                        "Window that multiplies the ramp; ramp: none")
+      ->default_str(base::name_of(filter.window))
       ->group(group);
   command
       .add_option("--cutoff", filter.cutoff,
-                  "frequency in cycles a pixel up to which the ramp rises; 0.5: all")
+                  "Frequency up to which the ramp rises, in cycles a pixel. 0.5: all frequencies")
       ->check(number_between(0.01, 0.5))
       ->capture_default_str()
       ->group(group);
   command
       .add_option("--falloff", filter.falloff,
-                  "sigma of the Gaussian, in cycles a pixel, by which it falls beyond")
+                  "Sigma of the Gaussian by which it falls beyond, in cycles a pixel")
       ->check(number_between(0.001, 0.5))
       ->capture_default_str()
       ->group(group);
@@ -148,10 +149,10 @@ void add_wbp(CLI::App& baseline) {
 
 void add_sirt(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
-      "sirt", "simultaneous iterative reconstruction, stopped before it fits the noise");
+      "sirt", "Simultaneous iterative reconstruction, stopped before it fits the noise");
   const auto arguments = add_method<baseline::SirtOptions>(command);
   command
-      .add_option("--relaxation", arguments->method.relaxation, "length of a step, between 0 and 2")
+      .add_option("--relaxation", arguments->method.relaxation, "Length of a step, between 0 and 2")
       ->check(number_between(0.01, 1.99))
       ->capture_default_str()
       ->group("Method");
@@ -159,27 +160,29 @@ void add_sirt(CLI::App& baseline) {
 
 void add_sart_tv(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
-      "sart-tv", "ordered subsets of views, with steps down the total variation between passes");
+      "sart-tv", "Ordered subsets of views, with steps down the total variation between passes");
   const auto arguments = add_method<baseline::SartTvOptions>(command);
   baseline::SartTvOptions& method = arguments->method;
   const char* group = "Method";
-  command.add_option("--subsets", method.subsets, "interleaved subsets of the views in a pass")
+  command.add_option("--subsets", method.subsets, "Interleaved subsets of the views in a pass")
       ->check(number_above(0))
       ->capture_default_str()
       ->group(group);
   command
       .add_option("--relaxation", method.relaxation,
-                  "length of a subset's step in the first pass, between 0 and 2; it falls")
+                  "Length of a subset's step in the first pass, between 0 and 2; it decays")
       ->check(number_between(0.01, 1.99))
       ->capture_default_str()
       ->group(group);
-  command.add_option("--tv-steps", method.tv_steps, "down the total variation after each pass")
+  command
+      .add_option("--tv-steps", method.tv_steps,
+                  "Number of steps down the total variation after each pass")
       ->check(number_above(0))
       ->capture_default_str()
       ->group(group);
   command
       .add_option("--weight", method.weight,
-                  "length of these steps altogether, over that of the change which the pass made")
+                  "Length of these steps together, in units of the change that the pass made")
       ->check(number_above(0))
       ->capture_default_str()
       ->group(group);
@@ -187,40 +190,42 @@ void add_sart_tv(CLI::App& baseline) {
 
 void add_tv(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
-      "tv", "least squares with total variation, by Chambolle and Pock's method");
+      "tv", "Least squares with total variation, by Chambolle and Pock's method");
   const auto arguments = add_method<baseline::TvOptions>(command);
   baseline::TvOptions& method = arguments->method;
   const char* group = "Method";
   command
       .add_option("--weight", method.weight,
-                  "of the total variation, in noise units: half the sum of squared residuals over "
-                  "the noise's variance, plus this times the sum of the density's gradients; "
-                  "default: 3, 8 if concave")
+                  "Weight of the total variation, in noise units: the objective is half the sum of "
+                  "squared residuals over the noise's variance, plus this times the sum of the "
+                  "density's gradients")
       ->check(number_above(0))
+      ->default_str("3; 8 if concave")
       ->group(group);
   add_enum_option<Penalty>(
       command, "--penalty", method.penalty,
-      "smooth: total variation; concave: spares edges, reweighted; default: smooth, and "
-      "with --tune the one that predicts held-out views better")
+      "Kind of total variation: smooth is the usual one, concave spares edges by reweighting")
+      ->default_str("smooth; with --tune the one that predicts held-out views better")
       ->group(group);
 }
 
-// Of the methods that fit a network.
+// Registers the options of methods that fit a network.
 void add_network_options(CLI::App& command, baseline::NetworkOptions& method) {
   const char* group = "Method";
   constexpr int kMostLayers = 16, kWidest = 1024;
   command
       .add_option("--hidden-layers", method.hidden_layers,
-                  "layers of neurons between what is given for a position and its density")
+                  "Layers of neurons between the features of a position and its density")
       ->check(number_between(1, kMostLayers))
       ->capture_default_str()
       ->group(group);
-  command.add_option("--width", method.width, "neurons of a hidden layer")
+  command.add_option("--width", method.width, "Neurons of a hidden layer")
       ->check(number_between(1, kWidest))
       ->capture_default_str()
       ->group(group);
   command
-      .add_option("--learning-rate", method.learning_rate, "of the first step; it falls to a tenth")
+      .add_option("--learning-rate", method.learning_rate,
+                  "Learning rate of the first step; it decays to a tenth")
       ->check(number_above(0))
       ->capture_default_str()
       ->group(group);
@@ -229,27 +234,32 @@ void add_network_options(CLI::App& command, baseline::NetworkOptions& method) {
 
 void add_ingp(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
-      "ingp", "a multi-resolution hash grid and a small network, as in Instant-NGP");
+      "ingp", "A multi-resolution hash grid and a small network, as in Instant-NGP");
   const auto arguments = add_method<baseline::IngpOptions>(command);
   add_network_options(command, arguments->method);
   baseline::HashGridOptions& grid = arguments->method.grid;
   const char* group = "Method";
-  command.add_option("--levels", grid.levels, "grids, from coarse to fine")
+  command.add_option("--levels", grid.levels, "Number of grids, from coarse to fine")
       ->check(number_between(1, 32))
       ->capture_default_str()
       ->group(group);
-  command.add_option("--coarsest", grid.coarsest, "pixels between vertices of the coarsest level")
-      ->check(number_between(0.25, 1024))
-      ->capture_default_str()
-      ->group(group);
-  command.add_option("--finest", grid.finest, "pixels between vertices of the finest level")
+  command
+      .add_option("--coarsest", grid.coarsest,
+                  "Distance between vertices of the coarsest level, in binned pixels")
       ->check(number_between(0.25, 1024))
       ->capture_default_str()
       ->group(group);
   command
-      .add_option("--table-bits", grid.table_bits,
-                  "log2 of the most vertices that a level stores; where it has more, they share "
-                  "entries by a hash")
+      .add_option("--finest", grid.finest,
+                  "Distance between vertices of the finest level, in binned pixels")
+      ->check(number_between(0.25, 1024))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option(
+          "--table-bits", grid.table_bits,
+          "Binary logarithm of the most vertices that a level stores. Where it has more, they "
+          "share entries by a hash")
       ->check(number_between(4, 28))
       ->capture_default_str()
       ->group(group);
@@ -257,18 +267,18 @@ void add_ingp(CLI::App& baseline) {
 
 void add_implicit(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
-      "implicit", "a network of coordinates, which learns the noise of each view");
+      "implicit", "A network of coordinates, which learns the noise of each view");
   const auto arguments = add_method<baseline::ImplicitOptions>(command);
   add_network_options(command, arguments->method);
   command
       .add_option("--features", arguments->method.features,
-                  "plane waves of random direction that the network is given for a position")
+                  "Plane waves of random direction: the features of a position")
       ->check(number_between(1, 4096))
       ->capture_default_str()
       ->group("Method");
   command
       .add_option("--shortest", arguments->method.shortest,
-                  "shortest wavelength of them, in pixels")
+                  "Shortest wavelength of the plane waves, in binned pixels")
       ->check(number_between(1, 1024))
       ->capture_default_str()
       ->group("Method");
@@ -278,7 +288,7 @@ void add_implicit(CLI::App& baseline) {
 
 void add_baseline_command(CLI::App& program) {
   CLI::App& command =
-      *program.add_subcommand("baseline", "reconstructions by other methods, to compare with");
+      *program.add_subcommand("baseline", "Reconstruct by another method, to compare with");
   command.require_subcommand(1);
   add_wbp(command);
   add_sirt(command);

@@ -94,7 +94,7 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
   const char* group = "Comparison";
   command
       .add_option("--methods", arguments.names,
-                  fmt::format("methods to run, the main one first: some of {}",
+                  fmt::format("Methods to run, the main one first: some of {}",
                               fmt::join(compare::names_of(compare::known_methods()), ", ")))
       ->delimiter(',')
       ->capture_default_str()
@@ -105,28 +105,29 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
                   "smooth'; may be repeated")
       ->allow_extra_args(false)
       ->group(group);
-  command.add_option("--truth", arguments.truth, "MRC volume to score against")->group(group);
+  command.add_option("--truth", arguments.truth, "MRC volume to score all methods against")
+      ->group(group);
   command
       .add_flag(
           "--tune", arguments.tune,
-          "tune the methods that have --tune, anew in every run; a run for --hold-out is tuned "
+          "Tune the methods that have --tune, anew in every run; a run for --hold-out is tuned "
           "without the views that score it")
       ->group(group);
   command
       .add_flag("--halves", arguments.halves,
-                "also run every method on the odd and on the even views, and correlate the two")
+                "Also run every method on the odd and on the even views, and correlate the two")
       ->group(group);
   command
       .add_option("--hold-out", arguments.hold_out,
-                  "also run every method without every Nth view, and report how well it predicts "
+                  "Also run every method without every Nth view, and report how well it predicts "
                   "these views")
       ->check(number_between(2, kMostViews))
       ->group(group);
-  command.add_option("-o,--output", arguments.folder, "folder of all results")
+  command.add_option("-o,--output", arguments.folder, "Folder of all results")
       ->required()
       ->group(group);
   command
-      .add_flag("--overwrite", arguments.overwrite, "remove old results and run all methods anew")
+      .add_flag("--overwrite", arguments.overwrite, "Remove old results and run all methods anew")
       ->group(group);
   return {"--methods",  "--also",   "--truth",     "--tune",   "--halves",
           "--hold-out", "--output", "--overwrite", "--exclude"};

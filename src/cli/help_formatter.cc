@@ -104,7 +104,7 @@ std::string HelpFormatter::make_help(const CLI::App* command, std::string name,
     });
   }
   const std::vector<const CLI::App*> commands = command->get_subcommands(nullptr);
-  if (!commands.empty()) help += "\nCommands:\n";
+  if (!commands.empty()) help += "\nSubcommands:\n";
   for (const CLI::App* sub : commands) help += make_subcommand(sub);
   return help;
 }

@@ -23,6 +23,8 @@ options that people use, `--help-all` shows all of them. The other commands (`ba
 - The command line takes a value after a space or an equals sign: `--rank 16`, `--center=-3,20`.
 - `--config FILE.toml` reads options from a file: `rank = 16`, `tune = true`, `roi = [0, 0, 512, 512]`.
   Options on the command line win.
+- The name is that of the member of `tomofield::Options` (of `tomofield::SeriesFiles` for files) in
+  C++, and of the argument in Python.
 - The key is the name in the JSON beside a tomogram, under `options`, where every option has the
   value that was used.
 - An option with an automatic default takes the word `auto` as well.
@@ -57,8 +59,8 @@ std::string value_text(const Row& row) {
 
 std::string line_of(const Row& row) {
   const std::string flag(row.flag);
-  return fmt::format("| `{}` | {} | {} | {} | `{}` |\n", flag, cell(value_text(row)),
-                     cell(default_text(row)), cell(row.help), row.key);
+  return fmt::format("| `{}` | {} | {} | {} | `{}` | `{}` |\n", flag, cell(value_text(row)),
+                     cell(default_text(row)), cell(row.help), row.name, row.key);
 }
 
 }  // namespace
@@ -68,8 +70,9 @@ std::string options_markdown() {
   const Row* previous = nullptr;
   for (const Row& row : all_rows()) {
     if (previous == nullptr || previous->group != row.group)
-      page += fmt::format("\n## {}\n\n| option | value | default | meaning | key |\n|-|-|-|-|-|\n",
-                          title_of(row.group));
+      page += fmt::format(
+          "\n## {}\n\n| option | value | default | meaning | name | key |\n|-|-|-|-|-|-|\n",
+          title_of(row.group));
     page += line_of(row);
     previous = &row;
   }

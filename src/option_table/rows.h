@@ -60,6 +60,7 @@ struct Row {
   std::string_view flag;  ///< "--epochs", "-o,--output", or "stack" for the positional argument;
                           ///< neighbours with one flag share it and are written as a list
   Member member;
+  std::string_view name;  ///< of the member, in C++ and Python
   Group group = Group::kSeries;
   std::string_view label = {};  ///< stands for the value in the help; empty: by the type
   std::string_view unit = {};

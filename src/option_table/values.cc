@@ -208,8 +208,8 @@ json::json_pointer pointer_to(std::string_view key) {
   return json::json_pointer(path);
 }
 
-void require_known_keys(const json& json, const std::string& prefix) {
-  for (const auto& [name, value] : json.items()) {
+void require_known_keys(const json& section, const std::string& prefix) {
+  for (const auto& [name, value] : section.items()) {
     const std::string key = prefix + name;
     if (!flag_of(key).empty()) continue;
     const bool is_section = value.is_object() && std::ranges::any_of(all_rows(), [&](const Row& r) {
@@ -296,19 +296,19 @@ json to_json(const SeriesFiles& files, const Options& options) {
   return all;
 }
 
-void from_json(const json& json, Choices& choices) {
-  require_known_keys(json, "");
+void from_json(const json& source, Choices& choices) {
+  require_known_keys(source, "");
   Choices found = choices;
   for (const Row& row : all_rows()) {
     const auto pointer = pointer_to(row.key);
-    if (!json.contains(pointer)) continue;
+    if (!source.contains(pointer)) continue;
     try {
       visit_value(row, found.files, found.options,
-                  [&](auto& value) { read_json(json.at(pointer), value); });
+                  [&](auto& value) { read_json(source.at(pointer), value); });
     } catch (const nlohmann::json::exception&) {
-      throw Error(fmt::format("'{}' cannot be {}", row.key, json.at(pointer).dump()));
+      throw Error(fmt::format("'{}' cannot be {}", row.key, source.at(pointer).dump()));
     } catch (const Error& error) {
-      throw Error(fmt::format("'{}' {}, not {}", row.key, error.what(), json.at(pointer).dump()));
+      throw Error(fmt::format("'{}' {}, not {}", row.key, error.what(), source.at(pointer).dump()));
     }
   }
   choices = std::move(found);

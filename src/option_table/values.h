@@ -43,7 +43,7 @@ nlohmann::json to_json(const SeriesFiles& files, const Options& options);
 
 /// Reads what to_json() wrote. Keys that are absent keep their values. Throws Error for a key that
 /// is not in the table and for a value of the wrong type.
-void from_json(const nlohmann::json& json, Choices& choices);
+void from_json(const nlohmann::json& source, Choices& choices);
 
 /// Fills in the options whose automatic value depends on the contrast: the scale of the views and
 /// the activation.

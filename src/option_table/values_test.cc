@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -12,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "option_table/documentation.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 
@@ -260,13 +257,6 @@ TEST(OptionTable, RangesHoldTheirLimits) {
   EXPECT_FALSE(Range::multiple_of(16, 4096).contains(24));
   EXPECT_TRUE(Range::either(1, -1).contains(-1));
   EXPECT_FALSE(Range::either(1, -1).contains(0));
-}
-
-TEST(OptionTable, DocumentationIsWhatTheTableSays) {
-  std::ifstream file(TOMOFIELD_SOURCE_DIR "/docs/options.md");
-  const std::string committed(std::istreambuf_iterator<char>(file), {});
-  EXPECT_EQ(committed, options_markdown())
-      << "make it anew: build/release/options_markdown > docs/options.md";
 }
 
 }  // namespace

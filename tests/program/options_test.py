@@ -1,6 +1,4 @@
-"""Tests the help and the options of reconstruct against docs/options.md.
-
-usage: options_test.py TOMOFIELD SCRATCH_DIR"""
+"""Tests the help and the options of reconstruct against docs/options.md."""
 
 import json
 import os
@@ -93,7 +91,3 @@ def test_recorded_options_repeat_the_run():
     explicit = harness.Results(output)
     assert options_of(explicit) == recorded
     assert harness.read_bytes(explicit.volume_path) == harness.read_bytes(automatic.volume_path)
-
-
-if __name__ == "__main__":
-    harness.run_tests(globals())
