@@ -55,6 +55,12 @@ struct EnumNames<VolumeAxes> {
   static constexpr std::array kNames{std::pair{VolumeAxes::kXyz, "xyz"},
                                      std::pair{VolumeAxes::kXzy, "xzy"}};
 };
+template <>
+struct EnumNames<VoxelType> {
+  static constexpr std::array kNames{std::pair{VoxelType::kFloat32, "2"},
+                                     std::pair{VoxelType::kFloat16, "12"},
+                                     std::pair{VoxelType::kInt16, "1"}};
+};
 
 /// Returns the name of a value.
 template <typename Enum>

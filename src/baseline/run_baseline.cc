@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "base/faults.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
@@ -17,10 +18,11 @@
 #include "io/scratch_memory.h"
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
+#include "option_table/values.h"
 #include "output/mask_metrics.h"
 #include "output/result_files.h"
+#include "output/shared_options.h"
 #include "projection/sample_grid.h"
-#include "reconstruct/options_json.h"
 #include "selection/trial_measurement.h"
 #include "tomofield/error.h"
 
@@ -31,9 +33,15 @@ using kernels::kLanes;
 
 projection::SampleGrid grid_of(const measurement::Measurement& series,
                                const BaselineOptions& options) {
-  return projection::make_sample_grid(series.geometry, static_cast<double>(series.roi.x0),
-                                      static_cast<double>(series.roi.x1),
-                                      options.specimen.with_margin ? options.margin_spacing : 0.0);
+  return projection::make_sample_grid(
+      series.geometry, static_cast<double>(series.roi.x0), static_cast<double>(series.roi.x1),
+      options.shared.with_margin ? options.shared.margin_spacing : 0.0);
+}
+
+bool fits_view_scale(const BaselineOptions& options) {
+  Options shared = options.shared;
+  option_table::choose_by_contrast(shared);
+  return *shared.fit_view_scale;
 }
 
 // Estimates the memory: the volumes and detectors of the method, and a pair of slabs and its rays
@@ -96,18 +104,20 @@ output::ModelInfo volume_info(const measurement::Measurement& series,
   info.roi = series.roi;
   info.pixel_size_A = series.pixel_size_A;
   info.density_unit = series.unit;
-  info.is_dark = options.input.contrast == Contrast::kDark;
+  info.is_dark = options.shared.contrast == Contrast::kDark;
   return info;
 }
 
 nlohmann::json options_json(const BaselineOptions& options) {
-  return {{"input", reconstruction::input_json(options.input)},
-          {"specimen", reconstruction::specimen_json(options.specimen)},
-          {"with_margin", options.specimen.with_margin},
-          {"margin_spacing", options.margin_spacing},
-          {"fit_view_scale", options.fit_view_scale},
-          {"hold_out", options.hold_out},
-          {"tune", options.tune},
+  const Options& shared = options.shared;
+  const nlohmann::json all = option_table::to_json(options.files, shared);
+  return {{"input", all["input"]},
+          {"specimen", all["specimen"]},
+          {"with_margin", shared.with_margin},
+          {"margin_spacing", shared.margin_spacing},
+          {"fit_view_scale", fits_view_scale(options)},
+          {"hold_out", shared.hold_out},
+          {"tune", shared.tune},
           {"method", json_of(options.method)}};
 }
 
@@ -161,8 +171,8 @@ void write_results(const Solution& solution, const measurement::Measurement& ser
                    const BaselinePaths& paths) {
   const output::ModelInfo info = volume_info(series, options);
   write_voxels(voxels_of(solution.densities), output::region_box(info, 1.0), info,
-               fmt::format("baseline {}", facts_of(options.method).name), options.volume,
-               paths.volume);
+               fmt::format("baseline {}", facts_of(options.method).name),
+               output::volume_options(options.shared), paths.volume);
   io::write_json(
       paths.json,
       {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"figures", figures}});
@@ -180,15 +190,17 @@ BaselinePaths baseline_paths(const std::filesystem::path& volume) {
   return {volume, stem.string() + ".json", stem};
 }
 
-void check_outputs(const BaselineOptions& options) {
-  const BaselinePaths paths = baseline_paths(options.output);
-  output::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.input,
-                             options.overwrite,
+void check_options(const BaselineOptions& options) {
+  base::require_no_faults(option_table::range_faults(options.shared));
+  const BaselinePaths paths = baseline_paths(options.shared.output);
+  output::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
+                             options.shared.overwrite,
                              "give --overwrite to replace it, or another name with -o");
 }
 
 BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {
-  const measurement::Measurement planned = plan_measurement(series, options.specimen);
+  const measurement::Measurement planned =
+      plan_measurement(series, output::specimen_options(options.shared));
   if (planned.x_tilt_deg != 0.0) {
     throw Error(fmt::format(
         "the series has an x-axis tilt of {}°, which this baseline does not turn back: leave "
@@ -197,8 +209,8 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
   }
   // This and trial_views() throw if there are too few views.
   const std::vector<int> held_out =
-      measurement::held_out_views(planned.geometry.tilt_deg, options.hold_out);
-  if (options.tune) selection::trial_views(planned.geometry.tilt_deg, held_out);
+      measurement::held_out_views(planned.geometry.tilt_deg, options.shared.hold_out);
+  if (options.shared.tune) selection::trial_views(planned.geometry.tilt_deg, held_out);
   const projection::SampleGrid grid = grid_of(planned, options);
   BaselinePlan plan;
   plan.num_views = planned.geometry.num_views();
@@ -210,7 +222,8 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
   plan.num_parameters = size.num_parameters;
   plan.memory_bytes =
       estimate_memory(planned, grid, facts_of(options.method), size,
-                      series.stored_memory(distributed::Communicator::alone()), options.tune);
+                      series.stored_memory(distributed::Communicator::alone()),
+                      options.shared.tune);
   const std::string advice = fmt::format(
       "use a larger --bin or --margin-spacing, a smaller --roi or --thickness, or fewer "
       "--threads{}",
@@ -222,21 +235,23 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
 BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
                              const BaselineOptions& requested, const BaselineProgress& progress) {
   BaselineOptions options = requested;
-  const BaselinePaths paths = baseline_paths(options.output);
+  const BaselinePaths paths = baseline_paths(options.shared.output);
+  const bool fit_view_scale = fits_view_scale(options);
   const measurement::Measurement series =
-      prepare_measurement(tilt_series, options.specimen, io::scratch_directory(paths.volume));
+      prepare_measurement(tilt_series, output::specimen_options(options.shared),
+                          io::scratch_directory(paths.volume));
   const std::vector<int> held_out =
-      measurement::held_out_views(series.geometry.tilt_deg, options.hold_out);
+      measurement::held_out_views(series.geometry.tilt_deg, options.shared.hold_out);
   nlohmann::json tuning = nullptr;
-  if (options.tune) {
+  if (options.shared.tune) {
     const Tuned tuned =
-        tune(options.method, {series, grid_of(series, options), held_out, options.fit_view_scale},
+        tune(options.method, {series, grid_of(series, options), held_out, fit_view_scale},
              progress.tuning);
     tuning = tuning_json(tuned);
     options.method = tuned.method;
   }
   VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays, series.noise_sigma,
-                       {held_out, options.fit_view_scale});
+                       {held_out, fit_view_scale});
   const base::Stopwatch running;
   Solution solution =
       reconstruct(problem, options.method, series.mean_density,
@@ -245,8 +260,7 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   const MethodSize size = size_of(options.method, problem.grid(), problem.num_rows());
   nlohmann::json figures =
       figures_json(solution, problem, series, size.num_parameters, fit_seconds);
-  figures["held_out"] =
-      held_out_json(problem, held_out, options.fit_view_scale, solution.densities);
+  figures["held_out"] = held_out_json(problem, held_out, fit_view_scale, solution.densities);
   figures["tuning"] = tuning;
   write_results(solution, series, options, figures, paths);
   return summary_of(solution, problem.num_rays());

@@ -6,23 +6,18 @@
 #include "base/progress.h"
 #include "baseline/method.h"
 #include "measurement/prepare.h"
-#include "output/volume.h"
 #include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::baseline {
 
 /// The settings of a baseline reconstruction.
 struct BaselineOptions {
-  tilt_series::TiltSeriesOptions input;
-  measurement::SpecimenOptions specimen;
-  double margin_spacing = 2.0;  ///< binned pixels between samples of the margins
+  SeriesFiles files;
+  /// The options that do not depend on the method: images, masks, specimen, margin_spacing,
+  /// fit_view_scale, hold_out, tune (tune.h), volume, output and overwrite. Others have no effect.
+  Options shared;
   Method method;
-  bool fit_view_scale = false;   ///< per-view scale and offset as nuisances
-  int hold_out = 0;              ///< keep every Nth view from the fit; 0: none
-  bool tune = false;             ///< choose settings by views that are not held out (tune.h)
-  output::VolumeOptions volume;  ///< `box` stays empty: it is the fitted one
-  std::filesystem::path output;  ///< the volume; JSON and pictures lie beside it
-  bool overwrite = false;
 };
 
 /// The files of a run, named after its volume.
@@ -31,9 +26,9 @@ struct BaselinePaths {
 };
 BaselinePaths baseline_paths(const std::filesystem::path& volume);
 
-/// Checks the output files. Throws Error if results would replace existing ones without
-/// `overwrite`, or if they cannot be written.
-void check_outputs(const BaselineOptions& options);
+/// Checks the options and the output files. Throws Error for options out of range, and if results
+/// would replace existing ones without `overwrite` or cannot be written.
+void check_options(const BaselineOptions& options);
 
 /// The plan of a run. Making it allocates and writes nothing.
 struct BaselinePlan {
@@ -63,7 +58,7 @@ struct BaselineProgress {
 
 /// Reads the series, tunes if the options ask for it, reconstructs, and writes the volume (MRC, in
 /// the input's units and contrast) and the metrics and resolved options (JSON). Starts at once:
-/// call check_outputs() and plan_baseline() first.
+/// call check_options() and plan_baseline() first.
 BaselineSummary run_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options,
                              const BaselineProgress& progress);
 

@@ -2,9 +2,10 @@
 
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 
-#include "base/faults.h"
+#include "base/enum_names.h"
 #include "base/parallel.h"
 #include "baseline/run_baseline.h"
 #include "baseline/tune.h"
@@ -12,25 +13,25 @@
 #include "cli/common_options.h"
 #include "cli/enum_option.h"
 #include "cli/fit_options.h"
-#include "cli/input_options.h"
+#include "cli/help_formatter.h"
 #include "cli/number_checks.h"
 #include "cli/pictures.h"
 #include "cli/progress_bar.h"
-#include "cli/specimen_options.h"
+#include "cli/table_options.h"
 #include "cli/tensorf_command.h"
-#include "cli/volume_options.h"
-#include "fit/options.h"
 #include "io/scratch_memory.h"
+#include "output/shared_options.h"
 
 namespace tomofield::cli {
 namespace {
 
+using option_table::Group;
+
 template <typename Method>
 struct Arguments {
-  baseline::BaselineOptions options;
+  option_table::Choices choices;
   Method method;
-  std::string view_scale = "auto";
-  std::string non_negative = "auto";
+  std::optional<bool> non_negative;
   bool dry_run = false;
 };
 
@@ -56,48 +57,44 @@ void print_summary(const baseline::BaselineSummary& summary) {
 
 template <typename Method>
 void run(Arguments<Method>& arguments) {
-  baseline::BaselineOptions& options = arguments.options;
+  const Options& shared = arguments.choices.options;
   Method& method = arguments.method;
-  const bool is_dark = options.input.contrast == Contrast::kDark;
-  options.fit_view_scale = is_on(arguments.view_scale, is_dark);
   if constexpr (requires { method.non_negative; })
-    method.non_negative = is_on(arguments.non_negative, !is_dark);
-  options.method = method;
-  base::require_no_faults(options.specimen.faults());
-  baseline::check_outputs(options);
-  options.input.scratch_dir = io::scratch_directory(options.output);
-  options.input.keep_views = !arguments.dry_run;
-  const tilt_series::TiltSeries series(options.input);
-  print_plan(baseline::plan_baseline(series, options), method.facts(), options.volume.axes);
-  if (options.tune) fmt::print("short trials first, that choose settings by held-out views\n");
+    method.non_negative = arguments.non_negative.value_or(shared.contrast != Contrast::kDark);
+  const baseline::BaselineOptions options{arguments.choices.files, shared, method};
+  baseline::check_options(options);
+  tilt_series::TiltSeriesOptions input = output::series_options(options.files, shared);
+  input.scratch_dir = io::scratch_directory(shared.output);
+  input.keep_views = !arguments.dry_run;
+  const tilt_series::TiltSeries series(input);
+  print_plan(baseline::plan_baseline(series, options), method.facts(), shared.axes);
+  if (shared.tune) fmt::print("short trials first, that choose settings by held-out views\n");
   std::fflush(stdout);  // before what comes of the run, in a file too
   if (arguments.dry_run) return;
   print_summary(baseline::run_baseline(series, options,
                                        {make_progress_bar("tune"), make_progress_bar("baseline")}));
-  const baseline::BaselinePaths paths = baseline::baseline_paths(options.output);
+  const baseline::BaselinePaths paths = baseline::baseline_paths(shared.output);
   fmt::print("tomogram  {}\nfigures   {}\n", paths.volume.string(), paths.json.string());
   write_pictures(paths.volume, series, paths.picture_prefix);
 }
 
-// Of every method.
+// Registers the options of every method.
 template <typename Method>
 void add_fit_options(CLI::App& command, Arguments<Method>& arguments) {
-  baseline::BaselineOptions& options = arguments.options;
-  add_shared_fit_options(command, {options.margin_spacing, options.hold_out, arguments.view_scale});
+  add_shared_fit_options(command, arguments.choices);
   if constexpr (baseline::Tunable<Method>) {
     command
-        .add_flag("--tune", options.tune,
-                  "choose the weight, or what else regularises, by how well short trials predict "
-                  "every 8th view, then reconstruct from all views with it (but those of "
-                  "--hold-out, which no trial sees)")
+        .add_flag("--tune", arguments.choices.options.tune,
+                  "Choose the weight, or what else regularises, by short trials that predict every "
+                  "8th view, then reconstruct from all views. No trial sees those of --hold-out")
         ->group("Fit");
   }
 }
 
-// Of those that iterate.
+// Registers the options of methods that iterate.
 template <typename Method>
 void add_iteration_options(CLI::App& command, Arguments<Method>& arguments) {
-  command.add_option("--iterations", arguments.method.iterations, "passes over all views")
+  command.add_option("--iterations", arguments.method.iterations, "Passes over all views")
       ->check(number_above(0))
       ->capture_default_str()
       ->group("Method");
@@ -106,54 +103,49 @@ void add_iteration_options(CLI::App& command, Arguments<Method>& arguments) {
 
 template <typename Method>
 void add_run_options(CLI::App& command, Arguments<Method>& arguments) {
-  const char* group = "Running";
-  command
-      .add_option("-o,--output", arguments.options.output,
-                  "the tomogram; figures (.json) and pictures go beside it")
-      ->required()
-      ->group(group);
-  command.add_flag("--overwrite", arguments.options.overwrite, "replace existing results")
-      ->group(group);
+  for (const char* key : {"running.output", "running.overwrite"})
+    add_row(command, key, arguments.choices);
   command
       .add_flag("--dry-run", arguments.dry_run,
-                "check everything, print what would be done and the memory it needs")
-      ->group(group);
+                "Check everything and print the plan and the memory it needs")
+      ->group(std::string(title_of(Group::kRun)));
 }
 
 template <typename Method>
 std::shared_ptr<Arguments<Method>> add_method(CLI::App& command) {
   auto arguments = std::make_shared<Arguments<Method>>();
-  add_input_options(command, arguments->options.input);
-  add_specimen_options(command, arguments->options.specimen);
+  add_input_options(command, arguments->choices);
+  add_groups(command, arguments->choices, {Group::kSpecimen});
   if constexpr (requires { arguments->method.iterations; })
     add_iteration_options(command, *arguments);
   add_fit_options(command, *arguments);
-  add_volume_options(command, arguments->options.volume);
+  add_groups(command, arguments->choices, {Group::kVolume});
   add_run_options(command, *arguments);
   add_common_options(command);
+  add_help_all(command);
   command.callback([arguments] { run(*arguments); });
   return arguments;
 }
 
 void add_wbp(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
-      "wbp", "weighted (filtered) back-projection: a ramp with a roll-off");
+      "wbp", "Weighted (filtered) back-projection: a ramp filter with a roll-off");
   const auto arguments = add_method<baseline::WbpOptions>(command);
   baseline::RampFilterOptions& filter = arguments->method.filter;
   const char* group = "Method";
-  command.add_option("--window", filter.window, "factor of the ramp: ramp (none), cosine or hann")
-      ->check(CLI::IsMember({"ramp", "cosine", "hann"}))
-      ->capture_default_str()
+  add_enum_option<baseline::RampWindow>(command, "--window", filter.window,
+                                        "Window that multiplies the ramp; ramp: none")
+      ->default_str(base::name_of(filter.window))
       ->group(group);
   command
       .add_option("--cutoff", filter.cutoff,
-                  "frequency in cycles a pixel up to which the ramp rises; 0.5: all")
+                  "Frequency up to which the ramp rises, in cycles a pixel. 0.5: all frequencies")
       ->check(number_between(0.01, 0.5))
       ->capture_default_str()
       ->group(group);
   command
       .add_option("--falloff", filter.falloff,
-                  "sigma of the Gaussian, in cycles a pixel, by which it falls beyond")
+                  "Sigma of the Gaussian by which it falls beyond, in cycles a pixel")
       ->check(number_between(0.001, 0.5))
       ->capture_default_str()
       ->group(group);
@@ -161,10 +153,10 @@ void add_wbp(CLI::App& baseline) {
 
 void add_sirt(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
-      "sirt", "simultaneous iterative reconstruction, stopped before it fits the noise");
+      "sirt", "Simultaneous iterative reconstruction, stopped before it fits the noise");
   const auto arguments = add_method<baseline::SirtOptions>(command);
   command
-      .add_option("--relaxation", arguments->method.relaxation, "length of a step, between 0 and 2")
+      .add_option("--relaxation", arguments->method.relaxation, "Length of a step, between 0 and 2")
       ->check(number_between(0.01, 1.99))
       ->capture_default_str()
       ->group("Method");
@@ -172,27 +164,29 @@ void add_sirt(CLI::App& baseline) {
 
 void add_sart_tv(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
-      "sart-tv", "ordered subsets of views, with steps down the total variation between passes");
+      "sart-tv", "Ordered subsets of views, with steps down the total variation between passes");
   const auto arguments = add_method<baseline::SartTvOptions>(command);
   baseline::SartTvOptions& method = arguments->method;
   const char* group = "Method";
-  command.add_option("--subsets", method.subsets, "interleaved subsets of the views in a pass")
+  command.add_option("--subsets", method.subsets, "Interleaved subsets of the views in a pass")
       ->check(number_above(0))
       ->capture_default_str()
       ->group(group);
   command
       .add_option("--relaxation", method.relaxation,
-                  "length of a subset's step in the first pass, between 0 and 2; it falls")
+                  "Length of a subset's step in the first pass, between 0 and 2; it decays")
       ->check(number_between(0.01, 1.99))
       ->capture_default_str()
       ->group(group);
-  command.add_option("--tv-steps", method.tv_steps, "down the total variation after each pass")
+  command
+      .add_option("--tv-steps", method.tv_steps,
+                  "Number of steps down the total variation after each pass")
       ->check(number_above(0))
       ->capture_default_str()
       ->group(group);
   command
       .add_option("--weight", method.weight,
-                  "length of these steps altogether, over that of the change which the pass made")
+                  "Length of these steps together, in units of the change that the pass made")
       ->check(number_above(0))
       ->capture_default_str()
       ->group(group);
@@ -200,40 +194,42 @@ void add_sart_tv(CLI::App& baseline) {
 
 void add_tv(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
-      "tv", "least squares with total variation, by Chambolle and Pock's method");
+      "tv", "Least squares with total variation, by Chambolle and Pock's method");
   const auto arguments = add_method<baseline::TvOptions>(command);
   baseline::TvOptions& method = arguments->method;
   const char* group = "Method";
   command
       .add_option("--weight", method.weight,
-                  "of the total variation, in noise units: half the sum of squared residuals over "
-                  "the noise's variance, plus this times the sum of the density's gradients; "
-                  "default: 3, 8 if concave")
+                  "Weight of the total variation, in noise units: the objective is half the sum of "
+                  "squared residuals over the noise's variance, plus this times the sum of the "
+                  "density's gradients")
       ->check(number_above(0))
+      ->default_str("3; 8 if concave")
       ->group(group);
   add_enum_option<Penalty>(
       command, "--penalty", method.penalty,
-      "smooth: total variation; concave: spares edges, reweighted; default: smooth, and "
-      "with --tune the one that predicts held-out views better")
+      "Kind of total variation: smooth is the usual one, concave spares edges by reweighting")
+      ->default_str("smooth; with --tune the one that predicts held-out views better")
       ->group(group);
 }
 
-// Of the methods that fit a network.
+// Registers the options of methods that fit a network.
 void add_network_options(CLI::App& command, baseline::NetworkOptions& method) {
   const char* group = "Method";
   constexpr int kMostLayers = 16, kWidest = 1024;
   command
       .add_option("--hidden-layers", method.hidden_layers,
-                  "layers of neurons between what is given for a position and its density")
+                  "Layers of neurons between the features of a position and its density")
       ->check(number_between(1, kMostLayers))
       ->capture_default_str()
       ->group(group);
-  command.add_option("--width", method.width, "neurons of a hidden layer")
+  command.add_option("--width", method.width, "Neurons of a hidden layer")
       ->check(number_between(1, kWidest))
       ->capture_default_str()
       ->group(group);
   command
-      .add_option("--learning-rate", method.learning_rate, "of the first step; it falls to a tenth")
+      .add_option("--learning-rate", method.learning_rate,
+                  "Learning rate of the first step; it decays to a tenth")
       ->check(number_above(0))
       ->capture_default_str()
       ->group(group);
@@ -242,27 +238,32 @@ void add_network_options(CLI::App& command, baseline::NetworkOptions& method) {
 
 void add_ingp(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
-      "ingp", "a multi-resolution hash grid and a small network, as in Instant-NGP");
+      "ingp", "A multi-resolution hash grid and a small network, as in Instant-NGP");
   const auto arguments = add_method<baseline::IngpOptions>(command);
   add_network_options(command, arguments->method);
   baseline::HashGridOptions& grid = arguments->method.grid;
   const char* group = "Method";
-  command.add_option("--levels", grid.levels, "grids, from coarse to fine")
+  command.add_option("--levels", grid.levels, "Number of grids, from coarse to fine")
       ->check(number_between(1, 32))
       ->capture_default_str()
       ->group(group);
-  command.add_option("--coarsest", grid.coarsest, "pixels between vertices of the coarsest level")
-      ->check(number_between(0.25, 1024))
-      ->capture_default_str()
-      ->group(group);
-  command.add_option("--finest", grid.finest, "pixels between vertices of the finest level")
+  command
+      .add_option("--coarsest", grid.coarsest,
+                  "Distance between vertices of the coarsest level, in binned pixels")
       ->check(number_between(0.25, 1024))
       ->capture_default_str()
       ->group(group);
   command
-      .add_option("--table-bits", grid.table_bits,
-                  "log2 of the most vertices that a level stores; where it has more, they share "
-                  "entries by a hash")
+      .add_option("--finest", grid.finest,
+                  "Distance between vertices of the finest level, in binned pixels")
+      ->check(number_between(0.25, 1024))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option(
+          "--table-bits", grid.table_bits,
+          "Binary logarithm of the most vertices that a level stores. Where it has more, they "
+          "share entries by a hash")
       ->check(number_between(4, 28))
       ->capture_default_str()
       ->group(group);
@@ -270,18 +271,18 @@ void add_ingp(CLI::App& baseline) {
 
 void add_implicit(CLI::App& baseline) {
   CLI::App& command = *baseline.add_subcommand(
-      "implicit", "a network of coordinates, which learns the noise of each view");
+      "implicit", "A network of coordinates, which learns the noise of each view");
   const auto arguments = add_method<baseline::ImplicitOptions>(command);
   add_network_options(command, arguments->method);
   command
       .add_option("--features", arguments->method.features,
-                  "plane waves of random direction that the network is given for a position")
+                  "Plane waves of random direction: the features of a position")
       ->check(number_between(1, 4096))
       ->capture_default_str()
       ->group("Method");
   command
       .add_option("--shortest", arguments->method.shortest,
-                  "shortest wavelength of them, in pixels")
+                  "Shortest wavelength of the plane waves, in binned pixels")
       ->check(number_between(1, 1024))
       ->capture_default_str()
       ->group("Method");
@@ -291,7 +292,7 @@ void add_implicit(CLI::App& baseline) {
 
 void add_baseline_command(CLI::App& program) {
   CLI::App& command =
-      *program.add_subcommand("baseline", "reconstructions by other methods, to compare with");
+      *program.add_subcommand("baseline", "Reconstruct by another method, to compare with");
   command.require_subcommand(1);
   add_wbp(command);
   add_sirt(command);

@@ -12,16 +12,15 @@ void add_common_options(CLI::App& command) {
   constexpr int kMostThreads = 1024;
   command
       .add_option_function<int>("--threads", base::set_thread_count,
-                                "number of threads; default: OMP_NUM_THREADS, or every core. The "
-                                "result is the same for any "
-                                "number")
+                                "Number of threads; the result is the same for any")
       ->check(number_between(1, kMostThreads))
-      ->type_name("INT")
+      ->type_name("N")
+      ->default_str("all cores, or OMP_NUM_THREADS")
       ->group(group);
   command
       .add_option_function<std::string>(
           "--config", [](const std::string&) {},
-          "read options from a TOML file, such as thickness = 150; the command line wins")
+          "Read options from a TOML file, such as thickness = 150")
       ->type_name("FILE.toml")
       ->group(group);
 }

@@ -11,11 +11,10 @@
 #include "cli/commands.h"
 #include "cli/common_options.h"
 #include "cli/exit_status.h"
-#include "cli/fit_options.h"
-#include "cli/input_options.h"
+#include "cli/help_formatter.h"
 #include "cli/number_checks.h"
-#include "cli/specimen_options.h"
 #include "cli/stop_signal.h"
+#include "cli/table_options.h"
 #include "compare/comparison.h"
 
 namespace tomofield::cli {
@@ -24,9 +23,7 @@ namespace {
 constexpr double kMostViews = 1e9;
 
 struct Arguments {
-  tilt_series::TiltSeriesOptions input;  // checked here, read again by the methods
-  measurement::SpecimenOptions specimen;
-  std::string view_scale = "auto";  // checked here, used by the methods
+  option_table::Choices choices;  // checked here, used by the methods
   std::vector<std::string> names{"vm", "tv", "sirt", "wbp"};
   std::vector<std::string> others;
   std::string truth, folder;
@@ -66,7 +63,8 @@ void run(const CLI::App& command, const Arguments& arguments,
          const std::vector<std::string>& own_options) {
   compare::CompareOptions options;
   options.program = std::filesystem::read_symlink("/proc/self/exe");
-  options.input = arguments.input;
+  options.files = arguments.choices.files;
+  options.series = arguments.choices.options;
   options.series_words = series_words(command, own_options);
   options.methods = compare::choose_methods(arguments.names, arguments.others);
   if (!arguments.truth.empty()) options.truth = arguments.truth;
@@ -96,7 +94,7 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
   const char* group = "Comparison";
   command
       .add_option("--methods", arguments.names,
-                  fmt::format("methods to run, the main one first: some of {}",
+                  fmt::format("Methods to run, the main one first: some of {}",
                               fmt::join(compare::names_of(compare::known_methods()), ", ")))
       ->delimiter(',')
       ->capture_default_str()
@@ -107,28 +105,29 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
                   "smooth'; may be repeated")
       ->allow_extra_args(false)
       ->group(group);
-  command.add_option("--truth", arguments.truth, "MRC volume to score against")->group(group);
+  command.add_option("--truth", arguments.truth, "MRC volume to score all methods against")
+      ->group(group);
   command
       .add_flag(
           "--tune", arguments.tune,
-          "tune the methods that have --tune, anew in every run; a run for --hold-out is tuned "
+          "Tune the methods that have --tune, anew in every run; a run for --hold-out is tuned "
           "without the views that score it")
       ->group(group);
   command
       .add_flag("--halves", arguments.halves,
-                "also run every method on the odd and on the even views, and correlate the two")
+                "Also run every method on the odd and on the even views, and correlate the two")
       ->group(group);
   command
       .add_option("--hold-out", arguments.hold_out,
-                  "also run every method without every Nth view, and report how well it predicts "
+                  "Also run every method without every Nth view, and report how well it predicts "
                   "these views")
       ->check(number_between(2, kMostViews))
       ->group(group);
-  command.add_option("-o,--output", arguments.folder, "folder of all results")
+  command.add_option("-o,--output", arguments.folder, "Folder of all results")
       ->required()
       ->group(group);
   command
-      .add_flag("--overwrite", arguments.overwrite, "remove old results and run all methods anew")
+      .add_flag("--overwrite", arguments.overwrite, "Remove old results and run all methods anew")
       ->group(group);
   return {"--methods",  "--also",   "--truth",     "--tune",   "--halves",
           "--hold-out", "--output", "--overwrite", "--exclude"};
@@ -141,11 +140,12 @@ void add_compare_command(CLI::App& program) {
       "compare",
       "Run several methods on one series: their volumes, a table and report.html side by side");
   auto arguments = std::make_shared<Arguments>();
-  add_input_options(command, arguments->input);
-  add_specimen_options(command, arguments->specimen);
-  add_view_scale(command, arguments->view_scale);
+  add_input_options(command, arguments->choices);
+  add_groups(command, arguments->choices, {option_table::Group::kSpecimen});
+  add_row(command, "fit.fit_view_scale", arguments->choices);
   const auto own_options = add_own_options(command, *arguments);
   add_common_options(command);
+  add_help_all(command);
   command.callback([&command, arguments, own_options] { run(command, *arguments, own_options); });
 }
 

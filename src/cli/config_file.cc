@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "cli/help_formatter.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
@@ -128,9 +129,10 @@ void expand_config_file(const CLI::App& program, std::vector<std::string>& argum
   for (const auto& [key, node] : read_toml(*path)) {
     const Entry entry(*path, std::string(key.str()), node);
     const CLI::Option* option = command->get_option_no_throw("--" + entry.name());
-    if (option == nullptr || option->check_name(kConfigFlag) || option->check_name("--help")) {
-      entry.fail(
-          fmt::format("is no option of `{0}`; `{0} --help` lists them", full_name(*command)));
+    if (option == nullptr || option->check_name(kConfigFlag) || option->check_name("--help") ||
+        option->check_name("--help-all")) {
+      entry.fail(fmt::format("is no option of `{0}`; `{0} {1}` lists them", full_name(*command),
+                             help_flag_of(*command)));
     }
     if (is_given(*option, given)) continue;
     for (std::string& word : entry.arguments(option->get_items_expected_max()))

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -15,11 +18,17 @@ CLI::Option* add_enum_option(CLI::App& command, const std::string& flag, Target&
                              const std::string& help) {
   std::vector<std::string> names;
   for (const auto& [value, name] : base::EnumNames<Enum>::kNames) names.emplace_back(name);
+  const auto check = [names](const std::string& text) {
+    return std::ranges::count(names, text) > 0
+               ? std::string()
+               : fmt::format("must be {}, not '{}'", fmt::join(names, " or "), text);
+  };
   return command
       .add_option_function<std::string>(
           flag, [&target](const std::string& name) { target = *base::enum_named<Enum>(name); },
           help)
-      ->check(CLI::IsMember(names));
+      ->check(CLI::Validator(check, ""))
+      ->type_name(fmt::format("{}", fmt::join(names, "|")));
 }
 
 }  // namespace tomofield::cli

@@ -8,11 +8,13 @@
 #include "cli/commands.h"
 #include "cli/common_options.h"
 #include "cli/evaluate_options.h"
+#include "cli/help_formatter.h"
 #include "evaluate/compare.h"
 #include "evaluate/fsc_files.h"
 #include "evaluate/volume_score.h"
 #include "io/atomic_file.h"
 #include "io/json.h"
+#include "output/shared_options.h"
 #include "report/fsc_picture.h"
 
 namespace tomofield::cli {
@@ -92,9 +94,12 @@ void correlate(const EvaluateArguments& arguments, Findings& findings) {
 }
 
 void reproject(const EvaluateArguments& arguments, Findings& findings) {
-  evaluate::VolumeScoreOptions options{arguments.volume, arguments.input, arguments.specimen,
-                                       arguments.hold_out};
-  options.input.stack = *arguments.series;
+  SeriesFiles files = arguments.choices.files;
+  files.stack = *arguments.series;
+  const Options& chosen = arguments.choices.options;
+  const evaluate::VolumeScoreOptions options{arguments.volume,
+                                             output::series_options(files, chosen),
+                                             output::specimen_options(chosen), arguments.hold_out};
   const evaluate::VolumeScore score = evaluate::score_volume(options);
   findings.figures["reprojection"] = evaluate::volume_score_json(score, options);
   fmt::print("reprojection error {:.4f} of the noise's variance in {} views\n", score.errors.total,
@@ -157,6 +162,7 @@ void add_evaluate_command(CLI::App& program) {
       "Score a volume: against the truth, against another half, or by its own contrast and noise");
   add_evaluate_options(*command, *arguments);
   add_common_options(*command);
+  add_help_all(*command);
   command->callback([arguments] { run_evaluate(*arguments); });
 }
 

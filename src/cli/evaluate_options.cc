@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "cli/input_options.h"
+#include "base/faults.h"
 #include "cli/number_checks.h"
-#include "cli/specimen_options.h"
+#include "cli/table_options.h"
 #include "io/output_files.h"
 #include "output/result_files.h"
 #include "tomofield/error.h"
@@ -65,7 +65,7 @@ void add_comparison_options(CLI::App& command, EvaluateArguments& arguments) {
   command
       .add_option_function<std::string>(
           "--box", [&arguments](const std::string& text) { arguments.box = parse_box(text); },
-          "compare (PSNR, SSIM, FSC) only these voxels of the other volume, zero-based, the last "
+          "Compare (PSNR, SSIM, FSC) only these voxels of the other volume, zero-based, the last "
           "excluded")
       ->check(box_check())
       ->type_name(kBoxType);
@@ -78,7 +78,7 @@ void add_fsc_options(CLI::App& command, EvaluateArguments& arguments) {
     return command.add_option(name, file, help)->type_name("FILE")->group(group);
   };
   CLI::Option* fsc = add_file("--fsc", arguments.fsc_with,
-                              "correlate with this MRC volume: the other half, or the truth");
+                              "Correlate with this MRC volume: the other half, or the truth");
   add_file("--fsc-mask", arguments.fsc_mask,
            "MRC volume with weights from 0 to 1, soft at its edges; default: a weight of 1 that "
            "fades over the outer eighth at every face")
@@ -89,7 +89,7 @@ void add_fsc_options(CLI::App& command, EvaluateArguments& arguments) {
           [&arguments](const std::vector<double>& tilts) {
             arguments.tilts = {tilts[0], tilts[1]};
           },
-          "lowest and highest tilt in degrees, as in --tilt-range=-60,50: also correlate the "
+          "Lowest and highest tilt in degrees, as in --tilt-range=-60,50: also correlate the "
           "measured "
           "frequencies and the missing wedge separately (tilt axis Y)")
       ->delimiter(',')
@@ -98,8 +98,8 @@ void add_fsc_options(CLI::App& command, EvaluateArguments& arguments) {
       ->type_name("LOW,HIGH")
       ->needs(fsc)
       ->group(group);
-  add_file("--fsc-csv", arguments.fsc_csv, "write the curves as a table")->needs(fsc);
-  add_file("--fsc-picture", arguments.fsc_picture, "draw the curves (PNG)")->needs(fsc);
+  add_file("--fsc-csv", arguments.fsc_csv, "Write the curves as a table")->needs(fsc);
+  add_file("--fsc-picture", arguments.fsc_picture, "Draw the curves (PNG)")->needs(fsc);
 }
 
 void add_contrast_options(CLI::App& command, EvaluateArguments& arguments) {
@@ -107,15 +107,15 @@ void add_contrast_options(CLI::App& command, EvaluateArguments& arguments) {
   command
       .add_flag(
           "--cnr", arguments.contrast,
-          "compute the contrast-to-noise ratio and the equivalent number of looks; regions are "
+          "Compute the contrast-to-noise ratio and the equivalent number of looks; regions are "
           "chosen unless given (default if no other score is asked for)")
       ->group(group);
   CLI::Option* foreground =
       add_boxes(command, "--foreground", arguments.regions.foreground,
-                "voxels of VOLUME that show structure; may be given several times");
+                "Voxels of VOLUME that show structure; may be given several times");
   CLI::Option* background =
       add_boxes(command, "--background", arguments.regions.background,
-                "voxels of VOLUME that show no structure; may be given several times");
+                "Voxels of VOLUME that show no structure; may be given several times");
   foreground->needs(background)->group(group);
   background->needs(foreground)->group(group);
 }
@@ -129,7 +129,7 @@ void add_profile_options(CLI::App& command, EvaluateArguments& arguments) {
               [&arguments](const std::vector<double>& v) {
                 arguments.profile = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
               },
-              "sample a line between two points, in voxels (of TRUTH, if there is one); voxel i "
+              "Sample a line between two points, in voxels (of TRUTH, if there is one); voxel i "
               "covers [i, i+1)")
           ->delimiter(',')
           ->expected(6)
@@ -137,7 +137,7 @@ void add_profile_options(CLI::App& command, EvaluateArguments& arguments) {
           ->type_name(kBoxType)
           ->group(group);
   CLI::Option* csv =
-      command.add_option("--profile-csv", arguments.profile_csv, "write the profile to this table")
+      command.add_option("--profile-csv", arguments.profile_csv, "Write the profile to this table")
           ->type_name("FILE")
           ->group(group);
   line->needs(csv);
@@ -151,7 +151,7 @@ void add_reprojection_options(CLI::App& command, EvaluateArguments& arguments) {
       command
           .add_option(
               "--series", arguments.series,
-              "tilt series (MRC stack): project the volume and compare it with the views, after "
+              "Tilt series (MRC stack): project the volume and compare it with the views, after "
               "the best scale and offset of each view. The options of the series are those "
               "of reconstruct")
           ->type_name("STACK")
@@ -159,12 +159,12 @@ void add_reprojection_options(CLI::App& command, EvaluateArguments& arguments) {
   const std::size_t first = command.get_options().size();
   command
       .add_option("--hold-out", arguments.hold_out,
-                  "score only the views that reconstruct --hold-out N keeps from the fit")
+                  "Score only the views that reconstruct --hold-out N keeps from the fit")
       ->check(number_above(0))
       ->type_name("N")
       ->group(group);
-  add_series_options(command, arguments.input);
-  add_place_options(command, arguments.specimen);
+  add_series_options(command, arguments.choices);
+  add_place_options(command, arguments.choices);
   const std::vector<CLI::Option*> options = command.get_options();
   for (std::size_t i = first; i < options.size(); ++i) options[i]->needs(series);
 }
@@ -179,7 +179,10 @@ void EvaluateArguments::check() const {
         fmt::format("--tilt-range must be from a lower to a higher tilt, not from {:g}° to "
                     "{:g}°",
                     tilts->low_deg, tilts->high_deg));
-  std::vector<std::filesystem::path> inputs = output::input_files(input), outputs;
+  Options series_options = choices.options;
+  series_options.thickness = 1;  // the volume has its own
+  base::require_no_faults(option_table::range_faults(series_options));
+  std::vector<std::filesystem::path> inputs = output::input_files(choices.files), outputs;
   inputs.push_back(volume);
   for (const auto& file : {truth, fsc_with, fsc_mask, series})
     if (file) inputs.push_back(*file);
@@ -195,9 +198,9 @@ void add_evaluate_options(CLI::App& command, EvaluateArguments& arguments) {
   add_contrast_options(command, arguments);
   add_profile_options(command, arguments);
   add_reprojection_options(command, arguments);
-  command.add_option("--json", arguments.json, "write all metrics to this JSON file")
+  command.add_option("--json", arguments.json, "Write all metrics to this JSON file")
       ->type_name("FILE");
-  command.add_flag("--overwrite", arguments.overwrite, "replace existing files");
+  command.add_flag("--overwrite", arguments.overwrite, "Replace existing files");
 }
 
 }  // namespace tomofield::cli

@@ -8,8 +8,7 @@
 #include "evaluate/contrast.h"
 #include "evaluate/fsc.h"
 #include "evaluate/profile.h"
-#include "measurement/prepare.h"
-#include "tilt_series/tilt_series.h"
+#include "option_table/values.h"
 
 namespace tomofield::cli {
 
@@ -29,8 +28,7 @@ struct EvaluateArguments {
   std::optional<std::filesystem::path> profile_csv;
 
   std::optional<std::filesystem::path> series;
-  tilt_series::TiltSeriesOptions input;  ///< options of `series`
-  measurement::SpecimenOptions specimen;
+  option_table::Choices choices;  ///< options of `series`
   int hold_out = 0;
 
   std::optional<std::filesystem::path> json;

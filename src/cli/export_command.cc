@@ -11,9 +11,10 @@
 #include "cli/commands.h"
 #include "cli/common_options.h"
 #include "cli/number_checks.h"
-#include "cli/volume_options.h"
+#include "cli/table_options.h"
 #include "io/atomic_file.h"
 #include "output/model_file.h"
+#include "output/shared_options.h"
 #include "output/volume.h"
 #include "tomofield/error.h"
 
@@ -30,7 +31,7 @@ struct ExportArguments {
   std::vector<std::int64_t> size;
   std::optional<double> voxel_size_A;
   double bin = 1.0;
-  output::VolumeOptions volume;
+  option_table::Choices choices;  // of the volume group alone
   bool overwrite = false;
 };
 
@@ -74,8 +75,9 @@ void run_export(ExportArguments& arguments) {
   const auto& angles = arguments.rotation;
   if (!angles.empty())
     box.field_from_box = field::rotation_from_euler(angles[0], angles[1], angles[2]);
-  arguments.volume.box = box;
-  output::write_volume(model, arguments.volume, arguments.output);
+  output::VolumeOptions volume = output::volume_options(arguments.choices.options);
+  volume.box = box;
+  output::write_volume(model, volume, arguments.output);
   fmt::print("{}: {} × {} × {} voxels (x, y, z) of {:.6g} Å about {:.6g}, {:.6g}, {:.6g} px\n",
              arguments.output.string(), box.size[0], box.size[1], box.size[2],
              box.voxel_px * model.pixel_size_A, box.centre_px[0], box.centre_px[1],
@@ -142,7 +144,7 @@ void add_export_command(CLI::App& program) {
   command->add_option("-o,--output", arguments->output, "MRC volume")->required();
   command->add_flag("--overwrite", arguments->overwrite, "Replace an existing volume");
   add_box_options(*command, *arguments);
-  add_volume_options(*command, arguments->volume);
+  add_groups(*command, arguments->choices, {option_table::Group::kVolume});
   add_common_options(*command);
   command->callback([arguments] { run_export(*arguments); });
 }

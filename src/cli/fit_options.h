@@ -2,33 +2,22 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
-#include <string>
+#include <optional>
 
 #include "geometry/tilt_geometry.h"
-#include "output/volume.h"
+#include "option_table/values.h"
+#include "tomofield/options.h"
 
 namespace tomofield::cli {
 
-/// Options of every command that reconstructs, whatever the method.
-struct SharedFitOptions {
-  double& margin_spacing;
-  int& hold_out;
-  std::string& view_scale;  ///< auto, on or off: see is_on()
-};
+/// Registers --view-scale, --margin-spacing and --hold-out, which every method has.
+void add_shared_fit_options(CLI::App& command, option_table::Choices& choices);
 
-/// Registers --view-scale: auto, on or off.
-void add_view_scale(CLI::App& command, std::string& value);
-/// Registers --view-scale, --margin-spacing and --hold-out.
-void add_shared_fit_options(CLI::App& command, const SharedFitOptions& options);
+/// Registers --non-negative of a baseline: auto (none), on or off.
+void add_non_negative(CLI::App& command, std::optional<bool>& value);
 
-/// Registers --non-negative of a baseline: auto, on or off.
-void add_non_negative(CLI::App& command, std::string& value);
-
-/// Registers --seed in a group of options.
+/// Registers the --seed of a baseline.
 void add_seed(CLI::App& command, std::uint64_t& seed, const char* group);
-
-/// The meaning of auto, on or off.
-bool is_on(const std::string& value, bool automatic);
 
 /// What is reconstructed from what.
 struct Sizes {
@@ -39,8 +28,8 @@ struct Sizes {
   double thickness;
   VolumeAxes axes;
 };
-/// The first line of what a command says before it starts: the tomogram's sizes in the order of its
-/// file. compare::planned_grid() reads it.
+/// Prints the first line of what a command says before it starts: the tomogram's sizes in the order
+/// of its file. compare::planned_grid() reads it.
 void print_sizes(const Sizes& sizes);
 
 }  // namespace tomofield::cli

@@ -8,11 +8,13 @@
 #include <string_view>
 
 #include "cli/commands.h"
-#include "cli/input_options.h"
+#include "cli/help_formatter.h"
 #include "cli/model_info.h"
+#include "cli/table_options.h"
 #include "io/mrc.h"
 #include "io/mrc_header.h"
 #include "io/positioned_file.h"
+#include "output/shared_options.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::cli {
@@ -107,11 +109,14 @@ void add_info_command(CLI::App& program) {
       "info",
       "Show the contents of a file; with tilt angles (--tlt, --aln, --mdoc) also check it as a "
       "tilt series and list its views");
-  auto options = std::make_shared<tilt_series::TiltSeriesOptions>();
-  add_input_options(*command, *options);
-  command->callback([options] {
-    options->keep_views = false;
-    print_info(*options);
+  auto choices = std::make_shared<option_table::Choices>();
+  add_input_options(*command, *choices);
+  add_help_all(*command);
+  command->callback([choices] {
+    tilt_series::TiltSeriesOptions options =
+        output::series_options(choices->files, choices->options);
+    options.keep_views = false;
+    print_info(options);
   });
 }
 

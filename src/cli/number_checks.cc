@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <string>
-#include <string_view>
 
 #include "io/text_lines.h"
 
@@ -26,26 +25,16 @@ CLI::Validator number_that(std::string wanted, Holds holds) {
           ""};
 }
 
-template <typename Value>
-std::optional<std::vector<Value>> list_of(const std::string& text,
-                                          std::optional<Value> (*parse)(std::string_view)) {
-  std::vector<Value> values;
+}  // namespace
+
+std::optional<std::vector<long long>> parse_whole_numbers(const std::string& text) {
+  std::vector<long long> values;
   for (const std::string& word : CLI::detail::split(text, ',')) {
-    const std::optional<Value> value = parse(word);
+    const std::optional<long long> value = io::parse_integer(word);
     if (!value) return std::nullopt;
     values.push_back(*value);
   }
   return values;
-}
-
-}  // namespace
-
-std::optional<std::vector<double>> parse_numbers(const std::string& text) {
-  return list_of(text, io::parse_number);
-}
-
-std::optional<std::vector<long long>> parse_whole_numbers(const std::string& text) {
-  return list_of(text, io::parse_integer);
 }
 
 CLI::Validator number_above(double low) {

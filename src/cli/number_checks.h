@@ -11,9 +11,8 @@ namespace tomofield::cli {
 /// say in a few words which numbers are valid.
 CLI::Validator number_above(double low);
 CLI::Validator number_between(double low, double high);
-/// Parse numbers with commas between them, in one word of the command line. (Several words would
-/// take the words after them.) Return nothing if one of the numbers cannot be parsed.
-std::optional<std::vector<double>> parse_numbers(const std::string& text);
+/// Parses whole numbers with commas between them, in one word of the command line. Returns nothing
+/// if one of the numbers cannot be parsed.
 std::optional<std::vector<long long>> parse_whole_numbers(const std::string& text);
 /// Returns a check of a seed. Without it, CLI11 takes -1 for the largest unsigned number.
 CLI::Validator seed_check();

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <new>
 #include <string>
 #include <string_view>
@@ -16,6 +17,7 @@
 #include "cli/commands.h"
 #include "cli/config_file.h"
 #include "cli/exit_status.h"
+#include "cli/help_formatter.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
@@ -35,7 +37,14 @@ void add_commands(CLI::App& program, const distributed::Communicator& processes)
   add_info_command(program);
 }
 
-// Returns the subcommand that was called, as the user writes it.
+// Returns the subcommand that was called.
+const CLI::App& called_command(const CLI::App& program) {
+  const CLI::App* app = &program;
+  while (!app->get_subcommands().empty()) app = app->get_subcommands().front();
+  return *app;
+}
+
+// Returns the name of a command as the user writes it: "tomofield baseline tv".
 std::string command_name(const CLI::App& program) {
   std::string name = program.get_name();
   for (const CLI::App* app = &program; !app->get_subcommands().empty();) {
@@ -86,8 +95,9 @@ int run_command(CLI::App& program, std::vector<std::string> arguments,
     program.parse(arguments);
   } catch (const CLI::ParseError& error) {                       // the same in all processes
     if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
-    throw distributed::SharedError(
-        fmt::format("{}; `{} --help` lists the options", error.what(), command_name(program)));
+    throw distributed::SharedError(fmt::format("{}; `{} {}` lists the options", error.what(),
+                                               command_name(program),
+                                               help_flag_of(called_command(program))));
   }
   return 0;
 }
@@ -119,6 +129,7 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
       "tomofield"};
   program.set_version_flag(
       "--version", fmt::format("tomofield " TOMOFIELD_VERSION " ({})", base::source_commit()));
+  program.formatter(std::make_shared<HelpFormatter>());
   program.require_subcommand(1);
   add_commands(program, processes);
   try {

@@ -18,6 +18,7 @@
 #include "cli/pictures.h"
 #include "cli/progress_bar.h"
 #include "cli/stop_signal.h"
+#include "cli/table_options.h"
 
 namespace tomofield::cli {
 namespace {
@@ -84,31 +85,17 @@ ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
   return {
       stop_status(),
       fmt::format("stopped; {} '{}': continue with the same command and --resume{}", what_is_there,
-                  file.string(), options.overwrite ? " instead of --overwrite" : "")};
+                  file.string(), options.resolved.overwrite ? " instead of --overwrite" : "")};
 }
 
 }  // namespace
 
-void add_run_options(CLI::App& command, reconstruction::ReconstructOptions& options,
-                     bool& dry_run) {
-  const char* group = "Running";
+void add_run_options(CLI::App& command, option_table::Choices& choices, bool& dry_run) {
+  add_groups(command, choices, {option_table::Group::kRun});
+  command.get_option("--resume")->excludes("--overwrite");
   command
-      .add_option("-o,--output", options.output,
-                  "the tomogram; model (.h5), figures (.json) and pictures go beside it")
-      ->required()
-      ->group(group);
-  command.add_flag("--overwrite", options.overwrite, "replace existing results")->group(group);
-  command
-      .add_flag("--resume", options.resume, "continue from the model file of an interrupted run")
-      ->excludes("--overwrite")
-      ->group(group);
-  command.add_option("--checkpoint-minutes", options.checkpoint_minutes, "between checkpoints")
-      ->capture_default_str()
-      ->group(group);
-  command
-      .add_flag("--dry-run", dry_run,
-                "check everything, print what would be done and the memory it needs")
-      ->group(group);
+      .add_flag("--dry-run", dry_run, "Check everything and print the plan and the memory it needs")
+      ->group(std::string(title_of(option_table::Group::kRun)));
 }
 
 void run_reconstruction(const tilt_series::TiltSeries& series,
@@ -118,7 +105,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
     print_plan(options, reconstruction::plan_run(series, options, processes), processes.size());
   });
   if (dry_run) return;
-  const reconstruction::OutputPaths paths = reconstruction::output_paths(options.output);
+  const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
   const bool is_job = processes.size() > 1;
   stop_on_signals(is_job);
   if (is_job) processes.while_waiting(tell_if_stuck(paths.model, processes));
@@ -134,7 +121,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
     case reconstruction::Outcome::kStopped:
       throw stopped("the checkpoint is", paths.model, options);
     case reconstruction::Outcome::kStoppedTuning:
-      if (options.tune) throw stopped("the finished trials are in", paths.trials, options);
+      if (options.resolved.tune) throw stopped("the finished trials are in", paths.trials, options);
       throw ExitStatus{stop_status(), "stopped before the first checkpoint"};
   }
   if (!processes.is_first()) return;

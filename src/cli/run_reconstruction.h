@@ -3,13 +3,14 @@
 #include <CLI/CLI.hpp>
 
 #include "distributed/communicator.h"
+#include "option_table/values.h"
 #include "reconstruct/reconstruct.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::cli {
 
 /// Registers -o, --overwrite, --resume, --checkpoint-minutes and --dry-run.
-void add_run_options(CLI::App& command, reconstruction::ReconstructOptions& options, bool& dry_run);
+void add_run_options(CLI::App& command, option_table::Choices& choices, bool& dry_run);
 
 /// Prints the plan of a fit, runs it, with progress and until it is interrupted, and writes its
 /// pictures. Only the plan if `dry_run`. Call reconstruct::check_options() first. Throws ExitStatus

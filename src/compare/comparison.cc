@@ -14,8 +14,10 @@
 #include "io/atomic_file.h"
 #include "io/json.h"
 #include "io/mrc.h"
+#include "output/shared_options.h"
 #include "report/fsc_picture.h"
 #include "report/html.h"
+#include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {
@@ -92,11 +94,11 @@ void add_correlations(const Scores& scores, report::HtmlPage& page) {
 
 std::string report_page(const CompareOptions& options, const std::vector<Row>& rows,
                         const Table& table, const Scores& scores) {
-  report::HtmlPage page("Comparison: " + options.input.stack.filename().string());
+  report::HtmlPage page("Comparison: " + options.files.stack.filename().string());
   page.add_paragraph(fmt::format(
       "tomofield {}; {} methods on {}. The main method is {}; bold is the best of a column, an "
       "orange cell is better than the main method's.",
-      TOMOFIELD_VERSION, rows.size(), options.input.stack.string(), rows.front().run.method.title));
+      TOMOFIELD_VERSION, rows.size(), options.files.stack.string(), rows.front().run.method.title));
   page.add_table(table_cells(table));
   page.add_paragraph(scores.remark);
   add_pictures(options, rows, page);
@@ -113,7 +115,7 @@ nlohmann::json comparison_json(const CompareOptions& options, const std::vector<
     methods[i]["volume"] = rows[i].volume.string();
   }
   return {{"tomofield", TOMOFIELD_VERSION},
-          {"series", options.input.stack.string()},
+          {"series", options.files.stack.string()},
           {"truth", options.truth ? nlohmann::json(options.truth->string()) : nullptr},
           {"methods", methods}};
 }
@@ -130,13 +132,13 @@ void remove_all_results(const fs::path& folder, const std::vector<Row>& rows) {
 
 void check_comparison(const CompareOptions& options) {
   if (options.methods.empty()) throw Error("a comparison needs a method: give --methods or --also");
-  if (!fs::exists(options.input.stack))
-    throw Error(fmt::format("the series '{}' does not exist", options.input.stack.string()));
+  if (!fs::exists(options.files.stack))
+    throw Error(fmt::format("the series '{}' does not exist", options.files.stack.string()));
   if (options.truth) io::MrcReader{*options.truth};
 }
 
 Outcome compare_methods(const CompareOptions& options, const RunHooks& hooks) {
-  tilt_series::TiltSeriesOptions checked = options.input;
+  tilt_series::TiltSeriesOptions checked = output::series_options(options.files, options.series);
   checked.keep_views = false;  // the runs read them
   const tilt_series::TiltSeries series(checked);
   const PlannedRuns plan = plan_runs(options, series);

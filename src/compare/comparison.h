@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "compare/rows.h"
-#include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::compare {
 
 struct CompareOptions {
   std::filesystem::path program;  ///< tomofield itself
-  tilt_series::TiltSeriesOptions input;
+  SeriesFiles files;
+  Options series;  ///< says how the series is read and where the specimen is
   std::vector<std::string> series_words;       ///< words of the command line, without --exclude
   std::vector<Method> methods;                 ///< the first is the main one
   std::optional<std::filesystem::path> truth;  ///< MRC volume

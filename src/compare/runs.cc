@@ -29,7 +29,7 @@ const char* suffix_of(Purpose purpose) {
 // Returns the 1-based sections that are left out: the user's, and every second one of the rest.
 std::string excluded(Purpose purpose, const CompareOptions& options,
                      const tilt_series::TiltSeries& series) {
-  std::string sections = options.input.exclude;
+  std::string sections = options.series.exclude;
   if (purpose != Purpose::kOddViews && purpose != Purpose::kEvenViews) return sections;
   const std::size_t first = purpose == Purpose::kOddViews ? 1 : 0;
   for (std::size_t v = first; v < series.views().size(); v += 2)
@@ -70,7 +70,7 @@ Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
   // Settings are tuned anew for every purpose: those chosen on all views have seen the held-out
   // ones.
   if (options.tune && method.tunes) run.command.push_back("--tune");
-  run.inputs = output::input_files(options.input);
+  run.inputs = output::input_files(options.files);
   std::ranges::copy(named_files({own, method.arguments.end()}), std::back_inserter(run.inputs));
   return run;
 }

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "compare/comparison.h"
+#include "tilt_series/tilt_series.h"
 
 namespace tomofield::compare {
 

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "objective/options.h"
 
 namespace tomofield::fit {
@@ -25,8 +22,6 @@ struct FieldOptions {
 
   /// Returns the spacing of vertices in the smallest leaves.
   double finest_spacing() const { return vertex_spacing / (tree == TreeKind::kAdaptive ? 2 : 1); }
-  /// Returns every fault of these options, a sentence each.
-  std::vector<std::string> faults() const;
 };
 
 /// How a field is fitted: the weights of the loss and the schedule.
@@ -45,9 +40,6 @@ struct FitOptions : objective::ObjectiveOptions {
   bool fit_view_scale = false;     ///< fit a scale and an offset of every view as nuisances
   int hold_out = 0;                ///< keep every Nth view from the fit; 0: none
   int patience = 0;  ///< epochs without a better held-out error before the fit stops; 0: never
-
-  /// Returns every fault of these options, a sentence each.
-  std::vector<std::string> faults() const;
 };
 
 /// Returns the usual side of a leaf. Plain vertices express as much in larger leaves, which have

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "distributed/gathered_arrays.h"
+#include "option_table/rows.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
@@ -92,30 +93,19 @@ nlohmann::json without_times(const TunedFit& tuned) {
   return json;
 }
 
-// What a user calls an entry of a fingerprint: the option, whose name its own is but for some.
-std::string name_of(const std::string& entry) {
-  static const std::map<std::string, std::string> others{{"choose_penalty", "--tv-penalty"},
-                                                         {"fit penalty", "--tv-penalty"},
-                                                         {"fit density_variation", "--tv"},
-                                                         {"fit factor_variation", "--tv-factors"},
-                                                         {"fit boundary", "--bcc"},
-                                                         {"fit fourier", "--ifp"},
-                                                         {"fit fourier_ring", "--ifp-ring"},
-                                                         {"fit fit_view_scale", "--view-scale"},
-                                                         {"fit patience", "--early-stop"},
-                                                         {"field kind", "--field"},
-                                                         {"field with_margin", "--no-margin"},
-                                                         {"field depth", "--leaf-size"},
-                                                         {"specimen axis_x", "--center"},
-                                                         {"specimen axis_z", "--center"},
-                                                         {"bin_factor", "--bin"}};
-  if (const auto other = others.find(entry); other != others.end()) return other->second;
-  if (entry.starts_with("alignment")) return "the alignment of the views";
+// Returns what a user calls an entry of a fingerprint: the flag of the option, or where it is from.
+std::string name_of(const std::string& key) {
+  // Entries that are not options themselves, and the options that decide them.
+  static const std::map<std::string, std::string> derived{{"choose_penalty", "fit.penalty"},
+                                                          {"field.depth", "field.leaf_size"},
+                                                          {"bin_factor", "input.bin"}};
+  const auto other = derived.find(key);
+  const auto flag = option_table::flag_of(other == derived.end() ? key : other->second);
+  if (!flag.empty()) return std::string(flag);
+  if (key.starts_with("alignment")) return "the alignment of the views";
   for (const char* of_series : {"rays", "noise_sigma", "unit", "tilt_deg"})
-    if (entry.starts_with(of_series)) return "the tilt series or how it is read";
-  std::string name = entry.substr(entry.find(' ') + 1);
-  std::ranges::replace(name, '_', '-');
-  return "--" + name;
+    if (key.starts_with(of_series)) return "the tilt series or how it is read";
+  return key;
 }
 
 // What differs between two fingerprints, as "--seed, the tilt series or how it is read".
@@ -128,10 +118,10 @@ std::string differences(const std::string& found, const std::string& wanted) {
     std::string name = change["path"].get<std::string>();
     const std::size_t index = name.find_first_of("0123456789");
     if (index != std::string::npos) name.resize(index);  // of an array: its name will do
-    std::ranges::replace(name, '/', ' ');
-    const std::size_t first = name.find_first_not_of(' ');
+    std::ranges::replace(name, '/', '.');
+    const std::size_t first = name.find_first_not_of('.');
     if (first == std::string::npos) return "everything";
-    names.insert(name_of(name.substr(first, name.find_last_not_of(' ') + 1 - first)));
+    names.insert(name_of(name.substr(first, name.find_last_not_of('.') + 1 - first)));
   }
   return fmt::format("{}", fmt::join(names, ", "));
 }

@@ -12,26 +12,23 @@
 
 namespace tomofield::reconstruction {
 
-/// Everything that a reconstruction is made from.
+/// Everything that a reconstruction is made from. run_options() in resolve.h makes it.
 struct ReconstructOptions {
+  SeriesFiles files;
+  Options resolved;             ///< every option as it is used
+  bool choose_penalty = false;  ///< by trials; `resolved` has the penalty that they start from
+  // The same options as the rooms below take them, with the constants of the method.
   tilt_series::TiltSeriesOptions input;
   measurement::SpecimenOptions specimen;
   fit::FieldOptions field;
   fit::FitOptions fit;
-  bool choose_penalty = false;  ///< of total variation, by held-out error, in place of fit.penalty
-  bool tune = false;  ///< choose the weight, rank and epochs by held-out error too (tune.h)
   output::VolumeOptions volume;
-  std::filesystem::path output;  ///< the volume; model, JSON and pictures lie beside it;
-                                 ///< empty: results stay in memory
-  bool overwrite = false;
-  bool resume = false;  ///< continue from the model file, if there is one
-  double checkpoint_minutes = 5;
-  /// Trials of settings before the fit, about; 0: none are to be chosen. A fit of few
+  /// Returns how many trials come before the fit, about; 0: nothing is to be chosen. A fit of few
   /// views cannot spare any for the penalty alone, and rays of raw views are not predicted.
   int num_trials(int num_fitted_views) const;
-  /// Every fault that these options have by themselves, a sentence each.
+  /// Returns a sentence for every option that is out of range or does not go with another one.
   std::vector<std::string> faults() const;
-  /// Those that they have for a job of several processes.
+  /// Returns a sentence for every option that a job of several processes cannot have.
   std::vector<std::string> faults_of_job() const;
 };
 
@@ -50,7 +47,8 @@ OutputPaths output_paths(const std::filesystem::path& volume);
 /// where they shall go. Nothing is read.
 void check_options(const ReconstructOptions& options);
 
-/// Every option as it was resolved, for the JSON and the model file.
+/// Returns every option as it was resolved and the constants of the method, for the JSON and the
+/// model file.
 nlohmann::json options_json(const ReconstructOptions& options);
 
 }  // namespace tomofield::reconstruction

@@ -2,56 +2,43 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <string>
 
 #include "base/faults.h"
 #include "fit/integer_program.h"
 #include "fit/options.h"
+#include "option_table/values.h"
+#include "reconstruct/resolve.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
 namespace {
 
-ReconstructOptions good_options() {
-  ReconstructOptions options;
-  options.specimen.thickness = 100;
+Options good_options() {
+  Options options;
+  options.thickness = 100;
   return options;
 }
 
-TEST(ReconstructOptions, DefaultsAreSound) { EXPECT_TRUE(good_options().faults().empty()); }
-
-TEST(ReconstructOptions, NoNumberMayBeNaN) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (double fit::FieldOptions::*number :
-       {&fit::FieldOptions::vertex_spacing, &fit::FieldOptions::margin_spacing,
-        &fit::FieldOptions::sharpness, &fit::FieldOptions::initial_scale}) {
-    fit::FieldOptions options;
-    options.*number = nan;
-    EXPECT_EQ(options.faults().size(), 1u);
-  }
-  for (double fit::FitOptions::*number : std::initializer_list<double fit::FitOptions::*>{
-           &fit::FitOptions::learning_rate, &fit::FitOptions::final_rate,
-           &fit::FitOptions::density_variation, &fit::FitOptions::factor_variation,
-           &fit::FitOptions::boundary, &fit::FitOptions::fourier, &fit::FitOptions::concavity,
-           &fit::FitOptions::gradient_floor}) {
-    fit::FitOptions options;
-    options.*number = nan;
-    EXPECT_EQ(options.faults().size(), 1u);
-  }
+std::vector<std::string> faults_of(const Options& options) {
+  return run_options({}, options).faults();
 }
 
+std::string json_text(const Options& options) { return option_table::to_json({}, options).dump(); }
+
+TEST(ReconstructOptions, DefaultsAreSound) { EXPECT_TRUE(faults_of(good_options()).empty()); }
+
 TEST(ReconstructOptions, EveryFaultIsNamedAtOnce) {
-  ReconstructOptions options = good_options();
-  options.specimen.thickness = 0;
-  options.field.leaf_size = 24;
-  options.field.rank = 0;
-  options.fit.subsets = 0;
+  Options options = good_options();
+  options.thickness = 0;
+  options.leaf_size = 24;
+  options.rank = 0;
+  options.subsets = 0;
   options.checkpoint_minutes = -1;
-  EXPECT_EQ(options.faults().size(), 5u);
+  EXPECT_EQ(faults_of(options).size(), 5u);
   const std::string message =
-      testing::message_of<Error>([&] { base::require_no_faults(options.faults()); });
+      testing::message_of<Error>([&] { base::require_no_faults(faults_of(options)); });
   for (const char* word :
        {"--thickness", "--leaf-size", "24", "--rank", "--subsets", "--checkpoint-minutes"})
     EXPECT_NE(message.find(word), std::string::npos) << word << " in " << message;
@@ -73,12 +60,12 @@ TEST(ReconstructOptions, LargeLeavesOfAUniformTreeAreRootCells) {
 TEST(ReconstructOptions, OnlyFactorsOfAUniformTreeBeginAsVertices) {
   if (!fit::can_solve_integer_programs()) GTEST_SKIP() << "this build is without COIN-OR CBC";
   const auto num_faults = [](FieldKind kind, TreeKind tree, Engine engine) {
-    ReconstructOptions options = good_options();
-    options.fit.vertex_epochs = 3;
-    options.field.kind = kind;
-    options.field.tree = tree;
-    options.fit.engine = engine;
-    return options.faults().size();
+    Options options = good_options();
+    options.vertex_epochs = 3;
+    options.field = kind;
+    options.tree = tree;
+    options.engine = engine;
+    return faults_of(options).size();
   };
   EXPECT_EQ(num_faults(FieldKind::kVm, TreeKind::kUniform, Engine::kSlab), 0u);
   EXPECT_EQ(num_faults(FieldKind::kGrid, TreeKind::kUniform, Engine::kSlab), 1u);
@@ -88,13 +75,82 @@ TEST(ReconstructOptions, OnlyFactorsOfAUniformTreeBeginAsVertices) {
 
 TEST(ReconstructOptions, ABudgetIsForAdaptiveTrees) {
   if (!fit::can_solve_integer_programs()) GTEST_SKIP() << "this build is without COIN-OR CBC";
-  fit::FieldOptions options;
+  Options options = good_options();
   options.leaf_budget = 12;
-  EXPECT_EQ(options.faults().size(), 1u);
+  EXPECT_EQ(faults_of(options).size(), 1u);
   options.tree = TreeKind::kAdaptive;
-  EXPECT_TRUE(options.faults().empty());
+  EXPECT_TRUE(faults_of(options).empty());
   options.leaf_budget = -1;
-  EXPECT_EQ(options.faults().size(), 1u);
+  EXPECT_EQ(faults_of(options).size(), 1u);
+}
+
+TEST(ResolvedOptions, FollowOtherOptions) {
+  const Options usual = resolve(good_options());
+  EXPECT_EQ(usual.leaf_size, 32);
+  EXPECT_EQ(usual.epochs, 10);
+  EXPECT_EQ(usual.vertex_epochs, 10);
+  EXPECT_EQ(usual.coarse_epochs, 80);
+  EXPECT_EQ(usual.learning_rate, 0.05);
+  EXPECT_EQ(usual.activation, Activation::kIdentity);  // dark contrast
+  EXPECT_EQ(usual.fit_view_scale, true);
+
+  Options requested = good_options();
+  requested.field = FieldKind::kGrid;
+  requested.epochs = 5;
+  requested.contrast = Contrast::kBright;
+  const Options grid = resolve(requested);
+  EXPECT_EQ(grid.leaf_size, 64);
+  EXPECT_EQ(grid.epochs, 5);
+  EXPECT_EQ(grid.vertex_epochs, 0);
+  EXPECT_EQ(grid.coarse_epochs, 40);  // half of the usual, as the epochs are
+  EXPECT_EQ(grid.learning_rate, 0.035);
+  EXPECT_EQ(grid.activation, Activation::kSoftplus);
+  EXPECT_EQ(grid.fit_view_scale, false);
+}
+
+TEST(ResolvedOptions, KeepWhatIsGiven) {
+  Options requested = good_options();
+  requested.leaf_size = 48;
+  requested.epochs = 3;
+  requested.vertex_epochs = 2;
+  requested.coarse_epochs = 0;
+  requested.learning_rate = 0.2;
+  requested.density_variation = 1.5;
+  requested.penalty = Penalty::kSmooth;
+  requested.activation = Activation::kSoftplus;
+  requested.fit_view_scale = false;
+  EXPECT_EQ(json_text(resolve(requested)), json_text(requested));
+}
+
+TEST(ResolvedOptions, StayTheSameWhenResolvedAgain) {
+  for (const FieldKind kind : {FieldKind::kVm, FieldKind::kGrid}) {
+    for (const TreeKind tree : {TreeKind::kUniform, TreeKind::kAdaptive}) {
+      Options options = good_options();
+      options.field = kind;
+      options.tree = tree;
+      const Options resolved = resolve(options);
+      EXPECT_EQ(json_text(resolve(resolved)), json_text(resolved));
+    }
+  }
+}
+
+TEST(ResolvedOptions, TrialsChooseThePenaltyUnlessItOrItsWeightIsGiven) {
+  const Options open = resolve(good_options());
+  EXPECT_FALSE(open.penalty || open.density_variation);
+  const ReconstructOptions run = run_options({}, good_options());
+  EXPECT_TRUE(run.choose_penalty);
+  EXPECT_EQ(run.resolved.penalty, Penalty::kConcave);  // the trials start from it
+  EXPECT_EQ(run.fit.density_variation, 14);
+
+  Options smooth = good_options();
+  smooth.penalty = Penalty::kSmooth;
+  EXPECT_FALSE(run_options({}, smooth).choose_penalty);
+  EXPECT_EQ(run_options({}, smooth).fit.density_variation, 5);
+
+  Options weighted = good_options();
+  weighted.density_variation = 3;
+  EXPECT_FALSE(run_options({}, weighted).choose_penalty);
+  EXPECT_EQ(run_options({}, weighted).fit.penalty, Penalty::kConcave);
 }
 
 }  // namespace

@@ -69,22 +69,23 @@ std::optional<TunedFit> choose_settings(const measurement::Measurement& measurem
                                         const distributed::Communicator& processes) {
   const TuneHooks tune_hooks{.progress = hooks.tune_progress,
                              .stop_requested = hooks.stop_requested};
-  if (!options.tune)
+  if (!options.resolved.tune)
     return tune_penalty(measurement, options.field, options.fit, tune_hooks, processes);
   const std::string fingerprint = fingerprint_of(options, measurement, processes);
   std::optional<selection::TrialFile> file;
   const std::filesystem::path trials =
-      options.output.empty() ? std::filesystem::path() : paths.trials;
-  processes.run_collectively([&] { file.emplace(trials, fingerprint, options.resume); });
+      options.resolved.output.empty() ? std::filesystem::path() : paths.trials;
+  processes.run_collectively([&] { file.emplace(trials, fingerprint, options.resolved.resume); });
   return tune(measurement, options.field, options.fit, options.choose_penalty, *file, tune_hooks,
               processes);
 }
 
 void apply(const TrialSettings& settings, ReconstructOptions& options) {
-  options.fit.penalty = settings.penalty;
-  options.fit.density_variation = settings.variation;
-  options.fit.epochs = settings.epochs;
-  options.field.rank = settings.rank;
+  Options& resolved = options.resolved;
+  resolved.penalty = options.fit.penalty = settings.penalty;
+  resolved.density_variation = options.fit.density_variation = settings.variation;
+  resolved.epochs = options.fit.epochs = settings.epochs;
+  resolved.rank = options.field.rank = settings.rank;
 }
 
 // Chooses what `options` leave to trials, or takes what the run that is resumed has chosen; false
@@ -93,7 +94,7 @@ bool settle_options(const measurement::Measurement& measurement, const OutputPat
                     const ReconstructHooks& hooks, const distributed::Communicator& processes,
                     ReconstructOptions& options, std::optional<TunedFit>& tuned) {
   if (options.num_trials(measurement.num_fitted_views()) == 0) return true;
-  if (options.resume && std::filesystem::exists(paths.model)) {
+  if (options.resolved.resume && std::filesystem::exists(paths.model)) {
     processes.run_collectively([&] { resuming([&] { tuned = stored_choice(paths.model); }); });
   } else {
     tuned = choose_settings(measurement, paths, hooks, options, processes);
@@ -134,9 +135,9 @@ RunResult reconstruct(const tilt_series::TiltSeries& tilt_series,
                       const ReconstructOptions& requested, const ReconstructHooks& hooks,
                       const distributed::Communicator& processes) {
   ReconstructOptions options = requested;
-  const OutputPaths paths = output_paths(options.output);
+  const OutputPaths paths = output_paths(options.resolved.output);
   measurement::Measurement measurement = measurement::prepare_measurement(
-      tilt_series, options.specimen, io::scratch_directory(options.output),
+      tilt_series, options.specimen, io::scratch_directory(options.resolved.output),
       fit::band_rows(options.field), processes);
   measurement.held_out =
       measurement::held_out_views(measurement.geometry.tilt_deg, options.fit.hold_out);
@@ -145,13 +146,13 @@ RunResult reconstruct(const tilt_series::TiltSeries& tilt_series,
     return {.outcome = Outcome::kStoppedTuning, .results = {}};
   origin.fingerprint = fingerprint_of(options, measurement, processes);
   fit::Fit fit(measurement, options.field, options.fit, processes);
-  if (options.resume) processes.run_collectively([&] { resume(paths, origin.fingerprint, fit); });
+  if (options.resolved.resume) processes.run_collectively([&] { resume(paths, origin.fingerprint, fit); });
 
   const base::Stopwatch running;
   std::function<void()> save;
-  if (!options.output.empty())
+  if (!options.resolved.output.empty())
     save = [&] { save_checkpoint(paths.model, fit, model_info(measurement, options), origin); };
-  if (!run_with_checkpoints(fit, options.checkpoint_minutes, hooks, save))
+  if (!run_with_checkpoints(fit, options.resolved.checkpoint_minutes, hooks, save))
     return {.outcome = Outcome::kStopped, .results = {}};
   return {.outcome = Outcome::kFinished,
           .results = finish(fit, measurement, options, origin, running.seconds())};

@@ -32,8 +32,8 @@ void write_picture(const fit::Fit& fit, const measurement::Measurement& series,
 nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& series,
                          const ReconstructOptions& options) {
   const measurement::ViewErrors error = fit.held_out_error();
-  if (!options.output.empty())
-    write_picture(fit, series, error, output_paths(options.output).held_out_picture);
+  if (!options.resolved.output.empty())
+    write_picture(fit, series, error, output_paths(options.resolved.output).held_out_picture);
   nlohmann::json json =
       measurement::report_held_out(error, series.geometry.tilt_deg, options.fit.patience > 0);
   json["error_by_epoch"] = fit.progress().held_out_error;
@@ -75,8 +75,8 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   figures["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
   const output::ModelInfo info = model_info(series, options);
   const output::VolumeShare share = volume_share(fit, series);
-  const bool writes_files = !options.output.empty();
-  const OutputPaths paths = output_paths(options.output);
+  const bool writes_files = !options.resolved.output.empty();
+  const OutputPaths paths = output_paths(options.resolved.output);
   if (writes_files) save_fit(paths.model, fit, info, progress_state(fit, origin));
   Results results{.model = {info, fit.take_field()},
                   .metrics = {{"tomofield", TOMOFIELD_VERSION},

@@ -74,7 +74,7 @@ std::vector<double> half_circle(double step) {
   return tilts;
 }
 
-WbpOptions with_window(const char* window) {
+WbpOptions with_window(RampWindow window) {
   WbpOptions options;
   options.filter.window = window;
   return options;
@@ -84,9 +84,9 @@ class Wbp : public testing::OneThread {};
 
 TEST_F(Wbp, DensitiesAreThoseOfTheBall) {
   const Ball ball(half_circle(3));
-  for (const char* window : {"ramp", "cosine", "hann"})
+  for (const RampWindow window : {RampWindow::kRamp, RampWindow::kCosine, RampWindow::kHann})
     EXPECT_NEAR(mean_inside(ball.reconstructed(with_window(window))), Ball::kDensity, 0.02)
-        << window;
+        << base::name_of(window);
 }
 
 TEST_F(Wbp, UnevenTiltsCountByTheirSpacing) {

@@ -35,9 +35,9 @@ std::vector<kiss_fft_cpx> ramp_kernel(int length) {
 
 double roll_off(const RampFilterOptions& options, double f) {
   const double cosine = std::cos(kPi * f);
-  const double window = options.window == "hann"     ? cosine * cosine
-                        : options.window == "cosine" ? cosine
-                                                     : 1.0;
+  const double window = options.window == RampWindow::kHann     ? cosine * cosine
+                        : options.window == RampWindow::kCosine ? cosine
+                                                                : 1.0;
   if (f <= options.cutoff) return window;
   const double beyond = (f - options.cutoff) / options.falloff;
   return window * options.cutoff / f * std::exp(-0.5 * beyond * beyond);

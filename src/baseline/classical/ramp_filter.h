@@ -2,18 +2,22 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
 #include <vector>
+
+#include "base/enum_names.h"
 
 struct kiss_fft_state;
 
 namespace tomofield::baseline {
 
+/// The factor of the ramp: 1, cos πf or cos² πf.
+enum class RampWindow { kRamp, kCosine, kHann };
+
 /// The roll-off of the ramp |f|, with f in cycles a pixel, 0.5 at most.
 struct RampFilterOptions {
-  std::string window = "hann";  ///< the factor: 1 (ramp), cos πf (cosine) or cos² πf (hann)
-  double cutoff = 0.5;          ///< end of the rise, cycles a pixel, as in IMOD's RADIAL
-  double falloff = 0.05;        ///< σ of the Gaussian fall beyond it, cycles a pixel
+  RampWindow window = RampWindow::kHann;
+  double cutoff = 0.5;    ///< end of the rise, cycles a pixel, as in IMOD's RADIAL
+  double falloff = 0.05;  ///< σ of the Gaussian fall beyond it, cycles a pixel
 };
 
 /// Filters rows of a detector for back-projection. It is a linear convolution with the ramp of
@@ -39,3 +43,14 @@ class RampFilter {
 };
 
 }  // namespace tomofield::baseline
+
+namespace tomofield::base {
+
+template <>
+struct EnumNames<baseline::RampWindow> {
+  static constexpr std::array kNames{std::pair{baseline::RampWindow::kRamp, "ramp"},
+                                     std::pair{baseline::RampWindow::kCosine, "cosine"},
+                                     std::pair{baseline::RampWindow::kHann, "hann"}};
+};
+
+}  // namespace tomofield::base

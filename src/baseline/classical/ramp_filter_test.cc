@@ -16,7 +16,7 @@ namespace {
 using kernels::kLanes;
 
 constexpr int kWidth = 37;
-constexpr RampFilterOptions kPlain{.window = "ramp", .cutoff = 0.5, .falloff = 0.05};
+constexpr RampFilterOptions kPlain{.window = RampWindow::kRamp, .cutoff = 0.5, .falloff = 0.05};
 
 std::vector<float> random_rays() {
   std::vector<float> rays(static_cast<std::size_t>(kWidth) * kLanes);
@@ -56,9 +56,9 @@ TEST(RampFilter, ResponseIsTheFrequencyTimesTheWindow) {
   const int width = 500;
   RampFilterOptions options = kPlain;
   const RampFilter ramp(options, width);
-  options.window = "hann";
+  options.window = RampWindow::kHann;
   const RampFilter hann(options, width);
-  options.window = "cosine";
+  options.window = RampWindow::kCosine;
   const RampFilter cosine(options, width);
   for (const double f : {0.05, 0.1, 0.25, 0.4}) {
     const double c = std::cos(std::numbers::pi * f);

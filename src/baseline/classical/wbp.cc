@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "baseline/classical/bridge_gaps.h"
 #include "baseline/classical/tilt_weights.h"
 #include "kernels/lanes.h"
@@ -42,7 +43,9 @@ void add_backprojection(const projection::SampleGrid& grid, const float* backpro
 }  // namespace
 
 nlohmann::json WbpOptions::json() const {
-  return {{"window", filter.window}, {"cutoff", filter.cutoff}, {"falloff", filter.falloff}};
+  return {{"window", base::name_of(filter.window)},
+          {"cutoff", filter.cutoff},
+          {"falloff", filter.falloff}};
 }
 
 Solution reconstruct_wbp(const VoxelProblem& problem, const WbpOptions& options,

@@ -6,21 +6,32 @@
 
 #include "base/lanes.h"
 #include "fit/stages.h"
+#include "reconstruct/resolve.h"
 #include "tomofield/error.h"
 
 namespace tomofield::baseline {
 
-reconstruction::ReconstructOptions tensorf_options() {
-  reconstruction::ReconstructOptions options;
-  options.field.depth = 0;
-  options.field.rank = 48;
-  options.fit.coarse_epochs =
-      fit::usual_schedule(options.field, options.fit).coarse_epochs_of(options.fit.epochs);
-  options.fit.coarse_bin = 8;
-  options.fit.penalty = Penalty::kSmooth;
-  options.fit.density_variation = objective::usual_variation(options.fit.penalty);
-  options.fit.boundary = 0;
+Options tensorf_defaults() {
+  const fit::FieldOptions field;
+  const fit::FitOptions fit;
+  Options options;
+  options.rank = 48;
+  options.epochs = fit.epochs;
+  options.vertex_epochs = 0;
+  options.coarse_epochs = fit::usual_schedule(field, fit).coarse_epochs_of(fit.epochs);
+  options.coarse_bin = 8;
+  options.learning_rate = fit.learning_rate;
+  options.penalty = Penalty::kSmooth;
+  options.density_variation = objective::usual_variation(Penalty::kSmooth);
+  options.boundary = 0;
   return options;
+}
+
+reconstruction::ReconstructOptions tensorf_options(const SeriesFiles& files,
+                                                   const Options& options) {
+  reconstruction::ReconstructOptions run = reconstruction::run_options(files, options);
+  run.field.depth = 0;
+  return run;
 }
 
 void cover_with_one_node(const geometry::Roi& roi, reconstruction::ReconstructOptions& options) {
@@ -36,6 +47,7 @@ void cover_with_one_node(const geometry::Roi& roi, reconstruction::ReconstructOp
   std::int64_t step = std::int64_t{base::kLanes} * options.fit.coarse_bin;
   while (step > base::kLanes && step > side) step /= 2;
   options.field.leaf_size = static_cast<int>((side + step - 1) / step * step);
+  options.resolved.leaf_size = options.field.leaf_size;
 }
 
 }  // namespace tomofield::baseline

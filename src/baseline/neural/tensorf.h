@@ -5,11 +5,14 @@
 
 namespace tomofield::baseline {
 
-/// Returns TensoRF (Chen et al. 2022) as options of the main method: the vector–matrix factors of
-/// one node that covers the whole region of interest, coarse to fine in several steps, and a total
-/// variation with the smooth penalty. It has no leaves, no boundary consistency and no concave
-/// penalty.
-reconstruction::ReconstructOptions tensorf_options();
+/// Returns the defaults of TensoRF (Chen et al. 2022) as options of the main method: vector–matrix
+/// factors, coarse to fine in several steps, total variation of the smooth kind, no boundary
+/// consistency.
+Options tensorf_defaults();
+
+/// Resolves the options as reconstruction::run_options() does, for a tree without levels.
+reconstruction::ReconstructOptions tensorf_options(const SeriesFiles& files,
+                                                   const Options& options);
 
 /// Makes the one node as large as the region. Throws Error if the region is larger than a node can
 /// be.

@@ -14,8 +14,10 @@ namespace tomofield::baseline {
 namespace {
 
 reconstruction::ReconstructOptions options_for(std::int64_t width, std::int64_t height) {
-  reconstruction::ReconstructOptions options = tensorf_options();
-  options.field.with_margin = false;
+  Options requested = tensorf_defaults();
+  requested.thickness = 40;
+  requested.with_margin = false;
+  reconstruction::ReconstructOptions options = tensorf_options({}, requested);
   cover_with_one_node({5, 7, 5 + width, 7 + height}, options);
   return options;
 }
@@ -29,7 +31,7 @@ TEST(Tensorf, OneNodeCoversTheRegion) {
     ASSERT_EQ(domain.tree.num_leaves(), 1);
     EXPECT_GE(domain.tree.leaf(0).square.size, std::max<std::int64_t>(width, 90));
     EXPECT_LT(domain.tree.leaf(0).square.size, std::max<std::int64_t>(width, 90) + 128);
-    EXPECT_EQ(options.field.faults(), std::vector<std::string>());
+    EXPECT_EQ(options.faults(), std::vector<std::string>());
   }
 }
 

@@ -1,0 +1,320 @@
+#include "option_table/rows.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.h"
+#include "base/lanes.h"
+
+namespace tomofield::option_table {
+namespace {
+
+constexpr double kMaxCount = 1e9;
+constexpr double kMaxLeaf = 4096;
+
+constexpr std::string_view kUnbinned = "unbinned pixels";
+constexpr std::string_view kBinned = "binned pixels";
+
+// Names a member of a row once, for the pointer and for the name in C++ and Python.
+#define MEMBER(Struct, field_name) .member = &Struct::field_name, .name = #field_name
+
+// clang-format would spread a row over many lines.
+// clang-format off
+constexpr Row kRows[] = {
+    // The series
+    {.key = "input.stack", .flag = "stack", MEMBER(SeriesFiles, stack), .group = Group::kSeries,
+     .label = "STACK",
+     .help = "Tilt series: an MRC stack, raw or aligned", .is_common = true, .is_required = true},
+
+    // Tilt angles and alignment
+    {.key = "input.tlt", .flag = "--tlt", MEMBER(SeriesFiles, tlt), .group = Group::kAlignment,
+     .help = "Tilt angles in degrees, a line for every section (.tlt, .rawtlt)",
+     .is_common = true},
+    {.key = "input.xf", .flag = "--xf", MEMBER(SeriesFiles, xf), .group = Group::kAlignment,
+     .help = "IMOD's transforms (.xf) for a raw stack; leave out for an aligned one",
+     .is_common = true},
+    {.key = "input.xtilt", .flag = "--xtilt", MEMBER(SeriesFiles, xtilt),
+     .group = Group::kAlignment,
+     .help = "IMOD's x-axis tilts (.xtilt): a line with degrees for every section"},
+    {.key = "input.aln", .flag = "--aln", MEMBER(SeriesFiles, aln), .group = Group::kAlignment,
+     .help = "AreTomo's alignment of the raw stack (.aln): angles, rotation, shifts",
+     .is_common = true},
+    {.key = "input.mdoc", .flag = "--mdoc", MEMBER(SeriesFiles, mdoc),
+     .group = Group::kAlignment,
+     .help = "SerialEM's metadata (.mdoc): angles, and the pixel size if the stack has none. "
+             "--tlt wins over its angles and over those of --aln"},
+    {.key = "input.exclude", .flag = "--exclude", MEMBER(Options, exclude),
+     .group = Group::kAlignment, .label = "LIST",
+     .help = "Sections to leave out, counted from 1, as in 1-3,40"},
+
+    // Images
+    {.key = "input.bin", .flag = "--bin", MEMBER(Options, bin), .group = Group::kImages,
+     .label = "FACTOR", .range = Range::at_least(1),
+     .help = "Reduce the views by this factor, whole or not", .is_common = true},
+    {.key = "input.angpix", .flag = "--angpix", MEMBER(Options, angpix),
+     .group = Group::kImages, .unit = "Å", .range = Range::above(0), .automatic = "as --bin says",
+     .help = "Reduce the views to this pixel size instead"},
+    {.key = "input.pixel_size_A", .flag = "--pixel-size", MEMBER(Options, pixel_size_A),
+     .group = Group::kImages, .unit = "Å", .range = Range::above(0),
+     .automatic = "that of the stack's header, else of --mdoc",
+     .help = "Pixel size of the stack as it is, where its header has none or a wrong one"},
+    {.key = "input.contrast", .flag = "--contrast", MEMBER(Options, contrast),
+     .group = Group::kImages,
+     .help = "How dense matter looks: dark, as a cryo microscope records it, or bright, as in "
+             "dark-field images and line integrals",
+     .is_common = true},
+    {.key = "input.log", .flag = "--log", MEMBER(Options, take_log), .group = Group::kImages,
+     .help = "Take the logarithm of the transmitted intensity instead of its linear approximation "
+             "(with --contrast dark)"},
+
+    // Masks
+    {.key = "input.bead_diameter_nm", .flag = "--bead-diameter",
+     MEMBER(Options, bead_diameter_nm), .group = Group::kMasks, .unit = "nm",
+     .range = Range::at_least(0),
+     .automatic = "estimated with --contrast dark where there clearly are beads, else none",
+     .help = "Diameter of the gold beads to find and mask in every view. 0: none"},
+    {.key = "input.fiducials", .flag = "--fiducials", MEMBER(SeriesFiles, fiducials),
+     .group = Group::kMasks,
+     .help = "Positions of more beads to mask: IMOD's fiducial model of this stack as text "
+             "(model2point, with or without -object or -contour)"},
+    {.key = "input.mask", .flag = "--mask", MEMBER(SeriesFiles, mask), .group = Group::kMasks,
+     .help = "MRC stack of the same size as the tilt series. Its zeros leave pixels out"},
+
+    // Specimen
+    {.key = "specimen.thickness", .flag = "--thickness", MEMBER(Options, thickness),
+     .group = Group::kSpecimen, .unit = kUnbinned, .range = Range::between(1, 1e6),
+     .help = "Thickness of the tomogram along Z", .is_common = true, .is_required = true},
+    {.key = "specimen.roi", .flag = "--roi", MEMBER(Options, roi), .group = Group::kSpecimen,
+     .label = "X0,Y0,X1,Y1", .unit = kUnbinned, .automatic = "the whole field of view",
+     .help = "Region of interest at zero tilt; X1 and Y1 lie outside",
+     .is_common = true},
+    {.key = "specimen.hand", .flag = "--hand", MEMBER(Options, hand), .group = Group::kSpecimen,
+     .range = Range::either(1, -1),
+     .help = "Direction of the tilt. 1: x = X cos + Z sin, as IMOD, AreTomo and RELION have it; "
+             "-1: the volume is mirrored in Z"},
+    {.key = "specimen.axis_x", .flag = "--center", MEMBER(Options, axis_x),
+     .group = Group::kSpecimen, .label = "X[,Z]", .unit = kUnbinned, .automatic = "the centre",
+     .help = "Position of the tilt axis on the view, and in the volume. Pixel i covers [i, i+1)"},
+    {.key = "specimen.axis_z", .flag = "--center", MEMBER(Options, axis_z),
+     .group = Group::kSpecimen, .label = "X[,Z]", .unit = kUnbinned, .automatic = "the centre",
+     .help = "Height of the tilt axis in the volume: the second number of --center"},
+    {.key = "field.with_margin", .flag = "--no-margin", MEMBER(Options, with_margin),
+     .group = Group::kSpecimen,
+     .help = "The specimen ends inside the field of view: model nothing outside of it"},
+
+    // Field
+    {.key = "field.kind", .flag = "--field", MEMBER(Options, field), .group = Group::kField,
+     .help = "vm: vector-matrix factors in every leaf; grid: plain vertices"},
+    {.key = "field.leaf_size", .flag = "--leaf-size", MEMBER(Options, leaf_size),
+     .group = Group::kField, .unit = kBinned, .range = Range::multiple_of(base::kLanes, kMaxLeaf),
+     .automatic = "32; 64 for a uniform tree of plain vertices", .help = "Side of a leaf"},
+    {.key = "field.tree", .flag = "--tree", MEMBER(Options, tree), .group = Group::kField,
+     .help = "uniform: all leaves are alike; adaptive: leaves are finer where the density varies "
+             "more"},
+    {.key = "field.leaf_budget", .flag = "--leaf-budget", MEMBER(Options, leaf_budget),
+     .group = Group::kField, .range = Range::between(0, kMaxCount),
+     .help = "Largest number of leaves of an adaptive tree. 0: as many as it begins with"},
+    {.key = "field.vertex_spacing", .flag = "--vertex-spacing", MEMBER(Options, vertex_spacing),
+     .group = Group::kField, .unit = kBinned, .range = Range::between(0.25, 64),
+     .help = "Distance between vertices, in leaves of --leaf-size"},
+    {.key = "field.rank", .flag = "--rank", MEMBER(Options, rank), .group = Group::kField,
+     .range = Range::between(1, 256), .help = "Components of each mode (with --field vm)"},
+    {.key = "field.activation", .flag = "--activation", MEMBER(Options, activation),
+     .group = Group::kField,
+     .automatic = "identity for dark contrast, whose zero is uncertain, else softplus",
+     .help = "softplus keeps densities above zero; identity lets them have either sign"},
+
+    // Fit
+    {.key = "fit.epochs", .flag = "--epochs", MEMBER(Options, epochs), .group = Group::kFit,
+     .range = Range::between(1, kMaxCount),
+     .automatic = "10; 30 for factors that do not begin with vertices; 5 for vertices 2 or more "
+                  "pixels apart (4 or more in an adaptive tree)",
+     .help = "Passes over all views at full resolution"},
+    {.key = "fit.vertex_epochs", .flag = "--vertex-epochs", MEMBER(Options, vertex_epochs),
+     .group = Group::kFit, .range = Range::between(0, kMaxCount),
+     .automatic = "as many as --epochs, at most 10, where vertices take no more memory than "
+                  "factors, else 0",
+     .help = "Passes at full resolution before them with plain vertices, which are factorised "
+             "afterwards. 0: fit factors from the start"},
+    {.key = "fit.coarse_epochs", .flag = "--coarse-epochs", MEMBER(Options, coarse_epochs),
+     .group = Group::kFit, .range = Range::between(0, kMaxCount),
+     .automatic = "80; fewer in proportion where --epochs is below its own default",
+     .help = "Passes before all of these over binned views. 0: none"},
+    {.key = "fit.coarse_bin", .flag = "--coarse-bin", MEMBER(Options, coarse_bin),
+     .group = Group::kFit, .unit = "pixels on each axis", .range = Range::between(2, 64),
+     .help = "Largest binning of the coarse passes: a power of two that divides a sixteenth of a "
+             "leaf's side. Passes with half of it follow, down to 2"},
+    {.key = "fit.subsets", .flag = "--subsets", MEMBER(Options, subsets), .group = Group::kFit,
+     .range = Range::between(1, kMaxCount),
+     .help = "Steps of a pass. Each takes an interleaved subset of the views"},
+    {.key = "fit.engine", .flag = "--engine", MEMBER(Options, engine), .group = Group::kFit,
+     .help = "slab: fast, for one tilt axis; ray: any geometry of the views, which are not "
+             "resampled"},
+    {.key = "fit.ray_samples", .flag = "--ray-samples", MEMBER(Options, ray_samples),
+     .group = Group::kFit, .range = Range::between(0, 1 << 20),
+     .help = "Samples along a leaf's diagonal (with --engine ray). 0: one a pixel"},
+    {.key = "fit.rays_per_step", .flag = "--rays-per-step", MEMBER(Options, rays_per_step),
+     .group = Group::kFit, .range = Range::between(0, kMaxCount),
+     .help = "Rays of a step, about (with --engine ray). 0: all rays divided by --subsets"},
+    {.key = "fit.learning_rate", .flag = "--learning-rate", MEMBER(Options, learning_rate),
+     .group = Group::kFit, .range = Range::above(0), .automatic = "0.05; 0.035 for --field grid",
+     .help = "Learning rate of the first step; it decays exponentially. Vertices that are "
+             "factorised later take 0.7 of it, the factors made of them 0.3"},
+    {.key = "fit.density_variation", .flag = "--tv", MEMBER(Options, density_variation),
+     .group = Group::kFit, .unit = "noise units", .range = Range::at_least(0),
+     .automatic = "14; 5 with the smooth penalty",
+     .help = "Weight of the density's total variation"},
+    {.key = "fit.factor_variation", .flag = "--tv-factors", MEMBER(Options, factor_variation),
+     .group = Group::kFit, .unit = "noise units", .range = Range::at_least(0),
+     .help = "Weight of the factors' total variation"},
+    {.key = "fit.penalty", .flag = "--tv-penalty", MEMBER(Options, penalty),
+     .group = Group::kFit,
+     .automatic = "the one that predicts held-out views better in two short trials; concave if "
+                  "--tv is given",
+     .help = "Kind of total variation: concave keeps edges sharp, smooth is the usual one"},
+    {.key = "fit.boundary", .flag = "--bcc", MEMBER(Options, boundary), .group = Group::kFit,
+     .range = Range::at_least(0),
+     .help = "Weight of the boundary consistency: neighbouring leaves agree on their faces"},
+    {.key = "fit.fourier", .flag = "--ifp", MEMBER(Options, fourier), .group = Group::kFit,
+     .range = Range::at_least(0),
+     .help = "Weight of the isotropic Fourier prior, which acts against streaks along X and Y"},
+    {.key = "fit.fourier_ring", .flag = "--ifp-ring", MEMBER(Options, fourier_ring),
+     .group = Group::kFit,
+     .help = "The prior compares the Fourier axes with the mean or the max of a ring"},
+    {.key = "fit.fit_view_scale", .flag = "--view-scale", MEMBER(Options, fit_view_scale),
+     .group = Group::kFit, .automatic = "on for dark contrast, else off",
+     .help = "Fit a scale and an offset for every view"},
+    {.key = "field.margin_spacing", .flag = "--margin-spacing", MEMBER(Options, margin_spacing),
+     .group = Group::kFit, .unit = kBinned, .range = Range::between(1, 64),
+     .help = "Distance between samples of the margin around the region of interest"},
+    {.key = "fit.hold_out", .flag = "--hold-out", MEMBER(Options, hold_out),
+     .group = Group::kFit, .range = Range::zero_or_between(2, kMaxCount),
+     .help = "Leave every Nth view out of the fit and score it. 0: none",
+     .is_common = true},
+    {.key = "tune", .flag = "--tune", MEMBER(Options, tune), .group = Group::kFit,
+     .help = "Choose --tv-penalty, --tv, --rank and --epochs by short trials that predict every "
+             "8th view, then fit all views",
+     .is_common = true},
+    {.key = "fit.patience", .flag = "--early-stop", MEMBER(Options, patience),
+     .group = Group::kFit, .unit = "epochs", .range = Range::between(0, kMaxCount),
+     .help = "Stop after so many epochs without a better error of the held-out views. 0: never"},
+    {.key = "fit.seed", .flag = "--seed", MEMBER(Options, seed), .group = Group::kFit,
+     .help = "Seed of all random numbers"},
+
+    // Volume
+    {.key = "volume.mode", .flag = "--mode", MEMBER(Options, voxel_type),
+     .group = Group::kVolume,
+     .help = "MRC mode of the volume. 2: float; 12: half float; 1: scaled 16-bit integers"},
+    {.key = "volume.axes", .flag = "--axes", MEMBER(Options, axes), .group = Group::kVolume,
+     .help = "Order of the axes in the file: xyz, or xzy as IMOD's tilt writes it (same hand)"},
+    {.key = "volume.invert", .flag = "--invert", MEMBER(Options, invert),
+     .group = Group::kVolume, .help = "Write the other contrast than the input's"},
+
+    // Running
+    {.key = "running.output", .flag = "-o,--output", MEMBER(Options, output),
+     .group = Group::kRun,
+     .help = "The tomogram; model, metrics and pictures go beside it",
+     .is_common = true, .is_required = true},
+    {.key = "running.overwrite", .flag = "--overwrite", MEMBER(Options, overwrite),
+     .group = Group::kRun, .help = "Replace existing results", .is_common = true},
+    {.key = "running.resume", .flag = "--resume", MEMBER(Options, resume), .group = Group::kRun,
+     .help = "Continue an interrupted run from its model file", .is_common = true},
+    {.key = "running.checkpoint_minutes", .flag = "--checkpoint-minutes",
+     MEMBER(Options, checkpoint_minutes), .group = Group::kRun, .unit = "minutes",
+     .range = Range::at_least(0), .help = "Time between checkpoints"},
+};
+// clang-format on
+#undef MEMBER
+
+const Row* find(std::string_view key) {
+  const auto* row = std::ranges::find(kRows, key, &Row::key);
+  return row == std::end(kRows) ? nullptr : row;
+}
+
+}  // namespace
+
+bool Range::contains(double value) const {
+  if (kind == Kind::kAny) return true;
+  if (!std::isfinite(value)) return false;
+  const bool is_between = value >= low && value <= high;
+  switch (kind) {
+    case Kind::kAny:
+      return true;
+    case Kind::kBetween:
+      return is_between;
+    case Kind::kZeroOrBetween:
+      return value == 0 || is_between;
+    case Kind::kAbove:
+      return value > low;
+    case Kind::kAtLeast:
+      return value >= low;
+    case Kind::kMultiple:
+      return is_between && std::fmod(value, low) == 0;
+    case Kind::kEither:
+      return value == low || value == high;
+  }
+  return false;
+}
+
+std::string Range::text() const {
+  switch (kind) {
+    case Kind::kAny:
+      return {};
+    case Kind::kBetween:
+      return fmt::format("from {} to {}", low, high);
+    case Kind::kZeroOrBetween:
+      return fmt::format("0 or from {} to {}", low, high);
+    case Kind::kAbove:
+      return fmt::format("above {}", low);
+    case Kind::kAtLeast:
+      return fmt::format("{} or more", low);
+    case Kind::kMultiple:
+      return fmt::format("a multiple of {} up to {}", low, high);
+    case Kind::kEither:
+      return fmt::format("{} or {}", low, high);
+  }
+  return {};
+}
+
+std::string_view title_of(Group group) {
+  switch (group) {
+    case Group::kSeries:
+      return "Tilt series";
+    case Group::kAlignment:
+      return "Tilt angles and alignment";
+    case Group::kImages:
+      return "Images";
+    case Group::kMasks:
+      return "Masks";
+    case Group::kSpecimen:
+      return "Specimen";
+    case Group::kField:
+      return "Field";
+    case Group::kFit:
+      return "Fit";
+    case Group::kVolume:
+      return "Volume";
+    case Group::kRun:
+      return "Running";
+  }
+  return {};
+}
+
+std::span<const Row> all_rows() { return kRows; }
+
+const Row& row_of(std::string_view key) {
+  const Row* row = find(key);
+  TOMOFIELD_CHECK(row != nullptr, std::string(key));
+  return *row;
+}
+
+std::string_view flag_of(std::string_view key) {
+  const Row* row = find(key);
+  if (row == nullptr) return {};
+  const std::size_t long_name = row->flag.find("--");
+  return long_name == std::string_view::npos ? row->flag : row->flag.substr(long_name);
+}
+
+}  // namespace tomofield::option_table

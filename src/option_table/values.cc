@@ -1,0 +1,324 @@
+#include "option_table/values.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <system_error>
+#include <type_traits>
+
+#include "base/enum_names.h"
+#include "tomofield/error.h"
+
+namespace tomofield::option_table {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::string_view kAutomatic = "auto";
+
+template <typename T>
+inline constexpr bool kIsOptional = false;
+template <typename T>
+inline constexpr bool kIsOptional<std::optional<T>> = true;
+
+// The type of a value, without the std::optional around it.
+template <typename T>
+struct Plain {
+  using type = T;
+};
+template <typename T>
+struct Plain<std::optional<T>> {
+  using type = T;
+};
+
+template <typename T>
+inline constexpr bool kIsNumber = std::is_arithmetic_v<T> && !std::is_same_v<T, bool>;
+
+// Joins names as "a, b or c".
+std::string alternatives(const std::vector<std::string>& names) {
+  std::string text = names.front();
+  for (std::size_t i = 1; i < names.size(); ++i)
+    text += (i + 1 == names.size() ? " or " : ", ") + names[i];
+  return text;
+}
+
+template <typename Enum>
+std::vector<std::string> names_of() {
+  std::vector<std::string> names;
+  for (const auto& [value, name] : base::EnumNames<Enum>::kNames) names.emplace_back(name);
+  return names;
+}
+
+// Reading. Each overload sets `value`, or returns what the text must be.
+
+template <typename Integer>
+requires std::is_integral_v<Integer> std::string read(std::string_view text, Integer& value) {
+  Integer number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error == std::errc::result_out_of_range) return "a whole number that is not so large";
+  if (error != std::errc() || end != text.data() + text.size())
+    return std::is_unsigned_v<Integer> ? "a whole number from 0" : "a whole number";
+  value = number;
+  return {};
+}
+
+std::string read(std::string_view text, bool& value) {
+  if (text != "true" && text != "false") return "true or false";
+  value = text == "true";
+  return {};
+}
+
+std::string read(std::string_view text, double& value) {
+  const std::string copy(text);
+  char* end = nullptr;
+  const double number = std::strtod(copy.c_str(), &end);
+  if (copy.empty() || *end != '\0') return "a number";
+  value = number;
+  return {};
+}
+
+std::string read(std::string_view text, std::string& value) {
+  value = text;
+  return {};
+}
+
+std::string read(std::string_view text, std::filesystem::path& value) {
+  value = text;
+  return {};
+}
+
+std::string read(std::string_view text, Rectangle& value) {
+  Rectangle found;
+  std::int64_t* const corners[] = {&found.x0, &found.y0, &found.x1, &found.y1};
+  constexpr const char* kWanted = "four whole numbers, x0,y0,x1,y1";
+  std::string_view rest = text;
+  for (std::int64_t* corner : corners) {
+    const bool is_last = corner == &found.y1;
+    const std::size_t end = is_last ? rest.size() : rest.find(',');
+    if (end == std::string_view::npos || !read(rest.substr(0, end), *corner).empty())
+      return kWanted;
+    if (!is_last) rest.remove_prefix(end + 1);
+  }
+  value = found;
+  return {};
+}
+
+template <typename Enum>
+requires std::is_enum_v<Enum> std::string read(std::string_view text, Enum& value) {
+  const std::optional<Enum> found = base::enum_named<Enum>(text);
+  if (!found) return alternatives(names_of<Enum>());
+  value = *found;
+  return {};
+}
+
+// An option that can be on, off or automatic.
+std::string read_optional(std::string_view text, std::optional<bool>& value) {
+  if (text != "on" && text != "off") return "auto, on or off";
+  value = text == "on";
+  return {};
+}
+
+template <typename T>
+std::string read_optional(std::string_view text, std::optional<T>& value) {
+  T found{};
+  const std::string wanted = read(text, found);
+  if (wanted.empty()) value = std::move(found);
+  if (wanted.empty() || std::is_same_v<T, Rectangle>) return wanted;
+  return (std::is_enum_v<T> ? "auto, " : "auto or ") + wanted;
+}
+
+std::string read(std::string_view text, std::optional<std::filesystem::path>& value) {
+  value = text;
+  return {};
+}
+
+template <typename T>
+std::string read(std::string_view text, std::optional<T>& value) {
+  if (text != kAutomatic) return read_optional(text, value);
+  value.reset();
+  return {};
+}
+
+// Writing.
+
+std::string write(bool value) { return value ? "true" : "false"; }
+std::string write(const std::string& value) { return value; }
+std::string write(const std::filesystem::path& value) { return value.string(); }
+std::string write(const Rectangle& r) { return fmt::format("{},{},{},{}", r.x0, r.y0, r.x1, r.y1); }
+template <typename T>
+requires(kIsNumber<T> || std::is_enum_v<T>) std::string write(T value) {
+  if constexpr (std::is_enum_v<T>)
+    return base::name_of(value);
+  else
+    return fmt::format("{}", value);
+}
+
+// JSON.
+
+template <typename T>
+json json_of(const T& value) {
+  if constexpr (kIsOptional<T>)
+    return value ? json_of(*value) : json(nullptr);
+  else if constexpr (std::is_same_v<T, std::filesystem::path>)
+    return value.string();
+  else if constexpr (std::is_same_v<T, Rectangle>)
+    return {value.x0, value.y0, value.x1, value.y1};
+  else if constexpr (std::is_same_v<T, VoxelType>)
+    return std::stoi(base::name_of(value));  // the number of the MRC mode
+  else if constexpr (std::is_enum_v<T>)
+    return base::name_of(value);
+  else
+    return value;
+}
+
+template <typename T>
+void read_json(const json& source, T& value) {
+  if constexpr (kIsOptional<T>) {
+    if (source.is_null()) {
+      value.reset();
+      return;
+    }
+    typename Plain<T>::type found{};
+    read_json(source, found);
+    value = std::move(found);
+  } else if constexpr (std::is_same_v<T, Rectangle>) {
+    value = {source.at(0), source.at(1), source.at(2), source.at(3)};
+  } else if constexpr (std::is_same_v<T, VoxelType>) {
+    const std::string wanted = read(std::to_string(source.get<int>()), value);
+    if (!wanted.empty()) throw Error("must be " + wanted);
+  } else if constexpr (std::is_enum_v<T> || std::is_same_v<T, std::filesystem::path>) {
+    const std::string wanted = read(source.get<std::string>(), value);
+    if (!wanted.empty()) throw Error("must be " + wanted);
+  } else if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool>) {
+    if (!source.is_number_integer()) throw Error("must be a whole number");
+    const std::string wanted = read(source.dump(), value);
+    if (!wanted.empty()) throw Error("must be " + wanted);
+  } else {
+    value = source.get<T>();
+  }
+}
+
+json::json_pointer pointer_to(std::string_view key) {
+  std::string path = "/" + std::string(key);
+  for (char& c : path)
+    if (c == '.') c = '/';
+  return json::json_pointer(path);
+}
+
+void require_known_keys(const json& section, const std::string& prefix) {
+  for (const auto& [name, value] : section.items()) {
+    const std::string key = prefix + name;
+    if (!flag_of(key).empty()) continue;
+    const bool is_section = value.is_object() && std::ranges::any_of(all_rows(), [&](const Row& r) {
+                              return r.key.starts_with(key + ".");
+                            });
+    if (!is_section)
+      throw Error(fmt::format("'{}' is no option: docs/options.md lists their names", key));
+    require_known_keys(value, key + ".");
+  }
+}
+
+}  // namespace
+
+std::string set_from_text(const Row& row, std::string_view text, Choices& choices) {
+  return visit_value(row, choices.files, choices.options,
+                     [&](auto& value) { return read(text, value); });
+}
+
+std::optional<std::string> text_of(const Row& row, const Choices& choices) {
+  const auto text = visit_value(row, choices.files, choices.options,
+                                []<typename T>(const T& value) -> std::optional<std::string> {
+                                  if constexpr (std::is_same_v<T, std::optional<bool>>) {
+                                    if (!value) return std::nullopt;
+                                    return *value ? "on" : "off";
+                                  } else if constexpr (kIsOptional<T>) {
+                                    return value ? std::optional(write(*value)) : std::nullopt;
+                                  } else {
+                                    return write(value);
+                                  }
+                                });
+  return text && text->empty() ? std::nullopt : text;
+}
+
+std::string label_of(const Row& row) {
+  if (!row.label.empty()) return std::string(row.label);
+  const Choices none;
+  return visit_value(row, none.files, none.options, []<typename T>(const T&) -> std::string {
+    using Value = typename Plain<T>::type;
+    const std::string automatic = kIsOptional<T> ? "auto|" : "";
+    if constexpr (std::is_same_v<T, std::optional<bool>>)
+      return "auto|on|off";
+    else if constexpr (std::is_enum_v<Value>)
+      return automatic + fmt::format("{}", fmt::join(names_of<Value>(), "|"));
+    else if constexpr (std::is_same_v<Value, std::filesystem::path>)
+      return "FILE";
+    else if constexpr (std::is_integral_v<Value>)
+      return "N";
+    else
+      return "NUMBER";
+  });
+}
+
+bool is_flag(const Row& row) { return std::holds_alternative<bool Options::*>(row.member); }
+
+std::vector<std::string> range_faults(const Options& options) {
+  std::vector<std::string> faults;
+  const SeriesFiles no_files;
+  for (const Row& row : all_rows()) {
+    visit_value(row, no_files, options, [&]<typename T>(const T& value) {
+      using Value = typename Plain<T>::type;
+      if constexpr (kIsNumber<Value>) {
+        const auto require = [&](Value number) {
+          if (row.range.contains(static_cast<double>(number))) return;
+          faults.push_back(
+              fmt::format("{} must be {}, not {}", flag_of(row.key), row.range.text(), number));
+        };
+        if constexpr (kIsOptional<T>) {
+          if (value) require(*value);
+        } else {
+          require(value);
+        }
+      }
+    });
+  }
+  return faults;
+}
+
+json to_json(const SeriesFiles& files, const Options& options) {
+  json all = json::object();
+  for (const Row& row : all_rows()) {
+    all[pointer_to(row.key)] =
+        visit_value(row, files, options, [](const auto& value) { return json_of(value); });
+  }
+  return all;
+}
+
+void from_json(const json& source, Choices& choices) {
+  require_known_keys(source, "");
+  Choices found = choices;
+  for (const Row& row : all_rows()) {
+    const auto pointer = pointer_to(row.key);
+    if (!source.contains(pointer)) continue;
+    try {
+      visit_value(row, found.files, found.options,
+                  [&](auto& value) { read_json(source.at(pointer), value); });
+    } catch (const nlohmann::json::exception&) {
+      throw Error(fmt::format("'{}' cannot be {}", row.key, source.at(pointer).dump()));
+    } catch (const Error& error) {
+      throw Error(fmt::format("'{}' {}, not {}", row.key, error.what(), source.at(pointer).dump()));
+    }
+  }
+  choices = std::move(found);
+}
+
+void choose_by_contrast(Options& options) {
+  const bool is_dark = options.contrast == Contrast::kDark;
+  if (!options.fit_view_scale) options.fit_view_scale = is_dark;
+  if (!options.activation)
+    options.activation = is_dark ? Activation::kIdentity : Activation::kSoftplus;
+}
+
+}  // namespace tomofield::option_table

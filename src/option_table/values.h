@@ -1,0 +1,52 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "option_table/rows.h"
+#include "tomofield/options.h"
+
+namespace tomofield::option_table {
+
+/// Holds the values of all options.
+struct Choices {
+  SeriesFiles files;
+  Options options;
+};
+
+/// Sets an option to what a text says, as the command line and the configuration file write it:
+/// "24", "dark", "0,0,512,512", "auto" for options that can be chosen automatically, "true" and
+/// "false" for flags. Returns what the text must be if it cannot be read, else an empty text.
+/// Ranges are checked by range_faults().
+std::string set_from_text(const Row& row, std::string_view text, Choices& choices);
+
+/// Returns the value of an option as set_from_text() reads it, or nothing if it is to be chosen
+/// automatically or is an empty text.
+std::optional<std::string> text_of(const Row& row, const Choices& choices);
+
+/// Returns what stands for the value of an option in the help: "FILE", "dark|bright".
+std::string label_of(const Row& row);
+
+/// Returns true if an option is a flag without a value.
+bool is_flag(const Row& row);
+
+/// Returns a sentence for every number that is out of its range: "--rank must be from 1 to 256,
+/// not 0".
+std::vector<std::string> range_faults(const Options& options);
+
+/// Returns all options as nested objects, named after the keys of the table. Options that are to
+/// be chosen automatically are null.
+nlohmann::json to_json(const SeriesFiles& files, const Options& options);
+
+/// Reads what to_json() wrote. Keys that are absent keep their values. Throws Error for a key that
+/// is not in the table and for a value of the wrong type.
+void from_json(const nlohmann::json& source, Choices& choices);
+
+/// Fills in the options whose automatic value depends on the contrast: the scale of the views and
+/// the activation.
+void choose_by_contrast(Options& options);
+
+}  // namespace tomofield::option_table

@@ -1,0 +1,59 @@
+#include "output/shared_options.h"
+
+namespace tomofield::output {
+namespace {
+
+io::MrcMode mrc_mode(VoxelType type) {
+  switch (type) {
+    case VoxelType::kFloat32:
+      return io::MrcMode::kFloat32;
+    case VoxelType::kFloat16:
+      return io::MrcMode::kFloat16;
+    case VoxelType::kInt16:
+      return io::MrcMode::kInt16;
+  }
+  return io::MrcMode::kFloat32;
+}
+
+}  // namespace
+
+tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Options& options) {
+  tilt_series::TiltSeriesOptions series;
+  series.stack = files.stack;
+  series.tlt = files.tlt;
+  series.xf = files.xf;
+  series.xtilt = files.xtilt;
+  series.aln = files.aln;
+  series.mdoc = files.mdoc;
+  series.mask = files.mask;
+  series.fiducials = files.fiducials;
+  series.exclude = options.exclude;
+  series.bin = options.bin;
+  series.angpix = options.angpix;
+  series.pixel_size_A = options.pixel_size_A;
+  series.contrast = options.contrast;
+  series.take_log = options.take_log;
+  series.bead_diameter_nm = options.bead_diameter_nm;
+  series.resample = options.engine == Engine::kSlab;
+  return series;
+}
+
+measurement::SpecimenOptions specimen_options(const Options& options) {
+  measurement::SpecimenOptions specimen{.thickness = options.thickness,
+                                        .roi = {},
+                                        .hand = options.hand,
+                                        .axis_x = options.axis_x,
+                                        .axis_z = options.axis_z,
+                                        .with_margin = options.with_margin};
+  if (const auto& roi = options.roi) specimen.roi = {roi->x0, roi->y0, roi->x1, roi->y1};
+  return specimen;
+}
+
+VolumeOptions volume_options(const Options& options) {
+  return {.box = {},
+          .mode = mrc_mode(options.voxel_type),
+          .axes = options.axes,
+          .invert = options.invert};
+}
+
+}  // namespace tomofield::output

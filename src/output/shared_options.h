@@ -1,0 +1,19 @@
+#pragma once
+
+#include "measurement/prepare.h"
+#include "output/volume.h"
+#include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
+
+namespace tomofield::output {
+
+/// Returns how a tilt series is read. Views stay as they were recorded for the ray engine.
+tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Options& options);
+
+/// Returns what the options say of the specimen.
+measurement::SpecimenOptions specimen_options(const Options& options);
+
+/// Returns how a volume is written, for the region of interest.
+VolumeOptions volume_options(const Options& options);
+
+}  // namespace tomofield::output

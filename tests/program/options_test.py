@@ -1,0 +1,93 @@
+"""Tests the help and the options of reconstruct against docs/options.md."""
+
+import json
+import os
+import pathlib
+import re
+
+import harness
+
+PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs/options.md"
+ROW = re.compile(r"^\| `([^`]+)` \|.*\| `([^`]+)` \|$", re.MULTILINE)
+COMMON = {"stack", "--tlt", "--xf", "--aln", "--bin", "--contrast", "--thickness", "--roi", "--tune",
+          "--hold-out", "--output", "--overwrite", "--resume", "--dry-run", "--threads", "--config",
+          "--help", "--help-all"}
+
+
+def flags_of_keys():
+    """Returns the flag of every key in docs/options.md."""
+    rows = {key: flags.split(",")[-1] for flags, key in ROW.findall(PAGE.read_text("utf-8"))}
+    assert len(rows) == 56, len(rows)
+    return rows
+
+
+def options_in(text):
+    """Returns the names of the options that a help text describes, each on the left of a line."""
+    return {name.split(",")[-1] for name in re.findall(r"^  (-[-\w,]+|stack)\b", text, re.MULTILINE)}
+
+
+def options_of(results):
+    with open(results.json_path, encoding="utf-8") as file:
+        return json.load(file)["options"]
+
+
+def test_help_fits_on_a_screen():
+    text = harness.succeed("reconstruct", "--help").stdout
+    lines = text.rstrip().splitlines()
+    assert len(lines) <= 40 and max(map(len, lines)) <= 100, text
+    assert options_in(text) == COMMON, options_in(text) ^ COMMON
+    assert "Example: tomofield reconstruct " in text
+
+
+def test_help_all_has_every_option_of_the_page():
+    text = harness.succeed("reconstruct", "--help-all").stdout
+    page = set(flags_of_keys().values())
+    assert options_in(text) == page | COMMON, options_in(text) ^ (page | COMMON)
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_help_of_baselines_has_their_own_options():
+    text = harness.succeed("baseline", "tv", "--help").stdout
+    assert "--weight" in text and "--xtilt" not in text
+    assert "--xtilt" in harness.succeed("baseline", "tv", "--help-all").stdout
+
+
+def test_a_file_says_what_the_command_line_says():
+    series = harness.Series("series")
+    written = series.reconstruct("written", "--rank", 5, "--roi", "2,3,40,30", "--ifp", 0.5,
+                                 "--center=23.5,11", "--tv-penalty", "smooth", "--view-scale", "on")
+    file = os.path.join(series.directory, "options.toml")
+    with open(file, "w", encoding="utf-8") as config:
+        config.write('roi = [2, 3, 40, 30]\nifp = 0.5\ncenter = [23.5, 11]\ntv-penalty = "smooth"\n'
+                     'view-scale = "on"\nrank = 7\n')
+    quick = harness.merge(harness.QUICK, ["--tv-penalty", "smooth"])[:-2]
+    output = os.path.join(harness.fresh_directory("configured"), "out.mrc")
+    harness.succeed("reconstruct", *series.input, "-o", output, *harness.merge(quick, ["--rank", 5]),
+                    "--config", file)
+    configured = harness.Results(output)
+    assert options_of(configured) == options_of(written)
+    assert options_of(configured)["specimen"]["axis_z"] == 11
+    assert harness.read_bytes(configured.volume_path) == harness.read_bytes(written.volume_path)
+
+
+def test_recorded_options_repeat_the_run():
+    """Gives every option that a run recorded, and none is left to be chosen automatically."""
+    series = harness.Series("series")
+    automatic = series.reconstruct("automatic", "--contrast", "dark")
+    recorded = options_of(automatic)
+    words = []
+    for key, flag in flags_of_keys().items():
+        group, _, name = key.rpartition(".")
+        if not flag.startswith("--") or group == "running" or key.startswith("specimen.axis"):
+            continue
+        value = recorded[group][name] if group else recorded[name]
+        if isinstance(value, bool) and flag != "--view-scale":
+            words += [flag] if value != flag.startswith("--no-") else []
+        elif value not in (None, ""):
+            words.append(f"{flag}={ {True: 'on', False: 'off'}.get(value, value) }"
+                         if isinstance(value, bool) else f"{flag}={value}")
+    output = os.path.join(harness.fresh_directory("explicit"), "out.mrc")
+    harness.succeed("reconstruct", series.stack, "-o", output, *words)
+    explicit = harness.Results(output)
+    assert options_of(explicit) == recorded
+    assert harness.read_bytes(explicit.volume_path) == harness.read_bytes(automatic.volume_path)
