@@ -4,7 +4,7 @@
 
 #include "output/model_file.h"
 #include "report/mask_picture.h"
-#include "report/slices.h"
+#include "report/slice.h"
 #include "report/tree_picture.h"
 
 namespace tomofield::cli {

@@ -6,7 +6,7 @@
 
 #include "field/sampling/sample_box.h"
 #include "report/canvas.h"
-#include "report/grey_scale.h"
+#include "report/slice.h"
 
 namespace tomofield::report {
 namespace {
