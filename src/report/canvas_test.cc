@@ -1,4 +1,4 @@
-#include "report/text.h"
+#include "report/canvas.h"
 
 #include <gtest/gtest.h>
 
