@@ -15,7 +15,7 @@
 #include "io/atomic_file.h"
 #include "io/json.h"
 #include "output/shared_options.h"
-#include "report/fsc_picture.h"
+#include "report/pictures.h"
 
 namespace tomofield::cli {
 namespace {

@@ -15,8 +15,8 @@
 #include "io/json.h"
 #include "io/mrc.h"
 #include "output/shared_options.h"
-#include "report/fsc_picture.h"
 #include "report/html.h"
+#include "report/pictures.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
 

@@ -10,7 +10,7 @@
 #include "evaluate/compare.h"
 #include "evaluate/contrast.h"
 #include "evaluate/fsc_files.h"
-#include "report/fsc_picture.h"
+#include "report/pictures.h"
 
 namespace tomofield::compare {
 namespace {
