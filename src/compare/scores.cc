@@ -7,9 +7,9 @@
 #include <optional>
 #include <span>
 
-#include "evaluate/compare.h"
 #include "evaluate/contrast.h"
 #include "evaluate/fsc_files.h"
+#include "evaluate/similarity.h"
 #include "report/pictures.h"
 
 namespace tomofield::compare {

@@ -1,4 +1,4 @@
-#include "evaluate/compare.h"
+#include "evaluate/similarity.h"
 
 #include <gtest/gtest.h>
 
