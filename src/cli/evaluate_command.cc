@@ -9,7 +9,7 @@
 #include "cli/common_options.h"
 #include "cli/evaluate_options.h"
 #include "cli/help_formatter.h"
-#include "evaluate/fsc_files.h"
+#include "evaluate/fsc.h"
 #include "evaluate/similarity.h"
 #include "evaluate/volume_score.h"
 #include "io/atomic_file.h"

@@ -8,7 +8,7 @@
 #include <span>
 
 #include "evaluate/contrast.h"
-#include "evaluate/fsc_files.h"
+#include "evaluate/fsc.h"
 #include "evaluate/similarity.h"
 #include "report/pictures.h"
 
