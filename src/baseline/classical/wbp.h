@@ -1,12 +1,24 @@
 #pragma once
 
+#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
+#include <vector>
 
 #include "baseline/classical/ramp_filter.h"
 #include "baseline/solver.h"
 #include "baseline/voxel_problem.h"
 
 namespace tomofield::baseline {
+
+/// Returns the part of the half circle that each tilt stands for, in radians: half of the distances
+/// to its neighbours in the order of tilts, where 180° is 0° again. Beyond the first and the last
+/// tilt at most the mean spacing counts, so that no tilt stands for the missing wedge.
+std::vector<double> tilt_weights(const std::vector<double>& tilt_deg);
+
+/// Replaces the rays [x, lane] that do not count (mask [x], a bit a lane) by a straight line
+/// between the nearest ones in their row that count. Rays at the end of a row, with none that
+/// counts on one side, become 0.
+void bridge_gaps(const std::uint16_t* mask, std::int64_t width, float* rays);
 
 struct WbpOptions {
   RampFilterOptions filter;
