@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "baseline/classical/row_action.h"
+#include "baseline/classical/sirt.h"
 #include "baseline/classical/slab_gradient.h"
 
 namespace tomofield::baseline {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "base/random.h"
-#include "baseline/classical/row_action.h"
 #include "baseline/classical/sirt.h"
 #include "geometry/tilt_geometry.h"
 #include "voxel_comparison.h"
