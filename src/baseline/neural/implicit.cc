@@ -3,7 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "baseline/neural/fourier_encoding.h"
+#include "baseline/neural/encodings.h"
 
 namespace tomofield::baseline {
 namespace {

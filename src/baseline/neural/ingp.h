@@ -1,6 +1,6 @@
 #pragma once
 
-#include "baseline/neural/hash_grid.h"
+#include "baseline/neural/encodings.h"
 #include "baseline/neural/network_fit.h"
 
 namespace tomofield::baseline {

@@ -5,7 +5,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "baseline/neural/dense_network.h"
-#include "baseline/neural/point_encoding.h"
+#include "baseline/neural/encodings.h"
 #include "baseline/solver.h"
 #include "baseline/voxel_problem.h"
 
