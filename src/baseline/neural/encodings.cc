@@ -5,7 +5,7 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "baseline/neural/fast_sine.h"
+#include "baseline/neural/dense_network.h"
 
 namespace tomofield::baseline {
 namespace {
