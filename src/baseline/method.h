@@ -7,8 +7,7 @@
 #include "baseline/classical/sirt.h"
 #include "baseline/classical/tv_reconstruction.h"
 #include "baseline/classical/wbp.h"
-#include "baseline/neural/implicit.h"
-#include "baseline/neural/ingp.h"
+#include "baseline/neural/network_methods.h"
 #include "baseline/solver.h"
 #include "baseline/voxel_problem.h"
 

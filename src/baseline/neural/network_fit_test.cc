@@ -5,8 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "baseline/neural/implicit.h"
-#include "baseline/neural/ingp.h"
+#include "baseline/neural/network_methods.h"
 #include "voxel_comparison.h"
 
 namespace tomofield::baseline {

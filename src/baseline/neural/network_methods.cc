@@ -1,12 +1,19 @@
-#include "baseline/neural/implicit.h"
+#include "baseline/neural/network_methods.h"
 
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "baseline/neural/encodings.h"
+#include "baseline/neural/network_density.h"
 
 namespace tomofield::baseline {
 namespace {
+
+std::unique_ptr<PointEncoding> encoding_of(const IngpOptions& options,
+                                           const projection::SampleGrid& samples,
+                                           std::int64_t num_rows) {
+  return std::make_unique<HashGrid>(box_of(samples, num_rows), options.grid);
+}
 
 std::unique_ptr<PointEncoding> encoding_of(const ImplicitOptions& options) {
   // This seed keeps the random numbers of the encoding apart from the network's.
@@ -16,6 +23,25 @@ std::unique_ptr<PointEncoding> encoding_of(const ImplicitOptions& options) {
 }
 
 }  // namespace
+
+nlohmann::json IngpOptions::json() const {
+  nlohmann::json json = NetworkOptions::json();
+  json.update({{"levels", grid.levels},
+               {"coarsest", grid.coarsest},
+               {"finest", grid.finest},
+               {"table_bits", grid.table_bits}});
+  return json;
+}
+
+MethodSize IngpOptions::size(const projection::SampleGrid& samples, std::int64_t num_rows) const {
+  return network_size(samples, num_rows, *encoding_of(*this, samples, num_rows), *this);
+}
+
+Solution reconstruct_ingp(VoxelProblem& problem, const IngpOptions& options, double mean_density,
+                          const AfterIteration& after_iteration) {
+  return fit_network(problem, options, encoding_of(options, problem.grid(), problem.num_rows()),
+                     mean_density, /*learns_noise=*/false, after_iteration);
+}
 
 nlohmann::json ImplicitOptions::json() const {
   nlohmann::json json = NetworkOptions::json();
