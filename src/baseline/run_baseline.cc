@@ -11,7 +11,6 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
-#include "baseline/held_out.h"
 #include "baseline/tune.h"
 #include "baseline/voxel_problem.h"
 #include "io/json.h"

@@ -11,7 +11,7 @@
 
 #include "base/log.h"
 #include "base/stopwatch.h"
-#include "baseline/held_out.h"
+#include "baseline/voxel_problem.h"
 #include "selection/trial_series.h"
 #include "selection/scores.h"
 
