@@ -1,4 +1,4 @@
-#include "compare/row_file.h"
+#include "compare/rows.h"
 
 #include <gtest/gtest.h>
 
