@@ -7,7 +7,6 @@
 #include <array>
 
 #include "compare/pictures.h"
-#include "compare/rehearsal.h"
 #include "compare/runs.h"
 #include "compare/scores.h"
 #include "compare/table.h"
