@@ -17,7 +17,7 @@
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
 #include "option_table/values.h"
-#include "output/mask_metrics.h"
+#include "output/metrics.h"
 #include "output/result_files.h"
 #include "output/shared_options.h"
 #include "projection/sample_grid.h"
