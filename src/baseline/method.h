@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <variant>
 
 #include "baseline/classical/sart_tv.h"
@@ -27,5 +28,9 @@ nlohmann::json json_of(const Method& method);
 /// Reconstructs with a method. `mean_density` is the specimen's, in density units.
 Solution reconstruct(VoxelProblem& problem, const Method& method, double mean_density,
                      const AfterIteration& after_iteration);
+
+/// Returns the fall of the objective in the last tenth of the iterations, as a fraction of the
+/// objective. Returns nothing for a method that does not iterate.
+std::optional<double> last_decrease(const Solution& solution);
 
 }  // namespace tomofield::baseline

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <functional>
-#include <optional>
 #include <vector>
 
 #include "base/aligned_buffer.h"
@@ -38,10 +37,6 @@ struct Solution {
   /// The noise of the fitted views, in density units times pixels, if the method learns it.
   std::vector<double> noise_sigma = {};
 };
-
-/// Returns the fall of the objective in the last tenth of the iterations, as a fraction of the
-/// objective. Returns nothing for a method that does not iterate.
-std::optional<double> last_decrease(const Solution& solution);
 
 /// The report of a finished iteration. Its losses are those of the densities that it began with.
 struct IterationReport {

@@ -69,8 +69,6 @@ std::vector<std::string> changes(const json& before, const json& now) {
   return all;
 }
 
-namespace fs = std::filesystem;
-
 // Returns the path FOLDER/NAME with a suffix.
 fs::path file_of(const Row& row, const char* suffix) {
   return row.volume.parent_path() / (row.run.name + suffix);

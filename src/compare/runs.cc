@@ -21,6 +21,8 @@
 namespace tomofield::compare {
 namespace {
 
+namespace fs = std::filesystem;
+
 const char* suffix_of(Purpose purpose) {
   switch (purpose) {
     case Purpose::kVolume:
@@ -54,12 +56,11 @@ std::ptrdiff_t num_command_words(const Method& method) {
 }
 
 // Returns the files among a method's own words: `--mask FILE`, `--config=FILE`.
-std::vector<std::filesystem::path> named_files(const std::vector<std::string>& words) {
-  std::vector<std::filesystem::path> files;
+std::vector<fs::path> named_files(const std::vector<std::string>& words) {
+  std::vector<fs::path> files;
   for (const std::string& word : words) {
-    const std::filesystem::path value =
-        word.starts_with('-') ? word.substr(word.find('=') + 1) : word;
-    if (std::filesystem::is_regular_file(value)) files.push_back(value);
+    const fs::path value = word.starts_with('-') ? word.substr(word.find('=') + 1) : word;
+    if (fs::is_regular_file(value)) files.push_back(value);
   }
   return files;
 }
@@ -83,8 +84,6 @@ Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
   std::ranges::copy(named_files({own, method.arguments.end()}), std::back_inserter(run.inputs));
   return run;
 }
-
-namespace fs = std::filesystem;
 
 // Makes a directory where a folder is, or will be made. Removes it with all its contents.
 class ScratchFolder {

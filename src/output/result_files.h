@@ -12,7 +12,7 @@ namespace tomofield::output {
 std::vector<std::filesystem::path> input_files(const SeriesFiles& files);
 
 /// Checks that the results of a series can be written (io/output_files.h) and that none replaces a
-/// file that the series is read from. Pictures of slices (report/slices.h) are results too. Throws
+/// file that the series is read from. Pictures of slices (report/slice.h) are results too. Throws
 /// Error, with `advice`, otherwise.
 void check_result_files(std::vector<std::filesystem::path> results,
                         const std::filesystem::path& picture_prefix, const SeriesFiles& input,

@@ -45,10 +45,10 @@ struct SartTvOptions {
 };
 
 /// Reconstructs by ordered-subset SART (Andersen and Kak 1984) with steps down the total variation
-/// between its passes, as in ASD-POCS (Sidky and Pan 2008). A pass takes the step of row_action.h
+/// between its passes, as in ASD-POCS (Sidky and Pan 2008). A pass takes the step of sirt.h
 /// with each subset in turn. Then `tv_steps` steps of length
 ///   weight · |x after the pass − x before| / tv_steps
-/// reduce the variation (variation_descent.h), so they shrink as the data are met. The relaxation
+/// reduce the variation (VariationDescent), so they shrink as the data are met. The relaxation
 /// shrinks as well; otherwise the subsets would pull to and fro for ever. The method has no
 /// objective, so the solution reports its data loss as one. `start` is the density of every voxel
 /// at first. Memory: five volumes and the rays.

@@ -39,7 +39,7 @@ struct SirtOptions {
 };
 
 /// Reconstructs by weighted simultaneous iterative reconstruction (Gilbert 1972) from zero
-/// densities. An iteration is the step of row_action.h with all views at once. It minimises
+/// densities. An iteration is the step above with all views at once. It minimises
 ///   ½ Σ (residual / σ)² / ray length.
 /// The method has no prior, and must therefore stop before it has fitted the noise.
 Solution reconstruct_sirt(VoxelProblem& problem, const SirtOptions& options,

@@ -15,8 +15,6 @@ namespace {
 
 using kernels::kLanes;
 
-using kernels::kLanes;
-
 bool is_extended(const VoxelProblem& problem) { return problem.grid().segments().size() > 1; }
 
 std::vector<double> weights_of_views(const VoxelProblem& problem) {

@@ -29,7 +29,7 @@ struct WbpOptions {
 
 /// Reconstructs by weighted back-projection (Gilbert 1972; Kak and Slaney 1988, chapter 3):
 ///   x = x₀ + Σ_view Δθ_view / (h_x h_z) Aᵀ_view (ramp ∗ (b − A x₀))
-/// with Δθ of tilt_weights(). Rays that do not count are bridged (bridge_gaps.h). Neither the noise
+/// with Δθ of tilt_weights(). bridge_gaps() fills rays that do not count. Neither the noise
 /// of a view nor a fitted scale plays a part. Densities may be negative.
 ///
 /// If the specimen ends inside the field of view (no margins), x₀ is 0. If it goes on, x₀ is

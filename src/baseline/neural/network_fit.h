@@ -74,7 +74,7 @@ MethodSize network_size(const projection::SampleGrid& grid, std::int64_t num_row
 
 /// Fits a network (network_density.h) to the views by Adam and samples it at the voxels. There is
 /// no explicit prior. A step uses the data term of all views in a few rows (RowSet); the sets come
-/// in random order. With `learns_noise`, the noise of each view is learned too (noise_levels.h) and
+/// in random order. With `learns_noise`, the noise of each view is learned too (NoiseLevels) and
 /// weighs the view. `mean_density` is the density at the start.
 Solution fit_network(VoxelProblem& problem, const NetworkOptions& options,
                      std::unique_ptr<PointEncoding> encoding, double mean_density,

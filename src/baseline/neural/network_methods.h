@@ -32,7 +32,7 @@ struct ImplicitOptions : NetworkOptions {
                        .width = 64,
                        .learning_rate = 0.006,
                        .activation = Activation::kSine} {}
-  int features = 128;      ///< plane waves at the network's input (fourier_encoding.h)
+  int features = 128;      ///< plane waves at the network's input (encodings.h)
   double shortest = 20.0;  ///< shortest wavelength of the plane waves, pixels
 
   MethodFacts facts() const {
