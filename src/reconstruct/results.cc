@@ -7,9 +7,9 @@
 
 #include "base/lanes.h"
 #include "io/json.h"
-#include "output/held_out_picture.h"
 #include "output/metrics.h"
 #include "output/volume.h"
+#include "report/pictures.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -24,7 +24,7 @@ nlohmann::json score_fit(const fit::Fit& fit, const measurement::PreparedSeries&
   const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
   const measurement::PredictedView view = fit.predict_held_out(*nearest, model);
   fit.processes().run_collectively([&] {
-    if (fit.processes().is_first()) output::write_held_out_picture(picture, view);
+    if (fit.processes().is_first()) report::write_held_out_picture(view, picture);
   });
   nlohmann::json json =
       measurement::report_held_out(error, series.geometry.tilt_deg, stopped_by_them);

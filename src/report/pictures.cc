@@ -18,8 +18,10 @@
 namespace tomofield::report {
 namespace {
 
-constexpr std::int64_t kMinWidth_px = 512;
-constexpr std::uint8_t kMaskedRed = 220, kMaskedOther = 60;
+constexpr std::int64_t kMinMaskWidth_px = 512;
+constexpr Colour kMasked{220, 60, 60};
+constexpr Colour kLeafBorder{255, 140, 0};
+constexpr std::int64_t kPanelGap_px = 4;  // white pixels between panels of a held-out view
 
 std::size_t lowest_tilt(const tilt_series::TiltSeries& series) {
   const auto& views = series.views();
@@ -47,8 +49,6 @@ std::vector<std::uint8_t> grey_values(const std::vector<float>& image,
   return grey;
 }
 
-constexpr Colour kBorder{255, 140, 0};
-
 // Returns the slice at half the thickness, one voxel a pixel: [y, x].
 std::vector<float> central_slice(const output::Model& model) {
   const geometry::Roi& roi = model.roi;
@@ -66,8 +66,21 @@ void draw_border(const field::Square& square, const geometry::Roi& roi, std::int
                  Canvas& canvas) {
   const std::int64_t x0 = (square.x0 - roi.x0) * zoom, y0 = (square.y0 - roi.y0) * zoom;
   const std::int64_t size = square.size * zoom;
-  canvas.fill(x0, y0, x0 + size, y0 + 1, kBorder);
-  canvas.fill(x0, y0, x0 + 1, y0 + size, kBorder);
+  canvas.fill(x0, y0, x0 + size, y0 + 1, kLeafBorder);
+  canvas.fill(x0, y0, x0 + 1, y0 + size, kLeafBorder);
+}
+
+std::vector<float> residual_of(const measurement::PredictedView& view) {
+  std::vector<float> residual(view.measured.size());
+  for (std::size_t i = 0; i < residual.size(); ++i)
+    residual[i] = view.measured[i] - view.predicted[i];
+  return residual;
+}
+
+std::uint8_t grey_of(double value, double black, double range) {
+  if (!std::isfinite(value) || !(range > 0)) return 0;
+  return static_cast<std::uint8_t>(
+      std::lround(std::clamp((value - black) / range, 0.0, 1.0) * 255.0));
 }
 
 }  // namespace
@@ -78,16 +91,15 @@ void write_mask_picture(const tilt_series::TiltSeries& series, const std::filesy
   std::vector<std::uint8_t> valid(image.size());
   series.read_view(lowest_tilt(series), image, valid);
   const std::vector<std::uint8_t> grey = grey_values(image, valid);
-  const std::int64_t zoom = std::max<std::int64_t>(1, (kMinWidth_px + width - 1) / width);
+  const std::int64_t zoom = std::max<std::int64_t>(1, (kMinMaskWidth_px + width - 1) / width);
   std::vector<std::uint8_t> pixels;
   pixels.reserve(static_cast<std::size_t>(width * height * zoom * zoom * 3));
   for (std::int64_t row = 0; row < height * zoom; ++row) {
     const std::int64_t y = height - 1 - row / zoom;  // the first row is at the bottom
     for (std::int64_t column = 0; column < width * zoom; ++column) {
       const auto at = static_cast<std::size_t>(y * width + column / zoom);
-      const std::uint8_t red = valid[at] ? grey[at] : kMaskedRed;
-      const std::uint8_t other = valid[at] ? grey[at] : kMaskedOther;
-      pixels.insert(pixels.end(), {red, other, other});
+      const Colour colour = valid[at] ? Colour{grey[at], grey[at], grey[at]} : kMasked;
+      pixels.insert(pixels.end(), colour.begin(), colour.end());
     }
   }
   io::write_png_rgb(path, width * zoom, height * zoom, pixels);
@@ -141,6 +153,34 @@ void write_fsc_picture(const evaluate::Fsc& fsc, const std::filesystem::path& pa
   if (fsc.missing)
     curves.push_back(fsc_curve("missing wedge", frequency, fsc.missing->correlation));
   write_curve_plot(fsc_axes(frequency.back()), curves, path);
+}
+
+void write_held_out_picture(const measurement::PredictedView& view,
+                            const std::filesystem::path& path) {
+  std::vector<float> valid;
+  for (const float value : view.measured)
+    if (std::isfinite(value)) valid.push_back(value);
+  const double black = valid.empty() ? 0.0 : base::percentile(valid, 0.5);
+  const double range = valid.empty() ? 0.0 : base::percentile(valid, 99.5) - black;
+  const struct {
+    std::vector<float> values;
+    double black;
+  } panels[] = {{view.measured, black}, {view.predicted, black}, {residual_of(view), -range / 2}};
+
+  const std::int64_t width = 3 * view.width + 2 * kPanelGap_px;
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width * view.height), 255);
+  for (std::int64_t panel = 0; panel < 3; ++panel) {
+    for (std::int64_t y = 0; y < view.height; ++y) {
+      const std::int64_t row = view.height - 1 - y;  // the first row is at the bottom
+      for (std::int64_t x = 0; x < view.width; ++x) {
+        const auto value =
+            static_cast<double>(panels[panel].values[static_cast<std::size_t>(y * view.width + x)]);
+        pixels[static_cast<std::size_t>(row * width + panel * (view.width + kPanelGap_px) + x)] =
+            grey_of(value, panels[panel].black, range);
+      }
+    }
+  }
+  io::write_png_grey(path, width, view.height, pixels);
 }
 
 }  // namespace tomofield::report

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "evaluate/fsc.h"
+#include "measurement/held_out.h"
 #include "output/model_file.h"
 #include "report/curve_plot.h"
 #include "tilt_series/tilt_series.h"
@@ -33,5 +34,13 @@ Curve fsc_curve(std::string name, const std::vector<double>& frequency_per_A,
 /// those inside the tilt range and those of the missing wedge. Replaces `path`. Throws Error if it
 /// cannot be written.
 void write_fsc_picture(const evaluate::Fsc& fsc, const std::filesystem::path& path);
+
+/// Writes a picture (PNG) of a held-out view. Three panels lie side by side: the measured view, the
+/// predicted view and the residual (measured − predicted). They share one grey scale: black to
+/// white spans the middle 99 % of the measured values. The scale is shifted for the residual, so
+/// that zero is the middle grey. Pixels that are not measurements are black. Throws Error if `path`
+/// cannot be written.
+void write_held_out_picture(const measurement::PredictedView& view,
+                            const std::filesystem::path& path);
 
 }  // namespace tomofield::report
