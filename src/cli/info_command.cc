@@ -163,6 +163,7 @@ void print_training(const output::TrainingState& state) {
   fmt::print("  training state   {}\n", names.empty() ? "none" : names);
 }
 
+// Prints the contents of a model file.
 void print_model(const std::filesystem::path& path) {
   output::TrainingState training;
   const output::Model model = output::load_model(path, &training);
