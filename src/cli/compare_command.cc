@@ -20,7 +20,7 @@
 namespace tomofield::cli {
 namespace {
 
-constexpr double kMostViews = 1e9;
+constexpr double kMaxViews = 1e9;
 
 struct Arguments {
   option_table::Choices choices;  // checked here, used by the methods
@@ -121,7 +121,7 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
       .add_option("--hold-out", arguments.hold_out,
                   "Also run every method without every Nth view, and report how well it predicts "
                   "these views")
-      ->check(number_between(2, kMostViews))
+      ->check(number_between(2, kMaxViews))
       ->group(group);
   command.add_option("-o,--output", arguments.folder, "Folder of all results")
       ->required()

@@ -46,7 +46,7 @@ struct HashGrid::Corners {
 
 HashGrid::HashGrid(const Point& box, const HashGridOptions& options) {
   const double steps = std::max(options.levels - 1, 1);
-  const std::uint64_t most = std::uint64_t{1} << options.table_bits;
+  const std::uint64_t max_entries = std::uint64_t{1} << options.table_bits;
   for (int l = 0; l < options.levels; ++l) {
     const double spacing =
         options.coarsest * std::pow(options.finest / options.coarsest, l / steps);
@@ -57,8 +57,8 @@ HashGrid::HashGrid(const Point& box, const HashGridOptions& options) {
       level.cells[axis] = static_cast<std::uint32_t>(std::max(cells, 1.0));
       entries *= level.cells[axis] + 1;
     }
-    if (entries > most) level.mask = static_cast<std::uint32_t>(most - 1);
-    num_parameters_ += std::min(entries, most) * kFeatures;
+    if (entries > max_entries) level.mask = static_cast<std::uint32_t>(max_entries - 1);
+    num_parameters_ += std::min(entries, max_entries) * kFeatures;
     levels_.push_back(level);
   }
 }
