@@ -125,7 +125,7 @@ nlohmann::json held_out_json(const VoxelProblem& problem, const std::vector<int>
                                       problem.projector().geometry().tilt_deg);
 }
 
-nlohmann::json figures_json(const Solution& solution, const VoxelProblem& problem,
+nlohmann::json metrics_json(const Solution& solution, const VoxelProblem& problem,
                             const measurement::PreparedSeries& series, std::size_t num_parameters,
                             double seconds) {
   nlohmann::json views = nlohmann::json::array();
@@ -163,7 +163,7 @@ AfterIteration report_to(const base::ProgressSink& progress, const MethodFacts& 
 }
 
 void write_results(const Solution& solution, const measurement::PreparedSeries& series,
-                   const BaselineOptions& options, const nlohmann::json& figures,
+                   const BaselineOptions& options, const nlohmann::json& metrics,
                    const BaselinePaths& paths) {
   const output::ModelInfo info = volume_info(series, options);
   write_voxels(voxels_of(solution.densities), output::region_box(info, 1.0), info,
@@ -171,7 +171,7 @@ void write_results(const Solution& solution, const measurement::PreparedSeries& 
                output::volume_options(options.shared), paths.volume);
   io::write_json(
       paths.json,
-      {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"figures", figures}});
+      {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"metrics", metrics}});
 }
 
 BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays) {
@@ -252,11 +252,11 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
                   report_to(progress.reconstruction, facts_of(options.method), problem.num_rays()));
   const double fit_seconds = running.seconds();
   const MethodSize size = size_of(options.method, problem.grid(), problem.num_rows());
-  nlohmann::json figures =
-      figures_json(solution, problem, series, size.num_parameters, fit_seconds);
-  figures["held_out"] = held_out_json(problem, held_out, fit_view_scale, solution.densities);
-  figures["tuning"] = tuning;
-  write_results(solution, series, options, figures, paths);
+  nlohmann::json metrics =
+      metrics_json(solution, problem, series, size.num_parameters, fit_seconds);
+  metrics["held_out"] = held_out_json(problem, held_out, fit_view_scale, solution.densities);
+  metrics["tuning"] = tuning;
+  write_results(solution, series, options, metrics, paths);
   return summary_of(solution, problem.num_rays());
 }
 

@@ -86,7 +86,7 @@ void run(const CLI::App& command, const Arguments& arguments,
   const compare::Outcome outcome = compare::compare_methods(options, hooks);
   if (outcome != compare::Outcome::kFinished) throw stopped(outcome, arguments);
   fmt::print(
-      "report    {}\nfigures   {}\ntable     {}\n", (options.folder / "report.html").string(),
+      "report    {}\nmetrics   {}\ntable     {}\n", (options.folder / "report.html").string(),
       (options.folder / "comparison.json").string(), (options.folder / "comparison.csv").string());
 }
 

@@ -88,7 +88,7 @@ void print_series(const tilt_series::TiltSeriesOptions& options) {
   if (options.contrast == Contrast::kDark) {
     fmt::print("  empty beam       {:.7g}\n", series.empty_beam());
   }
-  const tilt_series::MaskFigures& masks = series.mask_figures();
+  const tilt_series::MaskMetrics& masks = series.mask_metrics();
   fmt::print("  masked           {} beads of {:.3g} nm, {} hot or dead pixels\n", masks.num_beads,
              masks.bead_diameter_A / 10, masks.num_bad_pixels);
   fmt::print("  section  tilt/°  x-tilt/°  noise\n");

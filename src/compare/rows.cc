@@ -153,8 +153,8 @@ void write_row(const fs::path& file, const json& origin, const RowState& state) 
                         {"peak_bytes", state.costs.peak_bytes}});
 }
 
-json read_figures(const fs::path& file) {
-  return read_json(file, [](const json& document) { return document.at("figures"); });
+json read_metrics(const fs::path& file) {
+  return read_json(file, [](const json& document) { return document.at("metrics"); });
 }
 
 std::vector<Row> new_rows(const std::vector<Run>& runs, const fs::path& folder) {
@@ -201,7 +201,7 @@ bool run_rows(const fs::path& program, const RunHooks& hooks, std::vector<Row>& 
     if (!is_there && hooks.must_stop()) return false;
     if (hooks.run_starts) hooks.run_starts(row.run, is_there);
     if (!is_there && !run(program, hooks, row)) return false;
-    row.figures = read_figures(file_of(row, ".json"));
+    row.metrics = read_metrics(file_of(row, ".json"));
     require_one_grid({rows.front().run.name, read_grid(rows.front().volume)},
                      {row.run.name, read_grid(row.volume)});
   }

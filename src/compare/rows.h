@@ -46,7 +46,7 @@ void write_row(const std::filesystem::path& file, const nlohmann::json& origin,
                const RowState& state);
 
 /// Returns the metrics in the JSON file of a method. Throws Error if there are none.
-nlohmann::json read_figures(const std::filesystem::path& file);
+nlohmann::json read_metrics(const std::filesystem::path& file);
 
 /// A run of a method.
 struct Run {
@@ -63,7 +63,7 @@ struct Row {
   std::filesystem::path volume;
   nlohmann::json origin;  ///< origin_of() the run
   RowState state;
-  nlohmann::json figures = nullptr;  ///< the metrics in the method's JSON, once it is finished
+  nlohmann::json metrics = nullptr;  ///< the metrics in the method's JSON, once it is finished
 };
 
 struct RunHooks {

@@ -31,7 +31,7 @@ HeldOutError held_out_error(
     bool fit_view_scale,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
-/// Logs the error; returns it and that of each view, for the figures of a run. With
+/// Logs the error; returns it and that of each view, for the metrics of a run. With
 /// `stopped_by_them` the same views decided when the fit stopped, and both say so.
 nlohmann::json report_held_out(const HeldOutError& error, const std::vector<double>& tilt_deg,
                                bool stopped_by_them = false);

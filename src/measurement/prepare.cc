@@ -203,7 +203,7 @@ std::vector<double> masked_parts(const SlabViews& rays,
 }
 
 void log_masks(const PreparedSeries& prepared) {
-  const tilt_series::MaskFigures& masks = prepared.masks;
+  const tilt_series::MaskMetrics& masks = prepared.masks;
   double masked = 0;
   const int num_views = prepared.geometry.num_views();
   for (int v = 0; v < num_views; ++v)
@@ -297,7 +297,7 @@ PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
         views.read(view, image, valid);
       },
       scratch_dir);
-  prepared.masks = series.mask_figures();
+  prepared.masks = series.mask_metrics();
   prepared.masked_part = masked_parts(*prepared.rays, processes);
   log_masks(prepared);
   return prepared;

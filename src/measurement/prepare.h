@@ -41,7 +41,7 @@ struct PreparedSeries {
   std::vector<double> noise_sigma;  ///< of each view, in density units
   double mean_density = 0.0;        ///< in density units
   double empty_beam = 0.0;          ///< I0 in data units (dark contrast)
-  tilt_series::MaskFigures masks;   ///< what was masked, in all of the views
+  tilt_series::MaskMetrics masks;   ///< what was masked, in all of the views
   std::unique_ptr<SlabViews> rays;
   std::vector<double> masked_part;  ///< of each view's `rays`: those that carry no loss
   /// Views, and which of their rows are fitted: those of the region of interest, or all.

@@ -39,7 +39,7 @@ nlohmann::json stages_json(const std::vector<fit::Stage>& stages) {
 }  // namespace
 
 nlohmann::json mask_json(const measurement::PreparedSeries& series) {
-  const tilt_series::MaskFigures& masks = series.masks;
+  const tilt_series::MaskMetrics& masks = series.masks;
   nlohmann::json views = nlohmann::json::array();
   const int num_views = series.geometry.num_views();
   double masked_part = 0;
@@ -58,7 +58,7 @@ nlohmann::json mask_json(const measurement::PreparedSeries& series) {
           {"views", views}};
 }
 
-nlohmann::json figures_json(const fit::Fit& fit, const measurement::PreparedSeries& series,
+nlohmann::json metrics_json(const fit::Fit& fit, const measurement::PreparedSeries& series,
                             double seconds) {
   const fit::Progress& progress = fit.progress();
   nlohmann::json views = nlohmann::json::array();

@@ -14,7 +14,7 @@ nlohmann::json mask_json(const measurement::PreparedSeries& series);
 
 /// Returns the metrics of a fit as JSON, for the file beside the volume. `seconds` is the fit's
 /// time.
-nlohmann::json figures_json(const fit::Fit& fit, const measurement::PreparedSeries& series,
+nlohmann::json metrics_json(const fit::Fit& fit, const measurement::PreparedSeries& series,
                             double seconds);
 
 /// Returns as JSON the work and the times of each process in the steps of this run. Every process

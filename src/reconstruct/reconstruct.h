@@ -24,7 +24,7 @@ struct ReconstructHooks {
 enum class Outcome { kFinished, kStopped, kStoppedTuning };
 
 /// The main job: fits a field to the series and writes the volume (MRC), the
-/// model (HDF5, also the checkpoint while it runs), and the figures and resolved
+/// model (HDF5, also the checkpoint while it runs), and the metrics and resolved
 /// options (JSON). Call check_options() and
 /// plan_run() first: this starts at once.
 ///

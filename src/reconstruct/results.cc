@@ -61,13 +61,13 @@ output::ModelInfo model_info(const measurement::PreparedSeries& series,
 void write_results(fit::Fit& fit, const measurement::PreparedSeries& series,
                    const ReconstructOptions& options, const FitOrigin& origin,
                    const OutputPaths& paths, double seconds) {
-  nlohmann::json figures = output::figures_json(fit, series, seconds);
-  figures["held_out"] = nullptr;
+  nlohmann::json metrics = output::metrics_json(fit, series, seconds);
+  metrics["held_out"] = nullptr;
   if (options.fit.hold_out > 0) {
-    figures["held_out"] = score_fit(fit, series, options.fit.patience > 0, paths.held_out_picture);
+    metrics["held_out"] = score_fit(fit, series, options.fit.patience > 0, paths.held_out_picture);
   }
-  figures["processes"] = output::processes_json(fit, seconds);
-  figures["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
+  metrics["processes"] = output::processes_json(fit, seconds);
+  metrics["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
   save_fit(paths.model, fit, model_info(series, options), progress_state(fit, origin));
   const output::VolumeShare share = volume_share(fit, series);
   output::Model model{model_info(series, options), fit.take_field()};
@@ -76,7 +76,7 @@ void write_results(fit::Fit& fit, const measurement::PreparedSeries& series,
     if (!share.processes.is_first()) return;
     io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
                                 {"options", options_json(options)},
-                                {"figures", figures}});
+                                {"metrics", metrics}});
   });
 }
 

@@ -12,7 +12,7 @@ namespace tomofield::reconstruction {
 output::ModelInfo model_info(const measurement::PreparedSeries& series,
                              const ReconstructOptions& options);
 
-/// Writes what a finished fit leaves: model, volume, figures, and of views that were held out a
+/// Writes what a finished fit leaves: model, volume, metrics, and of views that were held out a
 /// picture. The fit's field is gone then. Every process calls it.
 void write_results(fit::Fit& fit, const measurement::PreparedSeries& series,
                    const ReconstructOptions& options, const FitOrigin& origin,

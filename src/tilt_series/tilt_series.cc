@@ -248,7 +248,7 @@ struct TiltSeries::Impl {
     processes.run_collectively([&] {
       for (std::size_t view = 0; view < views.size(); ++view) {
         require_measurements(view, found[view]);
-        beads.figures.num_bad_pixels += found[view].num_bad;
+        beads.metrics.num_bad_pixels += found[view].num_bad;
       }
     });
   }
@@ -263,9 +263,9 @@ struct TiltSeries::Impl {
       convert(&image);
       return image;
     };
-    const std::int64_t num_bad_pixels = beads.figures.num_bad_pixels;
+    const std::int64_t num_bad_pixels = beads.metrics.num_bad_pixels;
     beads = find_bead_masks(options, plan, stack, bead_views);
-    beads.figures.num_bad_pixels = num_bad_pixels;
+    beads.metrics.num_bad_pixels = num_bad_pixels;
     if (options.resample) return;
     for (std::size_t view = 0; view < views.size(); ++view) {
       for (MaskDisc& disc : beads.discs[view]) disc = as_recorded(disc, view);
@@ -338,7 +338,7 @@ double TiltSeries::pixel_size_A() const { return impl_->plan.pixel_size_A * bin_
 double TiltSeries::bin_factor() const { return impl_->plan.bin_factor; }
 const std::vector<double>& TiltSeries::noise_sigma() const { return impl_->noise_sigma; }
 double TiltSeries::empty_beam() const { return impl_->empty_beam; }
-const MaskFigures& TiltSeries::mask_figures() const { return impl_->beads.figures; }
+const MaskMetrics& TiltSeries::mask_metrics() const { return impl_->beads.metrics; }
 
 void TiltSeries::read_view(std::size_t view, std::span<float> image,
                            std::span<std::uint8_t> valid) const {

@@ -38,7 +38,7 @@ struct TiltSeriesOptions {
 };
 
 /// What was masked beside the fill of rotated images.
-struct MaskFigures {
+struct MaskMetrics {
   std::size_t num_beads = 0;              ///< with one position in the specimen
   double bead_diameter_A = 0.0;           ///< given or estimated; 0: no beads
   std::vector<std::size_t> beads_found;   ///< of each view: with a spot of their own
@@ -94,7 +94,7 @@ class TiltSeries {
   /// kBright 0, where none is needed.
   double empty_beam() const;
 
-  const MaskFigures& mask_figures() const;
+  const MaskMetrics& mask_metrics() const;
 
  private:
   struct Impl;

@@ -14,7 +14,7 @@ namespace tomofield::tilt_series {
 /// Discs of every view that hide beads and fiducials, in its aligned, binned pixels.
 struct BeadMasks {
   std::vector<std::vector<MaskDisc>> discs;
-  MaskFigures figures;  ///< of the beads
+  MaskMetrics metrics;  ///< of the beads
 };
 
 /// Opens the user's mask (--mask). Throws Error if it is not as large as the stack.
