@@ -14,11 +14,11 @@
 #include "baseline/tune.h"
 #include "baseline/voxel_problem.h"
 #include "io/json.h"
+#include "io/output_files.h"
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
 #include "option_table/values.h"
 #include "output/metrics.h"
-#include "output/result_files.h"
 #include "output/shared_options.h"
 #include "projection/sample_grid.h"
 #include "selection/trial_series.h"
@@ -189,9 +189,9 @@ BaselinePaths baseline_paths(const std::filesystem::path& volume) {
 void check_options(const BaselineOptions& options) {
   base::require_no_faults(option_table::range_faults(options.shared));
   const BaselinePaths paths = baseline_paths(options.shared.output);
-  output::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
-                             options.shared.overwrite,
-                             "give --overwrite to replace it, or another name with -o");
+  io::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
+                         options.shared.overwrite,
+                         "give --overwrite to replace it, or another name with -o");
 }
 
 BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {

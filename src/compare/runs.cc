@@ -15,7 +15,7 @@
 
 #include "compare/child_process.h"
 #include "compare/grid.h"
-#include "output/result_files.h"
+#include "io/output_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {
@@ -80,7 +80,7 @@ Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
   // Settings are tuned anew for every purpose: those chosen on all views have seen the held-out
   // ones.
   if (options.tune && method.tunes) run.command.push_back("--tune");
-  run.inputs = output::input_files(options.files);
+  run.inputs = io::input_files(options.files);
   std::ranges::copy(named_files({own, method.arguments.end()}), std::back_inserter(run.inputs));
   return run;
 }
