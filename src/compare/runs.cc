@@ -1,8 +1,8 @@
 #include "compare/runs.h"
 
 #include <fmt/format.h>
-
 #include <stdlib.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstring>

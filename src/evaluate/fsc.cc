@@ -1,9 +1,8 @@
 #include "evaluate/fsc.h"
 
-#include <fmt/core.h>
 #include <fmt/format.h>
-
 #include <kiss_fft.h>
+
 #include <algorithm>
 #include <cmath>
 #include <complex>

@@ -1,6 +1,5 @@
 #include "evaluate/reprojection.h"
 
-#include <fmt/core.h>
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 #include "report/slice.h"
 
 #include <gtest/gtest.h>
-
 #include <unistd.h>
+
 #include <cstdint>
 #include <filesystem>
 #include <limits>
