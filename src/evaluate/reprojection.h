@@ -48,7 +48,7 @@ struct VolumeScore {
   double unit = 1.0;             ///< data units that predictions and offsets are divided by
 };
 
-/// Computes the reprojection error of a volume (evaluate/reprojection.h). Throws Error for a volume
+/// Computes the reprojection error of a volume (reprojection_errors()). Throws Error for a volume
 /// that is not of the region of interest, and for a series that read_tilt_series() refuses.
 VolumeScore score_volume(const VolumeScoreOptions& options);
 
