@@ -242,7 +242,7 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
         tune(options.method, {series, grid_of(series, options), held_out, fit_view_scale},
              progress.tuning);
     tuning = tuning_json(tuned);
-    options.method = tuned.method;
+    options.method = tuned.settings;
   }
   VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays, series.noise_sigma,
                        {held_out, fit_view_scale});
