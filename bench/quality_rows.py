@@ -109,7 +109,7 @@ def measure(options, arguments, kind, noise, seed, scratch):
     truth = os.path.join(folder, "truth.mrc")
     row["scores"] = score(options, volume, truth, scratch)
     with open(os.path.splitext(volume)[0] + ".json") as file:
-        figures = json.load(file)["figures"]
+        figures = json.load(file)["metrics"]
     row.update({key: figures[key] for key in ("parameters", "leaves") if key in figures})
     model = os.path.splitext(volume)[0] + ".h5"
     if os.path.exists(model):

@@ -136,7 +136,7 @@ def measure_ours(options, shape, name, arguments, scratch):
                **figures_of(run_measured(command))}
     scores = quality_rows.score(options, volume, os.path.join(folder, "truth.mrc"), scratch)
     with open(os.path.join(scratch, "volume.json")) as file:
-        parameters = json.load(file)["figures"].get("parameters")
+        parameters = json.load(file)["metrics"].get("parameters")
     if parameters is not None:
         figures["parameters"] = [parameters]
     return {name: {**figures, "psnr_dB": [scores["psnr_raw_dB"]],

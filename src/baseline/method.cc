@@ -59,6 +59,13 @@ nlohmann::json json_of(const Method& method) {
   return json;
 }
 
+std::optional<double> last_decrease(const Solution& solution) {
+  const std::vector<double>& objective = solution.objective;
+  if (objective.size() < 2) return std::nullopt;
+  const double before = objective[(objective.size() - 1) * 9 / 10];
+  return (before - objective.back()) / objective.back();
+}
+
 Solution reconstruct(VoxelProblem& problem, const Method& method, double mean_density,
                      const AfterIteration& after_iteration) {
   return std::visit(

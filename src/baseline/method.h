@@ -1,14 +1,14 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <variant>
 
 #include "baseline/classical/sart_tv.h"
 #include "baseline/classical/sirt.h"
 #include "baseline/classical/tv_reconstruction.h"
 #include "baseline/classical/wbp.h"
-#include "baseline/neural/implicit.h"
-#include "baseline/neural/ingp.h"
+#include "baseline/neural/network_methods.h"
 #include "baseline/solver.h"
 #include "baseline/voxel_problem.h"
 
@@ -28,5 +28,9 @@ nlohmann::json json_of(const Method& method);
 /// Reconstructs with a method. `mean_density` is the specimen's, in density units.
 Solution reconstruct(VoxelProblem& problem, const Method& method, double mean_density,
                      const AfterIteration& after_iteration);
+
+/// Returns the fall of the objective in the last tenth of the iterations, as a fraction of the
+/// objective. Returns nothing for a method that does not iterate.
+std::optional<double> last_decrease(const Solution& solution);
 
 }  // namespace tomofield::baseline

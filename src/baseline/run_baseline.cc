@@ -11,16 +11,15 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
-#include "baseline/held_out.h"
 #include "baseline/tune.h"
 #include "baseline/voxel_problem.h"
 #include "io/json.h"
+#include "io/output_files.h"
 #include "io/scratch_memory.h"
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
 #include "option_table/values.h"
-#include "output/mask_metrics.h"
-#include "output/result_files.h"
+#include "output/metrics.h"
 #include "output/shared_options.h"
 #include "projection/sample_grid.h"
 #include "selection/trial_measurement.h"
@@ -57,7 +56,7 @@ std::size_t estimate_memory(const measurement::Measurement& plan,
   const std::size_t values_of_slab = static_cast<std::size_t>(method.volumes) * grid.size() +
                                      static_cast<std::size_t>(method.detectors) * rays;
   const std::size_t values_of_thread =
-      SlabPair::kMost * (static_cast<std::size_t>(method.buffers) * grid.size() + rays);
+      SlabPair::kMaxSlabs * (static_cast<std::size_t>(method.buffers) * grid.size() + rays);
   const std::size_t copied_slabs = tunes ? std::min<std::size_t>(slabs, kTrialSlabs) : 0;
   const std::size_t running =
       size.bytes +
@@ -129,7 +128,7 @@ nlohmann::json held_out_json(const VoxelProblem& problem, const std::vector<int>
                                       problem.projector().geometry().tilt_deg);
 }
 
-nlohmann::json figures_json(const Solution& solution, const VoxelProblem& problem,
+nlohmann::json metrics_json(const Solution& solution, const VoxelProblem& problem,
                             const measurement::Measurement& series, std::size_t num_parameters,
                             double seconds) {
   nlohmann::json views = nlohmann::json::array();
@@ -167,7 +166,7 @@ AfterIteration report_to(const base::ProgressSink& progress, const MethodFacts& 
 }
 
 void write_results(const Solution& solution, const measurement::Measurement& series,
-                   const BaselineOptions& options, const nlohmann::json& figures,
+                   const BaselineOptions& options, const nlohmann::json& metrics,
                    const BaselinePaths& paths) {
   const output::ModelInfo info = volume_info(series, options);
   write_voxels(voxels_of(solution.densities), output::region_box(info, 1.0), info,
@@ -175,7 +174,7 @@ void write_results(const Solution& solution, const measurement::Measurement& ser
                output::volume_options(options.shared), paths.volume);
   io::write_json(
       paths.json,
-      {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"figures", figures}});
+      {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"metrics", metrics}});
 }
 
 BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays) {
@@ -193,9 +192,9 @@ BaselinePaths baseline_paths(const std::filesystem::path& volume) {
 void check_options(const BaselineOptions& options) {
   base::require_no_faults(option_table::range_faults(options.shared));
   const BaselinePaths paths = baseline_paths(options.shared.output);
-  output::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
-                             options.shared.overwrite,
-                             "give --overwrite to replace it, or another name with -o");
+  io::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
+                         options.shared.overwrite,
+                         "give --overwrite to replace it, or another name with -o");
 }
 
 BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {
@@ -248,7 +247,7 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
         tune(options.method, {series, grid_of(series, options), held_out, fit_view_scale},
              progress.tuning);
     tuning = tuning_json(tuned);
-    options.method = tuned.method;
+    options.method = tuned.settings;
   }
   VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays, series.noise_sigma,
                        {held_out, fit_view_scale});
@@ -258,11 +257,11 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
                   report_to(progress.reconstruction, facts_of(options.method), problem.num_rays()));
   const double fit_seconds = running.seconds();
   const MethodSize size = size_of(options.method, problem.grid(), problem.num_rows());
-  nlohmann::json figures =
-      figures_json(solution, problem, series, size.num_parameters, fit_seconds);
-  figures["held_out"] = held_out_json(problem, held_out, fit_view_scale, solution.densities);
-  figures["tuning"] = tuning;
-  write_results(solution, series, options, figures, paths);
+  nlohmann::json metrics =
+      metrics_json(solution, problem, series, size.num_parameters, fit_seconds);
+  metrics["held_out"] = held_out_json(problem, held_out, fit_view_scale, solution.densities);
+  metrics["tuning"] = tuning;
+  write_results(solution, series, options, metrics, paths);
   return summary_of(solution, problem.num_rays());
 }
 

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <functional>
-#include <optional>
 #include <vector>
 
 #include "base/aligned_buffer.h"
@@ -39,10 +38,6 @@ struct Solution {
   std::vector<double> noise_sigma = {};
 };
 
-/// Returns the fall of the objective in the last tenth of the iterations, as a fraction of the
-/// objective. Returns nothing for a method that does not iterate.
-std::optional<double> last_decrease(const Solution& solution);
-
 /// The report of a finished iteration. Its losses are those of the densities that it began with.
 struct IterationReport {
   int iteration = 0;  ///< 1 is the first
@@ -64,9 +59,9 @@ class ThreadScratch {
       : num_buffers_(num_buffers) {
     const std::size_t threads = static_cast<std::size_t>(base::thread_count());
     for (std::size_t i = 0; i < threads; ++i)
-      detectors_.emplace_back(SlabPair::kMost * problem.projector().detector_size(num_views));
+      detectors_.emplace_back(SlabPair::kMaxSlabs * problem.projector().detector_size(num_views));
     for (std::size_t i = 0; i < threads * num_buffers; ++i)
-      samples_.emplace_back(SlabPair::kMost * problem.grid().size());
+      samples_.emplace_back(SlabPair::kMaxSlabs * problem.grid().size());
   }
   float* detector() { return detectors_[thread()].data(); }
   /// Returns a buffer with what its last user left in it.

@@ -11,14 +11,15 @@
 
 #include "base/log.h"
 #include "base/stopwatch.h"
-#include "baseline/held_out.h"
+#include "baseline/voxel_problem.h"
 #include "selection/scores.h"
+#include "selection/trial_file.h"
 #include "selection/trial_measurement.h"
 
 namespace tomofield::baseline {
 namespace {
 
-using selection::HeldOutScore;
+using Trials = selection::Trials<Method>;
 
 constexpr int kLadderSteps = 4;  // factors of √2 up and down from the first number of iterations
 constexpr int kCutoffs = 7;      // candidates, each √2 times the one before
@@ -28,7 +29,7 @@ constexpr int kCutoffs = 7;      // candidates, each √2 times the one before
 // rather than how good the weight is: after 10 iterations on a phantom a tenth of the best weight
 // seemed better.
 constexpr double kAtMinimum = 0.01;
-constexpr int kMostIterations = 400;  // upper limit for trials that have not converged
+constexpr int kMaxTrialIterations = 400;  // upper limit for trials that have not converged
 
 // Returns the settings that a tuning may change, as the command line writes them.
 std::string settings_text(const Method& method) {
@@ -44,41 +45,37 @@ std::string settings_text(const Method& method) {
   return text;
 }
 
-// Makes the trials of a search and reports its progress. It makes no trial twice.
-class Trials {
+// Makes the runs of the trials and reports their progress.
+class TrialRuns {
  public:
-  Trials(const TrialData& data, const base::ProgressSink& progress)
+  TrialRuns(const TrialData& data, const base::ProgressSink& progress)
       : data_(data),
         progress_(progress),
         views_(selection::trial_views(data.measurement.geometry.tilt_deg, data.scored)),
         measurement_(
             selection::trial_measurement(data.measurement, views_, selection::kTrialRows)) {}
 
-  const Trial& trial(const Method& method) {
-    const nlohmann::json settings = json_of(method);
-    const auto known = std::ranges::find_if(
-        trials_, [&](const Trial& t) { return json_of(t.method) == settings; });
-    if (known != trials_.end()) return *known;
-    const std::optional<double> fell = run(method, [&](int iteration) {
+  // Runs a method to its end.
+  Trial whole_run(const Method& method) {
+    std::vector<Trial> trials;
+    const std::optional<double> fell = run(method, trials, [&](int iteration) {
       return iteration == facts_of(method).iterations ? std::optional(method) : std::nullopt;
     });
-    trials_.back().last_decrease = fell;
-    return trials_.back();
+    trials.back().last_decrease = fell;
+    return trials.back();
   }
 
-  // Makes one run and scores it after each of these numbers of iterations, which ascend.
+  // Makes one run and returns a trial for each of these numbers of iterations, which ascend.
   template <StopsEarly Options>
-  std::vector<HeldOutScore> scores(Options options, const std::vector<int>& iterations) {
+  std::vector<Trial> stopped_runs(Options options, const std::vector<int>& iterations) {
     options.iterations = iterations.back();
-    const std::size_t first = trials_.size();
-    run(options, [&, stopped = options](int iteration) mutable {
+    std::vector<Trial> trials;
+    run(options, trials, [&, stopped = options](int iteration) mutable {
       stopped.iterations = iteration;
       return std::ranges::binary_search(iterations, iteration) ? std::optional<Method>(stopped)
                                                                : std::nullopt;
     });
-    std::vector<HeldOutScore> scores;
-    for (std::size_t i = first; i < trials_.size(); ++i) scores.push_back(trials_[i].score);
-    return scores;
+    return trials;
   }
 
   // Tells the progress what will come: about `runs` more runs, with `iterations` in all.
@@ -87,15 +84,14 @@ class Trials {
     expected_iterations_ = iterations_done_ + iterations;
   }
 
-  Tuned take(const Method& chosen) {
-    return {chosen, std::move(trials_), std::move(views_.predicted)};
-  }
+  const std::vector<int>& predicted_views() const { return views_.predicted; }
 
  private:
   // Adds a trial after each iteration for which trial_after() returns the trial's method. Returns
   // the fall of the objective at the end.
   template <typename TrialAfter>
-  std::optional<double> run(const Method& method, TrialAfter trial_after) {
+  std::optional<double> run(const Method& method, std::vector<Trial>& trials,
+                            TrialAfter trial_after) {
     VoxelProblem problem(measurement_.geometry, data_.grid, *measurement_.rays,
                          measurement_.noise_sigma, {measurement_.held_out, data_.fit_view_scale});
     const base::Stopwatch running;
@@ -106,7 +102,7 @@ class Trials {
       if (!tried) return;
       const measurement::ViewErrors errors =
           held_out_errors(problem, measurement_.held_out, data_.fit_view_scale, densities);
-      trials_.push_back({*tried, {errors.total, errors.view_error}, running.seconds(), {}});
+      trials.push_back({*tried, {errors.total, errors.view_error}, running.seconds(), {}});
       base::log_info(
           fmt::format("tried{}: held-out error {:.5f}", settings_text(*tried), errors.total));
     };
@@ -132,7 +128,6 @@ class Trials {
   selection::TrialViews views_;
   measurement::Measurement measurement_;
   base::Stopwatch running_;
-  std::vector<Trial> trials_;
   int num_runs_ = 0, expected_runs_ = 0;
   int iterations_done_ = 0, expected_iterations_ = 0;
 };
@@ -144,9 +139,7 @@ TvOptions with_better_penalty(const TvOptions& options, Trials& trials) {
   TvOptions concave = options, smooth = options;
   concave.penalty = Penalty::kConcave;
   smooth.penalty = Penalty::kSmooth;
-  const HeldOutScore with_concave = trials.trial(concave).score,
-                     with_smooth = trials.trial(smooth).score;
-  return selection::most_views_prefer(with_smooth, with_concave) ? smooth : concave;
+  return std::get<TvOptions>(trials.preferred_by_most_views(concave, smooth));
 }
 
 double first_weight(const TvOptions& options) {
@@ -159,11 +152,9 @@ double first_weight(const Options& options) {
 
 template <HasWeight Options>
 void choose_weight(Options& options, Trials& trials) {
-  options.weight = selection::search_weight(first_weight(options), [&](double weight) {
-    Options other = options;
-    other.weight = weight;
-    return trials.trial(other).score;
-  });
+  options = std::get<Options>(trials.with_best_weight(
+      options, first_weight(options),
+      [](Method& method, double weight) { std::get<Options>(method).weight = weight; }));
 }
 
 int on_ladder(int first, int step) {
@@ -171,37 +162,40 @@ int on_ladder(int first, int step) {
 }
 
 template <StopsEarly Options>
-void choose_iterations(Options& options, Trials& trials) {
+void choose_iterations(Options& options, TrialRuns& runs, Trials& trials) {
   std::vector<int> ladder;
   for (int step = -kLadderSteps; step <= kLadderSteps; ++step) {
     const int iterations = on_ladder(options.iterations, step);
     if (iterations > (ladder.empty() ? 0 : ladder.back())) ladder.push_back(iterations);
   }
-  options.iterations = ladder[selection::first_as_good_as_the_best(trials.scores(options, ladder))];
+  std::vector<Method> candidates;
+  for (Trial& trial : runs.stopped_runs(options, ladder)) {
+    candidates.push_back(trial.settings);
+    trials.add(std::move(trial));
+  }
+  options = std::get<Options>(trials.first_as_good(candidates));
 }
 
 template <HasCutoff Options>
 void choose_cutoff(Options& options, Trials& trials) {
-  std::vector<double> cutoffs;
-  std::vector<HeldOutScore> scores;
+  std::vector<Method> candidates;
   for (int step = 1; step <= kCutoffs; ++step) {
     Options other = options;
     other.filter.cutoff *= std::exp2(0.5 * (step - kCutoffs));
-    cutoffs.push_back(other.filter.cutoff);
-    scores.push_back(trials.trial(other).score);
+    candidates.push_back(other);
   }
-  options.filter.cutoff = cutoffs[selection::first_as_good_as_the_best(scores)];
+  options = std::get<Options>(trials.first_as_good(candidates));
 }
 
 // Repeats the search with more iterations until the chosen trial is at its minimum.
-Method tuned(const TvOptions& start, Trials& trials) {
+Method tuned(const TvOptions& start, TrialRuns& runs, Trials& trials) {
   for (TvOptions tried = start;;) {
-    const int runs = selection::kUsualWeights + (votes_on_penalty(tried) ? 1 : 0);
-    trials.expect(runs, runs * tried.iterations);
+    const int expected = selection::kUsualWeights + (votes_on_penalty(tried) ? 1 : 0);
+    runs.expect(expected, expected * tried.iterations);
     TvOptions chosen = with_better_penalty(tried, trials);
     choose_weight(chosen, trials);
     const double fell = trials.trial(chosen).last_decrease.value_or(0);
-    if (fell <= kAtMinimum || tried.iterations >= kMostIterations) {
+    if (fell <= kAtMinimum || tried.iterations >= kMaxTrialIterations) {
       chosen.iterations = start.iterations;
       return chosen;
     }
@@ -209,26 +203,26 @@ Method tuned(const TvOptions& start, Trials& trials) {
         "{} iterations are too few for trials: the objective still falls by {:.2g} % in the last "
         "tenth",
         tried.iterations, 100 * fell));
-    tried.iterations = std::min(4 * tried.iterations, kMostIterations);
+    tried.iterations = std::min(4 * tried.iterations, kMaxTrialIterations);
     if (start.weight) tried.weight = chosen.weight;
   }
 }
 
 template <typename Options>
-void expect_runs(const Options& options, Trials& trials) {
+void expect_runs(const Options& options, TrialRuns& runs) {
   constexpr int kWeights = HasWeight<Options> ? selection::kUsualWeights : 0;
   if constexpr (StopsEarly<Options>) {
-    trials.expect(kWeights + 1,
-                  kWeights * options.iterations + on_ladder(options.iterations, kLadderSteps));
+    runs.expect(kWeights + 1,
+                kWeights * options.iterations + on_ladder(options.iterations, kLadderSteps));
   }
-  if constexpr (HasCutoff<Options>) trials.expect(kCutoffs, kCutoffs);
+  if constexpr (HasCutoff<Options>) runs.expect(kCutoffs, kCutoffs);
 }
 
 template <typename Options>
-Method tuned(Options options, Trials& trials) {
-  expect_runs(options, trials);
+Method tuned(Options options, TrialRuns& runs, Trials& trials) {
+  expect_runs(options, runs);
   if constexpr (HasWeight<Options>) choose_weight(options, trials);
-  if constexpr (StopsEarly<Options>) choose_iterations(options, trials);
+  if constexpr (StopsEarly<Options>) choose_iterations(options, runs, trials);
   if constexpr (HasCutoff<Options>) choose_cutoff(options, trials);
   return options;
 }
@@ -236,25 +230,15 @@ Method tuned(Options options, Trials& trials) {
 }  // namespace
 
 Tuned tune(const Method& start, const TrialData& data, const base::ProgressSink& progress) {
-  Trials trials(data, progress);
+  TrialRuns runs(data, progress);
+  Trials trials([&](const Method& method) { return runs.whole_run(method); },
+                [](const Method& a, const Method& b) { return json_of(a) == json_of(b); });
   const Method method =
-      std::visit([&](const auto& options) { return tuned(options, trials); }, start);
+      std::visit([&](const auto& options) { return tuned(options, runs, trials); }, start);
   base::log_info(fmt::format("tuned:{}", settings_text(method)));
-  return trials.take(method);
+  return {method, trials.made(), runs.predicted_views()};
 }
 
-nlohmann::json tuning_json(const Tuned& tuned) {
-  nlohmann::json trials = nlohmann::json::array();
-  for (const Trial& t : tuned.trials) {
-    nlohmann::json entry = json_of(t.method);
-    entry["held_out_error"] = t.score.error;
-    entry["held_out_error_by_view"] = t.score.view_error;
-    entry["seconds"] = t.seconds;
-    trials.push_back(std::move(entry));
-  }
-  return {{"predicted_views", tuned.predicted_views},
-          {"chosen", json_of(tuned.method)},
-          {"trials", trials}};
-}
+nlohmann::json tuning_json(const Tuned& tuned) { return selection::tuned_json(tuned, json_of); }
 
 }  // namespace tomofield::baseline

@@ -2,14 +2,13 @@
 
 #include <concepts>
 #include <nlohmann/json_fwd.hpp>
-#include <optional>
 #include <vector>
 
 #include "base/progress.h"
 #include "baseline/method.h"
 #include "measurement/prepare.h"
 #include "projection/sample_grid.h"
-#include "selection/scores.h"
+#include "selection/trials.h"
 
 namespace tomofield::baseline {
 
@@ -25,19 +24,9 @@ concept HasCutoff = std::same_as<Options, WbpOptions>;
 template <typename Options>
 concept Tunable = HasWeight<Options> || StopsEarly<Options> || HasCutoff<Options>;
 
-/// A method with its settings and its error on the held-out views.
-struct Trial {
-  Method method;
-  selection::HeldOutScore score = {};
-  double seconds = 0;
-  std::optional<double> last_decrease = {};  ///< last_decrease() of its own run
-};
-
-struct Tuned {
-  Method method;
-  std::vector<Trial> trials;         ///< in order
-  std::vector<int> predicted_views;  ///< views of the trials' scores
-};
+/// A method is the settings of its trials.
+using Trial = selection::Trial<Method>;
+using Tuned = selection::Tuned<Method>;
 
 /// The data of the trials.
 struct TrialData {
@@ -48,7 +37,7 @@ struct TrialData {
 };
 
 /// Chooses the settings that best predict views held out from the trials. Its rules, rows and views
-/// are those of the main method's tuning (reconstruct/tuning.h, selection/trial_measurement.h).
+/// are those of the main method's tuning (selection/trials.h, selection/trial_measurement.h).
 ///
 /// It chooses the penalty if neither the penalty nor a weight is given: the views vote on both
 /// penalties with their usual weights. It chooses the weight by search_weight(). For methods that

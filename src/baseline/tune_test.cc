@@ -59,14 +59,14 @@ TvOptions tv(std::optional<double> weight) {
 TEST_F(BaselineTune, FindsABetterWeightFromEitherEnd) {
   for (const double start : {0.02, 200.0}) {
     const Tuned found = tuned(tv(start));
-    const TvOptions& chosen = std::get<TvOptions>(found.method);
+    const TvOptions& chosen = std::get<TvOptions>(found.settings);
     EXPECT_GT(*chosen.weight, 0.3) << start;
     EXPECT_LT(*chosen.weight, 20) << start;
     EXPECT_LT(error_of(chosen), 0.8 * error_of(tv(start))) << start;
     EXPECT_EQ(chosen.penalty, std::nullopt) << "a weight belongs to its penalty";
     std::set<std::pair<double, int>> weights;
     for (const Trial& t : found.trials) {
-      const auto& options = std::get<TvOptions>(t.method);
+      const auto& options = std::get<TvOptions>(t.settings);
       weights.emplace(*options.weight, options.iterations);
       EXPECT_EQ(t.score.view_error.size(), 5u);
     }
@@ -76,15 +76,15 @@ TEST_F(BaselineTune, FindsABetterWeightFromEitherEnd) {
 
 TEST_F(BaselineTune, TriesBothPenaltiesIfNothingIsSaid) {
   const Tuned found = tuned(tv({}));
-  EXPECT_EQ(std::get<TvOptions>(found.trials[0].method).penalty, Penalty::kConcave);
-  EXPECT_EQ(std::get<TvOptions>(found.trials[1].method).penalty, Penalty::kSmooth);
+  EXPECT_EQ(std::get<TvOptions>(found.trials[0].settings).penalty, Penalty::kConcave);
+  EXPECT_EQ(std::get<TvOptions>(found.trials[1].settings).penalty, Penalty::kSmooth);
   const bool votes_smooth =
       selection::most_views_prefer(found.trials[1].score, found.trials[0].score);
-  EXPECT_EQ(std::get<TvOptions>(found.method).penalty,
+  EXPECT_EQ(std::get<TvOptions>(found.settings).penalty,
             votes_smooth ? Penalty::kSmooth : Penalty::kConcave);
   TvOptions concave = tv({});
   concave.penalty = Penalty::kConcave;
-  EXPECT_EQ(std::get<TvOptions>(tuned(concave).method).penalty, Penalty::kConcave);
+  EXPECT_EQ(std::get<TvOptions>(tuned(concave).settings).penalty, Penalty::kConcave);
 }
 
 TEST_F(BaselineTune, IsNotMisledByIterationsThatAreTooFew) {
@@ -93,12 +93,12 @@ TEST_F(BaselineTune, IsNotMisledByIterationsThatAreTooFew) {
   few.iterations = 5;
   many.iterations = 200;
   const Tuned with_few = tuned(few), with_many = tuned(many);
-  EXPECT_EQ(std::get<TvOptions>(with_few.method).iterations, 5);
-  EXPECT_EQ(std::get<TvOptions>(with_few.trials.front().method).iterations, 5);
-  EXPECT_GE(std::get<TvOptions>(with_few.trials.back().method).iterations, 20);
-  EXPECT_EQ(std::get<TvOptions>(with_many.trials.back().method).iterations, 200);
-  const double ratio =
-      *std::get<TvOptions>(with_few.method).weight / *std::get<TvOptions>(with_many.method).weight;
+  EXPECT_EQ(std::get<TvOptions>(with_few.settings).iterations, 5);
+  EXPECT_EQ(std::get<TvOptions>(with_few.trials.front().settings).iterations, 5);
+  EXPECT_GE(std::get<TvOptions>(with_few.trials.back().settings).iterations, 20);
+  EXPECT_EQ(std::get<TvOptions>(with_many.trials.back().settings).iterations, 200);
+  const double ratio = *std::get<TvOptions>(with_few.settings).weight /
+                       *std::get<TvOptions>(with_many.settings).weight;
   EXPECT_GT(ratio, 0.6);
   EXPECT_LT(ratio, 1.7);
 }
@@ -107,8 +107,8 @@ TEST_F(BaselineTune, StopsBeforeTheNoiseIsFitted) {
   SirtOptions options;
   options.iterations = 300;
   const Tuned found = tuned(options);
-  EXPECT_LT(std::get<SirtOptions>(found.method).iterations, 300);
-  EXPECT_LT(error_of(found.method), error_of(options));
+  EXPECT_LT(std::get<SirtOptions>(found.settings).iterations, 300);
+  EXPECT_LT(error_of(found.settings), error_of(options));
 }
 
 TEST_F(BaselineTune, AStopIsTheSameAsARunOfSoManyIterations) {
@@ -118,8 +118,8 @@ TEST_F(BaselineTune, AStopIsTheSameAsARunOfSoManyIterations) {
   ASSERT_EQ(all.trials.size(), 9u);
   options.iterations = 2;  // its longest run has 8 iterations
   const Tuned few = tuned(options);
-  EXPECT_EQ(std::get<SirtOptions>(all.trials[4].method).iterations, 8);
-  EXPECT_EQ(std::get<SirtOptions>(few.trials.back().method).iterations, 8);
+  EXPECT_EQ(std::get<SirtOptions>(all.trials[4].settings).iterations, 8);
+  EXPECT_EQ(std::get<SirtOptions>(few.trials.back().settings).iterations, 8);
   EXPECT_EQ(all.trials[4].score.view_error, few.trials.back().score.view_error);
 }
 
@@ -130,12 +130,12 @@ TEST_F(BaselineTune, CutsOffWhereNoiseIsAllThereIs) {
   const WbpOptions start;
   const Tuned found = tuned(start);
   ASSERT_EQ(found.trials.size(), 7u);
-  EXPECT_NEAR(std::get<WbpOptions>(found.trials.front().method).filter.cutoff,
+  EXPECT_NEAR(std::get<WbpOptions>(found.trials.front().settings).filter.cutoff,
               start.filter.cutoff / 8, 1e-9);
-  const double chosen = std::get<WbpOptions>(found.method).filter.cutoff;
+  const double chosen = std::get<WbpOptions>(found.settings).filter.cutoff;
   EXPECT_LT(chosen, start.filter.cutoff);
   EXPECT_GT(chosen, start.filter.cutoff / 8);
-  EXPECT_LT(error_of(found.method), error_of(start));
+  EXPECT_LT(error_of(found.settings), error_of(start));
 }
 
 // A search does not know in advance how many weights it tries; the progress assumes the usual

@@ -99,7 +99,7 @@ std::vector<measurement::ViewSums> view_sums(const VoxelProblem& problem,
                                              std::span<const int> views, VoxelVolume& densities) {
   std::vector<std::vector<measurement::ViewSums>> sums(problem.num_pairs());
   for_each_pair(problem.num_slabs(), [&](const SlabPair& pair) {
-    base::AlignedBuffer<float> detector(SlabPair::kMost * problem.detector_size(views));
+    base::AlignedBuffer<float> detector(SlabPair::kMaxSlabs * problem.detector_size(views));
     sums[pair.index()] =
         problem.residuals(pair, views, densities.slab(pair.first), detector.data());
   });
@@ -113,6 +113,14 @@ std::vector<measurement::ViewSums> total(
     for (std::size_t v = 0; v < all.size(); ++v) all[v] += sums_of_part[part][v];
   }
   return all;
+}
+
+measurement::ViewErrors held_out_errors(const VoxelProblem& problem, const std::vector<int>& views,
+                                        bool fit_view_scale, VoxelVolume& densities) {
+  std::vector<double> weights;
+  for (const double sigma : problem.noise_sigma()) weights.push_back(1 / (sigma * sigma));
+  return measurement::view_errors(views, {view_sums(problem, views, densities)}, weights,
+                                  fit_view_scale);
 }
 
 }  // namespace tomofield::baseline

@@ -10,6 +10,7 @@
 #include "kernels/lanes.h"
 #include "measurement/slab_views.h"
 #include "measurement/view_residuals.h"
+#include "measurement/view_residuals.h"
 #include "projection/slab_projector.h"
 
 namespace tomofield::baseline {
@@ -118,5 +119,10 @@ std::vector<measurement::ViewSums> view_sums(const VoxelProblem& problem,
 /// Returns the sums over all parts, added in their order: the same for any thread count.
 std::vector<measurement::ViewSums> total(
     const std::vector<std::vector<measurement::ViewSums>>& sums_of_part);
+
+/// Computes how well densities predict `views` (measurement/view_residuals.h). Writes the padding of
+/// `densities`.
+measurement::ViewErrors held_out_errors(const VoxelProblem& problem, const std::vector<int>& views,
+                                        bool fit_view_scale, VoxelVolume& densities);
 
 }  // namespace tomofield::baseline

@@ -74,7 +74,7 @@ void run(Arguments<Method>& arguments) {
   print_summary(baseline::run_baseline(series, options,
                                        {make_progress_bar("tune"), make_progress_bar("baseline")}));
   const baseline::BaselinePaths paths = baseline::baseline_paths(shared.output);
-  fmt::print("tomogram  {}\nfigures   {}\n", paths.volume.string(), paths.json.string());
+  fmt::print("tomogram  {}\nmetrics   {}\n", paths.volume.string(), paths.json.string());
   write_pictures(paths.volume, series, paths.picture_prefix);
 }
 

@@ -20,7 +20,7 @@
 namespace tomofield::cli {
 namespace {
 
-constexpr double kMostViews = 1e9;
+constexpr double kMaxViews = 1e9;
 
 struct Arguments {
   option_table::Choices choices;  // checked here, used by the methods
@@ -86,7 +86,7 @@ void run(const CLI::App& command, const Arguments& arguments,
   const compare::Outcome outcome = compare::compare_methods(options, hooks);
   if (outcome != compare::Outcome::kFinished) throw stopped(outcome, arguments);
   fmt::print(
-      "report    {}\nfigures   {}\ntable     {}\n", (options.folder / "report.html").string(),
+      "report    {}\nmetrics   {}\ntable     {}\n", (options.folder / "report.html").string(),
       (options.folder / "comparison.json").string(), (options.folder / "comparison.csv").string());
 }
 
@@ -121,7 +121,7 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
       .add_option("--hold-out", arguments.hold_out,
                   "Also run every method without every Nth view, and report how well it predicts "
                   "these views")
-      ->check(number_between(2, kMostViews))
+      ->check(number_between(2, kMaxViews))
       ->group(group);
   command.add_option("-o,--output", arguments.folder, "Folder of all results")
       ->required()

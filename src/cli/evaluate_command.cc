@@ -9,20 +9,20 @@
 #include "cli/common_options.h"
 #include "cli/evaluate_options.h"
 #include "cli/help_formatter.h"
-#include "evaluate/compare.h"
-#include "evaluate/fsc_files.h"
-#include "evaluate/volume_score.h"
+#include "evaluate/fsc.h"
+#include "evaluate/reprojection.h"
+#include "evaluate/similarity.h"
 #include "io/atomic_file.h"
 #include "io/json.h"
 #include "output/shared_options.h"
-#include "report/fsc_picture.h"
+#include "report/pictures.h"
 
 namespace tomofield::cli {
 namespace {
 
 // All results, which are written after every score has been computed.
 struct Findings {
-  nlohmann::json figures;
+  nlohmann::json metrics;
   std::optional<evaluate::Fsc> fsc;
   std::string profile_csv;
 };
@@ -75,7 +75,7 @@ void compare_with_truth(const EvaluateArguments& arguments, Findings& findings) 
   const evaluate::VolumePair pair =
       evaluate::read_pair(arguments.volume, *arguments.truth, arguments.box);
   const evaluate::Comparison comparison = evaluate::compare(pair);
-  findings.figures.update(
+  findings.metrics.update(
       evaluate::comparison_json(comparison, arguments.volume, *arguments.truth));
   print_comparison(comparison);
   if (!arguments.profile) return;
@@ -89,7 +89,7 @@ void correlate(const EvaluateArguments& arguments, Findings& findings) {
   const evaluate::FscFiles files{arguments.volume, *arguments.fsc_with, arguments.fsc_mask,
                                  arguments.box, arguments.tilts};
   findings.fsc = evaluate::correlate_files(files);
-  findings.figures["fsc"] = evaluate::fsc_json(*findings.fsc, files);
+  findings.metrics["fsc"] = evaluate::fsc_json(*findings.fsc, files);
   print_fsc(*findings.fsc);
 }
 
@@ -101,7 +101,7 @@ void reproject(const EvaluateArguments& arguments, Findings& findings) {
                                              output::series_options(files, chosen),
                                              output::specimen_options(chosen), arguments.hold_out};
   const evaluate::VolumeScore score = evaluate::score_volume(options);
-  findings.figures["reprojection"] = evaluate::volume_score_json(score, options);
+  findings.metrics["reprojection"] = evaluate::volume_score_json(score, options);
   fmt::print("reprojection error {:.4f} of the noise's variance in {} views\n", score.errors.total,
              score.errors.views.size());
   for (std::size_t v = 0; v < score.tilt_deg.size(); ++v)
@@ -113,8 +113,8 @@ void measure_contrast(const EvaluateArguments& arguments, const base::Volume& vo
   const bool chosen = arguments.regions.foreground.empty();
   const evaluate::Regions regions = chosen ? evaluate::choose_regions(volume) : arguments.regions;
   const evaluate::ContrastScore score = evaluate::contrast_score(volume, regions);
-  findings.figures["contrast"] = evaluate::contrast_json(score, regions);
-  findings.figures["contrast"]["regions_chosen"] = chosen;
+  findings.metrics["contrast"] = evaluate::contrast_json(score, regions);
+  findings.metrics["contrast"]["regions_chosen"] = chosen;
   print_contrast(score, regions, chosen);
 }
 
@@ -136,7 +136,7 @@ void examine(const EvaluateArguments& arguments, Findings& findings) {
 }
 
 void write_findings(const EvaluateArguments& arguments, const Findings& findings) {
-  if (arguments.json) io::write_json(*arguments.json, findings.figures);
+  if (arguments.json) io::write_json(*arguments.json, findings.metrics);
   if (arguments.fsc_csv) io::write_text_file(*arguments.fsc_csv, evaluate::fsc_csv(*findings.fsc));
   if (arguments.fsc_picture) report::write_fsc_picture(*findings.fsc, *arguments.fsc_picture);
   if (arguments.profile_csv) io::write_text_file(*arguments.profile_csv, findings.profile_csv);
@@ -145,7 +145,7 @@ void write_findings(const EvaluateArguments& arguments, const Findings& findings
 void run_evaluate(const EvaluateArguments& arguments) {
   arguments.check();
   Findings findings;
-  findings.figures["reconstruction"] = arguments.volume.string();
+  findings.metrics["reconstruction"] = arguments.volume.string();
   if (arguments.truth) compare_with_truth(arguments, findings);
   if (arguments.fsc_with) correlate(arguments, findings);
   if (arguments.series) reproject(arguments, findings);

@@ -10,7 +10,6 @@
 #include "cli/number_checks.h"
 #include "cli/table_options.h"
 #include "io/output_files.h"
-#include "output/result_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
@@ -182,7 +181,7 @@ void EvaluateArguments::check() const {
   Options series_options = choices.options;
   series_options.thickness = 1;  // the volume has its own
   base::require_no_faults(option_table::range_faults(series_options));
-  std::vector<std::filesystem::path> inputs = output::input_files(choices.files), outputs;
+  std::vector<std::filesystem::path> inputs = io::input_files(choices.files), outputs;
   inputs.push_back(volume);
   for (const auto& file : {truth, fsc_with, fsc_mask, series})
     if (file) inputs.push_back(*file);

@@ -3,9 +3,8 @@
 #include <fmt/core.h>
 
 #include "output/model_file.h"
-#include "report/mask_picture.h"
-#include "report/slices.h"
-#include "report/tree_picture.h"
+#include "report/pictures.h"
+#include "report/slice.h"
 
 namespace tomofield::cli {
 

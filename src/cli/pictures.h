@@ -6,12 +6,12 @@
 
 namespace tomofield::cli {
 
-/// Writes pictures of the central slices of a volume (report/slices.h) and of the masks of its
-/// series (report/mask_picture.h), and prints their paths.
+/// Writes pictures of the central slices of a volume (report/slice.h) and of the masks of its
+/// series (report/pictures.h), and prints their paths.
 void write_pictures(const std::filesystem::path& volume, const tilt_series::TiltSeries& series,
                     const std::filesystem::path& prefix);
 
-/// Writes a picture of a model's leaves (report/tree_picture.h) and prints its path.
+/// Writes a picture of a model's leaves (report/pictures.h) and prints its path.
 void write_tree_picture(const std::filesystem::path& model, const std::filesystem::path& picture);
 
 }  // namespace tomofield::cli

@@ -76,7 +76,7 @@ void print_plan(const reconstruction::ReconstructOptions& options,
 }
 
 void print_files(const reconstruction::OutputPaths& paths) {
-  fmt::print("tomogram  {}\nmodel     {}\nfigures   {}\n", paths.volume.string(),
+  fmt::print("tomogram  {}\nmodel     {}\nmetrics   {}\n", paths.volume.string(),
              paths.model.string(), paths.json.string());
 }
 

@@ -10,6 +10,7 @@
 #include "cli/run_reconstruction.h"
 #include "cli/table_options.h"
 #include "io/scratch_memory.h"
+#include "reconstruct/resolve.h"
 
 namespace tomofield::cli {
 namespace {
@@ -33,12 +34,15 @@ void run(Arguments& arguments) {
   if (arguments.non_negative)
     requested.activation = *arguments.non_negative ? Activation::kSoftplus : Activation::kIdentity;
   reconstruction::ReconstructOptions options =
-      baseline::tensorf_options(arguments.choices.files, requested);
+      reconstruction::run_options(arguments.choices.files, requested);
+  options.field.depth = 0;  // the tree is one node
   reconstruction::check_options(options);
   options.input.scratch_dir = io::scratch_directory(options.resolved.output);
   options.input.keep_views = !arguments.dry_run;
   const tilt_series::TiltSeries series(options.input);
-  baseline::cover_with_one_node(plan_measurement(series, options.specimen).roi, options);
+  options.field.leaf_size = baseline::one_node_size(
+      plan_measurement(series, options.specimen).roi, options.fit.coarse_bin);
+  options.resolved.leaf_size = options.field.leaf_size;
   run_reconstruction(series, options, arguments.dry_run);
 }
 

@@ -7,7 +7,6 @@
 #include <array>
 
 #include "compare/pictures.h"
-#include "compare/rehearsal.h"
 #include "compare/runs.h"
 #include "compare/scores.h"
 #include "compare/table.h"
@@ -15,8 +14,8 @@
 #include "io/json.h"
 #include "io/mrc.h"
 #include "output/shared_options.h"
-#include "report/fsc_picture.h"
 #include "report/html.h"
+#include "report/pictures.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
 

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "report/curve_plot.h"
-#include "report/grey_scale.h"
 #include "report/html.h"
 #include "report/slice.h"
 

@@ -1,16 +1,27 @@
 #include "compare/runs.h"
 
 #include <fmt/format.h>
+#include <stdlib.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <iterator>
+#include <optional>
 #include <string>
+#include <system_error>
 
-#include "output/result_files.h"
+#include "compare/child_process.h"
+#include "compare/grid.h"
+#include "io/output_files.h"
+#include "tomofield/error.h"
 
 namespace tomofield::compare {
 namespace {
+
+namespace fs = std::filesystem;
 
 const char* suffix_of(Purpose purpose) {
   switch (purpose) {
@@ -45,12 +56,11 @@ std::ptrdiff_t num_command_words(const Method& method) {
 }
 
 // Returns the files among a method's own words: `--mask FILE`, `--config=FILE`.
-std::vector<std::filesystem::path> named_files(const std::vector<std::string>& words) {
-  std::vector<std::filesystem::path> files;
+std::vector<fs::path> named_files(const std::vector<std::string>& words) {
+  std::vector<fs::path> files;
   for (const std::string& word : words) {
-    const std::filesystem::path value =
-        word.starts_with('-') ? word.substr(word.find('=') + 1) : word;
-    if (std::filesystem::is_regular_file(value)) files.push_back(value);
+    const fs::path value = word.starts_with('-') ? word.substr(word.find('=') + 1) : word;
+    if (fs::is_regular_file(value)) files.push_back(value);
   }
   return files;
 }
@@ -70,9 +80,67 @@ Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
   // Settings are tuned anew for every purpose: those chosen on all views have seen the held-out
   // ones.
   if (options.tune && method.tunes) run.command.push_back("--tune");
-  run.inputs = output::input_files(options.files);
+  run.inputs = io::input_files(options.files);
   std::ranges::copy(named_files({own, method.arguments.end()}), std::back_inserter(run.inputs));
   return run;
+}
+
+// Makes a directory where a folder is, or will be made. Removes it with all its contents.
+class ScratchFolder {
+ public:
+  explicit ScratchFolder(const fs::path& folder) {
+    fs::path place = fs::absolute(folder);
+    while (!fs::exists(place)) place = place.parent_path();
+    std::string name = (place / ".tomofield-compare-XXXXXX").string();
+    if (!fs::is_directory(place) || mkdtemp(name.data()) == nullptr) {
+      throw Error(
+          fmt::format("the folder '{}' cannot be made or written: '{}' {}: give another "
+                      "with -o",
+                      folder.string(), place.string(),
+                      fs::is_directory(place) ? std::strerror(errno) : "is no folder"));
+    }
+    path_ = name;
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+std::string text_of(const fs::path& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+// Returns the grid of the row's future volume, or nothing if it was asked to stop.
+std::optional<Grid> grid_to_be(const CompareOptions& options, const RunHooks& hooks, const Row& row,
+                               const fs::path& scratch) {
+  if (is_done(row)) return read_grid(row.volume);
+  const fs::path log = scratch / "log";
+  // The volume lies in the folder if that exists, so that the check finds a result that would
+  // replace an input.
+  const bool has_folder = fs::is_directory(options.folder);
+  auto command =
+      full_command(options.program, row, has_folder ? row.volume : scratch / row.volume.filename());
+  command.emplace_back("--dry-run");
+  const ChildResult result = run_child(command, log, hooks.stop_requested);
+  if (hooks.must_stop()) return std::nullopt;
+  if (result.exit_status != 0)
+    throw Error(fmt::format("{}: {}", row.run.name, reason_of_failure(log)));
+  return planned_grid(text_of(log));
+}
+
+void require_not_replaced(const fs::path& truth, const Row& row) {
+  std::error_code absent;
+  if (!fs::equivalent(truth, row.volume, absent)) return;
+  throw Error(fmt::format("{} would replace the truth '{}': give another folder with -o",
+                          row.run.name, truth.string()));
 }
 
 }  // namespace
@@ -88,6 +156,24 @@ PlannedRuns plan_runs(const CompareOptions& options, const tilt_series::TiltSeri
       plan.runs.push_back(plan_run(purpose, method, exclude, options));
   }
   return plan;
+}
+
+bool rehearse(const CompareOptions& options, const RunHooks& hooks, const std::vector<Row>& rows) {
+  const ScratchFolder scratch(options.folder);
+  std::optional<NamedGrid> main;
+  for (const Row& row : rows) {
+    if (options.truth) require_not_replaced(*options.truth, row);
+    const std::optional<Grid> grid = grid_to_be(options, hooks, row, scratch.path());
+    if (!grid) return false;
+    if (!main) {
+      main = {row.run.name, *grid};
+      const bool is_a_part =
+          std::ranges::find(options.series_words, "--roi") != options.series_words.end();
+      if (options.truth) require_truth_fits(*options.truth, *main, is_a_part);
+    }
+    require_one_grid(*main, {row.run.name, *grid});
+  }
+  return true;
 }
 
 }  // namespace tomofield::compare

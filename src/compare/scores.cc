@@ -7,20 +7,20 @@
 #include <optional>
 #include <span>
 
-#include "evaluate/compare.h"
 #include "evaluate/contrast.h"
-#include "evaluate/fsc_files.h"
-#include "report/fsc_picture.h"
+#include "evaluate/fsc.h"
+#include "evaluate/similarity.h"
+#include "report/pictures.h"
 
 namespace tomofield::compare {
 namespace {
 
-using Figures = std::vector<std::optional<double>>;
+using Metrics = std::vector<std::optional<double>>;
 using Better = Column::Better;
 namespace fs = std::filesystem;
 
 void add_truth_scores(std::span<const Row> rows, const fs::path& truth, Table& table) {
-  Figures psnr, affine_psnr, ssim, affine_ssim;
+  Metrics psnr, affine_psnr, ssim, affine_ssim;
   for (const Row& row : rows) {
     const evaluate::Comparison scores =
         evaluate::compare(evaluate::read_pair(row.volume, truth, std::nullopt));
@@ -45,7 +45,7 @@ std::string boxes_text(const std::vector<evaluate::Box>& boxes) {
 // regions.
 std::string add_contrast(std::span<const Row> rows, Table& table) {
   evaluate::Regions regions;
-  Figures cnr, enl;
+  Metrics cnr, enl;
   for (const Row& row : rows) {
     const base::Volume volume = evaluate::read_volume(row.volume);
     if (&row == &rows.front()) regions = evaluate::choose_regions(volume);
@@ -73,7 +73,7 @@ std::optional<double> resolution_A(const evaluate::Fsc& fsc, double threshold) {
 std::vector<report::Curve> add_correlation(std::span<const Row> rows,
                                            const std::vector<fs::path>& others, double threshold,
                                            Column column, Table& table) {
-  Figures crossings;
+  Metrics crossings;
   std::vector<report::Curve> curves;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const evaluate::Fsc fsc = evaluate::correlate_files({rows[i].volume, others[i], {}, {}, {}});
@@ -86,9 +86,9 @@ std::vector<report::Curve> add_correlation(std::span<const Row> rows,
 }
 
 void add_held_out_errors(std::span<const Row> rows, Table& table) {
-  Figures errors;
+  Metrics errors;
   for (const Row& row : rows) {
-    const auto held_out = row.figures.value("held_out", nlohmann::json());
+    const auto held_out = row.metrics.value("held_out", nlohmann::json());
     errors.push_back(held_out.is_object() ? std::optional(held_out.at("error").get<double>())
                                           : std::nullopt);
   }

@@ -9,9 +9,9 @@ bool is_better(Column::Better better, double a, double b) {
   return better == Column::Better::kHigher ? a > b : a < b;
 }
 
-std::optional<double> number(const nlohmann::json& figures, const char* key) {
-  const auto found = figures.find(key);
-  if (found == figures.end() || !found->is_number()) return std::nullopt;
+std::optional<double> number(const nlohmann::json& metrics, const char* key) {
+  const auto found = metrics.find(key);
+  if (found == metrics.end() || !found->is_number()) return std::nullopt;
   return found->get<double>();
 }
 
@@ -21,10 +21,10 @@ std::string cell_text(const std::optional<double>& value, int digits) {
 
 }  // namespace
 
-void Table::add(Column column, const std::vector<std::optional<double>>& figures) {
+void Table::add(Column column, const std::vector<std::optional<double>>& metrics) {
   columns.push_back(std::move(column));
   values.resize(methods.size());
-  for (std::size_t row = 0; row < methods.size(); ++row) values[row].push_back(figures[row]);
+  for (std::size_t row = 0; row < methods.size(); ++row) values[row].push_back(metrics[row]);
 }
 
 std::optional<std::size_t> Table::best_row(std::size_t column) const {
@@ -52,7 +52,7 @@ Table table_of_costs(const std::vector<Row>& rows) {
     core.push_back(row.state.costs.core_seconds);
     wall.push_back(row.state.costs.wall_seconds);
     memory.push_back(static_cast<double>(row.state.costs.peak_bytes) / (1 << 20));
-    const auto count = number(row.figures, "parameters");
+    const auto count = number(row.metrics, "parameters");
     parameters.push_back(count ? std::optional(*count / 1e6) : std::nullopt);
   }
   table.add({"core_seconds", "core‑s", Column::Better::kLower, 1}, core);

@@ -26,7 +26,7 @@ struct Table {
   std::vector<std::vector<std::optional<double>>> values;
 
   /// Adds a column, one value a method.
-  void add(Column column, const std::vector<std::optional<double>>& figures);
+  void add(Column column, const std::vector<std::optional<double>>& metrics);
   /// Returns the row of the best value of a column. Returns nothing if neither higher nor lower is
   /// better.
   std::optional<std::size_t> best_row(std::size_t column) const;

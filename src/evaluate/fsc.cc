@@ -1,20 +1,54 @@
 #include "evaluate/fsc.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <kiss_fft.h>
 
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdlib>
 #include <limits>
+#include <memory>
 #include <numbers>
 
 #include "base/check.h"
+#include "base/log.h"
+#include "base/memory.h"
 #include "base/parallel.h"
-#include "evaluate/fourier_transform.h"
+#include "evaluate/volume_pair.h"
+#include "io/mrc.h"
 #include "tomofield/error.h"
 
 namespace tomofield::evaluate {
 namespace {
+
+constexpr std::int64_t kTile = 16;  // lines copied together, 128 bytes of each row
+
+// Transforms all lines of n values along one axis. Neighbours on a line are `stride` apart. The
+// lines lie in bundles: `stride` lines beside each other, one bundle behind the other.
+void transform_axis(std::int64_t n, std::int64_t stride, std::vector<std::complex<float>>& values) {
+  const std::unique_ptr<void, decltype(&std::free)> plan(
+      kiss_fft_alloc(static_cast<int>(n), 0, nullptr, nullptr), &std::free);
+  TOMOFIELD_CHECK(plan != nullptr, "plan of the transform");
+  const std::int64_t tiles = (stride + kTile - 1) / kTile;
+  const std::int64_t bundles = std::ssize(values) / (n * stride);
+  base::parallel_for(bundles * tiles, [&](std::int64_t task) {
+    const std::int64_t first_line = task % tiles * kTile;
+    const std::int64_t lines = std::min(kTile, stride - first_line);
+    std::complex<float>* first = values.data() + task / tiles * n * stride + first_line;
+    std::vector<kiss_fft_cpx> in(static_cast<std::size_t>(lines * n)), out(in.size());
+    for (std::int64_t i = 0; i < n; ++i)
+      for (std::int64_t l = 0; l < lines; ++l)
+        in[static_cast<std::size_t>(l * n + i)] = {first[i * stride + l].real(),
+                                                   first[i * stride + l].imag()};
+    for (std::int64_t l = 0; l < lines; ++l)
+      kiss_fft(static_cast<kiss_fft_cfg>(plan.get()), in.data() + l * n, out.data() + l * n);
+    for (std::int64_t i = 0; i < n; ++i)
+      for (std::int64_t l = 0; l < lines; ++l)
+        first[i * stride + l] = {out[static_cast<std::size_t>(l * n + i)].r,
+                                 out[static_cast<std::size_t>(l * n + i)].i};
+  });
+}
 
 // The sums over the Fourier voxels of a shell.
 struct ShellSums {
@@ -170,7 +204,49 @@ FscCurve curve_of(const std::vector<ShellSums>& shells) {
   return curve;
 }
 
+// Counts both volumes, the weights and the complex transform, in single precision.
+constexpr std::size_t kBytesOfVoxel = 20;
+
+void check_memory(const FscFiles& files) {
+  const io::MrcReader file(files.second);
+  const Box box = files.box.value_or(whole_box(file));
+  if (!lies_within(box, whole_box(file))) return;  // read_pair() reports this error
+  base::require_memory(kBytesOfVoxel * box.shape().voxels(), "the shell correlation",
+                       "restrict it with --box, or bin both volumes");
+}
+
+base::Volume read_mask(const std::filesystem::path& path, const std::filesystem::path& second,
+                       const Box& box) {
+  const io::MrcReader mask(path), volume(second);
+  if (whole_box(mask) != whole_box(volume)) {
+    const auto size = [](const io::MrcReader& f) {
+      return fmt::format("{} × {} × {}", f.header().nx, f.header().ny, f.header().nz);
+    };
+    throw Error(fmt::format("the mask '{}' has {} voxels and '{}' {}: give a mask of that size",
+                            path.string(), size(mask), second.string(), size(volume)));
+  }
+  return read_box(mask, box);
+}
+
+nlohmann::json crossing_json(const std::optional<double>& crossing) {
+  return crossing ? nlohmann::json(*crossing) : nlohmann::json();
+}
+
+nlohmann::json curve_json(const Fsc& fsc, const FscCurve& curve) {
+  return {{"resolution_at_0.5_A", crossing_json(crossing_A(fsc.frequency_per_A, curve, 0.5))},
+          {"resolution_at_0.143_A", crossing_json(crossing_A(fsc.frequency_per_A, curve, 0.143))},
+          {"correlation", curve.correlation},
+          {"voxels", curve.voxels}};
+}
+
 }  // namespace
+
+void transform_volume(const base::Shape3& shape, std::vector<std::complex<float>>& values) {
+  TOMOFIELD_CHECK(values.size() == shape.voxels(), "as many values as voxels");
+  transform_axis(shape.nx, 1, values);
+  transform_axis(shape.ny, shape.nx, values);
+  transform_axis(shape.nz, shape.nx * shape.ny, values);
+}
 
 bool TiltRange::covers(double kx, double kz) const {
   if (kx == 0.0 && kz == 0.0) return true;
@@ -238,6 +314,55 @@ std::optional<double> crossing_A(std::span<const double> frequency_per_A, const 
     return 1.0 / (f0 + (f1 - f0) * (before - threshold) / (before - value));
   }
   return std::nullopt;
+}
+
+Fsc correlate_files(const FscFiles& files) {
+  check_memory(files);
+  VolumePair pair = read_pair(files.first, files.second, files.box);
+  if (!(pair.second.voxel_size_A > 0.0)) {
+    base::log_warning(fmt::format("'{}' has no voxel size: resolutions are in voxels, not in Å",
+                                  files.second.string()));
+    pair.second.voxel_size_A = 1.0;
+  }
+  const base::Volume weights =
+      files.mask ? read_mask(*files.mask, files.second, pair.box) : edge_window(pair.second.shape);
+  return fourier_shell_correlation(pair.first, pair.second, weights, files.tilts);
+}
+
+nlohmann::json fsc_json(const Fsc& fsc, const FscFiles& files) {
+  nlohmann::json json = {{"first", files.first.string()},
+                         {"second", files.second.string()},
+                         {"frequency_per_A", fsc.frequency_per_A},
+                         {"all", curve_json(fsc, fsc.all)}};
+  json["mask"] = files.mask ? nlohmann::json(files.mask->string()) : nlohmann::json();
+  if (files.box) {
+    json["box_first"] = files.box->first;
+    json["box_last"] = files.box->last;
+  }
+  if (files.tilts) {
+    json["tilt_range_deg"] = {files.tilts->low_deg, files.tilts->high_deg};
+    json["measured"] = curve_json(fsc, *fsc.measured);
+    json["missing"] = curve_json(fsc, *fsc.missing);
+  }
+  return json;
+}
+
+std::string fsc_csv(const Fsc& fsc) {
+  const bool has_wedge = fsc.measured.has_value();
+  std::string text = "frequency_per_A,resolution_A,fsc,voxels";
+  text += has_wedge ? ",fsc_measured,voxels_measured,fsc_missing,voxels_missing\n" : "\n";
+  for (std::size_t s = 0; s < fsc.frequency_per_A.size(); ++s) {
+    const auto columns = [s](const FscCurve& curve) {
+      const double value = curve.correlation[s];
+      return fmt::format(",{},{}", std::isnan(value) ? "" : fmt::format("{:.6f}", value),
+                         curve.voxels[s]);
+    };
+    text += fmt::format("{:.8g},{:.6g}", fsc.frequency_per_A[s], 1.0 / fsc.frequency_per_A[s]);
+    text += columns(fsc.all);
+    if (has_wedge) text += columns(*fsc.measured) + columns(*fsc.missing);
+    text += "\n";
+  }
+  return text;
 }
 
 }  // namespace tomofield::evaluate

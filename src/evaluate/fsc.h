@@ -1,13 +1,29 @@
 #pragma once
 
+#include <complex>
 #include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/volume.h"
+#include "evaluate/box.h"
 
 namespace tomofield::evaluate {
+
+/// Computes the discrete Fourier transform in three dimensions, in place and not normalised:
+///   values[u] ← Σ_x values[x] exp(−2πi Σ_axis u x / n).
+/// `values` is [z, y, x] in single precision. Any size works; products of small primes are fast.
+void transform_volume(const base::Shape3& shape, std::vector<std::complex<float>>& values);
+
+/// Returns the frequency of an index in cycles over an axis of n samples: 0, 1 … −1, the order of
+/// numpy's fftfreq.
+inline std::int64_t signed_frequency(std::int64_t index, std::int64_t n) {
+  return index < (n + 1) / 2 ? index : index - n;
+}
 
 /// The tilts that a single-axis series about Y covers, in degrees.
 struct TiltRange {
@@ -54,5 +70,26 @@ Fsc fourier_shell_correlation(const base::Volume& first, const base::Volume& sec
 /// if the curve never falls below the threshold or starts below it.
 std::optional<double> crossing_A(std::span<const double> frequency_per_A, const FscCurve& curve,
                                  double threshold);
+
+/// The two files to correlate and the voxels of them that count.
+struct FscFiles {
+  std::filesystem::path first, second;
+  std::optional<std::filesystem::path> mask;  ///< default: edge_window()
+  std::optional<Box> box;                     ///< in voxels of the second
+  std::optional<TiltRange> tilts;
+};
+
+/// Computes the shell correlation of two MRC volumes, read as a pair (volume_pair.h). The mask is
+/// an MRC volume of the size of the second, with weights from 0 to 1. Where the second's header has
+/// no voxel size, frequencies count voxels, and a warning goes to base/log.h. Throws Error for
+/// volumes that cannot be correlated, and if memory is too small.
+Fsc correlate_files(const FscFiles& files);
+
+/// Returns the correlation as JSON. A crossing that does not exist and an empty shell are null.
+nlohmann::json fsc_json(const Fsc& fsc, const FscFiles& files);
+
+/// Returns a table with a line a shell: its frequency, its resolution, and the correlation and the
+/// number of Fourier voxels of each curve. An empty shell has an empty correlation.
+std::string fsc_csv(const Fsc& fsc);
 
 }  // namespace tomofield::evaluate

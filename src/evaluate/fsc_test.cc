@@ -8,7 +8,6 @@
 #include <numbers>
 
 #include "base/parallel.h"
-#include "evaluate/fourier_transform.h"
 #include "random_arrays.h"
 #include "tomofield/error.h"
 

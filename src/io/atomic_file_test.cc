@@ -104,9 +104,9 @@ TEST(AtomicFile, RefusesAReadOnlyDirectory) {
 
 TEST(Json, IsWrittenForPeople) {
   const ScratchDirectory scratch;
-  write_json(scratch / "figures.json",
+  write_json(scratch / "metrics.json",
              {{"name", "a\xff"}, {"loss", 0.5}});  // invalid UTF-8 survives
-  const auto read = nlohmann::json::parse(read_whole_file(scratch / "figures.json"));
+  const auto read = nlohmann::json::parse(read_whole_file(scratch / "metrics.json"));
   EXPECT_EQ(read["loss"], 0.5);
 }
 

@@ -40,7 +40,7 @@ struct Measurement {
   double bin_factor = 1.0;  ///< of `pixel_size_A` to the stack's
   double x_tilt_deg = 0.0;  ///< the same for every view: a rotation of the volume about X
   double empty_beam = 0.0;  ///< I0 in data units (dark contrast)
-  tilt_series::MaskFigures masks = {};
+  tilt_series::MaskMetrics masks = {};
   std::vector<double> masked_part = {};  ///< [view]: the part of the rays that carries no loss
 
   /// Returns the contrast of the views near zero tilt, in density units times pixels: the standard

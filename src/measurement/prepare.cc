@@ -180,7 +180,7 @@ std::vector<double> masked_parts(const SlabViews& rays,
 }
 
 void log_masks(const Measurement& prepared) {
-  const tilt_series::MaskFigures& masks = prepared.masks;
+  const tilt_series::MaskMetrics& masks = prepared.masks;
   double masked = 0;
   const int num_views = prepared.geometry.num_views();
   for (int v = 0; v < num_views; ++v)
@@ -266,7 +266,7 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
         take_view(series, view, processes, image, valid);
       },
       scratch_dir);
-  prepared.masks = series.mask_figures();
+  prepared.masks = series.mask_metrics();
   prepared.masked_part = masked_parts(*prepared.rays, processes);
   log_masks(prepared);
   return prepared;

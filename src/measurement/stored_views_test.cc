@@ -75,7 +75,7 @@ TEST_P(EachViewOnce, IsDecoded) {
   input.resample = c.resample;
   if (c.contrast == Contrast::kBright && c.has_beads) input.bead_diameter_nm = 10.0;
   const TiltSeries series(input);
-  EXPECT_EQ(series.mask_figures().num_beads > 0, c.has_beads);
+  EXPECT_EQ(series.mask_metrics().num_beads > 0, c.has_beads);
   const testing::ScratchDirectory scratch;
   SpecimenOptions specimen;
   specimen.thickness = 40;

@@ -8,7 +8,6 @@
 
 #include "base/enum_names.h"
 #include "base/parallel.h"
-#include "output/mask_metrics.h"
 
 namespace tomofield::output {
 namespace {
@@ -39,7 +38,27 @@ nlohmann::json stages_json(const std::vector<fit::Stage>& stages) {
 
 }  // namespace
 
-nlohmann::json figures_json(const fit::Fit& fit, const measurement::Measurement& series,
+nlohmann::json mask_json(const measurement::Measurement& series) {
+  const tilt_series::MaskMetrics& masks = series.masks;
+  nlohmann::json views = nlohmann::json::array();
+  const int num_views = series.geometry.num_views();
+  double masked_part = 0;
+  for (int v = 0; v < num_views; ++v) {
+    const auto view = static_cast<std::size_t>(v);
+    masked_part += series.masked_part[view] / num_views;
+    views.push_back({{"tilt_deg", series.geometry.tilt_deg[view]},
+                     {"beads_found", masks.beads_found[view]},
+                     {"beads_masked", masks.beads_masked[view]},
+                     {"masked_part", series.masked_part[view]}});
+  }
+  return {{"beads", masks.num_beads},
+          {"bead_diameter_nm", masks.bead_diameter_A / 10},
+          {"bad_pixels", masks.num_bad_pixels},
+          {"masked_part", masked_part},
+          {"views", views}};
+}
+
+nlohmann::json metrics_json(const fit::Fit& fit, const measurement::Measurement& series,
                             double seconds) {
   const fit::Progress& progress = fit.progress();
   nlohmann::json views = nlohmann::json::array();

@@ -7,9 +7,14 @@
 
 namespace tomofield::output {
 
+/// Returns the metrics of the masks as JSON, for every command that reconstructs: beads, hot and
+/// dead pixels, and the fraction of rays without a loss, of all rays and by view. Views are in the
+/// stack's order.
+nlohmann::json mask_json(const measurement::Measurement& series);
+
 /// Returns the metrics of a fit as JSON, for the file beside the volume. `seconds` is the fit's
 /// time.
-nlohmann::json figures_json(const fit::Fit& fit, const measurement::Measurement& series,
+nlohmann::json metrics_json(const fit::Fit& fit, const measurement::Measurement& series,
                             double seconds);
 
 /// Returns as JSON the work and the times of each process in the steps of this run. Every process

@@ -260,11 +260,11 @@ class ModelReader {
 
   std::vector<field::LeafShape> read_shapes(const Hdf5Group& group, int num_leaves) const {
     std::vector<field::LeafShape> shapes(static_cast<std::size_t>(num_leaves));
-    const auto read = [&](const char* name, int field::LeafShape::*member, std::int64_t least) {
+    const auto read = [&](const char* name, int field::LeafShape::*member, std::int64_t min) {
       Integers column(shapes.size());
       group.read_array<std::int64_t>(name, column);
       for (std::size_t i = 0; i < shapes.size(); ++i) {
-        require(column[i] >= least && column[i] <= field::LeafShape::kMostVertices,
+        require(column[i] >= min && column[i] <= field::LeafShape::kMostVertices,
                 "a leaf has an impossible shape");
         shapes[i].*member = static_cast<int>(column[i]);
       }

@@ -4,8 +4,8 @@
 
 #include "base/faults.h"
 #include "fit/integer_program.h"
+#include "io/output_files.h"
 #include "option_table/values.h"
-#include "output/result_files.h"
 #include "reconstruct/tuning.h"
 
 namespace tomofield::reconstruction {
@@ -80,7 +80,7 @@ void check_options(const ReconstructOptions& options) {
   if (options.field.tree == TreeKind::kAdaptive) results.push_back(paths.tree_picture);
   if (resolved.tune) results.push_back(paths.trials);
   if (options.fit.hold_out > 0) results.push_back(paths.held_out_picture);
-  output::check_result_files(
+  io::check_result_files(
       std::move(results), paths.picture_prefix, options.files, resolved.overwrite || resumes,
       resolved.resume ? "there is no checkpoint to resume, so give --overwrite to start over and "
                         "replace it, or another name with -o"

@@ -32,7 +32,7 @@ struct RunResult {
 };
 
 /// Does the main job: fits a field to the series and writes the volume (MRC), the
-/// model (HDF5, also the checkpoint while it runs), and the figures and resolved
+/// model (HDF5, also the checkpoint while it runs), and the metrics and resolved
 /// options (JSON). Without ReconstructOptions::output, writes none of them and saves no checkpoint.
 /// Call check_options() and plan_run() first: this starts at once.
 ///

@@ -8,9 +8,9 @@
 
 #include "base/lanes.h"
 #include "io/json.h"
-#include "output/held_out_picture.h"
 #include "output/metrics.h"
 #include "output/volume.h"
+#include "report/pictures.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -24,7 +24,7 @@ void write_picture(const fit::Fit& fit, const measurement::Measurement& series,
   const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
   const measurement::PredictedView view = fit.predict_held_out(*nearest, model);
   fit.processes().run_collectively([&] {
-    if (fit.processes().is_first()) output::write_held_out_picture(picture, view);
+    if (fit.processes().is_first()) report::write_held_out_picture(view, picture);
   });
 }
 
@@ -68,11 +68,11 @@ output::ModelInfo model_info(const measurement::Measurement& series,
 
 Results finish(fit::Fit& fit, const measurement::Measurement& series,
                const ReconstructOptions& options, const FitOrigin& origin, double seconds) {
-  nlohmann::json figures = output::figures_json(fit, series, seconds);
-  figures["held_out"] = nullptr;
-  if (options.fit.hold_out > 0) figures["held_out"] = score_fit(fit, series, options);
-  figures["processes"] = output::processes_json(fit, seconds);
-  figures["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
+  nlohmann::json metrics = output::metrics_json(fit, series, seconds);
+  metrics["held_out"] = nullptr;
+  if (options.fit.hold_out > 0) metrics["held_out"] = score_fit(fit, series, options);
+  metrics["processes"] = output::processes_json(fit, seconds);
+  metrics["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
   const output::ModelInfo info = model_info(series, options);
   const output::VolumeShare share = volume_share(fit, series);
   const bool writes_files = !options.resolved.output.empty();
@@ -81,7 +81,7 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   Results results{.model = {info, fit.take_field()},
                   .metrics = {{"tomofield", TOMOFIELD_VERSION},
                               {"options", options_json(options)},
-                              {"figures", std::move(figures)}}};
+                              {"metrics", std::move(metrics)}}};
   if (!writes_files) return results;
   output::write_volume(results.model, options.volume, paths.volume, share);
   share.processes.run_collectively([&] {

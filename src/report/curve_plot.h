@@ -32,8 +32,8 @@ struct PlotAxes {
 /// ends of the y axis are drawn at the ends. At most twelve curves have a colour of their own. A
 /// long name takes several lines of the legend, and the picture is as high as its legend needs.
 std::string curve_plot_svg(const PlotAxes& axes, const std::vector<Curve>& curves);
-/// Draws the same plot as a PNG of 900 × 360 pixels (or higher), with the letters of report/text.h.
-/// Replaces `path`. Throws Error if it cannot be written.
+/// Draws the same plot as a PNG of 900 × 360 pixels (or higher), with the letters of
+/// report/canvas.h. Replaces `path`. Throws Error if it cannot be written.
 void write_curve_plot(const PlotAxes& axes, const std::vector<Curve>& curves,
                       const std::filesystem::path& path);
 

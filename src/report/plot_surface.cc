@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "report/canvas.h"
 #include "report/html.h"
-#include "report/text.h"
 
 namespace tomofield::report {
 namespace {

@@ -1,10 +1,13 @@
 #include "report/slice.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "base/check.h"
+#include "base/percentile.h"
 #include "io/mrc.h"
 #include "io/png.h"
 
@@ -66,6 +69,41 @@ void write_slice_picture(const std::filesystem::path& path, const Slice& slice,
           scale.grey(static_cast<double>(row[x / zoom]));
   }
   io::write_png_grey(path, width, height, pixels);
+}
+
+GreyScale::GreyScale(std::vector<float> sample) {
+  std::erase_if(sample, [](float value) { return !std::isfinite(value); });
+  if (sample.empty()) return;
+  black_ = base::percentile(sample, 0.5);
+  const double white = base::percentile(sample, 99.5);
+  if (white > black_) to_grey_ = 255.0 / (white - black_);
+}
+
+std::uint8_t GreyScale::grey(double value) const {
+  const double grey = (value - black_) * to_grey_;
+  return static_cast<std::uint8_t>(
+      std::lround(std::isnan(grey) ? 0.0 : std::clamp(grey, 0.0, 255.0)));
+}
+
+std::int64_t picture_zoom(std::int64_t narrowest, std::int64_t widest) {
+  constexpr std::int64_t kMinWidth_px = 512;
+  constexpr std::int64_t kMaxWidth_px = 4096;
+  return std::clamp<std::int64_t>((kMinWidth_px + narrowest - 1) / narrowest, 1,
+                                  std::max<std::int64_t>(kMaxWidth_px / widest, 1));
+}
+
+std::vector<std::filesystem::path> write_slice_pictures(const std::filesystem::path& mrc,
+                                                        const std::filesystem::path& prefix) {
+  const auto slices = read_central_slices(mrc);
+  const GreyScale scale = grey_scale_of(slices);
+  const auto [narrowest, widest] = std::minmax({slices[0].width, slices[2].width});
+  const std::int64_t zoom = picture_zoom(narrowest, widest);
+  std::vector<std::filesystem::path> paths;
+  for (const Slice& slice : slices) {
+    paths.emplace_back(prefix.string() + "_" + slice.name + ".png");
+    write_slice_picture(paths.back(), slice, scale, zoom);
+  }
+  return paths;
 }
 
 }  // namespace tomofield::report

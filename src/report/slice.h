@@ -5,9 +5,23 @@
 #include <string>
 #include <vector>
 
-#include "report/grey_scale.h"
-
 namespace tomofield::report {
+
+/// Maps densities to greys. The 0.5 and 99.5 percentiles of a sample are black and white.
+class GreyScale {
+ public:
+  /// Takes the scale from the finite values of a sample. If there are none, everything is black.
+  explicit GreyScale(std::vector<float> sample);
+  /// Returns the grey of a value, from 0 to 255. NaN is black.
+  std::uint8_t grey(double value) const;
+
+ private:
+  double black_ = 0.0, to_grey_ = 0.0;
+};
+
+/// Returns the pixels a voxel at which pictures of small volumes are at least 512 wide, unless
+/// another would then be wider than 4096.
+std::int64_t picture_zoom(std::int64_t narrowest, std::int64_t widest);
 
 /// One plane of a volume: values[row × width + column]. The first row is at the bottom.
 struct Slice {
@@ -33,5 +47,16 @@ GreyScale grey_scale_of(const std::vector<Slice>& slices);
 /// Writes a PNG with `zoom` pixels a value; the first row is at the bottom. Replaces `path`.
 void write_slice_picture(const std::filesystem::path& path, const Slice& slice,
                          const GreyScale& scale, std::int64_t zoom);
+
+/// Draws the three central planes of an MRC volume: PREFIX_xy.png, PREFIX_xz.png and PREFIX_yz.png
+/// (the file's own axes). The first axis of each name runs to the right, the second upwards, as in
+/// 3dmod. One grey scale serves all three: black and white are the 0.5 and 99.5 percentiles of the
+/// planes' finite values, densities as stored. Voxels stay square. Small volumes are enlarged,
+/// whole pixels a voxel, until each picture is at least 512 pixels wide (unless another would then
+/// be wider than 4096).
+///
+/// Reads the file once, rows at a time. Returns the three paths. Replaces files.
+std::vector<std::filesystem::path> write_slice_pictures(const std::filesystem::path& mrc,
+                                                        const std::filesystem::path& prefix);
 
 }  // namespace tomofield::report

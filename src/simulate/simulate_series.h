@@ -8,7 +8,7 @@
 
 namespace tomofield::simulate {
 
-/// Figures of a series that was written.
+/// Metrics of a series that was written.
 struct SimulationSummary {
   struct Truth {
     double min = 0.0, max = 0.0, mean = 0.0;

@@ -235,7 +235,7 @@ struct TiltSeries::Impl {
       return image;
     };
     beads = find_bead_masks(options, plan, *stack, bead_views, processes);
-    beads.figures.num_bad_pixels = num_bad_pixels;
+    beads.metrics.num_bad_pixels = num_bad_pixels;
     aligned.reset();
     if (options.resample) return;
     for (std::size_t view = 0; view < views.size(); ++view) {
@@ -290,7 +290,7 @@ double TiltSeries::pixel_size_A() const { return impl_->plan.pixel_size_A * bin_
 double TiltSeries::bin_factor() const { return impl_->plan.bin_factor; }
 const std::vector<double>& TiltSeries::noise_sigma() const { return impl_->noise_sigma; }
 double TiltSeries::empty_beam() const { return impl_->intensity.empty_beam; }
-const MaskFigures& TiltSeries::mask_figures() const { return impl_->beads.figures; }
+const MaskMetrics& TiltSeries::mask_metrics() const { return impl_->beads.metrics; }
 
 void TiltSeries::read_view(std::size_t view, std::span<float> image,
                            std::span<std::uint8_t> valid) const {

@@ -44,7 +44,7 @@ struct TiltSeriesOptions {
 };
 
 /// Counts of what was masked beside the fill of rotated images.
-struct MaskFigures {
+struct MaskMetrics {
   std::size_t num_beads = 0;              ///< beads with one position in the specimen
   double bead_diameter_A = 0.0;           ///< given or estimated; 0: no beads
   std::vector<std::size_t> beads_found;   ///< [view]: beads with a spot of their own
@@ -107,7 +107,7 @@ class TiltSeries {
   /// kBright 0, where none is needed.
   double empty_beam() const;
 
-  const MaskFigures& mask_figures() const;
+  const MaskMetrics& mask_metrics() const;
 
  private:
   struct Impl;

@@ -84,7 +84,7 @@ def test_json_tells_how_the_tree_came_about(whole):
     with open(whole[:-4] + ".json") as file:
         record = json.load(file)
     assert record["options"]["field"]["tree"] == "adaptive"
-    updates = record["figures"]["tree_updates"]
+    updates = record["metrics"]["tree_updates"]
     assert [u["epoch"] for u in updates] == [2 * (i + 1) for i in range(len(updates))]
     assert updates[0]["splits"] > 0 and updates[0]["merges"] > 0
     assert updates[0]["predicted_error"] < updates[0]["error"]

@@ -99,21 +99,21 @@ def test_densities_are_not_negative_unless_allowed(baseline, plain):
         assert free.record["options"]["method"]["non_negative"] is False
 
 
-def test_json_has_figures_and_every_option(plain, series):
+def test_json_has_metrics_and_every_option(plain, series):
     for method, results in plain.items():
-        options, figures = results.record["options"], results.record["figures"]
+        options, metrics = results.record["options"], results.record["metrics"]
         assert options["input"]["stack"] == series.stack
         assert options["specimen"]["thickness"] == THICKNESS
         assert options["with_margin"] is False
         assert options["method"]["name"] == method
-        assert figures["held_out"] is None
-        assert figures["size_px"] == [WIDTH, HEIGHT, THICKNESS]
-        np.testing.assert_allclose([view["tilt_deg"] for view in figures["views"]], TILTS)
+        assert metrics["held_out"] is None
+        assert metrics["size_px"] == [WIDTH, HEIGHT, THICKNESS]
+        np.testing.assert_allclose([view["tilt_deg"] for view in metrics["views"]], TILTS)
     for method, (_, iterations, *_) in ITERATIVE.items():
-        options, figures = plain[method].record["options"], plain[method].record["figures"]
+        options, metrics = plain[method].record["options"], plain[method].record["metrics"]
         assert options["method"]["iterations"] == iterations
         for history in ("mean_squared_residual_per_noise_variance", "objective"):
-            values = figures[history]
+            values = metrics[history]
             most = 1 if method in NETWORKS else 0.5  # they have hardly begun
             assert len(values) == iterations + 1 and values[-1] < most * values[0], history
     assert plain["wbp"].record["options"]["method"]["window"] == "hann"
@@ -125,7 +125,7 @@ def test_json_has_figures_and_every_option(plain, series):
 
 
 def test_parameters_are_those_that_are_fitted(baseline, plain):
-    counts = {method: results.record["figures"]["parameters"]
+    counts = {method: results.record["metrics"]["parameters"]
               for method, results in plain.items()}
     for method in set(METHODS) - set(NETWORKS):
         assert counts[method] == WIDTH * HEIGHT * THICKNESS
@@ -133,17 +133,17 @@ def test_parameters_are_those_that_are_fitted(baseline, plain):
     assert counts["implicit"] == 33 * 16 + 17 * 16 + 17
     more, _ = baseline("ingp", "wider", "--width", 17, "--iterations", 1)
     # The inputs are two features of each of four levels.
-    assert more.record["figures"]["parameters"] - counts["ingp"] == 9 + 17 + 16 + 1 + 1
+    assert more.record["metrics"]["parameters"] - counts["ingp"] == 9 + 17 + 16 + 1 + 1
 
 
 def test_implicit_learns_the_noise_of_each_view(baseline, plain, series):
     noisy = series.views.copy()
     noisy[5] += np.random.default_rng(1).normal(0, 3 * series.views.std(), noisy[5].shape)
     results, _ = baseline("implicit", "noisy", source=series.with_views("noisy", noisy))
-    learned = [view["learned_noise_sigma"] for view in results.record["figures"]["views"]]
+    learned = [view["learned_noise_sigma"] for view in results.record["metrics"]["views"]]
     others = learned[:5] + learned[6:]
     assert learned[5] > 1.5 * max(others) and min(others) > 0, learned
-    assert "learned_noise_sigma" not in plain["ingp"].record["figures"]["views"][0]
+    assert "learned_noise_sigma" not in plain["ingp"].record["metrics"]["views"][0]
 
 
 def test_a_network_begins_where_its_seed_says(baseline):
@@ -161,17 +161,17 @@ def test_held_out_views_are_predicted_and_not_fitted(baseline, series):
     broken = series.with_views("broken", broken)
     for method in METHODS:
         results, run = baseline(method, "held-out", "--hold-out", every)
-        figures = results.record["figures"]
-        errors = {view["view"]: view["error"] for view in figures["held_out"]["views"]}
+        metrics = results.record["metrics"]
+        errors = {view["view"]: view["error"] for view in metrics["held_out"]["views"]}
         assert list(errors) == held_out
         assert f"held out: {len(held_out)} views, error" in run.stderr
-        residual = figures["mean_squared_residual_per_noise_variance"][-1]
-        print(f"{method}: held out {figures['held_out']['error']:.2f}, fitted {residual:.2f}")
+        residual = metrics["mean_squared_residual_per_noise_variance"][-1]
+        print(f"{method}: held out {metrics['held_out']['error']:.2f}, fitted {residual:.2f}")
         if method not in ("wbp", *NETWORKS):  # which fits none, which have hardly begun
-            assert figures["held_out"]["error"] > residual
-        assert len(figures["views"]) == len(TILTS) - len(held_out)
+            assert metrics["held_out"]["error"] > residual
+        assert len(metrics["views"]) == len(TILTS) - len(held_out)
         other, _ = baseline(method, "held-out-broken", "--hold-out", every, source=broken)
-        worse = {v["view"]: v["error"] for v in other.record["figures"]["held_out"]["views"]}
+        worse = {v["view"]: v["error"] for v in other.record["metrics"]["held_out"]["views"]}
         assert worse[held_out[1]] > (1.2 if method in NETWORKS else 2) * errors[held_out[1]]
         np.testing.assert_array_equal(other.volume, results.volume)
 
@@ -197,10 +197,10 @@ def test_tuned_settings_are_better_than_bad_ones_and_used_for_all_views(baseline
         source = sources.get(method, series)
         worse, _ = baseline(method, "bad", *options, source=source)
         results, run = baseline(method, "tuned", *options, "--tune", source=source)
-        figures, used = results.record["figures"], results.record["options"]
-        tuning, chosen = figures["tuning"], figures["tuning"]["chosen"]
-        assert used["method"] == chosen and used["tune"] and figures["held_out"] is None
-        assert len(figures["views"]) == len(TILTS)
+        metrics, used = results.record["metrics"], results.record["options"]
+        tuning, chosen = metrics["tuning"], metrics["tuning"]["chosen"]
+        assert used["method"] == chosen and used["tune"] and metrics["held_out"] is None
+        assert len(metrics["views"]) == len(TILTS)
         assert run.stderr.count("tried --") == len(tuning["trials"]) and "tuned: --" in run.stderr
         assert all(len(trial["held_out_error_by_view"]) == 5 for trial in tuning["trials"])
         gain = psnr(results.volume, series.truth) - psnr(worse.volume, series.truth)
@@ -222,7 +222,7 @@ def test_fitted_view_scales_do_not_upset_total_variation(shared_data):
         harness.succeed("baseline", "tv", os.path.join(folder, "haadf_tilt_tomviz_aligned.ali"), "--tlt",
                         os.path.join(folder, "haadf_tilt_raw.rawtlt"), "--contrast", "bright",
                         "--thickness", 32, "--iterations", 20, "--view-scale", view_scale, "-o", output)
-        objective[view_scale] = Baseline(output).record["figures"]["objective"][-1]
+        objective[view_scale] = Baseline(output).record["metrics"]["objective"][-1]
     assert objective["on"] < 1.5 * objective["off"], objective
 
 
@@ -230,10 +230,10 @@ def test_views_that_score_the_result_have_no_say_in_its_settings(baseline, serie
     every = 4
     scored, broken = harness.with_broken_views(series, every)
     for method in TUNED:
-        figures = [baseline(method, "scored", "--tune", *METHODS[method], "--hold-out", every,
-                            source=source)[0].record["figures"] for source in (series, broken)]
-        harness.assert_scored_views_have_no_say(figures, scored)
-        assert figures[0]["held_out"]["independent"] is True
+        metrics = [baseline(method, "scored", "--tune", *METHODS[method], "--hold-out", every,
+                            source=source)[0].record["metrics"] for source in (series, broken)]
+        harness.assert_scored_views_have_no_say(metrics, scored)
+        assert metrics[0]["held_out"]["independent"] is True
 
 
 def test_wider_roll_off_smooths_along_x(baseline, plain):

@@ -266,7 +266,7 @@ def test_scaling_keeps_whole_rows_of_the_same_arguments():
 [ -e {broken} ] && echo 'there is no memory' >&2 && exit 2
 echo >> {runs}
 while [ "$1" != -o ]; do shift; done
-echo '{json.dumps({"figures": figures})}' > "${{2%.mrc}}.json"
+echo '{json.dumps({"metrics": figures})}' > "${{2%.mrc}}.json"
 """)
     write_program(os.path.join(folder, "mpirun"), "shift 2\nexec \"$@\"\n")
 

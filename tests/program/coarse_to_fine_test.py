@@ -49,16 +49,16 @@ def whole(command):
     return results
 
 
-def test_plan_and_figures_count_both_stages(command, whole):
+def test_plan_and_metrics_count_both_stages(command, whole):
     plan = harness.succeed(*command(fresh_results("plan"), "--dry-run")).stdout
     assert f"{(COARSE + FINE) * SUBSETS} steps" in plan, plan
     assert f"epochs: {COARSE} of pixels 2 x 2, {FINE} at full resolution\n" in plan, plan
     with open(whole.json_path) as file:
         document = json.load(file)
     assert document["options"]["fit"]["coarse_epochs"] == COARSE
-    assert [stage["bin"] for stage in document["figures"]["stages"]] == [2, 1]
-    assert document["figures"]["steps"] == (COARSE + FINE) * SUBSETS
-    assert len(document["figures"]["mean_squared_residual_per_noise_variance"]) == COARSE + FINE
+    assert [stage["bin"] for stage in document["metrics"]["stages"]] == [2, 1]
+    assert document["metrics"]["steps"] == (COARSE + FINE) * SUBSETS
+    assert len(document["metrics"]["mean_squared_residual_per_noise_variance"]) == COARSE + FINE
 
 
 def test_the_coarse_stage_helps(command, psnr, whole):
@@ -119,13 +119,13 @@ def with_vertices(command):
     return results
 
 
-def figures(results):
+def metrics(results):
     with open(results.json_path) as file:
-        return json.load(file)["figures"]
+        return json.load(file)["metrics"]
 
 
 def residuals(results):
-    return figures(results)["mean_squared_residual_per_noise_variance"]
+    return metrics(results)["mean_squared_residual_per_noise_variance"]
 
 
 def test_factors_begin_as_plain_vertices(command, psnr, with_vertices):
@@ -133,7 +133,7 @@ def test_factors_begin_as_plain_vertices(command, psnr, with_vertices):
     assert "epochs: 10 of pixels 2 x 2 with plain vertices, 8 at full resolution with plain " \
         "vertices, 6 at full resolution\n" in plan, plan
     assert [(stage["field"], stage["bin"], stage["epochs"])
-            for stage in figures(with_vertices)["stages"]] \
+            for stage in metrics(with_vertices)["stages"]] \
         == [("grid", 2, 10), ("grid", 1, 8), ("vm", 1, 6)]
     with h5py.File(with_vertices.model_path) as model:
         assert model["field"].attrs["kind"] == b"vm"
@@ -154,7 +154,7 @@ def test_factors_go_on_where_vertices_were(with_vertices):
 def test_held_out_views_are_predicted_in_every_stage(command):
     results = fresh_results("held")
     harness.succeed(*command(results, *VERTICES_FIRST, "--hold-out", 4))
-    curve = figures(results)["held_out"]["error_by_epoch"]
+    curve = metrics(results)["held_out"]["error_by_epoch"]
     assert len(curve) == 24 and curve[-1] == min(curve), curve
 
 
@@ -162,7 +162,7 @@ def test_an_early_stop_is_one_of_factors(command):
     results = fresh_results("early")
     stopping = ["--hold-out", 4, "--tv", 0, "--epochs", 90, "--early-stop", 2]
     harness.succeed(*command(results, *harness.merge(VERTICES_FIRST, stopping)))
-    curve = figures(results)["held_out"]["error_by_epoch"]
+    curve = metrics(results)["held_out"]["error_by_epoch"]
     of_factors = curve[18:]
     assert min(curve) < min(of_factors), f"nothing before would have stopped it: {curve}"
     assert 3 <= len(of_factors) == 3 + of_factors.index(min(of_factors)) < 90, curve
@@ -173,7 +173,7 @@ def test_trials_of_the_penalty_are_the_same_whatever_factors_begin_with(command)
         results = fresh_results(name)
         harness.succeed(*command(results, "--rank", 20, "--tv-penalty", "auto", *options))
         return [(trial["tv_penalty"], trial["held_out_error"])
-                for trial in figures(results)["tuning"]["trials"]]
+                for trial in metrics(results)["tuning"]["trials"]]
 
     vertices = ["--coarse-epochs", 8, "--vertex-epochs", 1, "--epochs", 1]  # of 10
     factors = ["--coarse-epochs", 8, "--vertex-epochs", 0, "--epochs", 3]  # of 30
@@ -220,7 +220,7 @@ def test_leaves_of_a_grid_are_fitted_at_a_quarter_of_the_width_first(series, sta
         document = json.load(file)
     assert document["options"]["field"]["leaf_size"] == 64
     assert document["options"]["field"]["depth"] == 0
-    assert [(stage["bin"], stage["epochs"]) for stage in document["figures"]["stages"]] \
+    assert [(stage["bin"], stage["epochs"]) for stage in document["metrics"]["stages"]] \
         == [(4, COARSE), (2, COARSE), (1, FINE)]
     results = fresh_results("grid_resumed")
     stages = stages_when_stopped(results, *grid, "--leaf-size", 64)

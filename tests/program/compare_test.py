@@ -77,7 +77,7 @@ def test_every_method_is_run_scored_and_shown(compare, truth):
     assert abs(shades[0] - shades[1]) < 40, shades
 
 
-def test_halves_and_held_out_views_give_figures_without_a_truth(compare):
+def test_halves_and_held_out_views_give_metrics_without_a_truth(compare):
     folder = harness.fresh_directory("halves")
     compare(folder, "--halves", "--hold-out", 4, "--exclude", "3")
     rows = json.loads(read(folder, "comparison.json"))["methods"]
@@ -88,12 +88,12 @@ def test_halves_and_held_out_views_give_figures_without_a_truth(compare):
         by_hand = os.path.join(folder, "by_hand")
         harness.succeed(*row["command"], "-o", by_hand + ".mrc", "--overwrite", "--hold-out", 4)
         with open(by_hand + ".json") as file:
-            assert json.load(file)["figures"]["held_out"]["error"] == row["held_out_error"], row
+            assert json.load(file)["metrics"]["held_out"]["error"] == row["held_out_error"], row
         views = {}
         for half in ("odd", "even"):
             with open(os.path.join(folder, f"{row['method']}.{half}.json")) as file:
                 record = json.load(file)
-            views[half] = {view["tilt_deg"] for view in record["figures"]["views"]}
+            views[half] = {view["tilt_deg"] for view in record["metrics"]["views"]}
         assert not views["odd"] & views["even"] and len(views["odd"] | views["even"]) == 20
     assert "Shell correlation of odd and even views" in read(folder, "report.html")
 
@@ -108,14 +108,14 @@ def test_every_method_that_can_be_is_tuned(series):
         with open(os.path.join(folder, name + ".json")) as file:
             record = json.load(file)
         assert record["options"]["fit_view_scale"] is True
-        tunings[name] = record["figures"]["tuning"]
+        tunings[name] = record["metrics"]["tuning"]
     assert tunings["wbp"]["chosen"]["cutoff"] <= 0.5 and tunings["s"]["chosen"]["iterations"] > 5
     assert tunings["t"]["chosen"]["weight"] < 90
     rows = {row["method"]: row for row in json.loads(read(folder, "comparison.json"))["methods"]}
     for name in ("wbp", "s", "t"):
         with open(os.path.join(folder, name + ".held_out.json")) as file:
             record = json.load(file)
-        held_out, tuning = record["figures"]["held_out"], record["figures"]["tuning"]
+        held_out, tuning = record["metrics"]["held_out"], record["metrics"]["tuning"]
         assert record["options"]["method"] == tuning["chosen"], "the runs that score are not tuned"
         assert rows[name]["held_out_error"] == held_out["error"]
         scored = {view["view"] for view in held_out["views"]}

@@ -33,7 +33,7 @@ def run(*arguments):
 
 
 def evaluate(*arguments):
-    """Returns the figures of one comparison, and the run with its output."""
+    """Returns the metrics of one comparison, and the run with its output."""
     result = run(*arguments, "--json", path("score.json"), "--overwrite")
     assert result.returncode == 0, result.stderr
     return json.load(open(path("score.json"))), result
@@ -182,7 +182,7 @@ def test_hopeless_pairs_are_refused():
     assert result.returncode == 2 and "7 voxels" in result.stderr
 
 
-def test_existing_figures_are_kept_unless_asked():
+def test_existing_metrics_are_kept_unless_asked():
     _, truth = random_pair((10, 20, 30), 9)
     file = save("a.mrc", truth)
     with open(path("kept.json"), "w") as kept:

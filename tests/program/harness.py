@@ -208,10 +208,10 @@ def with_broken_views(source, every):
     return scored, source.with_views("broken", views)
 
 
-def assert_scored_views_have_no_say(figures, scored):
-    """Checks the figures of a series and of the same series with broken scored views. Both tunings
+def assert_scored_views_have_no_say(metrics, scored):
+    """Checks the metrics of a series and of the same series with broken scored views. Both tunings
     are the same and did not use these views, and the broken views spoil the score."""
-    assert_same_tuning(*(f["tuning"] for f in figures))
-    assert not set(figures[0]["tuning"]["predicted_views"]) & set(scored)
-    assert [view["view"] for view in figures[0]["held_out"]["views"]] == scored
-    assert figures[1]["held_out"]["error"] > 2 * figures[0]["held_out"]["error"]
+    assert_same_tuning(*(f["tuning"] for f in metrics))
+    assert not set(metrics[0]["tuning"]["predicted_views"]) & set(scored)
+    assert [view["view"] for view in metrics[0]["held_out"]["views"]] == scored
+    assert metrics[1]["held_out"]["error"] > 2 * metrics[0]["held_out"]["error"]

@@ -60,7 +60,7 @@ def reconstruct(name, series, *options, command=("reconstruct",), quick=QUICK):
     run = harness.succeed(*command, *series, "-o", output, *quick, *options)
     results = harness.Results(output)
     record = json.load(open(results.json_path))
-    return results, record["figures"]["mask"], run
+    return results, record["metrics"]["mask"], run
 
 
 @pytest.fixture(scope="module")
@@ -115,8 +115,8 @@ def test_nothing_is_found_where_there_are_none(plain):
     assert mask["beads"] == 0 and mask["masked_part"] == 0
     cell = harness.Series("cell")
     dark = cell.with_views("dark", 1000 - 10 * cell.views)
-    figures = json.load(open(dark.reconstruct("dark_cell", "--contrast", "dark").json_path))
-    assert figures["figures"]["mask"]["beads"] == 0
+    metrics = json.load(open(dark.reconstruct("dark_cell", "--contrast", "dark").json_path))
+    assert metrics["metrics"]["mask"]["beads"] == 0
 
 
 def test_masked_pixels_carry_no_loss(directory, plain, write_series):
@@ -127,9 +127,9 @@ def test_masked_pixels_carry_no_loss(directory, plain, write_series):
     harness.write_stack(mask, counts)
     spoilt = views.copy()
     spoilt[:, 30:44, 10:31] = np.random.default_rng(5).normal(100, 40, (len(TILTS), 14, 21))
-    first, figures, _ = reconstruct("plain_masked", plain, "--mask", mask)
+    first, metrics, _ = reconstruct("plain_masked", plain, "--mask", mask)
     second, _, _ = reconstruct("spoilt", write_series("spoilt", spoilt), "--mask", mask)
-    np.testing.assert_allclose(figures["masked_part"], 14 * 21 / (WIDTH * HEIGHT))
+    np.testing.assert_allclose(metrics["masked_part"], 14 * 21 / (WIDTH * HEIGHT))
     np.testing.assert_array_equal(first.volume, second.volume)
 
 

@@ -81,9 +81,9 @@ def succeed(processes, *arguments):
     return result
 
 
-def figures(results):
+def metrics(results):
     with open(results.json_path) as file:
-        found = json.load(file)["figures"]
+        found = json.load(file)["metrics"]
     for key in ("seconds", "processes", "threads"):  # of the run, not of the result
         found.pop(key)
     if found["tuning"]:
@@ -110,7 +110,7 @@ def test_results_have_the_bytes_of_one_process(command):
             shared = fresh_results(f"{name}{processes}")
             result = succeed(processes, *command(shared, *options, fit=fit))
             assert shared.same_as(alone), (name, processes)
-            assert figures(shared) == figures(alone), (name, processes)
+            assert metrics(shared) == metrics(alone), (name, processes)
             assert result.stdout.count("tomogram  ") == 1, result.stdout
             assert set(map(os.path.basename, glob.glob(os.path.dirname(shared.volume_path) + "/*"))) \
                 == set(map(os.path.basename, glob.glob(os.path.dirname(alone.volume_path) + "/*")))
@@ -138,7 +138,7 @@ def test_each_process_has_its_part(command):
     results = fresh_results("parts")
     succeed(3, *command(results))
     with open(results.json_path) as file:
-        processes = json.load(file)["figures"]["processes"]
+        processes = json.load(file)["metrics"]["processes"]
     assert [p["bands"] for p in processes] == [1, 2, 1], processes
     assert all(p["bytes_sent_per_step"] > 0 and p["seconds_computing"] > 0 for p in processes)
     # All send the same sums, and the one in the middle has two neighbours.

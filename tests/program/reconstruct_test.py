@@ -62,28 +62,28 @@ def test_specimen_is_found(series):
         assert gain > 3 and correlation > 0.7, (field, gain, correlation)
 
 
-def test_json_has_figures_and_every_option(plain, series):
+def test_json_has_metrics_and_every_option(plain, series):
     record = json.load(open(plain.json_path))
     assert re.fullmatch(r"\d+\.\d+\.\d+", record["tomofield"])
-    options, figures = record["options"], record["figures"]
+    options, metrics = record["options"], record["metrics"]
     assert options["input"]["stack"] == series.stack and options["input"]["tlt"] == series.tlt
     assert options["input"]["contrast"] == "bright" and options["input"]["bin"] == 1
     assert options["specimen"]["thickness"] == THICKNESS and options["specimen"]["hand"] == 1
     assert options["field"]["kind"] == "vm" and options["field"]["with_margin"] is False
     assert options["fit"]["epochs"] == 8 and options["fit"]["seed"] == 1
     assert options["volume"] == {"mode": 2, "axes": "xyz", "invert": False}
-    assert figures["steps"] == 8 * 7 and figures["size_px"] == [WIDTH, HEIGHT, THICKNESS]
-    assert abs(figures["pixel_size_A"] - PIXEL_SIZE) < 1e-5
-    residuals = figures["mean_squared_residual_per_noise_variance"]
+    assert metrics["steps"] == 8 * 7 and metrics["size_px"] == [WIDTH, HEIGHT, THICKNESS]
+    assert abs(metrics["pixel_size_A"] - PIXEL_SIZE) < 1e-5
+    residuals = metrics["mean_squared_residual_per_noise_variance"]
     assert len(residuals) == 8 and residuals[-1] < residuals[0]
-    np.testing.assert_allclose([view["tilt_deg"] for view in figures["views"]], TILTS)
+    np.testing.assert_allclose([view["tilt_deg"] for view in metrics["views"]], TILTS)
 
 
 def test_model_is_readable_with_h5py(plain):
     with h5py.File(plain.model_path) as model:
         assert model.attrs["format"] == b"tomofield model"
         parameters = model["field/parameters"][:]
-        assert parameters.size == json.load(open(plain.json_path))["figures"]["parameters"]
+        assert parameters.size == json.load(open(plain.json_path))["metrics"]["parameters"]
         assert np.isfinite(parameters).all() and parameters.std() > 0
         np.testing.assert_allclose(model["geometry/tilt_deg"][:], TILTS)
         options = json.loads(model.attrs["options_json"])
@@ -116,7 +116,7 @@ def test_same_seed_same_bytes_whatever_the_threads(plain, series):
     assert one.same_as(two) and one.same_as(plain)
     three = with_environment("three", 1, "--threads", 3)
     assert one.same_as(three)
-    assert json.load(open(three.json_path))["figures"]["threads"] == 3
+    assert json.load(open(three.json_path))["metrics"]["threads"] == 3
     other = series.reconstruct("other", "--seed", 2)
     assert not plain.same_as(other)
     copies = [os.path.join(harness.fresh_directory("copies"), f"{n}.mrc") for n in (1, 2)]
@@ -195,7 +195,7 @@ def test_excluded_views_do_not_count(series):
     views[excluded] = np.nan
     broken = series.with_views("broken", views)
     results = broken.reconstruct("excluded", "--exclude", "1,7-8")
-    record = json.load(open(results.json_path))["figures"]["views"]
+    record = json.load(open(results.json_path))["metrics"]["views"]
     np.testing.assert_allclose([view["tilt_deg"] for view in record], np.delete(TILTS, excluded))
     fewer = series.with_views("fewer", np.delete(views, excluded, axis=0),
                               np.delete(TILTS, excluded))

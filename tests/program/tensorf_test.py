@@ -56,7 +56,7 @@ def test_one_node_holds_everything(plain):
     n, nz, rank = options["field"]["leaf_size"] + 1, THICKNESS, 10
     # The parameters are VX, VY, VZ, MYZ, MXZ and MXY; the decoder has a few more.
     count = rank * (2 * n + nz + n * n + 2 * n * nz)
-    assert 0 <= record["figures"]["parameters"] - count < 10, count
+    assert 0 <= record["metrics"]["parameters"] - count < 10, count
 
 
 def test_variation_smooths_and_prior_takes_from_the_axes(plain, tensorf):
@@ -82,7 +82,7 @@ def test_densities_are_not_negative_unless_allowed(series, tensorf):
 
 def test_held_out_views_are_scored(tensorf):
     results, run = tensorf("held-out", "--hold-out", 5)
-    held_out = record_of(results)["figures"]["held_out"]
+    held_out = record_of(results)["metrics"]["held_out"]
     assert len(held_out["views"]) == len(TILTS) // 5 and "held out:" in run.stderr
 
 

@@ -29,7 +29,7 @@ def stem(results, suffix):
 
 def test_hold_out_reports_the_error_of_every_fourth_view(series):
     results = series.reconstruct("held", "--hold-out", 4)
-    held_out = record(results)["figures"]["held_out"]
+    held_out = record(results)["metrics"]["held_out"]
     curve = held_out["error_by_epoch"]
     assert len(curve) == 8 and curve[-1] == held_out["error"] and curve[-1] < curve[0], curve
     views = [view["view"] for view in held_out["views"]]
@@ -55,9 +55,9 @@ def test_picture_shows_measured_predicted_and_what_is_left(series):
 def test_early_stop_ends_the_fit_and_resumes_as_finished(series):
     options = ["--hold-out", 4, "--tv", 0, "--epochs", 200, "--early-stop", 2]
     results = series.reconstruct("early", *options)
-    curve = record(results)["figures"]["held_out"]["error_by_epoch"]
+    curve = record(results)["metrics"]["held_out"]["error_by_epoch"]
     assert len(curve) < 200 and len(curve) == np.argmin(curve) + 3, curve
-    assert record(results)["figures"]["held_out"]["independent"] is False
+    assert record(results)["metrics"]["held_out"]["independent"] is False
     before = read_bytes(results.volume_path)
     harness.succeed("reconstruct", *series.input, "-o", results.volume_path,
                     *harness.merge(harness.QUICK, options), "--resume")
@@ -78,7 +78,7 @@ def test_the_penalty_is_what_predicts_held_out_views_better(series):
     assert run.returncode == 143 and not left, (run.returncode, left)
     harness.succeed(*command, output, *options)
     written = json.load(open(output[:-len(".mrc")] + ".json"))
-    trials = {t["tv_penalty"]: t for t in written["figures"]["tuning"]["trials"]}
+    trials = {t["tv_penalty"]: t for t in written["metrics"]["tuning"]["trials"]}
     assert {t: trials[t]["tv"] for t in trials} == {"concave": 14, "smooth": 5}, trials
     assert all(len(t["held_out_error_by_view"]) == 5 for t in trials.values())
     assert all(t["epochs"] == 1 for t in trials.values())  # half of what plain vertices need for QUICK's
@@ -114,7 +114,7 @@ def test_what_trials_chose_is_in_the_checkpoint(series):
         for said in (other.stderr, resumed.stderr):
             assert "tried" not in said and "tune " not in said, said
         assert read_bytes(stopped.volume_path) == read_bytes(whole.volume_path)
-        harness.assert_same_tuning(*(record(results)["figures"]["tuning"]
+        harness.assert_same_tuning(*(record(results)["metrics"]["tuning"]
                                      for results in (whole, stopped)))
 
 
@@ -123,13 +123,13 @@ def test_views_that_score_the_result_have_no_say_in_its_settings(series):
     scored, broken = harness.with_broken_views(series, every)
     auto = [option for option in harness.QUICK if option not in ("--tv-penalty", "concave")]
     for options in (auto, harness.merge(auto, ["--tune", "--epochs", 2])):
-        figures = []
+        metrics = []
         for source in (series, broken):
             output = os.path.join(harness.fresh_directory("scored"), "out.mrc")
             harness.succeed("reconstruct", *source.input, "-o", output,
                             *harness.merge(options, ["--hold-out", every]))
-            figures.append(json.load(open(output[:-len(".mrc")] + ".json"))["figures"])
-        harness.assert_scored_views_have_no_say(figures, scored)
+            metrics.append(json.load(open(output[:-len(".mrc")] + ".json"))["metrics"])
+        harness.assert_scored_views_have_no_say(metrics, scored)
 
 
 TUNE = harness.merge(harness.QUICK, ["--epochs", 4, "--tune"])
@@ -138,7 +138,7 @@ TUNE = harness.merge(harness.QUICK, ["--epochs", 4, "--tune"])
 def test_tune_chooses_what_predicts_best_then_fits_all_views(series):
     results = series.reconstruct("tuned", "--epochs", 4, "--tune", "--tv", 500)
     written = record(results)
-    tuning = written["figures"]["tuning"]
+    tuning = written["metrics"]["tuning"]
     trials, chosen = tuning["trials"], tuning["chosen"]
     assert len(trials) >= 9 and len({(t["tv"], t["rank"], t["epochs"]) for t in trials}) == len(trials)
     assert {t["rank"] for t in trials} == {2, 4, 6} and {t["epochs"] for t in trials} == {2, 4, 8}
@@ -146,7 +146,7 @@ def test_tune_chooses_what_predicts_best_then_fits_all_views(series):
     options = written["options"]
     assert options["fit"]["density_variation"] == chosen["tv"] and options["tune"] is True
     assert options["field"]["rank"] == chosen["rank"] and options["fit"]["epochs"] == chosen["epochs"]
-    assert options["fit"]["hold_out"] == 0 and written["figures"]["held_out"] is None
+    assert options["fit"]["hold_out"] == 0 and written["metrics"]["held_out"] is None
     by_hand = series.reconstruct("by_hand", "--tv", chosen["tv"], "--rank", chosen["rank"],
                                  "--epochs", chosen["epochs"])
     assert read_bytes(by_hand.volume_path) == read_bytes(results.volume_path)
@@ -164,7 +164,7 @@ def test_tune_chooses_what_predicts_best_then_fits_all_views(series):
              *harness.merge(TUNE, ["--tv", 500]), "--resume"]
     harness.succeed(*again)
     assert read_bytes(results.volume_path) == before
-    repeated = record(results)["figures"]["tuning"]["trials"]
+    repeated = record(results)["metrics"]["tuning"]["trials"]
     assert repeated[:5] == trials[:5], "seconds show which trials were made anew"
     assert [t["held_out_error"] for t in repeated] == [t["held_out_error"] for t in trials]
 

@@ -108,7 +108,7 @@ TEST_F(Sirt, ViewsHeldOutDoNotCount) {
   EXPECT_FALSE(testing::same_bits(solution.densities, solve(series, options(5)).densities));
 }
 
-TEST_F(Sirt, ReportsEveryIterationWithTheFiguresThatItBeganWith) {
+TEST_F(Sirt, ReportsEveryIterationWithTheMetricsThatItBeganWith) {
   const SphereSeries series;
   VoxelProblem problem = testing::voxel_problem(series);
   std::vector<double> reported;

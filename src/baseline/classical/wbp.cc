@@ -1,11 +1,13 @@
 #include "baseline/classical/wbp.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <nlohmann/json.hpp>
+#include <numbers>
+#include <numeric>
 #include <vector>
 
 #include "base/enum_names.h"
-#include "baseline/classical/bridge_gaps.h"
-#include "baseline/classical/tilt_weights.h"
 #include "kernels/lanes.h"
 
 namespace tomofield::baseline {
@@ -41,6 +43,40 @@ void add_backprojection(const projection::SampleGrid& grid, const float* backpro
 }
 
 }  // namespace
+
+std::vector<double> tilt_weights(const std::vector<double>& tilt_deg) {
+  const std::size_t n = tilt_deg.size();
+  if (n == 1) return {std::numbers::pi};
+  std::vector<std::size_t> by_tilt(n);
+  std::iota(by_tilt.begin(), by_tilt.end(), std::size_t{0});
+  std::ranges::stable_sort(by_tilt, {}, [&](std::size_t view) { return tilt_deg[view]; });
+  const auto tilt = [&](std::size_t i) { return tilt_deg[by_tilt[i]]; };
+  const double range = tilt(n - 1) - tilt(0);
+  const double beyond = std::clamp(180.0 - range, 0.0, range / static_cast<double>(n - 1));
+  std::vector<double> weights(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double before = i > 0 ? tilt(i) - tilt(i - 1) : beyond;
+    const double after = i + 1 < n ? tilt(i + 1) - tilt(i) : beyond;
+    weights[by_tilt[i]] = (before + after) / 2 * std::numbers::pi / 180;
+  }
+  return weights;
+}
+
+void bridge_gaps(const std::uint16_t* mask, std::int64_t width, float* rays) {
+  for (int lane = 0; lane < kLanes; ++lane) {
+    const auto ray = [&](std::int64_t x) -> float& { return rays[x * kLanes + lane]; };
+    std::int64_t last = -1;  // the last ray that counts
+    for (std::int64_t x = 0; x <= width; ++x) {
+      const bool is_end = x == width;
+      if (!is_end && (mask[x] >> lane & 1) == 0) continue;
+      const bool has_both = last >= 0 && !is_end;
+      const float slope = has_both ? (ray(x) - ray(last)) / static_cast<float>(x - last) : 0.0f;
+      for (std::int64_t i = last + 1; i < x; ++i)
+        ray(i) = has_both ? ray(last) + slope * static_cast<float>(i - last) : 0.0f;
+      last = x;
+    }
+  }
+}
 
 nlohmann::json WbpOptions::json() const {
   return {{"window", base::name_of(filter.window)},

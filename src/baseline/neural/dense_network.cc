@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "base/random.h"
-#include "baseline/neural/fast_sine.h"
 #include "kernels/small_gemm.h"
 
 namespace tomofield::baseline {

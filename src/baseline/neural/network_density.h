@@ -7,7 +7,7 @@
 
 #include "base/aligned_buffer.h"
 #include "baseline/neural/dense_network.h"
-#include "baseline/neural/point_encoding.h"
+#include "baseline/neural/encodings.h"
 #include "baseline/solver.h"
 #include "projection/sample_grid.h"
 

@@ -8,8 +8,7 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "baseline/neural/fourier_encoding.h"
-#include "baseline/neural/hash_grid.h"
+#include "baseline/neural/encodings.h"
 #include "central_difference.h"
 #include "kernels/lanes.h"
 #include "random_arrays.h"

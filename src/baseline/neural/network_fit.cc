@@ -7,15 +7,18 @@
 #include <utility>
 #include <vector>
 
+#include "base/parallel.h"
 #include "base/random.h"
 #include "base/shuffle.h"
-#include "baseline/neural/lazy_adam.h"
 #include "baseline/neural/network_density.h"
-#include "baseline/neural/noise_levels.h"
+#include "kernels/adam.h"
 #include "kernels/lanes.h"
 
 namespace tomofield::baseline {
 namespace {
+
+constexpr std::size_t kBlock = 64;            // parameters that share the count of their steps
+constexpr std::size_t kBlocksOfThread = 256;  // blocks that a thread takes at once
 
 constexpr double kRateFall = 0.1;   // factor of the learning rate over all steps
 constexpr double kNoiseRate = 0.1;  // rate of the noise levels; it falls by the same factor
@@ -132,6 +135,55 @@ class NetworkFit {
 };
 
 }  // namespace
+
+double NoiseLevels::sigma(std::size_t view) const {
+  return start_[view] * std::exp(log_ratio_[view]);
+}
+
+void NoiseLevels::step(std::span<const double> counts, std::span<const double> squares,
+                       double rate) {
+  constexpr double kMaxExcess = 2.0;  // residuals far above their level must not make it overshoot
+  for (std::size_t v = 0; v < start_.size(); ++v) {
+    if (counts[v] == 0) continue;
+    const double excess = squares[v] / (counts[v] * sigma(v) * sigma(v)) - 1;
+    log_ratio_[v] += rate / 2 * std::min(excess, kMaxExcess);
+  }
+}
+
+double NoiseLevels::objective(std::span<const double> counts,
+                              std::span<const double> squares) const {
+  double sum = 0;
+  for (std::size_t v = 0; v < start_.size(); ++v)
+    sum += squares[v] / (2 * sigma(v) * sigma(v)) + counts[v] * log_ratio_[v];
+  return sum;
+}
+
+LazyAdam::LazyAdam(std::size_t num_parameters)
+    : gradient_(num_parameters),
+      m_(num_parameters),
+      v_(num_parameters),
+      steps_((num_parameters + kBlock - 1) / kBlock) {}
+
+void LazyAdam::step(double learning_rate, std::span<float> parameters) {
+  const std::size_t parts = (steps_.size() + kBlocksOfThread - 1) / kBlocksOfThread;
+  base::parallel_for(static_cast<std::int64_t>(parts), [&](std::int64_t part) {
+    const std::size_t first = static_cast<std::size_t>(part) * kBlocksOfThread;
+    const std::size_t end = std::min(first + kBlocksOfThread, steps_.size());
+    for (std::size_t b = first; b < end; ++b) step_block(b, learning_rate, parameters);
+  });
+}
+
+void LazyAdam::step_block(std::size_t block, double learning_rate, std::span<float> parameters) {
+  const std::size_t first = block * kBlock;
+  const std::size_t count = std::min(kBlock, gradient_.size() - first);
+  const std::span<float> gradient = std::span(gradient_).subspan(first, count);
+  if (std::ranges::all_of(gradient, [](float g) { return g == 0.0f; })) return;
+  const kernels::AdamStep usual;
+  const kernels::AdamStep step =
+      kernels::corrected_step(usual.beta1, usual.beta2, learning_rate, ++steps_[block]);
+  kernels::adam_step(step, static_cast<std::ptrdiff_t>(count), parameters.data() + first,
+                     gradient.data(), m_.data() + first, v_.data() + first);
+}
 
 nlohmann::json NetworkOptions::json() const {
   return {{"iterations", iterations},       {"hidden_layers", hidden_layers}, {"width", width},

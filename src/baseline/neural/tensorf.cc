@@ -6,7 +6,6 @@
 
 #include "base/lanes.h"
 #include "fit/stages.h"
-#include "reconstruct/resolve.h"
 #include "tomofield/error.h"
 
 namespace tomofield::baseline {
@@ -27,27 +26,18 @@ Options tensorf_defaults() {
   return options;
 }
 
-reconstruction::ReconstructOptions tensorf_options(const SeriesFiles& files,
-                                                   const Options& options) {
-  reconstruction::ReconstructOptions run = reconstruction::run_options(files, options);
-  run.field.depth = 0;
-  return run;
-}
-
-void cover_with_one_node(const geometry::Roi& roi, reconstruction::ReconstructOptions& options) {
-  constexpr std::int64_t kLargest = 4096;
+int one_node_size(const geometry::Roi& roi, int coarse_bin) {
+  constexpr std::int64_t kMaxSize = 4096;
   const std::int64_t side = std::max(roi.width(), roi.height());
-  if (side > kLargest) {
+  if (side > kMaxSize) {
     throw Error(
         fmt::format("the region of {} × {} pixels is too large for one node, which covers at most "
                     "{}: give a smaller --roi or a larger --bin",
-                    roi.width(), roi.height(), kLargest));
+                    roi.width(), roi.height(), kMaxSize));
   }
-  // Slabs of the coarsest pixels must end with the node. A small region bins fewer pixels.
-  std::int64_t step = std::int64_t{base::kLanes} * options.fit.coarse_bin;
+  std::int64_t step = std::int64_t{base::kLanes} * coarse_bin;
   while (step > base::kLanes && step > side) step /= 2;
-  options.field.leaf_size = static_cast<int>((side + step - 1) / step * step);
-  options.resolved.leaf_size = options.field.leaf_size;
+  return static_cast<int>((side + step - 1) / step * step);
 }
 
 }  // namespace tomofield::baseline

@@ -1,21 +1,18 @@
 #pragma once
 
 #include "geometry/tilt_geometry.h"
-#include "reconstruct/options.h"
+#include "tomofield/options.h"
 
 namespace tomofield::baseline {
 
 /// Returns the defaults of TensoRF (Chen et al. 2022) as options of the main method: vector–matrix
 /// factors, coarse to fine in several steps, total variation of the smooth kind, no boundary
-/// consistency.
+/// consistency. The tree is one node (one_node_size()).
 Options tensorf_defaults();
 
-/// Resolves the options as reconstruction::run_options() does, for a tree without levels.
-reconstruction::ReconstructOptions tensorf_options(const SeriesFiles& files,
-                                                   const Options& options);
-
-/// Makes the one node as large as the region. Throws Error if the region is larger than a node can
-/// be.
-void cover_with_one_node(const geometry::Roi& roi, reconstruction::ReconstructOptions& options);
+/// Returns the side of one node that covers a region, in pixels. Slabs of pixels that are binned
+/// by `coarse_bin` end with the node; a small region bins fewer pixels. Throws Error if the region
+/// is larger than a node can be.
+int one_node_size(const geometry::Roi& roi, int coarse_bin);
 
 }  // namespace tomofield::baseline

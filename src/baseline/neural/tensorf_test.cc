@@ -8,44 +8,57 @@
 
 #include "fit/domain.h"
 #include "fit/stages.h"
+#include "option_table/values.h"
 #include "tomofield/error.h"
 
 namespace tomofield::baseline {
 namespace {
 
-reconstruction::ReconstructOptions options_for(std::int64_t width, std::int64_t height) {
-  Options requested = tensorf_defaults();
-  requested.thickness = 40;
-  requested.with_margin = false;
-  reconstruction::ReconstructOptions options = tensorf_options({}, requested);
-  cover_with_one_node({5, 7, 5 + width, 7 + height}, options);
-  return options;
+int node_size(std::int64_t width, std::int64_t height) {
+  return one_node_size({5, 7, 5 + width, 7 + height}, tensorf_defaults().coarse_bin);
+}
+
+fit::FieldOptions field_for(std::int64_t width, std::int64_t height) {
+  fit::FieldOptions field;
+  field.depth = 0;
+  field.rank = tensorf_defaults().rank;
+  field.with_margin = false;
+  field.leaf_size = node_size(width, height);
+  return field;
 }
 
 TEST(Tensorf, OneNodeCoversTheRegion) {
   for (const std::int64_t width : {20, 100, 128, 500}) {
-    const reconstruction::ReconstructOptions options = options_for(width, 90);
+    const fit::FieldOptions field = field_for(width, 90);
     const geometry::Roi roi{5, 7, 5 + width, 97};
-    const auto domain = fit::make_domain(geometry::centred_geometry(600, 600, 40, {-60, 0, 60}),
-                                         roi, options.field);
+    const auto domain =
+        fit::make_domain(geometry::centred_geometry(600, 600, 40, {-60, 0, 60}), roi, field);
     ASSERT_EQ(domain.tree.num_leaves(), 1);
     EXPECT_GE(domain.tree.leaf(0).square.size, std::max<std::int64_t>(width, 90));
     EXPECT_LT(domain.tree.leaf(0).square.size, std::max<std::int64_t>(width, 90) + 128);
-    EXPECT_EQ(options.faults(), std::vector<std::string>());
+    Options options = tensorf_defaults();
+    options.thickness = 40;
+    options.leaf_size = field.leaf_size;
+    EXPECT_EQ(option_table::range_faults(options), std::vector<std::string>());
   }
 }
 
 TEST(Tensorf, StartsWithVerticesEightTimesAsFarApart) {
-  const reconstruction::ReconstructOptions options = options_for(128, 128);
-  const auto stages = fit::make_stages(options.field, options.fit);
+  const Options defaults = tensorf_defaults();
+  fit::FitOptions fit;
+  fit.epochs = *defaults.epochs;
+  fit.vertex_epochs = *defaults.vertex_epochs;
+  fit.coarse_epochs = *defaults.coarse_epochs;
+  fit.coarse_bin = defaults.coarse_bin;
+  const auto stages = fit::make_stages(field_for(128, 128), fit);
   ASSERT_EQ(stages.size(), 4u);
   EXPECT_EQ(stages.front().bin, 8);
-  EXPECT_EQ(options_for(40, 40).field.leaf_size, 64);  // a multiple of slabs of pixels binned by 2
+  EXPECT_EQ(node_size(40, 40), 64);  // a multiple of slabs of pixels binned by 2
 }
 
 TEST(Tensorf, RegionsAreNotLargerThanANode) {
-  EXPECT_EQ(options_for(4096, 10).field.leaf_size, 4096);
-  EXPECT_THROW(options_for(4097, 10), Error);
+  EXPECT_EQ(node_size(4096, 10), 4096);
+  EXPECT_THROW(node_size(4097, 10), Error);
 }
 
 }  // namespace

@@ -103,7 +103,7 @@ std::vector<std::vector<MaskDisc>> place_fiducials(const std::filesystem::path& 
 void add_fiducials(const TiltSeriesOptions& options, const SeriesPlan& plan,
                    const io::ImageStack& stack, BeadMasks* masks) {
   if (!options.fiducials) return;
-  const double diameter_px = masks->figures.bead_diameter_A / binned_pixel_A(plan);
+  const double diameter_px = masks->metrics.bead_diameter_A / binned_pixel_A(plan);
   auto places = place_fiducials(*options.fiducials, plan, stack);
   if (!(diameter_px > 0.0)) {
     throw Error(
@@ -152,18 +152,18 @@ BeadMasks find_bead_masks(const TiltSeriesOptions& options, const SeriesPlan& pl
                           const distributed::Communicator& processes) {
   BeadMasks masks;
   masks.discs.resize(plan.views.size());
-  masks.figures.beads_found.assign(plan.views.size(), 0);
+  masks.metrics.beads_found.assign(plan.views.size(), 0);
   if (searches_beads(options)) {
     BeadSearchOptions how;
     processes.run_collectively([&] { how = search_options(options, plan); });
     BeadSearch search = find_beads(views, how, processes);
     masks.discs = std::move(search.discs);
-    masks.figures.beads_found = std::move(search.num_found);
-    masks.figures.num_beads = search.num_beads;
-    masks.figures.bead_diameter_A = search.diameter_px * binned_pixel_A(plan);
+    masks.metrics.beads_found = std::move(search.num_found);
+    masks.metrics.num_beads = search.num_beads;
+    masks.metrics.bead_diameter_A = search.diameter_px * binned_pixel_A(plan);
   }
   processes.run_collectively([&] { add_fiducials(options, plan, stack, &masks); });
-  for (const auto& discs : masks.discs) masks.figures.beads_masked.push_back(discs.size());
+  for (const auto& discs : masks.discs) masks.metrics.beads_masked.push_back(discs.size());
   return masks;
 }
 

@@ -15,7 +15,7 @@ namespace tomofield::tilt_series {
 /// Discs that hide beads and fiducials, in the aligned, binned pixels of each view.
 struct BeadMasks {
   std::vector<std::vector<MaskDisc>> discs;
-  MaskFigures figures;  ///< of the beads
+  MaskMetrics metrics;  ///< of the beads
 };
 
 /// Opens the user's mask (--mask). Throws Error if it is not as large as the stack.

@@ -101,8 +101,8 @@ TEST(SeriesMasks, FiducialsAreMaskedWhereTheyAre) {
   options.fiducials = scratch.write("f.txt", "1 20.25 30.5 0.00\n1 40.5 11 2.00\n");
   options.bead_diameter_nm = 1.6;  // 4 pixels
   const TiltSeries series(options);
-  EXPECT_EQ(series.mask_figures().num_beads, 0u);
-  EXPECT_EQ(series.mask_figures().beads_masked, (std::vector<std::size_t>{1, 0, 1}));
+  EXPECT_EQ(series.mask_metrics().num_beads, 0u);
+  EXPECT_EQ(series.mask_metrics().beads_masked, (std::vector<std::size_t>{1, 0, 1}));
   for (const auto& [view, x, y] : {std::tuple{0, 20.25, 30.5}, {2, 40.5, 11.0}}) {
     const Hole hole = hole_of(series, static_cast<std::size_t>(view));
     EXPECT_NEAR(hole.x, x, 0.3);
@@ -181,7 +181,7 @@ TEST(SeriesMasks, HotPixelsAreCountedAndLeftOut) {
       },
       kPixelSize);
   const TiltSeries series(options);
-  EXPECT_EQ(series.mask_figures().num_bad_pixels, 1);
+  EXPECT_EQ(series.mask_metrics().num_bad_pixels, 1);
   const auto valid = valid_of(series, 1);
   EXPECT_EQ(valid[20 * kWidth + 10], 0);
   EXPECT_EQ(std::count(valid.begin(), valid.end(), 0), 1);
@@ -214,8 +214,8 @@ TEST(SeriesMasks, BeadsOfDarkSeriesAreMaskedUnlessTurnedOff) {
   scene.scatter_beads(10, 2);
   TiltSeriesOptions options = dark_series(scratch, scene);
   const TiltSeries series(options);
-  EXPECT_EQ(series.mask_figures().num_beads, 10u);
-  EXPECT_NEAR(series.mask_figures().bead_diameter_A, 0.866 * 5 * 8, 6);
+  EXPECT_EQ(series.mask_metrics().num_beads, 10u);
+  EXPECT_NEAR(series.mask_metrics().bead_diameter_A, 0.866 * 5 * 8, 6);
   const auto valid = valid_of(series, 15);
   for (const auto& bead : scene.beads) {
     const auto x = static_cast<std::size_t>(scene.bead_x(bead, 15));
@@ -225,7 +225,7 @@ TEST(SeriesMasks, BeadsOfDarkSeriesAreMaskedUnlessTurnedOff) {
   EXPECT_NEAR(masked, 10 * std::numbers::pi * std::pow(1.2 * 0.866 * 5, 2), 0.2 * masked);
   options.bead_diameter_nm = 0.0;
   const TiltSeries off(options);
-  EXPECT_EQ(off.mask_figures().num_beads, 0u);
+  EXPECT_EQ(off.mask_metrics().num_beads, 0u);
   const auto all = valid_of(off, 15);
   EXPECT_EQ(std::count(all.begin(), all.end(), 0), 0);
 }
@@ -248,9 +248,9 @@ TEST(SeriesMasks, BrightSeriesAreSearchedOnlyWhenAsked) {
       },
       kPixelSize);
   options.contrast = Contrast::kBright;
-  EXPECT_EQ(TiltSeries(options).mask_figures().num_beads, 0u);
+  EXPECT_EQ(TiltSeries(options).mask_metrics().num_beads, 0u);
   options.bead_diameter_nm = 4.0;
-  EXPECT_EQ(TiltSeries(options).mask_figures().num_beads, 6u);
+  EXPECT_EQ(TiltSeries(options).mask_metrics().num_beads, 6u);
 }
 
 }  // namespace
