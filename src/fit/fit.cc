@@ -56,7 +56,7 @@ int steps_per_epoch_of(const measurement::Measurement& measurement, const FitOpt
 
 // Returns the leaves that a process keeps; none: all.
 std::vector<int> leaves_to_keep(const distributed::Communicator& processes,
-                                const field::Quadtree& tree, distributed::Range bands) {
+                                const field::Quadtree& tree, base::Range bands) {
   return processes.size() == 1 ? std::vector<int>{} : needed_leaves(tree, bands);
 }
 

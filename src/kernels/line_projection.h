@@ -1,10 +1,11 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
+
+#include "base/range.h"
 
 namespace tomofield::kernels {
 
@@ -38,23 +39,6 @@ struct CrossingGroup {
   static constexpr int kMost = 4;
   template <typename T>
   using Numbers = std::array<T, kMost>;
-  /// The integers [first, end); empty if end <= first.
-  struct Range {
-    int first = 0, end = 0;
-    bool is_empty() const { return end <= first; }
-    bool contains(int from, int to) const { return from >= first && to <= end; }
-    bool overlaps(int from, int to) const { return !is_empty() && from < end && to > first; }
-    Range common_with(Range other) const {
-      const Range common{std::max(first, other.first), std::min(end, other.end)};
-      return common.is_empty() ? Range{} : common;
-    }
-    /// Returns the smallest range that contains both.
-    Range joined_with(Range other) const {
-      if (is_empty()) return other;
-      if (other.is_empty()) return *this;
-      return {std::min(first, other.first), std::max(end, other.end)};
-    }
-  };
 
   alignas(16) Numbers<float> offset, step, low, high, first_pixel, last_pixel, weight;
   /// For views: sample j takes from pixel p = floor(inverse · j + bias) + skipped and from p + 1.
@@ -65,7 +49,7 @@ struct CrossingGroup {
   alignas(16) Numbers<int> origin;
   /// `whole` are the pixels (for lines) or samples (for views) for which no crossing of the group
   /// needs a test of its ends. Outside of `reached`, no crossing has any weight.
-  Range whole, reached;
+  base::Range whole, reached;
 };
 
 /// Appends `lines` of one view to groups. All have the same step and at least one sample. Samples

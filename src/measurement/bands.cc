@@ -10,7 +10,7 @@
 
 namespace tomofield::measurement {
 
-using distributed::Range;
+using base::Range;
 
 Range own_bands(std::int64_t num_rows, std::int64_t band_rows,
                 const distributed::Communicator& processes) {

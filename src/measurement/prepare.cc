@@ -11,6 +11,7 @@
 
 #include "base/faults.h"
 #include "base/log.h"
+#include "base/range.h"
 #include "measurement/bands.h"
 #include "measurement/measurement.h"
 #include "tomofield/error.h"
@@ -288,7 +289,7 @@ PreparedSeries prepare_series(const tilt_series::TiltSeries& series,
   for (const double sigma : series.noise_sigma())
     prepared.noise_sigma.push_back(sigma / prepared.unit);
   const SlabViews::Shape shape = prepared.rays_shape();
-  const distributed::Range slabs =
+  const base::Range slabs =
       slabs_of_bands(own_bands(shape.num_rows, band_rows, processes), band_rows, shape.num_rows);
   SharedViews views(series, processes);
   prepared.rays = std::make_unique<SlabViews>(

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "base/lanes.h"
+#include "base/range.h"
 #include "distributed/communicator.h"
-#include "distributed/partition.h"
 
 namespace tomofield::measurement {
 
@@ -26,7 +26,7 @@ using ReadView =
 /// processes each holds some of the slabs alone.
 class SlabViews {
  public:
-  using Slabs = distributed::Range;
+  using Slabs = base::Range;
   struct Shape {
     std::size_t num_views = 0;
     std::int64_t width = 0, height = 0;        ///< of a view
@@ -92,7 +92,7 @@ class SlabViews {
   void add_words(std::size_t first, std::size_t count, std::uint64_t& hash) const;
   std::size_t line(int slab, int view) const;
   std::size_t num_lines() const;  // of a pixel in x: rays of a slab
-  distributed::Range held_rows() const;
+  base::Range held_rows() const;
 
   Shape shape_;
   std::filesystem::path scratch_dir_;

@@ -41,7 +41,7 @@ FourierPrior::FourierPrior(const field::Field& field, const geometry::Roi& roi,
 
 FourierPrior::FourierPrior(const field::Field& field, const geometry::Roi& roi,
                            const FourierPriorOptions& options,
-                           const distributed::Communicator& processes, distributed::Range own)
+                           const distributed::Communicator& processes, base::Range own)
     : field_(field), roi_(roi), options_(options), processes_(processes), own_(own) {
   const double width = static_cast<double>(roi.width()), height = static_cast<double>(roi.height());
   spacing_ = std::max(1.0, std::max(width, height) / options.most_samples);

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/range.h"
 #include "distributed/communicator.h"
-#include "distributed/partition.h"
 #include "geometry/tilt_geometry.h"
 #include "objective/axis_penalty.h"
 #include "objective/term.h"
@@ -32,7 +32,7 @@ class FourierPrior : public Term {
   /// Of a field that processes share, of which this one has the leaves `own`.
   FourierPrior(const field::Field& field, const geometry::Roi& roi,
                const FourierPriorOptions& options, const distributed::Communicator& processes,
-               distributed::Range own);
+               base::Range own);
 
   /// Adds the gradient of the own leaves to `gradient` (all parameters). Runs on all threads, with
   /// the same bits for any number of them.
@@ -52,7 +52,7 @@ class FourierPrior : public Term {
   geometry::Roi roi_;
   FourierPriorOptions options_;
   const distributed::Communicator& processes_;
-  distributed::Range own_;
+  base::Range own_;
   double spacing_ = 1.0;
   SliceShape shape_;
   std::vector<int> leaves_;  // that meet the region

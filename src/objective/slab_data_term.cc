@@ -19,7 +19,7 @@ double SlabDataTerm::add_slabs(const Step& step, const SlabBatch& batch,
   std::fill_n(detector.data(), size, 0.0f);
   batch.projector.forward(batch.all_samples, step.views, detector.data(), batch.size());
   float* rays = detector.data();
-  for (int slab = batch.slabs.first; slab < batch.slabs.end; ++slab, rays += detector_size) {
+  for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab, rays += detector_size) {
     for (std::size_t v = 0; v < step.views.size(); ++v) {
       const int view = step.views[v];
       view_sums[v] +=

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "base/aligned_buffer.h"
-#include "distributed/partition.h"
+#include "base/range.h"
 #include "objective/objective.h"
 
 namespace tomofield::objective {
@@ -19,8 +19,8 @@ struct SlabObjectiveContext {
   std::int64_t first_row = 0, num_rows = 0;    ///< of the slabs, in pixels of `full`
   geometry::Extent2 support;                   ///< where densities count
   bool has_factors = true;                     ///< the field has the factors that were asked for
-  distributed::Range own_bands;                ///< bands of this process
-  distributed::Range own_leaves;               ///< and their leaves
+  base::Range own_bands;                       ///< bands of this process
+  base::Range own_leaves;                      ///< and their leaves
   const ObjectiveOptions& options;
 };
 
@@ -60,7 +60,7 @@ class SlabObjective : public Objective {
   const projection::SlabProjector& projector_;
   const measurement::Measurement& measured_;
   projection::SlabSampler sampler_;
-  distributed::Range own_bands_;
+  base::Range own_bands_;
   std::vector<int> own_leaves_;
   std::vector<std::unique_ptr<Term>> terms_;
 };

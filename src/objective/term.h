@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "base/range.h"
 #include "field/field.h"
 #include "geometry/ray_geometry.h"
 #include "measurement/measurement.h"
@@ -28,18 +29,18 @@ struct Step {
 struct SlabBatch {
   const projection::SlabSampler& sampler;
   const projection::SlabProjector& projector;
-  projection::SlabSampler::Range slabs;  ///< [first, end), counted over the whole volume
+  base::Range slabs;  ///< counted over the whole volume
   bool begins_band = false;
   float* all_samples = nullptr;
   float* all_gradients = nullptr;
 
-  int size() const { return slabs.end - slabs.first; }
+  int size() const { return slabs.size(); }
   float* samples(int slab) const { return all_samples + offset(slab); }
   float* gradient(int slab) const { return all_gradients + offset(slab); }
 
  private:
   std::size_t offset(int slab) const {
-    return static_cast<std::size_t>(slab - slabs.first) * projector.grid().size();
+    return static_cast<std::size_t>(slab - slabs.begin) * projector.grid().size();
   }
 };
 
@@ -87,7 +88,7 @@ struct TermContext {
   int bin = 1;                               ///< pixels of `full` in one of the stage, on an axis
   geometry::Extent2 support;                 ///< where densities count
   bool has_factors = true;                   ///< the field has the factors that were asked for
-  distributed::Range own_leaves;             ///< leaves of this process
+  base::Range own_leaves;                    ///< leaves of this process
   const ObjectiveOptions& options;
 };
 

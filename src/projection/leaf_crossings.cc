@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/range.h"
+
 namespace tomofield::projection {
 namespace {
 
@@ -22,11 +24,8 @@ void descend(const field::Quadtree& tree, int index, const Line& line, const Hei
   for (int c = 0; c < 4; ++c) descend(tree, node.first_child + c, line, heights, crossings);
 }
 
-// The root cells [first, end) along one axis that positions between a and b touch.
-struct CellRange {
-  int first, end;
-};
-CellRange cells_between(double a, double b, std::int64_t origin, std::int64_t size, int count) {
+// Returns the root cells along one axis that positions between a and b touch.
+base::Range cells_between(double a, double b, std::int64_t origin, std::int64_t size, int count) {
   const auto cell = [&](double position) {
     const double at =
         std::floor((position - static_cast<double>(origin)) / static_cast<double>(size));
@@ -44,12 +43,12 @@ void find_crossings(const field::Quadtree& tree, const Line& line, const HeightR
   const field::RootGrid& roots = tree.roots();
   const auto along_x = [&](double z) { return line.x0 + line.x_per_z * z; };
   const auto along_y = [&](double z) { return line.y0 + line.y_per_z * z; };
-  const CellRange columns = cells_between(along_x(heights.low), along_x(heights.high), roots.x0,
-                                          roots.cell_size, roots.columns);
-  const CellRange rows = cells_between(along_y(heights.low), along_y(heights.high), roots.y0,
-                                       roots.cell_size, roots.rows);
-  for (int row = rows.first; row < rows.end; ++row) {
-    for (int column = columns.first; column < columns.end; ++column)
+  const base::Range columns = cells_between(along_x(heights.low), along_x(heights.high), roots.x0,
+                                            roots.cell_size, roots.columns);
+  const base::Range rows = cells_between(along_y(heights.low), along_y(heights.high), roots.y0,
+                                         roots.cell_size, roots.rows);
+  for (int row = rows.begin; row < rows.end; ++row) {
+    for (int column = columns.begin; column < columns.end; ++column)
       descend(tree, row * roots.columns + column, line, heights, crossings);
   }
 }

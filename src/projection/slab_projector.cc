@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/range.h"
 #include "kernels/lanes.h"
 #include "kernels/line_projection.h"
 
@@ -183,23 +184,23 @@ void backproject_parts(const Crossing& c, std::ptrdiff_t stride, const Slabs& sl
 
 // Returns the pixels, among those `reached` at all, that cross the middle of a block of lines
 // within a tile of samples. The first and the last tile take all pixels beyond them.
-CrossingGroup::Range pixels_of_tile(const Beam& beam, const Family& family, double middle_line,
-                                    int tile, CrossingGroup::Range reached) {
+base::Range pixels_of_tile(const Beam& beam, const Family& family, double middle_line, int tile,
+                           base::Range reached) {
   const double inverse = 1.0 / beam.step;
   const bool falls = beam.step < 0;
   const auto pixel_at = [&](int sample) {
     const double pixel =
         (sample - beam.offset - middle_line * beam.offset_per_line) * inverse + 1.0;
-    return static_cast<int>(std::clamp<double>(pixel, reached.first, reached.end));
+    return static_cast<int>(std::clamp<double>(pixel, reached.begin, reached.end));
   };
   const int end = tile + kSamplesAtOnce;
-  const int low = tile > 0 ? pixel_at(tile) : falls ? reached.end : reached.first;
-  const int high = end < family.num_samples ? pixel_at(end) : falls ? reached.first : reached.end;
+  const int low = tile > 0 ? pixel_at(tile) : falls ? reached.end : reached.begin;
+  const int high = end < family.num_samples ? pixel_at(end) : falls ? reached.begin : reached.end;
   return {std::min(low, high), std::max(low, high)};
 }
 
-CrossingGroup::Range reached_by_any(std::span<const CrossingGroup> groups) {
-  CrossingGroup::Range all;
+base::Range reached_by_any(std::span<const CrossingGroup> groups) {
+  base::Range all;
   for (const CrossingGroup& group : groups) all = all.joined_with(group.reached);
   return all;
 }
@@ -232,10 +233,10 @@ void project_family(const Family& family, const std::vector<Beam>& beams, int wi
     for (int tile = 0; tile < family.num_samples; tile += kSamplesAtOnce) {
       for (std::size_t v = 0; v < views.size(); ++v) {
         if (beam_of(v).flat != family.flat) continue;
-        const CrossingGroup::Range pixels = pixels_of_tile(
-            beam_of(v), family, first + 0.5 * (count - 1), tile, reached_by_any(groups[v]));
+        const base::Range pixels = pixels_of_tile(beam_of(v), family, first + 0.5 * (count - 1),
+                                                  tile, reached_by_any(groups[v]));
         kernels::project_lines(groups[v].data(), static_cast<int>(groups[v].size()), samples,
-                               family.sample_stride, pixels.first, pixels.end, rays_of(v), slabs);
+                               family.sample_stride, pixels.begin, pixels.end, rays_of(v), slabs);
       }
     }
   }

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "base/range.h"
 #include "distributed/gathered_arrays.h"
 #include "tomofield/error.h"
 
@@ -148,7 +149,7 @@ const typename Map::mapped_type& entry(const Map& map, const char* name, const s
 
 // The parameters of the leaves that a process works on, and what goes with them.
 distributed::GatheredArrays own_parts(const fit::Fit& fit) {
-  const distributed::Range leaves = fit.own_leaves();
+  const base::Range leaves = fit.own_leaves();
   return {fit.processes(), fit.field().offset(leaves.begin), fit.field().offset(leaves.end)};
 }
 

@@ -8,6 +8,7 @@
 #include "base/lanes.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/range.h"
 #include "field/vm/factorise.h"
 #include "fit/domain.h"
 #include "fit/fit.h"
@@ -75,7 +76,7 @@ std::size_t most_parameters(const fit::Domain& domain, const fit::FieldOptions& 
 double part_of_parameters(const fit::Domain& domain, FieldKind kind,
                           const distributed::Communicator& processes) {
   if (processes.size() == 1) return 1.0;
-  const distributed::Range bands =
+  const base::Range bands =
       measurement::own_bands(domain.num_rows, domain.tree.roots().cell_size, processes);
   std::vector<field::LeafShape> needed;
   for (const int leaf : fit::needed_leaves(domain.tree, bands))

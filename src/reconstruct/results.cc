@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/lanes.h"
+#include "base/range.h"
 #include "io/json.h"
 #include "output/held_out_picture.h"
 #include "output/metrics.h"
@@ -33,10 +34,10 @@ nlohmann::json score_fit(const fit::Fit& fit, const measurement::PreparedSeries&
 }
 
 output::VolumeShare volume_share(const fit::Fit& fit, const measurement::PreparedSeries& series) {
-  const distributed::Range slabs = series.rays->held();
+  const base::Range slabs = series.rays->held();
   const auto end_row =
       std::min<std::int64_t>(std::int64_t{slabs.end} * base::kLanes, series.roi.height());
-  const distributed::Range leaves = fit.own_leaves();
+  const base::Range leaves = fit.own_leaves();
   return {fit.processes(),
           {slabs.begin * base::kLanes, end_row},
           fit.field().offset(leaves.begin),

@@ -1,12 +1,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/range.h"
 #include "kernels/line_projection.h"
 
 namespace tomofield::kernels {
 namespace {
 
-using Range = CrossingGroup::Range;
+using base::Range;
 constexpr std::size_t kMost = CrossingGroup::kMost;
 
 // An upper bound on the rounding errors of positions and of samples' pixels, for up to 10⁵ pixels.
@@ -128,7 +129,7 @@ void group_views(std::span<const LineCrossing> views, const float* source,
   for (const LineCrossing& view : views) {
     if (view.first_pixel >= view.end_pixel) continue;
     const int pairs = pairs_a_sample(view);
-    const Range inner = samples_within(view), reached{inner.first - 2, inner.end + 2};
+    const Range inner = samples_within(view), reached{inner.begin - 2, inner.end + 2};
     const Range whole = pairs == 1 ? inner : Range{};
     for (int pair = 0; pair < pairs; ++pair) {
       CrossingGroup& group = group_of(count, groups);

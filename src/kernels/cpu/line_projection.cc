@@ -158,8 +158,8 @@ void take_from_groups(const CrossingGroup* groups, int num_groups, const float* 
       num_tables = 0;
     };
     for (int g = 0; g < num_groups; ++g) {
-      if (!groups[g].reached.overlaps(tile, tile_end)) continue;
-      if (groups[g].whole.contains(tile, tile_end)) {
+      if (!groups[g].reached.overlaps({tile, tile_end})) continue;
+      if (groups[g].whole.contains({tile, tile_end})) {
         fill<Items, true>(groups[g], next, tile, tile_end, tables[num_tables++]);
       } else {
         fill<Items, false>(groups[g], next, tile, tile_end, tables[num_tables++]);
