@@ -8,6 +8,7 @@
 #include "measurement/prepare.h"
 #include "output/volume.h"
 #include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::baseline {
 
@@ -39,7 +40,7 @@ void check_outputs(const BaselineOptions& options);
 struct BaselinePlan {
   int num_views = 0;
   geometry::TiltGeometry geometry;
-  geometry::Roi roi;
+  Rectangle roi;
   double pixel_size_A = 0;
   std::size_t num_voxels = 0;      ///< with the margins
   std::size_t num_parameters = 0;  ///< fitted ones: the voxels, or a network's parameters

@@ -6,6 +6,7 @@
 
 #include "geometry/tilt_geometry.h"
 #include "output/volume.h"
+#include "tomofield/options.h"
 
 namespace tomofield::cli {
 
@@ -35,7 +36,7 @@ struct Sizes {
   int num_views;
   std::int64_t view_width, view_height;
   double pixel_size_A;
-  geometry::Roi roi;
+  Rectangle roi;
   double thickness;
   VolumeAxes axes;
 };

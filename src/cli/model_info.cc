@@ -9,6 +9,7 @@
 
 #include "base/enum_names.h"
 #include "output/model_file.h"
+#include "tomofield/options.h"
 
 namespace tomofield::cli {
 namespace {
@@ -18,7 +19,7 @@ using field::LeafShape;
 
 void print_geometry(const output::ModelInfo& model) {
   const geometry::TiltGeometry& g = model.geometry;
-  const geometry::Roi& roi = model.roi;
+  const Rectangle& roi = model.roi;
   fmt::print("  pixel size       {:.7g} Å\n", model.pixel_size_A);
   fmt::print("  view             {} × {} px, thickness {:.6g} px\n", g.width, g.height,
              g.thickness);

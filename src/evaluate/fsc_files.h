@@ -14,7 +14,7 @@ namespace tomofield::evaluate {
 struct FscFiles {
   std::filesystem::path first, second;
   std::optional<std::filesystem::path> mask;  ///< default: edge_window()
-  std::optional<Box> box;                     ///< in voxels of the second
+  std::optional<base::Box> box;               ///< in voxels of the second
   std::optional<TiltRange> tilts;
 };
 

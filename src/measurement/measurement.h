@@ -8,6 +8,7 @@
 #include "geometry/ray_geometry.h"
 #include "geometry/tilt_geometry.h"
 #include "measurement/slab_views.h"
+#include "tomofield/options.h"
 
 namespace tomofield::measurement {
 
@@ -20,7 +21,7 @@ constexpr double kContrastPerThickness = 0.075;
 /// unit) and the noise of each view in the same units.
 struct Measurement {
   geometry::TiltGeometry geometry;
-  geometry::Roi roi;
+  Rectangle roi;
   const SlabViews* rays = nullptr;
   std::vector<double> noise_sigma;
   double mean_density = 0.0;

@@ -10,18 +10,19 @@
 #include "geometry/tilt_geometry.h"
 #include "measurement/slab_views.h"
 #include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::measurement {
 
 /// What the user says of the specimen. Lengths and positions are in unbinned
 /// pixels of the aligned view, whatever --bin makes of them.
 struct SpecimenOptions {
-  double thickness = 0;              ///< of the volume along Z
-  std::optional<geometry::Roi> roi;  ///< default: the whole field of view
-  int hand = 1;                      ///< 1 or −1 (TiltGeometry)
-  std::optional<double> axis_x;      ///< tilt axis on the view; default: its centre
-  std::optional<double> axis_z;      ///< and in the volume; default: its centre
-  bool with_margin = true;           ///< false: the specimen ends inside the field of view
+  double thickness = 0;          ///< of the volume along Z
+  std::optional<Rectangle> roi;  ///< default: the whole field of view
+  int hand = 1;                  ///< 1 or −1 (TiltGeometry)
+  std::optional<double> axis_x;  ///< tilt axis on the view; default: its centre
+  std::optional<double> axis_z;  ///< and in the volume; default: its centre
+  bool with_margin = true;       ///< false: the specimen ends inside the field of view
   /// Every fault of these options for a view of this size, a sentence each.
   std::vector<std::string> faults() const;
 };
@@ -33,7 +34,7 @@ struct SpecimenOptions {
 struct PreparedSeries {
   geometry::TiltGeometry geometry;
   std::optional<geometry::RayGeometry> ray_geometry;
-  geometry::Roi roi;          ///< in binned pixels
+  Rectangle roi;              ///< in binned pixels
   double pixel_size_A = 1.0;  ///< binned
   double bin_factor = 1.0;
   double x_tilt_deg = 0.0;          ///< the same for every view: a rotation of the volume about X

@@ -34,12 +34,12 @@ std::vector<double> positions(double first, double spacing, int count) {
 
 }  // namespace
 
-FourierPrior::FourierPrior(const field::Field& field, const geometry::Roi& roi,
+FourierPrior::FourierPrior(const field::Field& field, const Rectangle& roi,
                            const FourierPriorOptions& options)
     : FourierPrior(field, roi, options, distributed::Communicator::alone(),
                    {0, field.tree().num_leaves()}) {}
 
-FourierPrior::FourierPrior(const field::Field& field, const geometry::Roi& roi,
+FourierPrior::FourierPrior(const field::Field& field, const Rectangle& roi,
                            const FourierPriorOptions& options,
                            const distributed::Communicator& processes, base::Range own)
     : field_(field), roi_(roi), options_(options), processes_(processes), own_(own) {

@@ -5,9 +5,9 @@
 
 #include "base/range.h"
 #include "distributed/communicator.h"
-#include "geometry/tilt_geometry.h"
 #include "objective/axis_penalty.h"
 #include "objective/term.h"
+#include "tomofield/options.h"
 
 namespace tomofield::objective {
 
@@ -27,12 +27,10 @@ struct FourierPriorOptions {
 class FourierPrior : public Term {
  public:
   /// `field` must outlive it and may change its parameters; rebuild it when the tree changes.
-  FourierPrior(const field::Field& field, const geometry::Roi& roi,
-               const FourierPriorOptions& options);
+  FourierPrior(const field::Field& field, const Rectangle& roi, const FourierPriorOptions& options);
   /// Of a field that processes share, of which this one has the leaves `own`.
-  FourierPrior(const field::Field& field, const geometry::Roi& roi,
-               const FourierPriorOptions& options, const distributed::Communicator& processes,
-               base::Range own);
+  FourierPrior(const field::Field& field, const Rectangle& roi, const FourierPriorOptions& options,
+               const distributed::Communicator& processes, base::Range own);
 
   /// Adds the gradient of the own leaves to `gradient` (all parameters). Runs on all threads, with
   /// the same bits for any number of them.
@@ -49,7 +47,7 @@ class FourierPrior : public Term {
   std::vector<LeafSamples> leaf_samples(std::int64_t step) const;
 
   const field::Field& field_;
-  geometry::Roi roi_;
+  Rectangle roi_;
   FourierPriorOptions options_;
   const distributed::Communicator& processes_;
   base::Range own_;

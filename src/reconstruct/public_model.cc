@@ -36,7 +36,7 @@ Model::Model(const std::filesystem::path& path)
 double Model::pixel_size_A() const { return impl_->model.pixel_size_A; }
 
 SampleBox Model::region(double voxel_px) const {
-  const field::Box box = output::region_box(impl_->model, voxel_px);
+  const field::OrientedBox box = output::region_box(impl_->model, voxel_px);
   return {.centre_px = box.centre_px, .size = box.size, .voxel_px = box.voxel_px};
 }
 

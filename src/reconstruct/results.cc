@@ -39,7 +39,7 @@ output::VolumeShare volume_share(const fit::Fit& fit, const measurement::Prepare
       std::min<std::int64_t>(std::int64_t{slabs.end} * base::kLanes, series.roi.height());
   const base::Range leaves = fit.own_leaves();
   return {fit.processes(),
-          {slabs.begin * base::kLanes, end_row},
+          {slabs.begin * base::kLanes, static_cast<int>(end_row)},
           fit.field().offset(leaves.begin),
           fit.field().offset(leaves.end)};
 }

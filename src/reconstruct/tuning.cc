@@ -14,6 +14,7 @@
 #include "objective/options.h"
 #include "selection/trial_series.h"
 #include "tomofield/error.h"
+#include "tomofield/options.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -56,7 +57,7 @@ Strip middle_strip(const measurement::Measurement& whole, std::int64_t most_rows
   selection::TrialSeries series = selection::make_trial_series(
       whole.geometry, whole.noise_sigma, *whole.rays, whole.held_out, most_rows, *whole.processes);
   const std::int64_t rows = series.rays->shape().num_rows;
-  geometry::Roi roi = whole.roi;
+  Rectangle roi = whole.roi;
   roi.y0 += (all_rows - rows) / 2;
   roi.y1 = roi.y0 + rows;
   measurement::Measurement measurement{.geometry = series.geometry,

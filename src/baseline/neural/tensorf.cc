@@ -23,7 +23,7 @@ reconstruction::ReconstructOptions tensorf_options() {
   return options;
 }
 
-void cover_with_one_node(const geometry::Roi& roi, reconstruction::ReconstructOptions& options) {
+void cover_with_one_node(const Rectangle& roi, reconstruction::ReconstructOptions& options) {
   constexpr std::int64_t kLargest = 4096;
   const std::int64_t side = std::max(roi.width(), roi.height());
   if (side > kLargest) {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "geometry/tilt_geometry.h"
 #include "reconstruct/options.h"
+#include "tomofield/options.h"
 
 namespace tomofield::baseline {
 
@@ -13,6 +13,6 @@ reconstruction::ReconstructOptions tensorf_options();
 
 /// Makes the one node as large as the region. Throws Error if the region is larger than a node can
 /// be.
-void cover_with_one_node(const geometry::Roi& roi, reconstruction::ReconstructOptions& options);
+void cover_with_one_node(const Rectangle& roi, reconstruction::ReconstructOptions& options);
 
 }  // namespace tomofield::baseline

@@ -23,7 +23,7 @@ reconstruction::ReconstructOptions options_for(std::int64_t width, std::int64_t 
 TEST(Tensorf, OneNodeCoversTheRegion) {
   for (const std::int64_t width : {20, 100, 128, 500}) {
     const reconstruction::ReconstructOptions options = options_for(width, 90);
-    const geometry::Roi roi{5, 7, 5 + width, 97};
+    const Rectangle roi{5, 7, 5 + width, 97};
     const auto domain = fit::make_domain(geometry::centred_geometry(600, 600, 40, {-60, 0, 60}),
                                          roi, options.field);
     ASSERT_EQ(domain.tree.num_leaves(), 1);
