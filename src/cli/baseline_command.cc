@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "base/faults.h"
+#include "base/check.h"
 #include "base/parallel.h"
 #include "baseline/run_baseline.h"
 #include "baseline/tune.h"

@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "base/commit.h"
 #include "base/log.h"
+#include "base/version.h"
 #include "cli/commands.h"
 #include "cli/config_file.h"
 #include "cli/exit_status.h"

@@ -6,11 +6,10 @@
 #include <numeric>
 #include <utility>
 
-#include "base/lanes.h"
 #include "base/log.h"
 #include "base/random.h"
-#include "base/shuffle.h"
 #include "field/vm/factorise.h"
+#include "kernels/lanes.h"
 #include "measurement/bands.h"
 #include "objective/ray_data_term.h"
 #include "objective/slab_objective.h"
@@ -68,7 +67,7 @@ TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
   if (field.tree == TreeKind::kUniform) return {};
   const auto levels = leaves_by_level(domain.tree);
   const auto num_leaves = std::accumulate(levels.begin(), levels.end(), std::int64_t{0});
-  return {std::max(field.leaf_size / 2, static_cast<int>(base::kLanes)),
+  return {std::max(field.leaf_size / 2, static_cast<int>(kernels::kLanes)),
           field.leaf_budget > 0 ? field.leaf_budget : static_cast<int>(num_leaves),
           first.bin > 1 ? first.epochs - 1 : static_cast<std::int64_t>(kOpenPart * first.epochs),
           options.seed};

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "base/lanes.h"
 #include "fit/integer_program.h"
+#include "kernels/lanes.h"
 #include "tomofield/error.h"
 
 namespace tomofield::fit {
@@ -53,8 +53,8 @@ std::vector<std::string> FieldOptions::faults() const {
   faults.require_between("--leaf-budget", leaf_budget, 0, kMost);
   if (leaf_budget > 0 && tree == TreeKind::kUniform)
     faults.add("--leaf-budget is for --tree adaptive alone");
-  if (leaf_size < base::kLanes || leaf_size > kLargestLeaf || leaf_size % base::kLanes != 0) {
-    faults.add(fmt::format("--leaf-size must be a multiple of {} up to {}, not {}", base::kLanes,
+  if (leaf_size < kernels::kLanes || leaf_size > kLargestLeaf || leaf_size % kernels::kLanes != 0) {
+    faults.add(fmt::format("--leaf-size must be a multiple of {} up to {}, not {}", kernels::kLanes,
                            kLargestLeaf, leaf_size));
   }
   faults.require_between("--vertex-spacing", vertex_spacing, 0.25, 64);

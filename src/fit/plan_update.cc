@@ -4,8 +4,8 @@
 #include <cstddef>
 
 #include "base/check.h"
-#include "base/lanes.h"
 #include "fit/integer_program.h"
+#include "kernels/lanes.h"
 
 namespace tomofield::fit {
 namespace {
@@ -30,7 +30,8 @@ struct Candidates {
       const QuadtreeNode& leaf = tree.leaf(i);
       if (leaf.region != Region::kInterest) continue;
       ++num_active;
-      if (leaf.square.size % (2 * base::kLanes) == 0 && leaf.square.size / 2 >= options.least_size)
+      if (leaf.square.size % (2 * kernels::kLanes) == 0 &&
+          leaf.square.size / 2 >= options.least_size)
         splits.push_back(i);
       // The first of four consecutive leaves with one parent.
       if (leaf.level <= options.coarsest_level || !starts_siblings(tree, i)) continue;

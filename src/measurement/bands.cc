@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "base/lanes.h"
+#include "kernels/lanes.h"
 #include "tomofield/error.h"
 
 namespace tomofield::measurement {
@@ -29,7 +29,7 @@ Range own_bands(std::int64_t num_rows, std::int64_t band_rows,
 Range slabs_of_bands(Range bands, std::int64_t band_rows, std::int64_t num_rows) {
   const auto slab_at = [&](int band) {
     const std::int64_t row = std::min(band * band_rows, num_rows);
-    return static_cast<int>((row + base::kLanes - 1) / base::kLanes);
+    return static_cast<int>((row + kernels::kLanes - 1) / kernels::kLanes);
   };
   return {slab_at(bands.begin), slab_at(bands.end)};
 }

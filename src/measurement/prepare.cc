@@ -9,7 +9,7 @@
 #include <span>
 #include <utility>
 
-#include "base/faults.h"
+#include "base/check.h"
 #include "base/log.h"
 #include "base/range.h"
 #include "measurement/bands.h"

@@ -13,13 +13,13 @@
 #include <vector>
 
 #include "base/check.h"
-#include "base/lanes.h"
+#include "kernels/lanes.h"
 #include "tomofield/error.h"
 
 namespace tomofield::measurement {
 namespace {
 
-using base::kLanes;
+using kernels::kLanes;
 
 void* map_scratch_file(const std::filesystem::path& dir, std::size_t bytes) {
   std::string name = (dir / "tomofield-rays-XXXXXX").string();

@@ -8,9 +8,9 @@
 #include <span>
 #include <utility>
 
-#include "base/lanes.h"
 #include "base/range.h"
 #include "distributed/communicator.h"
+#include "kernels/lanes.h"
 
 namespace tomofield::measurement {
 
@@ -84,7 +84,7 @@ class SlabViews {
       const distributed::Communicator& processes = distributed::Communicator::alone()) const;
 
  private:
-  static constexpr std::int64_t kRows = base::kLanes;  // of a slab
+  static constexpr std::int64_t kRows = kernels::kLanes;  // of a slab
   std::pair<double, int> box_sum(int view, std::int64_t x0, std::int64_t y0, int size) const;
   static std::size_t bytes(const Shape& shape);
   void fill(double unit, const ReadView& read_view);

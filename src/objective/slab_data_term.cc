@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/aligned_buffer.h"
-#include "base/lanes.h"
+#include "kernels/lanes.h"
 
 namespace tomofield::objective {
 
@@ -25,7 +25,7 @@ double SlabDataTerm::add_slabs(const Step& step, const SlabBatch& batch,
       view_sums[v] +=
           measurement::data_term(step.models[static_cast<std::size_t>(view)], step.multiplicity,
                                  measured_.rays(slab, view), measured_.mask(slab, view), width,
-                                 rays + static_cast<std::ptrdiff_t>(v) * width * base::kLanes);
+                                 rays + static_cast<std::ptrdiff_t>(v) * width * kernels::kLanes);
     }
     measured_.release(slab);
   }

@@ -1,13 +1,13 @@
 #include "objective/total_variation.h"
 
 #include "base/aligned_buffer.h"
-#include "base/lanes.h"
 #include "base/random.h"
+#include "kernels/lanes.h"
 
 namespace tomofield::objective {
 namespace {
 
-using base::kLanes;
+using kernels::kLanes;
 using projection::SampleSegment;
 
 // Streams of the seed from here on choose the direction of the differences in each step.

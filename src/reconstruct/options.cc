@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "base/faults.h"
+#include "base/check.h"
 #include "output/result_files.h"
 #include "reconstruct/tuning.h"
 

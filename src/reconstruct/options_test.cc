@@ -5,7 +5,7 @@
 #include <limits>
 #include <string>
 
-#include "base/faults.h"
+#include "base/check.h"
 #include "fit/integer_program.h"
 #include "fit/options.h"
 #include "scratch_directory.h"

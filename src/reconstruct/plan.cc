@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "base/faults.h"
-#include "base/lanes.h"
+#include "base/check.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/range.h"
@@ -14,6 +13,7 @@
 #include "fit/fit.h"
 #include "fit/halo.h"
 #include "fit/stages.h"
+#include "kernels/lanes.h"
 #include "measurement/held_out.h"
 #include "measurement/slab_views.h"
 #include "objective/ray_data_term.h"
@@ -34,7 +34,7 @@ constexpr int kSlabsOfThread = projection::SlabProjector::kSlabsTogether;
 // the total variation, a leaf's vertices; and then a part of the volume.
 std::size_t thread_memory(const measurement::PreparedSeries& plan, const fit::Domain& domain,
                           int views_a_step) {
-  constexpr std::size_t kRow = base::kLanes * sizeof(float);
+  constexpr std::size_t kRow = kernels::kLanes * sizeof(float);
   const std::size_t slab = domain.grid.size() * sizeof(float);
   const std::size_t views =
       static_cast<std::size_t>(views_a_step) * static_cast<std::size_t>(plan.geometry.width) * kRow;
@@ -45,7 +45,7 @@ std::size_t thread_memory(const measurement::PreparedSeries& plan, const fit::Do
       std::size_t{16} << 20,
       static_cast<std::size_t>(static_cast<double>(plan.roi.width()) * plan.geometry.thickness) *
           kRow);
-  return kSlabsOfThread * (2 * slab + views) + 2 * slab / base::kLanes + leaf + written;
+  return kSlabsOfThread * (2 * slab + views) + 2 * slab / kernels::kLanes + leaf + written;
 }
 
 int num_fitted_views(const measurement::PreparedSeries& plan, const fit::FitOptions& options) {

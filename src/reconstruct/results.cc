@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
-#include "base/lanes.h"
 #include "base/range.h"
 #include "io/json.h"
+#include "kernels/lanes.h"
 #include "output/held_out_picture.h"
 #include "output/metrics.h"
 #include "output/volume.h"
@@ -36,10 +36,10 @@ nlohmann::json score_fit(const fit::Fit& fit, const measurement::PreparedSeries&
 output::VolumeShare volume_share(const fit::Fit& fit, const measurement::PreparedSeries& series) {
   const base::Range slabs = series.rays->held();
   const auto end_row =
-      std::min<std::int64_t>(std::int64_t{slabs.end} * base::kLanes, series.roi.height());
+      std::min<std::int64_t>(std::int64_t{slabs.end} * kernels::kLanes, series.roi.height());
   const base::Range leaves = fit.own_leaves();
   return {fit.processes(),
-          {slabs.begin * base::kLanes, static_cast<int>(end_row)},
+          {slabs.begin * kernels::kLanes, static_cast<int>(end_row)},
           fit.field().offset(leaves.begin),
           fit.field().offset(leaves.end)};
 }

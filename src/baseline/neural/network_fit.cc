@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "base/random.h"
-#include "base/shuffle.h"
 #include "baseline/neural/lazy_adam.h"
 #include "baseline/neural/network_density.h"
 #include "baseline/neural/noise_levels.h"

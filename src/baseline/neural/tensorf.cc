@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "base/lanes.h"
 #include "fit/stages.h"
+#include "kernels/lanes.h"
 #include "tomofield/error.h"
 
 namespace tomofield::baseline {
@@ -33,8 +33,8 @@ void cover_with_one_node(const Rectangle& roi, reconstruction::ReconstructOption
                     roi.width(), roi.height(), kLargest));
   }
   // Slabs of the coarsest pixels must end with the node. A small region bins fewer pixels.
-  std::int64_t step = std::int64_t{base::kLanes} * options.fit.coarse_bin;
-  while (step > base::kLanes && step > side) step /= 2;
+  std::int64_t step = std::int64_t{kernels::kLanes} * options.fit.coarse_bin;
+  while (step > kernels::kLanes && step > side) step /= 2;
   options.field.leaf_size = static_cast<int>((side + step - 1) / step * step);
 }
 
