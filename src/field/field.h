@@ -10,9 +10,9 @@
 
 #include "base/aligned_buffer.h"
 #include "base/random.h"
+#include "field/sampling/resample.h"
 #include "field/tree/quadtree.h"
 #include "field/tree/quadtree_edit.h"
-#include "field/vm/join_quarters.h"
 #include "kernels/lanes.h"
 #include "kernels/leaf_decoding.h"
 #include "kernels/total_variation.h"
