@@ -11,7 +11,7 @@
 #include "cli/input_options.h"
 #include "cli/model_info.h"
 #include "io/mrc.h"
-#include "io/mrc_header.h"
+#include "io/mrc_format.h"
 #include "io/positioned_file.h"
 #include "tilt_series/tilt_series.h"
 

@@ -12,8 +12,7 @@
 #include "base/log.h"
 #include "io/atomic_file.h"
 #include "io/mrc.h"
-#include "io/mrc_header.h"
-#include "io/mrc_values.h"
+#include "io/mrc_format.h"
 #include "io/positioned_file.h"
 #include "tomofield/error.h"
 
