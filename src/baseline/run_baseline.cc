@@ -48,7 +48,7 @@ std::size_t estimate_memory(const measurement::PreparedSeries& plan,
   const std::size_t values_of_slab = static_cast<std::size_t>(method.volumes) * grid.size() +
                                      static_cast<std::size_t>(method.detectors) * rays;
   const std::size_t values_of_thread =
-      SlabPair::kMost * (static_cast<std::size_t>(method.buffers) * grid.size() + rays);
+      SlabPair::kMax * (static_cast<std::size_t>(method.buffers) * grid.size() + rays);
   const std::size_t copied_slabs = tunes ? std::min<std::size_t>(slabs, kTrialSlabs) : 0;
   const std::size_t running =
       size.bytes +

@@ -64,9 +64,9 @@ class ThreadScratch {
       : num_buffers_(num_buffers) {
     const std::size_t threads = static_cast<std::size_t>(base::thread_count());
     for (std::size_t i = 0; i < threads; ++i)
-      detectors_.emplace_back(SlabPair::kMost * problem.projector().detector_size(num_views));
+      detectors_.emplace_back(SlabPair::kMax * problem.projector().detector_size(num_views));
     for (std::size_t i = 0; i < threads * num_buffers; ++i)
-      samples_.emplace_back(SlabPair::kMost * problem.grid().size());
+      samples_.emplace_back(SlabPair::kMax * problem.grid().size());
   }
   float* detector() { return detectors_[thread()].data(); }
   /// Returns a buffer with what its last user left in it.

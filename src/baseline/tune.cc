@@ -28,7 +28,7 @@ constexpr int kCutoffs = 7;      // candidates, each √2 times the one before
 // rather than how good the weight is: after 10 iterations on a phantom a tenth of the best weight
 // seemed better.
 constexpr double kAtMinimum = 0.01;
-constexpr int kMostIterations = 400;  // upper limit for trials that have not converged
+constexpr int kMaxIterations = 400;  // upper limit for trials that have not converged
 
 // Returns the settings that a tuning may change, as the command line writes them.
 std::string settings_text(const Method& method) {
@@ -200,7 +200,7 @@ Method tuned(const TvOptions& start, Trials& trials) {
     TvOptions chosen = with_better_penalty(tried, trials);
     choose_weight(chosen, trials);
     const double fell = trials.trial(chosen).last_decrease.value_or(0);
-    if (fell <= kAtMinimum || tried.iterations >= kMostIterations) {
+    if (fell <= kAtMinimum || tried.iterations >= kMaxIterations) {
       chosen.iterations = start.iterations;
       return chosen;
     }
@@ -208,7 +208,7 @@ Method tuned(const TvOptions& start, Trials& trials) {
         "{} iterations are too few for trials: the objective still falls by {:.2g} % in the last "
         "tenth",
         tried.iterations, 100 * fell));
-    tried.iterations = std::min(4 * tried.iterations, kMostIterations);
+    tried.iterations = std::min(4 * tried.iterations, kMaxIterations);
     if (start.weight) tried.weight = chosen.weight;
   }
 }

@@ -99,7 +99,7 @@ std::vector<measurement::ViewSums> view_sums(const VoxelProblem& problem,
                                              std::span<const int> views, VoxelVolume& densities) {
   std::vector<std::vector<measurement::ViewSums>> sums(problem.num_pairs());
   for_each_pair(problem.num_slabs(), [&](const SlabPair& pair) {
-    base::AlignedBuffer<float> detector(SlabPair::kMost * problem.detector_size(views));
+    base::AlignedBuffer<float> detector(SlabPair::kMax * problem.detector_size(views));
     sums[pair.index()] =
         problem.residuals(pair, views, densities.slab(pair.first), detector.data());
   });

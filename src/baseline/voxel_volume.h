@@ -18,11 +18,11 @@ namespace tomofield::baseline {
 /// Two slabs that are projected together, which takes less time: an even one and the one after it,
 /// unless that is past the end.
 struct SlabPair {
-  static constexpr int kMost = projection::SlabProjector::kSlabsTogether;
+  static constexpr int kMax = projection::SlabProjector::kSlabsTogether;
   int first = 0, count = 1;
   int end() const { return first + count; }
-  std::size_t index() const { return static_cast<std::size_t>(first / kMost); }
-  static int number(int num_slabs) { return (num_slabs + kMost - 1) / kMost; }
+  std::size_t index() const { return static_cast<std::size_t>(first / kMax); }
+  static int number(int num_slabs) { return (num_slabs + kMax - 1) / kMax; }
 };
 
 /// A volume whose voxels are the samples of the projector, slab after slab. Each slab is a buffer
@@ -94,8 +94,8 @@ inline std::size_t num_voxels(const projection::SampleGrid& grid, std::int64_t n
 template <typename Body>
 void for_each_pair(int num_slabs, Body&& body) {
   base::parallel_for(SlabPair::number(num_slabs), [&](std::int64_t index) {
-    const int first = SlabPair::kMost * static_cast<int>(index);
-    body(SlabPair{first, std::min(SlabPair::kMost, num_slabs - first)});
+    const int first = SlabPair::kMax * static_cast<int>(index);
+    body(SlabPair{first, std::min(SlabPair::kMax, num_slabs - first)});
   });
 }
 

@@ -9,13 +9,13 @@ namespace tomofield::cli {
 
 void add_common_options(CLI::App& command) {
   const char* group = "Running";
-  constexpr int kMostThreads = 1024;
+  constexpr int kMaxThreads = 1024;
   command
       .add_option_function<int>("--threads", base::set_thread_count,
                                 "number of threads; default: OMP_NUM_THREADS, or every core. The "
                                 "result is the same for any "
                                 "number")
-      ->check(number_between(1, kMostThreads))
+      ->check(number_between(1, kMaxThreads))
       ->type_name("INT")
       ->group(group);
   command

@@ -16,7 +16,7 @@ namespace {
 constexpr double kSecondsBetweenLines = 5.0;
 constexpr double kSecondsBetweenDraws = 0.2;
 constexpr std::size_t kBarWidth = 24;
-constexpr std::size_t kLeastBarWidth = 8;
+constexpr std::size_t kMinBarWidth = 8;
 
 // Returns the columns of the terminal. A longer line would wrap and could not be redrawn.
 std::size_t terminal_width() {
@@ -36,7 +36,7 @@ std::string terminal_line(const std::string& title, double fraction, const std::
   const std::size_t others = title.size() + state.size() + std::string_view(" [] ").size();
   const std::size_t room = columns > others ? columns - others : 0;
   std::string line =
-      room < kLeastBarWidth
+      room < kMinBarWidth
           ? title + " " + state
           : fmt::format("{} [{}] {}", title, bar(fraction, std::min(room, kBarWidth)), state);
   line.resize(std::min(line.size(), columns));

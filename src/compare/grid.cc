@@ -48,7 +48,7 @@ void require_one_grid(const NamedGrid& main, const NamedGrid& other) {
 void require_truth_fits(const std::filesystem::path& truth, const NamedGrid& main, bool is_a_part) {
   const Grid grid = read_grid(truth);
   if (!evaluate::voxel_sizes_differ(main.grid.voxel_A, grid.voxel_A,
-                                    evaluate::kMostScaleDifference) &&
+                                    evaluate::kMaxScaleDifference) &&
       !evaluate::have_axes_in_another_order(main.grid.size, grid.size) &&
       (is_a_part || evaluate::share_half(main.grid.size, grid.size)))
     return;

@@ -20,7 +20,7 @@ std::string to_text(const VolumeSizes& sizes) {
 void check_voxel_sizes(const io::MrcReader& first, const io::MrcReader& second) {
   const double a = first.header().voxel_size_A[0], b = second.header().voxel_size_A[0];
   if (std::abs(a - b) <= 1e-4 * std::abs(b)) return;
-  if (voxel_sizes_differ(a, b, kMostScaleDifference))
+  if (voxel_sizes_differ(a, b, kMaxScaleDifference))
     throw Error(fmt::format(
         "'{}' has voxels of {:.4g} Å and '{}' of {:.4g} Å: bring them to one voxel size first",
         first.path().string(), a, second.path().string(), b));

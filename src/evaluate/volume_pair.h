@@ -18,7 +18,7 @@ bool is_known_voxel_size(double voxel_A);
 /// Returns true if both voxel sizes (Å) are known and differ by more than `tolerance` times the
 /// second.
 bool voxel_sizes_differ(double first_A, double second_A, double tolerance);
-constexpr double kMostScaleDifference = 0.05;  ///< for read_pair()
+constexpr double kMaxScaleDifference = 0.05;  ///< for read_pair()
 
 /// Returns true if the axes of one of two volumes, which read_pair() would lay centre on centre,
 /// are in another order than the other's.

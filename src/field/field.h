@@ -26,7 +26,7 @@ struct LeafShape {
   int nx = 0, ny = 0, nz = 0;
   int rank_x = 0, rank_y = 0, rank_z = 0;  ///< ranks of VX⊗MYZ, VY⊗MXZ, VZ⊗MXY
   bool operator==(const LeafShape&) const = default;
-  static constexpr int kMostVertices = 1 << 16;  ///< along an axis
+  static constexpr int kMaxVertices = 1 << 16;  ///< along an axis
   std::size_t vertices_xz() const { return static_cast<std::size_t>(nx) * nz; }
 };
 

@@ -12,9 +12,9 @@
 namespace tomofield::objective {
 
 struct FourierPriorOptions {
-  double weight = 0.0;    ///< per px³ and density unit; 0 is off
-  int slices = 4;         ///< random heights z a step
-  int most_samples = 64;  ///< of the longer side of the region, at least 1 px apart
+  double weight = 0.0;   ///< per px³ and density unit; 0 is off
+  int slices = 4;        ///< random heights z a step
+  int max_samples = 64;  ///< of the longer side of the region, at least 1 px apart
   std::uint64_t seed = 1;
   AxisPenaltyOptions axes;
 };

@@ -40,7 +40,7 @@ std::unique_ptr<field::Field> uneven_field(FieldKind kind) {
 FourierPriorOptions some_options() {
   FourierPriorOptions options;
   options.weight = 0.5;
-  options.most_samples = 40;
+  options.max_samples = 40;
   options.seed = 4;
   return options;
 }

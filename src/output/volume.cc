@@ -29,7 +29,7 @@ constexpr const char* kMadeBy = "density field";
 void gather_parameters(const VolumeShare& share, field::Field& field) {
   distributed::GatheredArrays arrays(share.processes, share.first_parameter, share.end_parameter);
   const std::size_t parameters = arrays.add(field.parameters());
-  arrays.read_on_first([&] {
+  arrays.read_on_root([&] {
     field.keep_only({});
     auto into = field.parameters().begin();
     arrays.hand_out(parameters, [&](std::span<const float> piece) {
@@ -200,7 +200,7 @@ void write_volume(Model& model, const VolumeOptions& options, const std::filesys
   }
   gather_parameters(share, *model.field);
   share.processes.run_collectively([&] {
-    if (share.processes.is_first()) write_volume(model, options, path);
+    if (share.processes.is_root()) write_volume(model, options, path);
   });
 }
 

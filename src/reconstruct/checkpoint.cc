@@ -168,7 +168,7 @@ void save(const std::filesystem::path& path, const fit::Fit& fit, const output::
   const output::FloatSource parameters = source(fit.field().parameters());
   output::FloatArrays more;
   for (const auto& [name, values] : moments) more.emplace(name, source(values));
-  arrays.read_on_first(
+  arrays.read_on_root(
       [&] { output::save_model(path, fit.field(), parameters, info, &state, more); });
 }
 

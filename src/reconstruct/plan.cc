@@ -59,8 +59,8 @@ int steps_an_epoch(const measurement::PreparedSeries& plan, const fit::FitOption
 }
 
 // Of the first tree, or of an adaptive one whose budget is used up, as a field of this kind.
-std::size_t most_parameters(const fit::Domain& domain, const fit::FieldOptions& options,
-                            FieldKind kind) {
+std::size_t max_parameters(const fit::Domain& domain, const fit::FieldOptions& options,
+                           FieldKind kind) {
   std::vector<field::LeafShape> shapes = domain.shapes, inside;
   for (int i = 0; i < domain.tree.num_leaves(); ++i) {
     if (domain.tree.leaf(i).region == field::Region::kInterest)
@@ -88,7 +88,7 @@ double part_of_parameters(const fit::Domain& domain, FieldKind kind,
 // Those of a process as a field of this kind, in bytes.
 double parameter_bytes(const fit::Domain& domain, const fit::FieldOptions& options, FieldKind kind,
                        const distributed::Communicator& processes) {
-  return static_cast<double>(sizeof(float) * most_parameters(domain, options, kind)) *
+  return static_cast<double>(sizeof(float) * max_parameters(domain, options, kind)) *
          part_of_parameters(domain, kind, processes);
 }
 
@@ -122,8 +122,8 @@ measurement::SlabViews::Shape own_part(measurement::SlabViews::Shape shape,
                                        const distributed::Communicator& processes) {
   const std::int64_t band_rows = domain.tree.roots().cell_size;
   const std::int64_t bands = (shape.num_rows + band_rows - 1) / band_rows;
-  const std::int64_t most_bands = (bands + processes.size() - 1) / processes.size();
-  shape.num_rows = std::min(shape.num_rows, most_bands * band_rows);
+  const std::int64_t max_bands = (bands + processes.size() - 1) / processes.size();
+  shape.num_rows = std::min(shape.num_rows, max_bands * band_rows);
   return shape;
 }
 
@@ -175,7 +175,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.roi = plan.roi;
   run.thickness = plan.geometry.thickness;
   run.num_leaves = domain.tree.num_leaves();
-  run.num_parameters = most_parameters(domain, options.field, options.field.kind);
+  run.num_parameters = max_parameters(domain, options.field, options.field.kind);
   run.stages = fit::make_stages(options.field, options.fit);
   const fit::Stage& last = run.stages.back();
   run.num_trials = options.num_trials(num_fitted_views(plan, options.fit));
@@ -190,11 +190,11 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
                        "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, or "
                        "fewer --threads");
   for (const field::LeafShape& shape : domain.shapes) {
-    if (std::max(shape.nx, shape.nz) <= field::LeafShape::kMostVertices) continue;
+    if (std::max(shape.nx, shape.nz) <= field::LeafShape::kMaxVertices) continue;
     throw Error(fmt::format(
         "{} vertices along an axis of a leaf are more than {}: use a larger --vertex-spacing or "
         "--bin, or a smaller --thickness",
-        std::max(shape.nx, shape.nz), field::LeafShape::kMostVertices));
+        std::max(shape.nx, shape.nz), field::LeafShape::kMaxVertices));
   }
   return run;
 }

@@ -128,7 +128,7 @@ bool run_with_checkpoints(fit::Fit& fit, double checkpoint_minutes, const Recons
     if (hooks.progress) hooks.progress(progress_report(fit, first_step, running));
     const bool stop = hooks.stop_requested && hooks.stop_requested() && !fit.is_done();
     const bool is_due =
-        fit.processes().is_first() && since_checkpoint.seconds() > 60 * checkpoint_minutes;
+        fit.processes().is_root() && since_checkpoint.seconds() > 60 * checkpoint_minutes;
     // One that must stop stops all; when it is time for a checkpoint is up to the first.
     const double wanted = fit.processes().allreduce_max(stop ? 2.0 : is_due ? 1.0 : 0.0);
     stopped = wanted == 2.0;

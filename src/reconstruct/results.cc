@@ -25,7 +25,7 @@ nlohmann::json score_fit(const fit::Fit& fit, const measurement::PreparedSeries&
   const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
   const measurement::PredictedView view = fit.predict_held_out(*nearest, model);
   fit.processes().run_collectively([&] {
-    if (fit.processes().is_first()) output::write_held_out_picture(picture, view);
+    if (fit.processes().is_root()) output::write_held_out_picture(picture, view);
   });
   nlohmann::json json =
       measurement::report_held_out(error, series.geometry.tilt_deg, stopped_by_them);
@@ -74,7 +74,7 @@ void write_results(fit::Fit& fit, const measurement::PreparedSeries& series,
   output::Model model{model_info(series, options), fit.take_field()};
   output::write_volume(model, options.volume, paths.volume, share);
   share.processes.run_collectively([&] {
-    if (!share.processes.is_first()) return;
+    if (!share.processes.is_root()) return;
     io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
                                 {"options", options_json(options)},
                                 {"figures", figures}});

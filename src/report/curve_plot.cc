@@ -14,7 +14,7 @@ namespace tomofield::report {
 namespace {
 
 // The drawing area of a picture of kWidth pixels. The legend is at its right.
-constexpr int kWidth = 900, kLeastHeight = 360;
+constexpr int kWidth = 900, kMinHeight = 360;
 constexpr double kLeft = 70, kRight = 660, kTop = 30, kBelow = 55;
 constexpr double kLine = 20;            // distance of two lines of the legend
 constexpr double kNames = kRight + 48;  // x at which the names begin
@@ -84,7 +84,7 @@ std::vector<std::string> lines_of(const std::string& name) {
 int height_for(const Legend& legend) {
   std::size_t lines = 0;
   for (const auto& name : legend) lines += name.size();
-  return std::max(kLeastHeight, static_cast<int>(kTop + kLine * static_cast<double>(lines)));
+  return std::max(kMinHeight, static_cast<int>(kTop + kLine * static_cast<double>(lines)));
 }
 
 class Plot {

@@ -123,7 +123,7 @@ ChambollePock::ChambollePock(VoxelProblem& problem, const TvOptions& options, do
       py_(problem.grid(), problem.num_rows()),
       pz_(problem.grid(), problem.num_rows()) {
   for (std::size_t pair = 0; pair < problem.num_pairs(); ++pair)
-    q_.emplace_back(SlabPair::kMost * problem.detector_size());
+    q_.emplace_back(SlabPair::kMax * problem.detector_size());
   measure_steps();
   x_.fill(static_cast<float>(options.non_negative ? std::max(0.0, start) : start));
   if (options.penalty == Penalty::kConcave) begin_concave_penalty();

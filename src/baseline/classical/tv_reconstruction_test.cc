@@ -133,7 +133,7 @@ TEST_F(Tv, ConcavePenaltyOfHugeTauIsTheSmoothOne) {
 TEST_F(Tv, ConcavePenaltySparesEdges) {
   const SphereSeries series;
   // The weights are near the best one of each penalty.
-  const auto least_error = [&](const auto& options_of, const std::vector<double>& weights) {
+  const auto min_error = [&](const auto& options_of, const std::vector<double>& weights) {
     double least = testing::rms_truth();
     for (const double weight : weights) {
       const Solution solution = solve(testing::voxel_problem(series), options_of(150, weight));
@@ -141,7 +141,7 @@ TEST_F(Tv, ConcavePenaltySparesEdges) {
     }
     return least;
   };
-  EXPECT_LT(least_error(concave, {36, 54}), 0.97 * least_error(options, {12, 18, 27}));
+  EXPECT_LT(min_error(concave, {36, 54}), 0.97 * min_error(options, {12, 18, 27}));
 }
 
 TEST_F(Tv, SlabsAreSeamless) {

@@ -122,9 +122,9 @@ NetworkDensity::Counts NetworkDensity::counts_of(const projection::SampleGrid& g
   std::size_t columns = 0;
   for (const projection::SampleSegment& segment : grid.segments())
     columns += static_cast<std::size_t>(segment.nx) * static_cast<std::size_t>(segment.nz);
-  const std::int64_t most_rows =
+  const std::int64_t max_rows =
       (std::min<std::int64_t>(num_rows, kLanes) + RowSet::kStride - 1) / RowSet::kStride;
-  const std::size_t points = columns * static_cast<std::size_t>(most_rows);
+  const std::size_t points = columns * static_cast<std::size_t>(max_rows);
   const bool is_fitted = encoding.num_parameters() > 0;
   return {
       .parameters = encoding.num_parameters() + network.num_parameters(),

@@ -11,11 +11,11 @@ double NoiseLevels::sigma(std::size_t view) const {
 
 void NoiseLevels::step(std::span<const double> counts, std::span<const double> squares,
                        double rate) {
-  constexpr double kMost = 2.0;  // residuals far above their level must not make it overshoot
+  constexpr double kMaxExcess = 2.0;  // residuals far above their level must not make it overshoot
   for (std::size_t v = 0; v < start_.size(); ++v) {
     if (counts[v] == 0) continue;
     const double excess = squares[v] / (counts[v] * sigma(v) * sigma(v)) - 1;
-    log_ratio_[v] += rate / 2 * std::min(excess, kMost);
+    log_ratio_[v] += rate / 2 * std::min(excess, kMaxExcess);
   }
 }
 

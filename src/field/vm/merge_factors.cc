@@ -8,10 +8,10 @@
 namespace tomofield::field {
 namespace {
 
-constexpr int kMostSweeps = 60;
-constexpr double kLeastChange = 1e-3;  // relative to the residual's square, in a sweep
-constexpr double kExact = 1e-13;       // relative to the target's square: the floats' rounding
-constexpr double kProximity = 1e-6;    // relative to the mean diagonal of the normal matrix
+constexpr int kMaxSweeps = 60;
+constexpr double kMinChange = 1e-3;  // relative to the residual's square, in a sweep
+constexpr double kExact = 1e-13;     // relative to the target's square: the floats' rounding
+constexpr double kProximity = 1e-6;  // relative to the mean diagonal of the normal matrix
 
 // Improves `factor` to the least-squares solution of residual + factor otherᵀ ≈ factor' otherᵀ, and
 // updates the residual [rows of factor, rows of other].
@@ -148,10 +148,10 @@ class FactorMaps {
 double fit_factors(const RowMajorMatrix& b, LeafFactors& factors) {
   RowMajorMatrix residual = residual_of(b, factors);
   double square = residual.squaredNorm();
-  for (int n = 0; n < kMostSweeps && square > kExact * b.squaredNorm(); ++n) {
+  for (int n = 0; n < kMaxSweeps && square > kExact * b.squaredNorm(); ++n) {
     const double before = square;
     square = sweep(residual, factors);
-    if (square > (1 - kLeastChange) * before) break;
+    if (square > (1 - kMinChange) * before) break;
   }
   return square;
 }
