@@ -11,6 +11,7 @@
 #include "io/mrc.h"
 #include "output/model_file.h"
 #include "tomofield/options.h"
+#include "base/range.h"
 
 namespace tomofield::output {
 
