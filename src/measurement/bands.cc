@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "distributed/partition.h"
 #include "kernels/lanes.h"
 #include "tomofield/error.h"
 
