@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "base/commit.h"
+#include "base/version.h"
 #include "bench/cases.h"
 #include "bench/machine.h"
 #include "bench/measure.h"

@@ -49,7 +49,7 @@ struct StepSetup {
                                 field_options(kind))),
         field(fit::make_initial_field(domain, kThickness, 0.3, field_options(kind), 1)),
         sampler(*field, domain.grid, 0, geometry.height),
-        slab(sampler.band(kBand).first),
+        slab(sampler.band(kBand).begin),
         values(domain.shapes[0].vertices_xz() * kLanes),
         samples(domain.grid.size()),
         gradient(field->num_parameters()),

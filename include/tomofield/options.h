@@ -38,9 +38,12 @@ struct SeriesFiles {
   std::optional<std::filesystem::path> fiducials;  ///< text of model2point, stack coordinates
 };
 
-/// A rectangle [x0, x1) × [y0, y1) of the aligned view at zero tilt, in unbinned pixels.
+/// A rectangle [x0, x1) × [y0, y1) of pixels. A region of interest is one of the aligned view at
+/// zero tilt; those of Options count unbinned pixels.
 struct Rectangle {
   std::int64_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  std::int64_t width() const { return x1 - x0; }
+  std::int64_t height() const { return y1 - y0; }
   bool operator==(const Rectangle&) const = default;
 };
 

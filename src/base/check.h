@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace tomofield::base {
 
@@ -10,6 +11,9 @@ namespace tomofield::base {
   throw std::logic_error(std::string(file) + ":" + std::to_string(line) + ": '" + condition +
                          "' does not hold: " + context);
 }
+
+/// Throws Error with all the faults of the user's input, if there are any.
+void require_no_faults(const std::vector<std::string>& faults);
 
 }  // namespace tomofield::base
 

@@ -2,8 +2,12 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <numbers>
+#include <numeric>
+#include <utility>
+#include <vector>
 
 namespace tomofield::base {
 
@@ -55,5 +59,13 @@ class Random {
   }
   std::array<std::uint64_t, 4> state_{};
 };
+
+/// Returns 0, 1, …, count − 1 in random order (Fisher and Yates); every order is equally likely.
+inline std::vector<std::size_t> shuffled(std::size_t count, Random random) {
+  std::vector<std::size_t> order(count);
+  std::iota(order.begin(), order.end(), 0);
+  for (std::size_t i = count; i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);
+  return order;
+}
 
 }  // namespace tomofield::base

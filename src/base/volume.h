@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -13,6 +14,14 @@ struct Shape3 {
   std::int64_t nz = 0;
   std::size_t voxels() const { return static_cast<std::size_t>(nx * ny * nz); }
   bool operator==(const Shape3&) const = default;
+};
+
+/// A box of voxels, from `begin` up to but without `end`. Indices are x, y, z and count from zero.
+struct Box {
+  std::array<std::int64_t, 3> begin{};
+  std::array<std::int64_t, 3> end{};
+  Shape3 shape() const { return {end[0] - begin[0], end[1] - begin[1], end[2] - begin[2]}; }
+  bool operator==(const Box&) const = default;
 };
 
 /// A volume [z, y, x] in memory. It serves test data, phantoms and metrics; large tomograms are

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "base/faults.h"
+#include "base/check.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
@@ -219,10 +219,9 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
   plan.num_voxels = num_voxels(grid, planned.roi.height());
   const MethodSize size = size_of(options.method, grid, planned.roi.height());
   plan.num_parameters = size.num_parameters;
-  plan.memory_bytes =
-      estimate_memory(planned, grid, facts_of(options.method), size,
-                      series.stored_memory(distributed::Communicator::alone()),
-                      options.shared.tune);
+  plan.memory_bytes = estimate_memory(planned, grid, facts_of(options.method), size,
+                                      series.stored_memory(distributed::Communicator::alone()),
+                                      options.shared.tune);
   const std::string advice = fmt::format(
       "use a larger --bin or --margin-spacing, a smaller --roi or --thickness, or fewer "
       "--threads{}",
@@ -236,9 +235,8 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   BaselineOptions options = requested;
   const BaselinePaths paths = baseline_paths(options.shared.output);
   const bool fit_view_scale = fits_view_scale(options);
-  const measurement::Measurement series =
-      prepare_measurement(tilt_series, output::specimen_options(options.shared),
-                          io::scratch_directory(paths.volume));
+  const measurement::Measurement series = prepare_measurement(
+      tilt_series, output::specimen_options(options.shared), io::scratch_directory(paths.volume));
   const std::vector<int> held_out =
       measurement::held_out_views(series.geometry.tilt_deg, options.shared.hold_out);
   nlohmann::json tuning = nullptr;

@@ -34,7 +34,7 @@ void check_options(const BaselineOptions& options);
 struct BaselinePlan {
   int num_views = 0;
   geometry::TiltGeometry geometry;
-  geometry::Roi roi;
+  Rectangle roi;
   double pixel_size_A = 0;
   std::size_t num_voxels = 0;      ///< with the margins
   std::size_t num_parameters = 0;  ///< fitted ones: the voxels, or a network's parameters

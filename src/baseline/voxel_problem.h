@@ -10,7 +10,6 @@
 #include "kernels/lanes.h"
 #include "measurement/slab_views.h"
 #include "measurement/view_residuals.h"
-#include "measurement/view_residuals.h"
 #include "projection/slab_projector.h"
 
 namespace tomofield::baseline {
@@ -120,8 +119,8 @@ std::vector<measurement::ViewSums> view_sums(const VoxelProblem& problem,
 std::vector<measurement::ViewSums> total(
     const std::vector<std::vector<measurement::ViewSums>>& sums_of_part);
 
-/// Computes how well densities predict `views` (measurement/view_residuals.h). Writes the padding of
-/// `densities`.
+/// Computes how well densities predict `views` (measurement/view_residuals.h). Writes the padding
+/// of `densities`.
 measurement::ViewErrors held_out_errors(const VoxelProblem& problem, const std::vector<int>& views,
                                         bool fit_view_scale, VoxelVolume& densities);
 

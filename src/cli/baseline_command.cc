@@ -216,15 +216,15 @@ void add_tv(CLI::App& baseline) {
 // Registers the options of methods that fit a network.
 void add_network_options(CLI::App& command, baseline::NetworkOptions& method) {
   const char* group = "Method";
-  constexpr int kMostLayers = 16, kWidest = 1024;
+  constexpr int kMaxLayers = 16, kMaxWidth = 1024;
   command
       .add_option("--hidden-layers", method.hidden_layers,
                   "Layers of neurons between the features of a position and its density")
-      ->check(number_between(1, kMostLayers))
+      ->check(number_between(1, kMaxLayers))
       ->capture_default_str()
       ->group(group);
   command.add_option("--width", method.width, "Neurons of a hidden layer")
-      ->check(number_between(1, kWidest))
+      ->check(number_between(1, kMaxWidth))
       ->capture_default_str()
       ->group(group);
   command

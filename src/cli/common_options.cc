@@ -9,11 +9,11 @@ namespace tomofield::cli {
 
 void add_common_options(CLI::App& command) {
   const char* group = "Running";
-  constexpr int kMostThreads = 1024;
+  constexpr int kMaxThreads = 1024;
   command
       .add_option_function<int>("--threads", base::set_thread_count,
                                 "Number of threads; the result is the same for any")
-      ->check(number_between(1, kMostThreads))
+      ->check(number_between(1, kMaxThreads))
       ->type_name("N")
       ->default_str("all cores, or OMP_NUM_THREADS")
       ->group(group);

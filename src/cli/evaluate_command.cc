@@ -36,7 +36,7 @@ void print_comparison(const evaluate::Comparison& comparison) {
   fmt::print("correlation {:.5f}, scale {:.5f}, offset {:.5f}, peak {:.5f}\n", psnr.correlation,
              psnr.scale, psnr.offset, psnr.peak);
   fmt::print("box {} × {} × {} voxels from {},{},{} of the truth\n", shape.nx, shape.ny, shape.nz,
-             box.first[0], box.first[1], box.first[2]);
+             box.begin[0], box.begin[1], box.begin[2]);
 }
 
 // Returns the resolution at which a curve falls below a threshold, or why there is none.
@@ -66,8 +66,8 @@ void print_contrast(const evaluate::ContrastScore& score, const evaluate::Region
   fmt::print("CNR {:.4f}, ENL {:.4f} (normalised to [0, 1] from {:.6g} … {:.6g})\n", score.cnr,
              score.enl, score.low, score.high);
   fmt::print("regions {}:", chosen ? "chosen" : "given");
-  for (const auto& box : regions.foreground) fmt::print(" --foreground {}", to_text(box));
-  for (const auto& box : regions.background) fmt::print(" --background {}", to_text(box));
+  for (const auto& box : regions.foreground) fmt::print(" --foreground {}", evaluate::to_text(box));
+  for (const auto& box : regions.background) fmt::print(" --background {}", evaluate::to_text(box));
   fmt::print("\n");
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "base/faults.h"
+#include "base/check.h"
 #include "cli/number_checks.h"
 #include "cli/table_options.h"
 #include "io/output_files.h"
@@ -18,11 +18,11 @@ namespace {
 constexpr const char* kBoxType = "X0,Y0,Z0,X1,Y1,Z1";
 
 /// Parses a box of whole numbers. Returns nothing for any other text.
-std::optional<evaluate::Box> parse_box(const std::string& text) {
+std::optional<base::Box> parse_box(const std::string& text) {
   const auto numbers = parse_whole_numbers(text);
   if (!numbers || numbers->size() != 6) return std::nullopt;
-  evaluate::Box box;
-  for (std::size_t i = 0; i < 6; ++i) (i < 3 ? box.first : box.last)[i % 3] = (*numbers)[i];
+  base::Box box;
+  for (std::size_t i = 0; i < 6; ++i) (i < 3 ? box.begin : box.end)[i % 3] = (*numbers)[i];
   return box;
 }
 
@@ -37,8 +37,8 @@ CLI::Validator box_check() {
           ""};
 }
 
-CLI::Option* add_boxes(CLI::App& command, const std::string& name,
-                       std::vector<evaluate::Box>& boxes, const char* help) {
+CLI::Option* add_boxes(CLI::App& command, const std::string& name, std::vector<base::Box>& boxes,
+                       const char* help) {
   return command
       .add_option_function<std::vector<std::string>>(
           name,

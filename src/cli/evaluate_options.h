@@ -16,7 +16,7 @@ namespace tomofield::cli {
 struct EvaluateArguments {
   std::filesystem::path volume;
   std::optional<std::filesystem::path> truth;
-  std::optional<evaluate::Box> box;
+  std::optional<base::Box> box;
 
   std::optional<std::filesystem::path> fsc_with, fsc_mask, fsc_csv, fsc_picture;
   std::optional<evaluate::TiltRange> tilts;

@@ -21,7 +21,7 @@
 namespace tomofield::cli {
 namespace {
 
-using field::Box;
+using field::OrientedBox;
 using output::Model;
 
 struct ExportArguments {
@@ -48,7 +48,7 @@ void check_output(const ExportArguments& arguments) {
 
 field::Point point(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
 
-Box unrotated_box(const ExportArguments& arguments, const Model& model) {
+OrientedBox unrotated_box(const ExportArguments& arguments, const Model& model) {
   const double voxel_px =
       arguments.voxel_size_A ? *arguments.voxel_size_A / model.pixel_size_A : arguments.bin;
   if (!arguments.size.empty())
@@ -71,7 +71,7 @@ Box unrotated_box(const ExportArguments& arguments, const Model& model) {
 void run_export(ExportArguments& arguments) {
   check_output(arguments);
   const Model model = output::load_model(arguments.model);
-  Box box = unrotated_box(arguments, model);
+  OrientedBox box = unrotated_box(arguments, model);
   const auto& angles = arguments.rotation;
   if (!angles.empty())
     box.field_from_box = field::rotation_from_euler(angles[0], angles[1], angles[2]);

@@ -24,7 +24,7 @@ struct Sizes {
   int num_views;
   std::int64_t view_width, view_height;
   double pixel_size_A;
-  geometry::Roi roi;
+  Rectangle roi;
   double thickness;
   VolumeAxes axes;
 };

@@ -15,7 +15,7 @@
 #include "cli/help_formatter.h"
 #include "cli/table_options.h"
 #include "io/mrc.h"
-#include "io/mrc_header.h"
+#include "io/mrc_format.h"
 #include "io/positioned_file.h"
 #include "output/model_file.h"
 #include "output/shared_options.h"
@@ -101,7 +101,7 @@ void print_series(const tilt_series::TiltSeriesOptions& options) {
 
 void print_geometry(const output::ModelInfo& model) {
   const geometry::TiltGeometry& g = model.geometry;
-  const geometry::Roi& roi = model.roi;
+  const Rectangle& roi = model.roi;
   fmt::print("  pixel size       {:.7g} Å\n", model.pixel_size_A);
   fmt::print("  view             {} × {} px, thickness {:.6g} px\n", g.width, g.height,
              g.thickness);

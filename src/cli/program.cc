@@ -12,8 +12,8 @@
 #include <string_view>
 #include <vector>
 
-#include "base/commit.h"
 #include "base/log.h"
+#include "base/version.h"
 #include "cli/commands.h"
 #include "cli/config_file.h"
 #include "cli/exit_status.h"
@@ -119,10 +119,10 @@ int fail_alone(const distributed::Session& session, int status, const std::strin
 int run_program(int argc, char** argv, const distributed::Session& session) {
   const distributed::Communicator& processes = session.communicator();
   // Only the first process prints.
-  if (!processes.is_first() && std::freopen("/dev/null", "w", stdout) == nullptr) return 1;
-  if (processes.is_first()) base::set_log_sink(print_log);
+  if (!processes.is_root() && std::freopen("/dev/null", "w", stdout) == nullptr) return 1;
+  if (processes.is_root()) base::set_log_sink(print_log);
   const auto say = [&](const char* message) {
-    if (processes.is_first()) fmt::print(stderr, "tomofield: {}\n", message);
+    if (processes.is_root()) fmt::print(stderr, "tomofield: {}\n", message);
   };
   CLI::App program{
       "tomofield: clean tomograms from aligned tilt series by continuous density fields",

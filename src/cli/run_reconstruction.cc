@@ -28,7 +28,7 @@ std::function<void()> tell_if_stuck(const std::filesystem::path& model,
                                     const distributed::Communicator& processes) {
   constexpr double kSecondsToAnswer = 0.4;
   auto since = std::make_shared<std::optional<base::Stopwatch>>();
-  auto is_told = std::make_shared<bool>(!processes.is_first());
+  auto is_told = std::make_shared<bool>(!processes.is_root());
   return [=] {
     if (!stop_was_requested() || *is_told) return;
     if (!*since) since->emplace();
@@ -108,10 +108,10 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
   const bool is_job = processes.size() > 1;
   stop_on_signals(is_job);
-  if (is_job) processes.while_waiting(tell_if_stuck(paths.model, processes));
+  if (is_job) processes.set_waiting_callback(tell_if_stuck(paths.model, processes));
   reconstruction::ReconstructHooks hooks{
       .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};
-  if (processes.is_first()) {
+  if (processes.is_root()) {
     hooks.progress = make_progress_bar("reconstruct");
     hooks.tune_progress = make_progress_bar("tune");
   }
@@ -124,7 +124,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
       if (options.resolved.tune) throw stopped("the finished trials are in", paths.trials, options);
       throw ExitStatus{stop_status(), "stopped before the first checkpoint"};
   }
-  if (!processes.is_first()) return;
+  if (!processes.is_root()) return;
   print_files(paths);
   write_pictures(paths.volume, series, paths.picture_prefix);
   if (options.field.tree == TreeKind::kAdaptive)

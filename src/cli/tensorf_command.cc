@@ -40,8 +40,8 @@ void run(Arguments& arguments) {
   options.input.scratch_dir = io::scratch_directory(options.resolved.output);
   options.input.keep_views = !arguments.dry_run;
   const tilt_series::TiltSeries series(options.input);
-  options.field.leaf_size = baseline::one_node_size(
-      plan_measurement(series, options.specimen).roi, options.fit.coarse_bin);
+  options.field.leaf_size = baseline::one_node_size(plan_measurement(series, options.specimen).roi,
+                                                    options.fit.coarse_bin);
   options.resolved.leaf_size = options.field.leaf_size;
   run_reconstruction(series, options, arguments.dry_run);
 }

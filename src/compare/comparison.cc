@@ -18,6 +18,7 @@
 #include "report/pictures.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
+#include "tomofield/options.h"
 
 namespace tomofield::compare {
 namespace {
@@ -47,7 +48,7 @@ void add_pictures(const CompareOptions& options, const std::vector<Row>& rows,
   fs::create_directories(folder);
   const std::vector<Shown> shown = shown_volumes(rows, options.truth);
   const report::GreyScale scale = report::grey_scale_of(shown.front().planes);
-  const Detail detail = busiest_detail(shown.front().planes.front());
+  const Rectangle detail = busiest_detail(shown.front().planes.front());
   page.add_heading("Central slices");
   page.add_paragraph(
       "All, and the details below, on one grey scale: 0.5 to 99.5 percentiles of the first "

@@ -14,9 +14,9 @@ namespace tomofield::compare {
 struct CompareOptions {
   std::filesystem::path program;  ///< tomofield itself
   SeriesFiles files;
-  Options series;  ///< says how the series is read and where the specimen is
-  std::vector<std::string> series_words;       ///< words of the command line, without --exclude
-  std::vector<Method> methods;                 ///< the first is the main one
+  Options series;                         ///< says how the series is read and where the specimen is
+  std::vector<std::string> series_words;  ///< words of the command line, without --exclude
+  std::vector<Method> methods;            ///< the first is the main one
   std::optional<std::filesystem::path> truth;  ///< MRC volume
   bool tune = false;                           ///< give --tune to the methods that have it
   bool halves = false;  ///< also run on the odd and on the even views and correlate the two

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::int64_t kPictureWidth = 320;  // smallest width where whole voxels allow it
 
-double standard_deviation(const report::Slice& plane, const Detail& d) {
+double standard_deviation(const report::Slice& plane, const Rectangle& d) {
   double n = 0, sum = 0, squares = 0;
   for (std::int64_t y = d.y0; y < d.y1; ++y) {
     for (std::int64_t x = d.x0; x < d.x1; ++x) {
@@ -31,15 +31,15 @@ report::HtmlFigure figure(const Shown& volume, const report::Slice& slice, const
 
 }  // namespace
 
-Detail busiest_detail(const report::Slice& plane) {
+Rectangle busiest_detail(const report::Slice& plane) {
   const std::int64_t shorter = std::min(plane.width, plane.height);
   const std::int64_t side = std::min(shorter, std::max<std::int64_t>(shorter / 3, 32));
   const std::int64_t step = std::max<std::int64_t>(side / 2, 1);
-  Detail best{0, 0, side, side};
+  Rectangle best{0, 0, side, side};
   double largest = -1;
   for (std::int64_t y = 0; y + side <= plane.height; y += step) {
     for (std::int64_t x = 0; x + side <= plane.width; x += step) {
-      const Detail here{x, y, x + side, y + side};
+      const Rectangle here{x, y, x + side, y + side};
       const double deviation = standard_deviation(plane, here);
       if (deviation > largest) {
         largest = deviation;
@@ -62,7 +62,8 @@ std::vector<report::HtmlFigure> plane_figures(const std::vector<Shown>& volumes,
 }
 
 std::vector<report::HtmlFigure> detail_figures(const std::vector<Shown>& volumes,
-                                               const Detail& detail, const report::GreyScale& scale,
+                                               const Rectangle& detail,
+                                               const report::GreyScale& scale,
                                                const std::filesystem::path& folder) {
   const auto cut = [&](const Shown& volume) {
     return volume.planes.front().cut(detail.x0, detail.y0, detail.x1, detail.y1);
@@ -73,8 +74,8 @@ std::vector<report::HtmlFigure> detail_figures(const std::vector<Shown>& volumes
   return figures;
 }
 
-std::vector<report::Curve> detail_profiles(const std::vector<Shown>& volumes, const Detail& detail,
-                                           double voxel_size_A) {
+std::vector<report::Curve> detail_profiles(const std::vector<Shown>& volumes,
+                                           const Rectangle& detail, double voxel_size_A) {
   const double step = voxel_size_A > 0 ? voxel_size_A : 1.0;
   const std::int64_t row = (detail.y0 + detail.y1) / 2;
   std::vector<report::Curve> curves;

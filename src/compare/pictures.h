@@ -8,6 +8,7 @@
 #include "report/curve_plot.h"
 #include "report/html.h"
 #include "report/slice.h"
+#include "tomofield/options.h"
 
 namespace tomofield::compare {
 
@@ -17,14 +18,10 @@ struct Shown {
   std::vector<report::Slice> planes;  ///< xy, xz, yz
 };
 
-/// The part of the xy plane that the report enlarges, in voxels; the last ones are excluded.
-struct Detail {
-  std::int64_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-};
-
-/// Returns the square with the largest standard deviation on a lattice of half its side. Its side
-/// is a third of the plane's shorter side, at least 32 voxels.
-Detail busiest_detail(const report::Slice& plane);
+/// Returns the part of an xy plane that the report enlarges, in voxels: the square with the largest
+/// standard deviation on a lattice of half its side. Its side is a third of the plane's shorter
+/// side, at least 32 voxels.
+Rectangle busiest_detail(const report::Slice& plane);
 
 /// Draws the same plane (0: xy, 1: xz, 2: yz) of every volume. PNG files go to `folder`.
 std::vector<report::HtmlFigure> plane_figures(const std::vector<Shown>& volumes, std::size_t plane,
@@ -32,11 +29,12 @@ std::vector<report::HtmlFigure> plane_figures(const std::vector<Shown>& volumes,
                                               const std::filesystem::path& folder);
 /// Draws the detail of every xy plane. PNG files go to `folder`.
 std::vector<report::HtmlFigure> detail_figures(const std::vector<Shown>& volumes,
-                                               const Detail& detail, const report::GreyScale& scale,
+                                               const Rectangle& detail,
+                                               const report::GreyScale& scale,
                                                const std::filesystem::path& folder);
 /// Returns the densities along x through the middle of the detail. Distances are in Å, or in voxels
 /// if their size is not known.
-std::vector<report::Curve> detail_profiles(const std::vector<Shown>& volumes, const Detail& detail,
-                                           double voxel_size_A);
+std::vector<report::Curve> detail_profiles(const std::vector<Shown>& volumes,
+                                           const Rectangle& detail, double voxel_size_A);
 
 }  // namespace tomofield::compare

@@ -15,7 +15,7 @@ report::Slice plane_with_texture() {
 }
 
 TEST(BusiestDetail, LiesWhereThePlaneVariesMost) {
-  const Detail detail = busiest_detail(plane_with_texture());
+  const Rectangle detail = busiest_detail(plane_with_texture());
   EXPECT_EQ(detail.x1 - detail.x0, 32);
   EXPECT_EQ(detail.y1 - detail.y0, 32);
   EXPECT_EQ(detail.x0, 64);
@@ -23,7 +23,7 @@ TEST(BusiestDetail, LiesWhereThePlaneVariesMost) {
 }
 
 TEST(BusiestDetail, FitsIntoSmallPlanes) {
-  const Detail detail = busiest_detail(report::Slice("xy", 20, 9));
+  const Rectangle detail = busiest_detail(report::Slice("xy", 20, 9));
   EXPECT_EQ(detail.x1, 9);
   EXPECT_EQ(detail.y1, 9);
 }

@@ -35,9 +35,9 @@ void add_truth_scores(std::span<const Row> rows, const fs::path& truth, Table& t
   table.add({"ssim_affine", "SSIM, scaled", Better::kHigher, 3}, affine_ssim);
 }
 
-std::string boxes_text(const std::vector<evaluate::Box>& boxes) {
+std::string boxes_text(const std::vector<base::Box>& boxes) {
   std::vector<std::string> texts;
-  for (const evaluate::Box& box : boxes) texts.push_back(evaluate::to_text(box));
+  for (const base::Box& box : boxes) texts.push_back(evaluate::to_text(box));
   return fmt::format("{}", fmt::join(texts, " and "));
 }
 

@@ -13,7 +13,7 @@
 namespace tomofield::distributed {
 
 /// An Error that all ranks of a job throw together, with the same message
-/// (Communicator::run_collectively). Every rank can then end in order, and the first rank reports
+/// (Communicator::run_collectively). Every rank can then end in order, and the root reports
 /// the message once.
 class SharedError : public Error {
  public:
@@ -36,8 +36,9 @@ class Communicator {
 
   int rank() const { return rank_; }  ///< 0 <= rank < size
   int size() const { return size_; }
-  /// Returns true on rank 0, which reports to the user and writes what the ranks do not share.
-  bool is_first() const { return rank_ == 0; }
+  /// Returns true on the root, rank 0, which reports to the user and writes what the ranks do not
+  /// share.
+  bool is_root() const { return rank_ == 0; }
   /// Returns the number of ranks on this machine, this one included.
   int size_on_machine() const { return size_on_machine_; }
 
@@ -93,7 +94,7 @@ class Communicator {
   void run_collectively(const std::function<void()>& body) const;
 
   /// Sets a function that is called now and then while this rank waits long for others.
-  void while_waiting(std::function<void()> check) const { check_ = std::move(check); }
+  void set_waiting_callback(std::function<void()> check) const { check_ = std::move(check); }
 
   /// The bytes that this rank has sent, and the seconds for which it has waited for others, since
   /// the job started.

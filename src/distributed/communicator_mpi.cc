@@ -19,7 +19,7 @@ namespace {
 const MPI_Comm kAll = MPI_COMM_WORLD;
 constexpr int kTag = 1;
 // MPI counts in ints, so longer arrays go in pieces of this many elements.
-constexpr std::size_t kMostAtOnce = std::size_t{1} << 28;
+constexpr std::size_t kMaxAtOnce = std::size_t{1} << 28;
 
 template <typename T>
 MPI_Datatype type_of();
@@ -50,8 +50,8 @@ class Waiting {
 // Calls body(piece) for pieces whose elements MPI can count.
 template <typename T, typename Body>
 void for_each_piece(std::span<T> values, const Body& body) {
-  for (std::size_t at = 0; at < values.size(); at += kMostAtOnce)
-    body(values.subspan(at, std::min(kMostAtOnce, values.size() - at)));
+  for (std::size_t at = 0; at < values.size(); at += kMaxAtOnce)
+    body(values.subspan(at, std::min(kMaxAtOnce, values.size() - at)));
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ TEST(Communicator, AloneNothingChanges) {
   const Communicator& alone = Communicator::alone();
   EXPECT_EQ(alone.rank(), 0);
   EXPECT_EQ(alone.size(), 1);
-  EXPECT_TRUE(alone.is_first());
+  EXPECT_TRUE(alone.is_root());
   std::vector<double> values{1.5, -2.0};
   alone.allreduce_sum(std::span(values));
   EXPECT_EQ(values, (std::vector<double>{1.5, -2.0}));
@@ -62,7 +62,7 @@ TEST(GatheredArrays, AloneHandsOutAllOfThemInOrder) {
   const std::size_t a = arrays.add(first), b = arrays.add(second);
   std::vector<float> seen_first, seen_second;
   int pieces = 0;
-  arrays.read_on_first([&] {
+  arrays.read_on_root([&] {
     arrays.hand_out(b, [&](std::span<const float> piece) {
       seen_second.insert(seen_second.end(), piece.begin(), piece.end());
     });

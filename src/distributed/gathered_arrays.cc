@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kPiece = std::size_t{1} << 20;
 
-// A request of the first rank for [first, end) of an array; array −1 ends the service.
+// A request of the root for [first, end) of an array; array −1 ends the service.
 struct Request {
   std::int64_t array = -1, first = 0, end = 0;
 };
@@ -42,9 +42,9 @@ std::size_t GatheredArrays::add(std::span<const float> values) {
   return arrays_.size() - 1;
 }
 
-void GatheredArrays::read_on_first(const std::function<void()>& body) const {
+void GatheredArrays::read_on_root(const std::function<void()>& body) const {
   processes_.run_collectively([&] {
-    if (!processes_.is_first()) return answer();
+    if (!processes_.is_root()) return answer();
     // Releases the other ranks from waiting, also if the body throws.
     struct Dismissal {
       const Communicator& processes;

@@ -26,7 +26,7 @@ int first_piece(std::span<const double> work, int index, int count) {
 
 }  // namespace
 
-Range part_of(std::span<const double> work, int index, int count) {
+base::Range part_of(std::span<const double> work, int index, int count) {
   TOMOFIELD_CHECK(static_cast<int>(work.size()) >= count, "a piece for every part");
   return {first_piece(work, index, count), first_piece(work, index + 1, count)};
 }

@@ -11,6 +11,8 @@
 namespace tomofield::distributed {
 namespace {
 
+using base::Range;
+
 TEST(Partition, EqualPiecesMakeEqualParts) {
   const std::vector<double> work(12, 64.0);
   EXPECT_EQ(part_of(work, 0, 3), (Range{0, 4}));

@@ -7,34 +7,34 @@
 
 namespace tomofield::evaluate {
 
-Box whole_box(const base::Shape3& shape) { return {{}, {shape.nx, shape.ny, shape.nz}}; }
+base::Box whole_box(const base::Shape3& shape) { return {{}, {shape.nx, shape.ny, shape.nz}}; }
 
-Box whole_box(const io::MrcReader& file) {
+base::Box whole_box(const io::MrcReader& file) {
   return whole_box(base::Shape3{file.header().nx, file.header().ny, file.header().nz});
 }
 
-bool lies_within(const Box& box, const Box& outer) {
+bool lies_within(const base::Box& box, const base::Box& outer) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (box.first[axis] < outer.first[axis] || box.last[axis] > outer.last[axis] ||
-        box.first[axis] >= box.last[axis])
+    if (box.begin[axis] < outer.begin[axis] || box.end[axis] > outer.end[axis] ||
+        box.begin[axis] >= box.end[axis])
       return false;
   }
   return true;
 }
 
-std::string to_text(const Box& box) {
-  return fmt::format("{},{},{},{},{},{}", box.first[0], box.first[1], box.first[2], box.last[0],
-                     box.last[1], box.last[2]);
+std::string to_text(const base::Box& box) {
+  return fmt::format("{},{},{},{},{},{}", box.begin[0], box.begin[1], box.begin[2], box.end[0],
+                     box.end[1], box.end[2]);
 }
 
-base::Volume read_box(const io::MrcReader& file, const Box& box) {
+base::Volume read_box(const io::MrcReader& file, const base::Box& box) {
   base::Volume volume(box.shape(), file.header().voxel_size_A[0]);
   const base::Shape3& shape = volume.shape;
   std::vector<float> rows(static_cast<std::size_t>(file.header().nx * shape.ny));
   for (std::int64_t z = 0; z < shape.nz; ++z) {
-    file.read_rows(box.first[2] + z, box.first[1], shape.ny, rows);
+    file.read_rows(box.begin[2] + z, box.begin[1], shape.ny, rows);
     for (std::int64_t y = 0; y < shape.ny; ++y) {
-      const auto from = rows.begin() + y * file.header().nx + box.first[0];
+      const auto from = rows.begin() + y * file.header().nx + box.begin[0];
       std::copy(from, from + shape.nx, &volume.at(0, y, z));
     }
   }

@@ -18,15 +18,16 @@ struct Moments {
 };
 
 template <typename Visit>
-void for_each_voxel(const base::Volume& volume, const std::vector<Box>& boxes, Visit&& visit) {
-  for (const Box& box : boxes)
-    for (std::int64_t z = box.first[2]; z < box.last[2]; ++z)
-      for (std::int64_t y = box.first[1]; y < box.last[1]; ++y)
-        for (std::int64_t x = box.first[0]; x < box.last[0]; ++x)
+void for_each_voxel(const base::Volume& volume, const std::vector<base::Box>& boxes,
+                    Visit&& visit) {
+  for (const base::Box& box : boxes)
+    for (std::int64_t z = box.begin[2]; z < box.end[2]; ++z)
+      for (std::int64_t y = box.begin[1]; y < box.end[1]; ++y)
+        for (std::int64_t x = box.begin[0]; x < box.end[0]; ++x)
           visit(static_cast<double>(volume.at(x, y, z)));
 }
 
-Moments moments(const base::Volume& volume, const std::vector<Box>& boxes) {
+Moments moments(const base::Volume& volume, const std::vector<base::Box>& boxes) {
   double count = 0.0, sum = 0.0, squares = 0.0;
   for_each_voxel(volume, boxes, [&](double value) {
     count += 1.0;
@@ -53,9 +54,9 @@ void require_finite(const base::Volume& volume) {
 }
 
 void check_regions(const Regions& regions, const base::Shape3& shape) {
-  const Box whole = whole_box(shape);
+  const base::Box whole = whole_box(shape);
   for (const auto* boxes : {&regions.foreground, &regions.background}) {
-    for (const Box& box : *boxes) {
+    for (const base::Box& box : *boxes) {
       if (lies_within(box, whole)) continue;
       throw Error(fmt::format("the region {} must not be empty and must lie within {}, the volume",
                               to_text(box), to_text(whole)));
@@ -64,14 +65,14 @@ void check_regions(const Regions& regions, const base::Shape3& shape) {
 }
 
 // Returns the cubes of the lattice in order of z, y, x.
-std::vector<Box> lattice_cubes(const base::Shape3& shape) {
+std::vector<base::Box> lattice_cubes(const base::Shape3& shape) {
   const std::array<std::int64_t, 3> sizes{shape.nx, shape.ny, shape.nz};
   const std::int64_t side =
       std::clamp<std::int64_t>(*std::min_element(sizes.begin(), sizes.end()) / 8, 4, 32);
   const auto first = [&](std::size_t axis, std::int64_t cube) {
     return sizes[axis] % side / 2 + cube * side;
   };
-  std::vector<Box> cubes;
+  std::vector<base::Box> cubes;
   for (std::int64_t z = 0; z < shape.nz / side; ++z)
     for (std::int64_t y = 0; y < shape.ny / side; ++y)
       for (std::int64_t x = 0; x < shape.nx / side; ++x) {
@@ -112,7 +113,7 @@ ContrastScore contrast_score(const base::Volume& volume, const Regions& regions)
     throw Error(fmt::format("every voxel of the volume is {}: it has no contrast", low));
   ContrastScore score{.low = static_cast<double>(low), .high = static_cast<double>(high)};
   const double range = score.high - score.low;
-  const auto normalised = [&](const std::vector<Box>& boxes) {
+  const auto normalised = [&](const std::vector<base::Box>& boxes) {
     const Moments m = moments(volume, boxes);
     return Moments{(m.mean - score.low) / range, m.variance / (range * range)};
   };
@@ -130,7 +131,7 @@ ContrastScore contrast_score(const base::Volume& volume, const Regions& regions)
 
 Regions choose_regions(const base::Volume& volume) {
   require_finite(volume);
-  const std::vector<Box> cubes = lattice_cubes(volume.shape);
+  const std::vector<base::Box> cubes = lattice_cubes(volume.shape);
   std::vector<Moments> statistics(cubes.size());
   base::parallel_for(std::ssize(cubes), [&](std::int64_t c) {
     const auto i = static_cast<std::size_t>(c);
@@ -146,9 +147,9 @@ Regions choose_regions(const base::Volume& volume) {
 }
 
 nlohmann::json contrast_json(const ContrastScore& score, const Regions& regions) {
-  const auto boxes = [](const std::vector<Box>& all) {
+  const auto boxes = [](const std::vector<base::Box>& all) {
     nlohmann::json list = nlohmann::json::array();
-    for (const Box& box : all) list.push_back(to_text(box));
+    for (const base::Box& box : all) list.push_back(to_text(box));
     return list;
   };
   return {{"cnr", score.cnr},

@@ -10,7 +10,7 @@ namespace tomofield::evaluate {
 
 /// The boxes in which a volume shows structure and those in which it shows none, in its voxels.
 struct Regions {
-  std::vector<Box> foreground, background;
+  std::vector<base::Box> foreground, background;
 };
 
 /// The contrast of a volume that was mapped to [0, 1] by its smallest and its largest voxel: how

@@ -22,15 +22,15 @@ class ContrastTest : public ::testing::Test {
     fill(smooth_, 1.0f, 0.05f);
   }
 
-  void fill(const Box& box, float mean, float spread) {
-    for (std::int64_t z = box.first[2]; z < box.last[2]; ++z)
-      for (std::int64_t y = box.first[1]; y < box.last[1]; ++y)
-        for (std::int64_t x = box.first[0]; x < box.last[0]; ++x)
+  void fill(const base::Box& box, float mean, float spread) {
+    for (std::int64_t z = box.begin[2]; z < box.end[2]; ++z)
+      for (std::int64_t y = box.begin[1]; y < box.end[1]; ++y)
+        for (std::int64_t x = box.begin[0]; x < box.end[0]; ++x)
           volume_.at(x, y, z) = mean + spread * ((x + y + z) % 2 == 0 ? 1.0f : -1.0f);
   }
 
   base::Volume volume_;
-  const Box dense_{{12, 20, 8}, {16, 24, 12}}, smooth_{{40, 4, 24}, {44, 8, 28}};
+  const base::Box dense_{{12, 20, 8}, {16, 24, 12}}, smooth_{{40, 4, 24}, {44, 8, 28}};
 };
 
 TEST_F(ContrastTest, FollowsTheFormulae) {
@@ -45,7 +45,7 @@ TEST_F(ContrastTest, FollowsTheFormulae) {
 }
 
 TEST_F(ContrastTest, SeveralBoxesAreOneRegion) {
-  const Box left{{12, 20, 8}, {14, 24, 12}}, right{{14, 20, 8}, {16, 24, 12}};
+  const base::Box left{{12, 20, 8}, {14, 24, 12}}, right{{14, 20, 8}, {16, 24, 12}};
   EXPECT_NEAR(contrast_score(volume_, {{left, right}, {smooth_}}).cnr,
               contrast_score(volume_, {{dense_}, {smooth_}}).cnr, 1e-12);
 }

@@ -35,11 +35,11 @@ double trilinear(const base::Volume& volume, const std::array<double, 3>& point)
   return std::lerp(along_y(z.low), along_y(z.high), z.share);
 }
 
-void check_line(const LineSegment& line, const Box& place) {
+void check_line(const LineSegment& line, const base::Box& place) {
   for (const auto& end : {line.from, line.to}) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (end[axis] >= static_cast<double>(place.first[axis]) &&
-          end[axis] <= static_cast<double>(place.last[axis]))
+      if (end[axis] >= static_cast<double>(place.begin[axis]) &&
+          end[axis] <= static_cast<double>(place.end[axis]))
         continue;
       throw Error(fmt::format("the profile's end {:g},{:g},{:g} lies outside of the voxels {}",
                               end[0], end[1], end[2], to_text(place)));
@@ -69,13 +69,13 @@ std::vector<std::array<double, 3>> LineSegment::points() const {
   return all;
 }
 
-std::vector<double> line_profile(const base::Volume& volume, const Box& place,
+std::vector<double> line_profile(const base::Volume& volume, const base::Box& place,
                                  const LineSegment& line) {
   check_line(line, place);
   std::vector<double> values;
   for (auto point : line.points()) {
     for (std::size_t axis = 0; axis < 3; ++axis)
-      point[axis] -= static_cast<double>(place.first[axis]);
+      point[axis] -= static_cast<double>(place.begin[axis]);
     values.push_back(trilinear(volume, point));
   }
   return values;

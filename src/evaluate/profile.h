@@ -20,7 +20,7 @@ struct LineSegment {
 /// Returns the trilinear value at each point of a line. Beyond the centres of the outermost voxels,
 /// the outermost values continue. `place` is where the volume lies among the voxels that the line
 /// counts. Throws Error for a line that leaves the volume or is shorter than one voxel.
-std::vector<double> line_profile(const base::Volume& volume, const Box& place,
+std::vector<double> line_profile(const base::Volume& volume, const base::Box& place,
                                  const LineSegment& line);
 
 /// One column of a table of profiles.

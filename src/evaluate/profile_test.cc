@@ -46,7 +46,7 @@ TEST(Profile, GoesOnBeyondTheOutermostCentres) {
 
 TEST(Profile, CountsVoxelsOfTheWholeWhereItHasAPart) {
   const base::Volume volume = ramp({6, 6, 6});
-  const Box part{{10, 20, 30}, {16, 26, 36}};
+  const base::Box part{{10, 20, 30}, {16, 26, 36}};
   const auto whole =
       line_profile(volume, whole_box(volume.shape), {{1.0, 2.0, 3.0}, {5.0, 2.0, 3.0}});
   EXPECT_EQ(line_profile(volume, part, {{11.0, 22.0, 33.0}, {15.0, 22.0, 33.0}}), whole);
@@ -55,7 +55,7 @@ TEST(Profile, CountsVoxelsOfTheWholeWhereItHasAPart) {
 
 TEST(Profile, RefusesLinesOutsideOrTooShort) {
   const base::Volume volume = ramp({6, 6, 6});
-  const Box whole = whole_box(volume.shape);
+  const base::Box whole = whole_box(volume.shape);
   EXPECT_THROW(line_profile(volume, whole, {{1.0, 1.0, 1.0}, {6.1, 1.0, 1.0}}), Error);
   EXPECT_THROW(line_profile(volume, whole, {{-0.1, 1.0, 1.0}, {5.0, 1.0, 1.0}}), Error);
   EXPECT_THROW(line_profile(volume, whole, {{1.0, 1.0, 1.0}, {1.5, 1.0, 1.0}}), Error);

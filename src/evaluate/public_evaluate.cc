@@ -4,8 +4,8 @@
 
 #include <utility>
 
-#include "evaluate/compare.h"
 #include "evaluate/fsc.h"
+#include "evaluate/similarity.h"
 #include "tomofield/error.h"
 
 namespace tomofield {

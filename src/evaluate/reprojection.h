@@ -17,7 +17,7 @@ namespace tomofield::evaluate {
 /// The place of a volume of one voxel a pixel in the views.
 struct VolumePlace {
   geometry::TiltGeometry geometry;  ///< thickness: the volume's voxels in z
-  geometry::Roi roi;                ///< the pixels of its voxels at zero tilt
+  Rectangle roi;                    ///< the pixels of its voxels at zero tilt
   /// True if nothing of the specimen lies outside of the volume. Otherwise a ray counts only if it
   /// stays within the volume's x while it crosses the thickness.
   bool is_whole_specimen = false;

@@ -17,7 +17,7 @@ namespace {
 class ReprojectionTest : public ::testing::Test {
  protected:
   static constexpr std::int64_t kWidth = 60, kHeight = 30, kThickness = 8;
-  const geometry::Roi roi_{10, 4, 54, 26};
+  const Rectangle roi_{10, 4, 54, 26};
 
   ReprojectionTest() : volume_({roi_.width(), roi_.height(), kThickness}) {
     values_ = testing::random_floats(kHeight, 1, 1.0, 2.0);

@@ -42,7 +42,7 @@ bool is_ours(const io::MrcReader& volume) {
 // Returns the offset by the ORIGINs, in IMOD's sign, if they make one volume a part of the other.
 // Otherwise they say nothing: many programs write other things there, and most nothing.
 std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcReader& b) {
-  const VolumeSizes size_a = whole_box(a).last, size_b = whole_box(b).last;
+  const VolumeSizes size_a = whole_box(a).end, size_b = whole_box(b).end;
   Offset offset{};
   bool lies_in_b = true, lies_in_a = true;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -60,7 +60,7 @@ std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcRead
 }
 
 Offset offset_by_centres(const io::MrcReader& a, const io::MrcReader& b) {
-  const VolumeSizes size_a = whole_box(a).last, size_b = whole_box(b).last;
+  const VolumeSizes size_a = whole_box(a).end, size_b = whole_box(b).end;
   Offset offset;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::int64_t common = std::min(size_a[axis], size_b[axis]);
@@ -70,12 +70,12 @@ Offset offset_by_centres(const io::MrcReader& a, const io::MrcReader& b) {
 }
 
 // Returns the box that both volumes have, in voxels of `b`.
-Box common_box(const io::MrcReader& a, const io::MrcReader& b, const Offset& offset) {
-  const VolumeSizes size_a = whole_box(a).last, size_b = whole_box(b).last;
-  Box common;
+base::Box common_box(const io::MrcReader& a, const io::MrcReader& b, const Offset& offset) {
+  const VolumeSizes size_a = whole_box(a).end, size_b = whole_box(b).end;
+  base::Box common;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    common.first[axis] = std::max<std::int64_t>(0, offset[axis]);
-    common.last[axis] = std::min(size_b[axis], offset[axis] + size_a[axis]);
+    common.begin[axis] = std::max<std::int64_t>(0, offset[axis]);
+    common.end[axis] = std::min(size_b[axis], offset[axis] + size_a[axis]);
   }
   return common;
 }
@@ -83,7 +83,7 @@ Box common_box(const io::MrcReader& a, const io::MrcReader& b, const Offset& off
 // Refuses sizes of which laying the volumes centre on centre makes no sense, and warns of different
 // ones.
 void check_sizes(const io::MrcReader& first, const io::MrcReader& second) {
-  const VolumeSizes a = whole_box(first).last, b = whole_box(second).last;
+  const VolumeSizes a = whole_box(first).end, b = whole_box(second).end;
   if (a == b) return;
   const auto mismatch = [&](const char* advice) {
     return Error(fmt::format("'{}' has {} voxels and '{}' {}: {}", first.path().string(),
@@ -100,7 +100,7 @@ void check_sizes(const io::MrcReader& first, const io::MrcReader& second) {
                   first.path().string(), to_text(a), second.path().string(), to_text(b)));
 }
 
-void check_box(const Box& box, const Box& common, const io::MrcReader& second) {
+void check_box(const base::Box& box, const base::Box& common, const io::MrcReader& second) {
   if (lies_within(box, common)) return;
   throw Error(fmt::format(
       "the box {} must not be empty and must lie within {}, what both volumes have, in voxels of "
@@ -128,13 +128,13 @@ bool share_half(const VolumeSizes& first, const VolumeSizes& second) {
 }
 
 VolumePair read_pair(const std::filesystem::path& first, const std::filesystem::path& second,
-                     const std::optional<Box>& box) {
+                     const std::optional<base::Box>& box) {
   const io::MrcReader a(first), b(second);
   const std::optional<Offset> part = offset_by_origin(a, b);
   const Offset offset = part.value_or(offset_by_centres(a, b));
-  const Box common = common_box(a, b, offset);
+  const base::Box common = common_box(a, b, offset);
   if (part) {
-    if (whole_box(a).last != whole_box(b).last) {
+    if (whole_box(a).end != whole_box(b).end) {
       base::log_info(fmt::format("placed by their ORIGINs: what both have is {} of '{}'",
                                  evaluate::to_text(common), second.string()));
     }
@@ -143,11 +143,11 @@ VolumePair read_pair(const std::filesystem::path& first, const std::filesystem::
   }
   check_voxel_sizes(a, b);
   if (box) check_box(*box, common, b);
-  const Box in_second = box.value_or(common);
-  Box in_first = in_second;
+  const base::Box in_second = box.value_or(common);
+  base::Box in_first = in_second;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    in_first.first[axis] -= offset[axis];
-    in_first.last[axis] -= offset[axis];
+    in_first.begin[axis] -= offset[axis];
+    in_first.end[axis] -= offset[axis];
   }
   return {read_box(a, in_first), read_box(b, in_second), in_second};
 }

@@ -30,7 +30,7 @@ bool share_half(const VolumeSizes& first, const VolumeSizes& second);
 /// Two volumes of one shape, compared voxel by voxel.
 struct VolumePair {
   base::Volume first, second;
-  Box box;  ///< their place in the second file, in its voxels
+  base::Box box;  ///< their place in the second file, in its voxels
 };
 
 /// Reads an MRC volume and the one that it is compared with. Only the voxels of the box are in
@@ -46,6 +46,6 @@ struct VolumePair {
 /// more than 5 % apart, or, laid centre on centre, less than half of one in the other along some
 /// axis. Throws Error for a box that is empty or not within the common one.
 VolumePair read_pair(const std::filesystem::path& first, const std::filesystem::path& second,
-                     const std::optional<Box>& box);
+                     const std::optional<base::Box>& box);
 
 }  // namespace tomofield::evaluate

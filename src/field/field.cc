@@ -9,8 +9,8 @@
 #include "base/check.h"
 #include "base/parallel.h"
 #include "field/grid/grid_field.h"
+#include "field/merge_target.h"
 #include "field/sampling/resample.h"
-#include "field/vm/merge_target.h"
 #include "field/vm/vm_field.h"
 #include "tomofield/error.h"
 

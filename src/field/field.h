@@ -10,9 +10,9 @@
 
 #include "base/aligned_buffer.h"
 #include "base/random.h"
+#include "field/sampling/resample.h"
 #include "field/tree/quadtree.h"
 #include "field/tree/quadtree_edit.h"
-#include "field/vm/join_quarters.h"
 #include "kernels/lanes.h"
 #include "kernels/leaf_decoding.h"
 #include "kernels/total_variation.h"
@@ -26,7 +26,7 @@ struct LeafShape {
   int nx = 0, ny = 0, nz = 0;
   int rank_x = 0, rank_y = 0, rank_z = 0;  ///< ranks of VX⊗MYZ, VY⊗MXZ, VZ⊗MXY
   bool operator==(const LeafShape&) const = default;
-  static constexpr int kMostVertices = 1 << 16;  ///< along an axis
+  static constexpr int kMaxVertices = 1 << 16;  ///< along an axis
   std::size_t vertices_xz() const { return static_cast<std::size_t>(nx) * nz; }
 };
 

@@ -222,7 +222,7 @@ TEST(FitFactors, TakesMoreRanksThanVertices) {
 
 // Returns the smallest misfit that any leaf can have, from the quarters' vertex values merged as a
 // grid field.
-double least_misfit(const Field& quarters) {
+double min_misfit(const Field& quarters) {
   const auto grid = make_field(FieldKind::kGrid, quarters.tree(), kThickness, quarters.shapes());
   grid->bias = quarters.bias;
   std::vector<float> row(kShape.vertices_xz());
@@ -248,7 +248,7 @@ TEST(MergedFactors, AreNotWorseThanFromRandomStarts) {
     const auto quarters = four_quarters(FieldKind::kVm, noise);
     const auto merged = copy_of(*quarters);
     merge_all(*merged);
-    const double found = misfit(*merged, *quarters) - least_misfit(*quarters);
+    const double found = misfit(*merged, *quarters) - min_misfit(*quarters);
     const MergeTarget target = make_merge_target(*quarters, 0);
     std::vector<double> from_random;
     for (std::uint64_t seed = 0; seed < 9; ++seed) {

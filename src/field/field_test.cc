@@ -11,7 +11,7 @@
 
 #include "base/enum_names.h"
 #include "central_difference.h"
-#include "field/variation_planes.h"
+#include "field/array_variation.h"
 #include "random_arrays.h"
 #include "tomofield/error.h"
 

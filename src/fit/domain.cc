@@ -23,8 +23,7 @@ field::LeafShape leaf_shape(double size, double thickness, double spacing, doubl
 }
 
 // Root cells over a rectangle around the region of interest, which starts on a cell's corner.
-field::RootGrid root_grid(const geometry::Roi& roi, const geometry::Extent2& reach,
-                          std::int64_t cell) {
+field::RootGrid root_grid(const Rectangle& roi, const geometry::Extent2& reach, std::int64_t cell) {
   const auto cells = [cell](double length) {
     return static_cast<std::int64_t>(std::ceil(length / static_cast<double>(cell)));
   };
@@ -40,7 +39,7 @@ field::RootGrid root_grid(const geometry::Roi& roi, const geometry::Extent2& rea
 }
 
 // A domain for rays that meet the region of interest and reach no further than `reach`.
-Domain cover(double thickness, const geometry::Roi& roi, geometry::Extent2 reach,
+Domain cover(double thickness, const Rectangle& roi, geometry::Extent2 reach,
              const FieldOptions& options) {
   projection::SampleGrid grid = projection::make_sample_grid(
       {reach.x0, reach.x1}, thickness, static_cast<double>(roi.x0), static_cast<double>(roi.x1),
@@ -96,7 +95,7 @@ std::int64_t band_rows(const FieldOptions& options) {
   return static_cast<std::int64_t>(options.leaf_size) << options.depth;
 }
 
-Domain make_domain(const geometry::TiltGeometry& geometry, const geometry::Roi& roi,
+Domain make_domain(const geometry::TiltGeometry& geometry, const Rectangle& roi,
                    const FieldOptions& options) {
   const auto reach = geometry.reach();
   return cover(geometry.thickness, roi,
@@ -104,7 +103,7 @@ Domain make_domain(const geometry::TiltGeometry& geometry, const geometry::Roi& 
                options);
 }
 
-Domain make_domain(const geometry::RayGeometry& geometry, const geometry::Roi& roi,
+Domain make_domain(const geometry::RayGeometry& geometry, const Rectangle& roi,
                    const FieldOptions& options) {
   return cover(geometry.aligned.thickness, roi, reach_of_rays(geometry, roi), options);
 }

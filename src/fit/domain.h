@@ -8,13 +8,14 @@
 #include "geometry/ray_geometry.h"
 #include "geometry/tilt_geometry.h"
 #include "projection/sample_grid.h"
+#include "tomofield/options.h"
 
 namespace tomofield::fit {
 
 /// Where the field lives and how it is sampled: root cells over the region of
 /// interest and, with a margin, as far as any ray reaches.
 struct Domain {
-  geometry::Roi roi;
+  Rectangle roi;
   geometry::Extent2 support;  ///< where densities count: what `grid` and the rows cover
   std::int64_t first_row = 0, num_rows = 0;  ///< of the slabs
   projection::SampleGrid grid;
@@ -33,11 +34,11 @@ struct Domain {
 /// Rows of a band, which are those of a root cell.
 std::int64_t band_rows(const FieldOptions& options);
 
-Domain make_domain(const geometry::TiltGeometry& geometry, const geometry::Roi& roi,
+Domain make_domain(const geometry::TiltGeometry& geometry, const Rectangle& roi,
                    const FieldOptions& options);
 
 /// For views as they were recorded, whose rays also leave the region across its rows.
-Domain make_domain(const geometry::RayGeometry& geometry, const geometry::Roi& roi,
+Domain make_domain(const geometry::RayGeometry& geometry, const Rectangle& roi,
                    const FieldOptions& options);
 
 /// What `grid` covers at one sample a pixel of a stage, in its coordinates; margins end

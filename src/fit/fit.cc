@@ -6,10 +6,8 @@
 #include <numeric>
 #include <utility>
 
-#include "base/lanes.h"
 #include "base/log.h"
 #include "base/random.h"
-#include "base/shuffle.h"
 #include "field/vm/factorise.h"
 #include "objective/ray_data_term.h"
 #include "objective/slab_objective.h"
@@ -55,7 +53,7 @@ int steps_per_epoch_of(const measurement::Measurement& measurement, const FitOpt
 
 // Returns the leaves that a process keeps; none: all.
 std::vector<int> leaves_to_keep(const distributed::Communicator& processes,
-                                const field::Quadtree& tree, distributed::Range bands) {
+                                const field::Quadtree& tree, base::Range bands) {
   return processes.size() == 1 ? std::vector<int>{} : needed_leaves(tree, bands);
 }
 
@@ -67,7 +65,7 @@ TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
   if (field.tree == TreeKind::kUniform) return {};
   const auto levels = leaves_by_level(domain.tree);
   const auto num_leaves = std::accumulate(levels.begin(), levels.end(), std::int64_t{0});
-  return {std::max(field.leaf_size / 2, static_cast<int>(base::kLanes)),
+  return {std::max(field.leaf_size / 2, static_cast<int>(kernels::kLanes)),
           field.leaf_budget > 0 ? field.leaf_budget : static_cast<int>(num_leaves),
           first.bin > 1 ? first.epochs - 1 : static_cast<std::int64_t>(kOpenPart * first.epochs),
           options.seed};

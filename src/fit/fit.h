@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/range.h"
 #include "field/field.h"
 #include "fit/adam.h"
 #include "fit/domain.h"
@@ -82,8 +83,8 @@ class Fit {
 
   const distributed::Communicator& processes() const { return processes_; }
   /// Returns the bands that this process works on: all of them, if it is alone.
-  distributed::Range own_bands() const { return bands_; }
-  distributed::Range own_leaves() const { return leaves_of_bands(field_->tree(), bands_); }
+  base::Range own_bands() const { return bands_; }
+  base::Range own_leaves() const { return leaves_of_bands(field_->tree(), bands_); }
   /// Returns the leaves of a tree that this process keeps; none: all.
   std::vector<int> kept_leaves(const field::Quadtree& tree) const;
   /// Counts the steps that run() has taken, and their messages to other processes.
@@ -109,7 +110,7 @@ class Fit {
   FitOptions options_;
   std::vector<Stage> stages_;
   Domain domain_;
-  distributed::Range bands_;
+  base::Range bands_;
   std::unique_ptr<field::Field> field_;
   Adam optimizer_;
   TreeUpdates tree_updates_;

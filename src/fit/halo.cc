@@ -10,7 +10,7 @@
 namespace tomofield::fit {
 namespace {
 
-using distributed::Range;
+using base::Range;
 
 // Calls body(run, length, where it is when packed) for the runs in order.
 template <typename Body>

@@ -12,7 +12,7 @@
 namespace tomofield::fit {
 namespace {
 
-using distributed::Range;
+using base::Range;
 
 // Three columns and four rows of cells, some of them split, which makes leaves of three sizes.
 field::Quadtree uneven_tree() {

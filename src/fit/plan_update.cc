@@ -4,8 +4,8 @@
 #include <cstddef>
 
 #include "base/check.h"
-#include "base/lanes.h"
 #include "fit/integer_program.h"
+#include "kernels/lanes.h"
 
 namespace tomofield::fit {
 namespace {
@@ -16,7 +16,7 @@ using field::Region;
 
 // A change has to gain this part of the mean error, so that ties do not swing
 // to and fro between updates.
-constexpr double kLeastGain = 1e-6;
+constexpr double kMinGain = 1e-6;
 
 // The possible changes of a tree: variables of the program.
 struct Candidates {
@@ -30,7 +30,7 @@ struct Candidates {
       const QuadtreeNode& leaf = tree.leaf(i);
       if (leaf.region != Region::kInterest) continue;
       ++num_active;
-      if (leaf.square.size % (2 * base::kLanes) == 0 && leaf.square.size / 2 >= options.least_size)
+      if (leaf.square.size % (2 * kernels::kLanes) == 0 && leaf.square.size / 2 >= options.min_size)
         splits.push_back(i);
       // The first of four consecutive leaves with one parent.
       if (leaf.level <= options.coarsest_level || !starts_siblings(tree, i)) continue;
@@ -69,7 +69,7 @@ IntegerProgram make_program(const Candidates& candidates, const std::vector<doub
     const int variable = static_cast<int>(program.costs.size());
     split_variable[static_cast<std::size_t>(leaf)] = variable;
     const double gain = (1 - options.split_factor) * errors[static_cast<std::size_t>(leaf)];
-    program.costs.push_back(kLeastGain - gain / mean_error);
+    program.costs.push_back(kMinGain - gain / mean_error);
     budget.terms.push_back({variable, 1.0});
   }
   for (std::size_t g = 0; g < candidates.merges.size(); ++g) {
@@ -80,7 +80,7 @@ IntegerProgram make_program(const Candidates& candidates, const std::vector<doub
       const int split = split_variable[static_cast<std::size_t>(leaf)];
       if (split >= 0) program.rows.push_back({{{split, 1.0}, {variable, 1.0}}, 1.0});
     }
-    program.costs.push_back(kLeastGain + (options.merge_factor - 1) * sum / mean_error);
+    program.costs.push_back(kMinGain + (options.merge_factor - 1) * sum / mean_error);
     budget.terms.push_back({variable, -1.0});
   }
   program.rows.push_back(std::move(budget));

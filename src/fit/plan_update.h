@@ -8,7 +8,7 @@ namespace tomofield::fit {
 
 struct PlanOptions {
   int budget = 0;              ///< most leaves of the region of interest
-  int least_size = 16;         ///< of a leaf, px; sides stay multiples of a slab in any case
+  int min_size = 16;           ///< of a leaf, px; sides stay multiples of a slab in any case
   int coarsest_level = 0;      ///< no leaf becomes larger than this level's
   double split_factor = 0.75;  ///< predicted error of four quarters, of their leaf's
   double merge_factor = 1.1;   ///< predicted error of a merged leaf, of the sum of the four

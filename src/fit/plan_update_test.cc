@@ -83,7 +83,7 @@ class BruteForce {
     visit(i + 1, leaves, error);
     const field::QuadtreeNode& leaf = tree_.leaf(i);
     if (leaf.region != Region::kInterest) return;
-    if (leaf.square.size / 2 >= options_.least_size)
+    if (leaf.square.size / 2 >= options_.min_size)
       visit(i + 1, leaves + 3,
             error - (1 - options_.split_factor) * errors_[static_cast<std::size_t>(i)]);
     if (leaf.level <= options_.coarsest_level || i + 3 >= tree_.num_leaves()) return;
@@ -119,7 +119,7 @@ TEST_F(PlanUpdate, IsOptimalOnRandomTrees) {
     options.split_factor = random.uniform(0.2, 0.9);
     options.merge_factor = random.uniform(1.01, 2.0);
     options.coarsest_level = static_cast<int>(random.below(2));
-    options.least_size = random.below(2) == 0 ? 16 : 32;
+    options.min_size = random.below(2) == 0 ? 16 : 32;
     const BruteForce oracle(tree, errors, options);
     for (const int room : {-30, -6, -3, -1, 0, 1, 2, 3, 7, 1000}) {
       options.budget = num_active(tree) + room;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/lanes.h"
+#include "kernels/lanes.h"
 
 namespace tomofield::fit {
 namespace {
@@ -17,10 +17,10 @@ std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
   std::vector<int> bins;
   if (fit.engine != Engine::kSlab) return bins;
   const bool is_adaptive = field.tree == TreeKind::kAdaptive;
-  const bool may_halve = is_adaptive && field.leaf_size % (2 * base::kLanes) == 0;
+  const bool may_halve = is_adaptive && field.leaf_size % (2 * kernels::kLanes) == 0;
   const int smallest_leaf = may_halve ? field.leaf_size / 2 : field.leaf_size;
   const int most = is_adaptive ? std::min(fit.coarse_bin, 2) : fit.coarse_bin;
-  for (int bin = 2; bin <= most && smallest_leaf % (bin * base::kLanes) == 0; bin *= 2) {
+  for (int bin = 2; bin <= most && smallest_leaf % (bin * kernels::kLanes) == 0; bin *= 2) {
     if (std::ssize(bins) < fit.coarse_epochs) bins.push_back(bin);
   }
   return bins;

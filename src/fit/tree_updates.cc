@@ -14,8 +14,8 @@ constexpr std::int64_t kEpochsBetween = 2;
 
 }  // namespace
 
-TreeUpdates::TreeUpdates(int least_size, int budget, std::int64_t open_epochs, std::uint64_t seed)
-    : least_size_(least_size), budget_(budget), open_epochs_(open_epochs), seed_(seed) {}
+TreeUpdates::TreeUpdates(int min_size, int budget, std::int64_t open_epochs, std::uint64_t seed)
+    : min_size_(min_size), budget_(budget), open_epochs_(open_epochs), seed_(seed) {}
 
 bool TreeUpdates::update(std::int64_t epochs_done, field::Field& field, Adam::State& optimizer,
                          TreeProgress& progress) const {
@@ -26,8 +26,7 @@ bool TreeUpdates::update(std::int64_t epochs_done, field::Field& field, Adam::St
   }
   const std::vector<double> errors =
       leaf_errors(field, seed_, static_cast<std::uint64_t>(epochs_done));
-  const Plan plan =
-      plan_update(field.tree(), errors, {.budget = budget_, .least_size = least_size_});
+  const Plan plan = plan_update(field.tree(), errors, {.budget = budget_, .min_size = min_size_});
   if (!plan.edit.is_empty()) apply_edit(plan.edit, field, optimizer);
   progress.is_frozen = plan.edit.is_empty();
   progress.updates.push_back({.epoch = epochs_done,

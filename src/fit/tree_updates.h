@@ -27,9 +27,9 @@ struct TreeProgress {
 /// structure is open, until a plan changes nothing.
 class TreeUpdates {
  public:
-  /// The structure is open for `open_epochs`; leaves stay at least `least_size` wide and
+  /// The structure is open for `open_epochs`; leaves stay at least `min_size` wide and
   /// at most `budget` in number.
-  TreeUpdates(int least_size, int budget, std::int64_t open_epochs, std::uint64_t seed);
+  TreeUpdates(int min_size, int budget, std::int64_t open_epochs, std::uint64_t seed);
   /// Of a tree that stays as it is.
   TreeUpdates() = default;
 
@@ -38,7 +38,7 @@ class TreeUpdates {
               TreeProgress& progress) const;
 
  private:
-  int least_size_ = 0, budget_ = 0;
+  int min_size_ = 0, budget_ = 0;
   std::int64_t open_epochs_ = 0;
   std::uint64_t seed_ = 0;
 };

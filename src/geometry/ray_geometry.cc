@@ -78,7 +78,7 @@ HeightRange clip(const RayBundle::Line& line, const Extent2& rectangle, const He
   return clipped;
 }
 
-Extent2 reach_of_rays(const RayGeometry& geometry, const Roi& roi) {
+Extent2 reach_of_rays(const RayGeometry& geometry, const Rectangle& roi) {
   const Extent2 inside{static_cast<double>(roi.x0), static_cast<double>(roi.y0),
                        static_cast<double>(roi.x1), static_cast<double>(roi.y1)};
   const double thickness = geometry.aligned.thickness;

@@ -6,6 +6,7 @@
 
 #include "geometry/raw_from_aligned.h"
 #include "geometry/tilt_geometry.h"
+#include "tomofield/options.h"
 
 namespace tomofield::geometry {
 
@@ -66,6 +67,6 @@ HeightRange clip(const RayBundle::Line& line, const Extent2& rectangle, const He
 
 /// Returns the rectangle around everything that rays through the region of interest reach, over all
 /// views. It contains the region itself.
-Extent2 reach_of_rays(const RayGeometry& geometry, const Roi& roi);
+Extent2 reach_of_rays(const RayGeometry& geometry, const Rectangle& roi);
 
 }  // namespace tomofield::geometry

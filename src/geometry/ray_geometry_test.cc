@@ -128,7 +128,7 @@ TEST(RayGeometry, PiecesOfALineAddUpOverATiling) {
 // and each side of it is needed.
 TEST(RayGeometry, ReachHoldsTheRaysOfTheRegion) {
   const RayGeometry g = general_geometry(1);
-  for (const Roi& roi : {Roi{0, 0, 64, 48}, Roi{20, 15, 40, 30}}) {
+  for (const Rectangle& roi : {Rectangle{0, 0, 64, 48}, Rectangle{20, 15, 40, 30}}) {
     const Extent2 reach = reach_of_rays(g, roi);
     Extent2 seen{1e9, 1e9, -1e9, -1e9};
     for (int v = 0; v < g.num_views(); ++v) {

@@ -5,14 +5,6 @@
 
 namespace tomofield::geometry {
 
-/// A rectangle of the aligned view at zero tilt, in pixels: [x0, x1) × [y0, y1).
-struct Roi {
-  std::int64_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-  std::int64_t width() const { return x1 - x0; }
-  std::int64_t height() const { return y1 - y0; }
-  bool operator==(const Roi&) const = default;
-};
-
 /// A single-axis tilt geometry. This type alone owns the centres, the hand and the rotation.
 /// Coordinates are pixels of the aligned, binned view; pixel i covers [i, i + 1) and its centre is
 /// i + 0.5. The specimen's X and Y are those of the detector at zero tilt; Z runs over

@@ -11,7 +11,7 @@
 namespace tomofield::io {
 namespace {
 
-constexpr std::size_t kFewestColumns = 3, kMostColumns = 5;
+constexpr std::size_t kMinColumns = 3, kMaxColumns = 5;
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const TextLine& line,
                          const std::string& fault) {
@@ -42,7 +42,7 @@ std::vector<FiducialPoint> read_fiducial_points(const std::filesystem::path& pat
   std::size_t num_columns = 0;
   for (const TextLine& line : read_text_lines(path)) {
     const auto words = split_words(line.text);
-    if (words.size() < kFewestColumns || words.size() > kMostColumns) {
+    if (words.size() < kMinColumns || words.size() > kMaxColumns) {
       refuse(path, line, fmt::format("has {} columns", words.size()));
     }
     if (num_columns != 0 && words.size() != num_columns) {

@@ -84,7 +84,7 @@ struct MrcSpec {
 /// uint16 clamp values outside their range.
 ///
 /// Several ranks may write one file, each its own rows. All of them make a writer and close it; the
-/// first rank puts the file in place.
+/// root puts the file in place.
 class MrcWriter {
  public:
   MrcWriter(const std::filesystem::path& path, const MrcSpec& spec,

@@ -5,8 +5,7 @@
 
 #include "base/check.h"
 #include "io/mrc.h"
-#include "io/mrc_header.h"
-#include "io/mrc_values.h"
+#include "io/mrc_format.h"
 #include "io/positioned_file.h"
 #include "tomofield/error.h"
 

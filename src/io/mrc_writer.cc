@@ -12,8 +12,7 @@
 #include "base/log.h"
 #include "io/atomic_file.h"
 #include "io/mrc.h"
-#include "io/mrc_header.h"
-#include "io/mrc_values.h"
+#include "io/mrc_format.h"
 #include "io/positioned_file.h"
 #include "tomofield/error.h"
 
@@ -71,7 +70,7 @@ void warn_if_disk_is_small(const std::filesystem::path& path, std::int64_t bytes
 struct MrcWriter::Impl {
   MrcHeader header;
   const distributed::Communicator& processes;
-  std::optional<AtomicFile> target;  // only on the first rank
+  std::optional<AtomicFile> target;  // only on the root
   std::optional<PositionedFile> file;
 
   std::mutex mutex;  // guards the members below
@@ -86,7 +85,7 @@ struct MrcWriter::Impl {
         rows(static_cast<std::size_t>(spec.ny * spec.nz)) {
     std::filesystem::path temporary;
     processes.run_collectively([&] {
-      if (!processes.is_first()) return;
+      if (!processes.is_root()) return;
       target.emplace(path);
       temporary = target->temporary_path();
       const std::int64_t bytes = expected_file_bytes(header, path.string());
@@ -180,11 +179,11 @@ void MrcWriter::write_rows(std::int64_t section, std::int64_t first_row, std::in
 
 void MrcWriter::close() {
   impl_->processes.run_collectively([&] {
-    if (!impl_->processes.is_first()) impl_->file->close();
+    if (!impl_->processes.is_root()) impl_->file->close();
   });
   impl_->share_statistics();
   impl_->processes.run_collectively([&] {
-    if (!impl_->processes.is_first()) return;
+    if (!impl_->processes.is_root()) return;
     impl_->finish_statistics();
     const MrcHeaderBytes bytes = encode_mrc_header(impl_->header);
     impl_->file->write_at(0, bytes.data(), bytes.size());

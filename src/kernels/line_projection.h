@@ -1,10 +1,11 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
+
+#include "base/range.h"
 
 namespace tomofield::kernels {
 
@@ -35,26 +36,9 @@ struct LineCrossing {
 /// Up to four crossings as a structure of arrays: lines that one view sees, or views that see one
 /// line. A group is made once and serves all tiles.
 struct CrossingGroup {
-  static constexpr int kMost = 4;
+  static constexpr int kMax = 4;
   template <typename T>
-  using Numbers = std::array<T, kMost>;
-  /// The integers [first, end); empty if end <= first.
-  struct Range {
-    int first = 0, end = 0;
-    bool is_empty() const { return end <= first; }
-    bool contains(int from, int to) const { return from >= first && to <= end; }
-    bool overlaps(int from, int to) const { return !is_empty() && from < end && to > first; }
-    Range common_with(Range other) const {
-      const Range common{std::max(first, other.first), std::min(end, other.end)};
-      return common.is_empty() ? Range{} : common;
-    }
-    /// Returns the smallest range that contains both.
-    Range joined_with(Range other) const {
-      if (is_empty()) return other;
-      if (other.is_empty()) return *this;
-      return {std::min(first, other.first), std::max(end, other.end)};
-    }
-  };
+  using Numbers = std::array<T, kMax>;
 
   alignas(16) Numbers<float> offset, step, low, high, first_pixel, last_pixel, weight;
   /// For views: sample j takes from pixel p = floor(inverse · j + bias) + skipped and from p + 1.
@@ -65,7 +49,7 @@ struct CrossingGroup {
   alignas(16) Numbers<int> origin;
   /// `whole` are the pixels (for lines) or samples (for views) for which no crossing of the group
   /// needs a test of its ends. Outside of `reached`, no crossing has any weight.
-  Range whole, reached;
+  base::Range whole, reached;
 };
 
 /// Appends `lines` of one view to groups. All have the same step and at least one sample. Samples
@@ -82,7 +66,7 @@ void group_views(std::span<const LineCrossing> views, const float* source,
 /// One or two slabs that are processed together. They have the same crossings, so the indices and
 /// weights are computed once. `samples_apart` and `detectors_apart` are the distances in floats
 /// from the first slab's arrays to the second's.
-struct Slabs {
+struct SlabGroup {
   int count = 1;
   std::ptrdiff_t samples_apart = 0, detectors_apart = 0;
 };
@@ -93,7 +77,7 @@ struct Slabs {
 /// traffic a pixel and line: two cache lines of samples; the detector once for all lines.
 void project_lines(const CrossingGroup* lines, int num_groups, const float* samples,
                    std::ptrdiff_t stride, int first, int end, float* detector,
-                   const Slabs& slabs = {});
+                   const SlabGroup& slabs = {});
 
 /// Applies the adjoint: samples[j, lane] += Σ_views weight Σ_u hat(position_view(u) − j)
 /// detector_view[u, lane] for samples j in [first, end), padding included. All views see one line.
@@ -101,6 +85,6 @@ void project_lines(const CrossingGroup* lines, int num_groups, const float* samp
 /// view: two cache lines of the detector (more for |step| < 1); the sample once for all views.
 void backproject_lines(const CrossingGroup* views, int num_groups, const float* detector,
                        std::ptrdiff_t stride, int first, int end, float* samples,
-                       const Slabs& slabs = {});
+                       const SlabGroup& slabs = {});
 
 }  // namespace tomofield::kernels

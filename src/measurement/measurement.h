@@ -26,7 +26,7 @@ constexpr double kContrastPerThickness = 0.075;
 /// views as recorded, and `ray_geometry` says how they look at the specimen.
 struct Measurement {
   geometry::TiltGeometry geometry;
-  geometry::Roi roi;
+  Rectangle roi;
   std::shared_ptr<const SlabViews> rays = nullptr;  ///< divided by the unit; null in a plan
   std::vector<double> noise_sigma = {};             ///< [view]
   double mean_density = 0.0;

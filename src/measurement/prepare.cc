@@ -9,7 +9,7 @@
 #include <span>
 #include <utility>
 
-#include "base/faults.h"
+#include "base/check.h"
 #include "base/log.h"
 #include "tilt_series/view_owner.h"
 #include "tomofield/error.h"
@@ -45,14 +45,14 @@ double common_x_tilt(const std::vector<tilt_series::View>& views, double thickne
   return (low + high) / 2;
 }
 
-geometry::Roi scaled_roi(const geometry::Roi& roi, double factor) {
+Rectangle scaled_roi(const Rectangle& roi, double factor) {
   const auto scale = [factor](std::int64_t v) {
     return std::llround(static_cast<double>(v) / factor);
   };
   return {scale(roi.x0), scale(roi.y0), scale(roi.x1), scale(roi.y1)};
 }
 
-void check_roi(const geometry::Roi& roi, const geometry::TiltGeometry& g, double factor) {
+void check_roi(const Rectangle& roi, const geometry::TiltGeometry& g, double factor) {
   if (roi.x0 < 0 || roi.y0 < 0 || roi.x1 > g.width || roi.y1 > g.height || roi.width() < 1 ||
       roi.height() < 1) {
     throw Error(fmt::format(
@@ -229,7 +229,7 @@ Measurement plan_measurement(const tilt_series::TiltSeries& series,
   if (specimen.axis_x) plan.geometry.axis_x = *specimen.axis_x / plan.bin_factor;
   if (specimen.axis_z) plan.geometry.axis_z = *specimen.axis_z / plan.bin_factor;
   plan.roi = specimen.roi ? scaled_roi(*specimen.roi, plan.bin_factor)
-                          : geometry::Roi{0, 0, plan.geometry.width, plan.geometry.height};
+                          : Rectangle{0, 0, plan.geometry.width, plan.geometry.height};
   check_roi(plan.roi, plan.geometry, plan.bin_factor);
   check_axis(plan.geometry, plan.bin_factor);
   if (series.is_resampled()) {
@@ -258,7 +258,7 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
   set_unit(brightness_of_views(series, shape, processes), prepared);
   for (const double sigma : series.noise_sigma())
     prepared.noise_sigma.push_back(sigma / prepared.unit);
-  const distributed::Range slabs =
+  const base::Range slabs =
       slabs_of_bands(own_bands(shape.num_rows, band_rows, processes), band_rows, shape.num_rows);
   prepared.rays = std::make_shared<SlabViews>(
       shape, slabs, prepared.unit,

@@ -11,18 +11,19 @@
 #include "geometry/tilt_geometry.h"
 #include "measurement/measurement.h"
 #include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::measurement {
 
 /// What the user says about the specimen. Lengths and positions are in unbinned
 /// pixels of the aligned view, whatever --bin makes of them.
 struct SpecimenOptions {
-  double thickness = 0;              ///< of the volume along Z
-  std::optional<geometry::Roi> roi;  ///< default: the whole field of view
-  int hand = 1;                      ///< 1 or −1 (TiltGeometry)
-  std::optional<double> axis_x;      ///< tilt axis on the view; default: its centre
-  std::optional<double> axis_z;      ///< and in the volume; default: its centre
-  bool with_margin = true;           ///< false: the specimen ends inside the field of view
+  double thickness = 0;          ///< of the volume along Z
+  std::optional<Rectangle> roi;  ///< default: the whole field of view
+  int hand = 1;                  ///< 1 or −1 (TiltGeometry)
+  std::optional<double> axis_x;  ///< tilt axis on the view; default: its centre
+  std::optional<double> axis_z;  ///< and in the volume; default: its centre
+  bool with_margin = true;       ///< false: the specimen ends inside the field of view
   /// Returns every fault of these options, a sentence each.
   std::vector<std::string> faults() const;
 };

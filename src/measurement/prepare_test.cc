@@ -126,7 +126,7 @@ TEST(PrepareSeries, AThickerSpecimenOfTheSameMeanIsThinner) {
 TEST(PrepareSeries, ARegionOfInterestHasItsRowsAlone) {
   const SeriesFiles files;
   SpecimenOptions part = specimen();
-  part.roi = geometry::Roi{4, 5, 30, 29};
+  part.roi = Rectangle{4, 5, 30, 29};
   const Measurement prepared = files.prepared(part);
   EXPECT_EQ(prepared.rays->shape().first_row, 5);
   EXPECT_EQ(prepared.rays->shape().num_rows, 24);
@@ -142,7 +142,7 @@ TEST(PrepareSeries, BinnedViewsHaveABinnedGeometry) {
   files.options().bin = 2;
   SpecimenOptions options = specimen();
   options.axis_x = 15.0;
-  options.roi = geometry::Roi{4, 6, 30, 28};
+  options.roi = Rectangle{4, 6, 30, 28};
   const Measurement prepared = files.prepared(options);
   EXPECT_EQ(prepared.geometry.width, kWidth / 2);
   EXPECT_EQ(prepared.geometry.height, kHeight / 2);
@@ -167,7 +167,7 @@ TEST(PrepareSeries, OptionsThatDoNotFitTheSeriesAreRefused) {
   options.hand = 2;
   EXPECT_NE(complaint(options).find("--hand"), std::string::npos) << complaint(options);
   options = specimen();
-  options.roi = geometry::Roi{4, 5, 41, 29};
+  options.roi = Rectangle{4, 5, 41, 29};
   EXPECT_NE(complaint(options).find("--roi"), std::string::npos) << complaint(options);
   options = specimen();
   options.axis_x = 500;

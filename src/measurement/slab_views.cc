@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "base/check.h"
-#include "base/lanes.h"
+#include "kernels/lanes.h"
 #include "tomofield/error.h"
 
 namespace tomofield::measurement {
 
-using base::kLanes;
-using distributed::Range;
+using base::Range;
+using kernels::kLanes;
 
 namespace {
 
@@ -57,7 +57,7 @@ std::size_t SlabViews::num_lines() const {
          static_cast<std::size_t>(shape_.width);
 }
 
-distributed::Range SlabViews::held_rows() const {
+base::Range SlabViews::held_rows() const {
   return {held_.begin * kLanes, static_cast<int>(std::min<std::int64_t>(
                                     std::int64_t{held_.end} * kLanes, shape_.num_rows))};
 }

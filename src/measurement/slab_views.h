@@ -8,7 +8,7 @@
 #include <span>
 #include <utility>
 
-#include "base/lanes.h"
+#include "base/range.h"
 #include "distributed/communicator.h"
 #include "distributed/partition.h"
 #include "io/scratch_memory.h"
@@ -26,7 +26,7 @@ using ReadView =
 /// (io/scratch_memory.h). Of a job of several processes each holds some of the slabs alone.
 class SlabViews {
  public:
-  using Slabs = distributed::Range;
+  using Slabs = base::Range;
   struct Shape {
     std::size_t num_views = 0;
     std::int64_t width = 0, height = 0;        ///< of a view
@@ -85,14 +85,14 @@ class SlabViews {
       const distributed::Communicator& processes = distributed::Communicator::alone()) const;
 
  private:
-  static constexpr std::int64_t kRows = base::kLanes;  // of a slab
+  static constexpr std::int64_t kRows = kernels::kLanes;  // of a slab
   std::pair<double, int> box_sum(int view, std::int64_t x0, std::int64_t y0, int size) const;
   static std::size_t bytes(const Shape& shape);
   void fill(double unit, const ReadView& read_view);
   void add_words(std::size_t first, std::size_t count, std::uint64_t& hash) const;
   std::size_t line(int slab, int view) const;
   std::size_t num_lines() const;  // each has one x of a slab and a view
-  distributed::Range held_rows() const;
+  base::Range held_rows() const;
 
   Shape shape_;
   std::filesystem::path scratch_dir_;
@@ -105,11 +105,10 @@ class SlabViews {
 /// Returns the bands (rows of root cells, `band_rows` rows each but for the last) that a process
 /// works on: consecutive ones, as many rows as others have, in order of ranks. Throws Error if
 /// there are fewer bands than processes.
-distributed::Range own_bands(std::int64_t num_rows, std::int64_t band_rows,
-                             const distributed::Communicator& processes);
+base::Range own_bands(std::int64_t num_rows, std::int64_t band_rows,
+                      const distributed::Communicator& processes);
 
 /// Returns the slabs of those bands, 16 rows each, of `num_rows` rows in all.
-distributed::Range slabs_of_bands(distributed::Range bands, std::int64_t band_rows,
-                                  std::int64_t num_rows);
+base::Range slabs_of_bands(base::Range bands, std::int64_t band_rows, std::int64_t num_rows);
 
 }  // namespace tomofield::measurement

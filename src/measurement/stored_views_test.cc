@@ -103,7 +103,7 @@ TEST(StoredViews, GivesTheRaysThatAViewDecodedAnewWouldGive) {
   const TiltSeries series(input);
   SpecimenOptions specimen;
   specimen.thickness = 40;
-  specimen.roi = geometry::Roi{0, 30, scene.width, 110};
+  specimen.roi = Rectangle{0, 30, scene.width, 110};
   const Measurement measured = prepare_measurement(series, specimen, "/tmp");
   // Its views were forgotten, so that the series decodes this one again.
   constexpr std::size_t kView = 11;

@@ -34,17 +34,17 @@ std::vector<double> positions(double first, double spacing, int count) {
 
 }  // namespace
 
-FourierPrior::FourierPrior(const field::Field& field, const geometry::Roi& roi,
+FourierPrior::FourierPrior(const field::Field& field, const Rectangle& roi,
                            const FourierPriorOptions& options)
     : FourierPrior(field, roi, options, distributed::Communicator::alone(),
                    {0, field.tree().num_leaves()}) {}
 
-FourierPrior::FourierPrior(const field::Field& field, const geometry::Roi& roi,
+FourierPrior::FourierPrior(const field::Field& field, const Rectangle& roi,
                            const FourierPriorOptions& options,
-                           const distributed::Communicator& processes, distributed::Range own)
+                           const distributed::Communicator& processes, base::Range own)
     : field_(field), roi_(roi), options_(options), processes_(processes), own_(own) {
   const double width = static_cast<double>(roi.width()), height = static_cast<double>(roi.height());
-  spacing_ = std::max(1.0, std::max(width, height) / options.most_samples);
+  spacing_ = std::max(1.0, std::max(width, height) / options.max_samples);
   shape_ = {options.slices, static_cast<int>(height / spacing_),
             static_cast<int>(width / spacing_)};
   for (int leaf = 0; leaf < field.tree().num_leaves(); ++leaf) {

@@ -3,18 +3,18 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/range.h"
 #include "distributed/communicator.h"
-#include "distributed/partition.h"
-#include "geometry/tilt_geometry.h"
 #include "objective/axis_penalty.h"
 #include "objective/term.h"
+#include "tomofield/options.h"
 
 namespace tomofield::objective {
 
 struct FourierPriorOptions {
-  double weight = 0.0;    ///< per px³ and density unit; 0 is off
-  int slices = 4;         ///< random heights z a step
-  int most_samples = 64;  ///< of the longer side of the region, at least 1 px apart
+  double weight = 0.0;   ///< per px³ and density unit; 0 is off
+  int slices = 4;        ///< random heights z a step
+  int max_samples = 64;  ///< of the longer side of the region, at least 1 px apart
   std::uint64_t seed = 1;
   AxisPenaltyOptions axes;
 };
@@ -27,12 +27,10 @@ struct FourierPriorOptions {
 class FourierPrior : public Term {
  public:
   /// `field` must outlive it and may change its parameters; rebuild it when the tree changes.
-  FourierPrior(const field::Field& field, const geometry::Roi& roi,
-               const FourierPriorOptions& options);
+  FourierPrior(const field::Field& field, const Rectangle& roi, const FourierPriorOptions& options);
   /// Of a field that processes share, of which this one has the leaves `own`.
-  FourierPrior(const field::Field& field, const geometry::Roi& roi,
-               const FourierPriorOptions& options, const distributed::Communicator& processes,
-               distributed::Range own);
+  FourierPrior(const field::Field& field, const Rectangle& roi, const FourierPriorOptions& options,
+               const distributed::Communicator& processes, base::Range own);
 
   /// Adds the gradient of the own leaves to `gradient` (all parameters). Runs on all threads, with
   /// the same bits for any number of them.
@@ -49,10 +47,10 @@ class FourierPrior : public Term {
   std::vector<LeafSamples> leaf_samples(std::int64_t step) const;
 
   const field::Field& field_;
-  geometry::Roi roi_;
+  Rectangle roi_;
   FourierPriorOptions options_;
   const distributed::Communicator& processes_;
-  distributed::Range own_;
+  base::Range own_;
   double spacing_ = 1.0;
   SliceShape shape_;
   std::vector<int> leaves_;  // that meet the region

@@ -18,7 +18,7 @@ namespace {
 using field::LeafShape;
 using field::Region;
 
-constexpr geometry::Roi kRoi{.x0 = 4, .y0 = 16, .x1 = 118, .y1 = 106};
+constexpr Rectangle kRoi{.x0 = 4, .y0 = 16, .x1 = 118, .y1 = 106};
 
 // A margin cell, and leaves of 64 and 32 px over the region.
 std::unique_ptr<field::Field> uneven_field(FieldKind kind) {
@@ -40,7 +40,7 @@ std::unique_ptr<field::Field> uneven_field(FieldKind kind) {
 FourierPriorOptions some_options() {
   FourierPriorOptions options;
   options.weight = 0.5;
-  options.most_samples = 40;
+  options.max_samples = 40;
   options.seed = 4;
   return options;
 }

@@ -12,10 +12,10 @@ double typical_noise(std::span<const double> sigma_of_view) {
 }
 
 double concavity(double in_voxel_noise, std::span<const double> sigma_of_view) {
-  constexpr double kLeast = 0.02;
+  constexpr double kMinConcavity = 0.02;
   const double noise =
       typical_noise(sigma_of_view) / std::sqrt(static_cast<double>(sigma_of_view.size()));
-  return std::max(in_voxel_noise * noise, kLeast);
+  return std::max(in_voxel_noise * noise, kMinConcavity);
 }
 
 double gain_of_little_noise(double noise, double contrast) {

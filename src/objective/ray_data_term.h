@@ -10,13 +10,14 @@
 #include "measurement/view_residuals.h"
 #include "objective/term.h"
 #include "projection/ray_projector.h"
+#include "tomofield/options.h"
 
 namespace tomofield::objective {
 
 /// Where rays count: they must meet the region of interest, and densities outside the support are
 /// 0.
 struct RayRegion {
-  geometry::Roi roi;
+  Rectangle roi;
   geometry::Extent2 support;
 };
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/aligned_buffer.h"
-#include "base/lanes.h"
+#include "kernels/lanes.h"
 
 namespace tomofield::objective {
 
@@ -19,13 +19,13 @@ double SlabDataTerm::add_slabs(const Step& step, const SlabBatch& batch,
   std::fill_n(detector.data(), size, 0.0f);
   batch.projector.forward(batch.all_samples, step.views, detector.data(), batch.size());
   float* rays = detector.data();
-  for (int slab = batch.slabs.first; slab < batch.slabs.end; ++slab, rays += detector_size) {
+  for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab, rays += detector_size) {
     for (std::size_t v = 0; v < step.views.size(); ++v) {
       const int view = step.views[v];
       view_sums[v] +=
           measurement::data_term(step.models[static_cast<std::size_t>(view)], step.multiplicity,
                                  measured_.rays(slab, view), measured_.mask(slab, view), width,
-                                 rays + static_cast<std::ptrdiff_t>(v) * width * base::kLanes);
+                                 rays + static_cast<std::ptrdiff_t>(v) * width * kernels::kLanes);
     }
     measured_.release(slab);
   }

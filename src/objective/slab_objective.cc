@@ -85,12 +85,12 @@ SlabObjective::BandSums SlabObjective::add_band(const Step& step, int band, floa
   sums.views.resize(step.views.size());
   sums.terms.resize(terms_.size());
   const auto slabs = sampler_.band(band);
-  for (int slab = slabs.first; slab < slabs.end; slab += kSlabsTogether) {
+  for (int slab = slabs.begin; slab < slabs.end; slab += kSlabsTogether) {
     add_batch(step,
               {.sampler = sampler_,
                .projector = projector_,
                .slabs = {slab, std::min(slab + kSlabsTogether, slabs.end)},
-               .begins_band = slab == slabs.first,
+               .begins_band = slab == slabs.begin,
                .all_samples = w.samples.data(),
                .all_gradients = w.gradients.data()},
               gradient, sums);
@@ -105,14 +105,14 @@ SlabObjective::BandSums SlabObjective::add_band(const Step& step, int band, floa
 
 void SlabObjective::add_batch(const Step& step, const SlabBatch& batch, float* gradient,
                               BandSums& sums) const {
-  for (int slab = batch.slabs.first; slab < batch.slabs.end; ++slab)
+  for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab)
     sampler_.decode(slab, batch.samples(slab));
   if (terms_.empty() || !terms_.front()->replaces_gradient())
     std::fill_n(batch.all_gradients,
                 static_cast<std::size_t>(batch.size()) * projector_.grid().size(), 0.0f);
   for (std::size_t t = 0; t < terms_.size(); ++t)
     sums.terms[t].value += terms_[t]->add_slabs(step, batch, sums.views);
-  for (int slab = batch.slabs.first; slab < batch.slabs.end; ++slab) {
+  for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab) {
     sums.slab_grad_bias +=
         sampler_.decode_adjoint(slab, batch.samples(slab), batch.gradient(slab), gradient);
   }

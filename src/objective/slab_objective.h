@@ -20,8 +20,8 @@ struct SlabObjectiveContext {
   std::int64_t first_row = 0, num_rows = 0;    ///< of the slabs, in pixels of `full`
   geometry::Extent2 support;                   ///< where densities count
   bool has_factors = true;                     ///< the field has the factors that were asked for
-  distributed::Range own_bands;                ///< bands of this process
-  distributed::Range own_leaves;               ///< and their leaves
+  base::Range own_bands;                       ///< bands of this process
+  base::Range own_leaves;                      ///< and their leaves
   const ObjectiveOptions& options;
   const distributed::Communicator& processes = distributed::Communicator::alone();
 };
@@ -63,7 +63,7 @@ class SlabObjective : public Objective {
   const measurement::Measurement& measured_;
   projection::SlabSampler sampler_;
   const distributed::Communicator& processes_;
-  distributed::Range own_bands_;
+  base::Range own_bands_;
   std::vector<int> own_leaves_;
   std::vector<std::unique_ptr<Term>> terms_;
 };

@@ -29,18 +29,18 @@ struct Step {
 struct SlabBatch {
   const projection::SlabSampler& sampler;
   const projection::SlabProjector& projector;
-  projection::SlabSampler::Range slabs;  ///< [first, end), counted over the whole volume
+  base::Range slabs;  ///< counted over the whole volume
   bool begins_band = false;
   float* all_samples = nullptr;
   float* all_gradients = nullptr;
 
-  int size() const { return slabs.end - slabs.first; }
+  int size() const { return slabs.size(); }
   float* samples(int slab) const { return all_samples + offset(slab); }
   float* gradient(int slab) const { return all_gradients + offset(slab); }
 
  private:
   std::size_t offset(int slab) const {
-    return static_cast<std::size_t>(slab - slabs.first) * projector.grid().size();
+    return static_cast<std::size_t>(slab - slabs.begin) * projector.grid().size();
   }
 };
 
@@ -88,7 +88,7 @@ struct TermContext {
   int bin = 1;                               ///< pixels of `full` in one of the stage, on an axis
   geometry::Extent2 support;                 ///< where densities count
   bool has_factors = true;                   ///< the field has the factors that were asked for
-  distributed::Range own_leaves;             ///< leaves of this process
+  base::Range own_leaves;                    ///< leaves of this process
   const ObjectiveOptions& options;
   const distributed::Communicator& processes = distributed::Communicator::alone();
 };

@@ -1,13 +1,13 @@
 #include "objective/total_variation.h"
 
 #include "base/aligned_buffer.h"
-#include "base/lanes.h"
 #include "base/random.h"
+#include "kernels/lanes.h"
 
 namespace tomofield::objective {
 namespace {
 
-using base::kLanes;
+using kernels::kLanes;
 using projection::SampleSegment;
 
 // Streams of the seed from here on choose the direction of the differences in each step.
@@ -61,7 +61,7 @@ kernels::SlabVariation DensityVariation::variation_of(const SlabBatch& batch, st
 // Computes the flux from the last row of the band before into the first row of this one.
 void DensityVariation::start_flux(const Step& step, const SlabBatch& batch, float* row,
                                   float* flux) const {
-  const int slab = batch.slabs.first;
+  const int slab = batch.slabs.begin;
   if (slab == 0) return;
   batch.sampler.decode_row(static_cast<std::int64_t>(slab) * kLanes - 1, row);
   for (std::size_t s = 0; s < batch.projector.grid().segments().size(); ++s) {
@@ -87,7 +87,7 @@ double DensityVariation::add_slabs(const Step& step, const SlabBatch& batch,
   if (batch.slabs.end < batch.sampler.num_slabs())
     batch.sampler.decode_row(static_cast<std::int64_t>(batch.slabs.end) * kLanes, row.data());
   double value = 0.0;
-  for (int slab = batch.slabs.first; slab < batch.slabs.end; ++slab) {
+  for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab) {
     for (std::size_t s = 0; s < batch.projector.grid().segments().size(); ++s) {
       const std::ptrdiff_t origin = batch.projector.grid().segments()[s].origin;
       kernels::SlabVariation variation = variation_of(batch, s, step.number);

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "base/check.h"
-#include "base/lanes.h"
+#include "kernels/lanes.h"
 
 namespace tomofield::option_table {
 namespace {
@@ -108,7 +108,7 @@ constexpr Row kRows[] = {
     {.key = "field.kind", .flag = "--field", MEMBER(Options, field), .group = Group::kField,
      .help = "vm: vector-matrix factors in every leaf; grid: plain vertices"},
     {.key = "field.leaf_size", .flag = "--leaf-size", MEMBER(Options, leaf_size),
-     .group = Group::kField, .unit = kBinned, .range = Range::multiple_of(base::kLanes, kMaxLeaf),
+     .group = Group::kField, .unit = kBinned, .range = Range::multiple_of(kernels::kLanes, kMaxLeaf),
      .automatic = "32; 64 for a uniform tree of plain vertices", .help = "Side of a leaf"},
     {.key = "field.tree", .flag = "--tree", MEMBER(Options, tree), .group = Group::kField,
      .help = "uniform: all leaves are alike; adaptive: leaves are finer where the density varies "

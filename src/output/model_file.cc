@@ -264,7 +264,7 @@ class ModelReader {
       Integers column(shapes.size());
       group.read_array<std::int64_t>(name, column);
       for (std::size_t i = 0; i < shapes.size(); ++i) {
-        require(column[i] >= min && column[i] <= field::LeafShape::kMostVertices,
+        require(column[i] >= min && column[i] <= field::LeafShape::kMaxVertices,
                 "a leaf has an impossible shape");
         shapes[i].*member = static_cast<int>(column[i]);
       }

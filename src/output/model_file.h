@@ -12,13 +12,14 @@
 
 #include "field/field.h"
 #include "geometry/tilt_geometry.h"
+#include "tomofield/options.h"
 
 namespace tomofield::output {
 
 /// The meaning of a field: its place, its scale and its source.
 struct ModelInfo {
   geometry::TiltGeometry geometry;
-  geometry::Roi roi;  ///< the region asked for; the field is larger by the margin
+  Rectangle roi;  ///< the region asked for; the field is larger by the margin
   double x_tilt_deg =
       0.0;  ///< the specimen's rotation about X before the tilt, the same for all views
   double pixel_size_A = 1.0;  ///< side of a pixel, the unit of every length

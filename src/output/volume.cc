@@ -19,8 +19,8 @@
 namespace tomofield::output {
 namespace {
 
-using field::Box;
 using field::BoxPart;
+using field::OrientedBox;
 using field::Point;
 
 constexpr const char* kMadeBy = "density field";
@@ -29,7 +29,7 @@ constexpr const char* kMadeBy = "density field";
 void gather_parameters(const VolumeShare& share, field::Field& field) {
   distributed::GatheredArrays arrays(share.processes, share.first_parameter, share.end_parameter);
   const std::size_t parameters = arrays.add(field.parameters());
-  arrays.read_on_first([&] {
+  arrays.read_on_root([&] {
     field.keep_only({});
     auto into = field.parameters().begin();
     arrays.hand_out(parameters, [&](std::span<const float> piece) {
@@ -42,7 +42,7 @@ void gather_parameters(const VolumeShare& share, field::Field& field) {
 // The smallest upright box around a box, which may be turned.
 struct Bounds {
   Point low, high;
-  explicit Bounds(const Box& box) {
+  explicit Bounds(const OrientedBox& box) {
     low.fill(std::numeric_limits<double>::infinity());
     high.fill(-std::numeric_limits<double>::infinity());
     for (int corner = 0; corner < 8; ++corner) {
@@ -76,7 +76,7 @@ void require_inside(const field::Field& field, const Bounds& box) {
 // Warns of a box beyond the region of interest: there the field is a margin, which only some views
 // see.
 void warn_of_margin(const ModelInfo& info, const Bounds& box, double tolerance) {
-  const geometry::Roi& roi = info.roi;
+  const Rectangle& roi = info.roi;
   const Point first{static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0};
   const Point last{static_cast<double>(roi.x1), static_cast<double>(roi.y1),
                    info.geometry.thickness};
@@ -91,7 +91,7 @@ void warn_of_margin(const ModelInfo& info, const Bounds& box, double tolerance) 
 }
 
 // Returns the corner of the box from the view's corner in Å, in IMOD's sign.
-std::array<double, 3> origin_A(const ModelInfo& info, const Box& box, VolumeAxes axes) {
+std::array<double, 3> origin_A(const ModelInfo& info, const OrientedBox& box, VolumeAxes axes) {
   if (!box.is_aligned()) return {0.0, 0.0, 0.0};
   const auto [nx, ny, nz] = box.size;
   Point corner = box.position({0.0, 0.0, 0.0});
@@ -119,7 +119,7 @@ float largest_density(const VoxelSource& source, const distributed::Communicator
 // Writes densities times `scale` in the file's axes.
 class PartWriter {
  public:
-  PartWriter(io::MrcWriter& file, const Box& box, VolumeAxes axes, double scale)
+  PartWriter(io::MrcWriter& file, const OrientedBox& box, VolumeAxes axes, double scale)
       : file_(file), box_(box), axes_(axes), scale_(static_cast<float>(scale)) {}
 
   void operator()(const BoxPart& part) const {
@@ -147,7 +147,7 @@ class PartWriter {
 
  private:
   io::MrcWriter& file_;
-  const Box& box_;
+  const OrientedBox& box_;
   VolumeAxes axes_;
   float scale_;
 };
@@ -155,7 +155,7 @@ class PartWriter {
 // Turns a box of the specimen into the frame of the field. The fit sees the specimen after its
 // x-axis tilt, p = Ry(tilt) Rx(alpha) (P − C) (docs/geometry.md), so the box is turned by Rx(alpha)
 // about C. A mirrored Z turns the other way.
-void rotate_about_x(const ModelInfo& model, Box& box) {
+void rotate_about_x(const ModelInfo& model, OrientedBox& box) {
   const geometry::TiltGeometry& g = model.geometry;
   const double alpha = g.hand * model.x_tilt_deg * std::numbers::pi / 180.0;
   const double c = std::cos(alpha), s = std::sin(alpha);
@@ -168,9 +168,9 @@ void rotate_about_x(const ModelInfo& model, Box& box) {
 
 }  // namespace
 
-Box region_box(const ModelInfo& model, double voxel_px) {
+OrientedBox region_box(const ModelInfo& model, double voxel_px) {
   const auto& roi = model.roi;
-  Box box = field::box_between(
+  OrientedBox box = field::box_between(
       {static_cast<double>(roi.x0), static_cast<double>(roi.y0), 0.0},
       {static_cast<double>(roi.x1), static_cast<double>(roi.y1), model.geometry.thickness},
       voxel_px);
@@ -180,7 +180,7 @@ Box region_box(const ModelInfo& model, double voxel_px) {
 
 void write_volume(const Model& model, const VolumeOptions& options,
                   const std::filesystem::path& path) {
-  const Box box = options.box.value_or(region_box(model, 1.0));
+  const OrientedBox box = options.box.value_or(region_box(model, 1.0));
   const Bounds bounds(box);
   require_inside(*model.field, bounds);
   if (options.box) warn_of_margin(model, bounds, 0.5 * box.voxel_px);
@@ -190,7 +190,7 @@ void write_volume(const Model& model, const VolumeOptions& options,
 
 void write_volume(Model& model, const VolumeOptions& options, const std::filesystem::path& path,
                   const VolumeShare& share) {
-  const Box box = region_box(model, 1.0);
+  const OrientedBox box = region_box(model, 1.0);
   if (share.processes.size() == 1) return write_volume(model, options, path);
   if (box.is_aligned()) {
     const auto source = [&](const field::BoxSink& sink) {
@@ -200,11 +200,11 @@ void write_volume(Model& model, const VolumeOptions& options, const std::filesys
   }
   gather_parameters(share, *model.field);
   share.processes.run_collectively([&] {
-    if (share.processes.is_first()) write_volume(model, options, path);
+    if (share.processes.is_root()) write_volume(model, options, path);
   });
 }
 
-void write_voxels(const VoxelSource& source, const Box& box, const ModelInfo& info,
+void write_voxels(const VoxelSource& source, const OrientedBox& box, const ModelInfo& info,
                   const std::string& made_by, const VolumeOptions& options,
                   const std::filesystem::path& path, const distributed::Communicator& processes) {
   io::MrcSpec spec;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/range.h"
 #include "distributed/communicator.h"
 #include "field/sampling/sample_box.h"
 #include "io/mrc.h"
@@ -16,14 +17,14 @@ namespace tomofield::output {
 
 /// The options of a volume to write.
 struct VolumeOptions {
-  std::optional<field::Box> box;             ///< default: the region of interest, one voxel a pixel
+  std::optional<field::OrientedBox> box;     ///< default: the region of interest, one voxel a pixel
   io::MrcMode mode = io::MrcMode::kFloat32;  ///< kFloat32, kFloat16, or kInt16, which is scaled
   VolumeAxes axes = VolumeAxes::kXyz;
   bool invert = false;  ///< write the opposite of the input's contrast
 };
 
 /// Returns the region of interest and the whole thickness, in whole voxels of `voxel_px` pixels.
-field::Box region_box(const ModelInfo& model, double voxel_px);
+field::OrientedBox region_box(const ModelInfo& model, double voxel_px);
 
 /// Writes a box of a model as an MRC volume, in the input's units and contrast (dark input: dense
 /// is low, an empty region is 0). The header has the exact voxel size and IMOD's origin: minus the
@@ -40,7 +41,7 @@ void write_volume(const Model& model, const VolumeOptions& options,
 /// parameters [first_parameter, end_parameter).
 struct VolumeShare {
   const distributed::Communicator& processes;
-  field::BoxRows rows;
+  base::Range rows;
   std::size_t first_parameter, end_parameter;
 };
 void write_volume(Model& model, const VolumeOptions& options, const std::filesystem::path& path,
@@ -51,7 +52,7 @@ void write_volume(Model& model, const VolumeOptions& options, const std::filesys
 using VoxelSource = std::function<void(const field::BoxSink&)>;
 
 /// Writes densities from any source as write_volume() does. `made_by` goes into the header's label.
-void write_voxels(const VoxelSource& source, const field::Box& box, const ModelInfo& info,
+void write_voxels(const VoxelSource& source, const field::OrientedBox& box, const ModelInfo& info,
                   const std::string& made_by, const VolumeOptions& options,
                   const std::filesystem::path& path,
                   const distributed::Communicator& processes = distributed::Communicator::alone());

@@ -74,7 +74,8 @@ TEST(WriteVolume, AxesXzyTurnBackByImodsRotation) {
   const ScratchDirectory scratch;
   const auto model = uneven_model(FieldKind::kVm);
   VolumeOptions options;
-  options.box = field::Box{.centre_px = {31.0, 44.0, 9.5}, .size = {30, 21, 15}, .voxel_px = 1.0};
+  options.box =
+      field::OrientedBox{.centre_px = {31.0, 44.0, 9.5}, .size = {30, 21, 15}, .voxel_px = 1.0};
   write_volume(model, options, scratch / "xyz.mrc");
   options.axes = VolumeAxes::kXzy;
   write_volume(model, options, scratch / "xzy.mrc");
@@ -122,7 +123,8 @@ TEST(WriteVolume, RefusesWhatCannotBeWritten) {
   VolumeOptions options;
   EXPECT_NE(message_of<Error>([&] { write_volume(model, options, scratch / "no" / "out.mrc"); }),
             "");
-  options.box = field::Box{.centre_px = {31.0, 44.0, 90.0}, .size = {30, 20, 15}, .voxel_px = 1.0};
+  options.box =
+      field::OrientedBox{.centre_px = {31.0, 44.0, 90.0}, .size = {30, 20, 15}, .voxel_px = 1.0};
   const std::string message =
       message_of<Error>([&] { write_volume(model, options, scratch / "out.mrc"); });
   EXPECT_NE(message.find("its z runs from 82.5 to 97.5"), std::string::npos) << message;
@@ -133,12 +135,12 @@ TEST(WriteVolume, RefusesWhatCannotBeWritten) {
 // interest is, because p = Ry(tilt) Rx(alpha) (P − C) (docs/geometry.md).
 TEST(WriteVolume, TurnsTheSpecimenBackByItsXTilt) {
   auto model = uneven_model(FieldKind::kVm);
-  const field::Box straight = region_box(model, 1.0);
+  const field::OrientedBox straight = region_box(model, 1.0);
   model.x_tilt_deg = 30.0;
   const double c = std::cos(M_PI / 6), s = std::sin(M_PI / 6);
   for (const int hand : {1, -1}) {
     model.geometry.hand = hand;
-    const field::Box turned = region_box(model, 1.0);
+    const field::OrientedBox turned = region_box(model, 1.0);
     EXPECT_EQ(turned.size, straight.size);
     const field::Point p = straight.position({3.5, 20.5, 15.5});
     const field::Point q = turned.position({3.5, 20.5, 15.5});

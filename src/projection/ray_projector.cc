@@ -3,15 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/aligned_buffer.h"
 #include "base/check.h"
 #include "base/parallel.h"
-#include "projection/leaf_vertices.h"
+#include "base/range.h"
+#include "kernels/lanes.h"
 
 namespace tomofield::projection {
 namespace {
 
+using geometry::HeightRange;
 using geometry::RayBundle;
+using kernels::kLanes;
 using kernels::RayPiece;
+using Line = RayBundle::Line;
 
 constexpr std::int64_t kRaysAtOnce = 512;       // rays that a thread traces at a time
 constexpr std::uint32_t kGolden = 0x9e3779b9U;  // step of random_unit's counter
@@ -23,13 +28,112 @@ std::uint32_t key_of(const Ray& ray, std::uint32_t draw) {
   return kernels::mix_bits(key ^ static_cast<std::uint32_t>(ray.x));
 }
 
-float* scratch(std::size_t size) {
+// Returns the memory of this thread for the vertex values of a leaf.
+float* leaf_scratch(std::size_t size) {
   thread_local base::AlignedBuffer<float> buffer;
   buffer.reserve(size);
   return buffer.data();
 }
 
+// Returns the memory of this thread for 16 rows of a leaf.
+float* slab_scratch(std::size_t size) {
+  thread_local base::AlignedBuffer<float> buffer;
+  buffer.reserve(size);
+  return buffer.data();
+}
+
+// Returns a leaf's vertex counts as the ray kernels take them.
+kernels::LeafVertices vertices_of(const field::LeafShape& shape) {
+  return {.nx = shape.nx, .nz = shape.nz, .ny = shape.ny};
+}
+
+// Returns 16 rows of vertices, from row `first` on, as the rows of a slab. Rows past the last
+// vertex repeat it.
+field::LaneRows vertex_rows(int first, int ny) {
+  field::LaneRows rows;
+  for (int l = 0; l < kLanes; ++l) {
+    const int vertex = std::min(first + l, ny - 1);
+    const int lower = std::min(vertex, ny - 2);
+    rows.lower[static_cast<std::size_t>(l)] = lower;
+    rows.fraction[static_cast<std::size_t>(l)] = static_cast<float>(vertex - lower);
+  }
+  return rows;
+}
+
+// Overwrites values[x, z, y] with the pre-activation at every vertex of a leaf, bias included. Its
+// trilinear interpolation is the leaf's pre-activation everywhere.
+void contract_leaf(const field::Field& field, int leaf, float* values) {
+  const field::LeafShape& shape = field.shape(leaf);
+  const std::size_t columns = shape.vertices_xz();
+  float* slab = slab_scratch(columns * kLanes);
+  for (int first = 0; first < shape.ny; first += kLanes) {
+    const int count = std::min(kLanes, shape.ny - first);
+    field.slab_values(leaf, vertex_rows(first, shape.ny), slab);
+    for (std::size_t c = 0; c < columns; ++c)
+      std::copy_n(slab + c * kLanes, count,
+                  values + c * static_cast<std::size_t>(shape.ny) + first);
+  }
+}
+
+// Applies the adjoint: adds dL/d parameters of the leaf to gradient[0 … count).
+void contract_leaf_adjoint(const field::Field& field, int leaf, const float* grad_values,
+                           float* gradient) {
+  const field::LeafShape& shape = field.shape(leaf);
+  const std::size_t columns = shape.vertices_xz();
+  float* slab = slab_scratch(columns * kLanes);
+  for (int first = 0; first < shape.ny; first += kLanes) {
+    const int count = std::min(kLanes, shape.ny - first);
+    std::fill_n(slab, columns * kLanes, 0.0f);
+    for (std::size_t c = 0; c < columns; ++c) {
+      std::copy_n(grad_values + c * static_cast<std::size_t>(shape.ny) + first, count,
+                  slab + c * kLanes);
+    }
+    field.slab_gradient(leaf, vertex_rows(first, shape.ny), slab, gradient);
+  }
+}
+
+// Appends the leaves below a node that a line crosses.
+void descend(const field::Quadtree& tree, int index, const Line& line, const HeightRange& heights,
+             std::vector<LeafCrossing>& crossings) {
+  const field::QuadtreeNode& node = tree.nodes()[static_cast<std::size_t>(index)];
+  const field::Quadtree::Bounds b = tree.bounds(node.square);
+  const HeightRange inside = clip(line, {b.x0, b.y0, b.x1, b.y1}, heights);
+  if (inside.empty()) return;
+  if (node.is_leaf()) {
+    crossings.push_back({tree.leaf_of_node(index), inside});
+    return;
+  }
+  for (int c = 0; c < 4; ++c) descend(tree, node.first_child + c, line, heights, crossings);
+}
+
+// Returns the root cells along one axis that positions between a and b touch.
+base::Range cells_between(double a, double b, std::int64_t origin, std::int64_t size, int count) {
+  const auto cell = [&](double position) {
+    const double at =
+        std::floor((position - static_cast<double>(origin)) / static_cast<double>(size));
+    return static_cast<int>(std::clamp(at, -1.0, static_cast<double>(count)));
+  };
+  // One cell more on either side protects against rounding; clip() decides.
+  return {std::max(cell(std::min(a, b)) - 1, 0), std::min(cell(std::max(a, b)) + 2, count)};
+}
+
 }  // namespace
+
+void find_crossings(const field::Quadtree& tree, const Line& line, const HeightRange& heights,
+                    std::vector<LeafCrossing>& crossings) {
+  if (heights.empty()) return;
+  const field::RootGrid& roots = tree.roots();
+  const auto along_x = [&](double z) { return line.x0 + line.x_per_z * z; };
+  const auto along_y = [&](double z) { return line.y0 + line.y_per_z * z; };
+  const base::Range columns = cells_between(along_x(heights.low), along_x(heights.high), roots.x0,
+                                            roots.cell_size, roots.columns);
+  const base::Range rows = cells_between(along_y(heights.low), along_y(heights.high), roots.y0,
+                                         roots.cell_size, roots.rows);
+  for (int row = rows.begin; row < rows.end; ++row) {
+    for (int column = columns.begin; column < columns.end; ++column)
+      descend(tree, row * roots.columns + column, line, heights, crossings);
+  }
+}
 
 RayProjector::RayProjector(const geometry::RayGeometry& geometry, const field::Field& field,
                            const geometry::Extent2& support, int samples_per_diagonal)
@@ -39,7 +143,7 @@ RayProjector::RayProjector(const geometry::RayGeometry& geometry, const field::F
 }
 
 // Returns the samples of a crossing without the key.
-RayPiece RayProjector::sample_positions(const RayBundle& bundle, const RayBundle::Line& line,
+RayPiece RayProjector::sample_positions(const RayBundle& bundle, const Line& line,
                                         const LeafCrossing& crossing) const {
   const field::Square& square = field_.tree().leaf(crossing.leaf).square;
   const field::LeafShape& shape = field_.shape(crossing.leaf);
@@ -79,7 +183,7 @@ void RayProjector::trace_rays(std::span<const Ray> rays, std::uint32_t draw,
     for (std::int64_t i = block * kRaysAtOnce; i < end; ++i) {
       const Ray& ray = rays[static_cast<std::size_t>(i)];
       const RayBundle& bundle = bundles_[static_cast<std::size_t>(ray.view)];
-      const RayBundle::Line line = bundle.line(ray.x + 0.5, ray.y + 0.5);
+      const Line line = bundle.line(ray.x + 0.5, ray.y + 0.5);
       crossings.clear();
       find_crossings(field_.tree(), line, clip(line, support_, {0.0, field_.thickness()}),
                      crossings);
@@ -126,7 +230,7 @@ std::vector<float> RayProjector::forward(std::span<const Ray> rays, std::uint32_
     const std::size_t end = trace.first_of_leaf_[static_cast<std::size_t>(leaf) + 1];
     if (first == end) return;
     const kernels::LeafVertices vertices = vertices_of(field_.shape(leaf));
-    float* values = scratch(vertices.size());
+    float* values = leaf_scratch(vertices.size());
     contract_leaf(field_, leaf, values);
     for (std::size_t p = first; p < end; ++p) {
       RayTrace::Piece& piece = trace.pieces_[p];
@@ -149,7 +253,7 @@ double RayProjector::backward(const RayTrace& trace, std::span<const float> grad
     const std::size_t end = trace.first_of_leaf_[static_cast<std::size_t>(leaf) + 1];
     if (first == end) return;
     const kernels::LeafVertices vertices = vertices_of(field_.shape(leaf));
-    float* grad_values = scratch(vertices.size());
+    float* grad_values = leaf_scratch(vertices.size());
     std::fill_n(grad_values, vertices.size(), 0.0f);
     for (std::size_t p = first; p < end; ++p) {
       const RayTrace::Piece& piece = trace.pieces_[p];

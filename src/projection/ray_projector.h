@@ -6,11 +6,23 @@
 
 #include "base/aligned_buffer.h"
 #include "field/field.h"
+#include "field/tree/quadtree.h"
 #include "geometry/ray_geometry.h"
 #include "kernels/ray_samples.h"
-#include "projection/leaf_crossings.h"
 
 namespace tomofield::projection {
+
+/// The piece of a ray inside one leaf.
+struct LeafCrossing {
+  int leaf = 0;
+  geometry::HeightRange heights;  ///< never empty
+};
+
+/// Appends the leaves that a line crosses within `heights`, in the order of the leaves. Leaves are
+/// vertical prisms, so only (X, Y) matters. Each point of the line over the tree belongs to exactly
+/// one crossing.
+void find_crossings(const field::Quadtree& tree, const geometry::RayBundle::Line& line,
+                    const geometry::HeightRange& heights, std::vector<LeafCrossing>& crossings);
 
 /// The ray that ends in the centre of pixel (x, y) of a view as it was recorded.
 struct Ray {

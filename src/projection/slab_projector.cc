@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/range.h"
 #include "kernels/lanes.h"
 #include "kernels/line_projection.h"
 
@@ -15,7 +16,7 @@ namespace {
 using kernels::CrossingGroup;
 using kernels::kLanes;
 using kernels::LineCrossing;
-using kernels::Slabs;
+using kernels::SlabGroup;
 
 using Beam = SlabProjector::Beam;
 
@@ -46,17 +47,17 @@ Beam column_beam(const geometry::TiltGeometry& g, const SampleSegment& s, int vi
 }
 
 // The lines of a segment that one kind of view (flat or steep) crosses.
-struct Family {
+struct LineFamily {
   bool flat;
   int num_lines, num_samples;
   std::ptrdiff_t origin, line_stride, sample_stride;
   bool cut_low, cut_high;  // true if the lines end at a face where another segment continues
 };
 
-Family rows_of(const SampleSegment& s) {
+LineFamily rows_of(const SampleSegment& s) {
   return {true, s.nz, s.nx, s.origin, s.stride_z(), kLanes, s.cut_low, s.cut_high};
 }
-Family columns_of(const SampleSegment& s) {
+LineFamily columns_of(const SampleSegment& s) {
   return {false, s.nx, s.nz, s.origin, kLanes, s.stride_z(), false, false};
 }
 
@@ -86,7 +87,8 @@ int first_pixel_from(const Crossing& c, double position, int width) {
 }
 
 // Writes what the view sees of a line to `seen`, except for the pointers to samples or pixels.
-Crossing crossing(const Beam& beam, const Family& family, int line, int width, LineCrossing& seen) {
+Crossing crossing(const Beam& beam, const LineFamily& family, int line, int width,
+                  LineCrossing& seen) {
   Crossing c{seen, beam.offset + line * beam.offset_per_line, beam.step};
   c.line.offset = static_cast<float>(c.offset);
   c.line.step = static_cast<float>(c.step);
@@ -152,7 +154,8 @@ void for_each_part(const Crossing& c, Visit&& visit) {
   }
 }
 
-void project_parts(const Crossing& c, std::ptrdiff_t stride, const Slabs& slabs, float* detector) {
+void project_parts(const Crossing& c, std::ptrdiff_t stride, const SlabGroup& slabs,
+                   float* detector) {
   for_each_part(c, [&](int pixel, std::ptrdiff_t lower, float low_weight, float high_weight) {
     const float* sample = c.line.samples + lower * stride;
     float* out = detector + static_cast<std::ptrdiff_t>(pixel) * kLanes;
@@ -165,7 +168,7 @@ void project_parts(const Crossing& c, std::ptrdiff_t stride, const Slabs& slabs,
   });
 }
 
-void backproject_parts(const Crossing& c, std::ptrdiff_t stride, const Slabs& slabs,
+void backproject_parts(const Crossing& c, std::ptrdiff_t stride, const SlabGroup& slabs,
                        float* samples) {
   for_each_part(c, [&](int pixel, std::ptrdiff_t lower, float low_weight, float high_weight) {
     float* sample = samples + lower * stride;
@@ -183,29 +186,29 @@ void backproject_parts(const Crossing& c, std::ptrdiff_t stride, const Slabs& sl
 
 // Returns the pixels, among those `reached` at all, that cross the middle of a block of lines
 // within a tile of samples. The first and the last tile take all pixels beyond them.
-CrossingGroup::Range pixels_of_tile(const Beam& beam, const Family& family, double middle_line,
-                                    int tile, CrossingGroup::Range reached) {
+base::Range pixels_of_tile(const Beam& beam, const LineFamily& family, double middle_line, int tile,
+                           base::Range reached) {
   const double inverse = 1.0 / beam.step;
   const bool falls = beam.step < 0;
   const auto pixel_at = [&](int sample) {
     const double pixel =
         (sample - beam.offset - middle_line * beam.offset_per_line) * inverse + 1.0;
-    return static_cast<int>(std::clamp<double>(pixel, reached.first, reached.end));
+    return static_cast<int>(std::clamp<double>(pixel, reached.begin, reached.end));
   };
   const int end = tile + kSamplesAtOnce;
-  const int low = tile > 0 ? pixel_at(tile) : falls ? reached.end : reached.first;
-  const int high = end < family.num_samples ? pixel_at(end) : falls ? reached.first : reached.end;
+  const int low = tile > 0 ? pixel_at(tile) : falls ? reached.end : reached.begin;
+  const int high = end < family.num_samples ? pixel_at(end) : falls ? reached.begin : reached.end;
   return {std::min(low, high), std::max(low, high)};
 }
 
-CrossingGroup::Range reached_by_any(std::span<const CrossingGroup> groups) {
-  CrossingGroup::Range all;
+base::Range reached_by_any(std::span<const CrossingGroup> groups) {
+  base::Range all;
   for (const CrossingGroup& group : groups) all = all.joined_with(group.reached);
   return all;
 }
 
-void project_family(const Family& family, const std::vector<Beam>& beams, int width,
-                    const Slabs& slabs, const float* samples, std::span<const int> views,
+void project_family(const LineFamily& family, const std::vector<Beam>& beams, int width,
+                    const SlabGroup& slabs, const float* samples, std::span<const int> views,
                     float* detector) {
   std::vector<std::vector<CrossingGroup>> groups(views.size());
   std::array<LineCrossing, kLinesAtOnce> lines;
@@ -232,10 +235,10 @@ void project_family(const Family& family, const std::vector<Beam>& beams, int wi
     for (int tile = 0; tile < family.num_samples; tile += kSamplesAtOnce) {
       for (std::size_t v = 0; v < views.size(); ++v) {
         if (beam_of(v).flat != family.flat) continue;
-        const CrossingGroup::Range pixels = pixels_of_tile(
-            beam_of(v), family, first + 0.5 * (count - 1), tile, reached_by_any(groups[v]));
+        const base::Range pixels = pixels_of_tile(beam_of(v), family, first + 0.5 * (count - 1),
+                                                  tile, reached_by_any(groups[v]));
         kernels::project_lines(groups[v].data(), static_cast<int>(groups[v].size()), samples,
-                               family.sample_stride, pixels.first, pixels.end, rays_of(v), slabs);
+                               family.sample_stride, pixels.begin, pixels.end, rays_of(v), slabs);
       }
     }
   }
@@ -244,7 +247,8 @@ void project_family(const Family& family, const std::vector<Beam>& beams, int wi
 // Clears rows [first, first + count) with their padding, and the padding rows before the first and
 // after the last row. This happens right before they are added to, so that they are then in a
 // cache.
-void clear_rows(const Family& rows, int first, int count, const Slabs& slabs, float* samples) {
+void clear_rows(const LineFamily& rows, int first, int count, const SlabGroup& slabs,
+                float* samples) {
   const int from = first == 0 ? -1 : first;
   const int end = first + count == rows.num_lines ? first + count + 1 : first + count;
   for (int s = 0; s < slabs.count; ++s, samples += slabs.samples_apart)
@@ -252,8 +256,8 @@ void clear_rows(const Family& rows, int first, int count, const Slabs& slabs, fl
                 (end - from) * rows.line_stride, 0.0f);
 }
 
-void backproject_family(const Family& family, const std::vector<Beam>& beams, int width,
-                        const Slabs& slabs, const float* detector, std::span<const int> views,
+void backproject_family(const LineFamily& family, const std::vector<Beam>& beams, int width,
+                        const SlabGroup& slabs, const float* detector, std::span<const int> views,
                         float* samples) {
   std::array<std::vector<CrossingGroup>, kLinesAtOnce> groups;
   std::vector<LineCrossing> crossings;
@@ -320,7 +324,7 @@ void for_each_pair(int num_slabs, std::ptrdiff_t samples, std::ptrdiff_t detecto
                    const ProjectSlabs& project) {
   constexpr int kTogether = SlabProjector::kSlabsTogether;
   for (int slab = 0; slab < num_slabs; slab += kTogether)
-    project(Slabs{std::min(kTogether, num_slabs - slab), samples, detector}, slab * samples,
+    project(SlabGroup{std::min(kTogether, num_slabs - slab), samples, detector}, slab * samples,
             slab * detector);
 }
 
@@ -333,7 +337,7 @@ void SlabProjector::forward(float* samples, std::span<const int> views, float* d
     const SampleSegment& s = grid_.segments()[i];
     for (int slab = 0; slab < num_slabs; ++slab) fill_padding(s, samples + slab * samples_apart);
     for_each_pair(
-        num_slabs, samples_apart, detectors_apart, [&](const Slabs& slabs, auto at, auto rays) {
+        num_slabs, samples_apart, detectors_apart, [&](const SlabGroup& slabs, auto at, auto rays) {
           project_family(rows_of(s), beams_[i], width, slabs, samples + at, views, detector + rays);
           project_family(columns_of(s), beams_[i], width, slabs, samples + at, views,
                          detector + rays);
@@ -349,7 +353,7 @@ void SlabProjector::backward(const float* detector, std::span<const int> views, 
   for (std::size_t i = 0; i < beams_.size(); ++i) {
     const SampleSegment& s = grid_.segments()[i];
     for_each_pair(num_slabs, samples_apart, detectors_apart,
-                  [&](const Slabs& slabs, auto at, auto rays) {
+                  [&](const SlabGroup& slabs, auto at, auto rays) {
                     // Rows come first, because they clear what columns add to.
                     backproject_family(rows_of(s), beams_[i], width, slabs, detector + rays, views,
                                        samples + at);

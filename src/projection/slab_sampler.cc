@@ -168,7 +168,7 @@ void SlabSampler::decode_row(std::int64_t row, float* densities) const {
 
 std::vector<int> SlabSampler::leaves_of_band(int band) const {
   std::vector<int> leaves;
-  for (int slab = this->band(band).first; slab < this->band(band).end; ++slab) {
+  for (int slab = this->band(band).begin; slab < this->band(band).end; ++slab) {
     for (const Piece& piece : slabs_[static_cast<std::size_t>(slab)]) leaves.push_back(piece.leaf);
   }
   std::sort(leaves.begin(), leaves.end());

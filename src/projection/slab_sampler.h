@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "base/range.h"
 #include "field/field.h"
 #include "projection/sample_grid.h"
 
@@ -26,12 +27,9 @@ class SlabSampler {
   int num_slabs() const { return static_cast<int>(slabs_.size()); }
   /// Returns the rows of the volume in a slab: 16, or fewer in the last one.
   int rows_in_slab(int slab) const;
-  /// The slabs [first, end) of a band of root cells, 0 <= band < num_bands().
-  struct Range {
-    int first, end;
-  };
   int num_bands() const { return static_cast<int>(bands_.size()); }
-  Range band(int index) const { return bands_[static_cast<std::size_t>(index)]; }
+  /// Returns the slabs of a band of root cells, 0 <= index < num_bands().
+  base::Range band(int index) const { return bands_[static_cast<std::size_t>(index)]; }
 
   /// Overwrites `samples` with the densities of a slab; leaves the padding as it is.
   void decode(int slab, float* samples) const;
@@ -80,7 +78,7 @@ class SlabSampler {
   std::int64_t first_row_, num_rows_;
   int pixel_;
   std::vector<std::vector<Piece>> slabs_;
-  std::vector<Range> bands_;
+  std::vector<base::Range> bands_;
   std::vector<TapsZ> taps_z_;
   std::vector<std::size_t> row_origins_;
 };

@@ -211,9 +211,9 @@ TEST(SlabSampler, SlabsAndBandsCoverTheRows) {
   EXPECT_EQ(sampler.rows_in_slab(0), 16);
   EXPECT_EQ(sampler.rows_in_slab(5), 10);
   ASSERT_EQ(sampler.num_bands(), 2);
-  EXPECT_EQ(sampler.band(0).first, 0);
+  EXPECT_EQ(sampler.band(0).begin, 0);
   EXPECT_EQ(sampler.band(0).end, 4);
-  EXPECT_EQ(sampler.band(1).first, 4);
+  EXPECT_EQ(sampler.band(1).begin, 4);
   EXPECT_EQ(sampler.band(1).end, 6);
   // Every leaf belongs to its band, and each band of whole cells uses all of its leaves.
   std::vector<int> all;

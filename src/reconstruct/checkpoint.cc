@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "base/range.h"
 #include "distributed/gathered_arrays.h"
 #include "option_table/rows.h"
 #include "tomofield/error.h"
@@ -138,7 +139,7 @@ const typename Map::mapped_type& entry(const Map& map, const char* name, const s
 
 // The parameters of the leaves that a process works on, and what goes with them.
 distributed::GatheredArrays own_parts(const fit::Fit& fit) {
-  const distributed::Range leaves = fit.own_leaves();
+  const base::Range leaves = fit.own_leaves();
   return {fit.processes(), fit.field().offset(leaves.begin), fit.field().offset(leaves.end)};
 }
 
@@ -157,7 +158,7 @@ void save(const std::filesystem::path& path, const fit::Fit& fit, const output::
   const output::FloatSource parameters = source(fit.field().parameters());
   output::FloatArrays more;
   for (const auto& [name, values] : moments) more.emplace(name, source(values));
-  arrays.read_on_first(
+  arrays.read_on_root(
       [&] { output::save_model(path, fit.field(), parameters, info, &state, more); });
 }
 

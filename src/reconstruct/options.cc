@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "base/faults.h"
+#include "base/check.h"
 #include "fit/integer_program.h"
 #include "io/output_files.h"
 #include "option_table/values.h"

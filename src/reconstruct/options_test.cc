@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "base/faults.h"
+#include "base/check.h"
 #include "fit/integer_program.h"
 #include "fit/options.h"
 #include "option_table/values.h"

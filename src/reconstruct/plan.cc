@@ -4,15 +4,16 @@
 #include <string>
 #include <vector>
 
-#include "base/faults.h"
-#include "base/lanes.h"
+#include "base/check.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/range.h"
 #include "field/vm/factorise.h"
 #include "fit/domain.h"
 #include "fit/fit.h"
 #include "fit/halo.h"
 #include "fit/stages.h"
+#include "kernels/lanes.h"
 #include "measurement/held_out.h"
 #include "measurement/slab_views.h"
 #include "objective/ray_data_term.h"
@@ -33,7 +34,7 @@ constexpr int kSlabsOfThread = projection::SlabProjector::kSlabsTogether;
 // the total variation, a leaf's vertices; and then a part of the volume.
 std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domain& domain,
                           int views_a_step) {
-  constexpr std::size_t kRow = base::kLanes * sizeof(float);
+  constexpr std::size_t kRow = kernels::kLanes * sizeof(float);
   const std::size_t slab = domain.grid.size() * sizeof(float);
   const std::size_t views =
       static_cast<std::size_t>(views_a_step) * static_cast<std::size_t>(plan.geometry.width) * kRow;
@@ -44,7 +45,7 @@ std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domai
       std::size_t{16} << 20,
       static_cast<std::size_t>(static_cast<double>(plan.roi.width()) * plan.geometry.thickness) *
           kRow);
-  return kSlabsOfThread * (2 * slab + views) + 2 * slab / base::kLanes + leaf + written;
+  return kSlabsOfThread * (2 * slab + views) + 2 * slab / kernels::kLanes + leaf + written;
 }
 
 int num_fitted_views(const measurement::Measurement& plan, const fit::FitOptions& options) {
@@ -58,8 +59,8 @@ int steps_an_epoch(const measurement::Measurement& plan, const fit::FitOptions& 
 }
 
 // Of the first tree, or of an adaptive one whose budget is used up, as a field of this kind.
-std::size_t most_parameters(const fit::Domain& domain, const fit::FieldOptions& options,
-                            FieldKind kind) {
+std::size_t max_parameters(const fit::Domain& domain, const fit::FieldOptions& options,
+                           FieldKind kind) {
   std::vector<field::LeafShape> shapes = domain.shapes, inside;
   for (int i = 0; i < domain.tree.num_leaves(); ++i) {
     if (domain.tree.leaf(i).region == field::Region::kInterest)
@@ -75,7 +76,7 @@ std::size_t most_parameters(const fit::Domain& domain, const fit::FieldOptions& 
 double part_of_parameters(const fit::Domain& domain, FieldKind kind,
                           const distributed::Communicator& processes) {
   if (processes.size() == 1) return 1.0;
-  const distributed::Range bands =
+  const base::Range bands =
       measurement::own_bands(domain.num_rows, domain.tree.roots().cell_size, processes);
   std::vector<field::LeafShape> needed;
   for (const int leaf : fit::needed_leaves(domain.tree, bands))
@@ -87,7 +88,7 @@ double part_of_parameters(const fit::Domain& domain, FieldKind kind,
 // Those of a process as a field of this kind, in bytes.
 double parameter_bytes(const fit::Domain& domain, const fit::FieldOptions& options, FieldKind kind,
                        const distributed::Communicator& processes) {
-  return static_cast<double>(sizeof(float) * most_parameters(domain, options, kind)) *
+  return static_cast<double>(sizeof(float) * max_parameters(domain, options, kind)) *
          part_of_parameters(domain, kind, processes);
 }
 
@@ -121,8 +122,8 @@ measurement::SlabViews::Shape own_part(measurement::SlabViews::Shape shape,
                                        const distributed::Communicator& processes) {
   const std::int64_t band_rows = domain.tree.roots().cell_size;
   const std::int64_t bands = (shape.num_rows + band_rows - 1) / band_rows;
-  const std::int64_t most_bands = (bands + processes.size() - 1) / processes.size();
-  shape.num_rows = std::min(shape.num_rows, most_bands * band_rows);
+  const std::int64_t max_bands = (bands + processes.size() - 1) / processes.size();
+  shape.num_rows = std::min(shape.num_rows, max_bands * band_rows);
   return shape;
 }
 
@@ -177,7 +178,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.roi = plan.roi;
   run.thickness = plan.geometry.thickness;
   run.num_leaves = domain.tree.num_leaves();
-  run.num_parameters = most_parameters(domain, options.field, options.field.kind);
+  run.num_parameters = max_parameters(domain, options.field, options.field.kind);
   run.stages = fit::make_stages(options.field, options.fit);
   const fit::Stage& last = run.stages.back();
   run.num_trials = options.num_trials(num_fitted_views(plan, options.fit));
@@ -193,11 +194,11 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
                        "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, or "
                        "fewer --threads");
   for (const field::LeafShape& shape : domain.shapes) {
-    if (std::max(shape.nx, shape.nz) <= field::LeafShape::kMostVertices) continue;
+    if (std::max(shape.nx, shape.nz) <= field::LeafShape::kMaxVertices) continue;
     throw Error(fmt::format(
         "{} vertices along an axis of a leaf are more than {}: use a larger --vertex-spacing or "
         "--bin, or a smaller --thickness",
-        std::max(shape.nx, shape.nz), field::LeafShape::kMostVertices));
+        std::max(shape.nx, shape.nz), field::LeafShape::kMaxVertices));
   }
   return run;
 }

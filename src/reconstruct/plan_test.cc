@@ -6,6 +6,7 @@
 #include "reconstruct/reconstruct.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
+#include "tomofield/options.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -58,7 +59,7 @@ TEST_F(Plan, HasTheSizesOfTheSeriesAndTheField) {
 
 TEST_F(Plan, BinnedViewsAndARegionOfInterestAreSmaller) {
   options_.input.bin = 2;
-  options_.specimen.roi = geometry::Roi{8, 4, 56, 44};
+  options_.specimen.roi = Rectangle{8, 4, 56, 44};
   const RunPlan run = plan();
   EXPECT_EQ(run.view_width, kWidth / 2);
   EXPECT_EQ(run.view_height, kHeight / 2);

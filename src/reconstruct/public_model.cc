@@ -47,7 +47,7 @@ Model ModelAccess::make(output::Model model) {
 double Model::pixel_size_A() const { return impl_->model.pixel_size_A; }
 
 SampleBox Model::region(double voxel_px) const {
-  const field::Box box = output::region_box(impl_->model, voxel_px);
+  const field::OrientedBox box = output::region_box(impl_->model, voxel_px);
   SampleBox region{.centre_px = box.centre_px, .size = box.size, .voxel_px = box.voxel_px};
   // An x-axis tilt turns the box about X: these Euler angles have the same matrix.
   if (!box.is_aligned())

@@ -40,7 +40,7 @@ reconstruction::ReconstructOptions internal_options(const TiltSeries& series,
 
 // Samples the region of interest as write_volume() does, but for the type and the axes of a file.
 Tomogram sample_tomogram(const output::Model& model, bool invert) {
-  const field::Box box = output::region_box(model, 1.0);
+  const field::OrientedBox box = output::region_box(model, 1.0);
   const auto scale = static_cast<float>(invert ? -model.output_scale() : model.output_scale());
   Tomogram tomogram{.size = box.size,
                     .voxel_size_A = model.pixel_size_A,

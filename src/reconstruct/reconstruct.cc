@@ -116,7 +116,7 @@ bool run_with_checkpoints(fit::Fit& fit, double checkpoint_minutes, const Recons
     if (hooks.progress) hooks.progress(progress_report(fit, first_step, running));
     const bool stop = hooks.stop_requested && hooks.stop_requested() && !fit.is_done();
     const bool is_due =
-        fit.processes().is_first() && since_checkpoint.seconds() > 60 * checkpoint_minutes;
+        fit.processes().is_root() && since_checkpoint.seconds() > 60 * checkpoint_minutes;
     // One that must stop stops all; when it is time for a checkpoint is up to the first.
     const double wanted = fit.processes().allreduce_max(stop ? 2.0 : is_due ? 1.0 : 0.0);
     stopped = wanted == 2.0;
@@ -146,7 +146,8 @@ RunResult reconstruct(const tilt_series::TiltSeries& tilt_series,
     return {.outcome = Outcome::kStoppedTuning, .results = {}};
   origin.fingerprint = fingerprint_of(options, measurement, processes);
   fit::Fit fit(measurement, options.field, options.fit, processes);
-  if (options.resolved.resume) processes.run_collectively([&] { resume(paths, origin.fingerprint, fit); });
+  if (options.resolved.resume)
+    processes.run_collectively([&] { resume(paths, origin.fingerprint, fit); });
 
   const base::Stopwatch running;
   std::function<void()> save;

@@ -12,6 +12,7 @@
 #include "reconstruct/options.h"
 #include "reconstruct/results.h"
 #include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::reconstruction {
 
@@ -48,7 +49,7 @@ struct RunPlan {
   int num_views = 0;
   std::int64_t view_width = 0, view_height = 0;
   double pixel_size_A = 0;
-  geometry::Roi roi;
+  Rectangle roi;
   double thickness = 0;
   int num_leaves = 0;
   std::size_t num_parameters = 0;

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "base/lanes.h"
+#include "base/range.h"
 #include "io/json.h"
 #include "output/metrics.h"
 #include "output/volume.h"
@@ -24,7 +24,7 @@ void write_picture(const fit::Fit& fit, const measurement::Measurement& series,
   const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
   const measurement::PredictedView view = fit.predict_held_out(*nearest, model);
   fit.processes().run_collectively([&] {
-    if (fit.processes().is_first()) report::write_held_out_picture(view, picture);
+    if (fit.processes().is_root()) report::write_held_out_picture(view, picture);
   });
 }
 
@@ -41,12 +41,12 @@ nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& se
 }
 
 output::VolumeShare volume_share(const fit::Fit& fit, const measurement::Measurement& series) {
-  const distributed::Range slabs = series.rays->held();
+  const base::Range slabs = series.rays->held();
   const auto end_row =
-      std::min<std::int64_t>(std::int64_t{slabs.end} * base::kLanes, series.roi.height());
-  const distributed::Range leaves = fit.own_leaves();
+      std::min<std::int64_t>(std::int64_t{slabs.end} * kernels::kLanes, series.roi.height());
+  const base::Range leaves = fit.own_leaves();
   return {fit.processes(),
-          {slabs.begin * base::kLanes, end_row},
+          {slabs.begin * kernels::kLanes, static_cast<int>(end_row)},
           fit.field().offset(leaves.begin),
           fit.field().offset(leaves.end)};
 }
@@ -85,7 +85,7 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   if (!writes_files) return results;
   output::write_volume(results.model, options.volume, paths.volume, share);
   share.processes.run_collectively([&] {
-    if (share.processes.is_first()) io::write_json(paths.json, results.metrics);
+    if (share.processes.is_root()) io::write_json(paths.json, results.metrics);
   });
   return results;
 }

@@ -20,9 +20,9 @@ struct Results {
   nlohmann::json metrics;  ///< what the JSON beside the volume says
 };
 
-/// Takes the results out of a finished fit, whose field is gone then. If options.resolved.output names the
-/// volume, writes the volume, the model, the metrics, and of views that were held out a picture.
-/// Every process calls it.
+/// Takes the results out of a finished fit, whose field is gone then. If options.resolved.output
+/// names the volume, writes the volume, the model, the metrics, and of views that were held out a
+/// picture. Every process calls it.
 Results finish(fit::Fit& fit, const measurement::Measurement& series,
                const ReconstructOptions& options, const FitOrigin& origin, double seconds);
 

@@ -14,6 +14,7 @@
 #include "objective/options.h"
 #include "selection/trial_measurement.h"
 #include "tomofield/error.h"
+#include "tomofield/options.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -156,7 +157,7 @@ std::optional<TunedFit> found_by_first(const distributed::Communicator& processe
   std::optional<TunedFit> tuned;
   json found = nullptr;
   processes.run_collectively([&] {
-    if (!processes.is_first()) return;
+    if (!processes.is_root()) return;
     try {
       tuned = search();
     } catch (const StopRequested&) {
@@ -165,7 +166,7 @@ std::optional<TunedFit> found_by_first(const distributed::Communicator& processe
     found = tuning_json(*tuned);
   });
   found = json::parse(processes.broadcast(found.dump()));
-  if (processes.is_first() || found.is_null()) return tuned;
+  if (processes.is_root() || found.is_null()) return tuned;
   return tuned_from(found);
 }
 

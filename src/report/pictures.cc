@@ -51,8 +51,8 @@ std::vector<std::uint8_t> grey_values(const std::vector<float>& image,
 
 // Returns the slice at half the thickness, one voxel a pixel: [y, x].
 std::vector<float> central_slice(const output::Model& model) {
-  const geometry::Roi& roi = model.roi;
-  field::Box box;
+  const Rectangle& roi = model.roi;
+  field::OrientedBox box;
   box.size = {roi.width(), roi.height(), 1};
   box.centre_px = {0.5 * static_cast<double>(roi.x0 + roi.x1),
                    0.5 * static_cast<double>(roi.y0 + roi.y1), 0.5 * model.field->thickness()};
@@ -62,7 +62,7 @@ std::vector<float> central_slice(const output::Model& model) {
 }
 
 // Draws the lower x and y faces of a leaf. `zoom` is the picture pixels a pixel.
-void draw_border(const field::Square& square, const geometry::Roi& roi, std::int64_t zoom,
+void draw_border(const field::Square& square, const Rectangle& roi, std::int64_t zoom,
                  Canvas& canvas) {
   const std::int64_t x0 = (square.x0 - roi.x0) * zoom, y0 = (square.y0 - roi.y0) * zoom;
   const std::int64_t size = square.size * zoom;
@@ -106,7 +106,7 @@ void write_mask_picture(const tilt_series::TiltSeries& series, const std::filesy
 }
 
 void write_tree_picture(const output::Model& model, const std::filesystem::path& path) {
-  const geometry::Roi& roi = model.roi;
+  const Rectangle& roi = model.roi;
   const std::vector<float> slice = central_slice(model);
   const GreyScale scale(slice);
   const std::int64_t zoom = picture_zoom(roi.width(), roi.width());

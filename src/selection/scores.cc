@@ -8,7 +8,7 @@
 namespace tomofield::selection {
 namespace {
 
-constexpr int kMostSteps = 4;  // of the coarse search to one side: a factor of 256
+constexpr int kMaxSteps = 4;  // of the coarse search to one side: a factor of 256
 
 }  // namespace
 
@@ -49,7 +49,7 @@ double search_weight(double first, const ScoreOfWeight& score) {
   };
   // Coarse steps until the best weight has a worse one on either side; then finer ones.
   for (const double factor : {4.0, 0.25}) {
-    for (int step = 0; step < kMostSteps && error_of(factor) < error_of(1); ++step) best *= factor;
+    for (int step = 0; step < kMaxSteps && error_of(factor) < error_of(1); ++step) best *= factor;
   }
   for (const double factor : {2.0, std::sqrt(2.0)}) {
     const double below = error_of(1 / factor), here = error_of(1), above = error_of(factor);

@@ -14,6 +14,7 @@
 #include "fit/fit.h"
 #include "random_arrays.h"
 #include "sphere_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::fit {
 namespace {
@@ -33,7 +34,7 @@ geometry::RayGeometry ray_geometry(const SphereSeries& series) {
 }
 
 struct SphereTerm {
-  explicit SphereTerm(const FitOptions& fit_options, const geometry::Roi& roi = {0, 0, 32, 21})
+  explicit SphereTerm(const FitOptions& fit_options, const Rectangle& roi = {0, 0, 32, 21})
       : options(fit_options),
         geometry(ray_geometry(series)),
         domain(make_domain(geometry, roi, field_options())),
@@ -100,7 +101,7 @@ TEST(RayDataTerm, StepsAreAsLargeAsAskedFor) {
 TEST(RayDataTerm, RaysThatMissTheRegionAreLeftOut) {
   FitOptions options;
   options.subsets = 3;
-  const geometry::Roi roi{10, 6, 20, 14};
+  const Rectangle roi{10, 6, 20, 14};
   const SphereTerm s(options, roi);
   const auto keys = rays_of_epoch(s, 0);
   const std::set<Key> used(keys.begin(), keys.end());

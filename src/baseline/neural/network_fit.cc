@@ -9,7 +9,6 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "base/shuffle.h"
 #include "baseline/neural/network_density.h"
 #include "kernels/adam.h"
 #include "kernels/lanes.h"

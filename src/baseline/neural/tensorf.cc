@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "base/lanes.h"
 #include "fit/stages.h"
+#include "kernels/lanes.h"
 #include "tomofield/error.h"
 
 namespace tomofield::baseline {
@@ -26,7 +26,7 @@ Options tensorf_defaults() {
   return options;
 }
 
-int one_node_size(const geometry::Roi& roi, int coarse_bin) {
+int one_node_size(const Rectangle& roi, int coarse_bin) {
   constexpr std::int64_t kMaxSize = 4096;
   const std::int64_t side = std::max(roi.width(), roi.height());
   if (side > kMaxSize) {
@@ -35,8 +35,8 @@ int one_node_size(const geometry::Roi& roi, int coarse_bin) {
                     "{}: give a smaller --roi or a larger --bin",
                     roi.width(), roi.height(), kMaxSize));
   }
-  std::int64_t step = std::int64_t{base::kLanes} * coarse_bin;
-  while (step > base::kLanes && step > side) step /= 2;
+  std::int64_t step = std::int64_t{kernels::kLanes} * coarse_bin;
+  while (step > kernels::kLanes && step > side) step /= 2;
   return static_cast<int>((side + step - 1) / step * step);
 }
 

@@ -13,6 +13,6 @@ Options tensorf_defaults();
 /// Returns the side of one node that covers a region, in pixels. Slabs of pixels that are binned
 /// by `coarse_bin` end with the node; a small region bins fewer pixels. Throws Error if the region
 /// is larger than a node can be.
-int one_node_size(const geometry::Roi& roi, int coarse_bin);
+int one_node_size(const Rectangle& roi, int coarse_bin);
 
 }  // namespace tomofield::baseline

@@ -30,7 +30,7 @@ fit::FieldOptions field_for(std::int64_t width, std::int64_t height) {
 TEST(Tensorf, OneNodeCoversTheRegion) {
   for (const std::int64_t width : {20, 100, 128, 500}) {
     const fit::FieldOptions field = field_for(width, 90);
-    const geometry::Roi roi{5, 7, 5 + width, 97};
+    const Rectangle roi{5, 7, 5 + width, 97};
     const auto domain =
         fit::make_domain(geometry::centred_geometry(600, 600, 40, {-60, 0, 60}), roi, field);
     ASSERT_EQ(domain.tree.num_leaves(), 1);

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <vector>
 
+#include "field/array_variation.h"
+#include "field/merge_target.h"
 #include "field/sampling/resample.h"
-#include "field/variation_planes.h"
-#include "field/vm/merge_target.h"
 #include "kernels/column_interpolation.h"
 #include "kernels/small_gemm.h"
 

@@ -22,7 +22,7 @@ float* sample_scratch(std::size_t size) {
 
 }  // namespace
 
-AlignedRows::AlignedRows(const Field& field, const Box& box)
+AlignedRows::AlignedRows(const Field& field, const OrientedBox& box)
     : field_(field), box_(box), factor_(points_per_voxel(box)) {
   const std::int64_t num_z = box.size[2] * factor_;
   while (first_z_ < num_z && coordinate(2, first_z_) < 0) ++first_z_;

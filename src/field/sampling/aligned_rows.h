@@ -15,7 +15,7 @@ namespace tomofield::field {
 /// is the inner part of sample_box. Thread-safe.
 class AlignedRows {
  public:
-  AlignedRows(const Field& field, const Box& box);
+  AlignedRows(const Field& field, const OrientedBox& box);
 
   /// Returns the rows of voxels that fill the lanes: 16, or fewer if each has several rows of
   /// points.
@@ -53,7 +53,7 @@ class AlignedRows {
                    std::int64_t first_section, std::int64_t num_rows, float* voxels) const;
 
   const Field& field_;
-  Box box_;
+  OrientedBox box_;
   std::int64_t factor_;                   // points a voxel along each axis
   std::int64_t first_z_ = 0, end_z_ = 0;  // points inside the thickness
   std::map<int, TapsZ> taps_z_;           // the key is the number of vertices

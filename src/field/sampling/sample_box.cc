@@ -16,15 +16,16 @@ namespace {
 constexpr std::int64_t kPartValues = std::int64_t{1} << 22;
 
 // Samples a box along the axes: some rows of all sections, then the next rows.
-void sample_aligned(const Field& field, const Box& box, const BoxRows& some, const BoxSink& sink) {
+void sample_aligned(const Field& field, const OrientedBox& box, base::Range some,
+                    const BoxSink& sink) {
   const AlignedRows rows(field, box);
   const auto [nx, ny, nz] = box.size;
   const std::int64_t block = rows.rows_at_once();
   const std::int64_t part = std::clamp(kPartValues / (block * nx), std::int64_t{1}, nz);
-  TOMOFIELD_CHECK(some.first % block == 0 && some.end <= ny, "rows in whole blocks");
-  const std::int64_t num_blocks = (some.end - some.first + block - 1) / block;
+  TOMOFIELD_CHECK(some.begin % block == 0 && some.end <= ny, "rows in whole blocks");
+  const std::int64_t num_blocks = (some.end - some.begin + block - 1) / block;
   base::parallel_for(num_blocks, [&, nx = nx, nz = nz](std::int64_t index) {
-    const std::int64_t first_row = some.first + index * block;
+    const std::int64_t first_row = some.begin + index * block;
     const std::int64_t num_rows = std::min(block, some.end - first_row);
     const auto leaves = rows.contract(first_row, num_rows);
     std::vector<float> values;
@@ -38,7 +39,7 @@ void sample_aligned(const Field& field, const Box& box, const BoxRows& some, con
 }
 
 // Returns the mean density of a voxel's points.
-double voxel_density(const Field& field, const Box& box, std::int64_t x, std::int64_t y,
+double voxel_density(const Field& field, const OrientedBox& box, std::int64_t x, std::int64_t y,
                      std::int64_t z) {
   const std::int64_t factor = points_per_voxel(box);
   const auto along = [factor](std::int64_t voxel, std::int64_t point) {
@@ -57,13 +58,14 @@ double voxel_density(const Field& field, const Box& box, std::int64_t x, std::in
   return sum / static_cast<double>(factor * factor * factor);
 }
 
-void sample_rotated(const Field& field, const Box& box, const BoxRows& some, const BoxSink& sink) {
+void sample_rotated(const Field& field, const OrientedBox& box, base::Range some,
+                    const BoxSink& sink) {
   constexpr std::int64_t kBlock = 16;
   const auto [nx, ny, nz] = box.size;
-  const std::int64_t blocks = (some.end - some.first + kBlock - 1) / kBlock;
+  const std::int64_t blocks = (some.end - some.begin + kBlock - 1) / kBlock;
   base::parallel_for(nz * blocks, [&, nx = nx](std::int64_t index) {
     const std::int64_t section = index / blocks;
-    const std::int64_t first_row = some.first + index % blocks * kBlock;
+    const std::int64_t first_row = some.begin + index % blocks * kBlock;
     const std::int64_t num_rows = std::min(kBlock, some.end - first_row);
     std::vector<float> values;
     values.reserve(static_cast<std::size_t>(num_rows * nx));
@@ -87,7 +89,7 @@ Rotation rotation_from_euler(double rot_deg, double tilt_deg, double psi_deg) {
            {sb * ca, sb * sa, cb}}};
 }
 
-Point Box::position(const Point& voxel) const {
+Point OrientedBox::position(const Point& voxel) const {
   Point offset{};
   for (std::size_t a = 0; a < 3; ++a)
     offset[a] = (voxel[a] - static_cast<double>(size[a]) / 2) * voxel_px;
@@ -99,10 +101,10 @@ Point Box::position(const Point& voxel) const {
   return at;
 }
 
-Box box_between(const Point& low, const Point& high, double voxel_px) {
+OrientedBox box_between(const Point& low, const Point& high, double voxel_px) {
   // Sizes that are whole but for rounding count as whole.
   constexpr double kRounding = 1e-6;
-  Box box;
+  OrientedBox box;
   box.voxel_px = voxel_px;
   for (std::size_t a = 0; a < 3; ++a) {
     box.centre_px[a] = (low[a] + high[a]) / 2;
@@ -112,15 +114,15 @@ Box box_between(const Point& low, const Point& high, double voxel_px) {
   return box;
 }
 
-std::int64_t points_per_voxel(const Box& box) {
+std::int64_t points_per_voxel(const OrientedBox& box) {
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(box.voxel_px - 1e-9)));
 }
 
-void sample_box(const Field& field, const Box& box, const BoxSink& sink) {
-  sample_box(field, box, {0, box.size[1]}, sink);
+void sample_box(const Field& field, const OrientedBox& box, const BoxSink& sink) {
+  sample_box(field, box, {0, static_cast<int>(box.size[1])}, sink);
 }
 
-void sample_box(const Field& field, const Box& box, const BoxRows& rows, const BoxSink& sink) {
+void sample_box(const Field& field, const OrientedBox& box, base::Range rows, const BoxSink& sink) {
   TOMOFIELD_CHECK(box.size[0] > 0 && box.size[1] > 0 && box.size[2] > 0 && box.voxel_px > 0,
                   fmt::format("a box of {} × {} × {} voxels of {} px", box.size[0], box.size[1],
                               box.size[2], box.voxel_px));
@@ -128,7 +130,7 @@ void sample_box(const Field& field, const Box& box, const BoxRows& rows, const B
                    : sample_rotated(field, box, rows, sink);
 }
 
-std::vector<float> sample_box(const Field& field, const Box& box) {
+std::vector<float> sample_box(const Field& field, const OrientedBox& box) {
   const auto [nx, ny, nz] = box.size;
   std::vector<float> volume(static_cast<std::size_t>(nx * ny * nz));
   sample_box(field, box, [&, nx = nx, ny = ny](const BoxPart& part) {

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "base/range.h"
 #include "field/field.h"
 
 namespace tomofield::field {
@@ -19,9 +20,10 @@ inline constexpr Rotation kNoRotation{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 /// angles shows the particle in the orientation of the reference.
 Rotation rotation_from_euler(double rot_deg, double tilt_deg, double psi_deg);
 
-/// A box of cubic voxels anywhere in a field. The field's coordinates are pixels of the view at
-/// zero tilt, with z from 0 to the thickness.
-struct Box {
+/// A box of cubic voxels anywhere in a field, like the public SampleBox but with its rotation as a
+/// matrix. The field's coordinates are pixels of the view at zero tilt, with z from 0 to the
+/// thickness.
+struct OrientedBox {
   Point centre_px{};                      ///< the box's geometric centre
   std::array<std::int64_t, 3> size{};     ///< voxels in x, y, z
   double voxel_px = 1.0;                  ///< side of a voxel in pixels
@@ -35,11 +37,11 @@ struct Box {
 
 /// Returns the box with corners `low` and `high`, about the same centre, as far as whole voxels
 /// fill it (at least one).
-Box box_between(const Point& low, const Point& high, double voxel_px);
+OrientedBox box_between(const Point& low, const Point& high, double voxel_px);
 
 /// Returns the number of points along each axis whose mean is a voxel: 1 for voxels up to one
 /// pixel.
-std::int64_t points_per_voxel(const Box& box);
+std::int64_t points_per_voxel(const OrientedBox& box);
 
 /// A part of a sampled box. `values` are [section, row, x] with the box's whole width in x; rows go
 /// along its y and sections along its z.
@@ -59,15 +61,12 @@ using BoxSink = std::function<void(const BoxPart&)>;
 /// Boxes that are not rotated are evaluated 16 rows at a time, as in a fit. Rotated ones are
 /// evaluated point by point, which is tens of times slower. Memory: a few rows of the field's
 /// vertex values, and 16 MiB a thread.
-void sample_box(const Field& field, const Box& box, const BoxSink& sink);
-/// The rows [first, end) of a box. If the box is not rotated, `first` must be a multiple of 16.
-struct BoxRows {
-  std::int64_t first, end;
-};
-/// Computes the densities of some rows of a box.
-void sample_box(const Field& field, const Box& box, const BoxRows& rows, const BoxSink& sink);
+void sample_box(const Field& field, const OrientedBox& box, const BoxSink& sink);
+/// Computes the densities of some rows of a box. If the box is not rotated, the range must begin at
+/// a multiple of 16.
+void sample_box(const Field& field, const OrientedBox& box, base::Range rows, const BoxSink& sink);
 
 /// Returns the densities of a whole box, [z, y, x].
-std::vector<float> sample_box(const Field& field, const Box& box);
+std::vector<float> sample_box(const Field& field, const OrientedBox& box);
 
 }  // namespace tomofield::field

@@ -18,12 +18,12 @@ namespace {
 
 using testing::uneven_model;
 
-std::size_t index(const Box& box, std::int64_t x, std::int64_t y, std::int64_t z) {
+std::size_t index(const OrientedBox& box, std::int64_t x, std::int64_t y, std::int64_t z) {
   return static_cast<std::size_t>((z * box.size[1] + y) * box.size[0] + x);
 }
 
 // Computes the densities at the voxels' centres, one by one.
-std::vector<double> point_by_point(const Field& field, const Box& box) {
+std::vector<double> point_by_point(const Field& field, const OrientedBox& box) {
   std::vector<double> expected;
   for (std::int64_t z = 0; z < box.size[2]; ++z) {
     for (std::int64_t y = 0; y < box.size[1]; ++y) {
@@ -43,7 +43,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, EachBoxedField, ::testing::Values(FieldKind::kVm
 
 TEST_P(EachBoxedField, AlignedBoxesAreTheDensity) {
   const auto model = uneven_model(GetParam());
-  const std::vector<Box> boxes = {
+  const std::vector<OrientedBox> boxes = {
       box_between({10, 4, 0}, {110, 120, 21.5}, 1.0),                         // the region
       {.centre_px = {30.3, 41.7, 9.1}, .size = {37, 35, 11}, .voxel_px = 1},  // across leaves
       {.centre_px = {20, 30, 10}, .size = {33, 50, 7}, .voxel_px = 0.37},     // finer than pixels
@@ -51,13 +51,13 @@ TEST_P(EachBoxedField, AlignedBoxesAreTheDensity) {
       {.centre_px = {500, 4, 21}, .size = {3, 4, 5}, .voxel_px = 1},          // outside
       {.centre_px = {40, 40, 10}, .size = {1, 1, 1}, .voxel_px = 1},
   };
-  for (const Box& box : boxes)
+  for (const OrientedBox& box : boxes)
     testing::expect_near(sample_box(*model.field, box), point_by_point(*model.field, box), 3e-6);
 }
 
 TEST_P(EachBoxedField, OutsideTheDomainThereIsNothing) {
   const auto model = uneven_model(GetParam());
-  const Box box{.centre_px = {-60, 4, 0}, .size = {6, 6, 6}, .voxel_px = 1};
+  const OrientedBox box{.centre_px = {-60, 4, 0}, .size = {6, 6, 6}, .voxel_px = 1};
   const auto values = sample_box(*model.field, box);
   EXPECT_EQ(std::count(values.begin(), values.end(), 0.0f), 6 * 6 * 6 - 3 * 3 * 3);
   EXPECT_GT(values.back(), 0.0f);
@@ -68,11 +68,11 @@ TEST_P(EachBoxedField, OutsideTheDomainThereIsNothing) {
 TEST_P(EachBoxedField, CoarseVoxelsAreMeansOfFineOnes) {
   const auto model = uneven_model(GetParam());
   for (const double voxel_px : {2.0, 2.5, 20.0}) {
-    Box coarse{.centre_px = {31.2, 35.2, 12.0}, .size = {9, 7, 4}, .voxel_px = voxel_px};
+    OrientedBox coarse{.centre_px = {31.2, 35.2, 12.0}, .size = {9, 7, 4}, .voxel_px = voxel_px};
     if (voxel_px == 20.0) coarse.size = {2, 3, 1};
     const std::int64_t factor = points_per_voxel(coarse);
     ASSERT_EQ(factor, static_cast<std::int64_t>(std::ceil(voxel_px)));
-    Box fine = coarse;
+    OrientedBox fine = coarse;
     for (auto& n : fine.size) n *= factor;
     fine.voxel_px = voxel_px / static_cast<double>(factor);
     const auto fine_values = sample_box(*model.field, fine);
@@ -89,7 +89,7 @@ TEST_P(EachBoxedField, CoarseVoxelsAreMeansOfFineOnes) {
     }
     testing::expect_near(sample_box(*model.field, coarse), expected, 3e-6);
     // A rotation by a full turn takes the other code path.
-    Box turned = coarse;
+    OrientedBox turned = coarse;
     turned.field_from_box = rotation_from_euler(90, 0, 270);
     ASSERT_FALSE(turned.is_aligned());
     testing::expect_near(sample_box(*model.field, turned), expected, 3e-6);
@@ -98,10 +98,10 @@ TEST_P(EachBoxedField, CoarseVoxelsAreMeansOfFineOnes) {
 
 TEST_P(EachBoxedField, QuarterTurnsPermuteTheVolume) {
   const auto model = uneven_model(GetParam());
-  const Box box{.centre_px = {33.0, 35.0, 10.0}, .size = {13, 15, 11}, .voxel_px = 1.0};
+  const OrientedBox box{.centre_px = {33.0, 35.0, 10.0}, .size = {13, 15, 11}, .voxel_px = 1.0};
   const auto straight = sample_box(*model.field, box);
   // Rotate about z: field = R · box takes the box's x to the field's −y (RELION's rot is passive).
-  Box turned = box;
+  OrientedBox turned = box;
   turned.size = {15, 13, 11};
   turned.field_from_box = rotation_from_euler(90, 0, 0);
   auto values = sample_box(*model.field, turned);
@@ -143,7 +143,7 @@ TEST(SampleBox, EulerAnglesAreRelions) {
 }
 
 TEST(SampleBox, BoxesFillTheirCornersWithWholeVoxels) {
-  const Box box = box_between({10, 4, 0}, {110, 121, 21.5}, 2.0);
+  const OrientedBox box = box_between({10, 4, 0}, {110, 121, 21.5}, 2.0);
   EXPECT_EQ(box.size, (std::array<std::int64_t, 3>{50, 58, 10}));
   EXPECT_EQ(box.centre_px, (Point{60, 62.5, 10.75}));
   EXPECT_EQ(box.position({0, 0, 0}), (Point{10, 4.5, 0.75}));
@@ -154,7 +154,7 @@ TEST(SampleBox, BoxesFillTheirCornersWithWholeVoxels) {
 
 TEST(SampleBox, PartsCoverTheBoxOnceOnAnyNumberOfThreads) {
   const auto model = uneven_model(FieldKind::kVm);
-  const Box box{.centre_px = {30, 35, 10}, .size = {20, 37, 23}, .voxel_px = 1.0};
+  const OrientedBox box{.centre_px = {30, 35, 10}, .size = {20, 37, 23}, .voxel_px = 1.0};
   const int threads = base::thread_count();
   std::vector<std::vector<float>> results;
   for (const int count : {1, 3}) {

@@ -12,12 +12,12 @@ namespace {
 
 using Kind = LeafOrigin::Kind;
 
-// The change that the edit makes at each old node.
-struct NodeFates {
+// The changes that the edit makes at each old node.
+struct NodeChanges {
   std::vector<int> leaf;  // leaf number, −1 for inner nodes
   std::vector<bool> split, merge;
 
-  NodeFates(const Quadtree& tree, const QuadtreeEdit& edit)
+  NodeChanges(const Quadtree& tree, const QuadtreeEdit& edit)
       : leaf(tree.nodes().size(), -1), split(leaf.size()), merge(leaf.size()) {
     for (int i = 0; i < tree.num_leaves(); ++i)
       leaf[tree.leaves()[static_cast<std::size_t>(i)]] = i;
@@ -55,25 +55,25 @@ QuadtreeNode child_of(const QuadtreeNode& parent, int parent_index, int c) {
   return child;
 }
 
-LeafOrigin origin_of(const Pending& p, const Quadtree& tree, const NodeFates& fates) {
-  if (p.quarter >= 0) return {Kind::kQuarter, fates.leaf[p.old], p.quarter};
-  if (!fates.merge[p.old]) return {Kind::kSame, fates.leaf[p.old], 0};
+LeafOrigin origin_of(const Pending& p, const Quadtree& tree, const NodeChanges& changes) {
+  if (p.quarter >= 0) return {Kind::kQuarter, changes.leaf[p.old], p.quarter};
+  if (!changes.merge[p.old]) return {Kind::kSame, changes.leaf[p.old], 0};
   const int first_child = tree.nodes()[p.old].first_child;
-  return {Kind::kUnion, fates.leaf[static_cast<std::size_t>(first_child)], 0};
+  return {Kind::kUnion, changes.leaf[static_cast<std::size_t>(first_child)], 0};
 }
 
 }  // namespace
 
 EditedTree edit_tree(const Quadtree& tree, const QuadtreeEdit& edit) {
-  const NodeFates fates(tree, edit);
+  const NodeChanges changes(tree, edit);
   std::vector<Pending> nodes;  // breadth first, so that children follow their parents
   for (int root = 0; root < tree.roots().columns * tree.roots().rows; ++root)
     nodes.push_back({tree.nodes()[static_cast<std::size_t>(root)], static_cast<std::size_t>(root)});
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     const Pending parent = nodes[n];
     nodes[n].node.first_child = -1;
-    const bool splits = fates.split[parent.old];
-    const bool is_inner = parent.quarter < 0 && !fates.merge[parent.old] &&
+    const bool splits = changes.split[parent.old];
+    const bool is_inner = parent.quarter < 0 && !changes.merge[parent.old] &&
                           (splits || !tree.nodes()[parent.old].is_leaf());
     if (!is_inner) continue;
     nodes[n].node.first_child = static_cast<int>(nodes.size());
@@ -88,7 +88,7 @@ EditedTree edit_tree(const Quadtree& tree, const QuadtreeEdit& edit) {
   for (const Pending& p : nodes) plain.push_back(p.node);
   EditedTree edited{Quadtree(tree.roots(), std::move(plain)), {}};
   for (const int n : edited.tree.leaves())
-    edited.origins.push_back(origin_of(nodes[static_cast<std::size_t>(n)], tree, fates));
+    edited.origins.push_back(origin_of(nodes[static_cast<std::size_t>(n)], tree, changes));
   return edited;
 }
 

@@ -8,8 +8,8 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
-#include "field/vm/merge_target.h"
-#include "field/vm/vm_layout.h"
+#include "field/merge_target.h"
+#include "field/vm/vm_field.h"
 
 namespace tomofield::field {
 namespace {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "field/vm/merge_target.h"
-#include "field/vm/vm_layout.h"
+#include "field/merge_target.h"
+#include "field/vm/vm_field.h"
 
 namespace tomofield::field {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "field/vm/merge_target.h"
+#include "field/merge_target.h"
 
 namespace tomofield::field {
 
@@ -20,5 +20,9 @@ struct LeafFactors {
 /// pull to the present factor makes its solution unique where ranks exceed vertices. The misfit
 /// never grows. Ends when a sweep changes it by less than a thousandth. Returns the final misfit.
 double fit_factors(const RowMajorMatrix& b, LeafFactors& factors);
+
+/// Fits the parameters of a merged leaf of a vector–matrix field to its target. `parameters` hold
+/// the start.
+void merge_factors(const LeafShape& shape, const MergeTarget& target, float* parameters);
 
 }  // namespace tomofield::field

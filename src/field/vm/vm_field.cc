@@ -5,10 +5,9 @@
 #include <vector>
 
 #include "base/aligned_buffer.h"
+#include "field/array_variation.h"
 #include "field/sampling/resample.h"
-#include "field/variation_planes.h"
-#include "field/vm/factor_maps.h"
-#include "field/vm/vm_layout.h"
+#include "field/vm/merge_factors.h"
 #include "kernels/point_products.h"
 #include "kernels/row_interpolation.h"
 #include "kernels/small_gemm.h"
@@ -322,10 +321,7 @@ void VmField::join_leaves(const LeafShape& s, const Quarters& leaves, float* joi
 }
 
 void VmField::fit_merged(const LeafShape& s, const MergeTarget& target, float* parameters) const {
-  const FactorMaps maps(s, target);
-  LeafFactors factors = maps.read(parameters);
-  fit_factors(target.b, factors);
-  maps.write(factors, parameters);
+  merge_factors(s, target, parameters);
 }
 
 }  // namespace tomofield::field

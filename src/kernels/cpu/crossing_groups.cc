@@ -1,13 +1,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/range.h"
 #include "kernels/line_projection.h"
 
 namespace tomofield::kernels {
 namespace {
 
-using Range = CrossingGroup::Range;
-constexpr std::size_t kMost = CrossingGroup::kMost;
+using base::Range;
+constexpr std::size_t kMax = CrossingGroup::kMax;
 
 // An upper bound on the rounding errors of positions and of samples' pixels, for up to 10⁵ pixels.
 // It keeps the `whole` range, which is used without tests, within its memory.
@@ -84,7 +85,7 @@ void put_pair(const LineCrossing& c, int pair, std::size_t k, CrossingGroup& gro
 
 // Returns the group of crossing number `count`; starts a new group for every four.
 CrossingGroup& group_of(std::size_t count, std::vector<CrossingGroup>& groups) {
-  if (count % kMost == 0) groups.emplace_back();
+  if (count % kMax == 0) groups.emplace_back();
   return groups.back();
 }
 
@@ -95,9 +96,9 @@ void include(Range whole, Range reached, std::size_t k, CrossingGroup& group) {
 
 // Fills the last group with copies of its last crossing without weight, whose memory is readable.
 void fill_up(std::size_t count, std::vector<CrossingGroup>& groups) {
-  if (count % kMost == 0) return;
+  if (count % kMax == 0) return;
   CrossingGroup& g = groups.back();
-  for (std::size_t last = count % kMost - 1, k = last + 1; k < kMost; ++k) {
+  for (std::size_t last = count % kMax - 1, k = last + 1; k < kMax; ++k) {
     for (auto numbers :
          {&CrossingGroup::offset, &CrossingGroup::step, &CrossingGroup::low, &CrossingGroup::high,
           &CrossingGroup::first_pixel, &CrossingGroup::last_pixel, &CrossingGroup::inverse,
@@ -115,9 +116,9 @@ void group_lines(std::span<const LineCrossing> lines, const float* source,
   std::size_t count = 0;
   for (const LineCrossing& line : lines) {
     CrossingGroup& group = group_of(count, groups);
-    if (count % kMost == 0)
-      set_pixels(lines.subspan(count, std::min(kMost, lines.size() - count)), group);
-    put(line, count++ % kMost, line.samples - source, group);
+    if (count % kMax == 0)
+      set_pixels(lines.subspan(count, std::min(kMax, lines.size() - count)), group);
+    put(line, count++ % kMax, line.samples - source, group);
   }
   fill_up(count, groups);
 }
@@ -128,11 +129,11 @@ void group_views(std::span<const LineCrossing> views, const float* source,
   for (const LineCrossing& view : views) {
     if (view.first_pixel >= view.end_pixel) continue;
     const int pairs = pairs_a_sample(view);
-    const Range inner = samples_within(view), reached{inner.first - 2, inner.end + 2};
+    const Range inner = samples_within(view), reached{inner.begin - 2, inner.end + 2};
     const Range whole = pairs == 1 ? inner : Range{};
     for (int pair = 0; pair < pairs; ++pair) {
       CrossingGroup& group = group_of(count, groups);
-      const std::size_t k = count++ % kMost;
+      const std::size_t k = count++ % kMax;
       put(view, k, view.detector - source, group);
       put_pair(view, pair, k, group);
       include(whole, reached, k, group);

@@ -28,7 +28,7 @@ namespace tomofield::kernels::HWY_NAMESPACE {
 // thread is busy on the same core, which is why loops are unrolled and constants are known at
 // compile time. Making the tables takes another sixth of the time (docs/results/speed.md).
 constexpr int kTile = 32;
-constexpr int kItems = CrossingGroup::kMost;
+constexpr int kItems = CrossingGroup::kMax;
 constexpr int kMaxTables = 2;
 using IntVec = hn::Vec<IntTag>;
 template <typename T>
@@ -158,8 +158,8 @@ void take_from_groups(const CrossingGroup* groups, int num_groups, const float* 
       num_tables = 0;
     };
     for (int g = 0; g < num_groups; ++g) {
-      if (!groups[g].reached.overlaps(tile, tile_end)) continue;
-      if (groups[g].whole.contains(tile, tile_end)) {
+      if (!groups[g].reached.overlaps({tile, tile_end})) continue;
+      if (groups[g].whole.contains({tile, tile_end})) {
         fill<Items, true>(groups[g], next, tile, tile_end, tables[num_tables++]);
       } else {
         fill<Items, false>(groups[g], next, tile, tile_end, tables[num_tables++]);
@@ -288,7 +288,8 @@ void project_slabs(const CrossingGroup* groups, int num_groups, const float* sam
 }
 
 void project_lines(const CrossingGroup* groups, int num_groups, const float* samples,
-                   std::ptrdiff_t stride, int first, int end, float* detector, const Slabs& slabs) {
+                   std::ptrdiff_t stride, int first, int end, float* detector,
+                   const SlabGroup& slabs) {
   const Apart apart{slabs.samples_apart, slabs.detectors_apart};
   (slabs.count == 2 ? project_slabs<2> : project_slabs<1>)(groups, num_groups, samples, stride,
                                                            first, end, apart, detector);
@@ -296,7 +297,7 @@ void project_lines(const CrossingGroup* groups, int num_groups, const float* sam
 
 void backproject_lines(const CrossingGroup* groups, int num_groups, const float* detector,
                        std::ptrdiff_t stride, int first, int end, float* samples,
-                       const Slabs& slabs) {
+                       const SlabGroup& slabs) {
   const Apart apart{slabs.detectors_apart, slabs.samples_apart};
   const auto backproject = slabs.count == 2 ? take_from_groups<AdjointItems, 2, Adjacent>
                                             : take_from_groups<AdjointItems, 1, Adjacent>;
@@ -311,13 +312,14 @@ namespace tomofield::kernels {
 HWY_EXPORT(project_lines);
 HWY_EXPORT(backproject_lines);
 void project_lines(const CrossingGroup* groups, int num_groups, const float* samples,
-                   std::ptrdiff_t stride, int first, int end, float* detector, const Slabs& slabs) {
+                   std::ptrdiff_t stride, int first, int end, float* detector,
+                   const SlabGroup& slabs) {
   HWY_DYNAMIC_DISPATCH(project_lines)
   (groups, num_groups, samples, stride, first, end, detector, slabs);
 }
 void backproject_lines(const CrossingGroup* groups, int num_groups, const float* detector,
                        std::ptrdiff_t stride, int first, int end, float* samples,
-                       const Slabs& slabs) {
+                       const SlabGroup& slabs) {
   HWY_DYNAMIC_DISPATCH(backproject_lines)
   (groups, num_groups, detector, stride, first, end, samples, slabs);
 }

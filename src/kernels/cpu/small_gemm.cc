@@ -14,7 +14,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 // Vectors of columns of C that are computed together.
 //
-// A block of kMostRows rows of a panel stays in registers. The bound is kRows · kVecs FMAs, two a
+// A block of kMaxRows rows of a panel stays in registers. The bound is kRows · kVecs FMAs, two a
 // cycle, against kRows broadcasts of A and kVecs loads of B, also two a cycle. With one vector a
 // row, the broadcast is part of the FMA. At least eight FMAs are needed to hide their latency.
 //
@@ -26,9 +26,9 @@ struct Panel {
   static constexpr int kVecs = kVectors;
   static constexpr bool kNeighbours = kAreNeighbours;
 #if HWY_TARGET <= HWY_AVX3
-  static constexpr int kMostRows = kNeighbours ? 24 : kVecs == 3 ? 8 : 12;  // of 32 registers
+  static constexpr int kMaxRows = kNeighbours ? 24 : kVecs == 3 ? 8 : 12;  // of 32 registers
 #else
-  static constexpr int kMostRows = kVecs == 1 ? 8 : 12 / kVecs;  // of 16 registers
+  static constexpr int kMaxRows = kVecs == 1 ? 8 : 12 / kVecs;  // of 16 registers
 #endif
 };
 
@@ -104,11 +104,11 @@ HWY_INLINE void block_of_rows(std::ptrdiff_t rows, D d, const SmallGemm& g, std:
 // because a short block would wait for its few FMAs. Returns the column after the panel.
 template <class P, class D>
 HWY_INLINE std::ptrdiff_t panel(D d, const SmallGemm& g, std::ptrdiff_t col) {
-  const std::ptrdiff_t blocks = (g.rows + P::kMostRows - 1) / P::kMostRows;
+  const std::ptrdiff_t blocks = (g.rows + P::kMaxRows - 1) / P::kMaxRows;
   const std::ptrdiff_t lower = blocks == 0 ? 0 : g.rows / blocks, higher = g.rows - lower * blocks;
   for (std::ptrdiff_t i = 0, row = 0; i < blocks; ++i) {
     const std::ptrdiff_t rows = lower + (i < higher ? 1 : 0);
-    block_of_rows<P, P::kMostRows>(rows, d, g, row, col);
+    block_of_rows<P, P::kMaxRows>(rows, d, g, row, col);
     row += rows;
   }
   return col + P::kVecs * static_cast<std::ptrdiff_t>(hn::Lanes(d));

@@ -1,4 +1,4 @@
-#include "field/vm/merge_target.h"
+#include "field/merge_target.h"
 
 #include <vector>
 
@@ -6,6 +6,18 @@
 
 namespace tomofield::field {
 namespace {
+
+// Returns the interpolation matrix [n, n] from an axis' vertices to those of its first or second
+// half.
+Eigen::MatrixXd half_interpolation(int n, int half) {
+  Eigen::MatrixXd p = Eigen::MatrixXd::Zero(n, n);
+  for (int i = 0; i < n; ++i) {
+    const AxisPoint at(0.5 * half * (n - 1) + 0.5 * i, n);
+    p(i, at.lower) = 1 - at.fraction;
+    p(i, at.lower + 1) = at.fraction;
+  }
+  return p;
+}
 
 Eigen::MatrixXd normal_cholesky(int n) {
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
@@ -37,16 +49,6 @@ RowMajorMatrix vertex_values(const Field& field, int leaf) {
 }
 
 }  // namespace
-
-Eigen::MatrixXd half_interpolation(int n, int half) {
-  Eigen::MatrixXd p = Eigen::MatrixXd::Zero(n, n);
-  for (int i = 0; i < n; ++i) {
-    const AxisPoint at(0.5 * half * (n - 1) + 0.5 * i, n);
-    p(i, at.lower) = 1 - at.fraction;
-    p(i, at.lower + 1) = at.fraction;
-  }
-  return p;
-}
 
 MergeTarget make_merge_target(const Field& field, int first_leaf) {
   const LeafShape& s = field.shape(first_leaf);

@@ -1,4 +1,4 @@
-#include "field/variation_planes.h"
+#include "field/array_variation.h"
 
 #include <cmath>
 #include <cstddef>

@@ -1,4 +1,4 @@
-#include "field/vm/join_quarters.h"
+#include "field/sampling/resample.h"
 
 namespace tomofield::field {
 namespace {

@@ -24,8 +24,4 @@ struct MergeTarget {
 /// Makes the target of four sibling leaves of the same shape, first_leaf … first_leaf + 3.
 MergeTarget make_merge_target(const Field& field, int first_leaf);
 
-/// Returns the interpolation matrix [n, n] from an axis' vertices to those of its first or second
-/// half.
-Eigen::MatrixXd half_interpolation(int n, int half);
-
 }  // namespace tomofield::field

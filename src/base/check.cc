@@ -1,4 +1,4 @@
-#include "base/faults.h"
+#include "base/check.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "io/half_float.h"
+#include "io/mrc_format.h"
 
 #include <gtest/gtest.h>
 

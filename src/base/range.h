@@ -1,0 +1,32 @@
+#pragma once
+
+#include <algorithm>
+
+namespace tomofield::base {
+
+/// The consecutive integers [begin, end). A range whose end is not above its begin is empty.
+struct Range {
+  int begin = 0, end = 0;
+
+  int size() const { return end - begin; }
+  bool is_empty() const { return end <= begin; }
+  bool contains(int i) const { return begin <= i && i < end; }
+  /// Returns true if this range contains all of `other`, which is not empty.
+  bool contains(Range other) const { return begin <= other.begin && other.end <= end; }
+  /// Returns true if this range and `other`, which is not empty, have an integer in common.
+  bool overlaps(Range other) const { return !is_empty() && other.begin < end && begin < other.end; }
+  /// Returns the integers that are in both ranges.
+  Range common_with(Range other) const {
+    const Range common{std::max(begin, other.begin), std::min(end, other.end)};
+    return common.is_empty() ? Range{} : common;
+  }
+  /// Returns the smallest range that contains both.
+  Range joined_with(Range other) const {
+    if (is_empty()) return other;
+    if (other.is_empty()) return *this;
+    return {std::min(begin, other.begin), std::max(end, other.end)};
+  }
+  bool operator==(const Range&) const = default;
+};
+
+}  // namespace tomofield::base
