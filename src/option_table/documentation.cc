@@ -45,7 +45,7 @@ std::string cell(std::string_view text) {
 
 std::string default_text(const Row& row) {
   if (row.is_required) return "required";
-  if (!row.automatic.empty()) return "automatic: " + std::string(row.automatic);
+  if (!row.automatic.empty()) return fmt::format("automatic: {}", row.automatic);
   if (is_flag(row)) return "off";
   return text_of(row, {}).value_or("none");
 }
@@ -53,7 +53,7 @@ std::string default_text(const Row& row) {
 std::string value_text(const Row& row) {
   if (is_flag(row)) return "";
   const std::string range = row.range.text();
-  const std::string label = range.empty() ? "`" + label_of(row) + "`" : range;
+  const std::string label = range.empty() ? fmt::format("`{}`", label_of(row)) : range;
   return row.unit.empty() ? label : fmt::format("{} ({})", label, row.unit);
 }
 

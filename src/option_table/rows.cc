@@ -6,12 +6,12 @@
 #include <cmath>
 
 #include "base/check.h"
-#include "kernels/lanes.h"
 
 namespace tomofield::option_table {
 namespace {
 
 constexpr double kMaxCount = 1e9;
+constexpr double kLeafStep = 16;  // rows of a slab (kernels/lanes.h): leaves have whole slabs
 constexpr double kMaxLeaf = 4096;
 
 constexpr std::string_view kUnbinned = "unbinned pixels";
@@ -108,7 +108,7 @@ constexpr Row kRows[] = {
     {.key = "field.kind", .flag = "--field", MEMBER(Options, field), .group = Group::kField,
      .help = "vm: vector-matrix factors in every leaf; grid: plain vertices"},
     {.key = "field.leaf_size", .flag = "--leaf-size", MEMBER(Options, leaf_size),
-     .group = Group::kField, .unit = kBinned, .range = Range::multiple_of(kernels::kLanes, kMaxLeaf),
+     .group = Group::kField, .unit = kBinned, .range = Range::multiple_of(kLeafStep, kMaxLeaf),
      .automatic = "32; 64 for a uniform tree of plain vertices", .help = "Side of a leaf"},
     {.key = "field.tree", .flag = "--tree", MEMBER(Options, tree), .group = Group::kField,
      .help = "uniform: all leaves are alike; adaptive: leaves are finer where the density varies "

@@ -7,6 +7,7 @@
 #include "base/check.h"
 #include "fit/integer_program.h"
 #include "fit/options.h"
+#include "kernels/lanes.h"
 #include "option_table/values.h"
 #include "reconstruct/resolve.h"
 #include "scratch_directory.h"
@@ -55,6 +56,10 @@ TEST(ReconstructOptions, LargeLeavesOfAUniformTreeAreRootCells) {
   field.tree = TreeKind::kAdaptive;  // whose leaves may become twice as wide
   EXPECT_EQ(fit::usual_leaf_size(field), fit::FieldOptions{}.leaf_size);
   EXPECT_EQ(fit::usual_depth(field), 1);
+}
+
+TEST(ReconstructOptions, LeavesHaveWholeSlabs) {
+  EXPECT_EQ(option_table::row_of("field.leaf_size").range.low, kernels::kLanes);
 }
 
 TEST(ReconstructOptions, OnlyFactorsOfAUniformTreeBeginAsVertices) {

@@ -95,7 +95,7 @@ TEST_F(Plan, CountsTheTrials) {
   EXPECT_EQ(plan().num_trials, 2);
   options_.fit.hold_out = 7;  // 13 views are left, and trials of the penalty need 14
   EXPECT_EQ(plan().num_trials, 0);
-  options_.tune = true;
+  options_.resolved.tune = true;
   EXPECT_GT(plan().num_trials, 2);
   options_.fit.hold_out = 2;
   options_.input.exclude = "1-9";
