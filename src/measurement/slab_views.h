@@ -12,6 +12,7 @@
 #include "distributed/communicator.h"
 #include "distributed/partition.h"
 #include "io/scratch_memory.h"
+#include "kernels/lanes.h"
 
 namespace tomofield::measurement {
 
