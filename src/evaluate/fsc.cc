@@ -209,14 +209,14 @@ constexpr std::size_t kBytesOfVoxel = 20;
 
 void check_memory(const FscFiles& files) {
   const io::MrcReader file(files.second);
-  const Box box = files.box.value_or(whole_box(file));
+  const base::Box box = files.box.value_or(whole_box(file));
   if (!lies_within(box, whole_box(file))) return;  // read_pair() reports this error
   base::require_memory(kBytesOfVoxel * box.shape().voxels(), "the shell correlation",
                        "restrict it with --box, or bin both volumes");
 }
 
 base::Volume read_mask(const std::filesystem::path& path, const std::filesystem::path& second,
-                       const Box& box) {
+                       const base::Box& box) {
   const io::MrcReader mask(path), volume(second);
   if (whole_box(mask) != whole_box(volume)) {
     const auto size = [](const io::MrcReader& f) {
@@ -336,8 +336,8 @@ nlohmann::json fsc_json(const Fsc& fsc, const FscFiles& files) {
                          {"all", curve_json(fsc, fsc.all)}};
   json["mask"] = files.mask ? nlohmann::json(files.mask->string()) : nlohmann::json();
   if (files.box) {
-    json["box_first"] = files.box->first;
-    json["box_last"] = files.box->last;
+    json["box_first"] = files.box->begin;
+    json["box_last"] = files.box->end;
   }
   if (files.tilts) {
     json["tilt_range_deg"] = {files.tilts->low_deg, files.tilts->high_deg};

@@ -256,8 +256,8 @@ nlohmann::json comparison_json(const Comparison& comparison,
           {"scale", comparison.psnr.scale},
           {"offset", comparison.psnr.offset},
           {"peak", comparison.psnr.peak},
-          {"box_first", comparison.box.first},
-          {"box_last", comparison.box.last}};
+          {"box_first", comparison.box.begin},
+          {"box_last", comparison.box.end}};
 }
 
 }  // namespace tomofield::evaluate

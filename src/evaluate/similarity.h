@@ -45,7 +45,7 @@ SsimScore ssim(const base::Volume& reconstruction, const base::Volume& truth, do
 struct Comparison {
   PsnrScore psnr;
   SsimScore ssim;
-  Box box;  ///< the voxels compared, in the truth's coordinates
+  base::Box box;  ///< the voxels compared, in the truth's coordinates
 };
 
 /// Scores the first volume of a pair against the second, the truth. The peak of the PSNR is the
