@@ -12,51 +12,55 @@
 
 #include "base/enum_names.h"
 
-namespace tomofield::base {
-
-template <>
-struct EnumNames<VoxelType> {
-  static constexpr std::array kNames{std::pair{VoxelType::kFloat32, "float32"},
-                                     std::pair{VoxelType::kFloat16, "float16"},
-                                     std::pair{VoxelType::kInt16, "int16"}};
-};
-
-}  // namespace tomofield::base
-
 namespace tomofield::python {
 namespace {
 
 namespace py = pybind11;
 using Class = py::class_<Options>;
 
-template <typename Enum>
+// Names types as numpy does; the command line names the modes of MRC files.
+struct VoxelTypeNames {
+  static constexpr std::array kNames{std::pair{VoxelType::kFloat32, "float32"},
+                                     std::pair{VoxelType::kFloat16, "float16"},
+                                     std::pair{VoxelType::kInt16, "int16"}};
+};
+
+template <typename Names, typename Enum>
+std::string name_of(Enum value) {
+  for (const auto& [known, name] : Names::kNames)
+    if (known == value) return name;
+  return "";
+}
+
+template <typename Names, typename Enum>
 Enum value_named(const char* option, const std::string& name) {
-  if (const auto value = base::enum_named<Enum>(name)) return *value;
   std::string choices;
-  for (const auto& [value, choice] : base::EnumNames<Enum>::kNames)
+  for (const auto& [value, choice] : Names::kNames) {
+    if (name == choice) return value;
     choices += (choices.empty() ? "'" : ", '") + std::string(choice) + "'";
+  }
   throw Error(std::string("the option ") + option + " is one of " + choices + ", not '" + name +
               "'");
 }
 
-template <typename Enum>
+template <typename Enum, typename Names = base::EnumNames<Enum>>
 void add_choice(Class& options, const char* name, Enum Options::*member) {
   options.def_property(
-      name, [member](const Options& o) { return std::string(base::name_of(o.*member)); },
+      name, [member](const Options& o) { return name_of<Names>(o.*member); },
       [name, member](Options& o, const std::string& word) {
-        o.*member = value_named<Enum>(name, word);
+        o.*member = value_named<Names, Enum>(name, word);
       });
 }
 
-template <typename Enum>
+template <typename Enum, typename Names = base::EnumNames<Enum>>
 void add_choice(Class& options, const char* name, std::optional<Enum> Options::*member) {
   options.def_property(
       name,
       [member](const Options& o) {
-        return o.*member ? std::optional<std::string>(base::name_of(*(o.*member))) : std::nullopt;
+        return o.*member ? std::optional(name_of<Names>(*(o.*member))) : std::nullopt;
       },
       [name, member](Options& o, const std::optional<std::string>& word) {
-        o.*member = word ? std::optional(value_named<Enum>(name, *word)) : std::nullopt;
+        o.*member = word ? std::optional(value_named<Names, Enum>(name, *word)) : std::nullopt;
       });
 }
 
@@ -140,7 +144,7 @@ void add_volume_and_run(Class& options) {
       .def_readwrite("overwrite", &Options::overwrite)
       .def_readwrite("resume", &Options::resume)
       .def_readwrite("checkpoint_minutes", &Options::checkpoint_minutes);
-  add_choice(options, "voxel_type", &Options::voxel_type);
+  add_choice<VoxelType, VoxelTypeNames>(options, "voxel_type", &Options::voxel_type);
   add_choice(options, "axes", &Options::axes);
 }
 
