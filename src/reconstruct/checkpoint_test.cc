@@ -46,8 +46,8 @@ class Checkpoint : public ::testing::Test {
   static std::vector<float> parameters(const fit::Fit& fit) {
     return {fit.field().parameters().begin(), fit.field().parameters().end()};
   }
-  static selection::Tuned tuned() {
-    const selection::TrialSettings chosen{Penalty::kSmooth, 2.5, 8, 20};
+  static TunedFit tuned() {
+    const TrialSettings chosen{Penalty::kSmooth, 2.5, 8, 20};
     return {.settings = chosen,
             .trials = {{chosen, {1.25, {1.0, 1.5}}, 3.0}},
             .predicted_views = {4, 12}};

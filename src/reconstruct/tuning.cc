@@ -25,13 +25,6 @@ using nlohmann::json;
 constexpr std::int64_t kPenaltyRows = 32;
 constexpr double kPenaltyPart = 0.5;  // of the epochs that plain vertices need
 
-json settings_json(const TrialSettings& s) {
-  return {{"tv_penalty", base::name_of(s.penalty)},
-          {"tv", s.variation},
-          {"rank", s.rank},
-          {"epochs", s.epochs}};
-}
-
 TrialSettings settings_from(const json& entry) {
   return {.penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>()).value(),
           .variation = entry.at("tv"),
@@ -179,6 +172,13 @@ void log_trials(const std::vector<FitTrial>& trials) {
 }
 
 }  // namespace
+
+json settings_json(const TrialSettings& s) {
+  return {{"tv_penalty", base::name_of(s.penalty)},
+          {"tv", s.variation},
+          {"rank", s.rank},
+          {"epochs", s.epochs}};
+}
 
 FitTrials make_trials(FitTrials::RunTrial run) {
   constexpr double kRounding = 1e-9;

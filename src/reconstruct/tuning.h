@@ -55,6 +55,8 @@ struct TuneHooks {
   std::function<bool()> stop_requested;  ///< asked after every step
 };
 
+/// Writes settings as trial files and results have them.
+nlohmann::json settings_json(const TrialSettings& settings);
 /// Writes what a search chose and everything that it tried; tuned_from() reads it.
 nlohmann::json tuning_json(const TunedFit& tuned);
 TunedFit tuned_from(const nlohmann::json& tuning);
