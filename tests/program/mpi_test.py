@@ -127,11 +127,11 @@ def test_processes_find_the_beads_together(command):
     for extra in ([], ["--log"]):
         alone = fresh_results("beads")
         harness.succeed(*command(alone, *options, *extra, input=gold))
-        assert figures(alone)["mask"]["beads"] >= 5, figures(alone)["mask"]
+        assert metrics(alone)["mask"]["beads"] >= 5, metrics(alone)["mask"]
         shared = fresh_results("beads3")
         succeed(3, *command(shared, *options, *extra, input=gold))
         assert shared.same_as(alone), extra
-        assert figures(shared) == figures(alone), extra
+        assert metrics(shared) == metrics(alone), extra
 
 
 def test_each_process_has_its_part(command):
