@@ -75,7 +75,7 @@ std::optional<double> crossing_A(std::span<const double> frequency_per_A, const 
 struct FscFiles {
   std::filesystem::path first, second;
   std::optional<std::filesystem::path> mask;  ///< default: edge_window()
-  std::optional<base::Box> box;                     ///< in voxels of the second
+  std::optional<base::Box> box;               ///< in voxels of the second
   std::optional<TiltRange> tilts;
 };
 
