@@ -108,14 +108,15 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
   command.add_option("--truth", arguments.truth, "MRC volume to score all methods against")
       ->group(group);
   command
-      .add_flag(
-          "--tune", arguments.tune,
-          "Tune the methods that have --tune, anew in every run; a run for --hold-out is tuned "
-          "without the views that score it")
+      .add_flag("--tune", arguments.tune,
+                "Tune every method that has --tune, separately in each run. Runs for --hold-out "
+                "are tuned "
+                "without the views that score them")
       ->group(group);
   command
-      .add_flag("--halves", arguments.halves,
-                "Also run every method on the odd and on the even views, and correlate the two")
+      .add_flag(
+          "--halves", arguments.halves,
+          "Also run every method on the odd and on the even views, and correlate the two volumes")
       ->group(group);
   command
       .add_option("--hold-out", arguments.hold_out,
@@ -127,7 +128,7 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
       ->required()
       ->group(group);
   command
-      .add_flag("--overwrite", arguments.overwrite, "Remove old results and run all methods anew")
+      .add_flag("--overwrite", arguments.overwrite, "Remove old results and run all methods again")
       ->group(group);
   return {"--methods",  "--also",   "--truth",     "--tune",   "--halves",
           "--hold-out", "--output", "--overwrite", "--exclude"};
@@ -138,7 +139,7 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
 void add_compare_command(CLI::App& program) {
   CLI::App& command = *program.add_subcommand(
       "compare",
-      "Run several methods on one series: their volumes, a table and report.html side by side");
+      "Run several methods on one series, and write their volumes, a table and report.html");
   auto arguments = std::make_shared<Arguments>();
   add_input_options(command, arguments->choices);
   add_groups(command, arguments->choices, {option_table::Group::kSpecimen});

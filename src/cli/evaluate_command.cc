@@ -159,7 +159,8 @@ void add_evaluate_command(CLI::App& program) {
   auto arguments = std::make_shared<EvaluateArguments>();
   CLI::App* command = program.add_subcommand(
       "evaluate",
-      "Score a volume: against the truth, against another half, or by its own contrast and noise");
+      "Score a volume against a truth, another half or the views of a tilt series, or by its "
+      "contrast and noise");
   add_evaluate_options(*command, *arguments);
   add_common_options(*command);
   add_help_all(*command);

@@ -57,15 +57,17 @@ void add_comparison_options(CLI::App& command, EvaluateArguments& arguments) {
       ->type_name("VOLUME")
       ->required();
   command
-      .add_option("truth", arguments.truth,
-                  "MRC volume to score it against: PSNR and SSIM, raw and after the best scale and "
-                  "offset")
+      .add_option(
+          "truth", arguments.truth,
+          "MRC volume of the truth: computes PSNR and SSIM, raw and after the best scale and "
+          "offset")
       ->type_name("TRUTH");
   command
       .add_option_function<std::string>(
           "--box", [&arguments](const std::string& text) { arguments.box = parse_box(text); },
-          "Compare (PSNR, SSIM, FSC) only these voxels of the other volume, zero-based, the last "
-          "excluded")
+          "Compare only these voxels of the other volume (PSNR, SSIM, FSC). Voxels count from 0; "
+          "X1, "
+          "Y1 and Z1 lie outside")
       ->check(box_check())
       ->type_name(kBoxType);
 }
@@ -88,9 +90,9 @@ void add_fsc_options(CLI::App& command, EvaluateArguments& arguments) {
           [&arguments](const std::vector<double>& tilts) {
             arguments.tilts = {tilts[0], tilts[1]};
           },
-          "Lowest and highest tilt in degrees, as in --tilt-range=-60,50: also correlate the "
+          "Lowest and highest tilt in degrees, such as --tilt-range=-60,50. Correlates the "
           "measured "
-          "frequencies and the missing wedge separately (tilt axis Y)")
+          "frequencies and the missing wedge separately; the tilt axis is Y")
       ->delimiter(',')
       ->expected(2)
       ->check(number_between(-90.0, 90.0))
@@ -106,8 +108,9 @@ void add_contrast_options(CLI::App& command, EvaluateArguments& arguments) {
   command
       .add_flag(
           "--cnr", arguments.contrast,
-          "Compute the contrast-to-noise ratio and the equivalent number of looks; regions are "
-          "chosen unless given (default if no other score is asked for)")
+          "Compute the contrast-to-noise ratio and the equivalent number of looks; the "
+          "program chooses the regions unless --foreground and --background give them (default if "
+          "no other score is asked for)")
       ->group(group);
   CLI::Option* foreground =
       add_boxes(command, "--foreground", arguments.regions.foreground,
@@ -151,8 +154,8 @@ void add_reprojection_options(CLI::App& command, EvaluateArguments& arguments) {
           .add_option(
               "--series", arguments.series,
               "Tilt series (MRC stack): project the volume and compare it with the views, after "
-              "the best scale and offset of each view. The options of the series are those "
-              "of reconstruct")
+              "the best scale and offset of each view. Takes the same options for the "
+              "series as reconstruct")
           ->type_name("STACK")
           ->group(group);
   const std::size_t first = command.get_options().size();

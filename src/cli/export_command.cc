@@ -10,6 +10,7 @@
 
 #include "cli/commands.h"
 #include "cli/common_options.h"
+#include "cli/help_formatter.h"
 #include "cli/number_checks.h"
 #include "cli/table_options.h"
 #include "io/atomic_file.h"
@@ -93,42 +94,46 @@ void add_box_options(CLI::App& command, ExportArguments& arguments) {
       "", "finite");
   CLI::Option* box =
       command
-          .add_option("--box", arguments.box,
-                      "x0,y0,z0,x1,y1,z1: corners; default: the region of interest and the whole "
-                      "thickness")
+          .add_option(
+              "--box", arguments.box,
+              "Corners of the box (default: the region of interest and the whole thickness)")
           ->delimiter(',')
           ->expected(6)
+          ->type_name("X0,Y0,Z0,X1,Y1,Z1")
           ->check(finite)
           ->group(group);
-  CLI::Option* centre =
-      command.add_option("--center", arguments.centre, "x,y,z: centre of the box, with --size")
-          ->delimiter(',')
-          ->expected(3)
-          ->check(finite)
-          ->excludes(box)
-          ->group(group);
-  CLI::Option* size = command.add_option("--size", arguments.size, "nx,ny,nz: size in voxels")
+  CLI::Option* centre = command.add_option("--center", arguments.centre, "Centre of the box")
+                            ->delimiter(',')
+                            ->expected(3)
+                            ->type_name("X,Y,Z")
+                            ->check(finite)
+                            ->excludes(box)
+                            ->group(group);
+  CLI::Option* size = command.add_option("--size", arguments.size, "Size of the box in voxels")
                           ->delimiter(',')
                           ->expected(3)
+                          ->type_name("NX,NY,NZ")
                           ->check(number_between(1, std::numeric_limits<std::int32_t>::max()))
                           ->needs(centre)
                           ->group(group);
   centre->needs(size);
   command
       .add_option("--rotate", arguments.rotation,
-                  "rot,tilt,psi: Euler angles in degrees as RELION's rlnAngleRot, Tilt, Psi; the "
-                  "box turns about its centre and shows a particle in its reference's orientation")
+                  "RELION's Euler angles in degrees (rlnAngleRot, rlnAngleTilt, rlnAnglePsi). The "
+                  "box turns about its centre, so that a particle appears in the orientation of "
+                  "its reference")
       ->delimiter(',')
       ->expected(3)
+      ->type_name("ROT,TILT,PSI")
       ->check(finite)
       ->group(group);
   const CLI::Validator positive = number_between(1e-3, 1e6);
   CLI::Option* voxel_size = command
                                 .add_option("--voxel-size", arguments.voxel_size_A,
-                                            "voxel size in Å; default: the pixel size")
+                                            "Voxel size in Å (default: the pixel size)")
                                 ->check(positive)
                                 ->group(group);
-  command.add_option("--bin", arguments.bin, "voxel size in pixels, instead of --voxel-size")
+  command.add_option("--bin", arguments.bin, "Voxel size in pixels")
       ->check(positive)
       ->excludes(voxel_size)
       ->group(group);
@@ -141,11 +146,12 @@ void add_export_command(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "export", "Write any box of a model, at any voxel size and orientation, as an MRC volume");
   command->add_option("model", arguments->model, "Model file (.h5) of reconstruct")->required();
-  command->add_option("-o,--output", arguments->output, "MRC volume")->required();
+  command->add_option("-o,--output", arguments->output, "The MRC volume to write")->required();
   command->add_flag("--overwrite", arguments->overwrite, "Replace an existing volume");
   add_box_options(*command, *arguments);
   add_groups(*command, arguments->choices, {option_table::Group::kVolume});
   add_common_options(*command);
+  add_help_all(*command);
   command->callback([arguments] { run_export(*arguments); });
 }
 

@@ -189,8 +189,7 @@ void print_info(const tilt_series::TiltSeriesOptions& options) {
 void add_info_command(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "info",
-      "Show the contents of a file; with tilt angles (--tlt, --aln, --mdoc) also check it as a "
-      "tilt series and list its views");
+      "Show what an MRC file or a model holds. With tilt angles, check a stack as a tilt series");
   auto choices = std::make_shared<option_table::Choices>();
   add_input_options(*command, *choices);
   add_help_all(*command);

@@ -115,46 +115,51 @@ void add_simulate_command(CLI::App& program) {
   command->add_option("--size", options.cell.size_px, "Width and height in pixels")
       ->capture_default_str();
   command->add_option("--thickness", arguments->thickness_px,
-                      "Thickness in voxels [150, of a yardstick 75/128 of --size]");
-  command->add_option("--seed", options.cell.seed, "Seed of everything random")
+                      "Thickness in voxels (default: 150; with --yardstick 75/128 of --size)");
+  command->add_option("--seed", options.cell.seed, "Seed of all random numbers")
       ->check(seed_check())
       ->capture_default_str();
   CLI::Option* extended =
       command->add_flag("--extended", options.cell.is_extended,
-                        "The specimen leaves the field of view, as in a microscope");
+                        "The specimen continues outside the field of view, as in a microscope");
   CLI::Option* tilts = command->add_option(
-      "--tilts", arguments->tilts, "first:last:step in degrees [-70:69.5:1.5, extended -60:60:2]");
+      "--tilts", arguments->tilts,
+      "Tilt angles first:last:step in degrees (default: -70:69.5:1.5; with --extended -60:60:2)");
   command
       ->add_option("--yardstick", arguments->yardstick,
-                   "Phantom of the project's scores. a: a cell that ends in the field of view, 94 "
+                   "Phantom that the benchmarks use. a: a cell that ends in the field of view, 94 "
                    "views from -70 to 69.5 degrees; b: an extended specimen, 61 views from -60 to "
                    "60 degrees")
       ->check(CLI::IsMember({"a", "b"}))
       ->excludes(extended, tilts);
-  command->add_option("--voxel-size", options.voxel_size_A, "Å")->capture_default_str();
-  command->add_option("--noise", arguments->noise,
-                      "Gaussian noise as a fraction of the range of the view at 0° [0.05]");
+  command->add_option("--voxel-size", options.voxel_size_A, "Voxel size in Å")
+      ->capture_default_str();
+  command->add_option(
+      "--noise", arguments->noise,
+      "Gaussian noise as a fraction of the range of the view at 0° (default: 0.05)");
   command->add_option("--dose", options.dose,
-                      "Poisson counts of so many electrons per pixel and view, instead of --noise");
+                      "Electrons per pixel and view: Poisson noise in place of --noise");
   command
       ->add_option("--absorption", options.absorption_per_A,
-                   "Of counts: attenuation per unit of density and Å")
+                   "Attenuation per unit of density and Å (with --dose)")
       ->capture_default_str();
   command
       ->add_option("--contrast", arguments->contrast,
-                   "bright: line integrals (default); dark: an empty beam less the integrals")
+                   "bright: line integrals (default); dark: an empty beam minus the line integrals")
       ->check(CLI::IsMember({"dark", "bright"}));
   command
       ->add_option("--gain", options.gain_spread,
-                   "Spread of the logarithm of each view's random scale")
+                   "Standard deviation of the logarithm of each view's random scale")
       ->capture_default_str();
   command
-      ->add_option("--shifts", options.shift_spread_px,
-                   "Spread of each view's random shift in pixels; writes an .xf that undoes it")
+      ->add_option(
+          "--shifts", options.shift_spread_px,
+          "Standard deviation of each view's random shift in pixels; an .xf file undoes it")
       ->capture_default_str();
-  command->add_option("--gold", options.cell.num_beads, "Gold beads in the field of view")
+  command->add_option("--gold", options.cell.num_beads, "Number of gold beads in the field of view")
       ->capture_default_str();
-  command->add_option("--gold-diameter", arguments->gold_diameter_A, "Å")->capture_default_str();
+  command->add_option("--gold-diameter", arguments->gold_diameter_A, "Diameter of a gold bead in Å")
+      ->capture_default_str();
   command
       ->add_option("--gold-density", options.cell.bead_density,
                    "Density of gold (the cell's densest walls have 1)")

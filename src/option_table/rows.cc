@@ -44,7 +44,7 @@ constexpr Row kRows[] = {
     {.key = "input.mdoc", .flag = "--mdoc", MEMBER(SeriesFiles, mdoc),
      .group = Group::kAlignment,
      .help = "SerialEM's metadata (.mdoc): angles, and the pixel size if the stack has none. "
-             "--tlt wins over its angles and over those of --aln"},
+             "The angles of --tlt take precedence over those of --mdoc and --aln"},
     {.key = "input.exclude", .flag = "--exclude", MEMBER(Options, exclude),
      .group = Group::kAlignment, .label = "LIST",
      .help = "Sections to leave out, counted from 1, as in 1-3,40"},
@@ -52,14 +52,14 @@ constexpr Row kRows[] = {
     // Images
     {.key = "input.bin", .flag = "--bin", MEMBER(Options, bin), .group = Group::kImages,
      .label = "FACTOR", .range = Range::at_least(1),
-     .help = "Reduce the views by this factor, whole or not", .is_common = true},
+     .help = "Bin the views by this factor, which need not be a whole number", .is_common = true},
     {.key = "input.angpix", .flag = "--angpix", MEMBER(Options, angpix),
      .group = Group::kImages, .unit = "Å", .range = Range::above(0), .automatic = "as --bin says",
-     .help = "Reduce the views to this pixel size instead"},
+     .help = "Bin the views to this pixel size instead"},
     {.key = "input.pixel_size_A", .flag = "--pixel-size", MEMBER(Options, pixel_size_A),
      .group = Group::kImages, .unit = "Å", .range = Range::above(0),
      .automatic = "that of the stack's header, else of --mdoc",
-     .help = "Pixel size of the stack as it is, where its header has none or a wrong one"},
+     .help = "Pixel size of the unbinned stack, if its header has none or a wrong one"},
     {.key = "input.contrast", .flag = "--contrast", MEMBER(Options, contrast),
      .group = Group::kImages,
      .help = "How dense matter looks: dark, as a cryo microscope records it, or bright, as in "
@@ -73,14 +73,14 @@ constexpr Row kRows[] = {
     {.key = "input.bead_diameter_nm", .flag = "--bead-diameter",
      MEMBER(Options, bead_diameter_nm), .group = Group::kMasks, .unit = "nm",
      .range = Range::at_least(0),
-     .automatic = "estimated with --contrast dark where there clearly are beads, else none",
+     .automatic = "estimated with --contrast dark if there clearly are beads, else none",
      .help = "Diameter of the gold beads to find and mask in every view. 0: none"},
     {.key = "input.fiducials", .flag = "--fiducials", MEMBER(SeriesFiles, fiducials),
      .group = Group::kMasks,
      .help = "Positions of more beads to mask: IMOD's fiducial model of this stack as text "
              "(model2point, with or without -object or -contour)"},
     {.key = "input.mask", .flag = "--mask", MEMBER(SeriesFiles, mask), .group = Group::kMasks,
-     .help = "MRC stack of the same size as the tilt series. Its zeros leave pixels out"},
+     .help = "MRC stack of the same size as the tilt series. Pixels that are 0 in it are left out"},
 
     // Specimen
     {.key = "specimen.thickness", .flag = "--thickness", MEMBER(Options, thickness),
@@ -102,7 +102,7 @@ constexpr Row kRows[] = {
      .help = "Height of the tilt axis in the volume: the second number of --center"},
     {.key = "field.with_margin", .flag = "--no-margin", MEMBER(Options, with_margin),
      .group = Group::kSpecimen,
-     .help = "The specimen ends inside the field of view: model nothing outside of it"},
+     .help = "The specimen ends inside the field of view; the program models nothing outside it"},
 
     // Field
     {.key = "field.kind", .flag = "--field", MEMBER(Options, field), .group = Group::kField,
@@ -115,12 +115,12 @@ constexpr Row kRows[] = {
              "more"},
     {.key = "field.leaf_budget", .flag = "--leaf-budget", MEMBER(Options, leaf_budget),
      .group = Group::kField, .range = Range::between(0, kMaxCount),
-     .help = "Largest number of leaves of an adaptive tree. 0: as many as it begins with"},
+     .help = "Largest number of leaves of an adaptive tree. 0: as many as at the start"},
     {.key = "field.vertex_spacing", .flag = "--vertex-spacing", MEMBER(Options, vertex_spacing),
      .group = Group::kField, .unit = kBinned, .range = Range::between(0.25, 64),
      .help = "Distance between vertices, in leaves of --leaf-size"},
     {.key = "field.rank", .flag = "--rank", MEMBER(Options, rank), .group = Group::kField,
-     .range = Range::between(1, 256), .help = "Components of each mode (with --field vm)"},
+     .range = Range::between(1, 256), .help = "Number of components of each mode (with --field vm)"},
     {.key = "field.activation", .flag = "--activation", MEMBER(Options, activation),
      .group = Group::kField,
      .automatic = "identity for dark contrast, whose zero is uncertain, else softplus",
@@ -136,28 +136,29 @@ constexpr Row kRows[] = {
      .group = Group::kFit, .range = Range::between(0, kMaxCount),
      .automatic = "as many as --epochs, at most 10, where vertices take no more memory than "
                   "factors, else 0",
-     .help = "Passes at full resolution before them with plain vertices, which are factorised "
-             "afterwards. 0: fit factors from the start"},
+     .help = "Passes at full resolution with plain vertices, before those of --epochs; the vertices "
+             "are then factorised. 0: fit factors from the start"},
     {.key = "fit.coarse_epochs", .flag = "--coarse-epochs", MEMBER(Options, coarse_epochs),
      .group = Group::kFit, .range = Range::between(0, kMaxCount),
      .automatic = "80; fewer in proportion where --epochs is below its own default",
-     .help = "Passes before all of these over binned views. 0: none"},
+     .help = "Passes over binned views, before all passes at full resolution. 0: none"},
     {.key = "fit.coarse_bin", .flag = "--coarse-bin", MEMBER(Options, coarse_bin),
      .group = Group::kFit, .unit = "pixels on each axis", .range = Range::between(2, 64),
      .help = "Largest binning of the coarse passes: a power of two that divides a sixteenth of a "
              "leaf's side. Passes with half of it follow, down to 2"},
     {.key = "fit.subsets", .flag = "--subsets", MEMBER(Options, subsets), .group = Group::kFit,
      .range = Range::between(1, kMaxCount),
-     .help = "Steps of a pass. Each takes an interleaved subset of the views"},
+     .help = "Number of steps in a pass; each step uses one interleaved subset of the views"},
     {.key = "fit.engine", .flag = "--engine", MEMBER(Options, engine), .group = Group::kFit,
      .help = "slab: fast, for one tilt axis; ray: any geometry of the views, which are not "
              "resampled"},
     {.key = "fit.ray_samples", .flag = "--ray-samples", MEMBER(Options, ray_samples),
      .group = Group::kFit, .range = Range::between(0, 1 << 20),
-     .help = "Samples along a leaf's diagonal (with --engine ray). 0: one a pixel"},
+     .help = "Samples along a leaf's diagonal (with --engine ray). 0: one for each pixel"},
     {.key = "fit.rays_per_step", .flag = "--rays-per-step", MEMBER(Options, rays_per_step),
      .group = Group::kFit, .range = Range::between(0, kMaxCount),
-     .help = "Rays of a step, about (with --engine ray). 0: all rays divided by --subsets"},
+     .help = "Approximate number of rays in a step (with --engine ray). 0: all rays divided by "
+             "--subsets"},
     {.key = "fit.learning_rate", .flag = "--learning-rate", MEMBER(Options, learning_rate),
      .group = Group::kFit, .range = Range::above(0), .automatic = "0.05; 0.035 for --field grid",
      .help = "Learning rate of the first step; it decays exponentially. Vertices that are "
@@ -173,7 +174,7 @@ constexpr Row kRows[] = {
      .group = Group::kFit,
      .automatic = "the one that predicts held-out views better in two short trials; concave if "
                   "--tv is given",
-     .help = "Kind of total variation: concave keeps edges sharp, smooth is the usual one"},
+     .help = "Kind of total variation: concave keeps edges sharp, smooth is the standard one"},
     {.key = "fit.boundary", .flag = "--bcc", MEMBER(Options, boundary), .group = Group::kFit,
      .range = Range::at_least(0),
      .help = "Weight of the boundary consistency: neighbouring leaves agree on their faces"},
@@ -182,7 +183,7 @@ constexpr Row kRows[] = {
      .help = "Weight of the isotropic Fourier prior, which acts against streaks along X and Y"},
     {.key = "fit.fourier_ring", .flag = "--ifp-ring", MEMBER(Options, fourier_ring),
      .group = Group::kFit,
-     .help = "The prior compares the Fourier axes with the mean or the max of a ring"},
+     .help = "Compare the Fourier axes with the mean or the maximum of each ring"},
     {.key = "fit.fit_view_scale", .flag = "--view-scale", MEMBER(Options, fit_view_scale),
      .group = Group::kFit, .automatic = "on for dark contrast, else off",
      .help = "Fit a scale and an offset for every view"},
@@ -199,7 +200,7 @@ constexpr Row kRows[] = {
      .is_common = true},
     {.key = "fit.patience", .flag = "--early-stop", MEMBER(Options, patience),
      .group = Group::kFit, .unit = "epochs", .range = Range::between(0, kMaxCount),
-     .help = "Stop after so many epochs without a better error of the held-out views. 0: never"},
+     .help = "Stop after N epochs in which the held-out error has not fallen. 0: never"},
     {.key = "fit.seed", .flag = "--seed", MEMBER(Options, seed), .group = Group::kFit,
      .help = "Seed of all random numbers"},
 
@@ -210,7 +211,7 @@ constexpr Row kRows[] = {
     {.key = "volume.axes", .flag = "--axes", MEMBER(Options, axes), .group = Group::kVolume,
      .help = "Order of the axes in the file: xyz, or xzy as IMOD's tilt writes it (same hand)"},
     {.key = "volume.invert", .flag = "--invert", MEMBER(Options, invert),
-     .group = Group::kVolume, .help = "Write the other contrast than the input's"},
+     .group = Group::kVolume, .help = "Write the volume with the contrast of the input inverted"},
 
     // Running
     {.key = "running.output", .flag = "-o,--output", MEMBER(Options, output),
