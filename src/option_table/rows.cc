@@ -52,7 +52,7 @@ constexpr Row kRows[] = {
     // Images
     {.key = "input.bin", .flag = "--bin", MEMBER(Options, bin), .group = Group::kImages,
      .label = "FACTOR", .range = Range::at_least(1),
-     .help = "Bin the views by this factor, which need not be a whole number", .is_common = true},
+     .help = "Bin the views by this factor, whole or fractional", .is_common = true},
     {.key = "input.angpix", .flag = "--angpix", MEMBER(Options, angpix),
      .group = Group::kImages, .unit = "Å", .range = Range::above(0), .automatic = "as --bin says",
      .help = "Bin the views to this pixel size instead"},
