@@ -125,8 +125,7 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
     if (processes.is_root()) fmt::print(stderr, "tomofield: {}\n", message);
   };
   CLI::App program{
-      "tomofield: clean tomograms from aligned tilt series by continuous density fields.\n"
-      "`tomofield COMMAND --help` explains a command.",
+      "tomofield: clean tomograms from aligned tilt series by continuous density fields",
       "tomofield"};
   program.set_version_flag(
       "--version", fmt::format("tomofield " TOMOFIELD_VERSION " ({})", base::source_commit()));

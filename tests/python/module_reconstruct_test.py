@@ -1,8 +1,11 @@
 """tomofield.reconstruct() gives what the program gives, and stops when it is told to."""
 
 import _thread
+import inspect
 import json
 import os
+import pathlib
+import re
 import threading
 
 import numpy as np
@@ -147,6 +150,15 @@ def test_bad_input_is_refused_in_a_sentence(series, quick):
 def test_every_option_of_the_library_is_a_typed_keyword():
     core = {name for name in dir(tomofield._core.Options) if not name.startswith("_")}
     assert core == set(tomofield.Options.__annotations__)
+
+
+def test_every_row_of_the_option_table_is_a_keyword():
+    page = pathlib.Path(__file__).parents[2] / "docs" / "options.md"
+    names = set(re.findall(r"\| `(\w+)` \| `[a-z_.]+[\w.]*` \|$", page.read_text(), re.MULTILINE))
+    assert len(names) > 50
+    keywords = set(tomofield.Options.__annotations__) | set(
+        inspect.signature(tomofield.reconstruct).parameters)
+    assert names - keywords == {"stack"}  # the first argument, with arrays as well
 
 
 def test_options_keep_what_they_are_set_to():
