@@ -8,7 +8,7 @@
 namespace tomofield::simulate {
 namespace {
 
-/// ln k!, by Stirling's series where its three terms are exact to rounding.
+// Returns ln k!, for large k by three terms of Stirling's series, which are exact to rounding.
 double log_factorial(double k) {
   if (k < 16.0) {
     double product = 1.0;

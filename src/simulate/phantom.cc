@@ -20,13 +20,13 @@ constexpr double kLargestSum = 1.18;  // slab 0.2 + the densest wall 0.98
 constexpr double kSlabDensity = 0.2;
 constexpr std::uint64_t kCellStream = 1;
 constexpr std::uint64_t kBeadStream = 2;
-// A bead that found no free place so often means that the slab is full.
+// The slab counts as full if a bead finds no free place in this number of tries.
 constexpr int kTriesPerBead = 1000;
 
 double dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/// Three orthonormal vectors, uniformly distributed over all orientations:
-/// Gram–Schmidt on normal deviates.
+// Returns three orthonormal vectors with a uniformly distributed orientation, by Gram–Schmidt on
+// normal deviates.
 std::array<Vector3, 3> random_axes(base::Random& random) {
   std::array<Vector3, 3> axes;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -56,7 +56,7 @@ bool touches_any(const std::vector<Ellipsoid>& bodies, std::size_t first, const 
                      });
 }
 
-/// An ellipsoid of the recipe with its largest semi-axis `radius`, at the origin.
+// Draws an ellipsoid at the origin whose largest semi-axis is `radius`.
 Ellipsoid random_ellipsoid(double radius, base::Random& random) {
   Vector3 semi_axes;
   for (double& a : semi_axes) a = random.uniform(0.7 * radius, radius);
@@ -77,7 +77,7 @@ Ellipsoid random_ellipsoid(double radius, base::Random& random) {
   return e;
 }
 
-/// One lot of the recipe: `num_tries` radii in [low, high), largest first.
+// Tries one lot of ellipsoids: `num_tries` radii in [low, high), the largest first.
 void place_ellipsoids(int num_tries, double low, double high, base::Random& random,
                       Phantom& phantom) {
   std::vector<double> radii(static_cast<std::size_t>(num_tries));

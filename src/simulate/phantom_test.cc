@@ -18,7 +18,7 @@ CellOptions small_cell(bool is_extended) {
   return {.size_px = 48, .thickness_px = 30, .is_extended = is_extended, .max_tilt_deg = 60.0};
 }
 
-/// Midpoint sums of density_at along one ray, `step` voxels apart.
+/// Returns the midpoint sum of density_at() along one ray, `step` voxels apart.
 double quadrature(const Phantom& phantom, const ViewFrame& view, std::int64_t column,
                   std::int64_t row, double step) {
   const double tilt = view.tilt_deg * std::numbers::pi / 180.0;

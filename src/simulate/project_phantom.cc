@@ -12,13 +12,13 @@ namespace {
 
 constexpr std::int64_t kBandRows = 16;
 
-/// A view with what every pixel of it needs.
+// Holds a view with the sine and the cosine of its tilt.
 struct Beam {
   explicit Beam(const ViewFrame& v)
       : view(v),
         cosine(std::cos(v.tilt_deg * std::numbers::pi / 180.0)),
         sine(std::sin(v.tilt_deg * std::numbers::pi / 180.0)) {}
-  /// Position of a pixel centre relative to the specimen's centre.
+  // Return the position of a pixel centre relative to the specimen's centre.
   double x_of(std::int64_t pixel) const {
     return static_cast<double>(pixel) + 0.5 - static_cast<double>(view.width) / 2.0 -
            view.shift_x_px;
@@ -32,17 +32,17 @@ struct Beam {
   double sine;
 };
 
-/// Adds one ellipsoid to one row. With o the point of the ray nearest to the
-/// body's centre in the plane through it and d the ray's direction, the ray
-/// meets pᵀ Q p = s where A t² + 2 B t + E − s = 0, A = dᵀQd, B = oᵀQd,
-/// E = oᵀQo: the chord is 2 √(B² − A (E − s)) / A.
+// Adds one ellipsoid to one row. Let o be the point of the ray in the plane through the body's
+// centre that is nearest to the centre, and d the ray's direction. The ray o + t d meets pᵀ Q p = s
+// where A t² + 2 B t + E − s = 0, with A = dᵀQd, B = oᵀQd, E = oᵀQo. The chord between these points
+// is 2 √(B² − A (E − s)) / A.
 void add_ellipsoid_to_row(const Ellipsoid& body, const Beam& beam, double y, double* row) {
   const double offset_y = y - body.center[1];
   const double half_width_squared = body.radius * body.radius - offset_y * offset_y;
   if (half_width_squared <= 0.0) return;
   const double half_width = std::sqrt(half_width_squared);
   const double center_u = body.center[0] * beam.cosine + body.center[2] * beam.sine;
-  // The pixels whose centres lie within the bounding sphere's chord of this row.
+  // Only pixels whose centres lie within the bounding sphere's chord of this row can change.
   const double pixel_of_zero = -beam.x_of(0);
   const double last_column = static_cast<double>(beam.view.width - 1);
   const double first = std::max(std::ceil(center_u - half_width + pixel_of_zero), 0.0);
@@ -67,8 +67,8 @@ void add_ellipsoid_to_row(const Ellipsoid& body, const Beam& beam, double y, dou
   }
 }
 
-/// Length of the ray x = u cos θ − t sin θ, z = u sin θ + t cos θ inside |x| <=
-/// half_width, |z| <= half_thickness.
+// Returns the length of the ray x = u cos θ − t sin θ, z = u sin θ + t cos θ inside the box
+// |x| <= half_width, |z| <= half_thickness.
 double box_chord(const Beam& beam, double u, double half_width, double half_thickness) {
   double enter = -1e300, leave = 1e300;
   const auto clip = [&](double origin, double direction, double half) {
@@ -98,7 +98,7 @@ void add_slab_to_row(const Phantom& phantom, const Beam& beam, double y, double*
   }
 }
 
-/// The bodies that any of these rows can meet.
+// Returns the bodies that any of these rows can meet.
 std::vector<const Ellipsoid*> bodies_in_rows(std::span<const Ellipsoid> bodies, const Beam& beam,
                                              std::int64_t first_row, std::int64_t num_rows) {
   const double low = beam.y_of(first_row), high = beam.y_of(first_row + num_rows - 1);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::int64_t kBandRows = 64;
 
-/// Voxel centre `index` of `count` relative to the centre of the volume.
+// Returns the centre of voxel `index` of `count` relative to the centre of the volume.
 double centered(std::int64_t index, std::int64_t count) {
   return static_cast<double>(index) + 0.5 - static_cast<double>(count) / 2.0;
 }

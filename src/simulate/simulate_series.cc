@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,7 +16,6 @@
 #include "io/mrc.h"
 #include "simulate/noise.h"
 #include "simulate/phantom.h"
-#include "simulate/phantom_json.h"
 #include "simulate/project_phantom.h"
 #include "simulate/rasterize.h"
 #include "tomofield/error.h"
@@ -24,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Streams of the pixels' noise start here: one a row of a view.
+// Random streams from here on make the noise: one for each row of each view.
 constexpr std::uint64_t kNoiseStream = std::uint64_t{1} << 32;
 constexpr std::int64_t kTruthBatchVoxels = std::int64_t{1} << 22;
 
@@ -102,7 +103,7 @@ ViewFrame frame_of(const SimulatedView& view, const Phantom& phantom) {
           .shift_y_px = view.shift_y_px};
 }
 
-/// Standard deviation that the noise option stands for.
+// Returns the standard deviation of the noise in data units (SimulationOptions::noise).
 double noise_sigma(const Phantom& phantom, const std::vector<SimulatedView>& views, double noise) {
   const auto nearest = std::min_element(views.begin(), views.end(),
                                         [](const SimulatedView& a, const SimulatedView& b) {
@@ -114,7 +115,7 @@ double noise_sigma(const Phantom& phantom, const std::vector<SimulatedView>& vie
   return noise * (base::percentile(std::move(image), 99.5) - low);
 }
 
-/// Both stacks, a view at a time; they appear under their names together.
+// Writes both stacks, one view at a time.
 void write_views(const OutputFiles& files, const Phantom& phantom,
                  const std::vector<SimulatedView>& views, const SimulationOptions& options,
                  std::optional<double> sigma) {
@@ -149,8 +150,8 @@ void write_angles(const fs::path& path, const std::vector<SimulatedView>& views)
   io::write_text_file(path, text);
 }
 
-/// The specimen was moved by the shift, so aligning moves the image back. Both
-/// images have the same size, hence the same centre, and no rotation.
+// Writes the transforms that align the series: each moves the image back by the shift of the
+// specimen. Both images have the same size, hence the same centre.
 void write_transforms(const fs::path& path, const std::vector<SimulatedView>& views) {
   std::string text;
   for (const SimulatedView& view : views) {
@@ -158,6 +159,81 @@ void write_transforms(const fs::path& path, const std::vector<SimulatedView>& vi
                         -view.shift_x_px, -view.shift_y_px);
   }
   io::write_text_file(path, text);
+}
+
+using Json = nlohmann::json;
+
+Json options_json(const SimulationOptions& options) {
+  const CellOptions& cell = options.cell;
+  Json json{
+      {"size_px", cell.size_px},
+      {"thickness_px", cell.thickness_px},
+      {"extended", cell.is_extended},
+      {"seed", cell.seed},
+      {"tilts_deg", {options.tilts.first_deg, options.tilts.last_deg, options.tilts.step_deg}},
+      {"voxel_size_A", options.voxel_size_A},
+      {"contrast", options.contrast == Contrast::kDark ? "dark" : "bright"},
+      {"gain_spread", options.gain_spread},
+      {"shift_spread_px", options.shift_spread_px},
+      {"gold_beads", cell.num_beads},
+      {"gold_diameter_px", cell.bead_diameter_px},
+      {"gold_density", cell.bead_density}};
+  if (options.dose) {
+    json["dose_per_px"] = *options.dose;
+    json["absorption_per_A"] = options.absorption_per_A;
+  } else {
+    json["noise"] = options.noise;
+  }
+  return json;
+}
+
+Json body_json(const Ellipsoid& e) {
+  return {{"center_px", e.center},
+          {"radius_px", e.radius},
+          {"q", {{e.q[0], e.q[3], e.q[4]}, {e.q[3], e.q[1], e.q[5]}, {e.q[4], e.q[5], e.q[2]}}},
+          {"inner_to_outer_ratio", e.ratio},
+          {"wall_density", e.wall_density},
+          {"inside_density", e.inside_density}};
+}
+
+Json bead_json(const Ellipsoid& e) {
+  return {{"center_px", e.center}, {"radius_px", e.radius}, {"density", e.inside_density}};
+}
+
+// Returns the record beside the series: the options, the views, and every ellipsoid, with doubles
+// that read back exactly. Positions and lengths are voxels relative to the volume's centre, (X, Y,
+// Z).
+nlohmann::json phantom_json(const SimulationOptions& options, const Phantom& phantom,
+                            std::span<const SimulatedView> views,
+                            const SimulationSummary& summary) {
+  Json json{{"options", options_json(options)},
+            {"slab_density", phantom.slab_density},
+            {"half_width_px", phantom.half_width_px},
+            {"empty_beam", summary.empty_beam}};
+  if (summary.sigma) json["noise_sigma"] = *summary.sigma;
+  if (summary.truth) {
+    json["truth"] = {
+        {"min", summary.truth->min}, {"max", summary.truth->max}, {"mean", summary.truth->mean}};
+  }
+  json["views"] = Json::array();
+  for (const SimulatedView& view : views) {
+    json["views"].push_back({{"tilt_deg", view.tilt_deg},
+                             {"shift_px", {view.shift_x_px, view.shift_y_px}},
+                             {"gain", view.gain}});
+  }
+  json["ellipsoids"] = Json::array();
+  json["gold_beads"] = Json::array();
+  const std::size_t num_ellipsoids =
+      phantom.bodies.size() - static_cast<std::size_t>(phantom.num_beads);
+  for (std::size_t i = 0; i < phantom.bodies.size(); ++i) {
+    const Ellipsoid& body = phantom.bodies[i];
+    if (i < num_ellipsoids) {
+      json["ellipsoids"].push_back(body_json(body));
+    } else {
+      json["gold_beads"].push_back(bead_json(body));
+    }
+  }
+  return json;
 }
 
 }  // namespace
@@ -181,7 +257,7 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
   summary.num_views = static_cast<std::int64_t>(views.size());
   summary.empty_beam = Detector(options).empty_beam();
   if (!options.dose) summary.sigma = noise_sigma(phantom, views, options.noise);
-  // What an earlier run left and this one does not write would belie the rest.
+  // Files of an earlier run that this one does not replace would contradict the others.
   fs::remove(files.transforms);
   if (options.write_truth) {
     summary.truth = write_truth(files.truth, phantom, options);

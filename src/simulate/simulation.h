@@ -16,6 +16,7 @@ struct TiltRange {
   double last_deg = 69.5;
   double step_deg = 1.5;
 };
+/// Returns the usual tilts of a bounded or an extended specimen.
 TiltRange default_tilts(bool is_extended);
 
 /// Names the two phantoms that every score of the project refers to (docs/index.md).
@@ -24,26 +25,26 @@ enum class Yardstick {
   kB,  ///< a specimen that goes on outside it, in 61 views from −60° to 60°
 };
 
-/// What a simulated tilt series shall be.
+/// Sets a simulated tilt series.
 struct SimulationOptions {
-  CellOptions cell;  ///< max_tilt_deg is taken from `tilts`, whatever it says
+  CellOptions cell;  ///< its max_tilt_deg is replaced by that of `tilts`
   TiltRange tilts;
   double voxel_size_A = 10.0;
-  /// Gaussian noise, the same in all views: standard deviation over the range
-  /// (0.5 to 99.5 percentile) of the noise-free view nearest to zero tilt.
+  /// Standard deviation of the Gaussian noise, the same in all views, divided by the range (0.5 to
+  /// 99.5 percentile) of the noise-free view nearest to zero tilt.
   double noise = 0.05;
-  /// Electrons per pixel and view of an empty beam: Poisson counts of
-  /// dose · exp(−absorption · ∫ density), instead of Gaussian noise.
+  /// Electrons per pixel and view of an empty beam. If given, views are Poisson counts of mean
+  /// dose · exp(−absorption · ∫ density) and have no Gaussian noise.
   std::optional<double> dose;
-  /// Per unit of density and Å. The default makes the slab (0.169) lose a
-  /// factor e over 0.3 µm, as ice does with an energy filter at 300 kV.
+  /// Absorption per unit of density and Å. By default, the beam falls by a factor e over 0.3 µm of
+  /// the slab (density 0.169), as it does in ice with an energy filter at 300 kV.
   double absorption_per_A = 0.002;
   double gain_spread = 0.0;      ///< standard deviation of the logarithm of each view's scale
   double shift_spread_px = 0.0;  ///< standard deviation of each view's shift, in x and in y
   Contrast contrast = Contrast::kBright;
   bool write_truth = true;
 
-  /// Everything that is wrong, one sentence each; empty if nothing is.
+  /// Returns a sentence for each option that is out of range.
   std::vector<std::string> validate() const;
 };
 
@@ -51,7 +52,7 @@ struct SimulationOptions {
 /// thickness, which is 75/128 of cell.size_px. It leaves noise, seed and all else as they are.
 void apply_yardstick(Yardstick yardstick, SimulationOptions& options);
 
-/// What befell one view.
+/// Holds the tilt, the shift and the gain of a simulated view.
 struct SimulatedView {
   double tilt_deg = 0.0;
   double shift_x_px = 0.0;  ///< of the specimen in the image; thousandths, as .xf has them
@@ -59,18 +60,19 @@ struct SimulatedView {
   double gain = 1.0;
 };
 
-/// The views of a series: angles, and the random shifts and gains of the seed.
+/// Returns the views of a series: the tilts, and the random shifts and gains of the seed.
 std::vector<SimulatedView> plan_views(const SimulationOptions& options);
 
-/// The intensity that a detector stores for line integrals. Dark contrast
-/// without counts is empty_beam − ∫.
+/// Converts line integrals into the intensities that a detector stores. Dark contrast without
+/// counts stores empty_beam − ∫ density.
 class Detector {
  public:
   explicit Detector(const SimulationOptions& options);
-  /// Noise-free intensities in place of line integrals.
+  /// Replaces line integrals by noise-free intensities.
   void expose(std::vector<float>& image, double gain) const;
-  /// What no specimen at all would give at gain 1: the dose; the longest path
-  /// through the slab times the largest density of a cell, 1; or 0 if bright.
+  /// Returns the intensity without a specimen at gain 1. With counts it is the dose. With dark
+  /// contrast it is the longest path through the slab times the largest density of a cell, which
+  /// is 1. With bright contrast it is 0.
   double empty_beam() const { return empty_beam_; }
 
  private:

@@ -18,7 +18,7 @@
 #include "random_arrays.h"
 #include "shared_data.h"
 #include "simd_targets.h"
-#include "simulate/ellipsoid.h"
+#include "simulate/phantom.h"
 #include "simulate/project_phantom.h"
 
 namespace tomofield::projection {
