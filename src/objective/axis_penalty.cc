@@ -16,10 +16,10 @@ namespace {
 
 using Plan = std::unique_ptr<void, decltype(&std::free)>;
 
-// Frequency of an index, in cycles over the whole axis: 0, 1 … −1.
+// Returns the frequency of an index in cycles over the whole axis: 0, 1 … −1.
 int signed_frequency(int index, int n) { return index <= n / 2 ? index : index - n; }
 
-// Where a frequency lies: its ring, and its radius in parts of the Nyquist frequency.
+// Holds the ring of a frequency, and its radius in parts of the Nyquist frequency.
 struct Radius {
   int ring;
   double nyquist_part;
@@ -106,7 +106,7 @@ std::vector<double> ring_references(const SliceSpectra& spectra, RingReference r
 
 namespace {
 
-// One of the two axes of a stack of spectra: frequencies k of F(0, k) or F(k, 0).
+// Gives access to one of the two axes of a stack of spectra: F(0, k) or F(k, 0) for all k.
 class AxisLine {
  public:
   AxisLine(const SliceSpectra& spectra, bool along_x)
@@ -128,7 +128,7 @@ class AxisLine {
   int n_;
 };
 
-// Σ_k w max(0, A − R) on one axis, and its derivative by the axis' frequencies of each slice.
+// Returns Σ_k w max(0, A − R) on one axis. Stores its derivative by the axis in each slice.
 double line_penalty(const AxisLine& line, int slices, const std::vector<double>& references,
                     const AxisPenaltyOptions& options, std::vector<kiss_fft_cpx>& gradient) {
   const int n = line.size();
@@ -159,8 +159,8 @@ double line_penalty(const AxisLine& line, int slices, const std::vector<double>&
   return sum;
 }
 
-// The adjoint of an axis line: F(0, v) is the transform of the window times the
-// sum over x, so every sample of a row takes the same derivative but for the window.
+// Applies the adjoint of an axis line. F(0, v) is the transform of windowed sums over x, so apart
+// from the window every sample of a row has the same derivative.
 void spread_line(const SliceShape& s, bool along_x, const std::vector<kiss_fft_cpx>& line,
                  double weight, std::span<float> gradient) {
   const int n = along_x ? s.nx : s.ny;

@@ -7,28 +7,28 @@
 
 namespace tomofield::objective {
 
+/// Sets the isotropic Fourier prior on samples.
 struct AxisPenaltyOptions {
   RingReference reference = RingReference::kMean;
-  /// Eq. 8, w(ζ) = 1 / (exp((cutoff − ζ) / width) + 1), with ζ in parts of the
-  /// Nyquist frequency. The paper names no unit and no width; this is a soft
-  /// step, which leaves the low frequencies, where few points make a ring, alone.
+  /// Eq. 8 weighs a frequency ζ by w(ζ) = 1 / (exp((cutoff − ζ) / width) + 1). The paper names
+  /// neither the unit of ζ nor the width. Here ζ is in parts of the Nyquist frequency, and w is a
+  /// soft step that leaves out the low frequencies, whose rings have few points.
   double cutoff = 0.2;
   double width = 0.05;
-  double epsilon = 1e-3;  ///< density units; smooths amplitudes at zero
+  double epsilon = 1e-3;  ///< smooths amplitudes at zero, in density units
 };
 
-/// Samples of `slices` sections, [slice, y, x], evenly spaced in x and y alike.
+/// Sizes of an array [slice, y, x] of samples, with the same spacing in x and in y.
 struct SliceShape {
   int slices = 0, ny = 0, nx = 0;
   std::size_t plane() const { return static_cast<std::size_t>(ny) * nx; }
   std::size_t size() const { return plane() * slices; }
 };
 
-/// Spectra of a stack of slices: a Hann window (without which the step from one
-/// edge to the opposite one would itself be a streak on the axes), then the
-/// unitary transform in (x, y). The window is scaled to keep the variance of
-/// white noise, so amplitudes are those of the samples for any shape.
-/// Frequencies are [slice, v, u] in the usual order: 0, 1 … −1.
+/// Holds the spectra of a stack of slices [slice, v, u], with frequencies in the order 0, 1 … −1.
+/// It multiplies each slice by a Hann window and applies the unitary Fourier transform in x and y.
+/// Without a window, the step from one edge to the opposite one would make a streak on the axes.
+/// The window keeps the variance of white noise, so amplitudes do not depend on the shape.
 class SliceSpectra {
  public:
   SliceSpectra(const SliceShape& shape, std::span<const float> samples);
@@ -44,24 +44,21 @@ class SliceSpectra {
   std::vector<Complex> values_;
 };
 
-/// Hann window of n samples between their centres, Σ w² = n.
+/// Returns a Hann window of n samples with Σ w² = n.
 std::vector<float> hann_window(int n);
 
-/// Rings of a plane of frequencies: ring k holds those whose radius, in cycles
-/// per sample times max(nx, ny), rounds to k, up to the Nyquist frequency.
-/// Frequencies with |u| < 2 or |v| < 2 are left out: the axes themselves and
-/// what the window spreads of them (and of the mean) to their neighbours.
-/// Returns the reference of each ring, averaged over slices, and −1 for rings
-/// without points.
+/// Returns the reference amplitude of each ring of frequencies, averaged over the slices, and −1
+/// for rings without points. Ring k has the frequencies whose radius, in cycles a sample times
+/// max(nx, ny), rounds to k; the last ring is the Nyquist frequency. Frequencies with |u| < 2 or
+/// |v| < 2 are left out, because the window spreads the axes and the mean to their neighbours.
 std::vector<double> ring_references(const SliceSpectra& spectra, RingReference reference);
 
-/// The isotropic Fourier prior (eq. 7) on samples: with A(ζ) the mean over slices
-/// of the amplitude at a frequency on either axis and R its ring's reference,
+/// Computes the isotropic Fourier prior (eq. 7) of samples:
 ///
-///   mean over both axes of  w(ζ) max(0, A(ζ) − R(ζ)).
+///   weight · mean over the frequencies of both axes of  w(ζ) max(0, A(ζ) − R(ζ)),
 ///
-/// R is a constant to the gradient, which is added to `gradient` times `weight`.
-/// Returns weight · the penalty, in density units.
+/// where A(ζ) is the mean amplitude over the slices and R the reference of its ring. Returns the
+/// value and adds its gradient by the samples to `gradient`. The gradient takes R as a constant.
 double axis_penalty(const SliceShape& shape, std::span<const float> samples,
                     const AxisPenaltyOptions& options, double weight, std::span<float> gradient);
 

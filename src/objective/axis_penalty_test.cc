@@ -29,7 +29,7 @@ std::vector<float> noise(const SliceShape& shape, std::uint64_t seed) {
   return values;
 }
 
-// Stripes along y, the same in all rows, of `cycles` over the width.
+// Makes stripes along y with `cycles` over the width.
 std::vector<float> with_stripes(const SliceShape& shape, std::vector<float> values, int cycles,
                                 double height) {
   for (std::size_t n = 0; n < values.size(); ++n) {
@@ -51,7 +51,7 @@ void write_floats(const std::filesystem::path& path, const std::vector<float>& v
              static_cast<std::streamsize>(values.size() * sizeof(float)));
 }
 
-// The whole penalty once more by numpy, straight from the header's words.
+// Computes the penalty with numpy, as the header defines it.
 TEST(AxisPenalty, IsWhatNumpyFinds) {
   if (!testing::python_has("numpy")) GTEST_SKIP() << "python3-numpy is not installed";
   const ScratchDirectory scratch;
@@ -99,8 +99,8 @@ assert total > 0.001 and abs(float(found) - total) < 1e-4 * total, (found, total
   }
 }
 
-// Away from the hinge; the references are constants to the gradient, so the
-// stripes, which no ring's points hold, are what is varied.
+// Varies the stripes, which no ring contains, because the gradient takes the references as
+// constants. The values stay away from the hinge.
 TEST(AxisPenalty, GradientIsTheDerivativeAtFixedRings) {
   const auto samples = with_stripes(kShape, noise(kShape, 1), 9, 0.3);
   for (const double height : {0.0, 0.1}) {
@@ -149,7 +149,7 @@ TEST(AxisPenalty, DescentTakesStripesAwayAndLeavesTheRest) {
       sum += std::pow(static_cast<double>(a[n]) - static_cast<double>(plain[n]), 2);
     return sum;
   };
-  // Where the window vanishes the stripes stay.
+  // The stripes stay where the window vanishes.
   EXPECT_LT(squares(samples), 0.8 * squares(with_stripes(shape, plain, 11, 0.15)));
 }
 

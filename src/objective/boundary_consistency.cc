@@ -11,10 +11,10 @@ namespace {
 using field::Quadtree;
 using field::Square;
 
-// Streams of the seed from here on are these points'.
+// Random streams from here on draw the points.
 constexpr std::uint64_t kPointStream = std::uint64_t{1} << 48;
 
-// The faces along one side of a leaf: from one neighbour past the side to the next.
+// Adds the faces along one side of a leaf, one for each neighbour beyond it.
 void add_side(const Quadtree& tree, int leaf, bool faces_x, std::vector<Face>& faces) {
   const Square& s = tree.leaf(leaf).square;
   const std::int64_t at = faces_x ? s.x1() : s.y1();
@@ -62,7 +62,7 @@ BoundaryConsistency::BoundaryConsistency(const field::Field& field,
   }
 }
 
-// Points of one face, densities of both sides there, and the gradient by the lower side's.
+// Holds the points of a face, the densities of both leaves there, and the gradients by them.
 struct BoundaryConsistency::Samples {
   std::vector<double> x, y, z;
   std::vector<float> low, high, grad_low, grad_high;
@@ -74,7 +74,7 @@ struct BoundaryConsistency::Samples {
   }
 };
 
-// One point in each cell of a grid over the face.
+// Draws one point in each cell of a grid over the face.
 void BoundaryConsistency::draw_points(std::size_t index, std::int64_t step,
                                       Samples& samples) const {
   const Face& face = faces_[index];
@@ -101,7 +101,7 @@ void BoundaryConsistency::draw_points(std::size_t index, std::int64_t step,
   }
 }
 
-// The loss of one face and its derivatives by the densities of both sides.
+// Returns the loss of one face. Stores its derivatives by the densities of both leaves.
 double BoundaryConsistency::face_gradient(std::size_t index, std::int64_t step, Samples& s) const {
   const Face& face = faces_[index];
   draw_points(index, step, s);

@@ -7,38 +7,40 @@
 
 namespace tomofield::objective {
 
-/// What two neighbouring leaves share of a side: `along` runs over y for a face
-/// x = at, and over x for a face y = at; all of the thickness in z.
+/// A face is the part of a side that two neighbouring leaves share. It lies at x = `at` and goes
+/// from y = `begin` to `end`, or at y = `at` and goes from x = `begin` to `end`. It spans the
+/// thickness in z. Lengths are pixels.
 struct Face {
   int low = 0, high = 0;  ///< leaves before and after the face
   bool faces_x = true;    ///< the normal is x, else y
   std::int64_t at = 0;
-  std::int64_t begin = 0, end = 0;  ///< along the face, in pixels
+  std::int64_t begin = 0, end = 0;
   bool operator==(const Face&) const = default;
 };
 
-/// Every face between two leaves of a tree, of equal or different levels and
-/// regions; a side that meets several leaves has a face with each.
+/// Returns all faces between two leaves of a tree. A side that meets several leaves has a face with
+/// each of them.
 std::vector<Face> shared_faces(const field::Quadtree& tree);
 
+/// Sets the boundary consistency.
 struct BoundaryOptions {
   double weight = 0.0;    ///< per px² of face and density unit; 0 is off
-  double spacing = 8.0;   ///< px: one random point in each square of this side
-  double epsilon = 1e-3;  ///< density units; smooths the root where both sides agree
+  double spacing = 8.0;   ///< side of the squares that get one random point each, px
+  double epsilon = 1e-3;  ///< smooths the root where both sides agree, in density units
   std::uint64_t seed = 1;
 };
 
-/// Boundary consistency (eq. 6): the root mean square over random points of a
-/// face of what its two leaves disagree by, summed over faces by their area A,
+/// Penalises differences between two leaves at their common face (eq. 6):
 ///
 ///   L = weight · Σ_faces A √(mean_p (f_low(p) − f_high(p))² + ε²) − A ε,
 ///
-/// which is the total variation of a jump there, so its weight has the same
-/// units as total variation's. Points are new in every step and depend on seed,
-/// step and face alone.
+/// where A is the area of the face and p random points on it. This is the total variation of the
+/// jump at the face, so the weight has the unit of that of total variation. Each step draws new
+/// points, which depend on seed, step and face alone.
 class BoundaryConsistency : public Term {
  public:
-  /// Faces between leaves that are listed; leaves_of_band[b] are those that band b owns.
+  /// Takes the faces between leaves that are listed; leaves_of_band[b] lists the leaves of band b.
+  /// `field` must outlive the term.
   BoundaryConsistency(const field::Field& field,
                       const std::vector<std::vector<int>>& leaves_of_band,
                       const BoundaryOptions& options);

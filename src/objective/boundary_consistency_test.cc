@@ -44,7 +44,7 @@ std::unique_ptr<field::Field> uneven_field(FieldKind kind) {
   return field;
 }
 
-// Leaves of each band, without those in `left_out`.
+// Returns the leaves of each band without those in `left_out`.
 std::vector<std::vector<int>> bands_of(const Quadtree& tree,
                                        const std::vector<int>& left_out = {}) {
   std::vector<std::vector<int>> bands(2);
@@ -55,7 +55,7 @@ std::vector<std::vector<int>> bands_of(const Quadtree& tree,
   return bands;
 }
 
-// What find_leaf says half a pixel to either side, a pixel of face at a time.
+// Compares the faces with find_leaf() half a pixel to either side, for each pixel of a face.
 TEST(SharedFaces, AreTheSidesBetweenNeighbours) {
   const Quadtree tree = uneven_tree();
   const auto faces = shared_faces(tree);
@@ -106,8 +106,8 @@ Total evaluate(const field::Field& field, const BoundaryOptions& options, std::i
   return total;
 }
 
-// With dense points each face's mean is the integral over it, which a regular
-// sum over the densities of both leaves gives too.
+// With dense points the mean over a face is the integral over it. A regular sum over the densities
+// of both leaves must give the same.
 TEST_P(EachBoundaryField, ValueIsEquation6) {
   const auto field = uneven_field(GetParam());
   BoundaryOptions options = kOptions;

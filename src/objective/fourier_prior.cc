@@ -10,10 +10,10 @@
 namespace tomofield::objective {
 namespace {
 
-// Streams of the seed from here on are these samples'.
+// Random streams from here on place the samples.
 constexpr std::uint64_t kSampleStream = std::uint64_t{2} << 48;
 
-// Positions first + i · spacing, 0 <= i < count, that lie in [low, high).
+// Holds the range of the indices of ascending positions that lie in [low, high).
 struct Range {
   std::size_t begin, end;
   Range(const std::vector<double>& positions, double low, double high) {
@@ -26,6 +26,7 @@ struct Range {
   }
 };
 
+// Returns first + i · spacing for 0 <= i < count.
 std::vector<double> positions(double first, double spacing, int count) {
   std::vector<double> at;
   for (int i = 0; i < count; ++i) at.push_back(first + i * spacing);
@@ -54,7 +55,7 @@ FourierPrior::FourierPrior(const field::Field& field, const Rectangle& roi,
   }
 }
 
-// The samples of one leaf: where they are in the field and in the stack of slices.
+// Holds the samples in one leaf: their positions in the field and in the stack of slices.
 struct FourierPrior::LeafSamples {
   std::vector<double> x, y, z;
   std::vector<std::size_t> index;
@@ -69,8 +70,8 @@ struct FourierPrior::LeafSamples {
   }
 };
 
-// A grid with a random origin, so that over the steps every point of the region
-// counts and what the grid aliases averages out; heights stratified.
+// Draws the samples of a step: a grid with a random origin at stratified heights. Over the steps
+// every point of the region counts, and aliases of the grid average out.
 std::vector<FourierPrior::LeafSamples> FourierPrior::leaf_samples(std::int64_t step) const {
   base::Random random(options_.seed, kSampleStream + static_cast<std::uint64_t>(step));
   const auto origin = [&](std::int64_t low, std::int64_t length, int count) {

@@ -11,24 +11,24 @@
 
 namespace tomofield::objective {
 
+/// Sets the isotropic Fourier prior of a field.
 struct FourierPriorOptions {
   double weight = 0.0;   ///< per px³ and density unit; 0 is off
-  int slices = 4;        ///< random heights z a step
-  int max_samples = 64;  ///< of the longer side of the region, at least 1 px apart
+  int slices = 4;        ///< sections a step, at random heights z
+  int max_samples = 64;  ///< samples along the longer side of the region, at least 1 px apart
   std::uint64_t seed = 1;
   AxisPenaltyOptions axes;
 };
 
-/// Isotropic Fourier prior (eq. 7 and 8) of a field: `weight` · volume of the
-/// region of interest · axis_penalty of a few sections across it, on a coarse
-/// grid whose origin and heights are new in every step and depend on seed and
-/// step alone. Rings are measured anew in every step: their transform costs less
-/// than the samples, which the axis lines need anyway.
+/// Penalises streaks along x and y in the spectrum of a field (isotropic Fourier prior, eq. 7 and
+/// 8). The loss is weight · volume of the region of interest · axis_penalty() of a few sections,
+/// which are sampled on a coarse grid. Each step draws a new origin of the grid and new heights,
+/// which depend on seed and step alone.
 class FourierPrior : public Term {
  public:
   /// `field` must outlive it and may change its parameters; rebuild it when the tree changes.
   FourierPrior(const field::Field& field, const Rectangle& roi, const FourierPriorOptions& options);
-  /// Of a field that processes share, of which this one has the leaves `own`.
+  /// Makes the prior of a field that several processes share; this one has the leaves `own`.
   FourierPrior(const field::Field& field, const Rectangle& roi, const FourierPriorOptions& options,
                const distributed::Communicator& processes, base::Range own);
 
@@ -53,7 +53,7 @@ class FourierPrior : public Term {
   base::Range own_;
   double spacing_ = 1.0;
   SliceShape shape_;
-  std::vector<int> leaves_;  // that meet the region
+  std::vector<int> leaves_;  // leaves that meet the region
 };
 
 }  // namespace tomofield::objective

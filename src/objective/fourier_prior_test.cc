@@ -20,7 +20,7 @@ using field::Region;
 
 constexpr Rectangle kRoi{.x0 = 4, .y0 = 16, .x1 = 118, .y1 = 106};
 
-// A margin cell, and leaves of 64 and 32 px over the region.
+// Makes a margin cell, and leaves of 64 and 32 px over the region.
 std::unique_ptr<field::Field> uneven_field(FieldKind kind) {
   const field::RootGrid roots{.x0 = -64, .y0 = 16, .cell_size = 64, .columns = 3, .rows = 2};
   std::vector<Region> regions(6, Region::kInterest);
@@ -50,7 +50,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, EachFourierField,
                          ::testing::Values(FieldKind::kVm, FieldKind::kGrid),
                          [](const auto& kind) { return base::name_of(kind.param); });
 
-// Stripes along y: all vertices of an x hold the same value.
+// Makes stripes along y: all vertices at one x have the same value.
 void make_stripes(field::Field& field) {
   field.initialise(base::Random(3), 0.0);
   for (int leaf = 0; leaf < field.tree().num_leaves(); ++leaf) {
@@ -75,7 +75,7 @@ TEST_P(EachFourierField, ValueFallsAsTheGradientPromises) {
   ASSERT_GT(first.value, 0.0);
   double squares = first.grad_bias * first.grad_bias;
   for (const float g : gradient) squares += static_cast<double>(g) * static_cast<double>(g);
-  // A small step along the gradient, for a hundredth of the value.
+  // Takes a small step along the gradient, which changes the value by a hundredth.
   const double step = 0.01 * first.value / squares;
   for (std::size_t i = 0; i < gradient.size(); ++i)
     field->parameters()[i] -= static_cast<float>(step * static_cast<double>(gradient[i]));

@@ -4,21 +4,24 @@
 
 namespace tomofield::objective {
 
-/// Root mean square noise of the views' rays, in density units times pixels.
+// The weights of the variations are relative to the noise of the views. These functions convert
+// them. The noise of a ray and the contrast of the views are in density units times pixels.
+
+/// Returns the typical noise of a ray, 1 / √(mean of 1 / σ²) over the views. `sigma_of_view` has
+/// the standard deviation σ of the noise of each view, above 0.
 double typical_noise(std::span<const double> sigma_of_view);
 
-/// τ of a concave penalty of the density's gradient in density units, for τ in units of a voxel's
-/// noise: that of a voxel which is back-projected from N views is about 0.9 σ / √N (ramp filter).
-/// Steps well above it are edges, which a concave penalty spares; below, noise would be taken for
-/// edges. A τ much below any contrast leaves more local minima and no sharper edges, so it has a
-/// least value.
+/// Returns the parameter τ of a concave penalty in density units a pixel, for τ in units of a
+/// voxel's noise. A back-projection of N views with a ramp filter has a noise of about 0.9 σ / √N
+/// in a voxel. The penalty spares steps well above τ, which are edges. A smaller τ would spare
+/// noise as well. τ has a lower bound, because a value far below any contrast makes no sharper
+/// edges, but more local minima.
 double concavity(double in_voxel_noise, std::span<const double> sigma_of_view);
 
-/// How many times its weight in units of the noise a concave penalty has: more than once where
-/// there is little noise beside the views' contrast (both in density units times pixels). What few
-/// views and the missing wedge leave open does not become less with the noise, so that below some
-/// noise the weight no longer depends on it, in units of the squared residual
-/// (docs/results/ablation.md, "The weight and the noise").
+/// Returns a factor on the weight of a concave penalty: 1, or more if the noise is small compared
+/// with the contrast of the views. Few views and a missing wedge leave the density uncertain even
+/// without noise. The factor grows as 1 / noise there, so that the weight, in units of the squared
+/// residual, stops falling with the noise (docs/results/ablation.md, "The weight and the noise").
 double gain_of_little_noise(double noise, double contrast);
 
 }  // namespace tomofield::objective

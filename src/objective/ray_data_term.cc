@@ -12,11 +12,11 @@ namespace {
 using geometry::RayBundle;
 using projection::Ray;
 
-// Streams of the seed: what an epoch's batches and a step's samples are drawn from.
+// Random streams from here on draw the batches of an epoch and the samples of a step.
 constexpr std::uint64_t kBatchStream = std::uint64_t{1} << 44;
 constexpr std::uint64_t kSampleStream = std::uint64_t{2} << 40;
 
-// Rays that are traced and kept at once: some 100 samples each.
+// The number of rays that are traced and kept at once. Each has some 100 samples.
 constexpr std::size_t kRaysAtOnce = std::size_t{1} << 17;
 
 double smallest_leaf(const field::Quadtree& tree) {
@@ -26,7 +26,7 @@ double smallest_leaf(const field::Quadtree& tree) {
   return smallest;
 }
 
-// One sample a pixel, along the diagonal of the smallest leaf.
+// Returns one sample a pixel along the diagonal of the smallest leaf, unless the options say more.
 int samples_per_diagonal(const ObjectiveOptions& options, const field::Quadtree& tree,
                          double thickness) {
   if (options.ray_samples > 0) return options.ray_samples;
@@ -118,7 +118,7 @@ std::vector<Ray> RayDataTerm::batch(std::int64_t step) const {
   return rays;
 }
 
-// Adds the gradient of the step's rays; the loss is scaled up from them to all rays.
+// Adds the gradient of the step's rays. It is scaled up to all rays.
 TermValue RayDataTerm::add_field(const Step& step, float* gradient,
                                  std::span<measurement::ViewSums> view_sums) const {
   const std::vector<Ray> rays = batch(step.number);

@@ -14,8 +14,8 @@
 
 namespace tomofield::objective {
 
-/// Where rays count: they must meet the region of interest, and densities outside the support are
-/// 0.
+/// Says which rays and densities count. Rays must meet the region of interest. Densities outside
+/// the support are 0.
 struct RayRegion {
   Rectangle roi;
   geometry::Extent2 support;
@@ -25,13 +25,13 @@ struct RayRegion {
 int ray_steps_per_epoch(const ObjectiveOptions& options,
                         const measurement::SlabViews::Shape& shape);
 
-/// The data term of eq. 9 over random batches of rays: each step of an epoch
-/// takes one pixel, at random, of every run of as many pixels as an epoch has
-/// steps, in every view, so that an epoch uses each ray once and every step has
-/// all views and places. Rays that miss the region of interest or are masked do
-/// not count.
+/// Computes the data term of eq. 9 on random batches of rays. Let an epoch have n steps. Each view
+/// is divided into runs of n pixels, and every step takes another random pixel of each run. So an
+/// epoch uses each ray once, and every step has rays of all views and places. Rays that miss the
+/// region of interest or are masked do not count.
 class RayDataTerm : public Term {
  public:
+  /// `measured` and `field` must outlive the term.
   RayDataTerm(const geometry::RayGeometry& geometry, const measurement::SlabViews& measured,
               const field::Field& field, const RayRegion& region, const ObjectiveOptions& options);
 
@@ -40,12 +40,12 @@ class RayDataTerm : public Term {
   TermValue add_field(const Step& step, float* gradient,
                       std::span<measurement::ViewSums> view_sums) const override;
 
-  /// Bytes that a step needs beside the parameters, about.
+  /// Estimates the bytes that a step needs in addition to the parameters.
   static std::size_t working_memory(const geometry::RayGeometry& geometry,
                                     const field::Quadtree& tree, const ObjectiveOptions& options,
                                     const measurement::SlabViews::Shape& shape);
 
-  /// The rays of a step: those over the same row of root cells together.
+  /// Returns the rays of a step, sorted by the row of root cells that they cross.
   std::vector<projection::Ray> batch(std::int64_t step) const;
 
  private:

@@ -7,11 +7,11 @@
 
 namespace tomofield::objective {
 
-// The back-projection replaces the batch's gradient, which saves a pass that clears it: this term
-// comes first (terms.cc).
+// The back-projection replaces the gradient of the batch, which saves a pass that clears it. So
+// this term has to come first (terms.cc).
 double SlabDataTerm::add_slabs(const Step& step, const SlabBatch& batch,
                                std::span<measurement::ViewSums> view_sums) const {
-  thread_local base::AlignedBuffer<float> detector;  // of the slabs, one after another
+  thread_local base::AlignedBuffer<float> detector;  // one slab after another
   const std::int64_t width = batch.projector.geometry().width;
   const std::size_t detector_size = batch.projector.detector_size(step.views.size());
   const std::size_t size = static_cast<std::size_t>(batch.size()) * detector_size;

@@ -62,8 +62,8 @@ double SlabObjective::add_gradient(const Step& step, float* gradient,
     const int band = own_bands_.begin + static_cast<int>(i);
     bands[static_cast<std::size_t>(band)] = add_band(step, band, gradient);
   });
-  share(bands);
-  // In order: the same sums for any number of threads and processes.
+  allreduce(bands);
+  // Adds in the order of the bands, so that threads and processes do not change the bits.
   double slab_grad_bias = 0.0;
   std::vector<double> term_grad_bias(terms_.size());
   for (const BandSums& band : bands) {
@@ -118,8 +118,8 @@ void SlabObjective::add_batch(const Step& step, const SlabBatch& batch, float* g
   }
 }
 
-// Gives every process the sums of the others' bands, in one message.
-void SlabObjective::share(std::vector<BandSums>& bands) const {
+// Gives every process the sums of all bands, in one message.
+void SlabObjective::allreduce(std::vector<BandSums>& bands) const {
   if (processes_.size() == 1) return;
   std::vector<double> numbers;
   const auto for_each_number = [&](const auto& body) {

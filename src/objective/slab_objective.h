@@ -10,7 +10,7 @@
 
 namespace tomofield::objective {
 
-/// What a slab objective is made for.
+/// Holds the field, the views and the options of a slab objective.
 struct SlabObjectiveContext {
   const field::Field& field;
   const projection::SlabProjector& projector;  ///< of the stage's pixels
@@ -21,15 +21,16 @@ struct SlabObjectiveContext {
   geometry::Extent2 support;                   ///< where densities count
   bool has_factors = true;                     ///< the field has the factors that were asked for
   base::Range own_bands;                       ///< bands of this process
-  base::Range own_leaves;                      ///< and their leaves
+  base::Range own_leaves;                      ///< leaves of these bands
   const ObjectiveOptions& options;
   const distributed::Communicator& processes = distributed::Communicator::alone();
 };
 
-/// Evaluates the terms over batches of slabs on this machine's cores: a band (one row of root
-/// cells) is one piece of work. A band writes the gradient of its own leaves alone and only reads
-/// its neighbours' parameters, so bands may run in any order and on any thread. All that the
-/// context names must outlive the objective; it is made anew when the tree or the stage changes.
+/// Evaluates the terms on batches of slabs with the cores of this machine. A thread works on one
+/// band (a row of root cells) at a time. A band writes the gradient of its own leaves alone and
+/// only reads the parameters of its neighbours, so bands may run in any order and on any thread.
+/// Everything that the context refers to must outlive the objective. A new tree or stage needs a
+/// new objective.
 class SlabObjective : public Objective {
  public:
   explicit SlabObjective(const SlabObjectiveContext& context);
@@ -45,11 +46,11 @@ class SlabObjective : public Objective {
 
   const projection::SlabSampler& sampler() const { return sampler_; }
 
-  /// What a pass over a band found.
+  /// Holds the sums of a pass over a band.
   struct BandSums {
-    std::vector<measurement::ViewSums> views;  ///< one each of the step's views
+    std::vector<measurement::ViewSums> views;  ///< one for each view of the step
     double slab_grad_bias = 0.0;               ///< dL/d bias through the samples of slabs
-    std::vector<TermValue> terms;              ///< one each; grad_bias from Term::add_band alone
+    std::vector<TermValue> terms;  ///< one for each term; grad_bias from Term::add_band alone
   };
   /// Adds the gradient of the band's own leaves to `gradient` (all parameters).
   BandSums add_band(const Step& step, int band, float* gradient) const;
@@ -57,7 +58,7 @@ class SlabObjective : public Objective {
  private:
   struct Workspace;
   void add_batch(const Step& step, const SlabBatch& batch, float* gradient, BandSums& sums) const;
-  void share(std::vector<BandSums>& bands) const;
+  void allreduce(std::vector<BandSums>& bands) const;
 
   const projection::SlabProjector& projector_;
   const measurement::Measurement& measured_;

@@ -79,7 +79,8 @@ class Term {
   }
 };
 
-/// What terms are made for: a field on one tree, at the resolution of one stage.
+/// Holds what terms are made from: a field on one tree, and the views at the resolution of one
+/// stage.
 struct TermContext {
   const field::Field& field;
   const projection::SlabSampler& sampler;

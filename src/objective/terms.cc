@@ -26,8 +26,9 @@ kernels::VariationPenalty variation_penalty(const TermContext& c) {
   return penalty;
 }
 
-// A jump at a face counts as total variation does, density times area. Faces and the Fourier prior
-// count fine pixels: bin² of a face and bin³ of a volume to one of the stage.
+// A jump at a face counts like total variation: density times area. Faces and the Fourier prior
+// count pixels at full resolution. A pixel of the stage has bin² of them in a face and bin³ in a
+// volume.
 BoundaryOptions boundary_options(const TermContext& c, double noise) {
   return {.weight = c.options.boundary / (noise * c.bin * c.bin), .seed = c.options.seed};
 }
@@ -47,10 +48,11 @@ double variation_gain(const ObjectiveOptions& options, const measurement::Measur
   return gain_of_little_noise(typical_noise(full.noise_sigma), full.contrast());
 }
 
-// The residuals are in units of the noise, so a prior that were the same for every series would
-// have one weight there. Total variation is not such a prior: it must suppress noise, and its best
-// weight grows with the noise's deviation rather than its variance (as in denoising: Rudin, Osher
-// and Fatemi 1992). Weights divided by the noise of the stage's pixels serve every size.
+// The residuals are in units of the noise, with standard deviation σ. A prior that is the same for
+// every series would have a constant weight in these units. Total variation has to suppress the
+// noise: in units of the data its best weight grows with σ rather than with σ² (as in denoising:
+// Rudin, Osher and Fatemi 1992), so in units of the noise it falls as 1 / σ. The σ of the stage's
+// pixels serves every size.
 std::vector<std::unique_ptr<Term>> make_terms(const TermContext& c) {
   const double noise = typical_noise(c.measured.noise_sigma);
   const double density = variation_gain(c.options, c.full) * c.options.density_variation / noise;

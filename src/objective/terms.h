@@ -11,8 +11,8 @@ namespace tomofield::objective {
 /// and a line here.
 std::vector<std::unique_ptr<Term>> make_terms(const TermContext& context);
 
-/// Returns how many times its usual weight the density's variation has: more than once where there
-/// is little noise and the penalty is concave (noise_scale.h).
+/// Returns the factor on the weight of the density's variation: more than 1 if the penalty is
+/// concave and there is little noise (noise_scale.h).
 double variation_gain(const ObjectiveOptions& options, const measurement::Measurement& full);
 
 }  // namespace tomofield::objective

@@ -10,7 +10,7 @@ namespace {
 using kernels::kLanes;
 using projection::SampleSegment;
 
-// Streams of the seed from here on choose the direction of the differences in each step.
+// Random streams from here on draw the sides of the differences in each step.
 constexpr std::uint64_t kDirectionStream = std::uint64_t{1} << 40;
 
 // Returns the first row of a slab of a batch, where it lies among the others.
@@ -73,8 +73,8 @@ void DensityVariation::start_flux(const Step& step, const SlabBatch& batch, floa
 double DensityVariation::add_slabs(const Step& step, const SlabBatch& batch,
                                    std::span<measurement::ViewSums>) const {
   if (weight_ <= 0) return 0.0;
-  // What crosses from one slab to the next of a band, and a row past the batch. Padding starts as
-  // zeros and stays so: a new layout needs new buffers.
+  // `flux` goes from one slab of a band to the next; `row` is the first row past the batch. Padding
+  // starts as zeros and stays so: a new layout needs new buffers.
   thread_local base::AlignedBuffer<float> flux, row;
   if (row.size() != batch.sampler.row_size()) {
     flux.reset(batch.sampler.row_size());

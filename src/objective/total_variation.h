@@ -7,17 +7,17 @@
 
 namespace tomofield::objective {
 
-/// The sides to which the differences of a step go along x and z.
+/// Says to which side the differences of a step go, along x and along z.
 struct DifferenceSides {
   bool backward_x = false, backward_z = false;
 };
-/// Draws them for a step.
+/// Draws the sides of a step.
 DifferenceSides difference_sides(std::uint64_t seed, std::int64_t step);
 
-/// Isotropic total variation of the density on the samples of slabs (kernels/total_variation.h):
-/// weight · Σ penalty(|∇ density|) times the area that a sample stands for. Each step looks at
-/// edges from another corner, since forward differences alone treat the two sides of an edge
-/// differently.
+/// Computes the isotropic total variation of the density on the samples of slabs
+/// (kernels/total_variation.h): weight · Σ penalty(|∇ density|) · area of a sample. Forward
+/// differences alone would treat the two sides of an edge differently, so each step draws the sides
+/// of its differences.
 class DensityVariation : public Term {
  public:
   /// `weight` is per pixel of area and density unit; 0 is off.
@@ -37,7 +37,7 @@ class DensityVariation : public Term {
   std::uint64_t seed_;
 };
 
-/// Total variation of the factors of each leaf (field::Field::parameter_variation).
+/// Computes the total variation of the factors of each leaf (field::Field::parameter_variation).
 class FactorVariation : public Term {
  public:
   /// The field and the sampler must outlive the term. A weight of 0 is off.

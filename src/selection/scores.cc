@@ -8,7 +8,8 @@
 namespace tomofield::selection {
 namespace {
 
-constexpr int kMaxSteps = 4;  // of the coarse search to one side: a factor of 256
+// The maximum number of coarse steps to one side: a factor of 256.
+constexpr int kMaxSteps = 4;
 
 }  // namespace
 
@@ -47,7 +48,7 @@ double search_weight(double first, const ScoreOfWeight& score) {
   const auto error_of = [&](double factor) {
     return (tried[best * factor] = score(best * factor)).error;
   };
-  // Coarse steps until the best weight has a worse one on either side; then finer ones.
+  // Takes coarse steps until the best weight has a worse one on either side, and then finer ones.
   for (const double factor : {4.0, 0.25}) {
     for (int step = 0; step < kMaxSteps && error_of(factor) < error_of(1); ++step) best *= factor;
   }

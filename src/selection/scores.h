@@ -5,34 +5,37 @@
 
 namespace tomofield::selection {
 
-/// How well a trial predicts the views held out.
+/// Says how well a trial predicts the held-out views.
 struct HeldOutScore {
   double error = 0;                     ///< mean squared residual over the noise variance
-  std::vector<double> view_error = {};  ///< the same of each view held out
+  std::vector<double> view_error = {};  ///< the same of each held-out view
 };
 
-/// Whether a predicts more than half of the views held out better than b. Unlike the mean
-/// error, this cannot be decided by one view at the end of the tilts, which all predict badly.
+/// Says whether `a` predicts more than half of the held-out views better than `b`. One view at the
+/// end of the tilt range, which every trial predicts badly, can decide the mean error, but not
+/// this.
 bool most_views_prefer(const HeldOutScore& a, const HeldOutScore& b);
 
-/// Standard error of the mean difference of two trials over the views held out:
-/// the views' own noise is common to both and drops out.
+/// Returns the standard error of the mean difference of two trials over the held-out views. The
+/// noise of the views themselves is the same in both trials and cancels.
 double standard_error_of_difference(const HeldOutScore& a, const HeldOutScore& b);
 
-/// The first of these trials, in order of preference, that the best one does not beat by more than
-/// the standard error of their difference: what held-out views cannot tell apart. Index.
+/// Returns the index of the first trial that the best one does not beat by more than the standard
+/// error of their difference. `scores` are in order of preference. Held-out views cannot tell such
+/// a trial from the best one.
 std::size_t first_as_good_as_the_best(const std::vector<HeldOutScore>& scores);
 
-/// The score of a weight; asked for the same weight again it must give the same.
+/// Returns the score of a weight, and always the same one for the same weight.
 using ScoreOfWeight = std::function<HeldOutScore(double weight)>;
 
-/// Weights that search_weight() tries where the best is near the first.
+/// Number of weights that search_weight() tries if the best one is near the first.
 constexpr int kUsualWeights = 7;
 
-/// The weight of a regulariser that predicts held-out views best: by a 1-D search on a
-/// logarithmic scale, factors of 4 (to 256), then 2, then √2 about the best. Of the weights tried
-/// that cannot be told from the best the largest (the smoothest volume) is taken: where held-out
-/// views cannot tell, less noise is the better guess.
+/// Returns the weight of a regulariser that predicts held-out views best. It searches on a
+/// logarithmic scale: in factors of 4 (up to 256) from `first`, then 2 and √2 about the best. Of
+/// all tried weights that are as good as the best (first_as_good_as_the_best()), it takes the
+/// largest. That one makes the smoothest volume: where held-out views cannot tell, less noise is
+/// the better guess.
 double search_weight(double first, const ScoreOfWeight& score);
 
 }  // namespace tomofield::selection

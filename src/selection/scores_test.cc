@@ -27,7 +27,7 @@ TEST(StandardErrorOfDifference, IgnoresWhatTrialsShare) {
   EXPECT_NEAR(standard_error_of_difference(a, c), 1.0 / 3, 1e-12);  // s = 1/√3, over √3
 }
 
-// Error of a weight whose logarithm is so far from that of the best, all views alike.
+// Returns an error that grows with the distance from the best weight, the same for all views.
 HeldOutScore parabola(double weight, double best) {
   const double distance = std::log2(weight / best);
   const double error = 1 + 0.01 * distance * distance;

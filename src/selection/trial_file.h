@@ -25,7 +25,7 @@ nlohmann::json trials_json(const std::vector<Trial<Settings>>& trials,
   return table;
 }
 
-/// Writes what a search chose and everything that it tried.
+/// Writes the chosen settings and all trials of a search.
 template <typename Settings, typename SettingsJson>
 nlohmann::json tuned_json(const Tuned<Settings>& tuned, const SettingsJson& settings_json) {
   return {{"predicted_views", tuned.predicted_views},
@@ -37,9 +37,9 @@ nlohmann::json tuned_json(const Tuned<Settings>& tuned, const SettingsJson& sett
 /// repeat them.
 class TrialFile {
  public:
-  /// With `reuse`, reads the trials of an earlier run, if there are any. Throws Error if they
-  /// belong to another `fingerprint` (series and options) or are damaged. An empty path keeps the
-  /// trials in memory.
+  /// With `reuse`, reads the trials of an earlier run if the file exists. Throws Error if they
+  /// belong to another `fingerprint` (series and options) or are damaged. With an empty path, it
+  /// keeps the trials in memory alone.
   TrialFile(std::filesystem::path path, std::string fingerprint, bool reuse);
 
   /// Returns the trial that was made with these settings, if there is one.

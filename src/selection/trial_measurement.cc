@@ -10,8 +10,9 @@
 namespace tomofield::selection {
 namespace {
 
-// One view in eight is predicted, or five of fewer than forty views, since two or three views do
-// not tell noise from a better setting. Between two predicted views at least two are fitted.
+// Every eighth view is predicted, or about five of fewer than forty views, since two or three views
+// cannot tell noise from a better setting. At least two fitted views lie between two predicted
+// ones.
 constexpr int kMaxEvery = 8, kMinEvery = 3, kWanted = 5;
 constexpr int kMinViews = 6;
 

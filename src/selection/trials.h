@@ -18,11 +18,11 @@ struct Trial {
   Settings settings = {};
   HeldOutScore score = {};
   double seconds = 0;
-  /// Fall of the objective in the last tenth of an iterative method, as a part of it.
+  /// Relative decrease of the objective in the last tenth of an iterative method.
   std::optional<double> last_decrease = {};
 };
 
-/// What a search chose, and all that it tried.
+/// Holds the chosen settings and all trials of a search.
 template <typename Settings>
 struct Tuned {
   Settings settings = {};
@@ -42,8 +42,8 @@ class Trials {
   Trials(RunTrial run, AreEqual are_equal)
       : run_(std::move(run)), are_equal_(std::move(are_equal)) {}
 
-  /// Returns the trial with these settings, which it makes unless there is one. The reference
-  /// holds until the next trial is made.
+  /// Returns the trial with these settings and makes it if there is none yet. The reference is
+  /// valid until the next trial is made.
   const Trial<Settings>& trial(const Settings& settings) {
     const auto known = std::ranges::find_if(
         made_, [&](const Trial<Settings>& t) { return are_equal_(t.settings, settings); });
