@@ -10,27 +10,30 @@
 
 namespace tomofield::fit {
 
+/// Holds the decay rates of the first and the second moment.
 struct AdamOptions {
   double beta1 = 0.9;
   double beta2 = 0.99;
 };
 
-/// Adam over the leaves of a field and its decoder's bias. Moments are lazy: a
-/// leaf's advance, and its bias correction counts, only when a step touches it.
+/// Optimises the parameters of a field's leaves and the bias of its decoder (Adam; Kingma and Ba
+/// 2015). Each leaf counts its own steps: its moments and its bias correction advance only in steps
+/// that list it.
 class Adam {
  public:
   Adam(const field::Field& field, const AdamOptions& options);
 
-  /// One step on the listed leaves; their gradient is used up (zeroed).
+  /// Takes one step on the listed leaves and clears their gradient. `gradient` has one entry for
+  /// each parameter of the field.
   void step(field::Field& field, const std::vector<int>& leaves,
             base::AlignedBuffer<float>& gradient, double learning_rate);
-  /// One step on the bias, which every ray shares and which so moves slowly.
+  /// Takes one step on the bias; `gradient` is the derivative of the loss by it.
   void step_bias(field::Field& field, double gradient, double learning_rate);
 
-  /// The whole state, for checkpoints.
+  /// Holds the whole state, for checkpoints and for changes of the tree.
   struct State {
-    base::AlignedBuffer<float> m, v;
-    std::vector<std::int64_t> leaf_steps;
+    base::AlignedBuffer<float> m, v;       ///< moments of every parameter
+    std::vector<std::int64_t> leaf_steps;  ///< steps that each leaf has taken part in
     double bias_m = 0.0, bias_v = 0.0;
     std::int64_t bias_steps = 0;
   };

@@ -13,7 +13,7 @@
 namespace tomofield::fit {
 namespace {
 
-// Six leaves of different sizes.
+// Makes a field of six leaves of different sizes.
 std::unique_ptr<field::Field> small_field() {
   const field::RootGrid roots{.x0 = 0, .y0 = 0, .cell_size = 16, .columns = 3, .rows = 2};
   field::Quadtree tree(roots, std::vector<field::Region>(6, field::Region::kInterest));
@@ -24,7 +24,7 @@ std::unique_ptr<field::Field> small_field() {
   return field;
 }
 
-// Adam as Kingma and Ba write it, in double, for one parameter.
+// Adam for one parameter as Kingma and Ba write it, in doubles.
 struct PlainAdam {
   double m = 0, v = 0;
   int t = 0;
@@ -108,7 +108,7 @@ TEST(FieldAdam, BiasFollowsTheSameRule) {
   EXPECT_EQ(adam.state().bias_steps, 40);
 }
 
-// A checkpoint is the state: a new optimiser that is given it goes on alike.
+// A checkpoint stores the state. A new optimiser with this state takes the same steps.
 TEST(FieldAdam, GoesOnFromItsStateToTheSameBits) {
   const auto run = [](bool stop_halfway) {
     const auto field = small_field();

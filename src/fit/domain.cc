@@ -22,7 +22,7 @@ field::LeafShape leaf_shape(double size, double thickness, double spacing, doubl
           .rank_z = rank};
 }
 
-// Root cells over a rectangle around the region of interest, which starts on a cell's corner.
+// Returns the root cells that cover `reach`. The region of interest starts on the corner of a cell.
 field::RootGrid root_grid(const Rectangle& roi, const geometry::Extent2& reach, std::int64_t cell) {
   const auto cells = [cell](double length) {
     return static_cast<std::int64_t>(std::ceil(length / static_cast<double>(cell)));
@@ -38,7 +38,39 @@ field::RootGrid root_grid(const Rectangle& roi, const geometry::Extent2& reach, 
   return grid;
 }
 
-// A domain for rays that meet the region of interest and reach no further than `reach`.
+// Makes the tree that a fit starts with: the cells of the region of interest are split.
+field::Quadtree make_tree(const field::RootGrid& roots, const Rectangle& roi, int depth) {
+  std::vector<field::Region> regions;
+  for (int row = 0; row < roots.rows; ++row) {
+    for (int column = 0; column < roots.columns; ++column) {
+      const std::int64_t x0 = roots.x0 + column * roots.cell_size;
+      const std::int64_t y0 = roots.y0 + row * roots.cell_size;
+      const bool inside = x0 < roi.x1 && x0 + roots.cell_size > roi.x0 && y0 < roi.y1 &&
+                          y0 + roots.cell_size > roi.y0;
+      regions.push_back(inside ? field::Region::kInterest : field::Region::kMargin);
+    }
+  }
+  field::Quadtree tree(roots, regions);
+  tree.split_to_level(field::Region::kInterest, depth);
+  return tree;
+}
+
+// Returns the vertices of the leaves of a tree.
+std::vector<field::LeafShape> leaf_shapes(const field::Quadtree& tree, double thickness,
+                                          const FieldOptions& options) {
+  std::vector<field::LeafShape> shapes;
+  for (int leaf = 0; leaf < tree.num_leaves(); ++leaf) {
+    const bool inside = tree.leaf(leaf).region == field::Region::kInterest;
+    // Along z all leaves are as fine as the finest ones are in the plane.
+    shapes.push_back(leaf_shape(static_cast<double>(tree.leaf(leaf).square.size), thickness,
+                                inside ? options.vertex_spacing : options.margin_spacing,
+                                inside ? options.finest_spacing() : options.margin_spacing,
+                                inside ? options.rank : options.margin_rank));
+  }
+  return shapes;
+}
+
+// Makes a domain for rays that meet the region of interest and reach no further than `reach`.
 Domain cover(double thickness, const Rectangle& roi, geometry::Extent2 reach,
              const FieldOptions& options) {
   projection::SampleGrid grid = projection::make_sample_grid(
@@ -53,31 +85,12 @@ Domain cover(double thickness, const Rectangle& roi, geometry::Extent2 reach,
     reach.x1 = std::max(reach.x1, s.x1());
   }
   const field::RootGrid roots = root_grid(roi, reach, band_rows(options));
-  // Slabs start with the cells; below the region there are whole ones or none.
+  // The first slab starts with the first row of cells.
   const auto end_row = static_cast<std::int64_t>(std::ceil(reach.y1));
   reach.y0 = static_cast<double>(roots.y0);
   reach.y1 = static_cast<double>(end_row);
-  std::vector<field::Region> regions;
-  for (int row = 0; row < roots.rows; ++row) {
-    for (int column = 0; column < roots.columns; ++column) {
-      const std::int64_t x0 = roots.x0 + column * roots.cell_size;
-      const std::int64_t y0 = roots.y0 + row * roots.cell_size;
-      const bool inside = x0 < roi.x1 && x0 + roots.cell_size > roi.x0 && y0 < roi.y1 &&
-                          y0 + roots.cell_size > roi.y0;
-      regions.push_back(inside ? field::Region::kInterest : field::Region::kMargin);
-    }
-  }
-  field::Quadtree tree(roots, regions);
-  tree.split_to_level(field::Region::kInterest, options.depth);
-  std::vector<field::LeafShape> shapes;
-  // Along z all leaves are as fine as the finest ones are in the plane.
-  for (int leaf = 0; leaf < tree.num_leaves(); ++leaf) {
-    const bool inside = tree.leaf(leaf).region == field::Region::kInterest;
-    shapes.push_back(leaf_shape(static_cast<double>(tree.leaf(leaf).square.size), thickness,
-                                inside ? options.vertex_spacing : options.margin_spacing,
-                                inside ? options.finest_spacing() : options.margin_spacing,
-                                inside ? options.rank : options.margin_rank));
-  }
+  field::Quadtree tree = make_tree(roots, roi, options.depth);
+  std::vector<field::LeafShape> shapes = leaf_shapes(tree, thickness, options);
   return {.roi = roi,
           .support = reach,
           .first_row = roots.y0,
@@ -110,10 +123,10 @@ Domain make_domain(const geometry::RayGeometry& geometry, const Rectangle& roi,
 
 double Domain::coarsening(field::Region region, int bin) const {
   const FieldOptions usual;
-  const double of_usual = region == field::Region::kInterest
-                              ? usual.vertex_spacing / spacing
-                              : usual.margin_spacing / margin_spacing;
-  return std::max(1.0, bin * std::min(1.0, of_usual));
+  const double usual_over_own = region == field::Region::kInterest
+                                    ? usual.vertex_spacing / spacing
+                                    : usual.margin_spacing / margin_spacing;
+  return std::max(1.0, bin * std::min(1.0, usual_over_own));
 }
 
 field::LeafShape Domain::shape_in(field::Region region, int bin) const {
@@ -133,7 +146,7 @@ projection::SampleGrid sample_grid(const Domain& domain, double thickness, int b
   const double x1 = x0 + (fine.front().nx + bin - 1) / bin;
   if (fine.size() == 1) return projection::make_sample_grid({x0, x1}, thickness / bin, x0, x1, 0);
   const double spacing = fine.back().hx * domain.coarsening(field::Region::kMargin, bin) / bin;
-  // Whole samples inside the field; half a one less, as the grid is rounded up.
+  // The grid rounds the number of samples up. Half a sample less leaves those inside the field.
   const auto length = [spacing](double reach) {
     return (std::floor(reach / spacing) - 0.5) * spacing;
   };

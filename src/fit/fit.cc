@@ -19,7 +19,7 @@ namespace {
 // The bias moves every density at once, so it takes smaller steps than a factor.
 constexpr double kBiasRate = 0.02;
 
-// The stream of the seed that the order of an epoch's subsets comes from.
+// Random streams from here on give the order of an epoch's subsets.
 constexpr std::uint64_t kOrderStream = 1000;
 
 // Returns the views that are not held out.
@@ -51,13 +51,13 @@ int steps_per_epoch_of(const measurement::Measurement& measurement, const FitOpt
              : options.subsets;
 }
 
-// Returns the leaves that a process keeps; none: all.
+// Returns the leaves that a process keeps; an empty list means all.
 std::vector<int> leaves_to_keep(const distributed::Communicator& processes,
                                 const field::Quadtree& tree, base::Range bands) {
   return processes.size() == 1 ? std::vector<int>{} : needed_leaves(tree, bands);
 }
 
-// The part of an only stage in which the tree may change; else that is the first stage.
+// The tree may change in the coarse stage. Without one, it may change in this part of the fit.
 constexpr double kOpenPart = 0.4;
 
 TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
@@ -105,29 +105,30 @@ const Stage& Fit::stage() const {
                        [&](const Stage& s) { return epoch >= s.first_epoch; });
 }
 
-// Makes what belongs to one stage.
+// Makes the objects that belong to one stage.
 void Fit::enter_stage() {
   objective_.reset();
-  binned_.reset();  // before its successor needs memory
+  binned_.reset();  // its successor needs the memory
   binned_ = std::make_unique<measurement::Measurement>(binned(measurement_, stage().bin));
   projector_ = std::make_unique<projection::SlabProjector>(
       binned_->geometry, sample_grid(domain_, measurement_.geometry.thickness, stage().bin));
 }
 
-// Resamples the field to the vertices of the stage, or factorises it; the optimiser starts anew.
+// Resamples the field to the vertices of the stage, or factorises it. The optimiser starts anew.
 void Fit::resample_field() {
   std::vector<field::LeafShape> shapes;
   const field::Quadtree& tree = field_->tree();
   for (int leaf = 0; leaf < tree.num_leaves(); ++leaf)
     shapes.push_back(domain_.shape_in(tree.leaf(leaf).region, stage().bin));
-  gradient_.reset(0);  // and the moments go before the other field needs memory
+  // The gradient and the moments go before the other field needs memory.
+  gradient_.reset(0);
   optimizer_.state() = {};
   field_ = field_->kind() == stage().field_kind ? field_->resampled(std::move(shapes))
                                                 : field::factorised(*field_, std::move(shapes));
   optimizer_ = Adam(*field_, AdamOptions{});
 }
 
-// Passes from the end of a stage to the start of the next.
+// Goes from the end of a stage to the start of the next one.
 void Fit::refine() {
   const int last_bin = std::prev(&stage())->bin;
   enter_stage();
@@ -142,7 +143,7 @@ void Fit::refine() {
   halo_->refresh(*field_);  // other vertices depend on more of the old ones
 }
 
-// Makes what belongs to one tree.
+// Makes the objects that belong to one tree.
 void Fit::follow_tree() {
   gradient_.reset(field_->num_parameters());
   objective_ = std::make_unique<objective::SlabObjective>(objective::SlabObjectiveContext{
@@ -190,7 +191,7 @@ double Fit::work(std::int64_t steps) const {
 
 bool Fit::is_done() const {
   if (progress_.step == num_steps()) return true;
-  // Errors of stages before the last are those of other pixels or of plain vertices.
+  // Earlier stages have other pixels or plain vertices, so their errors do not compare.
   const auto first = static_cast<std::size_t>(stages_.back().first_epoch);
   const std::vector<double>& errors = progress_.held_out_error;
   if (options_.patience == 0 || errors.size() <= first) return false;
@@ -224,8 +225,8 @@ void Fit::run(const AfterStep& after_step) {
   }
 }
 
-// Returns every subsets-th view, from a first one that visits each residue once an epoch in random
-// order, so that a subset covers the whole tilt range evenly. With rays, slabs have no views.
+// Returns the views of a step: a subset of interleaved views, which covers the tilt range evenly.
+// An epoch visits all subsets in random order. The ray engine compares slabs with no views.
 std::vector<int> Fit::views_of_step(std::int64_t step) const {
   std::vector<int> views;
   if (measurement_.ray_geometry) return views;

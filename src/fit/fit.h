@@ -22,56 +22,63 @@
 
 namespace tomofield::fit {
 
-/// Where a fit stands between two steps: everything that a resumed run needs beside the field and
-/// the optimiser.
+/// Holds the state of a fit between two steps, apart from the field and the optimiser. A resumed
+/// run continues from these three.
 struct Progress {
-  std::int64_t step = 0;                          ///< steps done
-  std::vector<measurement::ViewModel> views;      ///< of every view
-  std::vector<measurement::ViewSums> epoch_sums;  ///< of the running epoch, of every view
-  std::vector<double> data_loss;  ///< mean squared residual over the noise variance, one an epoch
+  std::int64_t step = 0;                          ///< number of steps done
+  std::vector<measurement::ViewModel> views;      ///< scale, offset and weight of each view
+  std::vector<measurement::ViewSums> epoch_sums;  ///< sums of each view in the current epoch
+  std::vector<double> data_loss;  ///< of each epoch: mean squared residual over the noise variance
   TreeProgress tree;
-  std::vector<double> held_out_error;  ///< the same of the held-out views, if there are any
+  std::vector<double> held_out_error;  ///< of each epoch: the same of the held-out views, if any
 };
 
-/// Fits a field to the measured views by minimising an objective (eq. 9) with Adam.
+/// Fits a field to the measured views: it minimises an objective (eq. 9) with Adam.
 ///
-/// With the slab engine, a step uses every slab and one subset of the views; with the ray engine, a
-/// random part of the rays of all views. A fit passes through stages (stages.h): the field has the
-/// vertices, the kind and the learning rates of one stage until its epochs are over, and those of
-/// the next stage then.
+/// An epoch uses every ray that counts once. With the slab engine, a step uses all slabs and one
+/// subset of the views. With the ray engine, it uses a random part of the rays of all views. After
+/// each epoch the fit solves for the scales of the views, scores the held-out views and updates an
+/// adaptive tree, as far as the options ask for it.
 ///
-/// Processes that share a fit each work on some bands and keep the parameters of these and of the
-/// leaves next to them. They all-reduce sums that each adds for its own bands, in one order: the
-/// same bits for any number of processes.
+/// A fit goes through stages (stages.h). At the end of a stage, the field is resampled to the
+/// vertices of the next one, or factorised, and the optimiser starts anew.
+///
+/// Several processes can share a fit. Each works on some bands and keeps the parameters of their
+/// leaves and of the leaves next to them. Sums over bands are all-reduced in a fixed order, so the
+/// result has the same bits for any number of threads and processes.
 class Fit {
  public:
-  /// `measurement` and `processes` must outlive the fit.
+  /// Makes the initial field. `measurement` and `processes` must outlive the fit.
   Fit(const measurement::Measurement& measurement, const FieldOptions& field_options,
       const FitOptions& options,
       const distributed::Communicator& processes = distributed::Communicator::alone());
 
-  /// Called after every step; returning false stops the fit there.
+  /// Is called after every step; returning false stops the fit.
   using AfterStep = std::function<bool(const Fit&)>;
   /// Takes steps until the fit is done or `after_step` stops it.
   void run(const AfterStep& after_step);
-  /// Continues where another fit of the same options stood; the optimiser starts anew.
+  /// Takes over the progress and the field of another fit with the same options. The optimiser
+  /// starts anew; the caller can restore its state.
   void go_on_from(Progress progress, std::unique_ptr<field::Field> field);
 
   const Progress& progress() const { return progress_; }
-  /// Says whether every step is done, or the held-out error stops the fit before
-  /// (FitOptions::patience).
+  /// Says whether every step is done, or the held-out error has not improved for
+  /// FitOptions::patience epochs.
   bool is_done() const;
   int steps_per_epoch() const { return steps_per_epoch_; }
-  std::int64_t num_epochs() const;  ///< of all stages
+  /// Returns the number of epochs of all stages.
+  std::int64_t num_epochs() const;
   std::int64_t num_steps() const { return num_epochs() * steps_per_epoch(); }
   const std::vector<Stage>& stages() const { return stages_; }
-  /// Returns the work of the first `steps` steps, in steps of the last stage (Stage::step_cost).
+  /// Returns the estimated work of the first `steps` steps, in steps of the last stage
+  /// (Stage::step_cost).
   double work(std::int64_t steps) const;
 
-  /// Returns how many times its usual weight the density's variation has (objective/terms.h).
+  /// Returns the factor on the weight of the density's variation (objective/terms.h).
   double variation_gain() const;
-  /// Scores the field as it is on the held-out views, of which there must be some.
+  /// Scores the current field on the held-out views. There must be at least one.
   measurement::ViewErrors held_out_error() const;
+  /// Predicts a view, scaled by `model`, beside the measured one.
   measurement::PredictedView predict_held_out(int view, const measurement::ViewModel& model) const;
 
   const field::Field& field() const { return *field_; }
@@ -82,12 +89,13 @@ class Fit {
   Adam& optimizer() { return optimizer_; }
 
   const distributed::Communicator& processes() const { return processes_; }
-  /// Returns the bands that this process works on: all of them, if it is alone.
+  /// Returns the bands that this process works on; one process alone has all of them.
   base::Range own_bands() const { return bands_; }
+  /// Returns the leaves of these bands.
   base::Range own_leaves() const { return leaves_of_bands(field_->tree(), bands_); }
-  /// Returns the leaves of a tree that this process keeps; none: all.
+  /// Returns the leaves of a tree whose parameters this process keeps; an empty list means all.
   std::vector<int> kept_leaves(const field::Quadtree& tree) const;
-  /// Counts the steps that run() has taken, and their messages to other processes.
+  /// Counts the steps that run() has taken and their messages to other processes.
   struct Traffic : distributed::Communicator::Traffic {
     std::int64_t steps = 0;
   };
@@ -118,8 +126,8 @@ class Fit {
   std::vector<int> fitted_views_;
   int steps_per_epoch_;
 
-  // Belongs to one stage or one tree. The objective refers to the first two, so they keep their
-  // place when a fit is moved.
+  // These belong to one stage or one tree and are made anew for the next. The objective refers to
+  // the first two, so they must stay where they are when a fit is moved.
   std::unique_ptr<measurement::Measurement> binned_;
   std::unique_ptr<projection::SlabProjector> projector_;
   std::unique_ptr<objective::Objective> objective_;

@@ -12,7 +12,7 @@ namespace {
 
 using base::Range;
 
-// Calls body(run, length, where it is when packed) for the runs in order.
+// Calls body(first parameter, length, place in the packed buffer) for the runs in order.
 template <typename Body>
 void for_each_run(const std::vector<field::ParameterRuns>& all, const Body& body) {
   std::size_t packed = 0;
@@ -64,7 +64,7 @@ Halo::Part Halo::part(const field::Field& field, const std::vector<int>& leaves,
   std::size_t size = 0;
   for (const int leaf : leaves) {
     const field::Square& square = field.tree().leaf(leaf).square;
-    // The face, and the centre of the row at it.
+    // Covers the face and the centre of the row beside it.
     const double face = static_cast<double>(side == Side::kStart ? square.y0 : square.y1());
     const double row = face + (side == Side::kStart ? 0.5 : -0.5) * pixel;
     const double at_face = face + field::kPixelCentre;

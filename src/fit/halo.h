@@ -11,32 +11,38 @@
 
 namespace tomofield::fit {
 
-/// The leaves of those bands, which are numbered one after another.
+/// Returns the leaves of some bands; their numbers are consecutive.
 base::Range leaves_of_bands(const field::Quadtree& tree, base::Range bands);
 
-/// The leaves along both ends of a process's bands: its own, which its neighbours read, and
-/// theirs, which it reads for what crosses the boundary (boundary consistency, and total variation
-/// from the last row of one band to the first of the next).
+/// Lists the leaves on both sides of the boundaries between a process's bands and those of its
+/// neighbours. Terms of the loss that cross a boundary read both sides: boundary consistency, and
+/// the total variation from the last row of one band to the first of the next.
 struct HaloLeaves {
-  std::vector<int> own_first, own_last;  ///< along the first band's start, the last one's end
-  std::vector<int> before, after;        ///< across these; none at the domain's ends
+  std::vector<int> own_first, own_last;  ///< own leaves at the start and at the end of the bands
+  std::vector<int> before, after;  ///< leaves of the neighbours; empty at the ends of the domain
 };
+/// Returns the leaves at the boundaries of a process that works on `bands`.
 HaloLeaves halo_leaves(const field::Quadtree& tree, base::Range bands);
 
-/// The leaves whose parameters a process needs: those of its bands and across their ends.
+/// Returns the leaves whose parameters a process needs, ascending: its own and those of its
+/// neighbours at the boundaries.
 std::vector<int> needed_leaves(const field::Quadtree& tree, base::Range bands);
 
-/// Keeps what a process needs of its neighbours' leaves as they have it: the parameters that
-/// matter on the boundary and in the row on either side of it, whose rows are `pixel` high.
+/// Copies parameters of the neighbours' leaves at the boundaries (the halo) between processes. It
+/// copies those that densities depend on at the boundary itself and at the centre of the first row
+/// of pixels on either side of it.
 class Halo {
  public:
+  /// Plans the exchange for a process that works on `bands`. Rows are `pixel` high, in pixels at
+  /// full resolution. `processes` must outlive the halo.
   Halo(const field::Field& field, base::Range bands, int pixel,
        const distributed::Communicator& processes);
-  /// After every process has changed the parameters of its leaves.
+  /// Sends the own parameters at the boundaries to the neighbours and receives theirs. Every
+  /// process calls it after it has changed the parameters of its leaves.
   void refresh(field::Field& field);
 
  private:
-  // Runs in all parameters, and room for what they hold.
+  // Holds the places of parameters in the whole array, and a buffer for their values.
   struct Part {
     std::vector<field::ParameterRuns> runs;
     std::vector<float> packed;

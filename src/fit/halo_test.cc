@@ -14,7 +14,7 @@ namespace {
 
 using base::Range;
 
-// Three columns and four rows of cells, some of them split, which makes leaves of three sizes.
+// Makes three columns and four rows of cells. Some are split, so there are leaves of three sizes.
 field::Quadtree uneven_tree() {
   const field::RootGrid roots{.x0 = 5, .y0 = -7, .cell_size = 64, .columns = 3, .rows = 4};
   field::Quadtree tree(roots, std::vector<field::Region>(12, field::Region::kInterest));
@@ -45,7 +45,7 @@ TEST(Share, LeavesOfBandsAreThoseInTheirRows) {
   EXPECT_EQ(next, tree.num_leaves());
 }
 
-// Two leaves belong in the halo if they touch across the boundary: all pairs are tried.
+// Tries all pairs of leaves: those that touch across the boundary belong in the halo.
 TEST(Share, HaloLeavesTouchAcrossTheBoundary) {
   const field::Quadtree tree = uneven_tree();
   for (int boundary = 1; boundary < 4; ++boundary) {
@@ -63,7 +63,7 @@ TEST(Share, HaloLeavesTouchAcrossTheBoundary) {
     EXPECT_EQ(set_of(lower.own_last), below);
     EXPECT_EQ(set_of(lower.after), above);
     EXPECT_TRUE(lower.before.empty() && lower.own_first.empty());
-    // What one sends the other takes, in the same order.
+    // Each receives the leaves that the other sends, in the same order.
     EXPECT_EQ(upper.before, lower.own_last);
     EXPECT_EQ(upper.own_first, lower.after);
     EXPECT_TRUE(upper.after.empty() && upper.own_last.empty());

@@ -4,8 +4,8 @@
 
 namespace tomofield::fit {
 
-/// Yes-or-no decisions: minimise Σ cost_j x_j over x ∈ {0, 1}ⁿ where every row
-/// Σ coefficient · x <= bound holds.
+/// Describes the problem to minimise Σ cost_j x_j over x ∈ {0, 1}ⁿ such that Σ coefficient · x <=
+/// bound holds in every row.
 struct IntegerProgram {
   struct Term {
     int variable;
@@ -23,8 +23,8 @@ struct IntegerProgram {
 /// called.
 bool can_solve_integer_programs();
 
-/// Returns an optimal solution, the same one on every run (COIN-OR CBC; nothing is
-/// printed). The program must have a feasible point, such as x = 0.
+/// Returns an optimal solution, the same one on every run. COIN-OR CBC finds it and prints nothing.
+/// The program must have a feasible point, such as x = 0.
 std::vector<bool> solve(const IntegerProgram& program);
 
 }  // namespace tomofield::fit

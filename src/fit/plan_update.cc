@@ -14,11 +14,11 @@ using field::Quadtree;
 using field::QuadtreeNode;
 using field::Region;
 
-// A change has to gain this part of the mean error, so that ties do not swing
-// to and fro between updates.
+// A change has to gain this part of the mean error. Otherwise ties would swing to and fro between
+// updates.
 constexpr double kMinGain = 1e-6;
 
-// The possible changes of a tree: variables of the program.
+// Lists the possible changes of a tree; each is a variable of the program.
 struct Candidates {
   std::vector<int> splits;                 // leaf numbers
   std::vector<int> merges;                 // node numbers
@@ -32,7 +32,7 @@ struct Candidates {
       ++num_active;
       if (leaf.square.size % (2 * kernels::kLanes) == 0 && leaf.square.size / 2 >= options.min_size)
         splits.push_back(i);
-      // The first of four consecutive leaves with one parent.
+      // Siblings are four consecutive leaves with one parent.
       if (leaf.level <= options.coarsest_level || !starts_siblings(tree, i)) continue;
       merges.push_back(leaf.parent);
       siblings.push_back({i, i + 1, i + 2, i + 3});

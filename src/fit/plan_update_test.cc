@@ -18,7 +18,7 @@ using field::QuadtreeEdit;
 using field::Region;
 using field::RootGrid;
 
-// Interest cells, some of them split at random, with a margin cell at each end.
+// Makes cells of the region of interest, some split at random, with a margin cell at each end.
 Quadtree random_tree(base::Random& random, int columns, int num_splits) {
   std::vector<Region> regions(static_cast<std::size_t>(columns), Region::kInterest);
   regions.front() = regions.back() = Region::kMargin;
@@ -49,7 +49,7 @@ int leaves_after(const Quadtree& tree, const QuadtreeEdit& edit) {
          3 * (static_cast<int>(edit.split.size()) - static_cast<int>(edit.merge.size()));
 }
 
-// Least predicted error and fewest leaves over every possible edit, node by node.
+// Finds the smallest predicted error and number of leaves of all possible edits, node by node.
 class BruteForce {
  public:
   BruteForce(const Quadtree& tree, const std::vector<double>& errors, const PlanOptions& options)
@@ -126,7 +126,7 @@ TEST_F(PlanUpdate, IsOptimalOnRandomTrees) {
       const Plan plan = plan_update(tree, errors, options);
       EXPECT_NEAR(plan.predicted_error, oracle.best(options.budget), 1e-4) << n << ' ' << room;
       EXPECT_LE(leaves_after(tree, plan.edit), std::max(options.budget, oracle.fewest()));
-      // It is an edit of this tree, and says the same again.
+      // The plan is a valid edit of this tree, and a second plan is equal.
       EXPECT_EQ(field::edit_tree(tree, plan.edit).tree.num_leaves(),
                 leaves_after(tree, plan.edit) + tree.num_leaves() - num_active(tree));
       EXPECT_EQ(plan_update(tree, errors, options).edit, plan.edit);

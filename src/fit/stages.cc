@@ -8,19 +8,21 @@
 namespace tomofield::fit {
 namespace {
 
-// A step of plain vertices in steps of the usual factors, about, for the time that is left.
+// The cost of a step of plain vertices, in steps of the usual factors. It serves to estimate the
+// time that is left.
 constexpr double kVertexCost = 0.4;
 
-// Powers of two up to coarse_bin at which no slab straddles two leaves, at most one an epoch. An
-// adaptive tree has one: its structure is open in the first stage, where that should see most.
+// Returns the bins of the coarse stages, ascending: powers of two up to coarse_bin at which no slab
+// straddles two leaves, at most one for each coarse epoch. An adaptive tree has bin 2 alone: its
+// leaves may change in the first stage alone, which should resolve the structure well.
 std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
   std::vector<int> bins;
   if (fit.engine != Engine::kSlab) return bins;
   const bool is_adaptive = field.tree == TreeKind::kAdaptive;
   const bool may_halve = is_adaptive && field.leaf_size % (2 * kernels::kLanes) == 0;
   const int smallest_leaf = may_halve ? field.leaf_size / 2 : field.leaf_size;
-  const int most = is_adaptive ? std::min(fit.coarse_bin, 2) : fit.coarse_bin;
-  for (int bin = 2; bin <= most && smallest_leaf % (bin * kernels::kLanes) == 0; bin *= 2) {
+  const int max_bin = is_adaptive ? std::min(fit.coarse_bin, 2) : fit.coarse_bin;
+  for (int bin = 2; bin <= max_bin && smallest_leaf % (bin * kernels::kLanes) == 0; bin *= 2) {
     if (std::ssize(bins) < fit.coarse_epochs) bins.push_back(bin);
   }
   return bins;
@@ -41,7 +43,7 @@ bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit) {
       fit.engine != Engine::kSlab)
     return false;
   const double side = field.leaf_size / field.vertex_spacing;
-  const double left = side + 1 - field.rank;  // of x and y each, for vectors along z
+  const double left = side + 1 - field.rank;  // vertices along x and along y beyond the rank
   const double margin_side = (field.leaf_size << field.depth) / field.margin_spacing;
   return side <= 2 * field.rank && left > 0 && left * left >= field.rank &&
          (!field.with_margin || margin_side <= 4 * field.margin_rank);

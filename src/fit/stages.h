@@ -8,45 +8,54 @@
 
 namespace tomofield::fit {
 
-/// One resolution of a fit and one kind of field (DESIGN §5): projections of pixels `bin` times as
-/// wide, and as many of the field's vertices as they resolve (Domain::shape_in). The last stage has
-/// bin 1 and the kind of field that was asked for; those before it may have plain vertices for
-/// factors.
+/// Describes a part of a fit that has one resolution and one kind of field. The views have pixels
+/// `bin` times as wide, and the field has as many vertices as these resolve (Domain::shape_in). The
+/// last stage has bin 1 and the kind of field that was asked for. Earlier stages may have plain
+/// vertices in place of factors.
 struct Stage {
   FieldKind field_kind = FieldKind::kVm;
   int bin = 1;
   std::int64_t first_epoch = 0;
   int epochs = 0;
-  double first_rate = 0, last_rate = 0;  ///< learning rates; they fall exponentially
-  double step_cost = 1;                  ///< of a step, in those of the last stage, about
+  double first_rate = 0, last_rate = 0;  ///< learning rates; the rate decays exponentially
+  double step_cost = 1;                  ///< estimated time of a step, in steps of the last stage
 };
 
-/// How long an optimisation takes, by what the field can express.
+/// Says how long a fit takes with the default options.
 struct Schedule {
-  int epochs;            ///< at full resolution
-  double learning_rate;  ///< of the first step, but for FitOptions::vertex_rate
+  int epochs;            ///< of the last stage
+  double learning_rate;  ///< FitOptions::learning_rate
 
-  /// Epochs of plain vertices, and coarse ones, that go with so many fine ones: the same share of
-  /// the usual ones, at most all.
+  /// Returns the epochs of plain vertices that go before `fine` epochs of the last stage.
   int vertex_epochs_of(int fine) const;
+  /// Returns the coarse epochs that go before `fine` epochs at full resolution. A fit that is
+  /// shorter than usual has proportionally fewer of them.
   int coarse_epochs_of(int fine) const;
 };
 
-/// Whether factors usually begin as plain vertices, whose steps are cheaper and of which a third
-/// does (docs/results/ablation.md): where these take no more memory than the factors, that is, a
-/// leaf has at most twice as many along its side as the factors have ranks (of a margin, which is
-/// small, four times), and more than ranks, so that each of these has something to hold.
+/// Says whether a fit of factors begins with plain vertices by default. A step of plain vertices is
+/// cheaper, and a third of the epochs is enough (docs/results/ablation.md). They are used in
+/// uniform trees with the slab engine if they need no more memory than the factors: a leaf has at
+/// most twice as many vertices along its side as the factors have ranks, and a leaf of the margin
+/// at most four times as many. A leaf must also have enough vertices along its side beyond the
+/// rank, so that each vector along z has something to hold.
 bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit);
 
-/// Plain vertices, and factors that begin with them, converge in a third of the epochs that factors
-/// need, and vertices in smaller steps. Where they are as far apart as the pixels of the last
-/// coarse stage, it learns all that the field can express, and full resolution has little left to
-/// do (docs/results/ablation.md). Of `fit` only what says which stages there are counts.
+/// Returns the default schedule of a field. Plain vertices, and factors that begin with them,
+/// converge in a third of the epochs that other factors need. Vertices that are at least as far
+/// apart as the pixels of the last coarse stage need few epochs at full resolution, because the
+/// coarse stages have fitted all that they can express (docs/results/ablation.md). Only the members
+/// of `fit` that decide which stages there are have an effect.
 Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit);
 
-/// Coarse stages, each of half the pixel of the one before, which share the coarse epochs, unless
-/// they are off or leaves do not end with slabs of coarse pixels; the fine one of plain vertices,
-/// if factors begin with them; and that of the field. The ray engine has none but that.
+/// Returns the stages of a fit in order:
+///
+///   1. Coarse stages share the coarse epochs. The pixels of each are half as wide as those of the
+///      one before. There is no stage whose slabs would straddle two leaves.
+///   2. A stage at full resolution has plain vertices, if FitOptions::vertex_epochs is above 0.
+///   3. The last stage has the field that was asked for.
+///
+/// The ray engine has the last stage alone.
 std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit);
 
 }  // namespace tomofield::fit

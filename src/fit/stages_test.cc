@@ -50,7 +50,7 @@ TEST(Stages, FollowOneAnother) {
   EXPECT_EQ(make_stages({}, fit)[0].first_rate, fit.learning_rate);
 }
 
-// Of leaves that three coarse stages suit.
+// Returns the stages of leaves that are large enough for three coarse stages.
 std::vector<Stage> stages_of_large_leaves(int coarse_epochs, int coarse_bin) {
   FieldOptions field;
   field.leaf_size = 128;
@@ -109,7 +109,7 @@ TEST(Stages, FactorsMayBeginAsPlainVertices) {
     EXPECT_LT(stages[s].last_rate, stages[s].first_rate);
     first_epoch += epochs[s];
   }
-  // Vertices take smaller steps than factors, and these go on with small ones.
+  // Vertices have smaller rates than factors, and the factors made of them begin with small rates.
   EXPECT_DOUBLE_EQ(stages[0].first_rate, 0.7 * fit.learning_rate);
   EXPECT_DOUBLE_EQ(stages[2].first_rate, 0.35 * fit.learning_rate);
   EXPECT_DOUBLE_EQ(stages[3].first_rate, 0.3 * fit.learning_rate);
