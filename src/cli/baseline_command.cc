@@ -69,7 +69,7 @@ void run(Arguments<Method>& arguments) {
   const tilt_series::TiltSeries series(input);
   print_plan(baseline::plan_baseline(series, options), method.facts(), shared.axes);
   if (shared.tune) fmt::print("short trials first, that choose settings by held-out views\n");
-  std::fflush(stdout);  // before what comes of the run, in a file too
+  std::fflush(stdout);  // the plan comes before other output, in a file too
   if (arguments.dry_run) return;
   print_summary(baseline::run_baseline(series, options,
                                        {make_progress_bar("tune"), make_progress_bar("baseline")}));

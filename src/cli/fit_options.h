@@ -13,13 +13,13 @@ namespace tomofield::cli {
 /// Registers --view-scale, --margin-spacing and --hold-out, which every method has.
 void add_shared_fit_options(CLI::App& command, option_table::Choices& choices);
 
-/// Registers --non-negative of a baseline: auto (none), on or off.
+/// Registers --non-negative of a baseline: auto (no value), on or off.
 void add_non_negative(CLI::App& command, std::optional<bool>& value);
 
 /// Registers the --seed of a baseline.
 void add_seed(CLI::App& command, std::uint64_t& seed, const char* group);
 
-/// What is reconstructed from what.
+/// Holds the sizes of the views and of the tomogram.
 struct Sizes {
   int num_views;
   std::int64_t view_width, view_height;
@@ -28,8 +28,8 @@ struct Sizes {
   double thickness;
   VolumeAxes axes;
 };
-/// Prints the first line of what a command says before it starts: the tomogram's sizes in the order
-/// of its file. compare::planned_grid() reads it.
+/// Prints the first line of a plan: the number and the sizes of the views, and the sizes of the
+/// tomogram in the order of its file. compare::planned_grid() reads it.
 void print_sizes(const Sizes& sizes);
 
 }  // namespace tomofield::cli

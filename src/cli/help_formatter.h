@@ -5,9 +5,8 @@
 
 namespace tomofield::cli {
 
-/// Formats help texts for a screen of 100 columns. Of the options of the table
-/// (option_table/rows.h)
-/// --help shows those that are common, --help-all shows all.
+/// Formats help texts for a screen of 100 columns. --help shows the common options of the table
+/// (option_table/rows.h), --help-all shows all.
 class HelpFormatter : public CLI::Formatter {
  public:
   std::string make_help(const CLI::App* command, std::string name,

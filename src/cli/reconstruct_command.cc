@@ -6,8 +6,8 @@
 #include "cli/run_reconstruction.h"
 #include "cli/table_options.h"
 #include "io/scratch_memory.h"
+#include "reconstruct/options.h"
 #include "reconstruct/reconstruct.h"
-#include "reconstruct/resolve.h"
 
 namespace tomofield::cli {
 namespace {

@@ -1,5 +1,4 @@
 #include "cli/run_reconstruction.h"
-#include "base/enum_names.h"
 
 #include <fmt/format.h>
 
@@ -11,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
 #include "cli/exit_status.h"
@@ -23,7 +23,8 @@
 namespace tomofield::cli {
 namespace {
 
-// A process that dies cannot say so: mpirun then stops the others, which wait for it.
+// Returns a callback for a process that waits for others. After a signal, it tells the user that
+// they do not answer: one may have died, and then mpirun stops the rest.
 std::function<void()> tell_if_stuck(const std::filesystem::path& model,
                                     const distributed::Communicator& processes) {
   constexpr double kSecondsToAnswer = 0.4;
@@ -72,7 +73,7 @@ void print_plan(const reconstruction::ReconstructOptions& options,
       plan.num_parameters, plan.num_steps, base::thread_count(), processes,
       static_cast<double>(plan.memory_bytes) / (1 << 30), num_processes == 1 ? "" : " each");
   fmt::print("epochs: {}\n", epochs_text(plan.stages));
-  std::fflush(stdout);  // before what comes of the run, in a file too
+  std::fflush(stdout);  // the plan comes before other output, in a file too
 }
 
 void print_files(const reconstruction::OutputPaths& paths) {

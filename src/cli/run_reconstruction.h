@@ -12,10 +12,10 @@ namespace tomofield::cli {
 /// Registers -o, --overwrite, --resume, --checkpoint-minutes and --dry-run.
 void add_run_options(CLI::App& command, option_table::Choices& choices, bool& dry_run);
 
-/// Prints the plan of a fit, runs it, with progress and until it is interrupted, and writes its
-/// pictures. Only the plan if `dry_run`. Call reconstruct::check_options() first. Throws ExitStatus
-/// when it was stopped by a signal, with what there is to go on from. Processes that share it all
-/// call it; the first reports and writes pictures.
+/// Prints the plan of a reconstruction, runs it with a progress bar, and writes its pictures. With
+/// `dry_run` it prints the plan alone. The caller has called reconstruction::check_options()
+/// before. If a signal stops it, it throws an ExitStatus that says how to continue. Every process
+/// that shares the run calls it; the root prints and writes pictures.
 void run_reconstruction(
     const tilt_series::TiltSeries& series, const reconstruction::ReconstructOptions& options,
     bool dry_run, const distributed::Communicator& processes = distributed::Communicator::alone());

@@ -8,12 +8,12 @@
 
 namespace tomofield::cli {
 
-/// Registers one option of the table. It changes `choices`, which must outlive the parsing and hold
-/// the default. A flag that several rows share is registered once, for its first row.
+/// Registers one option of the table. Parsing stores its value in `choices`, which must outlive the
+/// parsing and hold the default. A flag that several rows share is registered for its first row.
 CLI::Option* add_row(CLI::App& command, const option_table::Row& row,
                      option_table::Choices& choices);
 
-/// Registers the option with a key, under its group in the help or under another title.
+/// Registers the option with a key. The help shows it under its group or under the title `group`.
 CLI::Option* add_row(CLI::App& command, std::string_view key, option_table::Choices& choices,
                      std::string_view group = {});
 
@@ -21,13 +21,13 @@ CLI::Option* add_row(CLI::App& command, std::string_view key, option_table::Choi
 void add_groups(CLI::App& command, option_table::Choices& choices,
                 std::initializer_list<option_table::Group> groups);
 
-/// Registers everything that says how a tilt series is read, but not its stack.
+/// Registers the options that say how a tilt series is read, but not its stack.
 void add_series_options(CLI::App& command, option_table::Choices& choices);
 
-/// Registers the same and the stack, a positional argument.
+/// Registers the stack as a positional argument, and the options of add_series_options().
 void add_input_options(CLI::App& command, option_table::Choices& choices);
 
-/// Registers where a volume lies in the views: the specimen's options without its thickness.
+/// Registers the options that say where a volume lies in the views.
 void add_place_options(CLI::App& command, option_table::Choices& choices);
 
 /// Returns the row that an option of a command was registered for, or null.

@@ -10,7 +10,7 @@
 #include "cli/run_reconstruction.h"
 #include "cli/table_options.h"
 #include "io/scratch_memory.h"
-#include "reconstruct/resolve.h"
+#include "reconstruct/options.h"
 
 namespace tomofield::cli {
 namespace {

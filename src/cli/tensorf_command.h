@@ -4,7 +4,7 @@
 
 namespace tomofield::cli {
 
-/// `baseline tensorf`.
+/// Registers `baseline tensorf`.
 void add_tensorf(CLI::App& baseline);
 
 }  // namespace tomofield::cli

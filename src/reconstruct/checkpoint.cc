@@ -17,7 +17,17 @@
 namespace tomofield::reconstruction {
 namespace {
 
-// Six numbers a view, in the order of the members.
+// Writes the x-axis tilt, the 2 × 2 matrix and the shift of each view.
+nlohmann::json alignment_json(const geometry::RayGeometry& g) {
+  nlohmann::json views = nlohmann::json::array();
+  for (std::size_t v = 0; v < g.x_tilt_deg.size(); ++v) {
+    const geometry::RawFromAligned& m = g.raw_from_aligned[v];
+    views.push_back({g.x_tilt_deg[v], m.m11, m.m12, m.m21, m.m22, m.shift_x_px, m.shift_y_px});
+  }
+  return views;
+}
+
+// Writes six numbers for each view, in the order of the members.
 std::vector<double> flatten(const std::vector<measurement::ViewSums>& sums) {
   std::vector<double> flat;
   for (const measurement::ViewSums& s : sums)
@@ -47,7 +57,8 @@ std::vector<measurement::ViewModel> unflatten_views(const std::vector<double>& f
   return views;
 }
 
-// Whether it is frozen; then four numbers an update, the last that of the levels, and its levels.
+// Stores whether the tree is frozen, then the numbers of each update: epoch, splits, merges, the
+// number of levels, and the leaves at each level. The errors of an update are stored as doubles.
 void store(const fit::TreeProgress& tree, output::TrainingState& state) {
   auto& numbers = state.integers["tree_updates"];
   auto& errors = state.doubles["tree_errors"];
@@ -87,16 +98,16 @@ std::string as_text(const std::vector<std::int64_t>& numbers) {
   return text;
 }
 
-// The same bytes whenever a fit is made.
+// Writes the trials without their times, so that a fit gives the same bytes whenever it is made.
 nlohmann::json without_times(const TunedFit& tuned) {
   nlohmann::json json = tuning_json(tuned);
   for (nlohmann::json& trial : json["trials"]) trial.erase("seconds");
   return json;
 }
 
-// Returns what a user calls an entry of a fingerprint: the flag of the option, or where it is from.
+// Returns the name that a user has for an entry of a fingerprint: a flag, or a part of the input.
 std::string name_of(const std::string& key) {
-  // Entries that are not options themselves, and the options that decide them.
+  // These entries are no options themselves; an option decides each.
   static const std::map<std::string, std::string> derived{{"choose_penalty", "fit.penalty"},
                                                           {"field.depth", "field.leaf_size"},
                                                           {"bin_factor", "input.bin"}};
@@ -109,7 +120,8 @@ std::string name_of(const std::string& key) {
   return key;
 }
 
-// What differs between two fingerprints, as "--seed, the tilt series or how it is read".
+// Names the differences between two fingerprints, as in "--seed, the tilt series or how it is
+// read".
 std::string differences(const std::string& found, const std::string& wanted) {
   const auto parse = [](const std::string& text) {
     return nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
@@ -118,7 +130,7 @@ std::string differences(const std::string& found, const std::string& wanted) {
   for (const nlohmann::json& change : nlohmann::json::diff(parse(found), parse(wanted))) {
     std::string name = change["path"].get<std::string>();
     const std::size_t index = name.find_first_of("0123456789");
-    if (index != std::string::npos) name.resize(index);  // of an array: its name will do
+    if (index != std::string::npos) name.resize(index);  // the name of an array is enough
     std::ranges::replace(name, '/', '.');
     const std::size_t first = name.find_first_not_of('.');
     if (first == std::string::npos) return "everything";
@@ -137,13 +149,13 @@ const typename Map::mapped_type& entry(const Map& map, const char* name, const s
   return found->second;
 }
 
-// The parameters of the leaves that a process works on, and what goes with them.
+// Prepares to gather arrays with one number for each parameter from the leaves of all processes.
 distributed::GatheredArrays own_parts(const fit::Fit& fit) {
   const base::Range leaves = fit.own_leaves();
   return {fit.processes(), fit.field().offset(leaves.begin), fit.field().offset(leaves.end)};
 }
 
-// A checkpoint if there are moments, else a model.
+// Writes a checkpoint if there are moments, else a model.
 void save(const std::filesystem::path& path, const fit::Fit& fit, const output::ModelInfo& info,
           const output::TrainingState& state,
           const std::map<std::string, std::span<const float>>& moments) {
@@ -163,6 +175,21 @@ void save(const std::filesystem::path& path, const fit::Fit& fit, const output::
 }
 
 }  // namespace
+
+std::string fingerprint_of(const ReconstructOptions& options,
+                           const measurement::Measurement& series,
+                           const distributed::Communicator& processes) {
+  nlohmann::json json = options_json(options);
+  json.erase("input");
+  json.erase("volume");
+  json["tilt_deg"] = series.geometry.tilt_deg;
+  if (series.ray_geometry) json["alignment"] = alignment_json(*series.ray_geometry);
+  json["bin_factor"] = series.bin_factor;
+  json["unit"] = series.unit;
+  json["noise_sigma"] = series.noise_sigma;
+  json["rays"] = fmt::format("{:016x}", series.rays->checksum(processes));
+  return json.dump();
+}
 
 output::TrainingState progress_state(const fit::Fit& fit, const FitOrigin& origin) {
   output::TrainingState state;

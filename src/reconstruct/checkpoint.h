@@ -4,38 +4,50 @@
 #include <optional>
 #include <string>
 
+#include "distributed/communicator.h"
 #include "fit/fit.h"
+#include "measurement/measurement.h"
 #include "output/model_file.h"
+#include "reconstruct/options.h"
 #include "reconstruct/tuning.h"
 
 namespace tomofield::reconstruction {
 
-/// What a fit was made from.
+/// Returns the fingerprint of a fit (JSON): the options, the geometry and a checksum of the rays.
+/// Two fits with the same fingerprint give the same bits. All processes that share the rays must
+/// call it and get the same text.
+std::string fingerprint_of(const ReconstructOptions& options,
+                           const measurement::Measurement& series,
+                           const distributed::Communicator& processes);
+
+/// Says what a fit was made from.
 struct FitOrigin {
-  std::string fingerprint;        ///< of the series and the options (JSON)
-  std::optional<TunedFit> tuned;  ///< by which some of the options were chosen
+  std::string fingerprint;        ///< fingerprint_of() its series and options
+  std::optional<TunedFit> tuned;  ///< the trials that chose some of its options
 };
 
-/// How far a fit is, as the model file stores it: all that a finished fit leaves.
+/// Returns the progress of a fit in the form of the model file, without the optimiser. A finished
+/// model has this state.
 output::TrainingState progress_state(const fit::Fit& fit, const FitOrigin& origin);
 
-/// Writes the model of a fit with what progress_state() gave: parameters from wherever they are,
-/// by the first of the processes that share it.
+/// Writes the model of a finished fit with the state that progress_state() returned. Every process
+/// that shares the fit calls it; the root writes the file.
 void save_fit(const std::filesystem::path& path, const fit::Fit& fit, const output::ModelInfo& info,
               const output::TrainingState& state);
 
-/// Writes the model of a fit between two steps with its optimiser's state, which
-/// triples the file, so that it can be continued bit for bit, by any number of processes.
+/// Writes the model of a fit between two steps with the state of the optimiser. Any number of
+/// processes can continue it bit for bit. The file is three times as large as a model. Every
+/// process that shares the fit calls it; the root writes the file.
 void save_checkpoint(const std::filesystem::path& path, const fit::Fit& fit,
                      const output::ModelInfo& info, const FitOrigin& origin);
 
-/// What the options of the fit in a checkpoint or model were chosen by. Throws Error if `path` is
-/// none.
+/// Returns the trials that chose options of the fit in a checkpoint or model, if any did. Throws
+/// Error if `path` is neither.
 std::optional<TunedFit> stored_choice(const std::filesystem::path& path);
 
-/// Puts a stored field and state into a fresh fit of the same options, on each process what it
-/// needs. Throws Error naming `path` if they belong to another series or other options, and what
-/// differs.
+/// Continues a stored fit: puts its field and its state into a new fit with the same options. Each
+/// process reads the parameters that it needs. Throws Error if `path` belongs to another series or
+/// to other options, and names what differs.
 void restore_fit(const std::filesystem::path& path, const std::string& fingerprint, fit::Fit& fit);
 
 }  // namespace tomofield::reconstruction

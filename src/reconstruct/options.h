@@ -9,46 +9,59 @@
 #include "measurement/prepare.h"
 #include "output/volume.h"
 #include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
 
 namespace tomofield::reconstruction {
 
-/// Everything that a reconstruction is made from. run_options() in resolve.h makes it.
+/// Fills in the options that follow from other options: leaves, epochs, learning rate, weights,
+/// activation and the scale of views. If neither the penalty nor its weight is given, both stay
+/// empty, because trials choose them. Values out of range stay as they are; check_options() names
+/// them.
+Options resolve(const Options& requested);
+
+/// Holds everything that a reconstruction is made from. run_options() makes it.
 struct ReconstructOptions {
   SeriesFiles files;
-  Options resolved;             ///< every option as it is used
-  bool choose_penalty = false;  ///< by trials; `resolved` has the penalty that they start from
-  // The same options as the rooms below take them, with the constants of the method.
+  Options resolved;  ///< the options that are used
+  /// Trials choose the penalty. `resolved` has the penalty that they start from.
+  bool choose_penalty = false;
+  // The same options in the types of the layers below, with the constants of the method.
   tilt_series::TiltSeriesOptions input;
   measurement::SpecimenOptions specimen;
   fit::FieldOptions field;
   fit::FitOptions fit;
   output::VolumeOptions volume;
-  /// Returns how many trials come before the fit, about; 0: nothing is to be chosen. A fit of few
-  /// views cannot spare any for the penalty alone, and rays of raw views are not predicted.
+
+  /// Returns the expected number of trials before the fit; 0 means that nothing is to be chosen.
+  /// A series of few views cannot spare any of them for a choice of the penalty alone, and trials
+  /// cannot predict the rays of raw views.
   int num_trials(int num_fitted_views) const;
-  /// Returns a sentence for every option that is out of range or does not go with another one.
+  /// Returns a sentence for each option that is out of range or does not go with another one.
   std::vector<std::string> faults() const;
-  /// Returns a sentence for every option that a job of several processes cannot have.
+  /// Returns a sentence for each option that a job of several processes cannot have.
   std::vector<std::string> faults_of_job() const;
 };
 
-/// The files of a reconstruction, named after its volume.
+/// Resolves the options and hands them to the layers below. Where trials choose an option, it gets
+/// the value that the trials start from. A fit keeps that value if no trials are made.
+ReconstructOptions run_options(const SeriesFiles& files, const Options& requested);
+
+/// Names the files of a reconstruction after its volume.
 struct OutputPaths {
   std::filesystem::path volume, model, json;
-  std::filesystem::path tree_picture;  ///< of adaptive trees alone
-  std::filesystem::path picture_prefix;
-  std::filesystem::path held_out_picture;  ///< with views held out
-  std::filesystem::path trials;            ///< of a tuning (JSON)
+  std::filesystem::path tree_picture;      ///< for adaptive trees
+  std::filesystem::path picture_prefix;    ///< of the slices
+  std::filesystem::path held_out_picture;  ///< if views are held out
+  std::filesystem::path trials;            ///< trials of --tune (JSON)
 };
+/// Returns the paths of the files beside `volume`.
 OutputPaths output_paths(const std::filesystem::path& volume);
 
-/// Throws Error for faulty options, and if results would replace an input, would
-/// replace existing files without --overwrite or --resume, or cannot be written
-/// where they shall go. Nothing is read.
+/// Throws Error for faulty options. Throws Error also if a result would replace an input, or an
+/// existing file without --overwrite or --resume, or cannot be written at its path. Reads no file.
 void check_options(const ReconstructOptions& options);
 
-/// Returns every option as it was resolved and the constants of the method, for the JSON and the
-/// model file.
+/// Writes the resolved options and the constants of the method for the metrics and the model file.
 nlohmann::json options_json(const ReconstructOptions& options);
 
 }  // namespace tomofield::reconstruction

@@ -9,7 +9,6 @@
 #include "fit/options.h"
 #include "kernels/lanes.h"
 #include "option_table/values.h"
-#include "reconstruct/resolve.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 

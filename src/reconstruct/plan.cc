@@ -25,13 +25,13 @@
 namespace tomofield::reconstruction {
 namespace {
 
-constexpr std::size_t kProgram = std::size_t{20} << 20;  // with its libraries
-constexpr std::size_t kMpi = std::size_t{40} << 20;      // OpenMPI's own, and what is packed for it
+constexpr std::size_t kProgram = std::size_t{20} << 20;  // the program with its libraries
+constexpr std::size_t kMpi = std::size_t{40} << 20;      // OpenMPI and its message buffers
 
 constexpr int kSlabsOfThread = projection::SlabProjector::kSlabsTogether;
 
-// What each thread works on: a pair of slabs with their gradient and the views of a step, rows for
-// the total variation, a leaf's vertices; and then a part of the volume.
+// Returns the bytes of a thread: a pair of slabs with their gradient and the views of a step, rows
+// for the total variation, the vertices of a leaf, and later a part of the volume.
 std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domain& domain,
                           int views_a_step) {
   constexpr std::size_t kRow = kernels::kLanes * sizeof(float);
@@ -58,7 +58,8 @@ int steps_an_epoch(const measurement::Measurement& plan, const fit::FitOptions& 
   return std::min(options.subsets, num_fitted_views(plan, options));
 }
 
-// Of the first tree, or of an adaptive one whose budget is used up, as a field of this kind.
+// Returns the number of parameters as a field of this kind. An adaptive tree counts with all leaves
+// of its budget.
 std::size_t max_parameters(const fit::Domain& domain, const fit::FieldOptions& options,
                            FieldKind kind) {
   std::vector<field::LeafShape> shapes = domain.shapes, inside;
@@ -72,7 +73,7 @@ std::size_t max_parameters(const fit::Domain& domain, const fit::FieldOptions& o
   return field::count_parameters(kind, shapes);
 }
 
-// What this process has of the parameters with their gradient and moments, and of its neighbours'.
+// Returns the part of all parameters that this process keeps: its own and those of its neighbours.
 double part_of_parameters(const fit::Domain& domain, FieldKind kind,
                           const distributed::Communicator& processes) {
   if (processes.size() == 1) return 1.0;
@@ -85,25 +86,25 @@ double part_of_parameters(const fit::Domain& domain, FieldKind kind,
          static_cast<double>(field::count_parameters(kind, domain.shapes));
 }
 
-// Those of a process as a field of this kind, in bytes.
+// Returns the bytes of the parameters of this process as a field of this kind.
 double parameter_bytes(const fit::Domain& domain, const fit::FieldOptions& options, FieldKind kind,
                        const distributed::Communicator& processes) {
   return static_cast<double>(sizeof(float) * max_parameters(domain, options, kind)) *
          part_of_parameters(domain, kind, processes);
 }
 
-// Parameters, their gradient and two moments, of the stage with the most; a tree that is edited has
-// all but the gradient once more.
+// Returns the bytes of the parameters, their gradient and two moments in the stage with the most.
+// When an adaptive tree changes, all but the gradient are there twice.
 double fitted_bytes(const fit::Domain& domain, const RunPlan& run, const fit::FieldOptions& options,
                     const distributed::Communicator& processes) {
   const double copies = options.tree == TreeKind::kAdaptive ? 7 : 4;
-  double most = 0;
+  double largest = 0;
   for (const fit::Stage& s : run.stages)
-    most = std::max(most, copies * parameter_bytes(domain, options, s.field_kind, processes));
-  return most;
+    largest = std::max(largest, copies * parameter_bytes(domain, options, s.field_kind, processes));
+  return largest;
 }
 
-// While plain vertices become factors.
+// Returns the bytes in use while plain vertices become factors; 0 if they do not.
 double factorising_bytes(const fit::Domain& domain, const RunPlan& run,
                          const fit::FieldOptions& options,
                          const distributed::Communicator& processes) {
@@ -116,7 +117,7 @@ double factorising_bytes(const fit::Domain& domain, const RunPlan& run,
          static_cast<double>(largest) * base::thread_count();
 }
 
-// The rows of a shape that the process with most of them has.
+// Returns the shape of the rays of the process that has the most rows.
 measurement::SlabViews::Shape own_part(measurement::SlabViews::Shape shape,
                                        const fit::Domain& domain,
                                        const distributed::Communicator& processes) {
@@ -139,7 +140,7 @@ std::size_t estimate_memory(const measurement::Measurement& plan, const fit::Dom
   const SlabViews::Shape own_shape = own_part(plan.rays_shape(), domain, processes);
   const int slabs_in_use = kSlabsOfThread * base::thread_count();
   const std::size_t rays = SlabViews::resident_memory(own_shape, slabs_in_use);
-  std::size_t coarse_rays = 0;  // the last coarse stage has the most of them
+  std::size_t coarse_rays = 0;  // of the last coarse stage, which has the most
   for (const fit::Stage& s : run.stages) {
     if (s.bin == 1) continue;
     coarse_rays =
@@ -159,6 +160,22 @@ std::size_t estimate_memory(const measurement::Measurement& plan, const fit::Dom
   return program +
          std::max(stored_views + decoding,
                   rays + coarse_rays + std::max({fitting + tracing, factorising, decoding}));
+}
+
+void require_views_for_trials(const measurement::Measurement& plan,
+                              const fit::FitOptions& options) {
+  const std::vector<double>& tilt_deg = plan.geometry.tilt_deg;
+  selection::trial_views(tilt_deg, measurement::held_out_views(tilt_deg, options.hold_out));
+}
+
+void require_few_vertices(const fit::Domain& domain) {
+  for (const field::LeafShape& shape : domain.shapes) {
+    if (std::max(shape.nx, shape.nz) <= field::LeafShape::kMaxVertices) continue;
+    throw Error(fmt::format(
+        "{} vertices along an axis of a leaf are more than {}: use a larger --vertex-spacing or "
+        "--bin, or a smaller --thickness",
+        std::max(shape.nx, shape.nz), field::LeafShape::kMaxVertices));
+  }
 }
 
 }  // namespace
@@ -182,10 +199,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.stages = fit::make_stages(options.field, options.fit);
   const fit::Stage& last = run.stages.back();
   run.num_trials = options.num_trials(num_fitted_views(plan, options.fit));
-  if (run.num_trials > 0)  // throws if there are too few
-    selection::trial_views(
-        plan.geometry.tilt_deg,
-        measurement::held_out_views(plan.geometry.tilt_deg, options.fit.hold_out));
+  if (run.num_trials > 0) require_views_for_trials(plan, options.fit);
   run.num_steps = (last.first_epoch + last.epochs) * steps_an_epoch(plan, options.fit);
   run.memory_bytes =
       estimate_memory(plan, domain, run, options, series.stored_memory(processes), processes);
@@ -193,13 +207,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
                        "this reconstruction",
                        "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, or "
                        "fewer --threads");
-  for (const field::LeafShape& shape : domain.shapes) {
-    if (std::max(shape.nx, shape.nz) <= field::LeafShape::kMaxVertices) continue;
-    throw Error(fmt::format(
-        "{} vertices along an axis of a leaf are more than {}: use a larger --vertex-spacing or "
-        "--bin, or a smaller --thickness",
-        std::max(shape.nx, shape.nz), field::LeafShape::kMaxVertices));
-  }
+  require_few_vertices(domain);
   return run;
 }
 

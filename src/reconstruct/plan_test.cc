@@ -48,7 +48,7 @@ TEST_F(Plan, HasTheSizesOfTheSeriesAndTheField) {
   EXPECT_EQ(run.thickness, 24);
   EXPECT_EQ(run.roi.width(), kWidth);
   EXPECT_EQ(run.roi.height(), kHeight);
-  // Two levels of 32 px root cells: the height of 48 px takes two of them.
+  // Root cells are 32 px high, so the height of 48 px takes two rows of them.
   constexpr std::size_t kLeaves = 16, kN = 17, kNz = 24;
   EXPECT_EQ(run.num_leaves, static_cast<int>(kLeaves));
   EXPECT_EQ(run.num_parameters, kLeaves * kN * kN * kNz);

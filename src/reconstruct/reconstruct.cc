@@ -13,7 +13,6 @@
 #include "io/scratch_memory.h"
 #include "measurement/held_out.h"
 #include "reconstruct/checkpoint.h"
-#include "reconstruct/fingerprint.h"
 #include "reconstruct/results.h"
 #include "reconstruct/tuning.h"
 #include "tomofield/error.h"
@@ -21,8 +20,31 @@
 namespace tomofield::reconstruction {
 namespace {
 
-// Calls what reads the checkpoint.
-void resuming(const std::function<void()>& read) {
+// Holds what the steps of a run share.
+struct Run {
+  const ReconstructHooks& hooks;
+  const distributed::Communicator& processes;
+  ReconstructOptions options;
+  OutputPaths paths;
+  measurement::Measurement measurement;
+
+  bool writes_files() const { return !options.resolved.output.empty(); }
+};
+
+// Prepares the views and holds some of them out, as the options say.
+measurement::Measurement prepare(const tilt_series::TiltSeries& series,
+                                 const ReconstructOptions& options,
+                                 const distributed::Communicator& processes) {
+  measurement::Measurement measurement = measurement::prepare_measurement(
+      series, options.specimen, io::scratch_directory(options.resolved.output),
+      fit::band_rows(options.field), processes);
+  measurement.held_out =
+      measurement::held_out_views(measurement.geometry.tilt_deg, options.fit.hold_out);
+  return measurement;
+}
+
+// Calls a function that reads the checkpoint. If it throws, adds what the user can do.
+void read_checkpoint(const std::function<void()>& read) {
   try {
     read();
   } catch (const Error& error) {
@@ -31,16 +53,54 @@ void resuming(const std::function<void()>& read) {
   }
 }
 
-// Loads the checkpoint, if there is one yet, into `fit`.
-void resume(const OutputPaths& paths, const std::string& fingerprint, fit::Fit& fit) {
-  if (!std::filesystem::exists(paths.model)) {
-    base::log_info(
-        fmt::format("no checkpoint {} yet: starting from the beginning", paths.model.string()));
+// Makes the trials and chooses settings by them. Returns nothing if a stop was requested.
+std::optional<TunedFit> choose_by_trials(const Run& run) {
+  const ReconstructOptions& options = run.options;
+  const TuneHooks hooks{.progress = run.hooks.tune_progress,
+                        .stop_requested = run.hooks.stop_requested};
+  if (!options.resolved.tune)
+    return tune_penalty(run.measurement, options.field, options.fit, hooks, run.processes);
+  const std::string fingerprint = fingerprint_of(options, run.measurement, run.processes);
+  const std::filesystem::path path = run.writes_files() ? run.paths.trials : "";
+  std::optional<selection::TrialFile> file;
+  run.processes.run_collectively([&] { file.emplace(path, fingerprint, options.resolved.resume); });
+  return tune(run.measurement, options.field, options.fit, options.choose_penalty, *file, hooks,
+              run.processes);
+}
+
+void apply(const TrialSettings& settings, ReconstructOptions& options) {
+  Options& resolved = options.resolved;
+  resolved.penalty = options.fit.penalty = settings.penalty;
+  resolved.density_variation = options.fit.density_variation = settings.variation;
+  resolved.epochs = options.fit.epochs = settings.epochs;
+  resolved.rank = options.field.rank = settings.rank;
+}
+
+// Chooses the options that are left to trials. A resumed run takes those that its checkpoint has.
+// Returns false if a stop was requested.
+bool choose_settings(Run& run, std::optional<TunedFit>& tuned) {
+  if (run.options.num_trials(run.measurement.num_fitted_views()) == 0) return true;
+  if (run.options.resolved.resume && std::filesystem::exists(run.paths.model)) {
+    run.processes.run_collectively(
+        [&] { read_checkpoint([&] { tuned = stored_choice(run.paths.model); }); });
+  } else {
+    tuned = choose_by_trials(run);
+    if (!tuned) return false;
+  }
+  if (tuned) apply(tuned->settings, run.options);
+  return true;
+}
+
+// Continues from the checkpoint, if there is one yet.
+void resume(const Run& run, const FitOrigin& origin, fit::Fit& fit) {
+  const std::filesystem::path& path = run.paths.model;
+  if (!std::filesystem::exists(path)) {
+    base::log_info(fmt::format("no checkpoint {} yet: starting from the beginning", path.string()));
     return;
   }
-  resuming([&] { restore_fit(paths.model, fingerprint, fit); });
-  base::log_info(fmt::format("resuming {} at step {} of {}", paths.model.string(),
-                             fit.progress().step, fit.num_steps()));
+  read_checkpoint([&] { restore_fit(path, origin.fingerprint, fit); });
+  base::log_info(fmt::format("resuming {} at step {} of {}", path.string(), fit.progress().step,
+                             fit.num_steps()));
 }
 
 base::ProgressReport progress_report(const fit::Fit& fit, std::int64_t first_step,
@@ -62,66 +122,24 @@ base::ProgressReport progress_report(const fit::Fit& fit, std::int64_t first_ste
   return report;
 }
 
-// The settings that predict views held out from trials best. None if a stop was requested.
-std::optional<TunedFit> choose_settings(const measurement::Measurement& measurement,
-                                        const OutputPaths& paths, const ReconstructHooks& hooks,
-                                        const ReconstructOptions& options,
-                                        const distributed::Communicator& processes) {
-  const TuneHooks tune_hooks{.progress = hooks.tune_progress,
-                             .stop_requested = hooks.stop_requested};
-  if (!options.resolved.tune)
-    return tune_penalty(measurement, options.field, options.fit, tune_hooks, processes);
-  const std::string fingerprint = fingerprint_of(options, measurement, processes);
-  std::optional<selection::TrialFile> file;
-  const std::filesystem::path trials =
-      options.resolved.output.empty() ? std::filesystem::path() : paths.trials;
-  processes.run_collectively([&] { file.emplace(trials, fingerprint, options.resolved.resume); });
-  return tune(measurement, options.field, options.fit, options.choose_penalty, *file, tune_hooks,
-              processes);
-}
-
-void apply(const TrialSettings& settings, ReconstructOptions& options) {
-  Options& resolved = options.resolved;
-  resolved.penalty = options.fit.penalty = settings.penalty;
-  resolved.density_variation = options.fit.density_variation = settings.variation;
-  resolved.epochs = options.fit.epochs = settings.epochs;
-  resolved.rank = options.field.rank = settings.rank;
-}
-
-// Chooses what `options` leave to trials, or takes what the run that is resumed has chosen; false
-// if a stop was requested.
-bool settle_options(const measurement::Measurement& measurement, const OutputPaths& paths,
-                    const ReconstructHooks& hooks, const distributed::Communicator& processes,
-                    ReconstructOptions& options, std::optional<TunedFit>& tuned) {
-  if (options.num_trials(measurement.num_fitted_views()) == 0) return true;
-  if (options.resolved.resume && std::filesystem::exists(paths.model)) {
-    processes.run_collectively([&] { resuming([&] { tuned = stored_choice(paths.model); }); });
-  } else {
-    tuned = choose_settings(measurement, paths, hooks, options, processes);
-    if (!tuned) return false;
-  }
-  if (tuned) apply(tuned->settings, options);
-  return true;
-}
-
-// Fits, and calls save(), if there is one, when a checkpoint is due; false if it was stopped, after
-// one.
-bool run_with_checkpoints(fit::Fit& fit, double checkpoint_minutes, const ReconstructHooks& hooks,
-                          const std::function<void()>& save) {
+// Runs the fit and saves checkpoints when they are due, if the run writes files. Returns false if
+// it was stopped; there is a checkpoint then.
+bool run_with_checkpoints(const Run& run, const FitOrigin& origin, fit::Fit& fit) {
+  const double seconds_between = 60 * run.options.resolved.checkpoint_minutes;
   const base::Stopwatch running;
   base::Stopwatch since_checkpoint;
   const std::int64_t first_step = fit.progress().step;
   bool stopped = false;
   fit.run([&](const fit::Fit&) {
+    const ReconstructHooks& hooks = run.hooks;
     if (hooks.progress) hooks.progress(progress_report(fit, first_step, running));
     const bool stop = hooks.stop_requested && hooks.stop_requested() && !fit.is_done();
-    const bool is_due =
-        fit.processes().is_root() && since_checkpoint.seconds() > 60 * checkpoint_minutes;
-    // One that must stop stops all; when it is time for a checkpoint is up to the first.
-    const double wanted = fit.processes().allreduce_max(stop ? 2.0 : is_due ? 1.0 : 0.0);
+    const bool is_due = run.processes.is_root() && since_checkpoint.seconds() > seconds_between;
+    // Any process can stop all of them. The root decides when it is time for a checkpoint.
+    const double wanted = run.processes.allreduce_max(stop ? 2.0 : is_due ? 1.0 : 0.0);
     stopped = wanted == 2.0;
-    if (wanted > 0.0 && save) {
-      save();
+    if (wanted > 0.0 && run.writes_files()) {
+      save_checkpoint(run.paths.model, fit, model_info(run.measurement, run.options), origin);
       since_checkpoint.restart();
     }
     return !stopped;
@@ -131,32 +149,23 @@ bool run_with_checkpoints(fit::Fit& fit, double checkpoint_minutes, const Recons
 
 }  // namespace
 
-RunResult reconstruct(const tilt_series::TiltSeries& tilt_series,
-                      const ReconstructOptions& requested, const ReconstructHooks& hooks,
-                      const distributed::Communicator& processes) {
-  ReconstructOptions options = requested;
-  const OutputPaths paths = output_paths(options.resolved.output);
-  measurement::Measurement measurement = measurement::prepare_measurement(
-      tilt_series, options.specimen, io::scratch_directory(options.resolved.output),
-      fit::band_rows(options.field), processes);
-  measurement.held_out =
-      measurement::held_out_views(measurement.geometry.tilt_deg, options.fit.hold_out);
+RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
+                      const ReconstructHooks& hooks, const distributed::Communicator& processes) {
+  Run run{.hooks = hooks,
+          .processes = processes,
+          .options = options,
+          .paths = output_paths(options.resolved.output),
+          .measurement = prepare(series, options, processes)};
   FitOrigin origin;
-  if (!settle_options(measurement, paths, hooks, processes, options, origin.tuned))
+  if (!choose_settings(run, origin.tuned))
     return {.outcome = Outcome::kStoppedTuning, .results = {}};
-  origin.fingerprint = fingerprint_of(options, measurement, processes);
-  fit::Fit fit(measurement, options.field, options.fit, processes);
-  if (options.resolved.resume)
-    processes.run_collectively([&] { resume(paths, origin.fingerprint, fit); });
-
+  origin.fingerprint = fingerprint_of(run.options, run.measurement, processes);
+  fit::Fit fit(run.measurement, run.options.field, run.options.fit, processes);
+  if (options.resolved.resume) processes.run_collectively([&] { resume(run, origin, fit); });
   const base::Stopwatch running;
-  std::function<void()> save;
-  if (!options.resolved.output.empty())
-    save = [&] { save_checkpoint(paths.model, fit, model_info(measurement, options), origin); };
-  if (!run_with_checkpoints(fit, options.resolved.checkpoint_minutes, hooks, save))
-    return {.outcome = Outcome::kStopped, .results = {}};
+  if (!run_with_checkpoints(run, origin, fit)) return {.outcome = Outcome::kStopped, .results = {}};
   return {.outcome = Outcome::kFinished,
-          .results = finish(fit, measurement, options, origin, running.seconds())};
+          .results = finish(fit, run.measurement, run.options, origin, running.seconds())};
 }
 
 }  // namespace tomofield::reconstruction

@@ -16,51 +16,58 @@
 
 namespace tomofield::reconstruction {
 
-/// What the caller sees while it runs.
+/// Holds the callbacks of a run.
 struct ReconstructHooks {
-  base::ProgressSink progress;
-  base::ProgressSink tune_progress;  ///< of the trials before the fit
-  std::function<bool()>
-      stop_requested;  ///< asked after every step; true saves a checkpoint and stops
+  base::ProgressSink progress;       ///< receives the progress of the fit
+  base::ProgressSink tune_progress;  ///< receives the progress of the trials before the fit
+  /// Is asked after every step. If it returns true, the run saves a checkpoint and stops.
+  std::function<bool()> stop_requested;
 };
 
-enum class Outcome { kFinished, kStopped, kStoppedTuning };
+/// Says how a run ended. A run that was stopped can be resumed.
+enum class Outcome {
+  kFinished,
+  kStopped,        ///< during the fit; there is a checkpoint
+  kStoppedTuning,  ///< during the trials before the fit; the finished ones are stored
+};
 
-/// What a run made.
+/// Holds the results of a run.
 struct RunResult {
   Outcome outcome = Outcome::kFinished;
   std::optional<Results> results;  ///< of a finished run
 };
 
-/// Does the main job: fits a field to the series and writes the volume (MRC), the
-/// model (HDF5, also the checkpoint while it runs), and the metrics and resolved
-/// options (JSON). Without ReconstructOptions::output, writes none of them and saves no checkpoint.
-/// Call check_options() and plan_run() first: this starts at once.
+/// Does the main job: prepares the views, chooses settings by trials if the options ask for it,
+/// fits a field and samples it. Writes the volume (MRC), the model (HDF5, which is also the
+/// checkpoint during the run), and the metrics with the resolved options (JSON). If Options::output
+/// is empty, it writes no file. Throws Error for bad input. The caller has called check_options()
+/// and plan_run() before.
 ///
-/// Processes share the work if all of them call it: the results have the same bits as those of
-/// one, which the first puts in place.
+/// If several processes call it, they share the work. The results have the same bits as those of
+/// one process. The root writes the files.
 RunResult reconstruct(
-    const tilt_series::TiltSeries& tilt_series, const ReconstructOptions& options,
+    const tilt_series::TiltSeries& series, const ReconstructOptions& options,
     const ReconstructHooks& hooks,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
-/// What a run will do; nothing is allocated or written for it.
+/// Says what a run will do. Lengths are pixels of the binned views.
 struct RunPlan {
   int num_views = 0;
   std::int64_t view_width = 0, view_height = 0;
-  double pixel_size_A = 0;
+  double pixel_size_A = 0;  ///< of the binned views
   Rectangle roi;
   double thickness = 0;
-  int num_leaves = 0;
-  std::size_t num_parameters = 0;
-  int num_trials = 0;  ///< short fits before it, about, that choose settings
+  int num_leaves = 0;              ///< at the start
+  std::size_t num_parameters = 0;  ///< max. during the last stage
+  int num_trials = 0;              ///< expected number of short fits that choose settings
   std::vector<fit::Stage> stages;
-  std::int64_t num_steps = 0;    ///< of all of them
-  std::size_t memory_bytes = 0;  ///< estimated peak, of each process
+  std::int64_t num_steps = 0;    ///< of all stages
+  std::size_t memory_bytes = 0;  ///< estimated peak of each process
 };
 
-/// Throws Error for options that do not fit the series or the number of processes, and when the
-/// memory needed is beyond what the machine has.
+/// Plans a run. It writes nothing and allocates neither views nor parameters. Throws Error for
+/// options that do not fit the series or the number of processes, and if the machine has less
+/// memory than the run needs.
 RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
                  const distributed::Communicator& processes = distributed::Communicator::alone());
 

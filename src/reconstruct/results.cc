@@ -15,7 +15,7 @@
 namespace tomofield::reconstruction {
 namespace {
 
-// Draws the view nearest to zero tilt of those held out.
+// Draws the held-out view nearest to zero tilt.
 void write_picture(const fit::Fit& fit, const measurement::Measurement& series,
                    const measurement::ViewErrors& error, const std::filesystem::path& picture) {
   const auto nearest = std::ranges::min_element(error.views, {}, [&](int view) {
@@ -28,7 +28,7 @@ void write_picture(const fit::Fit& fit, const measurement::Measurement& series,
   });
 }
 
-// Returns the error of the views held out, and draws one of them if the run writes files.
+// Returns the errors of the held-out views. Draws one of these views if the run writes files.
 nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& series,
                          const ReconstructOptions& options) {
   const measurement::ViewErrors error = fit.held_out_error();
@@ -40,6 +40,7 @@ nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& se
   return json;
 }
 
+// Returns the rows and the parameters that this process contributes to the volume.
 output::VolumeShare volume_share(const fit::Fit& fit, const measurement::Measurement& series) {
   const base::Range slabs = series.rays->held();
   const auto end_row =

@@ -10,19 +10,19 @@
 
 namespace tomofield::reconstruction {
 
-/// What the field of a fit means.
+/// Returns the metadata of a fitted model: geometry, region, units, contrast and options.
 output::ModelInfo model_info(const measurement::Measurement& series,
                              const ReconstructOptions& options);
 
-/// What a finished fit leaves.
+/// Holds the results of a finished fit.
 struct Results {
-  output::Model model;     ///< of several processes, each has the leaves that it worked on
-  nlohmann::json metrics;  ///< what the JSON beside the volume says
+  output::Model model;     ///< each process has the parameters of its own leaves
+  nlohmann::json metrics;  ///< the content of the JSON file beside the volume
 };
 
-/// Takes the results out of a finished fit, whose field is gone then. If options.resolved.output
-/// names the volume, writes the volume, the model, the metrics, and of views that were held out a
-/// picture. Every process calls it.
+/// Takes the results out of a finished fit, which loses its field. If options.resolved.output names
+/// the volume, it writes the volume, the model, the metrics, and a picture of a held-out view if
+/// there is one. `seconds` is the time of the fit. Every process calls it.
 Results finish(fit::Fit& fit, const measurement::Measurement& series,
                const ReconstructOptions& options, const FitOrigin& origin, double seconds);
 

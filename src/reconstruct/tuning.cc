@@ -21,9 +21,10 @@ namespace {
 
 using nlohmann::json;
 
-// Trials that compare penalties need less, since penalties differ by more than weights do.
+// Trials that compare penalties need fewer rows and epochs than others, since penalties differ by
+// more than weights do.
 constexpr std::int64_t kPenaltyRows = 32;
-constexpr double kPenaltyPart = 0.5;  // of the epochs that plain vertices need
+constexpr double kPenaltyPart = 0.5;  // part of the epochs that plain vertices need
 
 TrialSettings settings_from(const json& entry) {
   return {.penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>()).value(),
@@ -38,11 +39,11 @@ FitTrial trial_from(const json& entry) {
           .seconds = entry.value("seconds", 0.0)};
 }
 
-// The part of a measurement that trials are made on.
+// Holds the part of a measurement that trials use.
 struct Strip {
   selection::TrialViews views;
   measurement::Measurement measurement;
-  double part = 1;  // of all rows
+  double part = 1;  // number of its rows over that of all rows
 };
 
 Strip middle_strip(const measurement::Measurement& whole, std::int64_t max_rows,
@@ -75,7 +76,7 @@ class TrialFits {
     return trial;
   }
 
-  // Does as run() does, unless `file` has the trial already.
+  // Returns the trial from `file`, or makes it and adds it to the file.
   FitTrial run(const TrialSettings& settings, selection::TrialFile& file) {
     if (const auto known = file.find(settings_json(settings))) {
       ++num_done_;
@@ -129,7 +130,8 @@ class TrialFits {
   int num_done_ = 0;
 };
 
-// Half the schedule of the field `plain`; as much less as `fit` is less than usual for `field`.
+// Returns the options of a trial with plain vertices: half their usual schedule. If `fit` is
+// shorter than usual for `field`, the trial is shorter in proportion.
 fit::FitOptions penalty_trial_options(const fit::FieldOptions& plain,
                                       const fit::FieldOptions& field, const fit::FitOptions& fit) {
   const fit::Schedule usual = fit::usual_schedule(plain, fit);
@@ -143,9 +145,9 @@ fit::FitOptions penalty_trial_options(const fit::FieldOptions& plain,
   return shorter;
 }
 
-// What the first process finds, on all of them: trials are too small to share. None if a stop was
-// requested.
-std::optional<TunedFit> found_by_first(const distributed::Communicator& processes,
+// Lets the root search, and broadcasts the result: trials are too small for several processes.
+// Returns nothing if a stop was requested.
+std::optional<TunedFit> search_on_root(const distributed::Communicator& processes,
                                        const std::function<TunedFit()>& search) {
   std::optional<TunedFit> tuned;
   json found = nullptr;
@@ -250,7 +252,7 @@ std::optional<TunedFit> tune(const measurement::Measurement& measurement,
         search_settings({fit.penalty, first, field.rank, fit.epochs}, space, trials);
     return TunedFit{found, trials.made(), fits.predicted_views()};
   };
-  const std::optional<TunedFit> tuned = found_by_first(processes, search);
+  const std::optional<TunedFit> tuned = search_on_root(processes, search);
   if (!tuned) return std::nullopt;
   log_trials(tuned->trials);
   base::log_info(fmt::format(
@@ -276,7 +278,7 @@ std::optional<TunedFit> tune_penalty(const measurement::Measurement& measurement
         choose_penalty({fit.penalty, fit.density_variation, field.rank, shorter.epochs}, trials);
     return TunedFit{found, trials.made(), fits.predicted_views()};
   };
-  std::optional<TunedFit> tuned = found_by_first(processes, search);
+  std::optional<TunedFit> tuned = search_on_root(processes, search);
   if (!tuned) return std::nullopt;
   log_trials(tuned->trials);
   tuned->settings.epochs = fit.epochs;

@@ -7,12 +7,11 @@
 
 #include "base/progress.h"
 #include "fit/fit.h"
-#include "reconstruct/tuning.h"
 #include "selection/trial_file.h"
 
 namespace tomofield::reconstruction {
 
-/// Settings that trials choose, in place of the options of the run.
+/// Holds the settings that trials choose. They replace options of the run.
 struct TrialSettings {
   Penalty penalty = Penalty::kConcave;  ///< FitOptions::penalty
   double variation = 0;                 ///< FitOptions::density_variation
@@ -24,57 +23,64 @@ using FitTrial = selection::Trial<TrialSettings>;
 using FitTrials = selection::Trials<TrialSettings>;
 using TunedFit = selection::Tuned<TrialSettings>;
 
-/// What a search may change beside the weight and the epochs.
+/// Says what a search may change in addition to the weight and the epochs.
 struct SearchSpace {
-  bool penalty = true;  ///< concave or smooth, each first with its usual weight
-  bool rank = true;     ///< of fields that have one
+  bool penalty = true;  ///< compare the concave and the smooth penalty
+  bool rank = true;     ///< compare ranks; the field must have one
 };
 
-/// Makes the trials of a search with `run`; settings whose weights differ by rounding are equal.
+/// Prepares the trials of a search; `run` makes one trial. Settings whose weights differ by
+/// rounding count as equal.
 FitTrials make_trials(FitTrials::RunTrial run);
 
-/// Returns the penalty of total variation, with its usual weight, that most held-out views prefer;
-/// the concave one, if as many prefer either. Edges as sharp as a concave penalty makes them are
-/// right for some specimens only.
+/// Chooses the penalty of total variation that most held-out views prefer, each with its usual
+/// weight. If as many prefer either, it chooses the concave one. A concave penalty makes sharp
+/// edges, which are right for some specimens only.
 TrialSettings choose_penalty(const TrialSettings& start, FitTrials& trials);
 
-/// Chooses the settings that predict held-out views best, one at a time: the penalty; the weight
-/// of total variation (selection::search_weight); the rank among a third, two thirds and all of
-/// that of `start`; and the epochs among half, once and twice those of `start`. Settings that are
-/// better by no more than the standard error of the difference over the views count as equal; then
-/// the largest weight (the smoothest tomogram), the smallest rank and the fewest epochs win.
+/// Chooses the settings that predict held-out views best, one after another:
+///
+///   1. the penalty,
+///   2. the weight of total variation (selection::search_weight),
+///   3. the rank: a third, two thirds or all of that of `start`,
+///   4. the epochs: half, once or twice those of `start`.
+///
+/// Settings count as equally good if their errors differ by no more than the standard error of the
+/// difference over the views. Of equally good settings it takes the largest weight (the smoothest
+/// tomogram), the smallest rank and the smallest number of epochs.
 TrialSettings search_settings(const TrialSettings& start, const SearchSpace& space,
                               FitTrials& trials);
 
 /// Returns the number of trials of a search whose best weight is near the first.
 int expected_trials(const SearchSpace& space);
 
-/// What the caller sees of a search while it runs.
+/// Holds the callbacks of a search.
 struct TuneHooks {
   base::ProgressSink progress;
-  std::function<bool()> stop_requested;  ///< asked after every step
+  std::function<bool()> stop_requested;  ///< is asked after every step
 };
 
-/// Writes settings as trial files and results have them.
+/// Writes settings in the form that trial files and metrics have.
 nlohmann::json settings_json(const TrialSettings& settings);
-/// Writes what a search chose and everything that it tried; tuned_from() reads it.
+/// Writes the chosen settings and all trials.
 nlohmann::json tuning_json(const TunedFit& tuned);
+/// Reads what tuning_json() has written. Throws nlohmann::json::exception if it is damaged.
 TunedFit tuned_from(const nlohmann::json& tuning);
 
-/// Chooses settings by search_settings(), the penalty too if `tunes_penalty`. Trials are made on
-/// some rows in the middle, without the views that `measurement` holds out to score the result.
-/// Finished trials go to `file`; those found there are not repeated. Returns nothing if a stop
-/// was requested. Throws Error for too few views.
+/// Chooses settings by search_settings(); the penalty only if `tunes_penalty`. Trials use some rows
+/// in the middle and none of the views that `measurement` holds out to score the result. `file`
+/// stores finished trials, and trials that it has are not repeated. Returns nothing if a stop was
+/// requested. Throws Error for too few views. Every process calls it.
 std::optional<TunedFit> tune(
     const measurement::Measurement& measurement, const fit::FieldOptions& field,
     const fit::FitOptions& fit, bool tunes_penalty, selection::TrialFile& file,
     const TuneHooks& hooks,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
-/// Chooses the penalty alone, by choose_penalty(): two trials on half as many rows with plain
-/// vertices, whatever the field. Which penalty is right depends on the specimen, and plain vertices
-/// converge in a fraction of the time: a few per cent of a fit of 256 rows. Returns nothing if a
-/// stop was requested.
+/// Chooses the penalty alone by choose_penalty(), in two trials on half as many rows. The trials
+/// use plain vertices, whatever the field of the run: the right penalty depends on the specimen,
+/// and plain vertices converge in a fraction of the time. The trials take a few per cent of a fit
+/// of 256 rows. Returns nothing if a stop was requested. Every process calls it.
 std::optional<TunedFit> tune_penalty(
     const measurement::Measurement& measurement, const fit::FieldOptions& field,
     const fit::FitOptions& fit, const TuneHooks& hooks,
