@@ -8,7 +8,7 @@
 
 namespace tomofield {
 
-/// How alike a volume is to the truth, voxel by voxel. "Affine" scores are those of
+/// Says how similar a volume is to the truth, voxel by voxel. "Affine" scores are those of
 /// scale · volume + offset, the least-squares fit to the truth.
 struct VolumeScores {
   double psnr_raw_dB = 0.0;  ///< 10 log10(peak² / mean squared difference); infinite if equal

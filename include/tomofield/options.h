@@ -7,7 +7,7 @@
 
 namespace tomofield {
 
-/// Whether dense matter is dark (transmission images) or bright (phantoms, HAADF) in the views.
+/// Says whether dense matter is dark (transmission images) or bright (phantoms, HAADF) in views.
 enum class Contrast { kDark, kBright };
 /// Vector–matrix factors in every leaf, or plain trilinear vertices.
 enum class FieldKind { kVm, kGrid };

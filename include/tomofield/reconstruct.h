@@ -21,7 +21,7 @@ struct ViewImages {
   double pixel_size_A = 1.0;
 };
 
-/// What a reconstruction is made from: files, or arrays in memory. Cheap to copy.
+/// Holds the input of a reconstruction: files, or arrays in memory. It is cheap to copy.
 class TiltSeries {
  public:
   /// Names the files; reconstruct() opens them.
@@ -36,7 +36,7 @@ class TiltSeries {
   std::shared_ptr<const Impl> impl_;
 };
 
-/// How far a reconstruction is.
+/// Says how far a reconstruction is.
 struct Progress {
   double fraction_done = 0.0;
   double seconds_elapsed = 0.0;
@@ -49,11 +49,11 @@ struct Progress {
 /// stop the reconstruction. May throw: the exception leaves reconstruct(), and nothing is saved.
 using ProgressCallback = std::function<bool(const Progress&)>;
 
-/// What reconstruct() made.
+/// Holds the results of reconstruct().
 struct Reconstruction {
   bool is_finished = false;  ///< false: the callback stopped it, and the rest is empty
-  /// In the units and the contrast of the views, or the other contrast with Options::invert. Only
-  /// if Options::output is empty.
+  /// The density in the units and the contrast of the views, or in the other contrast with
+  /// Options::invert. It is there only if Options::output is empty.
   std::optional<Tomogram> tomogram;
   std::optional<Model> model;
   std::string metrics;  ///< JSON: what `tomofield reconstruct` writes beside the volume
@@ -62,15 +62,15 @@ struct Reconstruction {
 /// Fits a density field to a tilt series and samples it as a tomogram: the whole job of
 /// `tomofield reconstruct`, with the same defaults and the same bits.
 ///
-/// With Options::output, writes the tomogram, the model (.h5) and the metrics (.json) there and
+/// With Options::output, it writes the tomogram, the model (.h5) and the metrics (.json) there and
 /// leaves the tomogram out of the result. Only the command line draws pictures of slices, masks and
 /// trees. A run that the callback stops leaves a checkpoint, from which Options::resume continues.
 ///
-/// Without Options::output, writes nothing but a scratch file in the temporary folder for views
+/// Without Options::output, it writes nothing but a scratch file in the temporary folder for views
 /// that do not fit in memory. Options::voxel_type, axes, overwrite and checkpoint_minutes have no
 /// effect then.
 ///
-/// Works on all threads (set_thread_count()). Calls from several threads run one after another.
+/// It works on all threads (set_thread_count()). Calls from several threads run one after another.
 /// No Model may be opened from a file at the same time, since HDF5 is not thread-safe.
 ///
 /// Throws Error for options or files that cannot be used, and for too little memory.

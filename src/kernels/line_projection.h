@@ -41,9 +41,9 @@ struct CrossingGroup {
   using Numbers = std::array<T, kMax>;
 
   alignas(16) Numbers<float> offset, step, low, high, first_pixel, last_pixel, weight;
-  /// For views: sample j takes from pixel p = floor(inverse · j + bias) + skipped and from p + 1.
-  /// One such pair of pixels reaches a sample if |step| >= 1; otherwise several do, and each is a
-  /// crossing of its own.
+  /// The other numbers are for views. Sample j takes from pixel p = floor(inverse · j + bias) +
+  /// skipped and from p + 1. One such pair of pixels reaches a sample if |step| >= 1; otherwise
+  /// several do, and each is a crossing of its own.
   alignas(16) Numbers<float> inverse, bias, skipped;
   /// The position of sample 0 or pixel 0, in floats from the common source.
   alignas(16) Numbers<int> origin;

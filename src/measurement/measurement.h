@@ -34,7 +34,7 @@ struct Measurement {
   /// Views that carry no loss: they only tell how well the others predict them. Ascending.
   std::vector<int> held_out = {};
 
-  // Where it comes from.
+  // The members below say where the measurement comes from.
   double unit = 1.0;  ///< data units a density unit
   double pixel_size_A = 1.0;
   double bin_factor = 1.0;  ///< of `pixel_size_A` to the stack's

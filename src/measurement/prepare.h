@@ -15,8 +15,8 @@
 
 namespace tomofield::measurement {
 
-/// What the user says about the specimen. Lengths and positions are in unbinned
-/// pixels of the aligned view, whatever --bin makes of them.
+/// Holds what the user says about the specimen. Lengths and positions are pixels of the aligned
+/// view before binning.
 struct SpecimenOptions {
   double thickness = 0;          ///< of the volume along Z
   std::optional<Rectangle> roi;  ///< default: the whole field of view

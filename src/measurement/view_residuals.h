@@ -53,7 +53,7 @@ struct NuisancePrior {
 void fit_nuisances(const NuisancePrior& prior, const std::vector<ViewSums>& sums,
                    std::vector<ViewModel>& views);
 
-/// How well a field predicts views.
+/// Says how well a field predicts views.
 struct ViewErrors {
   std::vector<int> views;
   std::vector<ViewModel> models;   ///< [i]: the model that views[i] was scored with

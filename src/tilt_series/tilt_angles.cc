@@ -9,8 +9,8 @@
 namespace tomofield::tilt_series {
 namespace {
 
-// At a larger tilt a ray crosses several times the specimen's thickness, and the
-// margin that it would need grows without bound.
+// Beyond this tilt a ray crosses several times the specimen's thickness and would need an ever
+// wider margin.
 constexpr double kLargestTilt_deg = 80.0;
 
 TiltAngles angles_of_mdoc(const io::Mdoc& mdoc, const std::filesystem::path& path,

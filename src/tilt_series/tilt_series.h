@@ -15,7 +15,7 @@
 
 namespace tomofield::tilt_series {
 
-/// Where a tilt series is and how its intensities are to be read.
+/// Names the files of a tilt series and says how its intensities are read.
 struct TiltSeriesOptions {
   std::filesystem::path stack;                   ///< MRC stack, raw or aligned
   std::shared_ptr<const io::ImageStack> images;  ///< views in memory, in place of `stack`

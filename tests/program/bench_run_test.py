@@ -244,7 +244,7 @@ def test_methods_go_on_from_settings_that_were_kept_off_the_usual_start():
     table = bench("methods", folder, "--size", 48, "--table", *only)
     assert "| sirt | iterations 80 | 22.00 | " in table.stdout, table
     assert "| – | 1.2e+03 | – |" in table.stdout, table.stdout  # of all three
-    # Where there is a climb from the default start, the table shows it.
+    # The table shows a climb from the default start if there is one.
     write_row(folder, 48, 40, 19.0)
     table = bench("methods", folder, "--size", 48, "--table", *only)
     assert "| sirt | iterations 40 | 19.00 | " in table.stdout, table

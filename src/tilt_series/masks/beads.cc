@@ -23,12 +23,12 @@ constexpr double kWeak = 3.5;    // enough where a track says that a bead is the
 constexpr std::size_t kDiameterViews = 5;  // the lowest tilts, which the diameter is measured in
 constexpr double kDiameterStep = 1.4142135623730951;  // between the diameters that are tried
 
-// It is clear evidence if so many beads have spots in this part of all views each.
+// Beads are taken as found if this many of them have spots in this part of all views each.
 constexpr std::size_t kMinBeads = 3;
 constexpr double kPartOfViews = 0.5;
 
-// So many spots of a view are followed. Nobody adds more beads, and the
-// tracks of a view full of ice crystals are still found in seconds.
+// The maximum number of spots of a view that are followed. Nobody adds more beads, and with this
+// limit the tracks of a view full of ice crystals are found in seconds.
 constexpr std::size_t kMaxSpots = 1000;
 
 // Spots may always be this far from their track, since alignment is no better.

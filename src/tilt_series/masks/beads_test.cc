@@ -54,7 +54,7 @@ TEST(Beads, AreAllFoundAndMeasuredWithoutHelp) {
   EXPECT_EQ(search.num_beads, 18u);
   // A sphere's profile has half its height at sqrt(3)/2 of its diameter.
   EXPECT_NEAR(search.diameter_px, 0.866 * scene.diameter_px, 0.15 * scene.diameter_px);
-  // Of two that overlap in a view only one spot is seen, between them.
+  // Two beads that overlap in a view make one spot between them.
   expect_discs_on_beads(scene, search, 2.0);
 }
 
