@@ -24,11 +24,11 @@ struct ReconstructHooks {
   std::function<bool()> stop_requested;
 };
 
-/// Says how a run ended. A run that was stopped can be resumed.
+/// Says how a run ended. A run that writes files can be resumed after a stop.
 enum class Outcome {
   kFinished,
-  kStopped,        ///< during the fit; there is a checkpoint
-  kStoppedTuning,  ///< during the trials before the fit; the finished ones are stored
+  kStopped,        ///< during the fit; the checkpoint is saved
+  kStoppedTuning,  ///< during the trials; those of --tune that are finished are stored
 };
 
 /// Holds the results of a run.
