@@ -51,23 +51,25 @@ void add_pictures(const CompareOptions& options, const std::vector<Row>& rows,
   const Rectangle detail = busiest_detail(shown.front().planes.front());
   page.add_heading("Central slices");
   page.add_paragraph(
-      "All, and the details below, on one grey scale: 0.5 to 99.5 percentiles of the first "
+      "All slices and details share one grey scale: the 0.5 to 99.5 percentiles of the first "
       "volume.");
   for (std::size_t plane = 0; plane < 3; ++plane) {
     page.add_paragraph(std::array{"XY", "XZ", "YZ"}[plane]);
     page.add_figures(plane_figures(shown, plane, scale, folder));
   }
   page.add_heading("Detail");
-  page.add_paragraph(fmt::format("Where the XY slice varies most: x {} to {}, y {} to {}.",
-                                 detail.x0, detail.x1 - 1, detail.y0, detail.y1 - 1));
+  page.add_paragraph(
+      fmt::format("The detail lies where the XY slice varies most: x {} to {}, y {} to {}.",
+                  detail.x0, detail.x1 - 1, detail.y0, detail.y1 - 1));
   page.add_figures(detail_figures(shown, detail, scale, folder));
   const double voxel_A = io::MrcReader(rows.front().volume).header().voxel_size_A[0];
   page.add_heading("Profile");
   page.add_paragraph("Density along x through the middle of the detail, in the file's units.");
   std::vector<report::Curve> profiles = detail_profiles(shown, detail, voxel_A);
   // The truth goes last, so that methods keep the colours of the plots without a truth.
-  std::ranges::rotate(profiles,
-                      profiles.begin() + static_cast<std::ptrdiff_t>(shown.size() - rows.size()));
+  std::rotate(profiles.begin(),
+              profiles.begin() + static_cast<std::ptrdiff_t>(shown.size() - rows.size()),
+              profiles.end());
   page.add_svg(report::curve_plot_svg(
       {.x_title = voxel_A > 0 ? "distance, Å" : "distance, voxels", .y_title = "density"},
       profiles));

@@ -195,9 +195,9 @@ bool Fit::is_done() const {
   const auto first = static_cast<std::size_t>(stages_.back().first_epoch);
   const std::vector<double>& errors = progress_.held_out_error;
   if (options_.patience == 0 || errors.size() <= first) return false;
-  const auto fine =
-      std::ranges::subrange(errors.begin() + static_cast<std::ptrdiff_t>(first), errors.end());
-  return fine.end() - std::ranges::min_element(fine) > options_.patience;
+  const auto best =
+      std::min_element(errors.begin() + static_cast<std::ptrdiff_t>(first), errors.end());
+  return errors.end() - best > options_.patience;
 }
 
 measurement::ViewErrors Fit::held_out_error() const {

@@ -140,7 +140,7 @@ TEST(RayDataTerm, GradientIsTheDerivativeOfTheLoss) {
   const auto loss = [&] {
     std::vector<float> unused(s.field->num_parameters(), 0.0f);
     std::vector<measurement::ViewSums> sums(models.size());
-    s.term.add_field({.number = kStep, .models = models}, unused.data(), sums);
+    s.term.add_field({.number = kStep, .views = {}, .models = models}, unused.data(), sums);
     double sum = 0;
     for (std::size_t v = 0; v < models.size(); ++v)
       sum += 0.5 * 5 * models[v].weight * sums[v].squared_residual(models[v]);
@@ -149,7 +149,7 @@ TEST(RayDataTerm, GradientIsTheDerivativeOfTheLoss) {
   std::vector<float> gradient(s.field->num_parameters(), 0.0f);
   std::vector<measurement::ViewSums> sums(models.size());
   const objective::TermValue result =
-      s.term.add_field({.number = kStep, .models = models}, gradient.data(), sums);
+      s.term.add_field({.number = kStep, .views = {}, .models = models}, gradient.data(), sums);
   const auto derivative = [&](float& p) { return testing::central_difference(p, 4e-3f, loss); };
   base::set_thread_count(1);  // the work is too small for several
   EXPECT_NEAR(result.grad_bias / derivative(s.field->bias), 1.0, 1e-3);

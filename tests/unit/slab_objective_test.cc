@@ -110,6 +110,7 @@ class Problem {
                                    .measured = measured_,
                                    .full = measured_,
                                    .num_rows = kRows,
+                                   .support = {},
                                    .own_bands = {0, sampler_.num_bands()},
                                    .own_leaves = {0, field_->tree().num_leaves()},
                                    .options = options},
