@@ -96,17 +96,6 @@ output::VoxelSource voxels_of(const VoxelVolume& densities) {
   };
 }
 
-output::ModelInfo volume_info(const measurement::Measurement& series,
-                              const BaselineOptions& options) {
-  output::ModelInfo info;
-  info.geometry = series.geometry;
-  info.roi = series.roi;
-  info.pixel_size_A = series.pixel_size_A;
-  info.density_unit = series.unit;
-  info.is_dark = options.shared.contrast == Contrast::kDark;
-  return info;
-}
-
 nlohmann::json options_json(const BaselineOptions& options) {
   const Options& shared = options.shared;
   const nlohmann::json all = option_table::to_json(options.files, shared);
@@ -168,7 +157,7 @@ AfterIteration report_to(const base::ProgressSink& progress, const MethodFacts& 
 void write_results(const Solution& solution, const measurement::Measurement& series,
                    const BaselineOptions& options, const nlohmann::json& metrics,
                    const BaselinePaths& paths) {
-  const output::ModelInfo info = volume_info(series, options);
+  const output::ModelInfo info = output::model_info(series, options.shared.contrast);
   write_voxels(voxels_of(solution.densities), output::region_box(info, 1.0), info,
                fmt::format("baseline {}", facts_of(options.method).name),
                output::volume_options(options.shared), paths.volume);

@@ -19,7 +19,6 @@
 #include "cli/progress_bar.h"
 #include "cli/table_options.h"
 #include "cli/tensorf_command.h"
-#include "io/scratch_memory.h"
 #include "output/shared_options.h"
 
 namespace tomofield::cli {
@@ -64,7 +63,6 @@ void run(Arguments<Method>& arguments) {
   const baseline::BaselineOptions options{arguments.choices.files, shared, method};
   baseline::check_options(options);
   tilt_series::TiltSeriesOptions input = output::series_options(options.files, shared);
-  input.scratch_dir = io::scratch_directory(shared.output);
   input.keep_views = !arguments.dry_run;
   const tilt_series::TiltSeries series(input);
   print_plan(baseline::plan_baseline(series, options), method.facts(), shared.axes);

@@ -5,7 +5,6 @@
 #include "cli/help_formatter.h"
 #include "cli/run_reconstruction.h"
 #include "cli/table_options.h"
-#include "io/scratch_memory.h"
 #include "reconstruct/options.h"
 #include "reconstruct/reconstruct.h"
 
@@ -23,7 +22,6 @@ void run(const Arguments& arguments, const distributed::Communicator& processes)
   reconstruction::ReconstructOptions options =
       reconstruction::run_options(arguments.choices.files, arguments.choices.options);
   processes.run_collectively([&] { reconstruction::check_options(options); });
-  options.input.scratch_dir = io::scratch_directory(options.resolved.output);
   options.input.keep_views = !arguments.dry_run;
   const tilt_series::TiltSeries series(options.input, processes);
   run_reconstruction(series, options, arguments.dry_run, processes);

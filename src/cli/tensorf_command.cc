@@ -9,7 +9,6 @@
 #include "cli/help_formatter.h"
 #include "cli/run_reconstruction.h"
 #include "cli/table_options.h"
-#include "io/scratch_memory.h"
 #include "reconstruct/options.h"
 
 namespace tomofield::cli {
@@ -37,7 +36,6 @@ void run(Arguments& arguments) {
       reconstruction::run_options(arguments.choices.files, requested);
   options.field.depth = 0;  // the tree is one node
   reconstruction::check_options(options);
-  options.input.scratch_dir = io::scratch_directory(options.resolved.output);
   options.input.keep_views = !arguments.dry_run;
   const tilt_series::TiltSeries series(options.input);
   options.field.leaf_size = baseline::one_node_size(plan_measurement(series, options.specimen).roi,

@@ -1,5 +1,7 @@
 #include "output/shared_options.h"
 
+#include "io/scratch_memory.h"
+
 namespace tomofield::output {
 namespace {
 
@@ -35,6 +37,7 @@ tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Op
   series.take_log = options.take_log;
   series.bead_diameter_nm = options.bead_diameter_nm;
   series.resample = options.engine == Engine::kSlab;
+  series.scratch_dir = io::scratch_directory(options.output);
   return series;
 }
 
@@ -47,6 +50,17 @@ measurement::SpecimenOptions specimen_options(const Options& options) {
                                         .with_margin = options.with_margin};
   if (const auto& roi = options.roi) specimen.roi = {roi->x0, roi->y0, roi->x1, roi->y1};
   return specimen;
+}
+
+ModelInfo model_info(const measurement::Measurement& series, Contrast contrast) {
+  ModelInfo info;
+  info.geometry = series.geometry;
+  info.roi = series.roi;
+  info.x_tilt_deg = series.x_tilt_deg;
+  info.pixel_size_A = series.pixel_size_A;
+  info.density_unit = series.unit;
+  info.is_dark = contrast == Contrast::kDark;
+  return info;
 }
 
 VolumeOptions volume_options(const Options& options) {

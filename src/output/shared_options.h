@@ -7,11 +7,15 @@
 
 namespace tomofield::output {
 
-/// Returns how a tilt series is read. Views stay as they were recorded for the ray engine.
+/// Returns how a tilt series is read. Views stay as they were recorded for the ray engine. Scratch
+/// files go beside the output, if there is one.
 tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Options& options);
 
 /// Returns what the options say of the specimen.
 measurement::SpecimenOptions specimen_options(const Options& options);
+
+/// Returns what densities that were fitted to a measurement mean.
+ModelInfo model_info(const measurement::Measurement& series, Contrast contrast);
 
 /// Returns how a volume is written, for the region of interest.
 VolumeOptions volume_options(const Options& options);

@@ -11,7 +11,6 @@
 #include "field/sampling/sample_box.h"
 #include "io/image_stack.h"
 #include "io/json.h"
-#include "io/scratch_memory.h"
 #include "output/model_file.h"
 #include "output/volume.h"
 #include "reconstruct/options.h"
@@ -59,9 +58,9 @@ void require_usable(const SampleBox& box) {
         box.size[0], box.size[1], box.size[2], box.voxel_px));
 }
 
-// Turns densities into values of the input's kind and contrast.
-void to_output(const output::ModelInfo& model, std::vector<float>& values) {
-  const auto scale = static_cast<float>(model.output_scale());
+// Turns densities into values of the input's kind and contrast, or of the inverted contrast.
+void to_output(const output::ModelInfo& model, std::vector<float>& values, bool invert = false) {
+  const auto scale = static_cast<float>(invert ? -model.output_scale() : model.output_scale());
   for (float& value : values) value = scale * value + 0.0f;  // no −0
 }
 
@@ -70,7 +69,6 @@ reconstruction::ReconstructOptions internal_options(const TiltSeries& series,
   const auto& input = TiltSeriesAccess::impl(series);
   auto internal = reconstruction::run_options(input.files, options);
   internal.input.images = input.images;
-  internal.input.scratch_dir = io::scratch_directory(options.output);
   return internal;
 }
 
@@ -78,11 +76,10 @@ reconstruction::ReconstructOptions internal_options(const TiltSeries& series,
 // z, y, x.
 Tomogram sample_tomogram(const output::Model& model, bool invert) {
   const field::OrientedBox box = output::region_box(model, 1.0);
-  const auto scale = static_cast<float>(invert ? -model.output_scale() : model.output_scale());
   Tomogram tomogram{.size = box.size,
                     .voxel_size_A = model.pixel_size_A,
                     .values = field::sample_box(*model.field, box)};
-  for (float& value : tomogram.values) value = scale * value + 0.0f;  // no −0
+  to_output(model, tomogram.values, invert);
   return tomogram;
 }
 

@@ -9,6 +9,7 @@
 #include "base/range.h"
 #include "io/json.h"
 #include "output/metrics.h"
+#include "output/shared_options.h"
 #include "output/volume.h"
 #include "report/pictures.h"
 
@@ -56,13 +57,7 @@ output::VolumeShare volume_share(const fit::Fit& fit, const measurement::Measure
 
 output::ModelInfo model_info(const measurement::Measurement& series,
                              const ReconstructOptions& options) {
-  output::ModelInfo info;
-  info.geometry = series.geometry;
-  info.roi = series.roi;
-  info.x_tilt_deg = series.x_tilt_deg;
-  info.pixel_size_A = series.pixel_size_A;
-  info.density_unit = series.unit;
-  info.is_dark = options.input.contrast == Contrast::kDark;
+  output::ModelInfo info = output::model_info(series, options.input.contrast);
   info.options_json = options_json(options).dump();
   return info;
 }
