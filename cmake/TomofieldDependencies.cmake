@@ -1,5 +1,5 @@
 # Third-party libraries, all from Debian 12 (packages.txt says why each is there).
-find_package(OpenMP REQUIRED COMPONENTS CXX)
+find_package(TBB REQUIRED)
 find_package(Threads REQUIRED)
 find_package(hwy REQUIRED)
 set(HDF5_PREFER_PARALLEL OFF)
@@ -14,9 +14,10 @@ find_package(Eigen3 3.3 REQUIRED NO_MODULE)
 
 # Every layer may use these; they are also what the common precompiled headers need.
 set(TOMOFIELD_COMMON_LIBRARIES
-  OpenMP::OpenMP_CXX Threads::Threads fmt::fmt nlohmann_json::nlohmann_json)
+  Threads::Threads fmt::fmt nlohmann_json::nlohmann_json)
 
 # The layer of that name alone compiles against these.
+set(TOMOFIELD_base_LIBRARIES TBB::tbb)
 set(TOMOFIELD_io_LIBRARIES HDF5::HDF5 PNG::PNG)
 set(TOMOFIELD_kernels_LIBRARIES hwy::hwy)
 set(TOMOFIELD_field_LIBRARIES $<BUILD_INTERFACE:Eigen3::Eigen>)

@@ -1,34 +1,41 @@
 #pragma once
 
 #include <cstdint>
-#include <exception>
-#include <utility>
+#include <string>
+#include <type_traits>
 
 namespace tomofield::base {
 
-/// Returns the number of threads that parallel_for uses. It is set once, at start-up.
+/// Returns the number of threads that parallel_for uses. By default it is OMP_NUM_THREADS, or else
+/// the processors that this process may use (processors.h).
 int thread_count();
+/// Sets the number of threads; 0 is the default. No loop may run.
 void set_thread_count(int count);
+/// Says that so many processes of one job share this machine, so that the default number of threads
+/// is a share of the processors. Processes that are bound to different processors do not share.
+void share_machine_with(int processes);
+/// Says in a sentence how many threads there are and why, and whether they are bound to processors.
+std::string describe_threads();
 
 /// Returns the index of the calling thread inside a parallel_for, 0 <= index < thread_count().
 int thread_index();
 
-/// Calls body(i) for i in [0, count), in any order, on thread_count() threads. If bodies throw,
-/// rethrows the first exception after all threads have stopped. Results must not depend on which
-/// thread runs an index.
+namespace detail {
+void run_loop(const char* what, std::int64_t count, void (*call)(void*, std::int64_t), void* body);
+}
+
+/// Calls body(i) for i in [0, count), in any order, on thread_count() threads. `what` is a literal
+/// that names the loop in a trace (trace.h). A body may contain loops: threads that have nothing
+/// else to do join in, and a thread that waits for its inner loop works on that loop alone, so that
+/// what it holds is never needed twice. Threads that have nothing to do sleep. If bodies throw,
+/// some others may not be called, and the first exception is thrown again after all threads have
+/// left the loop. Results must not depend on which thread runs an index.
 template <typename Body>
-void parallel_for(std::int64_t count, Body&& body) {
-  std::exception_ptr failure;
-#pragma omp parallel for schedule(dynamic, 1) num_threads(thread_count())
-  for (std::int64_t i = 0; i < count; ++i) {
-    try {
-      body(i);
-    } catch (...) {
-#pragma omp critical(tomofield_parallel_failure)
-      if (!failure) failure = std::current_exception();
-    }
-  }
-  if (failure) std::rethrow_exception(failure);
+void parallel_for(const char* what, std::int64_t count, Body&& body) {
+  using Plain = std::remove_reference_t<Body>;
+  detail::run_loop(
+      what, count, [](void* b, std::int64_t i) { (*static_cast<Plain*>(b))(i); },
+      const_cast<std::remove_const_t<Plain>*>(&body));
 }
 
 }  // namespace tomofield::base

@@ -20,7 +20,7 @@ INSTANTIATE_TEST_SUITE_P(Threads, ParallelFor, ::testing::Values(1, 2, 5));
 TEST_P(ParallelFor, VisitsEachIndexOnce) {
   for (const std::int64_t count : {0, 1, 2, 7, 1000}) {
     std::vector<std::atomic<int>> visits(static_cast<std::size_t>(count));
-    parallel_for(count, [&](std::int64_t i) { ++visits[static_cast<std::size_t>(i)]; });
+    parallel_for("test", count, [&](std::int64_t i) { ++visits[static_cast<std::size_t>(i)]; });
     for (const auto& n : visits) ASSERT_EQ(n.load(), 1) << "of " << count;
   }
 }
@@ -28,7 +28,7 @@ TEST_P(ParallelFor, VisitsEachIndexOnce) {
 TEST_P(ParallelFor, ThreadsAreNumberedBelowTheCount) {
   EXPECT_EQ(thread_count(), GetParam());
   std::atomic<int> wrong{0};
-  parallel_for(500,
+  parallel_for("test", 500,
                [&](std::int64_t) { wrong += thread_index() < 0 || thread_index() >= GetParam(); });
   EXPECT_EQ(wrong.load(), 0);
 }
@@ -36,7 +36,7 @@ TEST_P(ParallelFor, ThreadsAreNumberedBelowTheCount) {
 TEST_P(ParallelFor, RethrowsWhatABodyThrows) {
   std::atomic<int> visits{0};
   const auto run = [&] {
-    parallel_for(100, [&](std::int64_t i) {
+    parallel_for("test", 100, [&](std::int64_t i) {
       ++visits;
       if (i == 37) throw std::runtime_error("thirty-seven");
     });
@@ -49,11 +49,11 @@ TEST_P(ParallelFor, RethrowsWhatABodyThrows) {
   }
   EXPECT_GT(visits.load(), 0);
   // The next loop must not see an exception of the last one.
-  EXPECT_NO_THROW(parallel_for(10, [](std::int64_t) {}));
+  EXPECT_NO_THROW(parallel_for("test", 10, [](std::int64_t) {}));
 }
 
 TEST_P(ParallelFor, OneOfManyExceptionsArrives) {
-  EXPECT_THROW(parallel_for(64, [](std::int64_t i) { throw static_cast<int>(i); }), int);
+  EXPECT_THROW(parallel_for("test", 64, [](std::int64_t i) { throw static_cast<int>(i); }), int);
 }
 
 TEST(ThreadCount, ZeroMeansAllOfTheMachine) {

@@ -78,7 +78,7 @@ base::ProgressReport progress_report(const IterationReport& report, int num_iter
 output::VoxelSource voxels_of(const VoxelVolume& densities) {
   return [&densities](const field::BoxSink& sink) {
     const projection::SampleSegment& segment = densities.grid().segments().front();
-    base::parallel_for(densities.num_slabs(), [&](std::int64_t index) {
+    base::parallel_for("write slabs", densities.num_slabs(), [&](std::int64_t index) {
       const int slab = static_cast<int>(index);
       const int num_rows = densities.rows_in_slab(slab);
       std::vector<float> values;

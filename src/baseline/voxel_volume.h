@@ -48,7 +48,7 @@ class VoxelVolume {
   }
 
   void fill(float density) {
-    base::parallel_for(num_slabs(), [&](std::int64_t index) {
+    base::parallel_for("slabs of volume", num_slabs(), [&](std::int64_t index) {
       const int s = static_cast<int>(index);
       for (const projection::SampleSegment& segment : grid_.segments()) {
         for (int k = 0; k < segment.nz; ++k) {
@@ -93,7 +93,7 @@ inline std::size_t num_voxels(const projection::SampleGrid& grid, std::int64_t n
 /// Calls body(pair) for every SlabPair, in any order and on any thread.
 template <typename Body>
 void for_each_pair(int num_slabs, Body&& body) {
-  base::parallel_for(SlabPair::number(num_slabs), [&](std::int64_t index) {
+  base::parallel_for("pairs of slabs", SlabPair::number(num_slabs), [&](std::int64_t index) {
     const int first = SlabPair::kMaxSlabs * static_cast<int>(index);
     body(SlabPair{first, std::min(SlabPair::kMaxSlabs, num_slabs - first)});
   });
@@ -111,7 +111,7 @@ double sum_over_pairs(int num_slabs, Body&& body) {
 template <typename Body>
 double sum_over_slabs(int num_slabs, Body&& body) {
   std::vector<double> parts(static_cast<std::size_t>(num_slabs));
-  base::parallel_for(num_slabs, [&](std::int64_t slab) {
+  base::parallel_for("sum of slabs", num_slabs, [&](std::int64_t slab) {
     parts[static_cast<std::size_t>(slab)] = body(static_cast<int>(slab));
   });
   return std::accumulate(parts.begin(), parts.end(), 0.0);

@@ -133,7 +133,7 @@ Regions choose_regions(const base::Volume& volume) {
   require_finite(volume);
   const std::vector<base::Box> cubes = lattice_cubes(volume.shape);
   std::vector<Moments> statistics(cubes.size());
-  base::parallel_for(std::ssize(cubes), [&](std::int64_t c) {
+  base::parallel_for("contrast", std::ssize(cubes), [&](std::int64_t c) {
     const auto i = static_cast<std::size_t>(c);
     statistics[i] = moments(volume, {cubes[i]});
   });

@@ -32,7 +32,7 @@ void transform_axis(std::int64_t n, std::int64_t stride, std::vector<std::comple
   TOMOFIELD_CHECK(plan != nullptr, "plan of the transform");
   const std::int64_t tiles = (stride + kTile - 1) / kTile;
   const std::int64_t bundles = std::ssize(values) / (n * stride);
-  base::parallel_for(bundles * tiles, [&](std::int64_t task) {
+  base::parallel_for("transform", bundles * tiles, [&](std::int64_t task) {
     const std::int64_t first_line = task % tiles * kTile;
     const std::int64_t lines = std::min(kTile, stride - first_line);
     std::complex<float>* first = values.data() + task / tiles * n * stride + first_line;
@@ -75,7 +75,7 @@ std::int64_t longest_axis(const base::Shape3& shape) {
 template <typename Body>
 auto sum_sections(std::int64_t nz, const Body& body) {
   std::vector<decltype(body(std::int64_t{}))> parts(static_cast<std::size_t>(nz));
-  base::parallel_for(nz, [&](std::int64_t z) { parts[static_cast<std::size_t>(z)] = body(z); });
+  base::parallel_for("sum sections", nz, [&](std::int64_t z) { parts[static_cast<std::size_t>(z)] = body(z); });
   double sum = 0.0;
   for (const double part : parts) sum += part;
   return sum;
@@ -134,7 +134,7 @@ std::vector<std::complex<float>> joint_transform(const Normalised& first,
                                                  const Normalised& second) {
   const base::Shape3& shape = first.volume.shape;
   std::vector<std::complex<float>> values(shape.voxels());
-  base::parallel_for(shape.nz, [&](std::int64_t z) {
+  base::parallel_for("join volumes", shape.nz, [&](std::int64_t z) {
     const std::size_t section = static_cast<std::size_t>(shape.nx * shape.ny);
     const std::size_t begin = static_cast<std::size_t>(z) * section;
     for (std::size_t i = begin; i < begin + section; ++i) values[i] = {first(i), second(i)};
@@ -180,7 +180,7 @@ WedgeSums section_sums(const base::Shape3& shape, const std::vector<std::complex
 WedgeSums shell_sums(const base::Shape3& shape, const std::vector<std::complex<float>>& joint,
                      const TiltRange& tilts) {
   std::vector<WedgeSums> sections(static_cast<std::size_t>(shape.nz));
-  base::parallel_for(shape.nz, [&](std::int64_t kz) {
+  base::parallel_for("correlate sections", shape.nz, [&](std::int64_t kz) {
     sections[static_cast<std::size_t>(kz)] = section_sums(shape, joint, kz, tilts);
   });
   WedgeSums total = sections.front();

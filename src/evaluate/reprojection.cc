@@ -150,7 +150,7 @@ measurement::ViewErrors reprojection_errors(const base::Volume& volume, const Vo
   std::vector<std::vector<char>> scored;
   for (const int view : views) scored.push_back(scored_pixels(place, view));
   measurement::SlabSums sums(static_cast<std::size_t>(measured.num_slabs()));
-  base::parallel_for(measured.num_slabs(), [&](std::int64_t slab) {
+  base::parallel_for("reproject", measured.num_slabs(), [&](std::int64_t slab) {
     sums[static_cast<std::size_t>(slab)] =
         slab_sums(projector, volume, measured, views, scored, static_cast<int>(slab));
   });

@@ -24,7 +24,7 @@ std::array<double, N> sum_pairs(std::span<const float> xs, std::span<const float
                                 const Terms& terms) {
   const std::size_t num_chunks = (xs.size() + kChunk - 1) / kChunk;
   std::vector<std::array<double, N>> partial(num_chunks);
-  base::parallel_for(static_cast<std::int64_t>(num_chunks), [&](std::int64_t chunk) {
+  base::parallel_for("sum differences", static_cast<std::int64_t>(num_chunks), [&](std::int64_t chunk) {
     const std::size_t first = static_cast<std::size_t>(chunk) * kChunk;
     const std::size_t last = std::min(first + kChunk, xs.size());
     std::array<double, N> sum{};
@@ -219,7 +219,7 @@ SsimScore ssim(const base::Volume& reconstruction, const base::Volume& truth, do
   const std::int64_t rows = shape.ny - kWindow + 1;
   const std::int64_t num_bands = (rows + kBandRows - 1) / kBandRows;
   std::vector<SsimScore> partial(static_cast<std::size_t>(num_bands));
-  base::parallel_for(num_bands, [&](std::int64_t band) {
+  base::parallel_for("similarity", num_bands, [&](std::int64_t band) {
     const std::int64_t first = band * kBandRows;
     Band windows(reconstruction, truth, first, std::min(kBandRows, rows - first));
     partial[static_cast<std::size_t>(band)] = windows.run(peak, scale, offset);

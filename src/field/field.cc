@@ -191,7 +191,7 @@ std::vector<LeafOrigin> Field::edit(const QuadtreeEdit& edit,
   const auto after = make_field(kind(), std::move(edited.tree), thickness_, std::move(shapes));
   std::vector<base::AlignedBuffer<float>> carried;
   for (std::size_t i = 0; i < moments.size(); ++i) carried.emplace_back(after->num_parameters());
-  base::parallel_for(after->tree().num_leaves(), [&](std::int64_t i) {
+  base::parallel_for("edit leaves", after->tree().num_leaves(), [&](std::int64_t i) {
     const LeafOrigin& origin = edited.origins[static_cast<std::size_t>(i)];
     const std::size_t at = after->offset(static_cast<int>(i));
     float* parameters = after->parameters_.data() + at;
@@ -214,7 +214,7 @@ std::unique_ptr<Field> Field::resampled(std::vector<LeafShape> shapes) const {
   after->bias = bias;
   after->activation = activation;
   after->is_kept_ = is_kept_;
-  base::parallel_for(tree_.num_leaves(), [&](std::int64_t i) {
+  base::parallel_for("resample leaves", tree_.num_leaves(), [&](std::int64_t i) {
     const int leaf = static_cast<int>(i);
     if (!keeps(leaf)) return;
     const LeafShape &from = shape(leaf), &to = after->shape(leaf);

@@ -14,7 +14,7 @@ Adam::Adam(const field::Field& field, const AdamOptions& options) : options_(opt
 
 void Adam::step(field::Field& field, const std::vector<int>& leaves,
                 base::AlignedBuffer<float>& gradient, double learning_rate) {
-  base::parallel_for(static_cast<std::int64_t>(leaves.size()), [&](std::int64_t i) {
+  base::parallel_for("adam", static_cast<std::int64_t>(leaves.size()), [&](std::int64_t i) {
     const int leaf = leaves[static_cast<std::size_t>(i)];
     const double t = static_cast<double>(++state_.leaf_steps[static_cast<std::size_t>(leaf)]);
     const std::size_t first = field.offset(leaf);

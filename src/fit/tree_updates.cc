@@ -52,7 +52,7 @@ double deviation(const field::Field& field, const field::Square& square, base::R
 std::vector<double> leaf_errors(const field::Field& field, std::uint64_t seed, std::uint64_t pass) {
   const field::Quadtree& tree = field.tree();
   std::vector<double> errors(static_cast<std::size_t>(tree.num_leaves()));
-  base::parallel_for(tree.num_leaves(), [&](std::int64_t i) {
+  base::parallel_for("rate leaves", tree.num_leaves(), [&](std::int64_t i) {
     const field::QuadtreeNode& leaf = tree.leaf(static_cast<int>(i));
     if (leaf.region != field::Region::kInterest) return;
     errors[static_cast<std::size_t>(i)] =

@@ -188,7 +188,7 @@ TEST(Mrc, StatisticsDoNotDependOnThreads) {
       writer.write_section(z, section);
     };
     if (parallel) {
-      base::parallel_for(40, [&](std::int64_t i) { write_section(39 - i); });
+      base::parallel_for("write sections", 40, [&](std::int64_t i) { write_section(39 - i); });
     } else {
       for (std::int64_t z = 0; z < 40; ++z) write_section(z);
     }

@@ -37,7 +37,7 @@ SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
   const std::int64_t width = projector.geometry().width;
   const auto num_slabs = static_cast<std::size_t>(measured.num_slabs());
   std::vector<ViewSums> all(num_slabs * views.size());
-  base::parallel_for(measured.held().size(), [&](std::int64_t s) {
+  base::parallel_for("predict held-out views", measured.held().size(), [&](std::int64_t s) {
     const int slab = measured.held().begin + static_cast<int>(s);
     auto rays = predict(sampler, projector, views, slab);
     for (std::size_t v = 0; v < views.size(); ++v) {

@@ -103,7 +103,7 @@ TermValue FourierPrior::add_gradient(std::int64_t step, float* gradient) const {
   if (options_.weight <= 0) return {};
   std::vector<LeafSamples> leaves = leaf_samples(step);
   std::vector<float> samples(shape_.size()), grad_samples(shape_.size(), 0.0f);
-  base::parallel_for(std::ssize(leaves), [&](std::int64_t l) {
+  base::parallel_for("fourier samples", std::ssize(leaves), [&](std::int64_t l) {
     LeafSamples& own = leaves[static_cast<std::size_t>(l)];
     const int leaf = leaves_[static_cast<std::size_t>(l)];
     if (!own_.contains(leaf)) return;
@@ -118,7 +118,7 @@ TermValue FourierPrior::add_gradient(std::int64_t step, float* gradient) const {
   result.value =
       axis_penalty(shape_, samples, options_.axes, options_.weight * volume, grad_samples);
   std::vector<double> grad_bias(leaves.size());
-  base::parallel_for(std::ssize(leaves), [&](std::int64_t l) {
+  base::parallel_for("fourier gradient", std::ssize(leaves), [&](std::int64_t l) {
     const LeafSamples& own = leaves[static_cast<std::size_t>(l)];
     const int leaf = leaves_[static_cast<std::size_t>(l)];
     if (!own_.contains(leaf)) return;

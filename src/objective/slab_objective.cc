@@ -58,7 +58,7 @@ double SlabObjective::add_gradient(const Step& step, float* gradient,
     band.views.resize(step.views.size());
     band.terms.resize(terms_.size());
   }
-  base::parallel_for(own_bands_.size(), [&](std::int64_t i) {
+  base::parallel_for("bands", own_bands_.size(), [&](std::int64_t i) {
     const int band = own_bands_.begin + static_cast<int>(i);
     bands[static_cast<std::size_t>(band)] = add_band(step, band, gradient);
   });

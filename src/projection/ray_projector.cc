@@ -177,7 +177,7 @@ void RayProjector::trace_rays(std::span<const Ray> rays, std::uint32_t draw,
   const auto num_rays = static_cast<std::int64_t>(rays.size());
   std::vector<std::vector<Found>> blocks(
       static_cast<std::size_t>((num_rays + kRaysAtOnce - 1) / kRaysAtOnce));
-  base::parallel_for(static_cast<std::int64_t>(blocks.size()), [&](std::int64_t block) {
+  base::parallel_for("trace rays", static_cast<std::int64_t>(blocks.size()), [&](std::int64_t block) {
     std::vector<LeafCrossing> crossings;
     const std::int64_t end = std::min(num_rays, (block + 1) * kRaysAtOnce);
     for (std::int64_t i = block * kRaysAtOnce; i < end; ++i) {
@@ -224,7 +224,7 @@ void RayProjector::trace_rays(std::span<const Ray> rays, std::uint32_t draw,
 std::vector<float> RayProjector::forward(std::span<const Ray> rays, std::uint32_t draw,
                                          RayTrace& trace) const {
   trace_rays(rays, draw, trace);
-  base::parallel_for(field_.tree().num_leaves(), [&](std::int64_t l) {
+  base::parallel_for("sample leaves", field_.tree().num_leaves(), [&](std::int64_t l) {
     const int leaf = static_cast<int>(l);
     const std::size_t first = trace.first_of_leaf_[static_cast<std::size_t>(leaf)];
     const std::size_t end = trace.first_of_leaf_[static_cast<std::size_t>(leaf) + 1];
@@ -247,7 +247,7 @@ double RayProjector::backward(const RayTrace& trace, std::span<const float> grad
                               float* gradient) const {
   const int num_leaves = field_.tree().num_leaves();
   std::vector<double> grad_bias(static_cast<std::size_t>(num_leaves), 0.0);
-  base::parallel_for(num_leaves, [&](std::int64_t l) {
+  base::parallel_for("gradient of leaves", num_leaves, [&](std::int64_t l) {
     const int leaf = static_cast<int>(l);
     const std::size_t first = trace.first_of_leaf_[static_cast<std::size_t>(leaf)];
     const std::size_t end = trace.first_of_leaf_[static_cast<std::size_t>(leaf) + 1];

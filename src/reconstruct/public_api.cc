@@ -171,7 +171,7 @@ std::vector<float> Model::sample_points(std::span<const Point> points) const {
   std::vector<float> values(points.size());
   constexpr std::int64_t kBatch = 1024;
   const auto count = std::ssize(points);
-  base::parallel_for((count + kBatch - 1) / kBatch, [&](std::int64_t batch) {
+  base::parallel_for("sample points", (count + kBatch - 1) / kBatch, [&](std::int64_t batch) {
     const std::int64_t end = std::min(count, (batch + 1) * kBatch);
     for (auto i = static_cast<std::size_t>(batch * kBatch); i < static_cast<std::size_t>(end); ++i)
       values[i] =

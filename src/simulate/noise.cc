@@ -52,7 +52,7 @@ template <typename Pixel>
 void for_each_pixel(std::span<float> image, std::int64_t width, std::uint64_t seed,
                     std::uint64_t first_stream, const Pixel& pixel) {
   const auto num_rows = static_cast<std::int64_t>(image.size()) / width;
-  base::parallel_for(num_rows, [&](std::int64_t row) {
+  base::parallel_for("add noise", num_rows, [&](std::int64_t row) {
     base::Random random(seed, first_stream + static_cast<std::uint64_t>(row));
     for (float& value :
          image.subspan(static_cast<std::size_t>(row * width), static_cast<std::size_t>(width)))

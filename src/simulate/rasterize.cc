@@ -75,7 +75,7 @@ void rasterize_sections(const Phantom& phantom, std::int64_t first_section,
   TOMOFIELD_CHECK(static_cast<std::int64_t>(sections.size()) == num_sections * shape.ny * shape.nx,
                   "the sections' buffer has another size");
   const std::int64_t bands = (shape.ny + kBandRows - 1) / kBandRows;
-  base::parallel_for(num_sections * bands, [&](std::int64_t unit) {
+  base::parallel_for("rasterize", num_sections * bands, [&](std::int64_t unit) {
     const std::int64_t section = unit / bands;
     const std::int64_t first_row = unit % bands * kBandRows;
     const std::int64_t num_rows = std::min(kBandRows, shape.ny - first_row);

@@ -63,7 +63,7 @@ MaskedImage align_image(const MaskedImage& raw, const RawFromAligned& transform,
   const double out_y = 0.5 * static_cast<double>(height - 1);
   const double raw_x = 0.5 * static_cast<double>(raw.width - 1) + transform.shift_x_px;
   const double raw_y = 0.5 * static_cast<double>(raw.height - 1) + transform.shift_y_px;
-  base::parallel_for(height, [&](std::int64_t y) {
+  base::parallel_for("align view", height, [&](std::int64_t y) {
     const double qy = static_cast<double>(y) - out_y;
     for (std::int64_t x = 0; x < width; ++x) {
       const double qx = static_cast<double>(x) - out_x;

@@ -104,7 +104,7 @@ double VariationDescent::step(double length, bool non_negative, VoxelVolume& den
   if (slope == 0.0) return variation;
   const float rate = static_cast<float>(length / slope);
   const float lowest = non_negative ? 0.0f : std::numeric_limits<float>::lowest();
-  base::parallel_for(densities.num_slabs(), [&](std::int64_t index) {
+  base::parallel_for("update slabs", densities.num_slabs(), [&](std::int64_t index) {
     const int slab = static_cast<int>(index);
     float* x = densities.slab(slab);
     const float* gradient = gradient_.slab(slab);

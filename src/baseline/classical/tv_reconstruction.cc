@@ -207,7 +207,7 @@ double ChambollePock::step_gradient_duals(int slab) {
 }
 
 void ChambollePock::take_weights() {
-  base::parallel_for(problem_.num_slabs(), [&](std::int64_t index) {
+  base::parallel_for("step sizes", problem_.num_slabs(), [&](std::int64_t index) {
     const int slab = static_cast<int>(index);
     for_each_gradient_row(x_, slab, factors_of_, [&](const GradientRow& g) {
       const float t = g.factors.y * static_cast<float>(tau_of_penalty_);

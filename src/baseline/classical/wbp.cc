@@ -94,7 +94,7 @@ Solution reconstruct_wbp(const VoxelProblem& problem, const WbpOptions& options,
   const std::vector<double> left_out = constants(problem, densities);
   const std::vector<int>& views = problem.views();
   ThreadScratch scratch(problem);
-  base::parallel_for(problem.num_slabs(), [&](std::int64_t index) {
+  base::parallel_for("backproject", problem.num_slabs(), [&](std::int64_t index) {
     const int slab = static_cast<int>(index);
     float* detector = scratch.detector();
     problem.residuals({slab}, views, densities.slab(slab), detector);

@@ -120,7 +120,7 @@ void HashGrid::encode(std::span<const Point> points, std::span<const float> para
 void HashGrid::accumulate(std::span<const Point> points, const float* grad_features,
                           std::span<float> grad_parameters) const {
   // The entries of a level belong to it alone, so levels may run at once.
-  base::parallel_for(std::ssize(levels_), [&](std::int64_t l) {
+  base::parallel_for("encode", std::ssize(levels_), [&](std::int64_t l) {
     const float* g = grad_features + kFeatures * l;
     for (const Point& point : points) {
       const Corners corners = corners_of(levels_[static_cast<std::size_t>(l)], point);

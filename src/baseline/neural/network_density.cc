@@ -178,7 +178,7 @@ std::span<float> NetworkDensity::evaluate(const Chunk& chunk, const RowSet& rows
 }
 
 void NetworkDensity::decode(const RowSet& rows, float* samples) {
-  base::parallel_for(std::ssize(chunks_), [&](std::int64_t index) {
+  base::parallel_for("network", std::ssize(chunks_), [&](std::int64_t index) {
     thread_local DenseNetwork::Batch batch;
     const Chunk& chunk = chunks_[static_cast<std::size_t>(index)];
     const std::span<const float> values = evaluate(chunk, rows, batch);
@@ -192,7 +192,7 @@ void NetworkDensity::decode(const RowSet& rows, float* samples) {
 void NetworkDensity::accumulate(const RowSet& rows, const float* grad_samples,
                                 std::span<float> gradient) {
   const std::size_t count = network_.num_parameters();
-  base::parallel_for(kParts, [&](std::int64_t part) {
+  base::parallel_for("network gradient", kParts, [&](std::int64_t part) {
     thread_local DenseNetwork::Batch batch;
     const std::size_t p = static_cast<std::size_t>(part);
     const std::span<float> sum = std::span(parts_).subspan(p * count, count);

@@ -165,7 +165,7 @@ LazyAdam::LazyAdam(std::size_t num_parameters)
 
 void LazyAdam::step(double learning_rate, std::span<float> parameters) {
   const std::size_t parts = (steps_.size() + kBlocksOfThread - 1) / kBlocksOfThread;
-  base::parallel_for(static_cast<std::int64_t>(parts), [&](std::int64_t part) {
+  base::parallel_for("sum gradients", static_cast<std::int64_t>(parts), [&](std::int64_t part) {
     const std::size_t first = static_cast<std::size_t>(part) * kBlocksOfThread;
     const std::size_t end = std::min(first + kBlocksOfThread, steps_.size());
     for (std::size_t b = first; b < end; ++b) step_block(b, learning_rate, parameters);

@@ -24,7 +24,7 @@ void sample_aligned(const Field& field, const OrientedBox& box, base::Range some
   const std::int64_t part = std::clamp(kPartValues / (block * nx), std::int64_t{1}, nz);
   TOMOFIELD_CHECK(some.begin % block == 0 && some.end <= ny, "rows in whole blocks");
   const std::int64_t num_blocks = (some.end - some.begin + block - 1) / block;
-  base::parallel_for(num_blocks, [&, nx = nx, nz = nz](std::int64_t index) {
+  base::parallel_for("sample box", num_blocks, [&, nx = nx, nz = nz](std::int64_t index) {
     const std::int64_t first_row = some.begin + index * block;
     const std::int64_t num_rows = std::min(block, some.end - first_row);
     const auto leaves = rows.contract(first_row, num_rows);
@@ -63,7 +63,7 @@ void sample_rotated(const Field& field, const OrientedBox& box, base::Range some
   constexpr std::int64_t kBlock = 16;
   const auto [nx, ny, nz] = box.size;
   const std::int64_t blocks = (some.end - some.begin + kBlock - 1) / kBlock;
-  base::parallel_for(nz * blocks, [&, nx = nx](std::int64_t index) {
+  base::parallel_for("sample rows", nz * blocks, [&, nx = nx](std::int64_t index) {
     const std::int64_t section = index / blocks;
     const std::int64_t first_row = some.begin + index % blocks * kBlock;
     const std::int64_t num_rows = std::min(kBlock, some.end - first_row);

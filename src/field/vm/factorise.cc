@@ -157,7 +157,7 @@ std::unique_ptr<Field> factorised(const Field& vertices, std::vector<LeafShape> 
   for (int leaf = 0; leaf < vertices.tree().num_leaves(); ++leaf)
     if (vertices.keeps(leaf)) kept.push_back(leaf);
   factors->keep_only(kept);
-  base::parallel_for(std::ssize(kept), [&](std::int64_t i) {
+  base::parallel_for("factorise leaves", std::ssize(kept), [&](std::int64_t i) {
     const int leaf = kept[static_cast<std::size_t>(i)];
     const LeafShape &from = vertices.shape(leaf), &to = factors->shape(leaf);
     TOMOFIELD_CHECK(from.nx == to.nx && from.ny == to.ny && from.nz == to.nz,

@@ -67,7 +67,7 @@ SearchedViews search_own_views(const BeadViews& views, double diameter,
   const std::size_t num_views = views.tilt_deg.size();
   searched.spots.resize(num_views);
   searched.is_valid.resize(num_views);
-  base::parallel_for(static_cast<std::int64_t>(num_views), [&](std::int64_t v) {
+  base::parallel_for("find beads", static_cast<std::int64_t>(num_views), [&](std::int64_t v) {
     const auto view = static_cast<std::size_t>(v);
     if (!is_own_view(view, processes)) return;
     const MaskedImage image = views.read(view);
@@ -153,7 +153,7 @@ std::optional<double> estimate_diameter(const BeadViews& views, const BeadSearch
   }
   for (const std::size_t view : lowest_tilts(views)) {
     const MaskedImage image = read_on_all(views, view, processes);
-    base::parallel_for(static_cast<std::int64_t>(trials.size()), [&](std::int64_t i) {
+    base::parallel_for("compare beads", static_cast<std::int64_t>(trials.size()), [&](std::int64_t i) {
       SizeTrial& trial = trials[static_cast<std::size_t>(i)];
       const std::vector<Spot> spots = find_spots(image, trial.about_px, kStrong);
       for (const Spot& spot : spots) trial.strength += spot.strength;

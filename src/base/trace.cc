@@ -1,0 +1,166 @@
+#include "base/trace.h"
+
+#include <chrono>
+#include <fstream>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "tomofield/error.h"
+
+namespace tomofield::base {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::int64_t kNone = -1;
+
+struct Event {
+  enum class Kind { kSpan, kLoop, kTask } kind;
+  const char* name;
+  std::int64_t begin, end;  // nanoseconds
+  int thread = 0;
+  std::int64_t loop = kNone, task = kNone, outer_task = kNone, index = 0, count = 0;
+  std::int64_t busy = 0, longest = 0;
+};
+
+struct Record {
+  std::mutex mutex;
+  std::vector<Event> events;
+  Clock::time_point start = Clock::now();
+  std::atomic<std::int64_t> next_id = 0;
+  std::atomic<bool> has_tasks = false;
+};
+Record& record() {
+  static Record the_record;
+  return the_record;
+}
+
+// The task that this thread runs. A loop in a task lets other threads run parts of that task.
+thread_local std::int64_t t_task = kNone;
+thread_local int t_thread = 0;
+
+std::int64_t now() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - record().start)
+      .count();
+}
+
+void add(const Event& event) {
+  const std::lock_guard lock(record().mutex);
+  record().events.push_back(event);
+}
+
+void raise(std::atomic<std::int64_t>& largest, std::int64_t value) {
+  for (std::int64_t known = largest; known < value && !largest.compare_exchange_weak(known, value);)
+    continue;
+}
+
+nlohmann::json json_of(const Event& e) {
+  constexpr const char* kCategories[] = {"span", "loop", "task"};
+  nlohmann::json args = nlohmann::json::object();
+  if (e.kind != Event::Kind::kSpan) args["loop"] = e.loop;
+  if (e.kind == Event::Kind::kTask) args.update({{"task", e.task}, {"index", e.index}});
+  if (e.kind == Event::Kind::kLoop) {
+    args.update({{"in_task", e.outer_task},
+                 {"tasks", e.count},
+                 {"busy_s", 1e-9 * static_cast<double>(e.busy)},
+                 {"longest_s", 1e-9 * static_cast<double>(e.longest)}});
+  }
+  return {{"name", e.name},
+          {"cat", kCategories[static_cast<int>(e.kind)]},
+          {"ph", "X"},
+          {"pid", 1},
+          {"tid", e.thread},
+          {"ts", 1e-3 * static_cast<double>(e.begin)},
+          {"dur", 1e-3 * static_cast<double>(e.end - e.begin)},
+          {"args", args}};
+}
+
+}  // namespace
+
+void trace::start() {
+  record().start = Clock::now();
+  is_on = true;
+}
+
+void trace::write(const std::filesystem::path& path) {
+  std::ofstream file(path);
+  const std::lock_guard lock(record().mutex);
+  file << "{\"traceEvents\":[\n";
+  const char* separator = "";
+  for (const Event& event : record().events) {
+    file << separator << json_of(event);
+    separator = ",\n";
+  }
+  file << "\n]}\n";
+  if (!file.flush()) throw Error("cannot write the trace " + path.string());
+}
+
+TraceSpan::TraceSpan(const char* name) : name_(name), begin_(trace::is_on ? now() : kNone) {}
+
+TraceSpan::~TraceSpan() {
+  if (begin_ == kNone) return;
+  add({.kind = Event::Kind::kSpan,
+       .name = name_,
+       .begin = begin_,
+       .end = now(),
+       .thread = t_thread});
+}
+
+TraceTasks::TraceTasks(bool is_wanted) : is_wanted_(is_wanted && trace::is_on) {
+  if (is_wanted_) record().has_tasks = true;
+}
+TraceTasks::~TraceTasks() {
+  if (is_wanted_) record().has_tasks = false;
+}
+
+// Without their tasks, loops inside of other loops would fill the record and tell little.
+TraceLoop::TraceLoop(const char* name, std::int64_t count) : name_(name), count_(count) {
+  if (!trace::is_on || (t_task != kNone && !record().has_tasks)) return;
+  id_ = record().next_id++;
+  outer_task_ = t_task;
+  begin_ = now();
+}
+
+TraceLoop::~TraceLoop() {
+  if (id_ < 0) return;
+  add({.kind = Event::Kind::kLoop,
+       .name = name_,
+       .begin = begin_,
+       .end = now(),
+       .thread = t_thread,
+       .loop = id_,
+       .outer_task = outer_task_,
+       .count = count_,
+       .busy = busy_,
+       .longest = longest_});
+}
+
+TraceLoop::Task::Task(TraceLoop& of, std::int64_t i, int on_thread)
+    : loop(of),
+      index(i),
+      id(record().next_id++),
+      outer_task(t_task),
+      begin(now()),
+      thread(on_thread) {
+  t_task = id;
+  t_thread = thread;
+}
+
+TraceLoop::Task::~Task() {
+  const std::int64_t end = now();
+  t_task = outer_task;
+  loop.busy_ += end - begin;
+  raise(loop.longest_, end - begin);
+  if (!record().has_tasks) return;
+  add({.kind = Event::Kind::kTask,
+       .name = loop.name_,
+       .begin = begin,
+       .end = end,
+       .thread = thread,
+       .loop = loop.id_,
+       .task = id,
+       .index = index});
+}
+
+}  // namespace tomofield::base
