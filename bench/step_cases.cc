@@ -145,6 +145,7 @@ Case variation_case(const std::shared_ptr<StepSetup>& s) {
                 v.samples = s->samples.data() + segment.origin;
                 v.gradient = s->grad_samples.data() + segment.origin;
                 v.nx = segment.nx;
+                v.x = {0, segment.nx};
                 v.nz = segment.nz;
                 v.stride_z = segment.stride_z();
                 v.num_rows = kLanes;

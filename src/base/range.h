@@ -1,6 +1,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
+#include <vector>
 
 namespace tomofield::base {
 
@@ -28,5 +30,17 @@ struct Range {
   }
   bool operator==(const Range&) const = default;
 };
+
+/// Returns consecutive ranges of similar sizes near `size` that cover [0, count).
+inline std::vector<Range> parts_of(int count, int size) {
+  const int num_parts = std::max(1, (count + size / 2) / size);
+  const auto begin_of = [&](int part) {
+    return static_cast<int>(static_cast<std::int64_t>(count) * part / num_parts);
+  };
+  std::vector<Range> parts;
+  for (int part = 0; part < num_parts; ++part)
+    parts.push_back({begin_of(part), begin_of(part + 1)});
+  return parts;
+}
 
 }  // namespace tomofield::base

@@ -8,6 +8,7 @@
 
 #include "base/log.h"
 #include "base/random.h"
+#include "base/trace.h"
 #include "field/vm/factorise.h"
 #include "objective/ray_data_term.h"
 #include "objective/slab_objective.h"
@@ -130,6 +131,7 @@ void Fit::resample_field() {
 
 // Goes from the end of a stage to the start of the next one.
 void Fit::refine() {
+  const base::TraceSpan span("enter stage");
   const int last_bin = std::prev(&stage())->bin;
   enter_stage();
   resample_field();
@@ -248,7 +250,15 @@ double Fit::learning_rate(std::int64_t step) const {
   return s.first_rate * std::pow(s.last_rate / s.first_rate, done);
 }
 
+// Says whether the trace has the tasks of the next step: the second one of each stage. The first
+// one also touches new memory.
+bool Fit::is_traced_in_detail() const {
+  return progress_.step == stage().first_epoch * steps_per_epoch() + 1;
+}
+
 void Fit::take_step() {
+  const base::TraceSpan span("step");
+  const base::TraceTasks tasks(is_traced_in_detail());
   const std::vector<int> views = views_of_step(progress_.step);
   const double multiplicity =
       static_cast<double>(fitted_views_.size()) / std::max(static_cast<double>(views.size()), 1.0);
@@ -262,6 +272,7 @@ void Fit::take_step() {
 }
 
 void Fit::score_held_out() {
+  const base::TraceSpan span("score held-out views");
   const measurement::ViewErrors error = held_out_error();
   for (std::size_t i = 0; i < error.views.size(); ++i)
     progress_.views[static_cast<std::size_t>(error.views[i])] = error.models[i];

@@ -103,6 +103,7 @@ class Fit {
 
  private:
   void take_step();
+  bool is_traced_in_detail() const;
   void end_epoch();
   void score_held_out();
   std::vector<int> views_of_step(std::int64_t step) const;

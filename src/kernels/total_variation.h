@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "base/range.h"
 #include "kernels/lanes.h"
 
 namespace tomofield::kernels {
@@ -22,7 +23,7 @@ struct DensityRow {
 
 /// The total variation of a decoded slab: weight · Σ φ over its voxels. The differences
 /// (D_x / h_x, D_y, D_z / h_z) are forward and zero past the last x and z; in x and z they may be
-/// backward instead.
+/// backward instead. A range of x can be computed by itself; it writes nothing outside its range.
 ///
 /// Slabs are coupled through their rows. `above` is the first row of the next slab, and `flux`
 /// carries the y-flux of the last row of the slab before. No slab therefore writes another slab's
@@ -32,6 +33,7 @@ struct SlabVariation {
       nullptr;  ///< [z, x, lane], stride_z floats between z; one float past the end is read
   float* gradient = nullptr;  ///< same layout, accumulated into
   int nx = 0, nz = 0;
+  base::Range x;  ///< samples along x to compute, counted in the direction of the differences
   std::ptrdiff_t stride_z = 0;
   int num_rows =
       0;  ///< lanes that are rows of the volume; below kLanes only at its end, without `above`
@@ -62,12 +64,15 @@ struct SampleOrder {
   std::ptrdiff_t operator()(int x, int z) const { return first + x * step_x + z * step_z; }
 };
 
-/// Adds the gradient and returns the value of the terms that belong to this slab's rows.
+/// Adds the gradient of samples slab.x and returns the value of their terms in this slab's rows.
 double slab_variation(const SlabVariation& slab);
 
-/// Computes the y-flux weight · φ′(m)/m · D_y of a single row, for the start of a band. `row` and
-/// `next` are the densities of this row and of the one after it; flux is [x, z].
+/// Computes the y-flux weight · φ′(m)/m · D_y of a single row at samples slab.x, to start with.
+/// `row` and `next` are the densities of this row and of the one after it; flux is [x, z].
 void row_flux(const SlabVariation& slab, const DensityRow& row, const DensityRow& next,
               float* flux);
+
+/// Clears the flux of samples slab.x, for the start of the volume.
+void clear_flux(const SlabVariation& slab);
 
 }  // namespace tomofield::kernels

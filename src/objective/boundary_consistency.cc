@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
+#include "base/parallel.h"
 #include "base/random.h"
 
 namespace tomofield::objective {
@@ -42,23 +44,19 @@ std::vector<Face> shared_faces(const Quadtree& tree) {
   return faces;
 }
 
-BoundaryConsistency::BoundaryConsistency(const field::Field& field,
-                                         const std::vector<std::vector<int>>& leaves_of_band,
+BoundaryConsistency::BoundaryConsistency(const field::Field& field, std::span<const int> leaves,
                                          const BoundaryOptions& options)
-    : field_(field), options_(options), bands_(leaves_of_band.size()) {
-  std::vector<int> band_of(static_cast<std::size_t>(field.tree().num_leaves()), -1);
-  for (std::size_t b = 0; b < leaves_of_band.size(); ++b) {
-    for (const int leaf : leaves_of_band[b])
-      band_of[static_cast<std::size_t>(leaf)] = static_cast<int>(b);
-  }
+    : field_(field),
+      options_(options),
+      faces_of_leaf_(static_cast<std::size_t>(field.tree().num_leaves())) {
+  std::vector<char> is_listed(faces_of_leaf_.size());
+  for (const int leaf : leaves) is_listed[static_cast<std::size_t>(leaf)] = 1;
   for (const Face& face : shared_faces(field.tree())) {
-    const int low = band_of[static_cast<std::size_t>(face.low)];
-    const int high = band_of[static_cast<std::size_t>(face.high)];
-    if (low < 0 || high < 0) continue;
-    const std::size_t index = faces_.size();
+    const auto low = static_cast<std::size_t>(face.low), high = static_cast<std::size_t>(face.high);
+    if (!is_listed[low] || !is_listed[high]) continue;
+    faces_of_leaf_[low].push_back(faces_.size());
+    faces_of_leaf_[high].push_back(faces_.size());
     faces_.push_back(face);
-    bands_[static_cast<std::size_t>(low)].push_back({index, true, high == low});
-    if (high != low) bands_[static_cast<std::size_t>(high)].push_back({index, false, true});
   }
 }
 
@@ -66,6 +64,7 @@ BoundaryConsistency::BoundaryConsistency(const field::Field& field,
 struct BoundaryConsistency::Samples {
   std::vector<double> x, y, z;
   std::vector<float> low, high, grad_low, grad_high;
+  double value = 0.0;
 
   field::Points points() const { return {x, y, z}; }
   void resize(std::size_t count) {
@@ -124,24 +123,39 @@ double BoundaryConsistency::face_gradient(std::size_t index, std::int64_t step, 
   return options_.weight * area * (root - epsilon);
 }
 
-TermValue BoundaryConsistency::add_gradient(int band, std::int64_t step, float* gradient) const {
-  thread_local Samples s;
-  TermValue result;
-  if (options_.weight <= 0) return result;
-  for (const FaceOfBand& owned : bands_[static_cast<std::size_t>(band)]) {
-    const Face& face = faces_[owned.face];
-    const double value = face_gradient(owned.face, step, s);
-    if (owned.owns_low) {
-      result.value += value;
-      result.grad_bias += field_.point_gradient(face.low, s.points(), s.low, s.grad_low,
-                                                gradient + field_.offset(face.low));
+// Returns the faces of some leaves, ascending.
+std::vector<std::size_t> BoundaryConsistency::faces_of(std::span<const int> leaves) const {
+  std::vector<std::size_t> faces;
+  for (const int leaf : leaves)
+    std::ranges::copy(faces_of_leaf_[static_cast<std::size_t>(leaf)], std::back_inserter(faces));
+  std::ranges::sort(faces);
+  const auto repeated = std::ranges::unique(faces);
+  faces.erase(repeated.begin(), repeated.end());
+  return faces;
+}
+
+void BoundaryConsistency::add_leaves(const Step& step, std::span<const int> leaves, float* gradient,
+                                     std::span<TermValue> of_leaf) const {
+  if (options_.weight <= 0) return;
+  const std::vector<std::size_t> faces = faces_of(leaves);
+  std::vector<Samples> samples(faces.size());
+  base::parallel_for("jumps at faces", std::ssize(faces), [&](std::int64_t i) {
+    Samples& s = samples[static_cast<std::size_t>(i)];
+    s.value = face_gradient(faces[static_cast<std::size_t>(i)], step.number, s);
+  });
+  base::parallel_for("gradient at faces", std::ssize(leaves), [&](std::int64_t i) {
+    const int leaf = leaves[static_cast<std::size_t>(i)];
+    float* const of_parameters = gradient + field_.offset(leaf);
+    TermValue& term = of_leaf[static_cast<std::size_t>(i)];
+    for (const std::size_t face : faces_of_leaf_[static_cast<std::size_t>(leaf)]) {
+      const auto at = std::ranges::lower_bound(faces, face) - faces.begin();
+      const Samples& s = samples[static_cast<std::size_t>(at)];
+      const bool is_low = faces_[face].low == leaf;
+      if (is_low) term.value += s.value;
+      term.grad_bias += field_.point_gradient(leaf, s.points(), is_low ? s.low : s.high,
+                                              is_low ? s.grad_low : s.grad_high, of_parameters);
     }
-    if (owned.owns_high) {
-      result.grad_bias += field_.point_gradient(face.high, s.points(), s.high, s.grad_high,
-                                                gradient + field_.offset(face.high));
-    }
-  }
-  return result;
+  });
 }
 
 }  // namespace tomofield::objective

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "objective/term.h"
@@ -39,33 +40,26 @@ struct BoundaryOptions {
 /// points, which depend on seed, step and face alone.
 class BoundaryConsistency : public Term {
  public:
-  /// Takes the faces between leaves that are listed; leaves_of_band[b] lists the leaves of band b.
-  /// `field` must outlive the term.
-  BoundaryConsistency(const field::Field& field,
-                      const std::vector<std::vector<int>>& leaves_of_band,
+  /// Takes the faces between the leaves that are listed. `field` must outlive the term.
+  BoundaryConsistency(const field::Field& field, std::span<const int> leaves,
                       const BoundaryOptions& options);
 
-  /// Adds the gradient of the band's own leaves to `gradient` (all parameters). The value counts
-  /// the faces whose lower leaf is the band's. A face between two bands is evaluated by both, so
-  /// bands may run on any thread.
-  TermValue add_gradient(int band, std::int64_t step, float* gradient) const;
-  TermValue add_band(const Step& step, int band, float* gradient) const override {
-    return add_gradient(band, step.number, gradient);
-  }
+  /// Adds the gradient of some of those leaves. The value of a face counts for its lower leaf. A
+  /// face between a leaf that is given and another one is evaluated too, so the other leaf may be
+  /// given to another process.
+  void add_leaves(const Step& step, std::span<const int> leaves, float* gradient,
+                  std::span<TermValue> of_leaf) const override;
 
  private:
-  struct FaceOfBand {
-    std::size_t face;
-    bool owns_low, owns_high;
-  };
   struct Samples;
   double face_gradient(std::size_t face, std::int64_t step, Samples& samples) const;
   void draw_points(std::size_t face, std::int64_t step, Samples& samples) const;
+  std::vector<std::size_t> faces_of(std::span<const int> leaves) const;
 
   const field::Field& field_;
   BoundaryOptions options_;
   std::vector<Face> faces_;
-  std::vector<std::vector<FaceOfBand>> bands_;
+  std::vector<std::vector<std::size_t>> faces_of_leaf_;  // ascending
 };
 
 }  // namespace tomofield::objective

@@ -1,36 +1,68 @@
 #include "objective/slab_data_term.h"
 
 #include <algorithm>
+#include <vector>
 
-#include "base/aligned_buffer.h"
+#include "base/parallel.h"
 #include "kernels/lanes.h"
 
 namespace tomofield::objective {
+
+using kernels::kLanes;
 
 // The back-projection replaces the gradient of the batch, which saves a pass that clears it. So
 // this term has to come first (terms.cc).
 double SlabDataTerm::add_slabs(const Step& step, const SlabBatch& batch,
                                std::span<measurement::ViewSums> view_sums) const {
-  thread_local base::AlignedBuffer<float> detector;  // one slab after another
+  const projection::SlabProjector& projector = batch.projector;
+  const std::size_t detector_size = projector.detector_size(step.views.size());
+  const auto detector = detectors_.borrow();
+  detector->reserve(static_cast<std::size_t>(batch.slabs.size()) * detector_size);
+  projector.fill_padding(batch.all_samples, batch.slabs.size());
+
+  const std::vector<base::Range>& ranges = projector.pixel_ranges();
+  const std::int64_t num_parts = batch.num_pairs() * std::ssize(ranges);
+  std::vector<measurement::ViewSums> sums(static_cast<std::size_t>(num_parts) * step.views.size());
+  base::parallel_for("compare with views", num_parts, [&](std::int64_t part) {
+    const base::Range slabs = batch.pair(part / std::ssize(ranges));
+    const auto first_slab = static_cast<std::size_t>(slabs.begin - batch.slabs.begin);
+    add_pixels(step, batch, slabs, ranges[static_cast<std::size_t>(part % std::ssize(ranges))],
+               detector->data() + first_slab * detector_size,
+               std::span(sums).subspan(static_cast<std::size_t>(part) * step.views.size(),
+                                       step.views.size()));
+  });
+  for (std::size_t i = 0; i < sums.size(); ++i) view_sums[i % step.views.size()] += sums[i];
+  for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab) measured_.release(slab);
+  projector.backward(detector->data(), batch.crossings, batch.all_gradients, batch.slabs.size());
+  return 0.0;
+}
+
+// Predicts some pixels of all views of a pair of slabs and replaces them by the derivatives of the
+// loss. `detector` is that of the first slab; there is one element of `sums` for each view.
+void SlabDataTerm::add_pixels(const Step& step, const SlabBatch& batch, base::Range slabs,
+                              base::Range pixels, float* detector,
+                              std::span<measurement::ViewSums> sums) const {
   const std::int64_t width = batch.projector.geometry().width;
   const std::size_t detector_size = batch.projector.detector_size(step.views.size());
-  const std::size_t size = static_cast<std::size_t>(batch.size()) * detector_size;
-  detector.reserve(size);
-  std::fill_n(detector.data(), size, 0.0f);
-  batch.projector.forward(batch.all_samples, step.views, detector.data(), batch.size());
-  float* rays = detector.data();
-  for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab, rays += detector_size) {
+  const auto rays_of = [&](int slab, std::size_t v) {
+    return detector + static_cast<std::size_t>(slab - slabs.begin) * detector_size +
+           (static_cast<std::int64_t>(v) * width + pixels.begin) * kLanes;
+  };
+  for (int slab = slabs.begin; slab < slabs.end; ++slab) {
+    for (std::size_t v = 0; v < step.views.size(); ++v)
+      std::fill_n(rays_of(slab, v), pixels.size() * kLanes, 0.0f);
+  }
+  batch.projector.forward_pixels(batch.samples(slabs.begin), batch.crossings, pixels, detector,
+                                 slabs.size());
+  for (int slab = slabs.begin; slab < slabs.end; ++slab) {
     for (std::size_t v = 0; v < step.views.size(); ++v) {
       const int view = step.views[v];
-      view_sums[v] +=
-          measurement::data_term(step.models[static_cast<std::size_t>(view)], step.multiplicity,
-                                 measured_.rays(slab, view), measured_.mask(slab, view), width,
-                                 rays + static_cast<std::ptrdiff_t>(v) * width * kernels::kLanes);
+      sums[v] += measurement::data_term(
+          step.models[static_cast<std::size_t>(view)], step.multiplicity,
+          measured_.rays(slab, view) + pixels.begin * kLanes,
+          measured_.mask(slab, view) + pixels.begin, pixels.size(), rays_of(slab, v));
     }
-    measured_.release(slab);
   }
-  batch.projector.backward(detector.data(), step.views, batch.all_gradients, batch.size());
-  return 0.0;
 }
 
 }  // namespace tomofield::objective

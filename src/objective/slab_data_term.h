@@ -1,5 +1,7 @@
 #pragma once
 
+#include "base/aligned_buffer.h"
+#include "base/pool.h"
 #include "measurement/slab_views.h"
 #include "objective/term.h"
 
@@ -18,7 +20,11 @@ class SlabDataTerm : public Term {
                    std::span<measurement::ViewSums> view_sums) const override;
 
  private:
+  void add_pixels(const Step& step, const SlabBatch& batch, base::Range slabs, base::Range pixels,
+                  float* detector, std::span<measurement::ViewSums> sums) const;
+
   const measurement::SlabViews& measured_;
+  mutable base::Pool<base::AlignedBuffer<float>> detectors_;
 };
 
 }  // namespace tomofield::objective

@@ -10,7 +10,12 @@
 namespace tomofield::objective {
 namespace {
 
-constexpr int kSlabsTogether = projection::SlabProjector::kSlabsTogether;
+// A batch has a pair of slabs while there are bands for all threads, and two pairs otherwise: they
+// take more memory, but can be worked on at the same time.
+int slabs_at_once(base::Range own_bands) {
+  constexpr int kPair = projection::SlabProjector::kSlabsTogether;
+  return own_bands.size() >= base::thread_count() ? kPair : 2 * kPair;
+}
 
 projection::SlabSampler make_sampler(const SlabObjectiveContext& c) {
   return {c.field, c.projector.grid(), c.first_row, (c.num_rows + c.bin - 1) / c.bin, c.bin};
@@ -23,15 +28,15 @@ TermContext term_context(const SlabObjectiveContext& c, const projection::SlabSa
 
 }  // namespace
 
-// Holds what a thread needs for a batch; kept between calls.
+// Holds what a task needs for a batch.
 struct SlabObjective::Workspace {
   base::AlignedBuffer<float> samples, gradients;
 
-  void fit(std::size_t slab_size) {
+  void fit(std::size_t size) {
     // Padding has to start as zeros and stays so: a new layout needs new buffers.
-    if (samples.size() == kSlabsTogether * slab_size) return;
-    samples.reset(kSlabsTogether * slab_size);
-    gradients.reset(kSlabsTogether * slab_size);
+    if (samples.size() == size) return;
+    samples.reset(size);
+    gradients.reset(size);
   }
 };
 
@@ -41,7 +46,8 @@ SlabObjective::SlabObjective(const SlabObjectiveContext& context) : SlabObjectiv
 
 SlabObjective::SlabObjective(const SlabObjectiveContext& context,
                              std::vector<std::unique_ptr<Term>> terms)
-    : projector_(context.projector),
+    : field_(context.field),
+      projector_(context.projector),
       measured_(context.measured),
       sampler_(make_sampler(context)),
       processes_(context.processes),
@@ -51,22 +57,14 @@ SlabObjective::SlabObjective(const SlabObjectiveContext& context,
     std::ranges::copy(sampler_.leaves_of_band(band), std::back_inserter(own_leaves_));
 }
 
+SlabObjective::~SlabObjective() = default;
+
 double SlabObjective::add_gradient(const Step& step, float* gradient,
                                    std::span<measurement::ViewSums> view_sums) const {
-  std::vector<BandSums> bands(static_cast<std::size_t>(sampler_.num_bands()));
-  for (BandSums& band : bands) {
-    band.views.resize(step.views.size());
-    band.terms.resize(terms_.size());
-  }
-  base::parallel_for("bands", own_bands_.size(), [&](std::int64_t i) {
-    const int band = own_bands_.begin + static_cast<int>(i);
-    bands[static_cast<std::size_t>(band)] = add_band(step, band, gradient);
-  });
-  allreduce(bands);
   // Adds in the order of the bands, so that threads and processes do not change the bits.
   double slab_grad_bias = 0.0;
   std::vector<double> term_grad_bias(terms_.size());
-  for (const BandSums& band : bands) {
+  for (const BandSums& band : add_bands(step, gradient)) {
     for (std::size_t v = 0; v < step.views.size(); ++v)
       view_sums[static_cast<std::size_t>(step.views[v])] += band.views[v];
     slab_grad_bias += band.slab_grad_bias;
@@ -78,43 +76,81 @@ double SlabObjective::add_gradient(const Step& step, float* gradient,
   return grad_bias;
 }
 
-SlabObjective::BandSums SlabObjective::add_band(const Step& step, int band, float* gradient) const {
-  thread_local Workspace w;
-  w.fit(projector_.grid().size());
-  BandSums sums;
-  sums.views.resize(step.views.size());
-  sums.terms.resize(terms_.size());
-  const auto slabs = sampler_.band(band);
-  for (int slab = slabs.begin; slab < slabs.end; slab += kSlabsTogether) {
+std::vector<SlabObjective::BandSums> SlabObjective::add_bands(const Step& step,
+                                                              float* gradient) const {
+  std::vector<BandSums> bands(static_cast<std::size_t>(sampler_.num_bands()));
+  for (BandSums& band : bands) {
+    band.views.resize(step.views.size());
+    band.terms.resize(terms_.size());
+  }
+  const projection::ViewCrossings crossings = projector_.crossings(step.views);
+  base::parallel_for("bands", own_bands_.size(), [&](std::int64_t i) {
+    const int band = own_bands_.begin + static_cast<int>(i);
+    add_slabs(step, band, crossings, gradient, bands[static_cast<std::size_t>(band)]);
+  });
+  add_leaves(step, gradient, bands);
+  allreduce(bands);
+  return bands;
+}
+
+void SlabObjective::add_slabs(const Step& step, int band,
+                              const projection::ViewCrossings& crossings, float* gradient,
+                              BandSums& sums) const {
+  const int at_once = slabs_at_once(own_bands_);
+  const auto workspace = workspaces_.borrow();
+  workspace->fit(static_cast<std::size_t>(at_once) * projector_.grid().size());
+  const base::Range slabs = sampler_.band(band);
+  for (int slab = slabs.begin; slab < slabs.end; slab += at_once) {
     add_batch(step,
               {.sampler = sampler_,
                .projector = projector_,
-               .slabs = {slab, std::min(slab + kSlabsTogether, slabs.end)},
-               .begins_band = slab == slabs.begin,
-               .all_samples = w.samples.data(),
-               .all_gradients = w.gradients.data()},
+               .crossings = crossings,
+               .slabs = {slab, std::min(slab + at_once, slabs.end)},
+               .all_samples = workspace->samples.data(),
+               .all_gradients = workspace->gradients.data()},
               gradient, sums);
   }
-  for (std::size_t t = 0; t < terms_.size(); ++t) {
-    const TermValue of_band = terms_[t]->add_band(step, band, gradient);
-    sums.terms[t].value += of_band.value;
-    sums.terms[t].grad_bias += of_band.grad_bias;
-  }
-  return sums;
 }
 
 void SlabObjective::add_batch(const Step& step, const SlabBatch& batch, float* gradient,
                               BandSums& sums) const {
+  std::vector<std::pair<int, int>> pieces;  // slab, piece
   for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab)
-    sampler_.decode(slab, batch.samples(slab));
+    for (int piece = 0; piece < sampler_.num_pieces(slab); ++piece)
+      pieces.emplace_back(slab, piece);
+  base::parallel_for("decode", std::ssize(pieces), [&](std::int64_t i) {
+    const auto [slab, piece] = pieces[static_cast<std::size_t>(i)];
+    sampler_.decode_piece(slab, piece, batch.samples(slab));
+  });
   if (terms_.empty() || !terms_.front()->replaces_gradient())
     std::fill_n(batch.all_gradients,
-                static_cast<std::size_t>(batch.size()) * projector_.grid().size(), 0.0f);
+                static_cast<std::size_t>(batch.slabs.size()) * projector_.grid().size(), 0.0f);
   for (std::size_t t = 0; t < terms_.size(); ++t)
     sums.terms[t].value += terms_[t]->add_slabs(step, batch, sums.views);
-  for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab) {
-    sums.slab_grad_bias +=
-        sampler_.decode_adjoint(slab, batch.samples(slab), batch.gradient(slab), gradient);
+
+  const std::vector<int> leaves = sampler_.leaves_of_slabs(batch.slabs);
+  std::vector<double> grad_bias(leaves.size() * static_cast<std::size_t>(batch.slabs.size()));
+  base::parallel_for("decode, adjoint", std::ssize(leaves), [&](std::int64_t i) {
+    for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab) {
+      const auto of_slab = static_cast<std::size_t>(slab - batch.slabs.begin) * leaves.size();
+      grad_bias[of_slab + static_cast<std::size_t>(i)] =
+          sampler_.decode_adjoint_of_leaf(leaves[static_cast<std::size_t>(i)], slab,
+                                          batch.samples(slab), batch.gradient(slab), gradient);
+    }
+  });
+  for (const double of_leaf : grad_bias) sums.slab_grad_bias += of_leaf;
+}
+
+// Adds the terms that are computed leaf by leaf to the gradient and to the sums of the bands.
+void SlabObjective::add_leaves(const Step& step, float* gradient,
+                               std::vector<BandSums>& bands) const {
+  for (std::size_t t = 0; t < terms_.size(); ++t) {
+    std::vector<TermValue> of_leaf(own_leaves_.size());
+    terms_[t]->add_leaves(step, own_leaves_, gradient, of_leaf);
+    for (std::size_t i = 0; i < of_leaf.size(); ++i) {
+      const auto band = static_cast<std::size_t>(field_.tree().band_of_leaf(own_leaves_[i]));
+      bands[band].terms[t] += of_leaf[i];
+    }
   }
 }
 

@@ -3,7 +3,8 @@
 #include <memory>
 #include <vector>
 
-#include "base/aligned_buffer.h"
+#include "base/pool.h"
+#include "base/range.h"
 #include "distributed/communicator.h"
 #include "distributed/partition.h"
 #include "objective/objective.h"
@@ -26,16 +27,18 @@ struct SlabObjectiveContext {
   const distributed::Communicator& processes = distributed::Communicator::alone();
 };
 
-/// Evaluates the terms on batches of slabs with the cores of this machine. A thread works on one
-/// band (a row of root cells) at a time. A band writes the gradient of its own leaves alone and
-/// only reads the parameters of its neighbours, so bands may run in any order and on any thread.
-/// Everything that the context refers to must outlive the objective. A new tree or stage needs a
-/// new objective.
+/// Evaluates the terms on batches of slabs with the cores of this machine. A task works on the
+/// slabs of one band (a row of root cells); threads that have no band help with the parts of one. A
+/// band writes the gradient of its own leaves alone and only reads the parameters of its
+/// neighbours. A leaf adds up its slabs in order, so threads change no bit. Everything that the
+/// context refers to must outlive the objective. A new tree or stage needs a new objective.
 class SlabObjective : public Objective {
  public:
   explicit SlabObjective(const SlabObjectiveContext& context);
   /// Evaluates these terms in place of the usual ones.
   SlabObjective(const SlabObjectiveContext& context, std::vector<std::unique_ptr<Term>> terms);
+
+  ~SlabObjective() override;
 
   double add_gradient(const Step& step, float* gradient,
                       std::span<measurement::ViewSums> view_sums) const override;
@@ -50,16 +53,21 @@ class SlabObjective : public Objective {
   struct BandSums {
     std::vector<measurement::ViewSums> views;  ///< one for each view of the step
     double slab_grad_bias = 0.0;               ///< dL/d bias through the samples of slabs
-    std::vector<TermValue> terms;  ///< one for each term; grad_bias from Term::add_band alone
+    std::vector<TermValue> terms;  ///< one for each term; grad_bias from Term::add_leaves alone
   };
-  /// Adds the gradient of the band's own leaves to `gradient` (all parameters).
-  BandSums add_band(const Step& step, int band, float* gradient) const;
+  /// Adds the gradient of the own leaves, but for Term::add_field(), to `gradient` (all
+  /// parameters). Returns the sums of all bands, complete on every process.
+  std::vector<BandSums> add_bands(const Step& step, float* gradient) const;
 
  private:
   struct Workspace;
+  void add_slabs(const Step& step, int band, const projection::ViewCrossings& crossings,
+                 float* gradient, BandSums& sums) const;
   void add_batch(const Step& step, const SlabBatch& batch, float* gradient, BandSums& sums) const;
+  void add_leaves(const Step& step, float* gradient, std::vector<BandSums>& bands) const;
   void allreduce(std::vector<BandSums>& bands) const;
 
+  const field::Field& field_;
   const projection::SlabProjector& projector_;
   const measurement::Measurement& measured_;
   projection::SlabSampler sampler_;
@@ -67,6 +75,7 @@ class SlabObjective : public Objective {
   base::Range own_bands_;
   std::vector<int> own_leaves_;
   std::vector<std::unique_ptr<Term>> terms_;
+  mutable base::Pool<Workspace> workspaces_;
 };
 
 }  // namespace tomofield::objective

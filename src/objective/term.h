@@ -1,10 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "base/range.h"
 #include "distributed/communicator.h"
 #include "field/field.h"
 #include "geometry/ray_geometry.h"
@@ -24,19 +26,28 @@ struct Step {
   double multiplicity = 1.0;  ///< scales the step's views up to the whole series
 };
 
-/// Consecutive slabs of one band that a thread works on together: decoded samples, and the gradient
+/// Consecutive slabs of one band that a task works on together: decoded samples, and the gradient
 /// of the loss by them. Slabs follow each other in memory, projector.grid().size() floats each.
+///
+/// They are worked on in pairs. What a pair yields does not depend on the other pairs of the batch,
+/// so the results are the same for batches of any number of pairs.
 struct SlabBatch {
   const projection::SlabSampler& sampler;
   const projection::SlabProjector& projector;
-  base::Range slabs;  ///< counted over the whole volume
-  bool begins_band = false;
+  const projection::ViewCrossings& crossings;  ///< of the step's views
+  base::Range slabs;                           ///< counted over the whole volume
   float* all_samples = nullptr;
   float* all_gradients = nullptr;
 
-  int size() const { return slabs.size(); }
   float* samples(int slab) const { return all_samples + offset(slab); }
   float* gradient(int slab) const { return all_gradients + offset(slab); }
+
+  int num_pairs() const { return (slabs.size() + 1) / 2; }
+  /// Returns the slabs of a pair; the last pair may have one.
+  base::Range pair(std::int64_t index) const {
+    const int first = slabs.begin + 2 * static_cast<int>(index);
+    return {first, std::min(first + 2, slabs.end)};
+  }
 
  private:
   std::size_t offset(int slab) const {
@@ -48,11 +59,18 @@ struct SlabBatch {
 struct TermValue {
   double value = 0.0;
   double grad_bias = 0.0;
+
+  TermValue& operator+=(const TermValue& other) {
+    value += other.value;
+    grad_bias += other.grad_bias;
+    return *this;
+  }
 };
 
 /// A term of the loss (eq. 9). It adds its value and its gradient where that is cheapest: to
-/// decoded samples of slabs, to the parameters of the leaves of a band, or to the whole field at
-/// once. Objects hold no state of a step, so bands may run on any threads.
+/// decoded samples of slabs, to the parameters of leaves, or to the whole field at once. Every
+/// function works on all threads, in pieces that do not depend on their number. Objects hold no
+/// state of a step.
 class Term {
  public:
   virtual ~Term() = default;
@@ -61,18 +79,18 @@ class Term {
   /// the first term may do so.
   virtual bool replaces_gradient() const { return false; }
   /// Adds the term of a batch of slabs: its gradient by the samples to batch.gradient(), sums of
-  /// residuals to `view_sums` (one each of step.views). Returns its value. The batches of a band
-  /// come in order and on one thread.
+  /// residuals to `view_sums` (one each of step.views). Returns its value. Several batches may be
+  /// worked on at the same time.
   virtual double add_slabs(const Step& /*step*/, const SlabBatch& /*batch*/,
                            std::span<measurement::ViewSums> /*view_sums*/) const {
     return 0.0;
   }
-  /// Adds the gradient by the parameters of a band's own leaves to `gradient` (all parameters).
-  virtual TermValue add_band(const Step& /*step*/, int /*band*/, float* /*gradient*/) const {
-    return {};
-  }
-  /// Adds the gradient by the parameters of all leaves of this process, on all its threads. Sums of
-  /// residuals go to `view_sums` (one for every view). Every process calls it.
+  /// Adds the gradient by the parameters of some leaves, which are ascending, to `gradient` (all
+  /// parameters). Adds the term of each leaf to `of_leaf`, which has one element for each.
+  virtual void add_leaves(const Step& /*step*/, std::span<const int> /*leaves*/,
+                          float* /*gradient*/, std::span<TermValue> /*of_leaf*/) const {}
+  /// Adds the gradient by the parameters of all leaves of this process. Sums of residuals go to
+  /// `view_sums` (one for every view). Every process calls it.
   virtual TermValue add_field(const Step& /*step*/, float* /*gradient*/,
                               std::span<measurement::ViewSums> /*view_sums*/) const {
     return {};

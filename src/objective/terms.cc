@@ -10,13 +10,6 @@
 namespace tomofield::objective {
 namespace {
 
-std::vector<std::vector<int>> leaves_of_bands(const projection::SlabSampler& sampler) {
-  std::vector<std::vector<int>> bands;
-  for (int band = 0; band < sampler.num_bands(); ++band)
-    bands.push_back(sampler.leaves_of_band(band));
-  return bands;
-}
-
 // Returns the penalty of both variations, in density units.
 kernels::VariationPenalty variation_penalty(const TermContext& c) {
   kernels::VariationPenalty penalty;
@@ -62,9 +55,9 @@ std::vector<std::unique_ptr<Term>> make_terms(const TermContext& c) {
   std::vector<std::unique_ptr<Term>> terms;
   if (!has_rays) terms.push_back(std::make_unique<SlabDataTerm>(*c.measured.rays));
   terms.push_back(std::make_unique<DensityVariation>(density, penalty, c.options.seed));
-  terms.push_back(std::make_unique<FactorVariation>(c.field, c.sampler, factors, penalty));
-  terms.push_back(std::make_unique<BoundaryConsistency>(c.field, leaves_of_bands(c.sampler),
-                                                        boundary_options(c, noise)));
+  terms.push_back(std::make_unique<FactorVariation>(c.field, factors, penalty));
+  terms.push_back(std::make_unique<BoundaryConsistency>(
+      c.field, c.sampler.leaves_of_slabs({0, c.sampler.num_slabs()}), boundary_options(c, noise)));
   terms.push_back(std::make_unique<FourierPrior>(c.field, c.full.roi, fourier_options(c, noise),
                                                  c.processes, c.own_leaves));
   if (has_rays)

@@ -1,7 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
+#include "base/pool.h"
+#include "base/range.h"
 #include "kernels/total_variation.h"
 #include "objective/term.h"
 
@@ -17,39 +21,44 @@ DifferenceSides difference_sides(std::uint64_t seed, std::int64_t step);
 /// Computes the isotropic total variation of the density on the samples of slabs
 /// (kernels/total_variation.h): weight · Σ penalty(|∇ density|) · area of a sample. Forward
 /// differences alone would treat the two sides of an edge differently, so each step draws the sides
-/// of its differences.
+/// of its differences. A pair of slabs decodes the rows before and after it by itself.
 class DensityVariation : public Term {
  public:
   /// `weight` is per pixel of area and density unit; 0 is off.
-  DensityVariation(double weight, const kernels::VariationPenalty& penalty, std::uint64_t seed)
-      : weight_(weight), penalty_(penalty), seed_(seed) {}
+  DensityVariation(double weight, const kernels::VariationPenalty& penalty, std::uint64_t seed);
+  ~DensityVariation() override;
 
   double add_slabs(const Step& step, const SlabBatch& batch,
                    std::span<measurement::ViewSums> view_sums) const override;
 
  private:
+  struct Rows;
+  struct SamplesOfSegment;
+  void decode_rows(const SlabBatch& batch, std::span<Rows> rows_of_pair) const;
+  double add_samples(const Step& step, const SlabBatch& batch, base::Range slabs,
+                     const SamplesOfSegment& part, Rows& rows) const;
   kernels::SlabVariation variation_of(const SlabBatch& batch, std::size_t segment,
                                       std::int64_t step) const;
-  void start_flux(const Step& step, const SlabBatch& batch, float* row, float* flux) const;
 
   double weight_;
   kernels::VariationPenalty penalty_;
   std::uint64_t seed_;
+  mutable base::Pool<std::vector<Rows>> rows_;
 };
 
 /// Computes the total variation of the factors of each leaf (field::Field::parameter_variation).
 class FactorVariation : public Term {
  public:
-  /// The field and the sampler must outlive the term. A weight of 0 is off.
-  FactorVariation(const field::Field& field, const projection::SlabSampler& sampler, double weight,
+  /// The field must outlive the term. A weight of 0 is off.
+  FactorVariation(const field::Field& field, double weight,
                   const kernels::VariationPenalty& penalty)
-      : field_(field), sampler_(sampler), weight_(weight), penalty_(penalty) {}
+      : field_(field), weight_(weight), penalty_(penalty) {}
 
-  TermValue add_band(const Step& step, int band, float* gradient) const override;
+  void add_leaves(const Step& step, std::span<const int> leaves, float* gradient,
+                  std::span<TermValue> of_leaf) const override;
 
  private:
   const field::Field& field_;
-  const projection::SlabSampler& sampler_;
   double weight_;
   kernels::VariationPenalty penalty_;
 };

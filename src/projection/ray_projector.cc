@@ -177,27 +177,28 @@ void RayProjector::trace_rays(std::span<const Ray> rays, std::uint32_t draw,
   const auto num_rays = static_cast<std::int64_t>(rays.size());
   std::vector<std::vector<Found>> blocks(
       static_cast<std::size_t>((num_rays + kRaysAtOnce - 1) / kRaysAtOnce));
-  base::parallel_for("trace rays", static_cast<std::int64_t>(blocks.size()), [&](std::int64_t block) {
-    std::vector<LeafCrossing> crossings;
-    const std::int64_t end = std::min(num_rays, (block + 1) * kRaysAtOnce);
-    for (std::int64_t i = block * kRaysAtOnce; i < end; ++i) {
-      const Ray& ray = rays[static_cast<std::size_t>(i)];
-      const RayBundle& bundle = bundles_[static_cast<std::size_t>(ray.view)];
-      const Line line = bundle.line(ray.x + 0.5, ray.y + 0.5);
-      crossings.clear();
-      find_crossings(field_.tree(), line, clip(line, support_, {0.0, field_.thickness()}),
-                     crossings);
-      std::uint32_t key = key_of(ray, draw);
-      for (const LeafCrossing& crossing : crossings) {
-        Found found{.leaf = crossing.leaf, .piece = {}};
-        found.piece.samples = sample_positions(bundle, line, crossing);
-        found.piece.samples.key = key;
-        found.piece.ray = static_cast<std::uint32_t>(i);
-        key += kGolden * static_cast<std::uint32_t>(found.piece.samples.num_samples);
-        blocks[static_cast<std::size_t>(block)].push_back(found);
-      }
-    }
-  });
+  base::parallel_for(
+      "trace rays", static_cast<std::int64_t>(blocks.size()), [&](std::int64_t block) {
+        std::vector<LeafCrossing> crossings;
+        const std::int64_t end = std::min(num_rays, (block + 1) * kRaysAtOnce);
+        for (std::int64_t i = block * kRaysAtOnce; i < end; ++i) {
+          const Ray& ray = rays[static_cast<std::size_t>(i)];
+          const RayBundle& bundle = bundles_[static_cast<std::size_t>(ray.view)];
+          const Line line = bundle.line(ray.x + 0.5, ray.y + 0.5);
+          crossings.clear();
+          find_crossings(field_.tree(), line, clip(line, support_, {0.0, field_.thickness()}),
+                         crossings);
+          std::uint32_t key = key_of(ray, draw);
+          for (const LeafCrossing& crossing : crossings) {
+            Found found{.leaf = crossing.leaf, .piece = {}};
+            found.piece.samples = sample_positions(bundle, line, crossing);
+            found.piece.samples.key = key;
+            found.piece.ray = static_cast<std::uint32_t>(i);
+            key += kGolden * static_cast<std::uint32_t>(found.piece.samples.num_samples);
+            blocks[static_cast<std::size_t>(block)].push_back(found);
+          }
+        }
+      });
 
   // Sort the pieces by leaf; each leaf's pieces stay in the order of the rays.
   trace.first_of_leaf_.assign(static_cast<std::size_t>(field_.tree().num_leaves()) + 1, 0);

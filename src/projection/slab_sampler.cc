@@ -121,54 +121,77 @@ std::ptrdiff_t SlabSampler::sample_offset(const Piece& piece) const {
 }
 
 void SlabSampler::decode(int slab, float* samples) const {
-  for (const Piece& piece : slabs_[static_cast<std::size_t>(slab)]) {
-    float* values = scratch(field_.shape(piece.leaf).vertices_xz() * kLanes, 0);
-    field_.slab_values(piece.leaf, piece.rows, values);
-    kernels::decode_leaf(kernel_piece(piece), values, samples + sample_offset(piece));
-  }
+  for (int piece = 0; piece < num_pieces(slab); ++piece) decode_piece(slab, piece, samples);
+}
+
+void SlabSampler::decode_piece(int slab, int index, float* samples) const {
+  const Piece& piece = slabs_[static_cast<std::size_t>(slab)][static_cast<std::size_t>(index)];
+  float* values = scratch(field_.shape(piece.leaf).vertices_xz() * kLanes, 0);
+  field_.slab_values(piece.leaf, piece.rows, values);
+  kernels::decode_leaf(kernel_piece(piece), values, samples + sample_offset(piece));
+}
+
+double SlabSampler::adjoint_of_piece(const Piece& piece, const float* samples,
+                                     const float* grad_samples, float* gradient) const {
+  const std::size_t size = field_.shape(piece.leaf).vertices_xz() * kLanes;
+  float* grad_values = scratch(size, 1);
+  std::fill_n(grad_values, size, 0.0f);
+  const std::ptrdiff_t at = sample_offset(piece);
+  const double grad_bias = kernels::decode_leaf_adjoint(kernel_piece(piece), samples + at,
+                                                        grad_samples + at, grad_values);
+  field_.slab_gradient(piece.leaf, piece.rows, grad_values, gradient + field_.offset(piece.leaf));
+  return grad_bias;
 }
 
 double SlabSampler::decode_adjoint(int slab, const float* samples, const float* grad_samples,
                                    float* gradient) const {
   double grad_bias = 0.0;
+  for (const Piece& piece : slabs_[static_cast<std::size_t>(slab)])
+    grad_bias += adjoint_of_piece(piece, samples, grad_samples, gradient);
+  return grad_bias;
+}
+
+double SlabSampler::decode_adjoint_of_leaf(int leaf, int slab, const float* samples,
+                                           const float* grad_samples, float* gradient) const {
+  double grad_bias = 0.0;
   for (const Piece& piece : slabs_[static_cast<std::size_t>(slab)]) {
-    const std::size_t size = field_.shape(piece.leaf).vertices_xz() * kLanes;
-    float* grad_values = scratch(size, 1);
-    std::fill_n(grad_values, size, 0.0f);
-    const std::ptrdiff_t at = sample_offset(piece);
-    grad_bias += kernels::decode_leaf_adjoint(kernel_piece(piece), samples + at, grad_samples + at,
-                                              grad_values);
-    field_.slab_gradient(piece.leaf, piece.rows, grad_values, gradient + field_.offset(piece.leaf));
+    if (piece.leaf == leaf) grad_bias += adjoint_of_piece(piece, samples, grad_samples, gradient);
   }
   return grad_bias;
 }
 
 void SlabSampler::decode_row(std::int64_t row, float* densities) const {
-  for (const Piece& piece : slabs_[static_cast<std::size_t>(row / kLanes)]) {
-    const field::LeafShape& shape = field_.shape(piece.leaf);
-    float* values = scratch(shape.vertices_xz(), 0);
-    field_.row_values(piece.leaf, row_centre(row), values);
-    const TapsZ& z = taps_z(piece.segment, shape.nz);
-    const int nz = grid_.segments()[piece.segment].nz;
-    float* out =
-        densities + row_origins_[piece.segment] + static_cast<std::size_t>(piece.first_sample) * nz;
-    for (std::size_t i = 0; i < piece.lower_x.size(); ++i, out += nz) {
-      const float* lower = values + static_cast<std::ptrdiff_t>(piece.lower_x[i]) * shape.nz;
-      const float fx = piece.fraction_x[i];
-      const auto at = [&](int k) { return lower[k] + fx * (lower[shape.nz + k] - lower[k]); };
-      for (int k = 0; k < nz; ++k) {
-        const float low = at(z.lower[static_cast<std::size_t>(k)]);
-        out[k] = low + z.fraction[static_cast<std::size_t>(k)] *
-                           (at(z.lower[static_cast<std::size_t>(k)] + 1) - low);
-      }
-    }
-  }
-  kernels::activate(field_.activation, densities, static_cast<std::ptrdiff_t>(row_size()));
+  for (int piece = 0; piece < num_pieces(static_cast<int>(row / kLanes)); ++piece)
+    decode_row_piece(row, piece, densities);
 }
 
-std::vector<int> SlabSampler::leaves_of_band(int band) const {
+void SlabSampler::decode_row_piece(std::int64_t row, int index, float* densities) const {
+  const Piece& piece =
+      slabs_[static_cast<std::size_t>(row / kLanes)][static_cast<std::size_t>(index)];
+  const field::LeafShape& shape = field_.shape(piece.leaf);
+  float* values = scratch(shape.vertices_xz(), 0);
+  field_.row_values(piece.leaf, row_centre(row), values);
+  const TapsZ& z = taps_z(piece.segment, shape.nz);
+  const int nz = grid_.segments()[piece.segment].nz;
+  float* const first =
+      densities + row_origins_[piece.segment] + static_cast<std::size_t>(piece.first_sample) * nz;
+  float* out = first;
+  for (std::size_t i = 0; i < piece.lower_x.size(); ++i, out += nz) {
+    const float* lower = values + static_cast<std::ptrdiff_t>(piece.lower_x[i]) * shape.nz;
+    const float fx = piece.fraction_x[i];
+    const auto at = [&](int k) { return lower[k] + fx * (lower[shape.nz + k] - lower[k]); };
+    for (int k = 0; k < nz; ++k) {
+      const float low = at(z.lower[static_cast<std::size_t>(k)]);
+      out[k] = low + z.fraction[static_cast<std::size_t>(k)] *
+                         (at(z.lower[static_cast<std::size_t>(k)] + 1) - low);
+    }
+  }
+  kernels::activate(field_.activation, first, out - first);
+}
+
+std::vector<int> SlabSampler::leaves_of_slabs(base::Range slabs) const {
   std::vector<int> leaves;
-  for (int slab = this->band(band).begin; slab < this->band(band).end; ++slab) {
+  for (int slab = slabs.begin; slab < slabs.end; ++slab) {
     for (const Piece& piece : slabs_[static_cast<std::size_t>(slab)]) leaves.push_back(piece.leaf);
   }
   std::sort(leaves.begin(), leaves.end());

@@ -38,13 +38,29 @@ class SlabSampler {
                         float* gradient) const;
   /// Computes the densities of one row, counted from first_row, as [segment][x][z] without padding.
   void decode_row(std::int64_t row, float* densities) const;
+
+  /// Returns the number of pieces in which a slab is decoded. A piece is the samples of one segment
+  /// that lie in one leaf. Different pieces may be decoded at the same time.
+  int num_pieces(int slab) const {
+    return static_cast<int>(slabs_[static_cast<std::size_t>(slab)].size());
+  }
+  /// Does the part of decode() that belongs to a piece.
+  void decode_piece(int slab, int piece, float* samples) const;
+  /// Does the part of decode_row() that belongs to a piece of the row's slab.
+  void decode_row_piece(std::int64_t row, int piece, float* densities) const;
+  /// Does the part of decode_adjoint() that belongs to a leaf. Different leaves may be worked on at
+  /// the same time.
+  double decode_adjoint_of_leaf(int leaf, int slab, const float* samples, const float* grad_samples,
+                                float* gradient) const;
   /// Returns the floats that decode_row writes.
   std::size_t row_size() const { return row_origins_.back(); }
   /// Returns the position of a segment's first float in them.
   std::size_t row_origin(std::size_t segment) const { return row_origins_[segment]; }
 
-  /// Returns the leaves that the slabs of a band sample.
-  std::vector<int> leaves_of_band(int band) const;
+  /// Returns the leaves that the slabs of a band sample, ascending.
+  std::vector<int> leaves_of_band(int band) const { return leaves_of_slabs(this->band(band)); }
+  /// Returns the leaves that some slabs sample, ascending.
+  std::vector<int> leaves_of_slabs(base::Range slabs) const;
 
  private:
   // The samples of one segment that lie in one leaf.
@@ -67,6 +83,8 @@ class SlabSampler {
   const TapsZ& taps_z(std::size_t segment, int num_vertices) const;
   kernels::LeafPiece kernel_piece(const Piece& piece) const;
   std::ptrdiff_t sample_offset(const Piece& piece) const;
+  double adjoint_of_piece(const Piece& piece, const float* samples, const float* grad_samples,
+                          float* gradient) const;
 
   const field::Field& field_;
   SampleGrid grid_;

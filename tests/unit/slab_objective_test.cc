@@ -97,13 +97,13 @@ class Problem {
     double data = 0, variation = 0, grad_bias = 0;
     std::vector<float> gradient;
   };
-  Result evaluate(bool last_band_first = false) const {
+  Result evaluate() const {
     std::vector<std::unique_ptr<Term>> terms;
     terms.push_back(std::make_unique<SlabDataTerm>(*rays_));
     terms.push_back(std::make_unique<DensityVariation>(weights_.density_variation, weights_.penalty,
                                                        seed_of_forward_differences()));
-    terms.push_back(std::make_unique<FactorVariation>(*field_, sampler_, weights_.factor_variation,
-                                                      weights_.penalty));
+    terms.push_back(
+        std::make_unique<FactorVariation>(*field_, weights_.factor_variation, weights_.penalty));
     const ObjectiveOptions options;
     const SlabObjective objective({.field = *field_,
                                    .projector = projector_,
@@ -118,9 +118,7 @@ class Problem {
     const Step step{.views = kViews, .models = models_, .multiplicity = kMultiplicity};
     Result result;
     result.gradient.resize(field_->num_parameters());
-    for (int i = 0; i < sampler_.num_bands(); ++i) {
-      const int band = last_band_first ? sampler_.num_bands() - 1 - i : i;
-      const SlabObjective::BandSums b = objective.add_band(step, band, result.gradient.data());
+    for (const SlabObjective::BandSums& b : objective.add_bands(step, result.gradient.data())) {
       for (std::size_t v = 0; v < kViews.size(); ++v) {
         const measurement::ViewModel& m = models_[static_cast<std::size_t>(kViews[v])];
         result.data += kMultiplicity * m.weight / 2 * b.views[v].squared_residual(m);
@@ -362,9 +360,24 @@ TEST(DensityVariation, StepsTakeDifferencesToEverySide) {
   EXPECT_EQ(seen.size(), 4u);
 }
 
-TEST(SlabObjective, OrderOfBandsChangesNoBit) {
-  const Problem p = random_problem(FieldKind::kVm, weights_of(0.4, 0.3, 0.3));
-  EXPECT_EQ(p.evaluate(false).gradient, p.evaluate(true).gradient);
+// With one thread for each of two bands or fewer, a batch has one pair of slabs, otherwise two.
+TEST(SlabObjective, ThreadsAndBatchesChangeNoBit) {
+  const SampleGrid grid = projection::make_sample_grid(tilted_geometry(), 0, kWidth, 2);
+  const Weights weights = weights_of(0.4, 0.3, 0.3);
+  const Problem factors = random_problem(FieldKind::kVm, weights);
+  const Problem leaves_of_two_pairs(field_of_cells(64), grid, weights);
+  for (const Problem* p : {&factors, &leaves_of_two_pairs}) {
+    base::set_thread_count(1);
+    const Problem::Result alone = p->evaluate();
+    for (const int threads : {2, 3, 8}) {
+      base::set_thread_count(threads);
+      const Problem::Result together = p->evaluate();
+      EXPECT_EQ(together.gradient, alone.gradient) << threads << " threads";
+      EXPECT_EQ(together.grad_bias, alone.grad_bias) << threads << " threads";
+      EXPECT_EQ(together.data, alone.data) << threads << " threads";
+    }
+    base::set_thread_count(0);
+  }
 }
 
 }  // namespace

@@ -76,15 +76,17 @@ class Penalty {
   Vec epsilon2() const { return epsilon2_; }
 
   // Returns weight φ′(m)/m = weight / (m + m²/τ) where `rows` is 1, and 0 elsewhere, for
-  // square = |∇f|² + ε² = m². Adds φ(m) there to the value.
-  HWY_INLINE Vec slope(Vec square, Vec rows) {
-    const Vec m = hn::Sqrt(square);
+  // square = |∇f|² + ε² = m².
+  HWY_INLINE Vec slope(Vec square, Vec m, Vec rows) const {
+    return hn::Div(hn::Mul(weight_, rows), hn::MulAdd(square, per_tau_, m));
+  }
+  // Adds φ(m) to the value where `rows` is 1.
+  HWY_INLINE void add(Vec m, Vec rows) {
     if (kConcave) {
       logs_.multiply(hn::MulAdd(hn::Mul(m, per_tau_), rows, hn::Set(Tag(), 1.0f)));
     } else {
       sum_ = hn::MulAdd(m, rows, sum_);
     }
-    return hn::Div(hn::Mul(weight_, rows), hn::MulAdd(square, per_tau_, m));
   }
 
   HWY_INLINE void end_row() {
@@ -138,6 +140,72 @@ HWY_INLINE Vec next_row(const float* sample, int v, float above) {
   return hn::IfThenElse(hn::FirstN(d, kVecLanes - 1), next, hn::Set(d, above));
 }
 
+// The differences of a sample in a row of z, one vector of its lanes at a time.
+class Differences {
+ public:
+  HWY_INLINE Differences(const SlabVariation& s, const RowMasks& masks, int z)
+      : s_(s),
+        masks_(masks),
+        order_(s, kLanes, s.stride_z),
+        above_order_(s, s.above.step_x, s.above.step_z),
+        z_(z),
+        up_(z + 1 < s.nz ? order_.step_z : 0),
+        per_hx2_(hn::Set(Tag(), s.per_hx * s.per_hx)),
+        per_hz2_(hn::Set(Tag(), s.per_hz * s.per_hz)) {}
+
+  // Goes to a sample of the row.
+  HWY_INLINE void move_to(int x) {
+    offset_ = order_(x, z_);
+    right_ = x + 1 < s_.nx ? order_.step_x : 0;
+    above_ = s_.above.data != nullptr ? s_.above.data[above_order_(x, z_)] : 0.0f;
+  }
+  // Returns where the sample lies.
+  HWY_INLINE std::ptrdiff_t offset() const { return offset_; }
+
+  // D_x and D_z are divided by h², as the flux needs them.
+  struct Of {
+    Vec dx_h, dy, dz_h, square;
+  };
+  // Returns the differences of vector v, and |∇f|² + ε².
+  HWY_INLINE Of of_vector(int v, Vec epsilon2) const {
+    const Tag d;
+    const std::ptrdiff_t lane = static_cast<std::ptrdiff_t>(v) * kVecLanes;
+    const float* const sample = s_.samples + offset_;
+    const Vec f = hn::LoadU(d, sample + lane);
+    const Vec dx = hn::Sub(hn::LoadU(d, sample + right_ + lane), f);
+    const Vec dz = hn::Sub(hn::LoadU(d, sample + up_ + lane), f);
+    const Vec dy =
+        hn::Mul(hn::Load(d, masks_.has_next + lane), hn::Sub(next_row(sample, v, above_), f));
+    const Vec dx_h = hn::Mul(dx, per_hx2_), dz_h = hn::Mul(dz, per_hz2_);
+    return {dx_h, dy, dz_h,
+            hn::MulAdd(dx, dx_h, hn::MulAdd(dy, dy, hn::MulAdd(dz, dz_h, epsilon2)))};
+  }
+
+ private:
+  const SlabVariation& s_;
+  const RowMasks& masks_;
+  SampleOrder order_, above_order_;
+  int z_;
+  std::ptrdiff_t up_, right_ = 0, offset_ = 0;
+  float above_ = 0.0f;
+  Vec per_hx2_, per_hz2_;
+};
+
+// Computes the flux along x out of sample x of row z; flux_x is [lane].
+template <bool kConcave>
+HWY_INLINE void flux_out_of(const SlabVariation& s, const RowMasks& masks,
+                            const Penalty<kConcave>& penalty, int x, int z, float* flux_x) {
+  const Tag d;
+  Differences differences(s, masks, z);
+  differences.move_to(x);
+  for (int v = 0; v < kVecs; ++v) {
+    const auto of = differences.of_vector(v, penalty.epsilon2());
+    const Vec rows = hn::Load(d, masks.is_row + static_cast<std::ptrdiff_t>(v) * kVecLanes);
+    const Vec slope = penalty.slope(of.square, hn::Sqrt(of.square), rows);
+    hn::Store(hn::Mul(slope, of.dx_h), d, flux_x + v * kVecLanes);
+  }
+}
+
 // Processes samples [first, end) of row z: gradient += −div(flux). flux_x holds the flux into the
 // first sample from the one before; on return, it holds the flux out of the last. flux_z, [x,
 // lane], holds the fluxes into the row from the one below; on return, those out of it.
@@ -151,31 +219,22 @@ HWY_INLINE void add_row(const SlabVariation& s, const RowMasks& masks, const Lan
                         Penalty<kConcave>& penalty, int z, int first, int end, float* flux_x,
                         float* flux_z) {
   const Tag d;
-  const SampleOrder order(s, kLanes, s.stride_z), flux_order(s, s.nz, 1);
-  const SampleOrder above_order(s, s.above.step_x, s.above.step_z);
-  const std::ptrdiff_t up = z + 1 < s.nz ? order.step_z : 0;
-  const Vec per_hx2 = hn::Set(d, s.per_hx * s.per_hx), per_hz2 = hn::Set(d, s.per_hz * s.per_hz);
+  const SampleOrder flux_order(s, s.nz, 1);
+  Differences differences(s, masks, z);
   Vec from_left[kVecs];
   for (int v = 0; v < kVecs; ++v) from_left[v] = hn::Load(d, flux_x + v * kVecLanes);
   for (int x = first; x < end; ++x, flux_z += kLanes) {
-    const std::ptrdiff_t offset = order(x, z);
-    const float* const sample = s.samples + offset;
-    const float* const right = sample + (x + 1 < s.nx ? order.step_x : 0);
-    const float above = s.above.data != nullptr ? s.above.data[above_order(x, z)] : 0.0f;
+    differences.move_to(x);
     Vec flux_y[kVecs], sum[kVecs];
     for (int v = 0; v < kVecs; ++v) {
       const std::ptrdiff_t lane = static_cast<std::ptrdiff_t>(v) * kVecLanes;
-      const Vec f = hn::LoadU(d, sample + lane);
-      const Vec dx = hn::Sub(hn::LoadU(d, right + lane), f);
-      const Vec dz = hn::Sub(hn::LoadU(d, sample + up + lane), f);
-      const Vec dy =
-          hn::Mul(hn::Load(d, masks.has_next + lane), hn::Sub(next_row(sample, v, above), f));
-      const Vec dx_h = hn::Mul(dx, per_hx2), dz_h = hn::Mul(dz, per_hz2);
-      const Vec square =
-          hn::MulAdd(dx, dx_h, hn::MulAdd(dy, dy, hn::MulAdd(dz, dz_h, penalty.epsilon2())));
-      const Vec slope = penalty.slope(square, hn::Load(d, masks.is_row + lane));
-      const Vec to_right = hn::Mul(slope, dx_h), to_top = hn::Mul(slope, dz_h);
-      flux_y[v] = hn::Mul(slope, dy);
+      const auto of = differences.of_vector(v, penalty.epsilon2());
+      const Vec rows = hn::Load(d, masks.is_row + lane);
+      const Vec m = hn::Sqrt(of.square);
+      penalty.add(m, rows);
+      const Vec slope = penalty.slope(of.square, m, rows);
+      const Vec to_right = hn::Mul(slope, of.dx_h), to_top = hn::Mul(slope, of.dz_h);
+      flux_y[v] = hn::Mul(slope, of.dy);
       const Vec in = hn::Add(from_left[v], hn::Load(d, flux_z + lane));
       sum[v] = hn::Sub(hn::Sub(in, to_right), hn::Add(to_top, flux_y[v]));
       from_left[v] = to_right;
@@ -185,7 +244,8 @@ HWY_INLINE void add_row(const SlabVariation& s, const RowMasks& masks, const Lan
     float& flux = s.flux[flux_order(x, z)];
     flux = shift.apply(flux_y, flux, from_below);
     for (int v = 0; v < kVecs; ++v) {
-      float* const g = s.gradient + offset + static_cast<std::ptrdiff_t>(v) * kVecLanes;
+      float* const g =
+          s.gradient + differences.offset() + static_cast<std::ptrdiff_t>(v) * kVecLanes;
       hn::StoreU(hn::Add(hn::LoadU(d, g), hn::Add(sum[v], from_below[v])), d, g);
     }
   }
@@ -206,8 +266,12 @@ HWY_INLINE double variation(const SlabVariation& s, const Scratch& scratch) {
   const LaneShift shift;
   Penalty<kConcave> penalty(s);
   std::fill_n(scratch.flux_x, static_cast<std::ptrdiff_t>(s.nz) * kLanes, 0.0f);
-  for (int first = 0; first < s.nx; first += scratch.tile) {
-    const int end = std::min(first + scratch.tile, s.nx);
+  for (int z = 0; z < s.nz && s.x.begin > 0; ++z) {
+    flux_out_of(s, masks, penalty, s.x.begin - 1, z,
+                scratch.flux_x + static_cast<std::ptrdiff_t>(z) * kLanes);
+  }
+  for (int first = s.x.begin; first < s.x.end; first += scratch.tile) {
+    const int end = std::min(first + scratch.tile, s.x.end);
     std::fill_n(scratch.flux_z, static_cast<std::ptrdiff_t>(end - first) * kLanes, 0.0f);
     for (int z = 0; z < s.nz; ++z) {
       add_row(s, masks, shift, penalty, z, first, end,
@@ -237,11 +301,17 @@ double slab_variation(const SlabVariation& slab) {
                                               scratch.data() + kTile * kLanes);
 }
 
+void clear_flux(const SlabVariation& s) {
+  const SampleOrder order(s, s.nz, 1);
+  for (int x = s.x.begin; x < s.x.end; ++x)
+    for (int z = 0; z < s.nz; ++z) s.flux[order(x, z)] = 0.0f;
+}
+
 void row_flux(const SlabVariation& s, const DensityRow& row, const DensityRow& next, float* flux) {
   const float tau = s.penalty.concavity;
   const SampleOrder order(s, row.step_x, row.step_z), next_order(s, next.step_x, next.step_z),
       flux_order(s, s.nz, 1);
-  for (int x = 0; x < s.nx; ++x) {
+  for (int x = s.x.begin; x < s.x.end; ++x) {
     const std::ptrdiff_t right = x + 1 < s.nx ? order.step_x : 0;
     for (int z = 0; z < s.nz; ++z) {
       const float* const at = row.data + order(x, z);
