@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "base/aligned_buffer.h"
 #include "base/parallel.h"
 #include "kernels/lanes.h"
 
@@ -10,14 +11,23 @@ namespace tomofield::objective {
 
 using kernels::kLanes;
 
+// Holds the detectors of the slabs, one after another.
+struct SlabDataTerm::Detectors : Scratch {
+  base::AlignedBuffer<float> rays;
+};
+
+std::unique_ptr<Term::Scratch> SlabDataTerm::make_scratch() const {
+  return std::make_unique<Detectors>();
+}
+
 // The back-projection replaces the gradient of the batch, which saves a pass that clears it. So
 // this term has to come first (terms.cc).
-double SlabDataTerm::add_slabs(const Step& step, const SlabBatch& batch,
+double SlabDataTerm::add_slabs(const Step& step, const SlabBatch& batch, Scratch* scratch,
                                std::span<measurement::ViewSums> view_sums) const {
   const projection::SlabProjector& projector = batch.projector;
   const std::size_t detector_size = projector.detector_size(step.views.size());
-  const auto detector = detectors_.borrow();
-  detector->reserve(static_cast<std::size_t>(batch.slabs.size()) * detector_size);
+  base::AlignedBuffer<float>& detector = static_cast<Detectors&>(*scratch).rays;
+  detector.reserve(static_cast<std::size_t>(batch.slabs.size()) * detector_size);
   projector.fill_padding(batch.all_samples, batch.slabs.size());
 
   const std::vector<base::Range>& ranges = projector.pixel_ranges();
@@ -27,13 +37,13 @@ double SlabDataTerm::add_slabs(const Step& step, const SlabBatch& batch,
     const base::Range slabs = batch.pair(part / std::ssize(ranges));
     const auto first_slab = static_cast<std::size_t>(slabs.begin - batch.slabs.begin);
     add_pixels(step, batch, slabs, ranges[static_cast<std::size_t>(part % std::ssize(ranges))],
-               detector->data() + first_slab * detector_size,
+               detector.data() + first_slab * detector_size,
                std::span(sums).subspan(static_cast<std::size_t>(part) * step.views.size(),
                                        step.views.size()));
   });
   for (std::size_t i = 0; i < sums.size(); ++i) view_sums[i % step.views.size()] += sums[i];
   for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab) measured_.release(slab);
-  projector.backward(detector->data(), batch.crossings, batch.all_gradients, batch.slabs.size());
+  projector.backward(detector.data(), batch.crossings, batch.all_gradients, batch.slabs.size());
   return 0.0;
 }
 

@@ -1,7 +1,9 @@
 #pragma once
 
-#include "base/aligned_buffer.h"
-#include "base/pool.h"
+#include <memory>
+#include <span>
+
+#include "base/range.h"
 #include "measurement/slab_views.h"
 #include "objective/term.h"
 
@@ -14,17 +16,18 @@ class SlabDataTerm : public Term {
   /// `measured` must outlive the term.
   explicit SlabDataTerm(const measurement::SlabViews& measured) : measured_(measured) {}
 
+  std::unique_ptr<Scratch> make_scratch() const override;
   bool replaces_gradient() const override { return true; }
   /// Returns 0, since the value follows from the sums of residuals.
-  double add_slabs(const Step& step, const SlabBatch& batch,
+  double add_slabs(const Step& step, const SlabBatch& batch, Scratch* scratch,
                    std::span<measurement::ViewSums> view_sums) const override;
 
  private:
+  struct Detectors;
   void add_pixels(const Step& step, const SlabBatch& batch, base::Range slabs, base::Range pixels,
                   float* detector, std::span<measurement::ViewSums> sums) const;
 
   const measurement::SlabViews& measured_;
-  mutable base::Pool<base::AlignedBuffer<float>> detectors_;
 };
 
 }  // namespace tomofield::objective

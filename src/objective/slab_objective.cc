@@ -28,11 +28,14 @@ TermContext term_context(const SlabObjectiveContext& c, const projection::SlabSa
 
 }  // namespace
 
-// Holds what a task needs for a batch.
+// Holds what the task of a band needs.
 struct SlabObjective::Workspace {
   base::AlignedBuffer<float> samples, gradients;
+  std::vector<std::unique_ptr<Term::Scratch>> of_terms;
 
-  void fit(std::size_t size) {
+  void fit(std::size_t size, const std::vector<std::unique_ptr<Term>>& terms) {
+    while (of_terms.size() < terms.size())
+      of_terms.push_back(terms[of_terms.size()]->make_scratch());
     // Padding has to start as zeros and stays so: a new layout needs new buffers.
     if (samples.size() == size) return;
     samples.reset(size);
@@ -98,7 +101,7 @@ void SlabObjective::add_slabs(const Step& step, int band,
                               BandSums& sums) const {
   const int at_once = slabs_at_once(own_bands_);
   const auto workspace = workspaces_.borrow();
-  workspace->fit(static_cast<std::size_t>(at_once) * projector_.grid().size());
+  workspace->fit(static_cast<std::size_t>(at_once) * projector_.grid().size(), terms_);
   const base::Range slabs = sampler_.band(band);
   for (int slab = slabs.begin; slab < slabs.end; slab += at_once) {
     add_batch(step,
@@ -106,14 +109,15 @@ void SlabObjective::add_slabs(const Step& step, int band,
                .projector = projector_,
                .crossings = crossings,
                .slabs = {slab, std::min(slab + at_once, slabs.end)},
+               .begins_band = slab == slabs.begin,
                .all_samples = workspace->samples.data(),
                .all_gradients = workspace->gradients.data()},
-              gradient, sums);
+              *workspace, gradient, sums);
   }
 }
 
-void SlabObjective::add_batch(const Step& step, const SlabBatch& batch, float* gradient,
-                              BandSums& sums) const {
+void SlabObjective::add_batch(const Step& step, const SlabBatch& batch, Workspace& workspace,
+                              float* gradient, BandSums& sums) const {
   std::vector<std::pair<int, int>> pieces;  // slab, piece
   for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab)
     for (int piece = 0; piece < sampler_.num_pieces(slab); ++piece)
@@ -126,7 +130,8 @@ void SlabObjective::add_batch(const Step& step, const SlabBatch& batch, float* g
     std::fill_n(batch.all_gradients,
                 static_cast<std::size_t>(batch.slabs.size()) * projector_.grid().size(), 0.0f);
   for (std::size_t t = 0; t < terms_.size(); ++t)
-    sums.terms[t].value += terms_[t]->add_slabs(step, batch, sums.views);
+    sums.terms[t].value +=
+        terms_[t]->add_slabs(step, batch, workspace.of_terms[t].get(), sums.views);
 
   const std::vector<int> leaves = sampler_.leaves_of_slabs(batch.slabs);
   std::vector<double> grad_bias(leaves.size() * static_cast<std::size_t>(batch.slabs.size()));

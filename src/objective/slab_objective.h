@@ -63,7 +63,8 @@ class SlabObjective : public Objective {
   struct Workspace;
   void add_slabs(const Step& step, int band, const projection::ViewCrossings& crossings,
                  float* gradient, BandSums& sums) const;
-  void add_batch(const Step& step, const SlabBatch& batch, float* gradient, BandSums& sums) const;
+  void add_batch(const Step& step, const SlabBatch& batch, Workspace& workspace, float* gradient,
+                 BandSums& sums) const;
   void add_leaves(const Step& step, float* gradient, std::vector<BandSums>& bands) const;
   void allreduce(std::vector<BandSums>& bands) const;
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -29,13 +30,13 @@ struct Step {
 /// Consecutive slabs of one band that a task works on together: decoded samples, and the gradient
 /// of the loss by them. Slabs follow each other in memory, projector.grid().size() floats each.
 ///
-/// They are worked on in pairs. What a pair yields does not depend on the other pairs of the batch,
-/// so the results are the same for batches of any number of pairs.
+/// The results are the same whether the slabs of a band come in batches of one pair or of more.
 struct SlabBatch {
   const projection::SlabSampler& sampler;
   const projection::SlabProjector& projector;
   const projection::ViewCrossings& crossings;  ///< of the step's views
   base::Range slabs;                           ///< counted over the whole volume
+  bool begins_band = false;
   float* all_samples = nullptr;
   float* all_gradients = nullptr;
 
@@ -75,13 +76,19 @@ class Term {
  public:
   virtual ~Term() = default;
 
+  /// What a term keeps for add_slabs() from one batch of a band to the next.
+  struct Scratch {
+    virtual ~Scratch() = default;
+  };
+  virtual std::unique_ptr<Scratch> make_scratch() const { return nullptr; }
+
   /// Says whether add_slabs() replaces the batch's gradient, which then need not be cleared. Only
   /// the first term may do so.
   virtual bool replaces_gradient() const { return false; }
   /// Adds the term of a batch of slabs: its gradient by the samples to batch.gradient(), sums of
-  /// residuals to `view_sums` (one each of step.views). Returns its value. Several batches may be
-  /// worked on at the same time.
-  virtual double add_slabs(const Step& /*step*/, const SlabBatch& /*batch*/,
+  /// residuals to `view_sums` (one each of step.views). Returns its value. The batches of a band
+  /// come in order and with the same `scratch`. Several bands may be worked on at the same time.
+  virtual double add_slabs(const Step& /*step*/, const SlabBatch& /*batch*/, Scratch* /*scratch*/,
                            std::span<measurement::ViewSums> /*view_sums*/) const {
     return 0.0;
   }

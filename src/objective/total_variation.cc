@@ -1,6 +1,9 @@
 #include "objective/total_variation.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <numeric>
+#include <vector>
 
 #include "base/aligned_buffer.h"
 #include "base/parallel.h"
@@ -57,14 +60,47 @@ kernels::SlabVariation DensityVariation::variation_of(const SlabBatch& batch, st
   return variation;
 }
 
-// The rows beside a pair of slabs, and the flux along y from one row to the next. Padding starts as
-// zeros and stays so.
-struct DensityVariation::Rows {
-  base::AlignedBuffer<float> before, after, flux;
+// Holds the row before a band, the row after each pair of slabs, and the flux along y from one slab
+// to the next. Padding starts as zeros and stays so.
+struct DensityVariation::Rows : Scratch {
+  base::AlignedBuffer<float> before, flux;
+  std::vector<base::AlignedBuffer<float>> after;
 
-  void fit(std::size_t size) {
-    for (base::AlignedBuffer<float>* row : {&before, &after, &flux})
-      if (row->size() != size) row->reset(size);
+  void fit(std::size_t size, int num_pairs) {
+    after.resize(std::max(after.size(), static_cast<std::size_t>(num_pairs)));
+    const auto fit_row = [size](base::AlignedBuffer<float>& row) {
+      if (row.size() != size) row.reset(size);
+    };
+    fit_row(before);
+    fit_row(flux);
+    std::ranges::for_each(after, fit_row);
+  }
+
+  // Decodes the rows beside the slabs of a batch, where there are such rows.
+  void decode(const SlabBatch& batch) {
+    const projection::SlabSampler& sampler = batch.sampler;
+    struct PieceOfRow {
+      std::int64_t row;
+      int piece;
+      float* densities;
+    };
+    std::vector<PieceOfRow> pieces;
+    const auto add = [&](std::int64_t row, float* densities) {
+      const auto slab = static_cast<int>(row / kLanes);
+      for (int piece = 0; piece < sampler.num_pieces(slab); ++piece)
+        pieces.push_back({row, piece, densities});
+    };
+    if (batch.begins_band && batch.slabs.begin > 0)
+      add(std::int64_t{batch.slabs.begin} * kLanes - 1, before.data());
+    for (int pair = 0; pair < batch.num_pairs(); ++pair) {
+      const int next = batch.pair(pair).end;
+      if (next < sampler.num_slabs())
+        add(std::int64_t{next} * kLanes, after[static_cast<std::size_t>(pair)].data());
+    }
+    base::parallel_for("rows beside slabs", std::ssize(pieces), [&](std::int64_t i) {
+      const PieceOfRow& piece = pieces[static_cast<std::size_t>(i)];
+      sampler.decode_row_piece(piece.row, piece.piece, piece.densities);
+    });
   }
 };
 
@@ -74,83 +110,53 @@ struct DensityVariation::SamplesOfSegment {
   base::Range x;
 };
 
-DensityVariation::DensityVariation(double weight, const kernels::VariationPenalty& penalty,
-                                   std::uint64_t seed)
-    : weight_(weight), penalty_(penalty), seed_(seed) {}
+std::unique_ptr<Term::Scratch> DensityVariation::make_scratch() const {
+  return std::make_unique<Rows>();
+}
 
-DensityVariation::~DensityVariation() = default;
-
-double DensityVariation::add_slabs(const Step& step, const SlabBatch& batch,
+double DensityVariation::add_slabs(const Step& step, const SlabBatch& batch, Scratch* scratch,
                                    std::span<measurement::ViewSums>) const {
   if (weight_ <= 0) return 0.0;
-  const auto num_pairs = static_cast<std::size_t>(batch.num_pairs());
-  const auto rows = rows_.borrow();
-  if (rows->size() < num_pairs) rows->resize(num_pairs);
-  for (Rows& of_pair : *rows) of_pair.fit(batch.sampler.row_size());
-  decode_rows(batch, *rows);
-
+  auto& rows = static_cast<Rows&>(*scratch);
+  rows.fit(batch.sampler.row_size(), batch.num_pairs());
+  rows.decode(batch);
   std::vector<SamplesOfSegment> parts;
   for (std::size_t s = 0; s < batch.projector.grid().segments().size(); ++s) {
     for (const base::Range x : base::parts_of(batch.projector.grid().segments()[s].nx, kTaskWidth))
       parts.push_back({s, x});
   }
-  std::vector<double> values(num_pairs * parts.size());
-  base::parallel_for("variation", std::ssize(values), [&](std::int64_t i) {
-    const auto pair = static_cast<std::size_t>(i) / parts.size();
-    values[static_cast<std::size_t>(i)] =
-        add_samples(step, batch, batch.pair(static_cast<std::int64_t>(pair)),
-                    parts[static_cast<std::size_t>(i) % parts.size()], (*rows)[pair]);
+  std::vector<double> values(parts.size());
+  base::parallel_for("variation", std::ssize(parts), [&](std::int64_t i) {
+    const auto part = static_cast<std::size_t>(i);
+    values[part] = add_samples(step, batch, parts[part], rows);
   });
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
-// Decodes the row before and the row after each pair of slabs, where there are such rows.
-void DensityVariation::decode_rows(const SlabBatch& batch, std::span<Rows> rows_of_pair) const {
-  struct PieceOfRow {
-    std::int64_t row;
-    int piece;
-    float* densities;
-  };
-  std::vector<PieceOfRow> pieces;
-  const auto add = [&](int slab, std::int64_t row, float* densities) {
-    if (slab < 0 || slab >= batch.sampler.num_slabs()) return;
-    for (int piece = 0; piece < batch.sampler.num_pieces(slab); ++piece)
-      pieces.push_back({row, piece, densities});
-  };
-  for (int pair = 0; pair < batch.num_pairs(); ++pair) {
-    const base::Range slabs = batch.pair(pair);
-    Rows& rows = rows_of_pair[static_cast<std::size_t>(pair)];
-    add(slabs.begin - 1, std::int64_t{slabs.begin} * kLanes - 1, rows.before.data());
-    add(slabs.end, std::int64_t{slabs.end} * kLanes, rows.after.data());
-  }
-  base::parallel_for("rows beside slabs", std::ssize(pieces), [&](std::int64_t i) {
-    const PieceOfRow& piece = pieces[static_cast<std::size_t>(i)];
-    batch.sampler.decode_row_piece(piece.row, piece.piece, piece.densities);
-  });
-}
-
-// Adds the gradient of some samples of a pair of slabs and returns the value of their terms.
-double DensityVariation::add_samples(const Step& step, const SlabBatch& batch, base::Range slabs,
+// Adds the gradient of some samples of the slabs, one slab after another, and returns the value of
+// their terms.
+double DensityVariation::add_samples(const Step& step, const SlabBatch& batch,
                                      const SamplesOfSegment& part, Rows& rows) const {
   const SampleSegment& segment = batch.projector.grid().segments()[part.segment];
   kernels::SlabVariation variation = variation_of(batch, part.segment, step.number);
   variation.x = part.x;
   variation.flux = rows.flux.data() + batch.sampler.row_origin(part.segment);
-  if (slabs.begin > 0) {
+  if (batch.begins_band && batch.slabs.begin > 0) {
     kernels::row_flux(variation, decoded_row(batch, rows.before.data(), part.segment),
-                      first_row(batch, slabs.begin, part.segment), variation.flux);
-  } else {
+                      first_row(batch, batch.slabs.begin, part.segment), variation.flux);
+  } else if (batch.begins_band) {
     kernels::clear_flux(variation);
   }
   double value = 0.0;
-  for (int slab = slabs.begin; slab < slabs.end; ++slab) {
+  for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab) {
+    const auto pair = static_cast<std::size_t>(slab - batch.slabs.begin) / 2;
     variation.samples = batch.samples(slab) + segment.origin;
     variation.gradient = batch.gradient(slab) + segment.origin;
     variation.num_rows = batch.sampler.rows_in_slab(slab);
     if (slab + 1 == batch.sampler.num_slabs())
       variation.above = {};
-    else if (slab + 1 == slabs.end)
-      variation.above = decoded_row(batch, rows.after.data(), part.segment);
+    else if (slab + 1 == batch.pair(static_cast<std::int64_t>(pair)).end)
+      variation.above = decoded_row(batch, rows.after[pair].data(), part.segment);
     else
       variation.above = first_row(batch, slab + 1, part.segment);
     value += kernels::slab_variation(variation);

@@ -1,11 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
-#include <vector>
 
-#include "base/pool.h"
-#include "base/range.h"
 #include "kernels/total_variation.h"
 #include "objective/term.h"
 
@@ -21,29 +19,28 @@ DifferenceSides difference_sides(std::uint64_t seed, std::int64_t step);
 /// Computes the isotropic total variation of the density on the samples of slabs
 /// (kernels/total_variation.h): weight · Σ penalty(|∇ density|) · area of a sample. Forward
 /// differences alone would treat the two sides of an edge differently, so each step draws the sides
-/// of its differences. A pair of slabs decodes the rows before and after it by itself.
+/// of its differences.
 class DensityVariation : public Term {
  public:
   /// `weight` is per pixel of area and density unit; 0 is off.
-  DensityVariation(double weight, const kernels::VariationPenalty& penalty, std::uint64_t seed);
-  ~DensityVariation() override;
+  DensityVariation(double weight, const kernels::VariationPenalty& penalty, std::uint64_t seed)
+      : weight_(weight), penalty_(penalty), seed_(seed) {}
 
-  double add_slabs(const Step& step, const SlabBatch& batch,
+  std::unique_ptr<Scratch> make_scratch() const override;
+  double add_slabs(const Step& step, const SlabBatch& batch, Scratch* scratch,
                    std::span<measurement::ViewSums> view_sums) const override;
 
  private:
   struct Rows;
   struct SamplesOfSegment;
-  void decode_rows(const SlabBatch& batch, std::span<Rows> rows_of_pair) const;
-  double add_samples(const Step& step, const SlabBatch& batch, base::Range slabs,
-                     const SamplesOfSegment& part, Rows& rows) const;
+  double add_samples(const Step& step, const SlabBatch& batch, const SamplesOfSegment& part,
+                     Rows& rows) const;
   kernels::SlabVariation variation_of(const SlabBatch& batch, std::size_t segment,
                                       std::int64_t step) const;
 
   double weight_;
   kernels::VariationPenalty penalty_;
   std::uint64_t seed_;
-  mutable base::Pool<std::vector<Rows>> rows_;
 };
 
 /// Computes the total variation of the factors of each leaf (field::Field::parameter_variation).
