@@ -84,7 +84,7 @@ def succeed(processes, *arguments):
 def metrics(results):
     with open(results.json_path) as file:
         found = json.load(file)["metrics"]
-    for key in ("seconds", "processes", "threads"):  # of the run, not of the result
+    for key in ("seconds", "processes", "threads", "threads_why"):  # of the run, not of the result
         found.pop(key)
     if found["tuning"]:
         for trial in found["tuning"]["trials"]:
@@ -132,6 +132,18 @@ def test_processes_find_the_beads_together(command):
         succeed(3, *command(shared, *options, *extra, input=gold))
         assert shared.same_as(alone), extra
         assert metrics(shared) == metrics(alone), extra
+
+
+def test_the_first_process_writes_its_trace(command):
+    results = fresh_results("traced")
+    folder = harness.fresh_directory("trace")
+    trace = os.path.join(folder, "trace.json")
+    said = succeed(2, *command(results, "--trace", trace)).stdout
+    assert said.count("trace     ") == 1 and os.listdir(folder) == ["trace.json"], said
+    with open(trace, encoding="utf-8") as file:
+        assert json.load(file)["traceEvents"]
+    refused = mpirun(2, *command(fresh_results("refused"), "--trace", trace))
+    assert refused.returncode == 2 and "give another name with --trace" in refused.stderr, refused
 
 
 def test_each_process_has_its_part(command):
