@@ -146,6 +146,19 @@ def test_the_first_process_writes_its_trace(command):
     assert refused.returncode == 2 and "give another name with --trace" in refused.stderr, refused
 
 
+def test_processes_share_the_threads_of_their_machine(command, monkeypatch):
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    alone = harness.succeed(*command(fresh_results("alone"))).stderr
+    if "one for each of the machine's processors" not in alone:
+        pytest.skip("this process may not use the whole machine")
+    monkeypatch.setenv("OMPI_MCA_hwloc_base_binding_policy", "none")
+    results = fresh_results("threads")
+    said = succeed(2, *command(results)).stderr
+    assert said.count("the share of each of 2 processes on this machine") == 1, said
+    with open(results.json_path, encoding="utf-8") as file:
+        assert json.load(file)["metrics"]["threads"] == max(1, os.cpu_count() // 2)
+
+
 def test_each_process_has_its_part(command):
     results = fresh_results("parts")
     succeed(3, *command(results))
