@@ -68,13 +68,11 @@ def series_arguments(folder, thickness):
 Usage = collections.namedtuple("Usage", "core_seconds peak_MiB wall_seconds")
 
 
-def run_measured(command):
+def run_measured(command, **keywords):
     """Runs a command and returns its Usage, which includes the processes that it started."""
-    # Threads would spin while they wait, and the spinning would count as core-seconds.
-    environment = {"OMP_WAIT_POLICY": "passive", **os.environ}
     start = time.monotonic()
     with tempfile.TemporaryFile("w+") as errors:
-        run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors, env=environment)
+        run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors, **keywords)
         _, status, usage = os.wait4(run.pid, 0)
         run.returncode = os.waitstatus_to_exitcode(status)
         if run.returncode != 0:

@@ -6,6 +6,7 @@ import os
 import re
 import statistics
 
+import measured_on
 import run_file
 
 
@@ -41,8 +42,8 @@ def of_group(run, group):
 
 
 def print_tables(run):
-    print(f"{'; '.join(run['machines'])}; commit {', '.join(run['commits'])}; {run['date']}. "
-          "Medians over repeats ± median absolute deviation.")
+    measured_on.print_origins(run)
+    print("Medians over repeats ± median absolute deviation.")
     for group, print_group in (("kernels", print_kernels),
                                ("reconstructions", print_reconstructions),
                                ("wide", print_wide), ("sizes", print_sizes)):

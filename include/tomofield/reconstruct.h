@@ -78,7 +78,7 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
                            const ProgressCallback& progress = {});
 
 /// Sets the number of threads that the library computes with. 0, the default, means OMP_NUM_THREADS
-/// or else every core. Results have the same bits for any number.
+/// or else the processors that this process may use. Results have the same bits for any number.
 void set_thread_count(int count);
 
 /// Fills in the options that follow from other options, as reconstruct() does. The penalty and its

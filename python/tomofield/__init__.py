@@ -189,5 +189,6 @@ def correlate_shells(first: npt.ArrayLike, second: npt.ArrayLike,
 
 
 def set_thread_count(count: int) -> None:
-    """Compute with this many threads. 0, the default: OMP_NUM_THREADS, or else every core."""
+    """Compute with this many threads. 0, the default: OMP_NUM_THREADS, or else the processors that
+    this process may use."""
     _core.set_thread_count(count)

@@ -84,7 +84,7 @@ Choice choose_count() {
   }
   if (p.allowed < p.online) {
     return {p.allowed,
-            fmt::format("as the affinity mask allows {} processors of {}", p.allowed, p.online)};
+            fmt::format("as the affinity mask allows {} of {} processors", p.allowed, p.online)};
   }
   return {p.online, fmt::format("one for each of the machine's processors")};
 }

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "base/processors.h"
 
 namespace tomofield::base {
 namespace {
@@ -54,6 +57,78 @@ TEST_P(ParallelFor, RethrowsWhatABodyThrows) {
 
 TEST_P(ParallelFor, OneOfManyExceptionsArrives) {
   EXPECT_THROW(parallel_for("test", 64, [](std::int64_t i) { throw static_cast<int>(i); }), int);
+}
+
+TEST_P(ParallelFor, ThreadThatWaitsForAnInnerLoopStartsNoOtherOuterIndex) {
+  std::vector<std::atomic<int>> running(static_cast<std::size_t>(GetParam()));
+  std::atomic<int> shared{0}, inner_calls{0};
+  parallel_for("outer", 40, [&](std::int64_t) {
+    std::atomic<int>& here = running[static_cast<std::size_t>(thread_index())];
+    shared += here++ > 0;
+    parallel_for("inner", 20, [&](std::int64_t) { ++inner_calls; });
+    --here;
+  });
+  EXPECT_EQ(shared.load(), 0);
+  EXPECT_EQ(inner_calls.load(), 40 * 20);
+}
+
+TEST_P(ParallelFor, ExceptionOfAnInnerLoopReachesTheCaller) {
+  const auto run = [] {
+    parallel_for("outer", 8, [](std::int64_t i) {
+      parallel_for("inner", 8, [i](std::int64_t j) {
+        if (i == 3 && j == 5) throw std::runtime_error("inner");
+      });
+    });
+  };
+  EXPECT_THROW(run(), std::runtime_error);
+}
+
+class DescribedThreads : public ::testing::Test {
+ protected:
+  void TearDown() override {
+    unsetenv("OMP_NUM_THREADS");
+    share_machine_with(1);
+    set_thread_count(0);
+  }
+  static bool says(const std::string& text) {
+    return describe_threads().find(text) != std::string::npos;
+  }
+};
+
+TEST_F(DescribedThreads, NumberThatWasAskedFor) {
+  setenv("OMP_NUM_THREADS", "7", 1);  // counts less
+  set_thread_count(3);
+  EXPECT_TRUE(says("3 threads, as asked for; ")) << describe_threads();
+  set_thread_count(1);
+  EXPECT_TRUE(says("1 thread, as asked for; not bound to processors, since "))
+      << describe_threads();
+}
+
+TEST_F(DescribedThreads, NumberOfTheEnvironment) {
+  setenv("OMP_NUM_THREADS", "5", 1);
+  set_thread_count(0);
+  EXPECT_EQ(thread_count(), 5);
+  EXPECT_TRUE(says("5 threads, as OMP_NUM_THREADS says; ")) << describe_threads();
+}
+
+TEST_F(DescribedThreads, NumbersThatAreNoneDoNotCount) {
+  set_thread_count(0);
+  const int usual = thread_count();
+  for (const char* text : {"", "0", "-2", "many"}) {
+    setenv("OMP_NUM_THREADS", text, 1);
+    set_thread_count(0);
+    EXPECT_EQ(thread_count(), usual) << text;
+  }
+}
+
+TEST_F(DescribedThreads, ProcessesOfAJobShareTheMachine) {
+  if (!processors_of_this_process().are_all_usable())
+    GTEST_SKIP() << "this process may not use the whole machine";
+  share_machine_with(100000);
+  EXPECT_EQ(thread_count(), 1);
+  EXPECT_TRUE(says("1 thread, the share of each of 100000 processes on this machine"))
+      << describe_threads();
+  EXPECT_TRUE(says("not bound to processors, since it shares the machine")) << describe_threads();
 }
 
 TEST(ThreadCount, ZeroMeansAllOfTheMachine) {

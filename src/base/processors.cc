@@ -27,10 +27,9 @@ int processors_in_affinity_mask(int online) {
 // Returns the quota that one group sets, in processors.
 std::optional<double> quota_of_version_2(const fs::path& group) {
   std::ifstream file(group / "cpu.max");
-  std::string quota;
-  double period = 0;
-  if (!(file >> quota >> period) || quota == "max" || period <= 0) return std::nullopt;
-  return std::stod(quota) / period;
+  double quota = 0, period = 0;
+  if (!(file >> quota >> period) || quota <= 0 || period <= 0) return std::nullopt;  // "max"
+  return quota / period;
 }
 
 std::optional<double> quota_of_version_1(const fs::path& group) {

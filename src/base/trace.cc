@@ -79,6 +79,8 @@ nlohmann::json json_of(const Event& e) {
 }  // namespace
 
 void trace::start() {
+  const std::lock_guard lock(record().mutex);
+  record().events.clear();
   record().start = Clock::now();
   is_on = true;
 }

@@ -11,7 +11,7 @@ namespace tomofield::base {
 /// exists. Nothing is recorded before start().
 namespace trace {
 
-/// Begins the record, with time 0.
+/// Begins an empty record, with time 0.
 void start();
 inline std::atomic<bool> is_on = false;
 /// Writes the record as a Chrome trace (JSON, "Trace Event Format", for chrome://tracing or

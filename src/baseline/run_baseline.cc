@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
@@ -141,6 +142,7 @@ nlohmann::json metrics_json(const Solution& solution, const VoxelProblem& proble
           {"size_px", {series.roi.width(), series.roi.height(), series.geometry.thickness}},
           {"seconds", seconds},
           {"threads", base::thread_count()},
+          {"threads_why", base::describe_threads()},
           {"mask", output::mask_json(series)},
           {"views", views}};
 }
@@ -221,6 +223,7 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
 
 BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
                              const BaselineOptions& requested, const BaselineProgress& progress) {
+  base::log_info(base::describe_threads());
   BaselineOptions options = requested;
   const BaselinePaths paths = baseline_paths(options.shared.output);
   const bool fit_view_scale = fits_view_scale(options);

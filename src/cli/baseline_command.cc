@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,6 +20,8 @@
 #include "cli/progress_bar.h"
 #include "cli/table_options.h"
 #include "cli/tensorf_command.h"
+#include "cli/trace_option.h"
+#include "distributed/communicator.h"
 #include "output/shared_options.h"
 
 namespace tomofield::cli {
@@ -32,6 +35,7 @@ struct Arguments {
   Method method;
   std::optional<bool> non_negative;
   bool dry_run = false;
+  std::optional<std::filesystem::path> trace;
 };
 
 void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts& method,
@@ -54,6 +58,23 @@ void print_summary(const baseline::BaselineSummary& summary) {
   fmt::print("\n");
 }
 
+// Runs a baseline whose options have been checked.
+void run_method(const baseline::BaselineOptions& options, const baseline::MethodFacts& method,
+                const baseline::BaselinePaths& paths, bool dry_run) {
+  const Options& shared = options.shared;
+  tilt_series::TiltSeriesOptions input = output::series_options(options.files, shared);
+  input.keep_views = !dry_run;
+  const tilt_series::TiltSeries series(input);
+  print_plan(baseline::plan_baseline(series, options), method, shared.axes);
+  if (shared.tune) fmt::print("short trials first, that choose settings by held-out views\n");
+  std::fflush(stdout);  // the plan comes before other output, in a file too
+  if (dry_run) return;
+  print_summary(baseline::run_baseline(series, options,
+                                       {make_progress_bar("tune"), make_progress_bar("baseline")}));
+  fmt::print("tomogram  {}\nmetrics   {}\n", paths.volume.string(), paths.json.string());
+  write_pictures(paths.volume, series, paths.picture_prefix);
+}
+
 template <typename Method>
 void run(Arguments<Method>& arguments) {
   const Options& shared = arguments.choices.options;
@@ -62,18 +83,10 @@ void run(Arguments<Method>& arguments) {
     method.non_negative = arguments.non_negative.value_or(shared.contrast != Contrast::kDark);
   const baseline::BaselineOptions options{arguments.choices.files, shared, method};
   baseline::check_options(options);
-  tilt_series::TiltSeriesOptions input = output::series_options(options.files, shared);
-  input.keep_views = !arguments.dry_run;
-  const tilt_series::TiltSeries series(input);
-  print_plan(baseline::plan_baseline(series, options), method.facts(), shared.axes);
-  if (shared.tune) fmt::print("short trials first, that choose settings by held-out views\n");
-  std::fflush(stdout);  // the plan comes before other output, in a file too
-  if (arguments.dry_run) return;
-  print_summary(baseline::run_baseline(series, options,
-                                       {make_progress_bar("tune"), make_progress_bar("baseline")}));
   const baseline::BaselinePaths paths = baseline::baseline_paths(shared.output);
-  fmt::print("tomogram  {}\nmetrics   {}\n", paths.volume.string(), paths.json.string());
-  write_pictures(paths.volume, series, paths.picture_prefix);
+  check_trace_file(arguments.trace, {paths.volume, paths.json}, options.files, shared.overwrite);
+  run_traced(arguments.dry_run ? std::nullopt : arguments.trace, distributed::Communicator::alone(),
+             [&] { run_method(options, method.facts(), paths, arguments.dry_run); });
 }
 
 // Registers the options of every method.
@@ -120,6 +133,7 @@ std::shared_ptr<Arguments<Method>> add_method(CLI::App& command) {
   add_groups(command, arguments->choices, {Group::kVolume});
   add_run_options(command, *arguments);
   add_common_options(command);
+  add_trace_option(command, arguments->trace);
   add_help_all(command);
   command.callback([arguments] { run(*arguments); });
   return arguments;

@@ -15,7 +15,7 @@ void add_common_options(CLI::App& command) {
                                 "Number of threads; the result is the same for any")
       ->check(number_between(1, kMaxThreads))
       ->type_name("N")
-      ->default_str("all cores, or OMP_NUM_THREADS")
+      ->default_str("the processors that this process may use, or OMP_NUM_THREADS")
       ->group(group);
   command
       .add_option_function<std::string>(

@@ -68,8 +68,9 @@ std::string notes_of(const CLI::Option& option) {
 }
 
 bool is_shown(const CLI::Option& option, CLI::AppFormatMode mode) {
+  if (mode == CLI::AppFormatMode::All) return true;
   const option_table::Row* row = row_of_option(option);
-  return mode == CLI::AppFormatMode::All || row == nullptr || row->is_common;
+  return row == nullptr ? option.get_group() != kHelpAllGroup : row->is_common;
 }
 
 std::string usage_of(const CLI::App& command, const std::string& name) {

@@ -5,8 +5,11 @@
 
 namespace tomofield::cli {
 
+/// The group of options outside of the table that --help-all alone shows.
+inline constexpr const char* kHelpAllGroup = "Diagnosis";
+
 /// Formats help texts for a screen of 100 columns. --help shows the common options of the table
-/// (option_table/rows.h), --help-all shows all.
+/// (option_table/rows.h) and those outside of it, --help-all shows all.
 class HelpFormatter : public CLI::Formatter {
  public:
   std::string make_help(const CLI::App* command, std::string name,

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/log.h"
+#include "base/parallel.h"
 #include "base/version.h"
 #include "cli/commands.h"
 #include "cli/config_file.h"
@@ -121,6 +122,7 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
   // Only the first process prints.
   if (!processes.is_root() && std::freopen("/dev/null", "w", stdout) == nullptr) return 1;
   if (processes.is_root()) base::set_log_sink(print_log);
+  base::share_machine_with(processes.size_on_machine());
   const auto say = [&](const char* message) {
     if (processes.is_root()) fmt::print(stderr, "tomofield: {}\n", message);
   };

@@ -1,10 +1,13 @@
+#include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "cli/commands.h"
 #include "cli/common_options.h"
 #include "cli/help_formatter.h"
 #include "cli/run_reconstruction.h"
 #include "cli/table_options.h"
+#include "cli/trace_option.h"
 #include "reconstruct/options.h"
 #include "reconstruct/reconstruct.h"
 
@@ -16,15 +19,23 @@ using option_table::Group;
 struct Arguments {
   option_table::Choices choices;
   bool dry_run = false;
+  std::optional<std::filesystem::path> trace;
 };
 
 void run(const Arguments& arguments, const distributed::Communicator& processes) {
   reconstruction::ReconstructOptions options =
       reconstruction::run_options(arguments.choices.files, arguments.choices.options);
-  processes.run_collectively([&] { reconstruction::check_options(options); });
+  processes.run_collectively([&] {
+    reconstruction::check_options(options);
+    const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
+    check_trace_file(arguments.trace, {paths.volume, paths.model, paths.json}, options.files,
+                     options.resolved.overwrite);
+  });
   options.input.keep_views = !arguments.dry_run;
-  const tilt_series::TiltSeries series(options.input, processes);
-  run_reconstruction(series, options, arguments.dry_run, processes);
+  run_traced(arguments.dry_run ? std::nullopt : arguments.trace, processes, [&] {
+    const tilt_series::TiltSeries series(options.input, processes);
+    run_reconstruction(series, options, arguments.dry_run, processes);
+  });
 }
 
 }  // namespace
@@ -38,6 +49,7 @@ void add_reconstruct_command(CLI::App& program, const distributed::Communicator&
              {Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume});
   add_run_options(command, arguments->choices, arguments->dry_run);
   add_common_options(command);
+  add_trace_option(command, arguments->trace);
   add_help_all(command);
   command.footer(
       "Example: tomofield reconstruct series.mrc --tlt series.tlt --xf series.xf --bin 4 \\\n"

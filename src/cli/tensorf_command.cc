@@ -1,5 +1,6 @@
 #include "cli/tensorf_command.h"
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -9,6 +10,7 @@
 #include "cli/help_formatter.h"
 #include "cli/run_reconstruction.h"
 #include "cli/table_options.h"
+#include "cli/trace_option.h"
 #include "reconstruct/options.h"
 
 namespace tomofield::cli {
@@ -18,6 +20,7 @@ struct Arguments {
   option_table::Choices choices{{}, baseline::tensorf_defaults()};
   std::optional<bool> non_negative;
   bool dry_run = false;
+  std::optional<std::filesystem::path> trace;
 };
 
 void add_method_options(CLI::App& command, Arguments& arguments) {
@@ -36,12 +39,18 @@ void run(Arguments& arguments) {
       reconstruction::run_options(arguments.choices.files, requested);
   options.field.depth = 0;  // the tree is one node
   reconstruction::check_options(options);
+  const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
+  check_trace_file(arguments.trace, {paths.volume, paths.model, paths.json}, options.files,
+                   options.resolved.overwrite);
   options.input.keep_views = !arguments.dry_run;
-  const tilt_series::TiltSeries series(options.input);
-  options.field.leaf_size = baseline::one_node_size(plan_measurement(series, options.specimen).roi,
-                                                    options.fit.coarse_bin);
-  options.resolved.leaf_size = options.field.leaf_size;
-  run_reconstruction(series, options, arguments.dry_run);
+  const auto& alone = distributed::Communicator::alone();
+  run_traced(arguments.dry_run ? std::nullopt : arguments.trace, alone, [&] {
+    const tilt_series::TiltSeries series(options.input);
+    options.field.leaf_size = baseline::one_node_size(
+        plan_measurement(series, options.specimen).roi, options.fit.coarse_bin);
+    options.resolved.leaf_size = options.field.leaf_size;
+    run_reconstruction(series, options, arguments.dry_run);
+  });
 }
 
 }  // namespace
@@ -57,6 +66,7 @@ void add_tensorf(CLI::App& baseline) {
   add_groups(command, arguments->choices, {option_table::Group::kVolume});
   add_run_options(command, arguments->choices, arguments->dry_run);
   add_common_options(command);
+  add_trace_option(command, arguments->trace);
   add_help_all(command);
   command.callback([arguments] { run(*arguments); });
 }

@@ -9,7 +9,6 @@
 
 #include <cerrno>
 #include <chrono>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <string_view>
@@ -36,8 +35,6 @@ pid_t start(const std::vector<std::string>& command, const std::filesystem::path
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log.c_str(),
                                    O_WRONLY | O_CREAT | O_TRUNC, 0644);
   posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  // OpenMP's threads spin while they wait, and all the longer on a busy machine.
-  setenv("OMP_WAIT_POLICY", "passive", /*overwrite=*/0);
   pid_t child = 0;
   const int fault = posix_spawn(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);

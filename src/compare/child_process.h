@@ -17,8 +17,7 @@ struct ChildResult {
 };
 
 /// Runs `command` (the program's path first) to its end and writes all its output to the file
-/// `log`. It runs as its own process, so that its time and memory are its own. Its threads sleep
-/// while they wait (OMP_WAIT_POLICY, unless it is set), so that core-seconds measure work. Asks
+/// `log`. It runs as its own process, so that its time and memory are its own. Asks
 /// `stop_requested` often; once it returns true, asks the child to stop (SIGTERM) and waits for it.
 /// Throws Error if the log cannot be written or the program cannot be started.
 ChildResult run_child(const std::vector<std::string>& command, const std::filesystem::path& log,

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <csignal>
-#include <cstdlib>
 #include <fstream>
 #include <iterator>
 
@@ -38,12 +37,6 @@ TEST_F(ChildProcess, MeasuresWhatItTook) {
   EXPECT_GE(busy.wall_seconds, 0.5 * busy.core_seconds);
   EXPECT_GT(busy.peak_bytes, 100'000);
   EXPECT_LT(busy.peak_bytes, std::int64_t{1} << 30);
-}
-
-TEST_F(ChildProcess, HasThreadsThatSleepWhileTheyWait) {
-  unsetenv("OMP_WAIT_POLICY");
-  run("echo $OMP_WAIT_POLICY");
-  EXPECT_EQ(said(), "passive\n");
 }
 
 TEST_F(ChildProcess, IsStoppedOnRequest) {

@@ -29,8 +29,9 @@ options that people use, `--help-all` shows all of them. The other commands (`ba
   value that was used.
 - An option with an automatic default takes the word `auto` as well.
 - Unbinned pixels are those of the aligned view before `--bin`; binned pixels are those after it.
-- Only the command line has `--threads N` (default: `OMP_NUM_THREADS`, or every core; the result is
-  the same for any number), `--dry-run` (checks everything and prints the plan) and `--config`.
+- Only the command line has `--threads N` (default: the processors that this process may use, or
+  `OMP_NUM_THREADS`; the result is the same for any number), `--dry-run` (checks everything and prints
+  the plan), `--trace FILE.json` (writes what the run did and when) and `--config`.
 )";
 
 // Escapes what Markdown would take for the end of a cell.

@@ -80,6 +80,7 @@ nlohmann::json metrics_json(const fit::Fit& fit, const measurement::Measurement&
           {"stages", stages_json(fit.stages())},
           {"seconds", seconds},
           {"threads", base::thread_count()},
+          {"threads_why", base::describe_threads()},
           {"mask", mask_json(series)},
           {"views", views}};
 }

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/log.h"
+#include "base/parallel.h"
 #include "base/stopwatch.h"
 #include "fit/fit.h"
 #include "io/scratch_memory.h"
@@ -151,6 +152,7 @@ bool run_with_checkpoints(const Run& run, const FitOrigin& origin, fit::Fit& fit
 
 RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
                       const ReconstructHooks& hooks, const distributed::Communicator& processes) {
+  base::log_info(base::describe_threads());
   Run run{.hooks = hooks,
           .processes = processes,
           .options = options,

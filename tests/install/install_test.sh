@@ -43,7 +43,6 @@ cmake -S "$source_dir/examples" -B "$scratch/examples" -G Ninja -DCMAKE_BUILD_TY
   -DCMAKE_PREFIX_PATH="$scratch/prefix" -DCMAKE_FIND_PACKAGE_NO_PACKAGE_REGISTRY=ON
 cmake --build "$scratch/examples"
 program=$scratch/prefix/bin/tomofield
-export OMP_WAIT_POLICY=passive
 cd "$scratch"
 "$program" simulate cell --size 32 --thickness 16 --noise 0.05 --seed 1 >/dev/null
 "$program" reconstruct cell/tilt_series.mrc --tlt cell/tilt_series.tlt --thickness 16 \

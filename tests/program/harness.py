@@ -15,9 +15,6 @@ import numpy as np
 PROGRAM = os.environ["TOMOFIELD_PROGRAM"]
 SCRATCH = None  # a folder of the running test, or of its module while a module's fixture is made
 
-# Threads would spin while they wait, which takes most of the time of small runs beside other tests.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-
 WIDTH, HEIGHT, THICKNESS = 48, 36, 24
 PIXEL_SIZE = 13.37
 TILTS = np.arange(-60, 61, 6.0)

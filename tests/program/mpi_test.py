@@ -84,7 +84,7 @@ def succeed(processes, *arguments):
 def metrics(results):
     with open(results.json_path) as file:
         found = json.load(file)["metrics"]
-    for key in ("seconds", "processes", "threads"):  # of the run, not of the result
+    for key in ("seconds", "processes", "threads", "threads_why"):  # of the run, not of the result
         found.pop(key)
     if found["tuning"]:
         for trial in found["tuning"]["trials"]:
@@ -132,6 +132,31 @@ def test_processes_find_the_beads_together(command):
         succeed(3, *command(shared, *options, *extra, input=gold))
         assert shared.same_as(alone), extra
         assert metrics(shared) == metrics(alone), extra
+
+
+def test_the_first_process_writes_its_trace(command):
+    results = fresh_results("traced")
+    folder = harness.fresh_directory("trace")
+    trace = os.path.join(folder, "trace.json")
+    said = succeed(2, *command(results, "--trace", trace)).stdout
+    assert said.count("trace     ") == 1 and os.listdir(folder) == ["trace.json"], said
+    with open(trace, encoding="utf-8") as file:
+        assert json.load(file)["traceEvents"]
+    refused = mpirun(2, *command(fresh_results("refused"), "--trace", trace))
+    assert refused.returncode == 2 and "give another name with --trace" in refused.stderr, refused
+
+
+def test_processes_share_the_threads_of_their_machine(command, monkeypatch):
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    alone = harness.succeed(*command(fresh_results("alone"))).stderr
+    if "one for each of the machine's processors" not in alone:
+        pytest.skip("this process may not use the whole machine")
+    monkeypatch.setenv("OMPI_MCA_hwloc_base_binding_policy", "none")
+    results = fresh_results("threads")
+    said = succeed(2, *command(results)).stderr
+    assert said.count("the share of each of 2 processes on this machine") == 1, said
+    with open(results.json_path, encoding="utf-8") as file:
+        assert json.load(file)["metrics"]["threads"] == max(1, os.cpu_count() // 2)
 
 
 def test_each_process_has_its_part(command):
