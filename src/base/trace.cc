@@ -1,5 +1,7 @@
 #include "base/trace.h"
 
+#include <time.h>
+
 #include <chrono>
 #include <fstream>
 #include <mutex>
@@ -19,6 +21,7 @@ struct Event {
   enum class Kind { kSpan, kLoop, kTask } kind;
   const char* name;
   std::int64_t begin, end;  // nanoseconds
+  std::int64_t processor;   // nanoseconds that the thread ran
   int thread = 0;
   std::int64_t loop = kNone, task = kNone, outer_task = kNone, index = 0, count = 0;
   std::int64_t busy = 0, longest = 0;
@@ -43,6 +46,13 @@ thread_local int t_thread = 0;
 std::int64_t now() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - record().start)
       .count();
+}
+
+// Returns the nanoseconds that this thread has run.
+std::int64_t processor_now() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return std::int64_t{1000000000} * time.tv_sec + time.tv_nsec;
 }
 
 void add(const Event& event) {
@@ -73,6 +83,7 @@ nlohmann::json json_of(const Event& e) {
           {"tid", e.thread},
           {"ts", 1e-3 * static_cast<double>(e.begin)},
           {"dur", 1e-3 * static_cast<double>(e.end - e.begin)},
+          {"tdur", 1e-3 * static_cast<double>(e.processor)},
           {"args", args}};
 }
 
@@ -98,7 +109,9 @@ void trace::write(const std::filesystem::path& path) {
   if (!file.flush()) throw Error("cannot write the trace " + path.string());
 }
 
-TraceSpan::TraceSpan(const char* name) : name_(name), begin_(trace::is_on ? now() : kNone) {}
+TraceSpan::TraceSpan(const char* name) : name_(name), begin_(trace::is_on ? now() : kNone) {
+  if (begin_ != kNone) processor_begin_ = processor_now();
+}
 
 TraceSpan::~TraceSpan() {
   if (begin_ == kNone) return;
@@ -106,6 +119,7 @@ TraceSpan::~TraceSpan() {
        .name = name_,
        .begin = begin_,
        .end = now(),
+       .processor = processor_now() - processor_begin_,
        .thread = t_thread});
 }
 
@@ -122,6 +136,7 @@ TraceLoop::TraceLoop(const char* name, std::int64_t count) : name_(name), count_
   id_ = record().next_id++;
   outer_task_ = t_task;
   begin_ = now();
+  processor_begin_ = processor_now();
 }
 
 TraceLoop::~TraceLoop() {
@@ -130,6 +145,7 @@ TraceLoop::~TraceLoop() {
        .name = name_,
        .begin = begin_,
        .end = now(),
+       .processor = processor_now() - processor_begin_,
        .thread = t_thread,
        .loop = id_,
        .outer_task = outer_task_,
@@ -144,6 +160,7 @@ TraceLoop::Task::Task(TraceLoop& of, std::int64_t i, int on_thread)
       id(record().next_id++),
       outer_task(t_task),
       begin(now()),
+      processor_begin(processor_now()),
       thread(on_thread) {
   t_task = id;
   t_thread = thread;
@@ -159,6 +176,7 @@ TraceLoop::Task::~Task() {
        .name = loop.name_,
        .begin = begin,
        .end = end,
+       .processor = processor_now() - processor_begin,
        .thread = thread,
        .loop = loop.id_,
        .task = id,

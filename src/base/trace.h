@@ -15,10 +15,11 @@ namespace trace {
 void start();
 inline std::atomic<bool> is_on = false;
 /// Writes the record as a Chrome trace (JSON, "Trace Event Format", for chrome://tracing or
-/// ui.perfetto.dev). Times are microseconds since start(). A loop has the number of its tasks and
-/// the seconds that all and the longest of them took. Tasks and loops name the loop and the task in
-/// which they ran, so that a reader can rebuild what waited for what. Throws Error if the file
-/// cannot be written.
+/// ui.perfetto.dev). Times are microseconds since start(); `tdur` is the time
+/// that the thread itself ran between the beginning and the end of an event. A loop has the number
+/// of its tasks and the seconds that all and the longest of them took. Tasks and loops name the
+/// loop and the task in which they ran, so that a reader can rebuild what waited for what. Throws
+/// Error if the file cannot be written.
 void write(const std::filesystem::path& path);
 
 }  // namespace trace
@@ -34,7 +35,7 @@ class TraceSpan {
 
  private:
   const char* name_;
-  std::int64_t begin_;
+  std::int64_t begin_, processor_begin_ = 0;
 };
 
 /// Records each task of parallel_for while it exists, if `is_wanted`. One at a time.
@@ -70,12 +71,12 @@ class TraceLoop {
     Task(TraceLoop& of, std::int64_t index, int thread);
     ~Task();
     TraceLoop& loop;
-    std::int64_t index, id, outer_task, begin;
+    std::int64_t index, id, outer_task, begin, processor_begin;
     int thread;
   };
 
   const char* name_;
-  std::int64_t count_, id_ = -1, outer_task_ = -1, begin_ = 0;
+  std::int64_t count_, id_ = -1, outer_task_ = -1, begin_ = 0, processor_begin_ = 0;
   std::atomic<std::int64_t> busy_ = 0, longest_ = 0;  // nanoseconds
 };
 

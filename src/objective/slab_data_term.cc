@@ -31,15 +31,11 @@ double SlabDataTerm::add_slabs(const Step& step, const SlabBatch& batch, Scratch
   projector.fill_padding(batch.all_samples, batch.slabs.size());
 
   const std::vector<base::Range>& ranges = projector.pixel_ranges();
-  const std::int64_t num_parts = batch.num_pairs() * std::ssize(ranges);
-  std::vector<measurement::ViewSums> sums(static_cast<std::size_t>(num_parts) * step.views.size());
-  base::parallel_for("compare with views", num_parts, [&](std::int64_t part) {
-    const base::Range slabs = batch.pair(part / std::ssize(ranges));
-    const auto first_slab = static_cast<std::size_t>(slabs.begin - batch.slabs.begin);
-    add_pixels(step, batch, slabs, ranges[static_cast<std::size_t>(part % std::ssize(ranges))],
-               detector.data() + first_slab * detector_size,
-               std::span(sums).subspan(static_cast<std::size_t>(part) * step.views.size(),
-                                       step.views.size()));
+  std::vector<measurement::ViewSums> sums(ranges.size() * step.views.size());
+  base::parallel_for("compare with views", std::ssize(ranges), [&](std::int64_t i) {
+    const auto range = static_cast<std::size_t>(i);
+    add_pixels(step, batch, ranges[range], detector.data(),
+               std::span(sums).subspan(range * step.views.size(), step.views.size()));
   });
   for (std::size_t i = 0; i < sums.size(); ++i) view_sums[i % step.views.size()] += sums[i];
   for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab) measured_.release(slab);
@@ -47,24 +43,23 @@ double SlabDataTerm::add_slabs(const Step& step, const SlabBatch& batch, Scratch
   return 0.0;
 }
 
-// Predicts some pixels of all views of a pair of slabs and replaces them by the derivatives of the
-// loss. `detector` is that of the first slab; there is one element of `sums` for each view.
-void SlabDataTerm::add_pixels(const Step& step, const SlabBatch& batch, base::Range slabs,
-                              base::Range pixels, float* detector,
-                              std::span<measurement::ViewSums> sums) const {
+// Predicts some pixels of all views and replaces them by the derivatives of the loss. There is one
+// element of `sums` for each view.
+void SlabDataTerm::add_pixels(const Step& step, const SlabBatch& batch, base::Range pixels,
+                              float* detector, std::span<measurement::ViewSums> sums) const {
   const std::int64_t width = batch.projector.geometry().width;
   const std::size_t detector_size = batch.projector.detector_size(step.views.size());
   const auto rays_of = [&](int slab, std::size_t v) {
-    return detector + static_cast<std::size_t>(slab - slabs.begin) * detector_size +
+    return detector + static_cast<std::size_t>(slab - batch.slabs.begin) * detector_size +
            (static_cast<std::int64_t>(v) * width + pixels.begin) * kLanes;
   };
-  for (int slab = slabs.begin; slab < slabs.end; ++slab) {
+  for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab) {
     for (std::size_t v = 0; v < step.views.size(); ++v)
       std::fill_n(rays_of(slab, v), pixels.size() * kLanes, 0.0f);
   }
-  batch.projector.forward_pixels(batch.samples(slabs.begin), batch.crossings, pixels, detector,
-                                 slabs.size());
-  for (int slab = slabs.begin; slab < slabs.end; ++slab) {
+  batch.projector.forward_pixels(batch.all_samples, batch.crossings, pixels, detector,
+                                 batch.slabs.size());
+  for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab) {
     for (std::size_t v = 0; v < step.views.size(); ++v) {
       const int view = step.views[v];
       sums[v] += measurement::data_term(

@@ -24,8 +24,8 @@ class SlabDataTerm : public Term {
 
  private:
   struct Detectors;
-  void add_pixels(const Step& step, const SlabBatch& batch, base::Range slabs, base::Range pixels,
-                  float* detector, std::span<measurement::ViewSums> sums) const;
+  void add_pixels(const Step& step, const SlabBatch& batch, base::Range pixels, float* detector,
+                  std::span<measurement::ViewSums> sums) const;
 
   const measurement::SlabViews& measured_;
 };

@@ -10,12 +10,7 @@
 namespace tomofield::objective {
 namespace {
 
-// A batch has a pair of slabs while there are bands for all threads, and two pairs otherwise: they
-// take more memory, but can be worked on at the same time.
-int slabs_at_once(base::Range own_bands) {
-  constexpr int kPair = projection::SlabProjector::kSlabsTogether;
-  return own_bands.size() >= base::thread_count() ? kPair : 2 * kPair;
-}
+constexpr int kSlabsTogether = projection::SlabProjector::kSlabsTogether;
 
 projection::SlabSampler make_sampler(const SlabObjectiveContext& c) {
   return {c.field, c.projector.grid(), c.first_row, (c.num_rows + c.bin - 1) / c.bin, c.bin};
@@ -99,16 +94,15 @@ std::vector<SlabObjective::BandSums> SlabObjective::add_bands(const Step& step,
 void SlabObjective::add_slabs(const Step& step, int band,
                               const projection::ViewCrossings& crossings, float* gradient,
                               BandSums& sums) const {
-  const int at_once = slabs_at_once(own_bands_);
   const auto workspace = workspaces_.borrow();
-  workspace->fit(static_cast<std::size_t>(at_once) * projector_.grid().size(), terms_);
+  workspace->fit(kSlabsTogether * projector_.grid().size(), terms_);
   const base::Range slabs = sampler_.band(band);
-  for (int slab = slabs.begin; slab < slabs.end; slab += at_once) {
+  for (int slab = slabs.begin; slab < slabs.end; slab += kSlabsTogether) {
     add_batch(step,
               {.sampler = sampler_,
                .projector = projector_,
                .crossings = crossings,
-               .slabs = {slab, std::min(slab + at_once, slabs.end)},
+               .slabs = {slab, std::min(slab + kSlabsTogether, slabs.end)},
                .begins_band = slab == slabs.begin,
                .all_samples = workspace->samples.data(),
                .all_gradients = workspace->gradients.data()},

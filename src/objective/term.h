@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -27,10 +26,9 @@ struct Step {
   double multiplicity = 1.0;  ///< scales the step's views up to the whole series
 };
 
-/// Consecutive slabs of one band that a task works on together: decoded samples, and the gradient
-/// of the loss by them. Slabs follow each other in memory, projector.grid().size() floats each.
-///
-/// The results are the same whether the slabs of a band come in batches of one pair or of more.
+/// A pair of consecutive slabs of one band, or the last slab of an odd number: decoded samples, and
+/// the gradient of the loss by them. Slabs follow each other in memory, projector.grid().size()
+/// floats each.
 struct SlabBatch {
   const projection::SlabSampler& sampler;
   const projection::SlabProjector& projector;
@@ -42,13 +40,6 @@ struct SlabBatch {
 
   float* samples(int slab) const { return all_samples + offset(slab); }
   float* gradient(int slab) const { return all_gradients + offset(slab); }
-
-  int num_pairs() const { return (slabs.size() + 1) / 2; }
-  /// Returns the slabs of a pair; the last pair may have one.
-  base::Range pair(std::int64_t index) const {
-    const int first = slabs.begin + 2 * static_cast<int>(index);
-    return {first, std::min(first + 2, slabs.end)};
-  }
 
  private:
   std::size_t offset(int slab) const {

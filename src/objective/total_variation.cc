@@ -1,6 +1,5 @@
 #include "objective/total_variation.h"
 
-#include <algorithm>
 #include <cstdint>
 #include <numeric>
 #include <vector>
@@ -29,6 +28,14 @@ kernels::DensityRow first_row(const SlabBatch& batch, int slab, std::size_t segm
 kernels::DensityRow decoded_row(const SlabBatch& batch, const float* row, std::size_t segment) {
   return {row + batch.sampler.row_origin(segment), batch.projector.grid().segments()[segment].nz,
           1};
+}
+
+// Returns the first row past a slab; none past the last slab of all.
+kernels::DensityRow row_above(const SlabBatch& batch, int slab, const float* decoded,
+                              std::size_t segment) {
+  if (slab + 1 == batch.sampler.num_slabs()) return {};
+  if (slab + 1 == batch.slabs.end) return decoded_row(batch, decoded, segment);
+  return first_row(batch, slab + 1, segment);
 }
 
 // A task has so many samples along x. Each one computes the flux along x into its first sample
@@ -60,46 +67,31 @@ kernels::SlabVariation DensityVariation::variation_of(const SlabBatch& batch, st
   return variation;
 }
 
-// Holds the row before a band, the row after each pair of slabs, and the flux along y from one slab
-// to the next. Padding starts as zeros and stays so.
+// Holds the row before a band, the row after a batch, and the flux along y from one slab to the
+// next. Padding starts as zeros and stays so.
 struct DensityVariation::Rows : Scratch {
-  base::AlignedBuffer<float> before, flux;
-  std::vector<base::AlignedBuffer<float>> after;
+  base::AlignedBuffer<float> before, after, flux;
 
-  void fit(std::size_t size, int num_pairs) {
-    after.resize(std::max(after.size(), static_cast<std::size_t>(num_pairs)));
-    const auto fit_row = [size](base::AlignedBuffer<float>& row) {
-      if (row.size() != size) row.reset(size);
-    };
-    fit_row(before);
-    fit_row(flux);
-    std::ranges::for_each(after, fit_row);
+  void fit(std::size_t size) {
+    for (base::AlignedBuffer<float>* row : {&before, &after, &flux})
+      if (row->size() != size) row->reset(size);
   }
 
   // Decodes the rows beside the slabs of a batch, where there are such rows.
   void decode(const SlabBatch& batch) {
     const projection::SlabSampler& sampler = batch.sampler;
-    struct PieceOfRow {
-      std::int64_t row;
-      int piece;
-      float* densities;
-    };
-    std::vector<PieceOfRow> pieces;
-    const auto add = [&](std::int64_t row, float* densities) {
-      const auto slab = static_cast<int>(row / kLanes);
-      for (int piece = 0; piece < sampler.num_pieces(slab); ++piece)
-        pieces.push_back({row, piece, densities});
-    };
-    if (batch.begins_band && batch.slabs.begin > 0)
-      add(std::int64_t{batch.slabs.begin} * kLanes - 1, before.data());
-    for (int pair = 0; pair < batch.num_pairs(); ++pair) {
-      const int next = batch.pair(pair).end;
-      if (next < sampler.num_slabs())
-        add(std::int64_t{next} * kLanes, after[static_cast<std::size_t>(pair)].data());
-    }
-    base::parallel_for("rows beside slabs", std::ssize(pieces), [&](std::int64_t i) {
-      const PieceOfRow& piece = pieces[static_cast<std::size_t>(i)];
-      sampler.decode_row_piece(piece.row, piece.piece, piece.densities);
+    const std::int64_t first = std::int64_t{batch.slabs.begin} * kLanes;
+    const std::int64_t end = std::int64_t{batch.slabs.end} * kLanes;
+    const bool has_before = batch.begins_band && batch.slabs.begin > 0;
+    const bool has_after = batch.slabs.end < sampler.num_slabs();
+    const int num_before = has_before ? sampler.num_pieces(batch.slabs.begin - 1) : 0;
+    const int num_after = has_after ? sampler.num_pieces(batch.slabs.end) : 0;
+    base::parallel_for("rows beside slabs", num_before + num_after, [&](std::int64_t i) {
+      const int piece = static_cast<int>(i);
+      if (piece < num_before)
+        sampler.decode_row_piece(first - 1, piece, before.data());
+      else
+        sampler.decode_row_piece(end, piece - num_before, after.data());
     });
   }
 };
@@ -118,7 +110,7 @@ double DensityVariation::add_slabs(const Step& step, const SlabBatch& batch, Scr
                                    std::span<measurement::ViewSums>) const {
   if (weight_ <= 0) return 0.0;
   auto& rows = static_cast<Rows&>(*scratch);
-  rows.fit(batch.sampler.row_size(), batch.num_pairs());
+  rows.fit(batch.sampler.row_size());
   rows.decode(batch);
   std::vector<SamplesOfSegment> parts;
   for (std::size_t s = 0; s < batch.projector.grid().segments().size(); ++s) {
@@ -149,16 +141,10 @@ double DensityVariation::add_samples(const Step& step, const SlabBatch& batch,
   }
   double value = 0.0;
   for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab) {
-    const auto pair = static_cast<std::size_t>(slab - batch.slabs.begin) / 2;
     variation.samples = batch.samples(slab) + segment.origin;
     variation.gradient = batch.gradient(slab) + segment.origin;
     variation.num_rows = batch.sampler.rows_in_slab(slab);
-    if (slab + 1 == batch.sampler.num_slabs())
-      variation.above = {};
-    else if (slab + 1 == batch.pair(static_cast<std::int64_t>(pair)).end)
-      variation.above = decoded_row(batch, rows.after[pair].data(), part.segment);
-    else
-      variation.above = first_row(batch, slab + 1, part.segment);
+    variation.above = row_above(batch, slab, rows.after.data(), part.segment);
     value += kernels::slab_variation(variation);
   }
   return value;

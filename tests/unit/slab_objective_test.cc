@@ -360,13 +360,12 @@ TEST(DensityVariation, StepsTakeDifferencesToEverySide) {
   EXPECT_EQ(seen.size(), 4u);
 }
 
-// With one thread for each of two bands or fewer, a batch has one pair of slabs, otherwise two.
-TEST(SlabObjective, ThreadsAndBatchesChangeNoBit) {
+TEST(SlabObjective, ThreadsChangeNoBit) {
   const SampleGrid grid = projection::make_sample_grid(tilted_geometry(), 0, kWidth, 2);
   const Weights weights = weights_of(0.4, 0.3, 0.3);
   const Problem factors = random_problem(FieldKind::kVm, weights);
-  const Problem leaves_of_two_pairs(field_of_cells(64), grid, weights);
-  for (const Problem* p : {&factors, &leaves_of_two_pairs}) {
+  const Problem high_leaves(field_of_cells(64), grid, weights);
+  for (const Problem* p : {&factors, &high_leaves}) {
     base::set_thread_count(1);
     const Problem::Result alone = p->evaluate();
     for (const int threads : {2, 3, 8}) {
