@@ -38,7 +38,7 @@ std::unique_ptr<SlabViews> make_views(SlabViews::Slabs held = SlabViews::all_sla
       }
     }
   };
-  return std::make_unique<SlabViews>(kShape, held, kUnit, read, "/tmp");
+  return std::make_unique<SlabViews>(kShape, held, kUnit, read_on_all_threads(read), "/tmp");
 }
 
 TEST(SlabViews, SomeSlabsAreThoseOfTheWhole) {

@@ -153,12 +153,13 @@ std::optional<double> estimate_diameter(const BeadViews& views, const BeadSearch
   }
   for (const std::size_t view : lowest_tilts(views)) {
     const MaskedImage image = read_on_all(views, view, processes);
-    base::parallel_for("compare beads", static_cast<std::int64_t>(trials.size()), [&](std::int64_t i) {
-      SizeTrial& trial = trials[static_cast<std::size_t>(i)];
-      const std::vector<Spot> spots = find_spots(image, trial.about_px, kStrong);
-      for (const Spot& spot : spots) trial.strength += spot.strength;
-      trial.profile.add(image, spots);
-    });
+    base::parallel_for("compare beads", static_cast<std::int64_t>(trials.size()),
+                       [&](std::int64_t i) {
+                         SizeTrial& trial = trials[static_cast<std::size_t>(i)];
+                         const std::vector<Spot> spots = find_spots(image, trial.about_px, kStrong);
+                         for (const Spot& spot : spots) trial.strength += spot.strength;
+                         trial.profile.add(image, spots);
+                       });
   }
   const auto best = std::max_element(
       trials.begin(), trials.end(),
