@@ -51,9 +51,17 @@ struct ImaginedSeries {
   }
 };
 
+FitTrials trials_of(ImaginedSeries& series) {
+  return make_trials([&](const std::vector<TrialSettings>& batch) {
+    std::vector<FitTrial> trials;
+    for (const TrialSettings& settings : batch) trials.push_back(series.run(settings));
+    return trials;
+  });
+}
+
 TrialSettings search(ImaginedSeries& series, std::vector<FitTrial>& trials,
                      const SearchSpace& space = {.penalty = false}) {
-  FitTrials search_trials = make_trials([&](const TrialSettings& s) { return series.run(s); });
+  FitTrials search_trials = trials_of(series);
   const TrialSettings found = search_settings({Penalty::kConcave, 9, 24, 30}, space, search_trials);
   trials = search_trials.made();
   return found;
@@ -93,7 +101,7 @@ TEST(SearchSettings, TakesThePenaltyThatPredictsBetterAndItsOwnWeight) {
     const TrialSettings found = search(series, trials, {});
     EXPECT_EQ(found.penalty, smooth_error > 0 ? Penalty::kConcave : Penalty::kSmooth);
     EXPECT_NEAR(found.variation, smooth_error > 0 ? 28 : 10, 1e-9);
-    FitTrials two = make_trials([&](const TrialSettings& s) { return series.run(s); });
+    FitTrials two = trials_of(series);
     EXPECT_EQ(choose_penalty({Penalty::kConcave, 3, 24, 30}, two).penalty, found.penalty);
     EXPECT_EQ(two.made().size(), 2u);
   }
