@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/range.h"
+#include "base/trace.h"
 #include "distributed/gathered_arrays.h"
 #include "option_table/rows.h"
 #include "tomofield/error.h"
@@ -159,6 +160,7 @@ distributed::GatheredArrays own_parts(const fit::Fit& fit) {
 void save(const std::filesystem::path& path, const fit::Fit& fit, const output::ModelInfo& info,
           const output::TrainingState& state,
           const std::map<std::string, std::span<const float>>& moments) {
+  const base::TraceSpan span(moments.empty() ? "write model" : "write checkpoint");
   fit.processes().run_collectively([&] { output::require_finite(fit.field(), path); });
   distributed::GatheredArrays arrays = own_parts(fit);
   const auto source = [&](std::span<const float> values) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/range.h"
+#include "base/trace.h"
 #include "io/json.h"
 #include "output/metrics.h"
 #include "output/shared_options.h"
@@ -32,6 +33,7 @@ void write_picture(const fit::Fit& fit, const measurement::Measurement& series,
 // Returns the errors of the held-out views. Draws one of these views if the run writes files.
 nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& series,
                          const ReconstructOptions& options) {
+  const base::TraceSpan span("score held-out views");
   const measurement::ViewErrors error = fit.held_out_error();
   if (!options.resolved.output.empty())
     write_picture(fit, series, error, output_paths(options.resolved.output).held_out_picture);
