@@ -2,6 +2,10 @@
 
 #include <fmt/core.h>
 
+#include <cstdint>
+#include <vector>
+
+#include "base/parallel.h"
 #include "base/trace.h"
 #include "output/model_file.h"
 #include "report/pictures.h"
@@ -12,12 +16,16 @@ namespace tomofield::cli {
 void write_pictures(const std::filesystem::path& volume, const tilt_series::TiltSeries& series,
                     const std::filesystem::path& prefix) {
   const base::TraceSpan span("draw pictures");
-  fmt::print("pictures ");
-  for (const std::filesystem::path& picture : report::write_slice_pictures(volume, prefix)) {
-    fmt::print(" {}", picture.string());
-  }
+  std::vector<std::filesystem::path> slices;
   const std::filesystem::path mask = prefix.string() + "_mask.png";
-  report::write_mask_picture(series, mask);
+  base::parallel_for("draw pictures", 2, [&](std::int64_t i) {
+    if (i == 0)
+      slices = report::write_slice_pictures(volume, prefix);
+    else
+      report::write_mask_picture(series, mask);
+  });
+  fmt::print("pictures ");
+  for (const std::filesystem::path& picture : slices) fmt::print(" {}", picture.string());
   fmt::print(" {}\n", mask.string());
 }
 

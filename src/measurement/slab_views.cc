@@ -122,8 +122,10 @@ void SlabViews::fill(double unit, const ReadViews& read_views) {
   for (int first = 0; first < num_views; first += at_once) {
     const Range views{first, std::min(first + at_once, num_views)};
     std::vector<ViewBuffer> buffers(static_cast<std::size_t>(views.size()));
-    for (ViewBuffer& buffer : buffers)
-      buffer = {std::vector<float>(pixels), std::vector<std::uint8_t>(pixels)};
+    base::parallel_for("make buffers", std::ssize(buffers), [&](std::int64_t i) {
+      buffers[static_cast<std::size_t>(i)] = {std::vector<float>(pixels),
+                                              std::vector<std::uint8_t>(pixels)};
+    });
     read_views(views, buffers);
     base::parallel_for("fill slabs", held_.size(), [&](std::int64_t s) {
       const int slab = held_.begin + static_cast<int>(s);

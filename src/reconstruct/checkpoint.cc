@@ -160,7 +160,6 @@ distributed::GatheredArrays own_parts(const fit::Fit& fit) {
 void save(const std::filesystem::path& path, const fit::Fit& fit, const output::ModelInfo& info,
           const output::TrainingState& state,
           const std::map<std::string, std::span<const float>>& moments) {
-  const base::TraceSpan span(moments.empty() ? "write model" : "write checkpoint");
   fit.processes().run_collectively([&] { output::require_finite(fit.field(), path); });
   distributed::GatheredArrays arrays = own_parts(fit);
   const auto source = [&](std::span<const float> values) {
@@ -214,6 +213,7 @@ void save_fit(const std::filesystem::path& path, const fit::Fit& fit, const outp
 
 void save_checkpoint(const std::filesystem::path& path, const fit::Fit& fit,
                      const output::ModelInfo& info, const FitOrigin& origin) {
+  const base::TraceSpan span("write checkpoint");
   output::TrainingState state = progress_state(fit, origin);
   const fit::Adam::State& adam = fit.optimizer().state();
   std::vector<std::int64_t> leaf_steps(adam.leaf_steps.size());

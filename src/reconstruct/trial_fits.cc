@@ -42,10 +42,10 @@ class TrialFits::Running {
     const bool is_last = fit_->is_done();
     part_done_ = is_last ? 1.0 : fit_->work(fit_->progress().step) / fit_->work(fit_->num_steps());
     const auto& errors = fit_->progress().held_out_error;
-    detail_ = fmt::format("{} tv {:.3g}  rank {}  epochs {}  held out {}",
-                          base::name_of(settings_.penalty), settings_.variation, settings_.rank,
-                          settings_.epochs,
-                          errors.empty() ? "-" : fmt::format("{:.4f}", errors.back()));
+    detail_ =
+        fmt::format("{} tv {:.3g}  rank {}  epochs {}  held out {}",
+                    base::name_of(settings_.penalty), settings_.variation, settings_.rank,
+                    settings_.epochs, errors.empty() ? "-" : fmt::format("{:.4f}", errors.back()));
     measurement::ViewErrors error;
     if (is_last) error = fit_->held_out_error();
     seconds_ += stopwatch.seconds();
@@ -96,8 +96,8 @@ std::vector<FitTrial> TrialFits::run(const std::vector<TrialSettings>& batch,
   processes_.run_collectively([&] {
     for (std::size_t i = 0; i < trials.size() && file && processes_.is_root(); ++i) {
       if (!trials[i] || known[i]) continue;
-      file->add(selection::trial_json(settings_json(batch[i]), trials[i]->score,
-                                      trials[i]->seconds));
+      file->add(
+          selection::trial_json(settings_json(batch[i]), trials[i]->score, trials[i]->seconds));
     }
   });
   if (was_stopped) throw StopRequested();

@@ -26,8 +26,8 @@ class TrialFits {
 
   /// Makes a trial with each of these settings. Takes those that `file` has from it, and adds the
   /// others to it; the root alone uses it, and it may be null. After every step it calls the hooks,
-  /// in the calling thread. Throws StopRequested if a stop was requested; `file` then has the trials
-  /// that were finished. Every process calls it and gets the same trials.
+  /// in the calling thread. Throws StopRequested if a stop was requested; `file` then has the
+  /// trials that were finished. Every process calls it and gets the same trials.
   std::vector<FitTrial> run(const std::vector<TrialSettings>& batch, selection::TrialFile* file);
 
   const std::vector<int>& predicted_views() const { return views_.predicted; }

@@ -49,8 +49,8 @@ fit::FitOptions penalty_trial_options(const fit::FieldOptions& plain,
 // stop was requested.
 std::optional<TunedFit> searched(TrialFits& fits, selection::TrialFile* file,
                                  const std::function<TrialSettings(FitTrials&)>& search) {
-  FitTrials trials = make_trials(
-      [&](const std::vector<TrialSettings>& batch) { return fits.run(batch, file); });
+  FitTrials trials =
+      make_trials([&](const std::vector<TrialSettings>& batch) { return fits.run(batch, file); });
   try {
     const TrialSettings found = search(trials);
     return TunedFit{found, trials.made(), fits.predicted_views()};

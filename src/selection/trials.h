@@ -37,8 +37,8 @@ template <typename Settings>
 class Trials {
  public:
   /// Makes a trial with each of these settings, which all differ, and returns them in this order.
-  /// The trials do not depend on each other, so they may be made at the same time. The same settings
-  /// always give the same score.
+  /// The trials do not depend on each other, so they may be made at the same time. The same
+  /// settings always give the same score.
   using RunTrials = std::function<std::vector<Trial<Settings>>(const std::vector<Settings>&)>;
   using RunTrial = std::function<Trial<Settings>(const Settings&)>;
   using AreEqual = std::function<bool(const Settings&, const Settings&)>;
@@ -47,13 +47,12 @@ class Trials {
       : run_(std::move(run)), are_equal_(std::move(are_equal)) {}
   /// Makes one trial after another.
   Trials(RunTrial run, AreEqual are_equal)
-      : Trials(
-            RunTrials([run = std::move(run)](const std::vector<Settings>& all) {
-              std::vector<Trial<Settings>> trials;
-              for (const Settings& settings : all) trials.push_back(run(settings));
-              return trials;
-            }),
-            std::move(are_equal)) {}
+      : Trials(RunTrials([run = std::move(run)](const std::vector<Settings>& all) {
+                 std::vector<Trial<Settings>> trials;
+                 for (const Settings& settings : all) trials.push_back(run(settings));
+                 return trials;
+               }),
+               std::move(are_equal)) {}
 
   /// Makes those of these trials that there are not yet, all of them together.
   void make(const std::vector<Settings>& wanted) {

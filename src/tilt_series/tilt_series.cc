@@ -243,6 +243,7 @@ struct TiltSeries::Impl {
       intensity.convert(&image);
       return image;
     };
+    bead_views.at_once = views_at_once(decoder.memory(), processes);
     beads = find_bead_masks(options, plan, *stack, bead_views, processes);
     beads.metrics.num_bad_pixels = num_bad_pixels;
     aligned.reset();
