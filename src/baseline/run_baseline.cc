@@ -12,6 +12,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
+#include "base/trace.h"
 #include "baseline/tune.h"
 #include "baseline/voxel_problem.h"
 #include "io/json.h"
@@ -243,9 +244,12 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays, series.noise_sigma,
                        {held_out, fit_view_scale});
   const base::Stopwatch running;
-  Solution solution =
-      reconstruct(problem, options.method, series.mean_density,
-                  report_to(progress.reconstruction, facts_of(options.method), problem.num_rays()));
+  Solution solution = [&] {
+    const base::TraceSpan span("solve");
+    return reconstruct(
+        problem, options.method, series.mean_density,
+        report_to(progress.reconstruction, facts_of(options.method), problem.num_rays()));
+  }();
   const double fit_seconds = running.seconds();
   const MethodSize size = size_of(options.method, problem.grid(), problem.num_rows());
   nlohmann::json metrics =

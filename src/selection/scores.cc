@@ -54,7 +54,7 @@ double search_weight(double first, const ScoreOfWeight& score, const ExpectWeigh
     if (expect) expect(weights);
   };
   // Takes coarse steps until the best weight has a worse one on either side, and then finer ones.
-  expect_factors({1, 4.0});
+  expect_factors({4.0, 1});
   for (const double factor : {4.0, 0.25}) {
     for (int step = 0; step < kMaxSteps && error_of(factor) < error_of(1); ++step) best *= factor;
   }
