@@ -129,9 +129,9 @@ std::vector<std::size_t> own_views(base::Range views, const distributed::Communi
 void take_views(const tilt_series::TiltSeries& series, base::Range views,
                 const distributed::Communicator& processes, std::span<ViewBuffer> buffers) {
   const std::vector<std::size_t> own = own_views(views, processes);
+  const std::size_t at_once = tilt_series::views_at_once(series.decoding_memory(), processes);
   processes.run_collectively([&] {
-    base::parallel_for("read views", std::ssize(own), [&](std::int64_t i) {
-      const std::size_t view = own[static_cast<std::size_t>(i)];
+    tilt_series::for_views("read views", own, at_once, [&](std::size_t view) {
       ViewBuffer& buffer = buffers[view - static_cast<std::size_t>(views.begin)];
       series.read_view(view, buffer.image, buffer.valid);
       series.forget_view(view);
