@@ -34,6 +34,9 @@ class Random {
     return result;
   }
 
+  /// Goes on as if bits() had been called `count` times. Takes microseconds, whatever the count.
+  void skip(std::uint64_t count);
+
   /// Returns a number that is uniform in [0, 1).
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }

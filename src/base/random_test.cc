@@ -28,6 +28,20 @@ TEST(Random, SequenceIsTheSameForEver) {
   }
 }
 
+TEST(Random, SkippedNumbersAreThoseThatWereNotTaken) {
+  for (const std::uint64_t count : {0u, 1u, 2u, 63u, 255u, 256u, 257u, 1000u, 123457u}) {
+    Random taken(3, 9), skipped(3, 9);
+    for (std::uint64_t i = 0; i < count; ++i) taken.bits();
+    skipped.skip(count);
+    for (int i = 0; i < 5; ++i) ASSERT_EQ(skipped.bits(), taken.bits()) << count;
+  }
+  Random twice(4), once(4);
+  twice.skip(std::uint64_t{1} << 62);
+  twice.skip(std::uint64_t{1} << 62);
+  once.skip(std::uint64_t{1} << 63);
+  EXPECT_EQ(twice.bits(), once.bits());
+}
+
 TEST(Random, NumbersAreUniform) {
   constexpr int kBins = 64, kCount = 64000;
   Random random(5, 2);

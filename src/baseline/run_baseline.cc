@@ -12,6 +12,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
+#include "base/trace.h"
 #include "baseline/tune.h"
 #include "baseline/voxel_problem.h"
 #include "io/json.h"
@@ -48,7 +49,8 @@ bool fits_view_scale(const BaselineOptions& options) {
 // for each thread. A tuning holds copies of the rays of its rows.
 std::size_t estimate_memory(const measurement::Measurement& plan,
                             const projection::SampleGrid& grid, const MethodFacts& method,
-                            const MethodSize& size, std::size_t stored_views, bool tunes) {
+                            const MethodSize& size, std::size_t stored_views, std::size_t decoding,
+                            bool tunes) {
   constexpr std::size_t kTrialSlabs = selection::kTrialRows / kLanes;
   constexpr std::size_t kFixed = std::size_t{24} << 20;  // program and libraries
   const std::size_t slabs = static_cast<std::size_t>((plan.roi.height() + kLanes - 1) / kLanes);
@@ -64,8 +66,8 @@ std::size_t estimate_memory(const measurement::Measurement& plan,
       sizeof(float) * (slabs * values_of_slab + copied_slabs * rays +
                        static_cast<std::size_t>(base::thread_count()) * values_of_thread);
   // The stored views make room for the rays one by one.
-  return kFixed + std::max(running, decoding_memory(plan) +
-                                        std::max(sizeof(float) * slabs * rays, stored_views));
+  return kFixed +
+         std::max(running, decoding + std::max(sizeof(float) * slabs * rays, stored_views));
 }
 
 base::ProgressReport progress_report(const IterationReport& report, int num_iterations,
@@ -212,7 +214,7 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
   plan.num_parameters = size.num_parameters;
   plan.memory_bytes = estimate_memory(planned, grid, facts_of(options.method), size,
                                       series.stored_memory(distributed::Communicator::alone()),
-                                      options.shared.tune);
+                                      decoding_memory(series, planned), options.shared.tune);
   const std::string advice = fmt::format(
       "use a larger --bin or --margin-spacing, a smaller --roi or --thickness, or fewer "
       "--threads{}",
@@ -242,9 +244,12 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays, series.noise_sigma,
                        {held_out, fit_view_scale});
   const base::Stopwatch running;
-  Solution solution =
-      reconstruct(problem, options.method, series.mean_density,
-                  report_to(progress.reconstruction, facts_of(options.method), problem.num_rays()));
+  Solution solution = [&] {
+    const base::TraceSpan span("solve");
+    return reconstruct(
+        problem, options.method, series.mean_density,
+        report_to(progress.reconstruction, facts_of(options.method), problem.num_rays()));
+  }();
   const double fit_seconds = running.seconds();
   const MethodSize size = size_of(options.method, problem.grid(), problem.num_rows());
   nlohmann::json metrics =

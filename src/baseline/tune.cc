@@ -11,6 +11,7 @@
 
 #include "base/log.h"
 #include "base/stopwatch.h"
+#include "base/trace.h"
 #include "baseline/voxel_problem.h"
 #include "selection/scores.h"
 #include "selection/trial_file.h"
@@ -230,6 +231,7 @@ Method tuned(Options options, TrialRuns& runs, Trials& trials) {
 }  // namespace
 
 Tuned tune(const Method& start, const TrialData& data, const base::ProgressSink& progress) {
+  const base::TraceSpan span("trials");
   TrialRuns runs(data, progress);
   Trials trials([&](const Method& method) { return runs.whole_run(method); },
                 [](const Method& a, const Method& b) { return json_of(a) == json_of(b); });

@@ -55,13 +55,15 @@ void Field::allocate() {
 }
 
 void Field::initialise(base::Random random, double scale) {
-  // Leaves that are not kept are drawn too, so that values do not depend on which leaves are kept.
-  for (int leaf = 0; leaf < tree_.num_leaves(); ++leaf) {
-    for (std::size_t i = offset(leaf); i < offset(leaf + 1); ++i) {
-      const float value = static_cast<float>(random.uniform(-scale, scale));
-      if (keeps(leaf)) parameters_[i] = value;
-    }
-  }
+  // Every parameter takes one number of the sequence, whichever leaves are kept.
+  base::parallel_for("initialise leaves", tree_.num_leaves(), [&](std::int64_t i) {
+    const int leaf = static_cast<int>(i);
+    if (!keeps(leaf)) return;
+    base::Random of_leaf = random;
+    of_leaf.skip(offset(leaf));
+    for (std::size_t at = offset(leaf); at < offset(leaf + 1); ++at)
+      parameters_[at] = static_cast<float>(of_leaf.uniform(-scale, scale));
+  });
 }
 
 void Field::keep_only(const std::vector<int>& leaves) {

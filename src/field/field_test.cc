@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/enum_names.h"
+#include "base/parallel.h"
 #include "central_difference.h"
 #include "field/array_variation.h"
 #include "random_arrays.h"
@@ -435,6 +436,29 @@ TEST_P(EachField, InitialDensitiesAreThoseOfTheBias) {
   const double expected = std::log1p(std::exp(4.0 * 0.25)) / 4.0;
   EXPECT_NEAR(field->density(3, 33, 17), expected, 0.011);
   EXPECT_NE(field->density(3, 33, 17), expected);
+}
+
+TEST_P(EachField, InitialParametersDependOnNeitherThreadsNorTheLeavesThatAreKept) {
+  const auto initial = [&](int threads, const std::vector<int>& kept) {
+    base::set_thread_count(threads);
+    auto field = two_cells(GetParam(), 4.0f);
+    std::ranges::fill(field->parameters(), 0.0f);
+    field->keep_only(kept);
+    field->initialise(base::Random(9), 0.01);
+    base::set_thread_count(0);
+    return field;
+  };
+  const auto all = initial(1, {});
+  base::Random random(9);
+  for (const float value : all->parameters())
+    ASSERT_EQ(value, static_cast<float>(random.uniform(-0.01, 0.01)));
+  const auto on_three = initial(3, {}), second = initial(3, {1});
+  for (std::size_t i = 0; i < all->num_parameters(); ++i) {
+    ASSERT_EQ(on_three->parameters()[i], all->parameters()[i]);
+    ASSERT_EQ(second->parameters()[i], i < all->offset(1)   ? 0.0f
+                                       : i < all->offset(2) ? all->parameters()[i]
+                                                            : 0.0f);
+  }
 }
 
 TEST(Field, HasTheKindThatItWasMadeWith) {

@@ -20,16 +20,36 @@ namespace {
 
 using kernels::kLanes;
 
-// Returns line integrals of a slab: [view, x, lane].
-base::AlignedBuffer<float> predict(const projection::SlabSampler& sampler,
-                                   const projection::SlabProjector& projector,
-                                   std::span<const int> views, int slab) {
-  base::AlignedBuffer<float> samples(projector.grid().size());
-  base::AlignedBuffer<float> rays(projector.detector_size(views.size()));
-  sampler.decode(slab, samples.data());
-  projector.forward(samples.data(), views, rays.data());
-  return rays;
-}
+// Computes line integrals of slabs. Each thread keeps its buffers from one slab to the next.
+class Predictor {
+ public:
+  Predictor(const projection::SlabSampler& sampler, const projection::SlabProjector& projector,
+            std::span<const int> views)
+      : sampler_(sampler),
+        projector_(projector),
+        views_(views),
+        buffers_(static_cast<std::size_t>(base::thread_count())) {}
+
+  // Returns [view, x, lane], valid until this thread asks for another slab.
+  float* rays_of(int slab) {
+    Buffers& b = buffers_[static_cast<std::size_t>(base::thread_index())];
+    b.samples.reserve(projector_.grid().size());
+    b.rays.reserve(projector_.detector_size(views_.size()));
+    b.rays.fill(0.0f);
+    sampler_.decode(slab, b.samples.data());
+    projector_.forward(b.samples.data(), views_, b.rays.data());
+    return b.rays.data();
+  }
+
+ private:
+  struct Buffers {
+    base::AlignedBuffer<float> samples, rays;
+  };
+  const projection::SlabSampler& sampler_;
+  const projection::SlabProjector& projector_;
+  std::span<const int> views_;
+  std::vector<Buffers> buffers_;
+};
 
 SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
                        const projection::SlabProjector& projector, const SlabViews& measured,
@@ -37,13 +57,14 @@ SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
   const std::int64_t width = projector.geometry().width;
   const auto num_slabs = static_cast<std::size_t>(measured.num_slabs());
   std::vector<ViewSums> all(num_slabs * views.size());
+  Predictor predictor(sampler, projector, views);
   base::parallel_for("predict held-out views", measured.held().size(), [&](std::int64_t s) {
     const int slab = measured.held().begin + static_cast<int>(s);
-    auto rays = predict(sampler, projector, views, slab);
+    float* rays = predictor.rays_of(slab);
     for (std::size_t v = 0; v < views.size(); ++v) {
       all[static_cast<std::size_t>(slab) * views.size() + v] =
           data_term({}, 1.0, measured.rays(slab, views[v]), measured.mask(slab, views[v]), width,
-                    rays.data() + static_cast<std::ptrdiff_t>(v) * width * kLanes);
+                    rays + static_cast<std::ptrdiff_t>(v) * width * kLanes);
     }
     measured.release(slab);
   });
@@ -109,19 +130,22 @@ PredictedView predicted_view(const projection::SlabSampler& sampler,
                        .height = shape.num_rows,
                        .measured = std::vector<float>(size),
                        .predicted = std::vector<float>(size)};
-  for (int slab = measured.held().begin; slab < measured.held().end; ++slab) {
-    const auto rays = predict(sampler, projector, std::span(&view, 1), slab);
+  Predictor predictor(sampler, projector, std::span(&view, 1));
+  base::parallel_for("predict view", measured.held().size(), [&](std::int64_t s) {
+    const int slab = measured.held().begin + static_cast<int>(s);
+    const float* rays = predictor.rays_of(slab);
     const std::int64_t rows = std::min<std::int64_t>(kLanes, shape.num_rows - slab * kLanes);
     for (std::int64_t lane = 0; lane < rows; ++lane)
       for (std::int64_t x = 0; x < shape.width; ++x) {
         const std::int64_t y = slab * kLanes + lane;
         const auto at = static_cast<std::size_t>(y * shape.width + x);
-        const double p = static_cast<double>(rays.data()[x * kLanes + lane]);
+        const double p = static_cast<double>(rays[x * kLanes + lane]);
         result.predicted[at] = static_cast<float>(model.scale * p + model.offset);
         result.measured[at] = measured.counts(view, x, y) ? measured.ray(view, x, y)
                                                           : std::numeric_limits<float>::quiet_NaN();
       }
-  }
+    measured.release(slab);
+  });
   processes.allreduce_sum(std::span(result.measured));
   processes.allreduce_sum(std::span(result.predicted));
   return result;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/check.h"
+#include "base/trace.h"
 
 namespace tomofield::measurement {
 namespace {
@@ -30,6 +31,7 @@ SlabViews::Shape Measurement::rays_shape() const {
 Measurement binned(const Measurement& fine, int bin) {
   Measurement coarse = fine;
   if (bin == 1) return coarse;
+  const base::TraceSpan span("bin views");
   coarse.rays = fine.rays->binned(bin);
   coarse.geometry.width = coarse.rays->shape().width;
   coarse.geometry.height = coarse.rays->shape().height;
@@ -43,6 +45,7 @@ Measurement binned(const Measurement& fine, int bin) {
 Measurement middle_rows(const Measurement& whole, std::int64_t max_rows, std::span<const int> views,
                         const distributed::Communicator& processes) {
   TOMOFIELD_CHECK(!whole.ray_geometry, "rays of views as recorded do not stay in their row");
+  const base::TraceSpan span("copy rows");
   Measurement part = whole;
   part.rays = whole.rays->middle_rows(max_rows, views, processes);
   const std::int64_t all_rows = whole.rays->shape().num_rows;

@@ -11,7 +11,10 @@
 
 #include "base/check.h"
 #include "base/log.h"
+#include "base/parallel.h"
+#include "base/trace.h"
 #include "tilt_series/view_owner.h"
+#include "tilt_series/views_at_once.h"
 #include "tomofield/error.h"
 
 namespace tomofield::measurement {
@@ -113,36 +116,57 @@ ViewBrightness view_brightness(std::span<const float> image, std::span<const std
   return {mean, std::sqrt(std::max(variance - noise * noise, 1e-4 * variance))};
 }
 
-// Gives a view to all processes: its owner reads, forgets and broadcasts it.
-void take_view(const tilt_series::TiltSeries& series, std::size_t view,
-               const distributed::Communicator& processes, std::span<float> image,
-               std::span<std::uint8_t> valid) {
+// Returns the views that this process owns, of those from `views.begin` on.
+std::vector<std::size_t> own_views(base::Range views, const distributed::Communicator& processes) {
+  std::vector<std::size_t> own;
+  for (int view = views.begin; view < views.end; ++view)
+    if (tilt_series::is_own_view(static_cast<std::size_t>(view), processes))
+      own.push_back(static_cast<std::size_t>(view));
+  return own;
+}
+
+// Gives some views to all processes: their owners read, forget and broadcast them.
+void take_views(const tilt_series::TiltSeries& series, base::Range views,
+                const distributed::Communicator& processes, std::span<ViewBuffer> buffers) {
+  const std::vector<std::size_t> own = own_views(views, processes);
+  const std::size_t at_once = tilt_series::views_at_once(series.decoding_memory(), processes);
   processes.run_collectively([&] {
-    if (!tilt_series::is_own_view(view, processes)) return;
-    series.read_view(view, image, valid);
-    series.forget_view(view);
+    tilt_series::for_views("read views", own, at_once, [&](std::size_t view) {
+      ViewBuffer& buffer = buffers[view - static_cast<std::size_t>(views.begin)];
+      series.read_view(view, buffer.image, buffer.valid);
+      series.forget_view(view);
+    });
   });
-  const int owner = tilt_series::owner_of_view(view, processes);
-  processes.broadcast(std::as_writable_bytes(image), owner);
-  processes.broadcast(std::as_writable_bytes(valid), owner);
+  for (int i = 0; i < views.size(); ++i) {
+    ViewBuffer& buffer = buffers[static_cast<std::size_t>(i)];
+    const int owner =
+        tilt_series::owner_of_view(static_cast<std::size_t>(views.begin + i), processes);
+    processes.broadcast(std::as_writable_bytes(std::span(buffer.image)), owner);
+    processes.broadcast(std::as_writable_bytes(std::span(buffer.valid)), owner);
+  }
 }
 
 // Measures the brightness of every view; each process measures the views that it owns.
 std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& series,
                                                 const SlabViews::Shape& shape,
                                                 const distributed::Communicator& processes) {
+  const base::TraceSpan span("measure brightness");
   const std::size_t first = static_cast<std::size_t>(shape.first_row * shape.width);
   const std::size_t count = static_cast<std::size_t>(shape.num_rows * shape.width);
-  std::vector<float> image(static_cast<std::size_t>(shape.width * shape.height));
-  std::vector<std::uint8_t> valid(image.size());
+  const auto pixels = static_cast<std::size_t>(shape.width * shape.height);
   std::vector<ViewBrightness> views(shape.num_views);
-  for (std::size_t view = 0; view < views.size(); ++view) {
-    if (!tilt_series::is_own_view(view, processes)) continue;
+  const auto measure = [&](std::size_t view) {
+    std::vector<float> image(pixels);
+    std::vector<std::uint8_t> valid(pixels);
     series.read_view(view, image, valid);
     views[view] =
         view_brightness(std::span(image).subspan(first, count),
                         std::span(valid).subspan(first, count), series.noise_sigma()[view]);
-  }
+  };
+  const std::vector<std::size_t> own = own_views({0, static_cast<int>(shape.num_views)}, processes);
+  const std::size_t at_once = tilt_series::views_at_once(series.decoding_memory(), processes);
+  processes.run_collectively(
+      [&] { tilt_series::for_views("measure brightness", own, at_once, measure); });
   processes.allreduce_sum(std::span(views), &ViewBrightness::mean, &ViewBrightness::contrast);
   return views;
 }
@@ -169,9 +193,10 @@ void set_unit(const std::vector<ViewBrightness>& views, Measurement& prepared) {
 
 std::vector<double> masked_parts(const SlabViews& rays,
                                  const distributed::Communicator& processes) {
-  std::vector<std::int64_t> valid;
-  for (int view = 0; view < static_cast<int>(rays.shape().num_views); ++view)
-    valid.push_back(rays.num_valid(view));
+  std::vector<std::int64_t> valid(rays.shape().num_views);
+  base::parallel_for("count rays", std::ssize(valid), [&](std::int64_t view) {
+    valid[static_cast<std::size_t>(view)] = rays.num_valid(static_cast<int>(view));
+  });
   processes.allreduce_sum(std::span(valid));
   const auto num_rays = static_cast<double>(rays.shape().width * rays.shape().num_rows);
   std::vector<double> masked;
@@ -205,12 +230,13 @@ std::vector<std::string> SpecimenOptions::faults() const {
   return found;
 }
 
-std::size_t decoding_memory(const Measurement& plan) {
-  constexpr double kBytesPerPixel = 5;
-  constexpr double kCopies = 3;
-  const double binned = static_cast<double>(plan.geometry.width * plan.geometry.height);
-  const double raw = binned * plan.bin_factor * plan.bin_factor;
-  return static_cast<std::size_t>(kCopies * kBytesPerPixel * (raw + binned));
+std::size_t decoding_memory(const tilt_series::TiltSeries& series, const Measurement& plan,
+                            const distributed::Communicator& processes) {
+  const std::size_t of_view = series.decoding_memory();
+  const std::size_t num_views =
+      std::min({tilt_series::views_at_once(of_view, processes), series.views().size(),
+                static_cast<std::size_t>(base::thread_count())});
+  return num_views * of_view + SlabViews::filling_memory(plan.rays_shape());
 }
 
 Measurement plan_measurement(const tilt_series::TiltSeries& series,
@@ -260,12 +286,15 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
     prepared.noise_sigma.push_back(sigma / prepared.unit);
   const base::Range slabs =
       slabs_of_bands(own_bands(shape.num_rows, band_rows, processes), band_rows, shape.num_rows);
-  prepared.rays = std::make_shared<SlabViews>(
-      shape, slabs, prepared.unit,
-      [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
-        take_view(series, view, processes, image, valid);
-      },
-      scratch_dir);
+  {
+    const base::TraceSpan span("fill slabs");
+    prepared.rays = std::make_shared<SlabViews>(
+        shape, slabs, prepared.unit,
+        [&](base::Range views, std::span<ViewBuffer> buffers) {
+          take_views(series, views, processes, buffers);
+        },
+        scratch_dir);
+  }
   prepared.masks = series.mask_metrics();
   prepared.masked_part = masked_parts(*prepared.rays, processes);
   log_masks(prepared);

@@ -33,9 +33,11 @@ struct SpecimenOptions {
 Measurement plan_measurement(const tilt_series::TiltSeries& series,
                              const SpecimenOptions& specimen);
 
-/// Returns the bytes that decoding a view takes, besides what is kept of the views: its raw pixels,
-/// aligned and as they are, with their masks, and what becomes of them.
-std::size_t decoding_memory(const Measurement& plan);
+/// Returns the bytes that reading the views takes at most, besides what is kept of them: those that
+/// are decoded at once, and the buffers from which slabs are filled.
+std::size_t decoding_memory(
+    const tilt_series::TiltSeries& series, const Measurement& plan,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
 
 /// Turns a series into rays in density units. The stored pixels of the series' views are given up
 /// (TiltSeries::forget_view). `scratch_dir` takes the rays if they do not fit in memory.

@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <vector>
+#include <utility>
 
-#include "base/check.h"
+#include "base/parallel.h"
+#include "base/xxhash64.h"
 #include "kernels/lanes.h"
 #include "tomofield/error.h"
 
@@ -19,6 +20,19 @@ namespace {
 
 // Bytes of a line: the pixels of a slab's rows with one x.
 constexpr std::size_t kRayBytes = kLanes * sizeof(float), kMaskBytes = sizeof(std::uint16_t);
+
+// Views are read so many at a time, as long as their buffers take no more than this memory.
+constexpr std::size_t kMaxBuffers = 64, kBufferBytes = std::size_t{1} << 30;
+
+std::size_t buffer_bytes(const SlabViews::Shape& shape) {
+  return static_cast<std::size_t>(shape.width * shape.height) *
+         (sizeof(float) + sizeof(std::uint8_t));
+}
+
+int views_in_buffers(const SlabViews::Shape& shape) {
+  const std::size_t fit = kBufferBytes / std::max<std::size_t>(buffer_bytes(shape), 1);
+  return static_cast<int>(std::clamp<std::size_t>(fit, 1, kMaxBuffers));
+}
 
 }  // namespace
 
@@ -36,20 +50,38 @@ std::size_t SlabViews::resident_memory(const Shape& shape, int slabs_in_use) {
   return bytes(used);
 }
 
+std::size_t SlabViews::filling_memory(const Shape& shape) {
+  const auto at_once = static_cast<std::size_t>(views_in_buffers(shape));
+  return std::min(at_once, shape.num_views) * buffer_bytes(shape);
+}
+
 SlabViews::Slabs SlabViews::all_slabs(const Shape& shape) {
   return {0, static_cast<int>((shape.num_rows + kLanes - 1) / kLanes)};
 }
 
-SlabViews::SlabViews(const Shape& shape, Slabs held, double unit, const ReadView& read_view,
-                     const std::filesystem::path& scratch_dir, std::size_t in_memory_bytes)
+ReadViews read_on_all_threads(ReadView read_view) {
+  return [read = std::move(read_view)](Range views, std::span<ViewBuffer> buffers) {
+    base::parallel_for("read views", views.size(), [&](std::int64_t i) {
+      ViewBuffer& buffer = buffers[static_cast<std::size_t>(i)];
+      read(static_cast<std::size_t>(views.begin + i), buffer.image, buffer.valid);
+    });
+  };
+}
+
+SlabViews::SlabViews(const Shape& shape, Slabs held, const std::filesystem::path& scratch_dir,
+                     std::size_t in_memory_bytes)
     : shape_(shape),
       scratch_dir_(scratch_dir),
       held_(held),
       memory_(num_lines() * (kRayBytes + kMaskBytes), "the prepared rays", scratch_dir,
               in_memory_bytes),
       rays_(reinterpret_cast<float*>(memory_.data())),
-      mask_(reinterpret_cast<std::uint16_t*>(rays_ + num_lines() * kLanes)) {
-  fill(unit, read_view);
+      mask_(reinterpret_cast<std::uint16_t*>(rays_ + num_lines() * kLanes)) {}
+
+SlabViews::SlabViews(const Shape& shape, Slabs held, double unit, const ReadViews& read_views,
+                     const std::filesystem::path& scratch_dir, std::size_t in_memory_bytes)
+    : SlabViews(shape, held, scratch_dir, in_memory_bytes) {
+  fill(unit, read_views);
 }
 
 std::size_t SlabViews::num_lines() const {
@@ -60,6 +92,10 @@ std::size_t SlabViews::num_lines() const {
 base::Range SlabViews::held_rows() const {
   return {held_.begin * kLanes, static_cast<int>(std::min<std::int64_t>(
                                     std::int64_t{held_.end} * kLanes, shape_.num_rows))};
+}
+
+int SlabViews::rows_of(int slab) const {
+  return static_cast<int>(std::min<std::int64_t>(kRows, shape_.num_rows - slab * kRows));
 }
 
 std::size_t SlabViews::line(int slab, int view) const {
@@ -77,25 +113,36 @@ void SlabViews::release(int slab) const {
   memory_.release(num_lines() * kRayBytes + first * kMaskBytes, count * kMaskBytes);
 }
 
-void SlabViews::fill(double unit, const ReadView& read_view) {
-  const std::size_t width = static_cast<std::size_t>(shape_.width);
-  const std::size_t pixels = width * static_cast<std::size_t>(shape_.height);
-  std::vector<float> image(pixels);
-  std::vector<std::uint8_t> valid(pixels);
+// Reads some views at a time. The threads that work on a slab later write it here, which puts its
+// memory near them.
+void SlabViews::fill(double unit, const ReadViews& read_views) {
   const float per_unit = static_cast<float>(1.0 / unit);
-  for (std::size_t v = 0; v < shape_.num_views; ++v) {
-    read_view(v, image, valid);
-    for (std::int64_t row = held_rows().begin; row < held_rows().end; ++row) {
-      const std::size_t first = static_cast<std::size_t>(shape_.first_row + row) * width;
-      const std::size_t to = line(static_cast<int>(row / kLanes), static_cast<int>(v));
-      const int lane = static_cast<int>(row % kLanes);
-      for (std::size_t x = 0; x < width; ++x) {
-        if (!valid[first + x]) continue;
-        rays_[(to + x) * kLanes + static_cast<std::size_t>(lane)] = image[first + x] * per_unit;
-        mask_[to + x] = static_cast<std::uint16_t>(mask_[to + x] | 1u << lane);
-      }
-    }
-    memory_.release(0, memory_.size());
+  const int at_once = views_in_buffers(shape_), num_views = static_cast<int>(shape_.num_views);
+  const auto pixels = static_cast<std::size_t>(shape_.width * shape_.height);
+  for (int first = 0; first < num_views; first += at_once) {
+    const Range views{first, std::min(first + at_once, num_views)};
+    std::vector<ViewBuffer> buffers(static_cast<std::size_t>(views.size()));
+    base::parallel_for("make buffers", std::ssize(buffers), [&](std::int64_t i) {
+      buffers[static_cast<std::size_t>(i)] = {std::vector<float>(pixels),
+                                              std::vector<std::uint8_t>(pixels)};
+    });
+    read_views(views, buffers);
+    base::parallel_for("fill slabs", held_.size(), [&](std::int64_t s) {
+      const int slab = held_.begin + static_cast<int>(s);
+      base::parallel_for("fill views", views.size(), [&](std::int64_t v) {
+        set_rows(slab, first + static_cast<int>(v), buffers[static_cast<std::size_t>(v)], per_unit);
+      });
+      release(slab);
+    });
+  }
+}
+
+void SlabViews::set_rows(int slab, int view, const ViewBuffer& from, float per_unit) {
+  const std::size_t width = static_cast<std::size_t>(shape_.width), to = line(slab, view);
+  for (int lane = 0; lane < rows_of(slab); ++lane) {
+    const std::size_t row = static_cast<std::size_t>(shape_.first_row + slab * kRows + lane);
+    for (std::size_t x = 0, at = row * width; x < width; ++x, ++at)
+      if (from.valid[at]) set_ray(to + x, lane, from.image[at] * per_unit);
   }
 }
 
@@ -105,22 +152,50 @@ SlabViews::Shape SlabViews::binned_shape(const Shape& shape, int bin) {
 }
 
 std::unique_ptr<SlabViews> SlabViews::binned(int bin) const {
-  const Shape coarse = binned_shape(shape_, bin);
   const Slabs held{held_.begin / bin, (held_.end + bin - 1) / bin};
-  const auto read_view = [&](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
-    const int view = static_cast<int>(v);
-    const std::int64_t end = std::min<std::int64_t>(held.end * kLanes, coarse.height);
-    for (std::int64_t y = held.begin * kLanes; y < end; ++y) {
-      for (std::int64_t x = 0; x < coarse.width; ++x) {
-        const std::size_t at = static_cast<std::size_t>(y * coarse.width + x);
-        const auto [sum, count] = box_sum(view, x * bin, y * bin, bin);
-        valid[at] = 2 * count >= bin * bin;
-        image[at] = valid[at] ? static_cast<float>(sum / count) : 0.0f;
-      }
-    }
-    memory_.release(0, memory_.size());
-  };
-  return std::make_unique<SlabViews>(coarse, held, bin, read_view, scratch_dir_);
+  std::unique_ptr<SlabViews> coarse(new SlabViews(binned_shape(shape_, bin), held, scratch_dir_,
+                                                  io::ScratchMemory::kInMemoryBytes));
+  base::parallel_for("bin slabs", held.size(), [&](std::int64_t s) {
+    const int slab = held.begin + static_cast<int>(s);
+    base::parallel_for("bin views", num_views(), [&](std::int64_t view) {
+      coarse->set_means(slab, static_cast<int>(view), *this, bin);
+    });
+    coarse->release(slab);
+    for (int fine = slab * bin; fine < std::min((slab + 1) * bin, held_.end); ++fine) release(fine);
+  });
+  return coarse;
+}
+
+// Sets the rays of a slab of a view to means of `fine`, in units `bin` times as large.
+void SlabViews::set_means(int slab, int view, const SlabViews& fine, int bin) {
+  const float per_unit = static_cast<float>(1.0 / bin);
+  const std::size_t to = line(slab, view);
+  std::vector<double> sums(static_cast<std::size_t>(shape_.width));
+  std::vector<int> counts(sums.size());
+  for (int lane = 0; lane < rows_of(slab); ++lane) {
+    std::ranges::fill(sums, 0.0);
+    std::ranges::fill(counts, 0);
+    const std::int64_t first = (slab * kRows + lane) * bin;
+    for (std::int64_t y = first; y < std::min(first + bin, fine.shape_.num_rows); ++y)
+      fine.add_row(view, y, bin, sums, counts);
+    for (std::size_t x = 0; x < sums.size(); ++x)
+      if (2 * counts[x] >= bin * bin)
+        set_ray(to + x, lane, static_cast<float>(sums[x] / counts[x]) * per_unit);
+  }
+}
+
+// Adds the rays of a row that count to the sums of `bin` neighbours each, and counts them.
+void SlabViews::add_row(int view, std::int64_t y, int bin, std::span<double> sums,
+                        std::span<int> counts) const {
+  const int slab = static_cast<int>(y / kRows), lane = static_cast<int>(y % kRows);
+  const float* values = rays(slab, view) + lane;
+  const std::uint16_t* masks = mask(slab, view);
+  for (std::int64_t x = 0; x < shape_.width; ++x) {
+    if ((masks[x] >> lane & 1) == 0) continue;
+    const auto coarse = static_cast<std::size_t>(x / bin);
+    sums[coarse] += static_cast<double>(values[x * kRows]);
+    ++counts[coarse];
+  }
 }
 
 std::unique_ptr<SlabViews> SlabViews::middle_rows(
@@ -128,39 +203,39 @@ std::unique_ptr<SlabViews> SlabViews::middle_rows(
     const distributed::Communicator& processes) const {
   const std::int64_t rows = std::min(max_rows, shape_.num_rows);
   const std::int64_t first = (shape_.num_rows - rows) / 2;
-  const auto read_view = [&](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
-    const int view = views[v];
-    std::fill(image.begin(), image.end(), 0.0f);
-    std::vector<float> is_valid(image.size());
-    for (std::int64_t y = 0; y < rows; ++y) {
-      if (first + y < held_rows().begin || first + y >= held_rows().end) continue;
-      for (std::int64_t x = 0; x < shape_.width; ++x) {
-        const auto at = static_cast<std::size_t>(y * shape_.width + x);
-        image[at] = ray(view, x, first + y);
-        is_valid[at] = counts(view, x, first + y);
-      }
-    }
-    processes.allreduce_sum(image);
-    processes.allreduce_sum(std::span(is_valid));
-    std::ranges::copy(is_valid, valid.begin());
-  };
   const Shape shape{views.size(), shape_.width, rows, 0, rows};
-  return std::make_unique<SlabViews>(shape, 1.0, read_view, scratch_dir_);
+  std::unique_ptr<SlabViews> middle(
+      new SlabViews(shape, all_slabs(shape), scratch_dir_, io::ScratchMemory::kInMemoryBytes));
+  base::parallel_for("copy rows", std::ssize(views), [&](std::int64_t view) {
+    for (int slab = 0; slab < middle->num_slabs(); ++slab)
+      middle->copy_rows(slab, static_cast<int>(view), *this, views[static_cast<std::size_t>(view)],
+                        first);
+  });
+  middle->share(processes);
+  memory_.release(0, memory_.size());
+  return middle;
 }
 
-// Returns the sum of the rays that count in a box, and how many do.
-std::pair<double, int> SlabViews::box_sum(int view, std::int64_t x0, std::int64_t y0,
-                                          int size) const {
-  double sum = 0.0;
-  int count = 0;
-  for (std::int64_t y = y0; y < std::min(y0 + size, shape_.num_rows); ++y) {
-    for (std::int64_t x = x0; x < std::min(x0 + size, shape_.width); ++x) {
-      if (!counts(view, x, y)) continue;
-      sum += static_cast<double>(ray(view, x, y));
-      ++count;
-    }
+// Copies the rows that `from` holds; the first row of all is `first_row` of `from`.
+void SlabViews::copy_rows(int slab, int view, const SlabViews& from, int from_view,
+                          std::int64_t first_row) {
+  const std::size_t to = line(slab, view);
+  for (int lane = 0; lane < rows_of(slab); ++lane) {
+    const std::int64_t y = first_row + slab * kRows + lane;
+    if (y < from.held_rows().begin || y >= from.held_rows().end) continue;
+    for (std::int64_t x = 0; x < shape_.width; ++x)
+      if (from.counts(from_view, x, y))
+        set_ray(to + static_cast<std::size_t>(x), lane, from.ray(from_view, x, y));
   }
-  return {sum, count};
+}
+
+// Gives the rays that any of the processes has to all of them.
+void SlabViews::share(const distributed::Communicator& processes) {
+  if (processes.size() == 1) return;
+  processes.allreduce_sum(std::span(rays_, num_lines() * kLanes));
+  std::vector<std::int64_t> masks(mask_, mask_ + num_lines());  // no two have the same bit
+  processes.allreduce_sum(std::span(masks));
+  std::ranges::copy(masks, mask_);
 }
 
 std::int64_t SlabViews::num_valid(int view) const {
@@ -172,37 +247,23 @@ std::int64_t SlabViews::num_valid(int view) const {
   return count;
 }
 
-void SlabViews::add_words(std::size_t first, std::size_t count, std::uint64_t& hash) const {
-  constexpr std::size_t kBlock = std::size_t{16} << 20;
-  for (std::size_t at = first; at < first + count; at += kBlock) {
-    const std::size_t size = std::min(kBlock, first + count - at);
-    const auto* words = reinterpret_cast<const std::uint32_t*>(memory_.data() + at);
-    for (std::size_t i = 0; i < size / sizeof(std::uint32_t); ++i)
-      hash = (hash ^ words[i]) * 0x100000001b3ULL;
-    memory_.release(at, size);
-  }
+std::uint64_t SlabViews::checksum_of(int slab) const {
+  const std::size_t lines = line(slab + 1, 0) - line(slab, 0);
+  base::Xxhash64 hash;
+  hash.add(std::as_bytes(std::span(rays(slab, 0), lines * kLanes)));
+  hash.add(std::as_bytes(std::span(mask(slab, 0), lines)));
+  release(slab);
+  return hash.value();
 }
 
 std::uint64_t SlabViews::checksum(const distributed::Communicator& processes) const {
-  std::uint64_t hash = 0xcbf29ce484222325ULL;
-  // The bytes of all slabs as one process would have them: every process goes on where the
-  // one before it ended. Only the last may hold an odd number of slabs, and half a word.
-  TOMOFIELD_CHECK(held_.end == num_slabs() || held_.size() % 2 == 0, "slabs are held in pairs");
-  const auto add_all = [&](std::size_t first, std::size_t count) {
-    for (int rank = 0; rank < processes.size(); ++rank) {
-      std::int64_t state = 0;
-      if (rank == processes.rank()) {
-        add_words(first, count, hash);
-        state = static_cast<std::int64_t>(hash);
-      }
-      processes.allreduce_sum(std::span(&state, 1));
-      if (processes.size() > 1) hash = static_cast<std::uint64_t>(state);
-    }
-  };
-  const std::size_t ray_bytes = num_lines() * kRayBytes;
-  add_all(0, ray_bytes);
-  add_all(ray_bytes, num_lines() * kMaskBytes);
-  return hash;
+  std::vector<std::int64_t> of_slab(static_cast<std::size_t>(num_slabs()));
+  base::parallel_for("checksum", held_.size(), [&](std::int64_t s) {
+    const int slab = held_.begin + static_cast<int>(s);
+    of_slab[static_cast<std::size_t>(slab)] = static_cast<std::int64_t>(checksum_of(slab));
+  });
+  processes.allreduce_sum(std::span(of_slab));
+  return base::xxhash64(std::as_bytes(std::span<const std::int64_t>(of_slab)));
 }
 
 Range own_bands(std::int64_t num_rows, std::int64_t band_rows,

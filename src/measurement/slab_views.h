@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "base/range.h"
 #include "distributed/communicator.h"
@@ -16,10 +17,21 @@
 
 namespace tomofield::measurement {
 
-/// Copies a view as height × width floats, and which pixels are measurements. It is called for the
-/// views in order.
+/// Copies a view as height × width floats, and which pixels are measurements. It is called for
+/// several views at once, on different threads.
 using ReadView =
     std::function<void(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid)>;
+
+/// A view that is being read: height × width pixels, zeros at first.
+struct ViewBuffer {
+  std::vector<float> image;
+  std::vector<std::uint8_t> valid;
+};
+/// Reads some views into as many buffers. It is called for all views in order, in the thread that
+/// makes the SlabViews.
+using ReadViews = std::function<void(base::Range views, std::span<ViewBuffer> buffers)>;
+/// Returns a function that reads each view with `read_view`, on all threads.
+ReadViews read_on_all_threads(ReadView read_view);
 
 /// The measured rays in the order in which slabs use them: [slab, view, x, lane]
 /// with 16 rows a slab, and a bit mask [slab, view, x] of the rays that count
@@ -36,16 +48,19 @@ class SlabViews {
   /// Returns the memory that views take while so many slabs are in use. Of a series in a scratch
   /// file, only what has not been released takes memory.
   static std::size_t resident_memory(const Shape& shape, int slabs_in_use);
+  /// Returns the memory of the buffers into which views are read.
+  static std::size_t filling_memory(const Shape& shape);
   static Slabs all_slabs(const Shape& shape);
 
   /// Reads every view and divides its intensities by `unit`. Throws Error if the scratch file
   /// cannot be made.
-  SlabViews(const Shape& shape, double unit, const ReadView& read_view,
+  SlabViews(const Shape& shape, double unit, ReadView read_view,
             const std::filesystem::path& scratch_dir,
             std::size_t in_memory_bytes = io::ScratchMemory::kInMemoryBytes)
-      : SlabViews(shape, all_slabs(shape), unit, read_view, scratch_dir, in_memory_bytes) {}
+      : SlabViews(shape, all_slabs(shape), unit, read_on_all_threads(std::move(read_view)),
+                  scratch_dir, in_memory_bytes) {}
   /// Holds some of the slabs, at least one; others must not be asked for.
-  SlabViews(const Shape& shape, Slabs held, double unit, const ReadView& read_view,
+  SlabViews(const Shape& shape, Slabs held, double unit, const ReadViews& read_views,
             const std::filesystem::path& scratch_dir,
             std::size_t in_memory_bytes = io::ScratchMemory::kInMemoryBytes);
   SlabViews(const SlabViews&) = delete;
@@ -80,17 +95,31 @@ class SlabViews {
   }
   /// Counts the rays of a view that count, in the slabs that are held.
   std::int64_t num_valid(int view) const;
-  /// Returns the 64-bit FNV-1a hash of rays and masks of all slabs, which tells one series from
-  /// another. The processes hold the slabs in order of ranks.
+  /// Returns a hash of rays and masks of all slabs (XXH64 of the XXH64 of each slab), which tells
+  /// one series from another.
   std::uint64_t checksum(
       const distributed::Communicator& processes = distributed::Communicator::alone()) const;
 
  private:
   static constexpr std::int64_t kRows = kernels::kLanes;  // of a slab
-  std::pair<double, int> box_sum(int view, std::int64_t x0, std::int64_t y0, int size) const;
+  // Makes slabs of zeros.
+  SlabViews(const Shape& shape, Slabs held, const std::filesystem::path& scratch_dir,
+            std::size_t in_memory_bytes);
   static std::size_t bytes(const Shape& shape);
-  void fill(double unit, const ReadView& read_view);
-  void add_words(std::size_t first, std::size_t count, std::uint64_t& hash) const;
+  void fill(double unit, const ReadViews& read_views);
+  void set_rows(int slab, int view, const ViewBuffer& from, float per_unit);
+  void set_means(int slab, int view, const SlabViews& fine, int bin);
+  void copy_rows(int slab, int view, const SlabViews& from, int from_view, std::int64_t first_row);
+  void set_ray(std::size_t line, int lane, float value) {
+    rays_[line * kRows + static_cast<std::size_t>(lane)] = value;
+    mask_[line] = static_cast<std::uint16_t>(mask_[line] | 1u << lane);
+  }
+  void add_row(int view, std::int64_t y, int bin, std::span<double> sums,
+               std::span<int> counts) const;
+  void share(const distributed::Communicator& processes);
+  std::uint64_t checksum_of(int slab) const;
+  int rows_of(int slab) const;
+  int num_views() const { return static_cast<int>(shape_.num_views); }
   std::size_t line(int slab, int view) const;
   std::size_t num_lines() const;  // each has one x of a slab and a view
   base::Range held_rows() const;

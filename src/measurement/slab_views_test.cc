@@ -4,11 +4,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <set>
 #include <span>
 
+#include "base/parallel.h"
 #include "base/random.h"
 
 namespace tomofield::measurement {
@@ -38,7 +41,7 @@ std::unique_ptr<SlabViews> make_views(SlabViews::Slabs held = SlabViews::all_sla
       }
     }
   };
-  return std::make_unique<SlabViews>(kShape, held, kUnit, read, "/tmp");
+  return std::make_unique<SlabViews>(kShape, held, kUnit, read_on_all_threads(read), "/tmp");
 }
 
 TEST(SlabViews, SomeSlabsAreThoseOfTheWhole) {
@@ -79,6 +82,70 @@ TEST(SlabViews, MiddleRowsAreCopied) {
     }
   }
   EXPECT_EQ(all->middle_rows(100, every)->checksum(), all->checksum());
+}
+
+TEST(SlabViews, AreTheSameOnAnyNumberOfThreads) {
+  const std::vector<int> some = {2, 0};
+  const auto checksums = [&](int threads) {
+    base::set_thread_count(threads);
+    const auto all = make_views();
+    const std::array<std::uint64_t, 4> found = {all->checksum(), all->binned(2)->checksum(),
+                                                all->binned(4)->checksum(),
+                                                all->middle_rows(20, some)->checksum()};
+    base::set_thread_count(0);
+    return found;
+  };
+  const auto on_one = checksums(1);
+  EXPECT_EQ(std::set(on_one.begin(), on_one.end()).size(), on_one.size());
+  EXPECT_EQ(checksums(3), on_one);
+  EXPECT_EQ(checksums(5), on_one);
+}
+
+TEST(SlabViews, ChecksumSeesEveryPixelAndMask) {
+  constexpr SlabViews::Shape kSmall{.num_views = 2, .width = 3, .height = 33, .num_rows = 33};
+  const auto checksum = [&](std::size_t view, std::size_t pixel, float value, bool is_valid) {
+    return SlabViews(
+               kSmall, 1.0,
+               [&](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
+                 std::ranges::fill(valid, std::uint8_t{1});
+                 if (v != view) return;
+                 image[pixel] = value;
+                 valid[pixel] = is_valid;
+               },
+               "/tmp")
+        .checksum();
+  };
+  std::set<std::uint64_t> all = {checksum(0, 0, 0.0f, true)};
+  std::size_t count = 1;
+  for (const std::size_t view : {0u, 1u}) {
+    for (const std::size_t pixel : {0u, 2u, 47u, 48u, 98u}) {
+      all.insert(checksum(view, pixel, 1.0f, true));
+      all.insert(checksum(view, pixel, 0.0f, false));
+      count += 2;
+    }
+  }
+  EXPECT_EQ(all.size(), count);
+}
+
+TEST(SlabViews, MoreViewsThanAreReadAtATime) {
+  constexpr SlabViews::Shape kMany{.num_views = 150, .width = 2, .height = 17, .num_rows = 17};
+  const SlabViews views(
+      kMany, 1.0,
+      [](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
+        for (std::size_t i = 0; i < image.size(); ++i) {
+          EXPECT_EQ(image[i], 0.0f) << "a used buffer";
+          image[i] = static_cast<float>(view * 100 + i);
+          valid[i] = i != view % image.size();
+        }
+      },
+      "/tmp");
+  for (int view = 0; view < 150; ++view) {
+    for (std::int64_t i = 0; i < 34; ++i) {
+      ASSERT_EQ(views.counts(view, i % 2, i / 2), i != view % 34) << view;
+      ASSERT_EQ(views.ray(view, i % 2, i / 2),
+                i != view % 34 ? static_cast<float>(view * 100 + i) : 0.0f);
+    }
+  }
 }
 
 // Pages of files that the process holds, in bytes.

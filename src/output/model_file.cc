@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "base/enum_names.h"
+#include "base/parallel.h"
+#include "base/trace.h"
 #include "io/atomic_file.h"
 #include "io/hdf5_file.h"
 #include "tomofield/error.h"
@@ -34,12 +36,20 @@ void write_column(Hdf5Group& group, const char* name, const Items& items, Get ge
 
 void require_finite_parameters(const field::Field& field, const std::string& complaint) {
   const std::span<const float> parameters = field.parameters();
-  for (int leaf = 0; leaf < field.tree().num_leaves(); ++leaf) {
-    for (std::size_t i = field.offset(leaf); field.keeps(leaf) && i < field.offset(leaf + 1); ++i) {
-      if (!std::isfinite(parameters[i]))
-        throw Error(fmt::format("{}: parameter {} is {}", complaint, i, parameters[i]));
-    }
-  }
+  std::vector<std::size_t> bad(static_cast<std::size_t>(field.tree().num_leaves()),
+                               parameters.size());  // the first one of each leaf
+  base::parallel_for("check parameters", std::ssize(bad), [&](std::int64_t i) {
+    const int leaf = static_cast<int>(i);
+    if (!field.keeps(leaf)) return;
+    const auto first = parameters.begin() + std::ptrdiff_t(field.offset(leaf)),
+               end = parameters.begin() + std::ptrdiff_t(field.offset(leaf + 1));
+    const auto found = std::find_if(first, end, [](float value) { return !std::isfinite(value); });
+    if (found != end)
+      bad[static_cast<std::size_t>(i)] = static_cast<std::size_t>(found - parameters.begin());
+  });
+  const auto first_bad = std::ranges::min_element(bad);
+  if (first_bad == bad.end() || *first_bad == parameters.size()) return;
+  throw Error(fmt::format("{}: parameter {} is {}", complaint, *first_bad, parameters[*first_bad]));
 }
 
 void write_geometry(Hdf5Group group, const ModelInfo& info) {
@@ -354,6 +364,7 @@ void save_model(const std::filesystem::path& path, const field::Field& field, co
 void save_model(const std::filesystem::path& path, const field::Field& field,
                 const FloatSource& parameters, const ModelInfo& info, const TrainingState* training,
                 const FloatArrays& more_floats) {
+  const base::TraceSpan span("write model");
   io::AtomicFile target(path);
   {
     io::Hdf5File file = io::Hdf5File::create(target.temporary_path());

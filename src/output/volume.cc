@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/log.h"
+#include "base/trace.h"
 #include "distributed/gathered_arrays.h"
 #include "tomofield/error.h"
 #include "tomofield/version.h"
@@ -207,6 +208,7 @@ void write_volume(Model& model, const VolumeOptions& options, const std::filesys
 void write_voxels(const VoxelSource& source, const OrientedBox& box, const ModelInfo& info,
                   const std::string& made_by, const VolumeOptions& options,
                   const std::filesystem::path& path, const distributed::Communicator& processes) {
+  const base::TraceSpan span("write volume");
   io::MrcSpec spec;
   spec.nx = box.size[0];
   spec.ny = box.size[1];

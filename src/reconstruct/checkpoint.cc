@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/range.h"
+#include "base/trace.h"
 #include "distributed/gathered_arrays.h"
 #include "option_table/rows.h"
 #include "tomofield/error.h"
@@ -212,6 +213,7 @@ void save_fit(const std::filesystem::path& path, const fit::Fit& fit, const outp
 
 void save_checkpoint(const std::filesystem::path& path, const fit::Fit& fit,
                      const output::ModelInfo& info, const FitOrigin& origin) {
+  const base::TraceSpan span("write checkpoint");
   output::TrainingState state = progress_state(fit, origin);
   const fit::Adam::State& adam = fit.optimizer().state();
   std::vector<std::int64_t> leaf_steps(adam.leaf_steps.size());

@@ -129,9 +129,10 @@ measurement::SlabViews::Shape own_part(measurement::SlabViews::Shape shape,
 }
 
 // Returns the peak memory of a process.
-std::size_t estimate_memory(const measurement::Measurement& plan, const fit::Domain& domain,
+std::size_t estimate_memory(const tilt_series::TiltSeries& series,
+                            const measurement::Measurement& plan, const fit::Domain& domain,
                             const RunPlan& run, const ReconstructOptions& options,
-                            std::size_t stored_views, const distributed::Communicator& processes) {
+                            const distributed::Communicator& processes) {
   using measurement::SlabViews;
   const auto parameters =
       static_cast<std::size_t>(fitted_bytes(domain, run, options.field, processes));
@@ -155,10 +156,10 @@ std::size_t estimate_memory(const measurement::Measurement& plan, const fit::Dom
                                                                  options.fit, plan.rays_shape())
                         : 0;
   const std::size_t program = kProgram + (processes.size() > 1 ? kMpi : 0);
-  const std::size_t decoding = measurement::decoding_memory(plan);
+  const std::size_t decoding = measurement::decoding_memory(series, plan, processes);
   // The stored views make room for the rays one by one.
   return program +
-         std::max(stored_views + decoding,
+         std::max(series.stored_memory(processes) + decoding,
                   rays + coarse_rays + std::max({fitting + tracing, factorising, decoding}));
 }
 
@@ -201,8 +202,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.num_trials = options.num_trials(num_fitted_views(plan, options.fit));
   if (run.num_trials > 0) require_views_for_trials(plan, options.fit);
   run.num_steps = (last.first_epoch + last.epochs) * steps_an_epoch(plan, options.fit);
-  run.memory_bytes =
-      estimate_memory(plan, domain, run, options, series.stored_memory(processes), processes);
+  run.memory_bytes = estimate_memory(series, plan, domain, run, options, processes);
   base::require_memory(run.memory_bytes * static_cast<std::size_t>(processes.size_on_machine()),
                        "this reconstruction",
                        "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, or "

@@ -4,12 +4,15 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
+#include "base/trace.h"
 #include "fit/fit.h"
 #include "io/scratch_memory.h"
 #include "measurement/held_out.h"
@@ -36,6 +39,7 @@ struct Run {
 measurement::Measurement prepare(const tilt_series::TiltSeries& series,
                                  const ReconstructOptions& options,
                                  const distributed::Communicator& processes) {
+  const base::TraceSpan span("prepare rays");
   measurement::Measurement measurement = measurement::prepare_measurement(
       series, options.specimen, io::scratch_directory(options.resolved.output),
       fit::band_rows(options.field), processes);
@@ -80,6 +84,7 @@ void apply(const TrialSettings& settings, ReconstructOptions& options) {
 // Chooses the options that are left to trials. A resumed run takes those that its checkpoint has.
 // Returns false if a stop was requested.
 bool choose_settings(Run& run, std::optional<TunedFit>& tuned) {
+  const base::TraceSpan span("choose settings");
   if (run.options.num_trials(run.measurement.num_fitted_views()) == 0) return true;
   if (run.options.resolved.resume && std::filesystem::exists(run.paths.model)) {
     run.processes.run_collectively(
@@ -92,8 +97,22 @@ bool choose_settings(Run& run, std::optional<TunedFit>& tuned) {
   return true;
 }
 
+// Returns what the fit is made from. All processes call it.
+FitOrigin origin_of(const Run& run, std::optional<TunedFit> tuned) {
+  const base::TraceSpan span("fingerprint");
+  return {.fingerprint = fingerprint_of(run.options, run.measurement, run.processes),
+          .tuned = std::move(tuned)};
+}
+
+std::unique_ptr<fit::Fit> begin_fit(const Run& run) {
+  const base::TraceSpan span("begin fit");
+  return std::make_unique<fit::Fit>(run.measurement, run.options.field, run.options.fit,
+                                    run.processes);
+}
+
 // Continues from the checkpoint, if there is one yet.
 void resume(const Run& run, const FitOrigin& origin, fit::Fit& fit) {
+  const base::TraceSpan span("read checkpoint");
   const std::filesystem::path& path = run.paths.model;
   if (!std::filesystem::exists(path)) {
     base::log_info(fmt::format("no checkpoint {} yet: starting from the beginning", path.string()));
@@ -126,6 +145,7 @@ base::ProgressReport progress_report(const fit::Fit& fit, std::int64_t first_ste
 // Runs the fit and saves checkpoints when they are due, if the run writes files. Returns false if
 // it was stopped; there is a checkpoint then.
 bool run_with_checkpoints(const Run& run, const FitOrigin& origin, fit::Fit& fit) {
+  const base::TraceSpan span("fit");
   const double seconds_between = 60 * run.options.resolved.checkpoint_minutes;
   const base::Stopwatch running;
   base::Stopwatch since_checkpoint;
@@ -158,16 +178,16 @@ RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOp
           .options = options,
           .paths = output_paths(options.resolved.output),
           .measurement = prepare(series, options, processes)};
-  FitOrigin origin;
-  if (!choose_settings(run, origin.tuned))
-    return {.outcome = Outcome::kStoppedTuning, .results = {}};
-  origin.fingerprint = fingerprint_of(run.options, run.measurement, processes);
-  fit::Fit fit(run.measurement, run.options.field, run.options.fit, processes);
-  if (options.resolved.resume) processes.run_collectively([&] { resume(run, origin, fit); });
+  std::optional<TunedFit> tuned;
+  if (!choose_settings(run, tuned)) return {.outcome = Outcome::kStoppedTuning, .results = {}};
+  const FitOrigin origin = origin_of(run, std::move(tuned));
+  const std::unique_ptr<fit::Fit> fit = begin_fit(run);
+  if (options.resolved.resume) processes.run_collectively([&] { resume(run, origin, *fit); });
   const base::Stopwatch running;
-  if (!run_with_checkpoints(run, origin, fit)) return {.outcome = Outcome::kStopped, .results = {}};
+  if (!run_with_checkpoints(run, origin, *fit))
+    return {.outcome = Outcome::kStopped, .results = {}};
   return {.outcome = Outcome::kFinished,
-          .results = finish(fit, run.measurement, run.options, origin, running.seconds())};
+          .results = finish(*fit, run.measurement, run.options, origin, running.seconds())};
 }
 
 }  // namespace tomofield::reconstruction

@@ -3,10 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <exception>
+#include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
+#include <vector>
 
+#include "base/parallel.h"
 #include "base/range.h"
+#include "base/trace.h"
 #include "io/json.h"
 #include "output/metrics.h"
 #include "output/shared_options.h"
@@ -16,25 +22,23 @@
 namespace tomofield::reconstruction {
 namespace {
 
-// Draws the held-out view nearest to zero tilt.
-void write_picture(const fit::Fit& fit, const measurement::Measurement& series,
-                   const measurement::ViewErrors& error, const std::filesystem::path& picture) {
+// Returns the held-out view nearest to zero tilt.
+measurement::PredictedView central_view(const fit::Fit& fit, const measurement::Measurement& series,
+                                        const measurement::ViewErrors& error) {
   const auto nearest = std::ranges::min_element(error.views, {}, [&](int view) {
     return std::abs(series.geometry.tilt_deg[static_cast<std::size_t>(view)]);
   });
   const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
-  const measurement::PredictedView view = fit.predict_held_out(*nearest, model);
-  fit.processes().run_collectively([&] {
-    if (fit.processes().is_root()) report::write_held_out_picture(view, picture);
-  });
+  return fit.predict_held_out(*nearest, model);
 }
 
-// Returns the errors of the held-out views. Draws one of these views if the run writes files.
+// Returns the errors of the held-out views. Predicts one of these views if the run writes files.
 nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& series,
-                         const ReconstructOptions& options) {
+                         const ReconstructOptions& options,
+                         std::optional<measurement::PredictedView>& view) {
+  const base::TraceSpan span("score held-out views");
   const measurement::ViewErrors error = fit.held_out_error();
-  if (!options.resolved.output.empty())
-    write_picture(fit, series, error, output_paths(options.resolved.output).held_out_picture);
+  if (!options.resolved.output.empty()) view = central_view(fit, series, error);
   nlohmann::json json =
       measurement::report_held_out(error, series.geometry.tilt_deg, options.fit.patience > 0);
   json["error_by_epoch"] = fit.progress().held_out_error;
@@ -53,6 +57,27 @@ output::VolumeShare volume_share(const fit::Fit& fit, const measurement::Measure
           fit.field().offset(leaves.end)};
 }
 
+using Writers = std::vector<std::function<void()>>;
+
+// Calls all writers. They work at the same time if this process is alone; several processes talk to
+// each other in them. Throws what the first of those that fail throws.
+void write_all(const Writers& writers, const distributed::Communicator& processes) {
+  if (processes.size() > 1) {
+    for (const auto& write : writers) write();
+    return;
+  }
+  std::vector<std::exception_ptr> failures(writers.size());
+  base::parallel_for("write results", std::ssize(writers), [&](std::int64_t i) {
+    try {
+      writers[static_cast<std::size_t>(i)]();
+    } catch (...) {
+      failures[static_cast<std::size_t>(i)] = std::current_exception();
+    }
+  });
+  for (const std::exception_ptr& failure : failures)
+    if (failure) std::rethrow_exception(failure);
+}
+
 }  // namespace
 
 output::ModelInfo model_info(const measurement::Measurement& series,
@@ -66,22 +91,37 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
                const ReconstructOptions& options, const FitOrigin& origin, double seconds) {
   nlohmann::json metrics = output::metrics_json(fit, series, seconds);
   metrics["held_out"] = nullptr;
-  if (options.fit.hold_out > 0) metrics["held_out"] = score_fit(fit, series, options);
+  std::optional<measurement::PredictedView> view;
+  if (options.fit.hold_out > 0) metrics["held_out"] = score_fit(fit, series, options, view);
   metrics["processes"] = output::processes_json(fit, seconds);
   metrics["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
   const output::ModelInfo info = model_info(series, options);
   const output::VolumeShare share = volume_share(fit, series);
   const bool writes_files = !options.resolved.output.empty();
   const OutputPaths paths = output_paths(options.resolved.output);
-  if (writes_files) save_fit(paths.model, fit, info, progress_state(fit, origin));
+  const distributed::Communicator& processes = share.processes;
+  const output::TrainingState state = progress_state(fit, origin);
+  if (writes_files && processes.size() > 1) save_fit(paths.model, fit, info, state);
   Results results{.model = {info, fit.take_field()},
                   .metrics = {{"tomofield", TOMOFIELD_VERSION},
                               {"options", options_json(options)},
                               {"metrics", std::move(metrics)}}};
   if (!writes_files) return results;
-  output::write_volume(results.model, options.volume, paths.volume, share);
-  share.processes.run_collectively([&] {
-    if (share.processes.is_root()) io::write_json(paths.json, results.metrics);
+  Writers writers;
+  if (processes.size() == 1)
+    writers.push_back([&] { output::save_model(paths.model, results.model, &state); });
+  writers.push_back(
+      [&] { output::write_volume(results.model, options.volume, paths.volume, share); });
+  if (view) {
+    writers.push_back([&] {
+      processes.run_collectively([&] {
+        if (processes.is_root()) report::write_held_out_picture(*view, paths.held_out_picture);
+      });
+    });
+  }
+  write_all(writers, processes);
+  processes.run_collectively([&] {
+    if (processes.is_root()) io::write_json(paths.json, results.metrics);
   });
   return results;
 }

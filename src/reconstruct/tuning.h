@@ -29,9 +29,9 @@ struct SearchSpace {
   bool rank = true;     ///< compare ranks; the field must have one
 };
 
-/// Prepares the trials of a search; `run` makes one trial. Settings whose weights differ by
+/// Prepares the trials of a search; `run` makes some trials. Settings whose weights differ by
 /// rounding count as equal.
-FitTrials make_trials(FitTrials::RunTrial run);
+FitTrials make_trials(FitTrials::RunTrials run);
 
 /// Chooses the penalty of total variation that most held-out views prefer, each with its usual
 /// weight. If as many prefer either, it chooses the concave one. A concave penalty makes sharp
@@ -54,7 +54,7 @@ TrialSettings search_settings(const TrialSettings& start, const SearchSpace& spa
 /// Returns the number of trials of a search whose best weight is near the first.
 int expected_trials(const SearchSpace& space);
 
-/// Holds the callbacks of a search.
+/// Holds the callbacks of a search. They are called in the thread that searches.
 struct TuneHooks {
   base::ProgressSink progress;
   std::function<bool()> stop_requested;  ///< is asked after every step
@@ -62,6 +62,8 @@ struct TuneHooks {
 
 /// Writes settings in the form that trial files and metrics have.
 nlohmann::json settings_json(const TrialSettings& settings);
+/// Reads a trial that selection::trial_json() has written with such settings.
+FitTrial trial_from(const nlohmann::json& entry);
 /// Writes the chosen settings and all trials.
 nlohmann::json tuning_json(const TunedFit& tuned);
 /// Reads what tuning_json() has written. Throws nlohmann::json::exception if it is damaged.

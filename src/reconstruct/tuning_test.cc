@@ -7,10 +7,12 @@
 #include <filesystem>
 #include <set>
 #include <string>
+#include <thread>
 #include <tuple>
 #include <utility>
 #include <vector>
 
+#include "base/parallel.h"
 #include "measurement/held_out.h"
 #include "scratch_directory.h"
 #include "sphere_series.h"
@@ -51,9 +53,17 @@ struct ImaginedSeries {
   }
 };
 
+FitTrials trials_of(ImaginedSeries& series) {
+  return make_trials([&](const std::vector<TrialSettings>& batch) {
+    std::vector<FitTrial> trials;
+    for (const TrialSettings& settings : batch) trials.push_back(series.run(settings));
+    return trials;
+  });
+}
+
 TrialSettings search(ImaginedSeries& series, std::vector<FitTrial>& trials,
                      const SearchSpace& space = {.penalty = false}) {
-  FitTrials search_trials = make_trials([&](const TrialSettings& s) { return series.run(s); });
+  FitTrials search_trials = trials_of(series);
   const TrialSettings found = search_settings({Penalty::kConcave, 9, 24, 30}, space, search_trials);
   trials = search_trials.made();
   return found;
@@ -93,7 +103,7 @@ TEST(SearchSettings, TakesThePenaltyThatPredictsBetterAndItsOwnWeight) {
     const TrialSettings found = search(series, trials, {});
     EXPECT_EQ(found.penalty, smooth_error > 0 ? Penalty::kConcave : Penalty::kSmooth);
     EXPECT_NEAR(found.variation, smooth_error > 0 ? 28 : 10, 1e-9);
-    FitTrials two = make_trials([&](const TrialSettings& s) { return series.run(s); });
+    FitTrials two = trials_of(series);
     EXPECT_EQ(choose_penalty({Penalty::kConcave, 3, 24, 30}, two).penalty, found.penalty);
     EXPECT_EQ(two.made().size(), 2u);
   }
@@ -185,6 +195,42 @@ TEST_F(Tuning, KeepsTrialsThatWereFinishedBeforeAStop) {
   EXPECT_GT(num_steps_, 0);
   EXPECT_LT(num_steps_, all_steps);
   EXPECT_EQ(resumed->settings, undisturbed->settings);
+}
+
+TEST_F(Tuning, IsTheSameOnAnyNumberOfThreadsAndCallsFromItsOwn) {
+  const std::thread::id here = std::this_thread::get_id();
+  int num_reports = 0;
+  double last_fraction = 0;
+  hooks_.stop_requested = [&] {
+    EXPECT_EQ(std::this_thread::get_id(), here);
+    return false;
+  };
+  hooks_.progress = [&](const base::ProgressReport& report) {
+    EXPECT_EQ(std::this_thread::get_id(), here);
+    EXPECT_GE(report.fraction_done, last_fraction);
+    last_fraction = report.fraction_done;
+    ++num_reports;
+  };
+  const auto choice = [&](int threads) {
+    base::set_thread_count(threads);
+    last_fraction = 0;
+    num_reports = 0;
+    nlohmann::json json = tuning_json(*tune_penalty(measurement_, field_, fit_, hooks_));
+    for (auto& trial : json["trials"]) trial.erase("seconds");
+    base::set_thread_count(0);
+    EXPECT_NEAR(last_fraction, 1, 1e-9);
+    EXPECT_GE(num_reports, 2 * fit_.subsets);
+    return json;
+  };
+  const nlohmann::json on_one = choice(1);
+  ASSERT_EQ(on_one["trials"].size(), 2u);
+  EXPECT_EQ(choice(2), on_one);
+  EXPECT_EQ(choice(3), on_one);
+}
+
+TEST_F(Tuning, AnExceptionOfTheProgressLeavesIt) {
+  hooks_.progress = [](const base::ProgressReport&) { throw Error("enough"); };
+  EXPECT_THROW(tune_penalty(measurement_, field_, fit_, hooks_), Error);
 }
 
 TEST_F(Tuning, DoesNotPredictTheViewsThatScoreTheResult) {

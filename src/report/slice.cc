@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/parallel.h"
 #include "base/percentile.h"
 #include "io/mrc.h"
 #include "io/png.h"
@@ -14,7 +15,7 @@
 namespace tomofield::report {
 namespace {
 
-constexpr std::int64_t kChunkValues = std::int64_t{1} << 22;
+constexpr std::int64_t kChunkValues = std::int64_t{1} << 18;
 constexpr std::size_t kMaxSample = std::size_t{1} << 20;
 
 }  // namespace
@@ -33,8 +34,8 @@ std::vector<Slice> read_central_slices(const std::filesystem::path& mrc) {
   Slice &xy = slices[0], &xz = slices[1], &yz = slices[2];
   file.read_section(h.nz / 2, xy.values);
   const std::int64_t chunk = std::clamp<std::int64_t>(kChunkValues / h.nx, 1, h.ny);
-  std::vector<float> rows(static_cast<std::size_t>(chunk * h.nx));
-  for (std::int64_t z = 0; z < h.nz; ++z) {
+  base::parallel_for("read slices", h.nz, [&](std::int64_t z) {
+    std::vector<float> rows(static_cast<std::size_t>(chunk * h.nx));
     for (std::int64_t y = 0; y < h.ny; y += chunk) {
       const std::int64_t count = std::min(chunk, h.ny - y);
       file.read_rows(z, y, count, std::span(rows).first(static_cast<std::size_t>(count * h.nx)));
@@ -44,7 +45,7 @@ std::vector<Slice> read_central_slices(const std::filesystem::path& mrc) {
         if (y + i == h.ny / 2) std::copy_n(row, h.nx, xz.row(z));
       }
     }
-  }
+  });
   return slices;
 }
 
@@ -99,10 +100,11 @@ std::vector<std::filesystem::path> write_slice_pictures(const std::filesystem::p
   const auto [narrowest, widest] = std::minmax({slices[0].width, slices[2].width});
   const std::int64_t zoom = picture_zoom(narrowest, widest);
   std::vector<std::filesystem::path> paths;
-  for (const Slice& slice : slices) {
-    paths.emplace_back(prefix.string() + "_" + slice.name + ".png");
-    write_slice_picture(paths.back(), slice, scale, zoom);
-  }
+  for (const Slice& slice : slices) paths.emplace_back(prefix.string() + "_" + slice.name + ".png");
+  base::parallel_for("draw slices", std::ssize(slices), [&](std::int64_t i) {
+    const auto slice = static_cast<std::size_t>(i);
+    write_slice_picture(paths[slice], slices[slice], scale, zoom);
+  });
   return paths;
 }
 

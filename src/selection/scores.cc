@@ -42,17 +42,24 @@ std::size_t first_as_good_as_the_best(const std::vector<HeldOutScore>& scores) {
   return static_cast<std::size_t>(first - scores.begin());
 }
 
-double search_weight(double first, const ScoreOfWeight& score) {
+double search_weight(double first, const ScoreOfWeight& score, const ExpectWeights& expect) {
   double best = first;
   std::map<double, HeldOutScore, std::greater<>> tried;
   const auto error_of = [&](double factor) {
     return (tried[best * factor] = score(best * factor)).error;
   };
+  const auto expect_factors = [&](const std::vector<double>& factors) {
+    std::vector<double> weights;
+    for (const double factor : factors) weights.push_back(best * factor);
+    if (expect) expect(weights);
+  };
   // Takes coarse steps until the best weight has a worse one on either side, and then finer ones.
+  expect_factors({4.0, 1});
   for (const double factor : {4.0, 0.25}) {
     for (int step = 0; step < kMaxSteps && error_of(factor) < error_of(1); ++step) best *= factor;
   }
   for (const double factor : {2.0, std::sqrt(2.0)}) {
+    expect_factors({1 / factor, 1, factor});
     const double below = error_of(1 / factor), here = error_of(1), above = error_of(factor);
     if (std::min(below, above) >= here) continue;
     best *= above < below ? factor : 1 / factor;

@@ -27,6 +27,8 @@ std::size_t first_as_good_as_the_best(const std::vector<HeldOutScore>& scores);
 
 /// Returns the score of a weight, and always the same one for the same weight.
 using ScoreOfWeight = std::function<HeldOutScore(double weight)>;
+/// Is told the weights whose scores are needed next, so that they can be computed together.
+using ExpectWeights = std::function<void(const std::vector<double>& weights)>;
 
 /// Number of weights that search_weight() tries if the best one is near the first.
 constexpr int kUsualWeights = 7;
@@ -36,6 +38,6 @@ constexpr int kUsualWeights = 7;
 /// all tried weights that are as good as the best (first_as_good_as_the_best()), it takes the
 /// largest. That one makes the smoothest volume: where held-out views cannot tell, less noise is
 /// the better guess.
-double search_weight(double first, const ScoreOfWeight& score);
+double search_weight(double first, const ScoreOfWeight& score, const ExpectWeights& expect = {});
 
 }  // namespace tomofield::selection

@@ -31,29 +31,50 @@ struct Tuned {
 };
 
 /// Makes the trials of a search, none of them twice, and applies the rules by which settings are
-/// chosen. It knows no method: the caller hands it "run one trial" and "are these settings equal".
+/// chosen. It knows no method: the caller hands it "run these trials" and "are these settings
+/// equal".
 template <typename Settings>
 class Trials {
  public:
-  /// Fits with these settings; the same settings always give the same score.
+  /// Makes a trial with each of these settings, which all differ, and returns them in this order.
+  /// The trials do not depend on each other, so they may be made at the same time. The same
+  /// settings always give the same score.
+  using RunTrials = std::function<std::vector<Trial<Settings>>(const std::vector<Settings>&)>;
   using RunTrial = std::function<Trial<Settings>(const Settings&)>;
   using AreEqual = std::function<bool(const Settings&, const Settings&)>;
 
-  Trials(RunTrial run, AreEqual are_equal)
+  Trials(RunTrials run, AreEqual are_equal)
       : run_(std::move(run)), are_equal_(std::move(are_equal)) {}
+  /// Makes one trial after another.
+  Trials(RunTrial run, AreEqual are_equal)
+      : Trials(RunTrials([run = std::move(run)](const std::vector<Settings>& all) {
+                 std::vector<Trial<Settings>> trials;
+                 for (const Settings& settings : all) trials.push_back(run(settings));
+                 return trials;
+               }),
+               std::move(are_equal)) {}
+
+  /// Makes those of these trials that there are not yet, all of them together.
+  void make(const std::vector<Settings>& wanted) {
+    std::vector<Settings> missing;
+    for (const Settings& settings : wanted) {
+      const auto is_equal = [&](const Settings& s) { return are_equal_(s, settings); };
+      if (!find(settings) && std::ranges::none_of(missing, is_equal)) missing.push_back(settings);
+    }
+    if (missing.empty()) return;
+    for (Trial<Settings>& trial : run_(missing)) made_.push_back(std::move(trial));
+  }
 
   /// Returns the trial with these settings and makes it if there is none yet. The reference is
   /// valid until the next trial is made.
   const Trial<Settings>& trial(const Settings& settings) {
-    const auto known = std::ranges::find_if(
-        made_, [&](const Trial<Settings>& t) { return are_equal_(t.settings, settings); });
-    if (known != made_.end()) return *known;
-    made_.push_back(run_(settings));
-    return made_.back();
+    make({settings});
+    return *find(settings);
   }
 
   /// Returns `other` if most held-out views prefer it, else `usual`.
   Settings preferred_by_most_views(const Settings& usual, const Settings& other) {
+    make({usual, other});
     const HeldOutScore of_usual = trial(usual).score, of_other = trial(other).score;
     return most_views_prefer(of_other, of_usual) ? other : usual;
   }
@@ -61,6 +82,7 @@ class Trials {
   /// Returns the first of these candidates, in order of preference, that the best one does not
   /// beat by more than the standard error of their difference.
   Settings first_as_good(const std::vector<Settings>& candidates) {
+    make(candidates);
     std::vector<HeldOutScore> scores;
     for (const Settings& settings : candidates) scores.push_back(trial(settings).score);
     return candidates[first_as_good_as_the_best(scores)];
@@ -70,11 +92,18 @@ class Trials {
   /// changes the weight alone.
   template <typename SetWeight>
   Settings with_best_weight(Settings settings, double first, const SetWeight& set_weight) {
-    const double best = search_weight(first, [&](double weight) {
+    const auto with = [&](double weight) {
       Settings tried = settings;
       set_weight(tried, weight);
-      return trial(tried).score;
-    });
+      return tried;
+    };
+    const double best = search_weight(
+        first, [&](double weight) { return trial(with(weight)).score; },
+        [&](const std::vector<double>& weights) {
+          std::vector<Settings> candidates;
+          for (const double weight : weights) candidates.push_back(with(weight));
+          make(candidates);
+        });
     set_weight(settings, best);
     return settings;
   }
@@ -85,7 +114,13 @@ class Trials {
   const std::vector<Trial<Settings>>& made() const { return made_; }
 
  private:
-  RunTrial run_;
+  const Trial<Settings>* find(const Settings& settings) const {
+    const auto known = std::ranges::find_if(
+        made_, [&](const Trial<Settings>& t) { return are_equal_(t.settings, settings); });
+    return known == made_.end() ? nullptr : &*known;
+  }
+
+  RunTrials run_;
   AreEqual are_equal_;
   std::vector<Trial<Settings>> made_;
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "base/parallel.h"
 
 namespace tomofield::tilt_series {
 namespace {
@@ -47,10 +48,9 @@ MaskedImage reduce_image(const MaskedImage& image, double factor) {
   MaskedImage out(static_cast<std::int64_t>(columns.size()),
                   static_cast<std::int64_t>(rows.size()));
 
-  std::vector<double> sums(columns.size()), areas(columns.size());
-  for (std::size_t y = 0; y < rows.size(); ++y) {
-    std::fill(sums.begin(), sums.end(), 0.0);
-    std::fill(areas.begin(), areas.end(), 0.0);
+  base::parallel_for("reduce image", std::ssize(rows), [&](std::int64_t row) {
+    const auto y = static_cast<std::size_t>(row);
+    std::vector<double> sums(columns.size()), areas(columns.size());
     for (std::size_t j = 0; j < rows[y].lengths.size(); ++j) {
       const std::size_t line = image.index(0, rows[y].first + static_cast<std::int64_t>(j));
       for (std::size_t x = 0; x < columns.size(); ++x) {
@@ -69,7 +69,7 @@ MaskedImage reduce_image(const MaskedImage& image, double factor) {
       out.valid[at] = areas[x] >= enough;
       out.values[at] = out.valid[at] ? static_cast<float>(sums[x] / areas[x]) : 0.0f;
     }
-  }
+  });
   return out;
 }
 

@@ -31,6 +31,13 @@ PixelCensus mask_not_finite(MaskedImage* image) {
 
 }  // namespace
 
+std::size_t decoding_memory(double raw_pixels, double bin_factor) {
+  constexpr double kBytesPerPixel = 5;
+  constexpr double kCopies = 3;
+  const double binned = raw_pixels / (bin_factor * bin_factor);
+  return static_cast<std::size_t>(kCopies * kBytesPerPixel * (raw_pixels + binned));
+}
+
 ViewDecoder::ViewDecoder(const io::ImageStack& stack, const SeriesPlan& plan, Contrast contrast,
                          std::optional<io::MrcReader> mask)
     : stack_(stack), plan_(plan), contrast_(contrast), mask_(std::move(mask)) {}
@@ -46,6 +53,11 @@ std::int64_t ViewDecoder::aligned_width() const {
 }
 std::int64_t ViewDecoder::aligned_height() const {
   return reduced_size(plan_.aligned_height, plan_.bin_factor);
+}
+
+std::size_t ViewDecoder::memory() const {
+  const auto& header = stack_.header();
+  return decoding_memory(static_cast<double>(header.nx * header.ny), plan_.bin_factor);
 }
 
 DecodedView ViewDecoder::decode(std::size_t view, Frames frames) const {

@@ -32,6 +32,10 @@ struct DecodedView {
   MaskedImage aligned;
 };
 
+/// Returns the bytes that decoding a view takes: its raw pixels, aligned and as they are, with
+/// their masks, and what becomes of them.
+std::size_t decoding_memory(double raw_pixels, double bin_factor);
+
 /// Makes images of views from sections of a stack. Thread-safe.
 class ViewDecoder {
  public:
@@ -43,6 +47,9 @@ class ViewDecoder {
   /// Reads the section of a view, masks what is no measurement (NaN, infinity, fill, the user's
   /// mask, hot and dead pixels), aligns and bins it. Throws Error if the stack cannot be read.
   DecodedView decode(std::size_t view, Frames frames) const;
+
+  /// Returns about the bytes that decode() and what is done with its result take.
+  std::size_t memory() const;
 
   /// Returns the size of a binned image in one of the frames.
   std::int64_t recorded_width() const;

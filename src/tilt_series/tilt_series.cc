@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <span>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include "base/check.h"
 #include "base/log.h"
+#include "base/trace.h"
 #include "io/image_stack.h"
 #include "io/mrc.h"
 #include "io/scratch_memory.h"
@@ -20,6 +22,7 @@
 #include "tilt_series/series_plan.h"
 #include "tilt_series/view_owner.h"
 #include "tilt_series/view_store.h"
+#include "tilt_series/views_at_once.h"
 #include "tomofield/error.h"
 
 namespace tomofield::tilt_series {
@@ -107,13 +110,15 @@ struct TiltSeries::Impl {
     });
   }
 
-  /// Calls body(view) for each view that this process owns.
+  /// Calls body(view) on all threads for each view that this process owns.
   template <typename Body>
-  void for_own_views(const distributed::Communicator& processes, const Body& body) const {
-    processes.run_collectively([&] {
-      for (std::size_t view = 0; view < views.size(); ++view)
-        if (is_own_view(view, processes)) body(view);
-    });
+  void for_own_views(const char* what, const distributed::Communicator& processes,
+                     const Body& body) const {
+    std::vector<std::size_t> own;
+    for (std::size_t view = 0; view < views.size(); ++view)
+      if (is_own_view(view, processes)) own.push_back(view);
+    const std::size_t at_once = views_at_once(decoder.memory(), processes);
+    processes.run_collectively([&] { for_views(what, own, at_once, body); });
   }
 
   /// Decodes every view once: stores it, refuses what cannot be used, finds I0 and the noise. The
@@ -122,7 +127,8 @@ struct TiltSeries::Impl {
     std::vector<ViewCheck> checks(views.size());
     std::vector<std::vector<float>> block_means(views.size());
     noise_sigma.assign(views.size(), 0.0);
-    for_own_views(processes, [&](std::size_t view) {
+    const base::TraceSpan span("decode views");
+    for_own_views("decode views", processes, [&](std::size_t view) {
       const DecodedView decoded = decoder.decode(
           view, {.recorded = !options.resample, .aligned = options.resample || aligned != nullptr});
       const MaskedImage& image = options.resample ? decoded.aligned : decoded.recorded;
@@ -206,12 +212,14 @@ struct TiltSeries::Impl {
                       "leave --log out",
                       stack->name(), intensity.empty_beam));
     }
-    std::int64_t num_raised = 0;
-    for_own_views(processes, [&](std::size_t view) {
+    const base::TraceSpan span("take logarithms");
+    std::atomic<std::int64_t> num_raised_here = 0;
+    for_own_views("take logarithms", processes, [&](std::size_t view) {
       MaskedImage image = measured->read(view);
-      num_raised += intensity.convert(&image);
+      num_raised_here += intensity.convert(&image);
       noise_sigma[view] = estimate_noise_sigma(image);
     });
+    std::int64_t num_raised = num_raised_here;
     processes.allreduce_sum(std::span(noise_sigma));
     processes.allreduce_sum(std::span(&num_raised, 1));
     if (num_raised == 0) return;
@@ -226,6 +234,7 @@ struct TiltSeries::Impl {
 
   /// Finds beads and fiducials in aligned images.
   void find_beads(const distributed::Communicator& processes) {
+    const base::TraceSpan span("find beads");
     const ViewStore* store = options.resample ? measured.get() : aligned.get();
     BeadViews bead_views;
     for (const View& view : views) bead_views.tilt_deg.push_back(view.tilt_deg);
@@ -234,6 +243,7 @@ struct TiltSeries::Impl {
       intensity.convert(&image);
       return image;
     };
+    bead_views.at_once = views_at_once(decoder.memory(), processes);
     beads = find_bead_masks(options, plan, *stack, bead_views, processes);
     beads.metrics.num_bad_pixels = num_bad_pixels;
     aligned.reset();
@@ -306,6 +316,8 @@ void TiltSeries::read_view(std::size_t view, std::span<float> image,
 void TiltSeries::forget_view(std::size_t view) const {
   if (impl_->measured && impl_->measured->holds(view)) impl_->measured->discard(view);
 }
+
+std::size_t TiltSeries::decoding_memory() const { return impl_->decoder.memory(); }
 
 std::size_t TiltSeries::stored_memory(const distributed::Communicator& processes) const {
   const std::size_t capacity = max_own_views(views().size(), processes);

@@ -100,6 +100,9 @@ class TiltSeries {
   /// Returns the memory that the stored views take at most, in a job of so many processes.
   std::size_t stored_memory(const distributed::Communicator& processes) const;
 
+  /// Returns about the bytes that reading one view takes, if it is decoded anew.
+  std::size_t decoding_memory() const;
+
   /// Returns the standard deviation of each view's noise, in the units of read_view.
   const std::vector<double>& noise_sigma() const;
 

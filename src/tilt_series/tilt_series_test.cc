@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "base/log.h"
+#include "base/parallel.h"
 #include "base/random.h"
 #include "io/mrc.h"
 #include "pixel_stack.h"
@@ -295,6 +296,35 @@ TEST(TiltSeries, DarkContrastBecomesLineIntegrals) {
   EXPECT_NEAR(load(logarithm, 0).image[centre], 0.7, 0.06);
   EXPECT_NEAR(load(logarithm, 0).image[0], 0.0, 0.05);
   EXPECT_NEAR(logarithm.noise_sigma()[0], 5.0 / kEmptyBeam, 0.3 * 5.0 / kEmptyBeam);
+}
+
+// Noise, beads and hot pixels need every pixel of every view.
+TEST(TiltSeries, IsTheSameOnAnyNumberOfThreads) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 9);
+  write_stack(options.stack, 64, 64, 9, [](auto x, auto y, auto z) {
+    base::Random random(static_cast<std::uint64_t>(z), static_cast<std::uint64_t>(y * 64 + x));
+    const bool is_bead = std::hypot(x - 20 - z, y - 30) < 3;
+    return kEmptyBeam - (is_bead ? 300.0f : 0.0f) + 5.0f * static_cast<float>(random.normal());
+  });
+  options.contrast = Contrast::kDark;
+  options.bin = 1.5;
+  for (const bool take_log : {false, true}) {
+    options.take_log = take_log;
+    base::set_thread_count(1);
+    const TiltSeries on_one(options);
+    base::set_thread_count(5);
+    const TiltSeries on_five(options);
+    base::set_thread_count(0);
+    EXPECT_EQ(on_five.noise_sigma(), on_one.noise_sigma());
+    EXPECT_EQ(on_five.empty_beam(), on_one.empty_beam());
+    EXPECT_EQ(on_five.mask_metrics().num_bad_pixels, on_one.mask_metrics().num_bad_pixels);
+    EXPECT_EQ(on_five.mask_metrics().beads_found, on_one.mask_metrics().beads_found);
+    for (std::size_t view = 0; view < 9; ++view) {
+      ASSERT_EQ(load(on_five, view).image, load(on_one, view).image);
+      ASSERT_EQ(load(on_five, view).valid, load(on_one, view).valid);
+    }
+  }
 }
 
 TEST(TiltSeries, LogarithmNeverSeesZero) {

@@ -32,9 +32,10 @@ std::size_t ViewStore::view_bytes() const { return bytes_of(1, width_, height_);
 
 void ViewStore::write(std::size_t view, const MaskedImage& image) {
   TOMOFIELD_CHECK(image.width == width_ && image.height == height_, "the view has another size");
-  TOMOFIELD_CHECK(!holds(view) && used_ + view_bytes() <= memory_.size(), "there is no room");
-  place_[view] = used_;
-  used_ += view_bytes();
+  TOMOFIELD_CHECK(!holds(view), "the view was written before");
+  const std::size_t place = used_.fetch_add(view_bytes());
+  TOMOFIELD_CHECK(place + view_bytes() <= memory_.size(), "there is no room");
+  place_[view] = place;
   float* to = reinterpret_cast<float*>(memory_.data() + place_[view]);
   for (std::size_t i = 0; i < image.values.size(); ++i)
     to[i] = image.valid[i] ? image.values[i] : std::numeric_limits<float>::quiet_NaN();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -11,7 +12,8 @@
 namespace tomofield::tilt_series {
 
 /// Decoded views of one size, [view, y, x] floats with NaN where there is no measurement. They lie
-/// in memory or, if they are large, in a scratch file. One thread writes; several may read.
+/// in memory or, if they are large, in a scratch file. Different views may be written, read and
+/// discarded by different threads at once.
 class ViewStore {
  public:
   /// Makes room for `capacity` of the `num_views` views of a series. Throws Error if there is none
@@ -35,8 +37,8 @@ class ViewStore {
   std::size_t view_bytes() const;
 
   std::int64_t width_, height_;
-  std::vector<std::size_t> place_;  // of each view in the memory, in bytes
-  std::size_t used_ = 0;            // bytes
+  std::vector<std::size_t> place_;     // of each view in the memory, in bytes
+  std::atomic<std::size_t> used_ = 0;  // bytes
   io::ScratchMemory memory_;
 };
 

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <stdexcept>
+#include <utility>
 
+#include "base/parallel.h"
 #include "scratch_directory.h"
 
 namespace tomofield::tilt_series {
@@ -34,6 +37,19 @@ TEST(ViewStore, ReturnsTheViewsThatItHolds) {
   EXPECT_FALSE(store.holds(4));
   EXPECT_THROW(store.read(4), std::logic_error);
   EXPECT_EQ(store.read(1).values, some_view(-200).values);
+}
+
+TEST(ViewStore, TakesViewsFromSeveralThreads) {
+  const testing::ScratchDirectory scratch;
+  constexpr std::size_t kViews = 200;
+  ViewStore store(kViews, kViews, 7, 5, scratch.path());
+  base::set_thread_count(4);
+  base::parallel_for("write views", kViews, [&](std::int64_t view) {
+    store.write(static_cast<std::size_t>(view), some_view(static_cast<float>(view)));
+  });
+  base::set_thread_count(0);
+  for (std::size_t view = 0; view < kViews; ++view)
+    ASSERT_EQ(store.read(view).values, some_view(static_cast<float>(view)).values);
 }
 
 }  // namespace

@@ -99,6 +99,7 @@ def test_results_have_the_bytes_of_one_process(command):
              "coarse": (["--field", "grid", "--leaf-size", 32, "--coarse-epochs", 3,
                          "--tv-penalty", "auto", "--mode", 1], (2,)),
              "vertices": (["--leaf-size", 32, "--vertex-epochs", 3, "--coarse-epochs", 2], (2,)),
+             "tune": (["--field", "grid", "--epochs", 2, "--tune"], (2, 3)),
              "coarser": (["--field", "grid", "--leaf-size", 64, "--coarse-epochs", 4], (2,)),
              "margin": (["--contrast", "dark", "--hold-out", 5, "--axes", "xzy", "--mode", 12],
                         (3,))}

@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "base/parallel.h"
@@ -117,6 +118,18 @@ TEST_F(KnownField, ScaleAndOffsetOfAViewAreNoError) {
     EXPECT_NEAR(model.offset, -3.0, 1.0);
   }
   EXPECT_GT(error(*measured, false).total, 10 * with.total);
+}
+
+TEST_F(KnownField, PredictionsAreTheSameOnAnyNumberOfThreads) {
+  const auto measured = measure(1.0, 0.0);
+  const auto predict = [&](int threads) {
+    base::set_thread_count(threads);
+    auto view = measurement::predicted_view(*sampler_, projector_, *measured, 4, {1.5, 2.0, 1.0});
+    const measurement::ViewErrors errors = error(*measured, true);
+    base::set_thread_count(0);
+    return std::tuple(view.predicted, errors.total, errors.view_error);
+  };
+  EXPECT_EQ(predict(3), predict(1));
 }
 
 TEST_F(KnownField, MeasuredViewsAreShownAsTheyAre) {

@@ -8,6 +8,8 @@
 #include <optional>
 #include <tuple>
 
+#include "base/parallel.h"
+
 namespace tomofield::tilt_series {
 namespace {
 
@@ -146,15 +148,19 @@ class TrackFinder {
 
   /// Returns the places that two strong spots fix and that other views support.
   std::vector<BeadTrack> suggest() const {
-    std::vector<BeadTrack> candidates;
     const std::size_t num_views = views_.tilt_deg.size();
-    for (std::size_t first = 0; first < num_views; ++first) {
+    std::vector<std::vector<BeadTrack>> from_view(num_views);
+    base::parallel_for("suggest tracks", std::ssize(from_view), [&](std::int64_t v) {
+      const auto first = static_cast<std::size_t>(v);
       for (std::size_t second = 0; second < num_views; ++second) {
         const double apart = views_.tilt_deg[second] - views_.tilt_deg[first];
         if (apart < kNearestTilt_deg || apart > kFarthestTilt_deg) continue;
-        suggest_from(first, second, &candidates);
+        suggest_from(first, second, &from_view[first]);
       }
-    }
+    });
+    std::vector<BeadTrack> candidates;
+    for (const auto& some : from_view)
+      candidates.insert(candidates.end(), some.begin(), some.end());
     return candidates;
   }
 

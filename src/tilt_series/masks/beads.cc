@@ -10,6 +10,7 @@
 #include "tilt_series/masks/bead_tracks.h"
 #include "tilt_series/masks/spots.h"
 #include "tilt_series/view_owner.h"
+#include "tilt_series/views_at_once.h"
 
 namespace tomofield::tilt_series {
 namespace {
@@ -67,9 +68,10 @@ SearchedViews search_own_views(const BeadViews& views, double diameter,
   const std::size_t num_views = views.tilt_deg.size();
   searched.spots.resize(num_views);
   searched.is_valid.resize(num_views);
-  base::parallel_for("find beads", static_cast<std::int64_t>(num_views), [&](std::int64_t v) {
-    const auto view = static_cast<std::size_t>(v);
-    if (!is_own_view(view, processes)) return;
+  std::vector<std::size_t> own;
+  for (std::size_t view = 0; view < num_views; ++view)
+    if (is_own_view(view, processes)) own.push_back(view);
+  for_views("find beads", own, views.at_once, [&](std::size_t view) {
     const MaskedImage image = views.read(view);
     searched.spots[view] = strongest_spots(image, diameter);
     searched.is_valid[view].assign(image.valid.begin(), image.valid.end());
@@ -153,12 +155,13 @@ std::optional<double> estimate_diameter(const BeadViews& views, const BeadSearch
   }
   for (const std::size_t view : lowest_tilts(views)) {
     const MaskedImage image = read_on_all(views, view, processes);
-    base::parallel_for("compare beads", static_cast<std::int64_t>(trials.size()), [&](std::int64_t i) {
-      SizeTrial& trial = trials[static_cast<std::size_t>(i)];
-      const std::vector<Spot> spots = find_spots(image, trial.about_px, kStrong);
-      for (const Spot& spot : spots) trial.strength += spot.strength;
-      trial.profile.add(image, spots);
-    });
+    base::parallel_for("compare beads", static_cast<std::int64_t>(trials.size()),
+                       [&](std::int64_t i) {
+                         SizeTrial& trial = trials[static_cast<std::size_t>(i)];
+                         const std::vector<Spot> spots = find_spots(image, trial.about_px, kStrong);
+                         for (const Spot& spot : spots) trial.strength += spot.strength;
+                         trial.profile.add(image, spots);
+                       });
   }
   const auto best = std::max_element(
       trials.begin(), trials.end(),

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "base/parallel.h"
 #include "tilt_series/binning.h"
 
 namespace tomofield::tilt_series {
@@ -51,7 +52,7 @@ struct Disc {
 /// Returns means of the disc around every pixel [y, x]; kUnknown where little was measured.
 std::vector<float> disc_means(const MaskedImage& image, const Disc& disc) {
   std::vector<float> means(image.values.size(), kUnknown);
-  for (std::int64_t y = 0; y < image.height; ++y) {
+  base::parallel_for("disc means", image.height, [&](std::int64_t y) {
     for (std::int64_t x = 0; x < image.width; ++x) {
       float sum = 0.0f, weight = 0.0f;
       for (const Disc::Pixel& pixel : disc.pixels) {
@@ -64,7 +65,7 @@ std::vector<float> disc_means(const MaskedImage& image, const Disc& disc) {
       }
       if (weight >= kMinMeasured * disc.total) means[image.index(x, y)] = sum / weight;
     }
-  }
+  });
   return means;
 }
 
@@ -78,7 +79,7 @@ std::vector<float> contrasts(const MaskedImage& image, double diameter) {
     dy[i] = std::lround(kDistance * diameter * std::sin(angle));
   }
   std::vector<float> contrast(means.size(), kUnknown);
-  for (std::int64_t y = 0; y < image.height; ++y) {
+  base::parallel_for("contrasts", image.height, [&](std::int64_t y) {
     for (std::int64_t x = 0; x < image.width; ++x) {
       const float centre = means[image.index(x, y)];
       if (centre == kUnknown) continue;
@@ -96,7 +97,7 @@ std::vector<float> contrasts(const MaskedImage& image, double diameter) {
                        differences.begin() + static_cast<std::ptrdiff_t>(count));
       contrast[image.index(x, y)] = *third;
     }
-  }
+  });
   return contrast;
 }
 

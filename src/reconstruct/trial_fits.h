@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "base/stopwatch.h"
+#include "reconstruct/tuning.h"
+#include "selection/trial_measurement.h"
+
+namespace tomofield::reconstruction {
+
+/// Is thrown by every process of a search after a stop was requested of one of them.
+struct StopRequested {};
+
+/// Makes the trials of a search, with its progress. The trials of a batch take their steps side by
+/// side. Several processes share the trials of a batch: each makes some of them alone.
+class TrialFits {
+ public:
+  /// The trials use at most `rows` rows in the middle of `measurement`. All references must outlive
+  /// the object.
+  TrialFits(const measurement::Measurement& measurement, std::int64_t rows,
+            const fit::FieldOptions& field, const fit::FitOptions& fit, const TuneHooks& hooks,
+            int num_expected, const distributed::Communicator& processes);
+
+  /// Makes a trial with each of these settings. Takes those that `file` has from it, and adds the
+  /// others to it; the root alone uses it, and it may be null. After every step it calls the hooks,
+  /// in the calling thread. Throws StopRequested if a stop was requested; `file` then has the
+  /// trials that were finished. Every process calls it and gets the same trials.
+  std::vector<FitTrial> run(const std::vector<TrialSettings>& batch, selection::TrialFile* file);
+
+  const std::vector<int>& predicted_views() const { return views_.predicted; }
+
+ private:
+  class Running;
+  using Trials = std::vector<std::optional<FitTrial>>;  // those that there are, of a batch
+
+  Trials known_trials(const std::vector<TrialSettings>& batch, const selection::TrialFile* file);
+  std::vector<std::unique_ptr<Running>> own_part(const std::vector<TrialSettings>& batch,
+                                                 const Trials& trials) const;
+  bool take_steps(std::vector<std::unique_ptr<Running>>& own, std::size_t batch_size);
+  bool report(const std::vector<std::unique_ptr<Running>>& own, std::size_t batch_size);
+  void share(Trials& trials) const;
+
+  selection::TrialViews views_;
+  measurement::Measurement measurement_;
+  double part_;  // number of the rows of trials over that of all rows
+  const fit::FieldOptions& field_;
+  const fit::FitOptions& fit_;
+  const TuneHooks& hooks_;
+  const distributed::Communicator& processes_;
+  base::Stopwatch running_;
+  int num_expected_;
+  int num_done_ = 0;
+};
+
+}  // namespace tomofield::reconstruction
