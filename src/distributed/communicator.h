@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <utility>
@@ -84,6 +85,22 @@ class Communicator {
   /// Sends `values` to rank `to`, which must receive as many. T is float or std::int64_t.
   template <typename T>
   void send(std::span<const T> values, int to) const;
+  /// Holds a message while it is sent. Its destructor waits until that is done.
+  class Sending {
+   public:
+    Sending(Sending&&) noexcept;
+    Sending& operator=(Sending&&) = delete;
+    ~Sending();
+
+   private:
+    friend class Communicator;
+    struct State;
+    explicit Sending(std::unique_ptr<State> state);
+    std::unique_ptr<State> state_;
+  };
+  /// Starts to send `values` to rank `to`, which must receive as many. Nothing is sent if there are
+  /// none.
+  [[nodiscard]] Sending start_sending(std::vector<float> values, int to) const;
   /// Waits for values that rank `from` sends, and fills `values` with them.
   template <typename T>
   void receive(std::span<T> values, int from) const;

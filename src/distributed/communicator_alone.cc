@@ -23,6 +23,16 @@ void Communicator::send(std::span<const T>, int) const {
 template void Communicator::send(std::span<const float>, int) const;
 template void Communicator::send(std::span<const std::int64_t>, int) const;
 
+struct Communicator::Sending::State {};
+Communicator::Sending::Sending(std::unique_ptr<State>) {}
+Communicator::Sending::Sending(Sending&&) noexcept = default;
+Communicator::Sending::~Sending() = default;
+
+Communicator::Sending Communicator::start_sending(std::vector<float> values, int) const {
+  TOMOFIELD_CHECK(values.empty(), "there is another process to send to");
+  return Sending(nullptr);
+}
+
 template <typename T>
 void Communicator::receive(std::span<T>, int) const {
   TOMOFIELD_CHECK(size_ > 1, "there is another process to receive from");

@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <memory>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "base/check.h"
@@ -151,6 +153,30 @@ void Communicator::send(std::span<const T> values, int to) const {
 }
 template void Communicator::send(std::span<const float>, int) const;
 template void Communicator::send(std::span<const std::int64_t>, int) const;
+
+struct Communicator::Sending::State {
+  const Communicator& processes;
+  std::vector<float> values;
+  Requests requests;
+};
+
+Communicator::Sending::Sending(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Communicator::Sending::Sending(Sending&&) noexcept = default;
+Communicator::Sending::~Sending() {
+  if (!state_ || state_->requests.all.empty()) return;
+  const Waiting waiting(state_->processes.traffic_.seconds);
+  state_->processes.finish(state_->requests);
+}
+
+Communicator::Sending Communicator::start_sending(std::vector<float> values, int to) const {
+  auto state = std::make_unique<Sending::State>(*this, std::move(values));
+  traffic_.bytes += static_cast<std::int64_t>(state->values.size() * sizeof(float));
+  for_each_piece(std::span(state->values), [&](std::span<float> piece) {
+    MPI_Isend(piece.data(), static_cast<int>(piece.size()), MPI_FLOAT, to, kTag, kAll,
+              state->requests.next());
+  });
+  return Sending(std::move(state));
+}
 
 template <typename T>
 void Communicator::receive(std::span<T> values, int from) const {

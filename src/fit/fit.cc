@@ -54,8 +54,8 @@ int steps_per_epoch_of(const measurement::Measurement& measurement, const FitOpt
 
 // Returns the leaves that a process keeps; an empty list means all.
 std::vector<int> leaves_to_keep(const distributed::Communicator& processes,
-                                const field::Quadtree& tree, base::Range bands) {
-  return processes.size() == 1 ? std::vector<int>{} : needed_leaves(tree, bands);
+                                const field::Quadtree& tree, const measurement::RowShare& share) {
+  return processes.size() == 1 ? std::vector<int>{} : needed_leaves(tree, share);
 }
 
 // The tree may change in the coarse stage. Without one, it may change in this part of the fit.
@@ -81,10 +81,10 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
       options_(with_at_most_one_subset_a_view(options, measurement.num_fitted_views())),
       stages_(make_stages(field_options, options_)),
       domain_(domain_of(measurement, field_options)),
-      bands_(measurement::own_bands(domain_.num_rows, domain_.tree.roots().cell_size, processes)),
+      share_(measurement::row_share(domain_.num_rows, domain_.tree.roots().cell_size, processes)),
       field_(make_initial_field(domain_, measurement.geometry.thickness, measurement.mean_density,
                                 of_kind(field_options, stages_.front().field_kind), options.seed,
-                                leaves_to_keep(processes, domain_.tree, bands_))),
+                                leaves_to_keep(processes, domain_.tree, share_))),
       optimizer_(*field_, AdamOptions{}),
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())),
       fitted_views_(views_but(measurement.geometry.num_views(), measurement.held_out)),
@@ -104,6 +104,11 @@ const Stage& Fit::stage() const {
   const std::int64_t epoch = progress_.step / steps_per_epoch();
   return *std::find_if(stages_.rbegin(), stages_.rend(),
                        [&](const Stage& s) { return epoch >= s.first_epoch; });
+}
+
+// Returns the share in the current stage. The slabs of coarse pixels are too high to divide bands.
+measurement::RowShare Fit::share_of_stage() const {
+  return stage().bin == 1 ? share_ : share_.without_help();
 }
 
 // Makes the objects that belong to one stage.
@@ -158,15 +163,15 @@ void Fit::follow_tree() {
       .num_rows = domain_.num_rows,
       .support = domain_.support,
       .has_factors = stage().field_kind == stages_.back().field_kind,
-      .own_bands = bands_,
+      .share = share_of_stage(),
       .own_leaves = own_leaves(),
       .options = options_,
       .processes = processes_});
-  halo_.emplace(*field_, bands_, stage().bin, processes());
+  halo_.emplace(*field_, share_of_stage(), stage().bin, processes());
 }
 
 std::vector<int> Fit::kept_leaves(const field::Quadtree& tree) const {
-  return leaves_to_keep(processes(), tree, bands_);
+  return leaves_to_keep(processes(), tree, share_);
 }
 
 void Fit::go_on_from(Progress progress, std::unique_ptr<field::Field> field) {

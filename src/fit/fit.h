@@ -17,6 +17,7 @@
 #include "fit/tree_updates.h"
 #include "measurement/held_out.h"
 #include "measurement/measurement.h"
+#include "measurement/row_share.h"
 #include "objective/objective.h"
 #include "projection/slab_projector.h"
 
@@ -43,7 +44,7 @@ struct Progress {
 /// A fit goes through stages (stages.h). At the end of a stage, the field is resampled to the
 /// vertices of the next one, or factorised, and the optimiser starts anew.
 ///
-/// Several processes can share a fit. Each works on some bands and keeps the parameters of their
+/// Several processes can share a fit. Each works on some rows and keeps the parameters of their
 /// leaves and of the leaves next to them. Sums over bands are all-reduced in a fixed order, so the
 /// result has the same bits for any number of threads and processes.
 class Fit {
@@ -89,10 +90,10 @@ class Fit {
   Adam& optimizer() { return optimizer_; }
 
   const distributed::Communicator& processes() const { return processes_; }
-  /// Returns the bands that this process works on; one process alone has all of them.
-  base::Range own_bands() const { return bands_; }
-  /// Returns the leaves of these bands.
-  base::Range own_leaves() const { return leaves_of_bands(field_->tree(), bands_); }
+  /// Returns the rows that this process works on; one process alone has all of them.
+  const measurement::RowShare& share() const { return share_; }
+  /// Returns the leaves of its bands.
+  base::Range own_leaves() const { return leaves_of_bands(field_->tree(), share_.bands); }
   /// Returns the leaves of a tree whose parameters this process keeps; an empty list means all.
   std::vector<int> kept_leaves(const field::Quadtree& tree) const;
   /// Counts the steps that run() has taken and their messages to other processes.
@@ -109,6 +110,7 @@ class Fit {
   std::vector<int> views_of_step(std::int64_t step) const;
   double learning_rate(std::int64_t step) const;
   const Stage& stage() const;
+  measurement::RowShare share_of_stage() const;
   void enter_stage();
   void resample_field();
   void refine();
@@ -119,7 +121,7 @@ class Fit {
   FitOptions options_;
   std::vector<Stage> stages_;
   Domain domain_;
-  base::Range bands_;
+  measurement::RowShare share_;
   std::unique_ptr<field::Field> field_;
   Adam optimizer_;
   TreeUpdates tree_updates_;

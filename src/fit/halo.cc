@@ -33,43 +33,43 @@ Range leaves_of_bands(const field::Quadtree& tree, Range bands) {
   return {first_of(bands.begin), first_of(bands.end)};
 }
 
-HaloLeaves halo_leaves(const field::Quadtree& tree, Range bands) {
+HaloLeaves halo_leaves(const field::Quadtree& tree, const measurement::RowShare& share) {
   const field::RootGrid& roots = tree.roots();
-  const std::int64_t first = roots.y0 + bands.begin * roots.cell_size;
-  const std::int64_t end = roots.y0 + bands.end * roots.cell_size;
+  const std::int64_t first = roots.y0 + share.bands.begin * roots.cell_size;
+  const std::int64_t end = roots.y0 + share.bands.end * roots.cell_size;
   HaloLeaves leaves;
-  if (bands.begin > 0) {
+  if (share.bands.begin > 0) {
     leaves.before = tree.leaves_across(first - 1, first);
-    leaves.own_first = tree.leaves_across(first, first + 1);
+    leaves.own_first = tree.leaves_across(first, first + share.rows_by_previous + 1);
   }
-  if (bands.end < roots.rows) {
+  if (share.bands.end < roots.rows) {
     leaves.own_last = tree.leaves_across(end - 1, end);
-    leaves.after = tree.leaves_across(end, end + 1);
+    leaves.after = tree.leaves_across(end, end + share.rows_for_next + 1);
   }
   return leaves;
 }
 
-std::vector<int> needed_leaves(const field::Quadtree& tree, Range bands) {
-  const Range own = leaves_of_bands(tree, bands);
-  const HaloLeaves halo = halo_leaves(tree, bands);
+std::vector<int> needed_leaves(const field::Quadtree& tree, const measurement::RowShare& share) {
+  const Range own = leaves_of_bands(tree, share.bands);
+  const HaloLeaves halo = halo_leaves(tree, share);
   std::vector<int> leaves = halo.before;
   for (int leaf = own.begin; leaf < own.end; ++leaf) leaves.push_back(leaf);
   leaves.insert(leaves.end(), halo.after.begin(), halo.after.end());
   return leaves;
 }
 
-Halo::Part Halo::part(const field::Field& field, const std::vector<int>& leaves, Side side,
-                      int pixel) {
+// Returns the parameters that densities between two y depend on.
+Halo::Part Halo::part(const field::Field& field, const std::vector<int>& leaves, double low,
+                      double high) {
   Part part;
   std::size_t size = 0;
   for (const int leaf : leaves) {
     const field::Square& square = field.tree().leaf(leaf).square;
-    // Covers the face and the centre of the row beside it.
-    const double face = static_cast<double>(side == Side::kStart ? square.y0 : square.y1());
-    const double row = face + (side == Side::kStart ? 0.5 : -0.5) * pixel;
-    const double at_face = face + field::kPixelCentre;
-    for (field::ParameterRuns runs :
-         field.parameters_between(leaf, std::min(row, at_face), std::max(row, at_face))) {
+    const auto within = [&](double y) {
+      return std::clamp(y, static_cast<double>(square.y0) + field::kPixelCentre,
+                        static_cast<double>(square.y1()) + field::kPixelCentre);
+    };
+    for (field::ParameterRuns runs : field.parameters_between(leaf, within(low), within(high))) {
       runs.first += field.offset(leaf);
       size += runs.size();
       part.runs.push_back(runs);
@@ -79,14 +79,25 @@ Halo::Part Halo::part(const field::Field& field, const std::vector<int>& leaves,
   return part;
 }
 
-Halo::Halo(const field::Field& field, Range bands, int pixel,
+Halo::Halo(const field::Field& field, const measurement::RowShare& share, int pixel,
            const distributed::Communicator& processes)
     : processes_(processes) {
-  const HaloLeaves leaves = halo_leaves(field.tree(), bands);
-  to_before_ = part(field, leaves.own_first, Side::kStart, pixel);
-  to_after_ = part(field, leaves.own_last, Side::kEnd, pixel);
-  from_before_ = part(field, leaves.before, Side::kEnd, pixel);
-  from_after_ = part(field, leaves.after, Side::kStart, pixel);
+  const HaloLeaves leaves = halo_leaves(field.tree(), share);
+  const field::RootGrid& roots = field.tree().roots();
+  const auto boundary = [&](int band) {
+    return static_cast<double>(roots.y0 + band * roots.cell_size);
+  };
+  const double first = boundary(share.bands.begin), end = boundary(share.bands.end);
+  const double half = 0.5 * pixel;  // to the centre of a row
+  // Covers the face and the centre of a row beside it.
+  const auto from = [&](double face) { return face - half; };
+  const auto to = [&](double face, std::int64_t rows) {
+    return face + std::max(field::kPixelCentre, static_cast<double>(rows) + half);
+  };
+  to_before_ = part(field, leaves.own_first, first, to(first, share.rows_by_previous));
+  to_after_ = part(field, leaves.own_last, from(end), end + field::kPixelCentre);
+  from_before_ = part(field, leaves.before, from(first), first + field::kPixelCentre);
+  from_after_ = part(field, leaves.after, end, to(end, share.rows_for_next));
 }
 
 void Halo::refresh(field::Field& field) {

@@ -23,15 +23,6 @@ field::Quadtree uneven_tree() {
   return tree;
 }
 
-TEST(Share, BandsOfAProcessAloneAreAll) {
-  const auto& alone = distributed::Communicator::alone();
-  EXPECT_EQ(measurement::own_bands(200, 64, alone), (Range{0, 4}));
-  EXPECT_EQ(measurement::own_bands(64, 64, alone), (Range{0, 1}));
-  EXPECT_EQ(measurement::slabs_of_bands({0, 4}, 64, 200), (Range{0, 13}));
-  EXPECT_EQ(measurement::slabs_of_bands({1, 3}, 64, 200), (Range{4, 12}));
-  EXPECT_EQ(measurement::slabs_of_bands({3, 4}, 64, 200), (Range{12, 13}));
-}
-
 TEST(Share, LeavesOfBandsAreThoseInTheirRows) {
   const field::Quadtree tree = uneven_tree();
   int next = 0;
@@ -44,6 +35,8 @@ TEST(Share, LeavesOfBandsAreThoseInTheirRows) {
   }
   EXPECT_EQ(next, tree.num_leaves());
 }
+
+measurement::RowShare share_of(Range bands) { return {bands, 0, 0}; }
 
 // Tries all pairs of leaves: those that touch across the boundary belong in the halo.
 TEST(Share, HaloLeavesTouchAcrossTheBoundary) {
@@ -58,8 +51,8 @@ TEST(Share, HaloLeavesTouchAcrossTheBoundary) {
     const auto set_of = [](const std::vector<int>& leaves) {
       return std::set<int>(leaves.begin(), leaves.end());
     };
-    const HaloLeaves lower = halo_leaves(tree, {0, boundary});
-    const HaloLeaves upper = halo_leaves(tree, {boundary, 4});
+    const HaloLeaves lower = halo_leaves(tree, share_of({0, boundary}));
+    const HaloLeaves upper = halo_leaves(tree, share_of({boundary, 4}));
     EXPECT_EQ(set_of(lower.own_last), below);
     EXPECT_EQ(set_of(lower.after), above);
     EXPECT_TRUE(lower.before.empty() && lower.own_first.empty());
@@ -67,9 +60,25 @@ TEST(Share, HaloLeavesTouchAcrossTheBoundary) {
     EXPECT_EQ(upper.before, lower.own_last);
     EXPECT_EQ(upper.own_first, lower.after);
     EXPECT_TRUE(upper.after.empty() && upper.own_last.empty());
-    const std::vector<int> needed = needed_leaves(tree, {boundary, 4});
+    const std::vector<int> needed = needed_leaves(tree, share_of({boundary, 4}));
     EXPECT_EQ(static_cast<int>(needed.size()),
               leaves_of_bands(tree, {boundary, 4}).size() + std::ssize(below));
+  }
+}
+
+// A process that works on the first rows of the next bands needs every leaf in these rows and in
+// the row after them.
+TEST(Share, HaloLeavesCoverTheRowsOfTheNextProcess) {
+  const field::Quadtree tree = uneven_tree();
+  for (const std::int64_t rows : {16, 32, 48}) {
+    const HaloLeaves lower = halo_leaves(tree, {{0, 2}, rows, 0});
+    const HaloLeaves upper = halo_leaves(tree, {{2, 4}, 0, rows});
+    EXPECT_EQ(upper.own_first, lower.after);
+    const std::int64_t y = tree.roots().y0 + 2 * 64;
+    for (int leaf = 0; leaf < tree.num_leaves(); ++leaf) {
+      const field::Square& s = tree.leaf(leaf).square;
+      EXPECT_EQ(std::ranges::count(lower.after, leaf), s.y0 <= y + rows && s.y1() > y ? 1 : 0);
+    }
   }
 }
 
@@ -125,7 +134,7 @@ TEST(Share, WhatIsNotKeptStaysZeroAndTheRestIsTheSame) {
   const std::vector<field::LeafShape> finer(
       shapes.size(), {.nx = 5, .ny = 7, .nz = 9, .rank_x = 2, .rank_y = 2, .rank_z = 2});
   const Range bands{1, 2};
-  const std::vector<int> needed = needed_leaves(tree, bands);
+  const std::vector<int> needed = needed_leaves(tree, share_of(bands));
   const auto whole = field::make_field(FieldKind::kVm, tree, 16.0, shapes);
   const auto part = field::make_field(FieldKind::kVm, tree, 16.0, shapes);
   part->keep_only(needed);

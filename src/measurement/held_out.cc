@@ -58,8 +58,8 @@ SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
   const auto num_slabs = static_cast<std::size_t>(measured.num_slabs());
   std::vector<ViewSums> all(num_slabs * views.size());
   Predictor predictor(sampler, projector, views);
-  base::parallel_for("predict held-out views", measured.held().size(), [&](std::int64_t s) {
-    const int slab = measured.held().begin + static_cast<int>(s);
+  base::parallel_for("predict held-out views", measured.own().size(), [&](std::int64_t s) {
+    const int slab = measured.own().begin + static_cast<int>(s);
     float* rays = predictor.rays_of(slab);
     for (std::size_t v = 0; v < views.size(); ++v) {
       all[static_cast<std::size_t>(slab) * views.size() + v] =
@@ -131,8 +131,8 @@ PredictedView predicted_view(const projection::SlabSampler& sampler,
                        .measured = std::vector<float>(size),
                        .predicted = std::vector<float>(size)};
   Predictor predictor(sampler, projector, std::span(&view, 1));
-  base::parallel_for("predict view", measured.held().size(), [&](std::int64_t s) {
-    const int slab = measured.held().begin + static_cast<int>(s);
+  base::parallel_for("predict view", measured.own().size(), [&](std::int64_t s) {
+    const int slab = measured.own().begin + static_cast<int>(s);
     const float* rays = predictor.rays_of(slab);
     const std::int64_t rows = std::min<std::int64_t>(kLanes, shape.num_rows - slab * kLanes);
     for (std::int64_t lane = 0; lane < rows; ++lane)

@@ -13,6 +13,8 @@
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/trace.h"
+#include "kernels/lanes.h"
+#include "measurement/row_share.h"
 #include "tilt_series/view_owner.h"
 #include "tilt_series/views_at_once.h"
 #include "tomofield/error.h"
@@ -284,8 +286,9 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
   set_unit(brightness_of_views(series, shape, processes), prepared);
   for (const double sigma : series.noise_sigma())
     prepared.noise_sigma.push_back(sigma / prepared.unit);
-  const base::Range slabs =
-      slabs_of_bands(own_bands(shape.num_rows, band_rows, processes), band_rows, shape.num_rows);
+  const RowShare share = row_share(shape.num_rows, band_rows, processes);
+  const SlabViews::Holding slabs{slabs_of_bands(share.bands, band_rows, shape.num_rows),
+                                 static_cast<int>(share.rows_for_next / kernels::kLanes)};
   {
     const base::TraceSpan span("fill slabs");
     prepared.rays = std::make_shared<SlabViews>(

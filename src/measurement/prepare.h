@@ -46,7 +46,7 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
                                 const std::filesystem::path& scratch_dir);
 
 /// Does the same on each of the processes that share a series. They get the same but for `rays`:
-/// each holds those of its own bands (own_bands) of `band_rows` rows.
+/// each holds those of its share (row_share.h) of bands of `band_rows` rows.
 Measurement prepare_measurement(const tilt_series::TiltSeries& series,
                                 const SpecimenOptions& specimen,
                                 const std::filesystem::path& scratch_dir, std::int64_t band_rows,

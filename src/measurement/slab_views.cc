@@ -1,7 +1,5 @@
 #include "measurement/slab_views.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <bit>
 #include <utility>
@@ -9,7 +7,6 @@
 #include "base/parallel.h"
 #include "base/xxhash64.h"
 #include "kernels/lanes.h"
-#include "tomofield/error.h"
 
 namespace tomofield::measurement {
 
@@ -68,30 +65,31 @@ ReadViews read_on_all_threads(ReadView read_view) {
   };
 }
 
-SlabViews::SlabViews(const Shape& shape, Slabs held, const std::filesystem::path& scratch_dir,
-                     std::size_t in_memory_bytes)
+SlabViews::SlabViews(const Shape& shape, const Holding& holding,
+                     const std::filesystem::path& scratch_dir, std::size_t in_memory_bytes)
     : shape_(shape),
       scratch_dir_(scratch_dir),
-      held_(held),
+      holding_(holding),
       memory_(num_lines() * (kRayBytes + kMaskBytes), "the prepared rays", scratch_dir,
               in_memory_bytes),
       rays_(reinterpret_cast<float*>(memory_.data())),
       mask_(reinterpret_cast<std::uint16_t*>(rays_ + num_lines() * kLanes)) {}
 
-SlabViews::SlabViews(const Shape& shape, Slabs held, double unit, const ReadViews& read_views,
-                     const std::filesystem::path& scratch_dir, std::size_t in_memory_bytes)
-    : SlabViews(shape, held, scratch_dir, in_memory_bytes) {
+SlabViews::SlabViews(const Shape& shape, const Holding& holding, double unit,
+                     const ReadViews& read_views, const std::filesystem::path& scratch_dir,
+                     std::size_t in_memory_bytes)
+    : SlabViews(shape, holding, scratch_dir, in_memory_bytes) {
   fill(unit, read_views);
 }
 
 std::size_t SlabViews::num_lines() const {
-  return static_cast<std::size_t>(held_.size()) * shape_.num_views *
+  return static_cast<std::size_t>(holding_.all().size()) * shape_.num_views *
          static_cast<std::size_t>(shape_.width);
 }
 
-base::Range SlabViews::held_rows() const {
-  return {held_.begin * kLanes, static_cast<int>(std::min<std::int64_t>(
-                                    std::int64_t{held_.end} * kLanes, shape_.num_rows))};
+base::Range SlabViews::own_rows() const {
+  return {own().begin * kLanes, static_cast<int>(std::min<std::int64_t>(
+                                    std::int64_t{own().end} * kLanes, shape_.num_rows))};
 }
 
 int SlabViews::rows_of(int slab) const {
@@ -99,7 +97,7 @@ int SlabViews::rows_of(int slab) const {
 }
 
 std::size_t SlabViews::line(int slab, int view) const {
-  return (static_cast<std::size_t>(slab - held_.begin) * shape_.num_views +
+  return (static_cast<std::size_t>(slab - own().begin) * shape_.num_views +
           static_cast<std::size_t>(view)) *
          static_cast<std::size_t>(shape_.width);
 }
@@ -127,8 +125,8 @@ void SlabViews::fill(double unit, const ReadViews& read_views) {
                                               std::vector<std::uint8_t>(pixels)};
     });
     read_views(views, buffers);
-    base::parallel_for("fill slabs", held_.size(), [&](std::int64_t s) {
-      const int slab = held_.begin + static_cast<int>(s);
+    base::parallel_for("fill slabs", holding_.all().size(), [&](std::int64_t s) {
+      const int slab = own().begin + static_cast<int>(s);
       base::parallel_for("fill views", views.size(), [&](std::int64_t v) {
         set_rows(slab, first + static_cast<int>(v), buffers[static_cast<std::size_t>(v)], per_unit);
       });
@@ -152,16 +150,16 @@ SlabViews::Shape SlabViews::binned_shape(const Shape& shape, int bin) {
 }
 
 std::unique_ptr<SlabViews> SlabViews::binned(int bin) const {
-  const Slabs held{held_.begin / bin, (held_.end + bin - 1) / bin};
-  std::unique_ptr<SlabViews> coarse(new SlabViews(binned_shape(shape_, bin), held, scratch_dir_,
+  const Slabs slabs{own().begin / bin, (own().end + bin - 1) / bin};
+  std::unique_ptr<SlabViews> coarse(new SlabViews(binned_shape(shape_, bin), {slabs}, scratch_dir_,
                                                   io::ScratchMemory::kInMemoryBytes));
-  base::parallel_for("bin slabs", held.size(), [&](std::int64_t s) {
-    const int slab = held.begin + static_cast<int>(s);
+  base::parallel_for("bin slabs", slabs.size(), [&](std::int64_t s) {
+    const int slab = slabs.begin + static_cast<int>(s);
     base::parallel_for("bin views", num_views(), [&](std::int64_t view) {
       coarse->set_means(slab, static_cast<int>(view), *this, bin);
     });
     coarse->release(slab);
-    for (int fine = slab * bin; fine < std::min((slab + 1) * bin, held_.end); ++fine) release(fine);
+    for (int fine = slab * bin; fine < std::min((slab + 1) * bin, own().end); ++fine) release(fine);
   });
   return coarse;
 }
@@ -205,7 +203,7 @@ std::unique_ptr<SlabViews> SlabViews::middle_rows(
   const std::int64_t first = (shape_.num_rows - rows) / 2;
   const Shape shape{views.size(), shape_.width, rows, 0, rows};
   std::unique_ptr<SlabViews> middle(
-      new SlabViews(shape, all_slabs(shape), scratch_dir_, io::ScratchMemory::kInMemoryBytes));
+      new SlabViews(shape, {all_slabs(shape)}, scratch_dir_, io::ScratchMemory::kInMemoryBytes));
   base::parallel_for("copy rows", std::ssize(views), [&](std::int64_t view) {
     for (int slab = 0; slab < middle->num_slabs(); ++slab)
       middle->copy_rows(slab, static_cast<int>(view), *this, views[static_cast<std::size_t>(view)],
@@ -216,13 +214,13 @@ std::unique_ptr<SlabViews> SlabViews::middle_rows(
   return middle;
 }
 
-// Copies the rows that `from` holds; the first row of all is `first_row` of `from`.
+// Copies the own rows of `from`; the first row of all is `first_row` of `from`.
 void SlabViews::copy_rows(int slab, int view, const SlabViews& from, int from_view,
                           std::int64_t first_row) {
   const std::size_t to = line(slab, view);
   for (int lane = 0; lane < rows_of(slab); ++lane) {
     const std::int64_t y = first_row + slab * kRows + lane;
-    if (y < from.held_rows().begin || y >= from.held_rows().end) continue;
+    if (y < from.own_rows().begin || y >= from.own_rows().end) continue;
     for (std::int64_t x = 0; x < shape_.width; ++x)
       if (from.counts(from_view, x, y))
         set_ray(to + static_cast<std::size_t>(x), lane, from.ray(from_view, x, y));
@@ -240,7 +238,7 @@ void SlabViews::share(const distributed::Communicator& processes) {
 
 std::int64_t SlabViews::num_valid(int view) const {
   std::int64_t count = 0;
-  for (int slab = held_.begin; slab < held_.end; ++slab) {
+  for (int slab = own().begin; slab < own().end; ++slab) {
     const std::uint16_t* m = mask(slab, view);
     for (std::int64_t x = 0; x < shape_.width; ++x) count += std::popcount(m[x]);
   }
@@ -258,35 +256,12 @@ std::uint64_t SlabViews::checksum_of(int slab) const {
 
 std::uint64_t SlabViews::checksum(const distributed::Communicator& processes) const {
   std::vector<std::int64_t> of_slab(static_cast<std::size_t>(num_slabs()));
-  base::parallel_for("checksum", held_.size(), [&](std::int64_t s) {
-    const int slab = held_.begin + static_cast<int>(s);
+  base::parallel_for("checksum", own().size(), [&](std::int64_t s) {
+    const int slab = own().begin + static_cast<int>(s);
     of_slab[static_cast<std::size_t>(slab)] = static_cast<std::int64_t>(checksum_of(slab));
   });
   processes.allreduce_sum(std::span(of_slab));
   return base::xxhash64(std::as_bytes(std::span<const std::int64_t>(of_slab)));
-}
-
-Range own_bands(std::int64_t num_rows, std::int64_t band_rows,
-                const distributed::Communicator& processes) {
-  std::vector<double> rows_of_band;
-  for (std::int64_t row = 0; row < num_rows; row += band_rows)
-    rows_of_band.push_back(static_cast<double>(std::min(band_rows, num_rows - row)));
-  const std::ptrdiff_t num_bands = std::ssize(rows_of_band);
-  if (num_bands < processes.size()) {
-    throw Error(fmt::format(
-        "{} processes cannot share {} rows of root cells ({} rows of pixels each): start at most "
-        "{}, or give --leaf-size 16, whose root cells have 32 rows",
-        processes.size(), num_bands, band_rows, num_bands));
-  }
-  return distributed::part_of(rows_of_band, processes.rank(), processes.size());
-}
-
-Range slabs_of_bands(Range bands, std::int64_t band_rows, std::int64_t num_rows) {
-  const auto slab_at = [&](int band) {
-    const std::int64_t row = std::min(band * band_rows, num_rows);
-    return static_cast<int>((row + kLanes - 1) / kLanes);
-  };
-  return {slab_at(bands.begin), slab_at(bands.end)};
 }
 
 }  // namespace tomofield::measurement

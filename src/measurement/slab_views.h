@@ -36,7 +36,7 @@ ReadViews read_on_all_threads(ReadView read_view);
 /// The measured rays in the order in which slabs use them: [slab, view, x, lane]
 /// with 16 rows a slab, and a bit mask [slab, view, x] of the rays that count
 /// (rows past the last one are masked). Small series lie in memory, large ones in a scratch file
-/// (io/scratch_memory.h). Of a job of several processes each holds some of the slabs alone.
+/// (io/scratch_memory.h). Each process of a job holds some of the slabs.
 class SlabViews {
  public:
   using Slabs = base::Range;
@@ -57,10 +57,17 @@ class SlabViews {
   SlabViews(const Shape& shape, double unit, ReadView read_view,
             const std::filesystem::path& scratch_dir,
             std::size_t in_memory_bytes = io::ScratchMemory::kInMemoryBytes)
-      : SlabViews(shape, all_slabs(shape), unit, read_on_all_threads(std::move(read_view)),
+      : SlabViews(shape, {all_slabs(shape)}, unit, read_on_all_threads(std::move(read_view)),
                   scratch_dir, in_memory_bytes) {}
-  /// Holds some of the slabs, at least one; others must not be asked for.
-  SlabViews(const Shape& shape, Slabs held, double unit, const ReadViews& read_views,
+  /// The slabs that a process holds: at least one of its own, which no other process has for its
+  /// own, and perhaps the next ones.
+  struct Holding {
+    Slabs own;
+    int num_next = 0;
+    Slabs all() const { return {own.begin, own.end + num_next}; }
+  };
+  /// Holds some of the slabs; others must not be asked for.
+  SlabViews(const Shape& shape, const Holding& holding, double unit, const ReadViews& read_views,
             const std::filesystem::path& scratch_dir,
             std::size_t in_memory_bytes = io::ScratchMemory::kInMemoryBytes);
   SlabViews(const SlabViews&) = delete;
@@ -71,7 +78,7 @@ class SlabViews {
   /// Columns and rows of fewer than `bin` pixels are coarse ones too.
   std::unique_ptr<SlabViews> binned(int bin) const;
   /// Returns a copy of at most `max_rows` rows in the middle, of these views, on every process.
-  /// Each process contributes the slabs that it holds.
+  /// Each process contributes its own slabs.
   std::unique_ptr<SlabViews> middle_rows(
       std::int64_t max_rows, std::span<const int> views,
       const distributed::Communicator& processes = distributed::Communicator::alone()) const;
@@ -80,7 +87,7 @@ class SlabViews {
 
   const Shape& shape() const { return shape_; }
   int num_slabs() const { return all_slabs(shape_).end; }
-  Slabs held() const { return held_; }
+  Slabs own() const { return holding_.own; }
   const float* rays(int slab, int view) const;          ///< [x, lane]
   const std::uint16_t* mask(int slab, int view) const;  ///< [x], bit = lane
   /// Removes a slab in a scratch file from the process's memory until it is used again.
@@ -93,7 +100,7 @@ class SlabViews {
   float ray(int view, std::int64_t x, std::int64_t y) const {
     return rays(static_cast<int>(y / kRows), view)[x * kRows + y % kRows];
   }
-  /// Counts the rays of a view that count, in the slabs that are held.
+  /// Counts the rays of a view that count, in the own slabs.
   std::int64_t num_valid(int view) const;
   /// Returns a hash of rays and masks of all slabs (XXH64 of the XXH64 of each slab), which tells
   /// one series from another.
@@ -103,7 +110,7 @@ class SlabViews {
  private:
   static constexpr std::int64_t kRows = kernels::kLanes;  // of a slab
   // Makes slabs of zeros.
-  SlabViews(const Shape& shape, Slabs held, const std::filesystem::path& scratch_dir,
+  SlabViews(const Shape& shape, const Holding& holding, const std::filesystem::path& scratch_dir,
             std::size_t in_memory_bytes);
   static std::size_t bytes(const Shape& shape);
   void fill(double unit, const ReadViews& read_views);
@@ -122,23 +129,14 @@ class SlabViews {
   int num_views() const { return static_cast<int>(shape_.num_views); }
   std::size_t line(int slab, int view) const;
   std::size_t num_lines() const;  // each has one x of a slab and a view
-  base::Range held_rows() const;
+  base::Range own_rows() const;
 
   Shape shape_;
   std::filesystem::path scratch_dir_;
-  Slabs held_;
+  Holding holding_;
   io::ScratchMemory memory_;
   float* rays_;
   std::uint16_t* mask_;
 };
-
-/// Returns the bands (rows of root cells, `band_rows` rows each but for the last) that a process
-/// works on: consecutive ones, as many rows as others have, in order of ranks. Throws Error if
-/// there are fewer bands than processes.
-base::Range own_bands(std::int64_t num_rows, std::int64_t band_rows,
-                      const distributed::Communicator& processes);
-
-/// Returns the slabs of those bands, 16 rows each, of `num_rows` rows in all.
-base::Range slabs_of_bands(base::Range bands, std::int64_t band_rows, std::int64_t num_rows);
 
 }  // namespace tomofield::measurement

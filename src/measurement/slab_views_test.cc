@@ -31,7 +31,8 @@ bool is_valid(std::size_t view, std::int64_t x, std::int64_t y) {
   return base::Random(11 + view, static_cast<std::uint64_t>(y * kShape.width + x)).below(4) > 0;
 }
 
-std::unique_ptr<SlabViews> make_views(SlabViews::Slabs held = SlabViews::all_slabs(kShape)) {
+std::unique_ptr<SlabViews> make_views(const SlabViews::Holding& holding = {
+                                          SlabViews::all_slabs(kShape)}) {
   const auto read = [](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
     for (std::int64_t y = 0; y < kShape.height; ++y) {
       for (std::int64_t x = 0; x < kShape.width; ++x) {
@@ -41,15 +42,16 @@ std::unique_ptr<SlabViews> make_views(SlabViews::Slabs held = SlabViews::all_sla
       }
     }
   };
-  return std::make_unique<SlabViews>(kShape, held, kUnit, read_on_all_threads(read), "/tmp");
+  return std::make_unique<SlabViews>(kShape, holding, kUnit, read_on_all_threads(read), "/tmp");
 }
 
 TEST(SlabViews, SomeSlabsAreThoseOfTheWhole) {
   const auto all = make_views();
   std::int64_t num_valid = 0;
-  for (const SlabViews::Slabs held : {SlabViews::Slabs{0, 2}, {2, 3}}) {
-    const auto some = make_views(held);
-    EXPECT_EQ(some->held(), held);
+  for (const SlabViews::Holding& holding : {SlabViews::Holding{{0, 2}, 1}, {{2, 3}, 0}}) {
+    const SlabViews::Slabs own = holding.own, held = holding.all();
+    const auto some = make_views(holding);
+    EXPECT_EQ(some->own(), own);
     EXPECT_EQ(some->num_slabs(), all->num_slabs());
     num_valid += some->num_valid(1);
     for (std::int64_t y = held.begin * 16; y < std::min<std::int64_t>(held.end * 16, 39); ++y) {
@@ -59,8 +61,8 @@ TEST(SlabViews, SomeSlabsAreThoseOfTheWhole) {
       }
     }
     const auto coarse = some->binned(2), all_coarse = all->binned(2);
-    EXPECT_EQ(coarse->held(), (SlabViews::Slabs{held.begin / 2, (held.end + 1) / 2}));
-    for (std::int64_t y = held.begin * 8; y < std::min<std::int64_t>(held.end * 8, 20); ++y)
+    EXPECT_EQ(coarse->own(), (SlabViews::Slabs{own.begin / 2, (own.end + 1) / 2}));
+    for (std::int64_t y = own.begin * 8; y < std::min<std::int64_t>(own.end * 8, 20); ++y)
       ASSERT_EQ(coarse->ray(2, 7, y), all_coarse->ray(2, 7, y));
   }
   EXPECT_EQ(num_valid, all->num_valid(1));

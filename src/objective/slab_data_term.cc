@@ -16,7 +16,7 @@ struct SlabDataTerm::Detectors : Scratch {
   base::AlignedBuffer<float> rays;
 };
 
-std::unique_ptr<Term::Scratch> SlabDataTerm::make_scratch() const {
+std::unique_ptr<Term::Scratch> SlabDataTerm::make_scratch(const projection::SlabSampler&) const {
   return std::make_unique<Detectors>();
 }
 

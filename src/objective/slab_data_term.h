@@ -16,7 +16,7 @@ class SlabDataTerm : public Term {
   /// `measured` must outlive the term.
   explicit SlabDataTerm(const measurement::SlabViews& measured) : measured_(measured) {}
 
-  std::unique_ptr<Scratch> make_scratch() const override;
+  std::unique_ptr<Scratch> make_scratch(const projection::SlabSampler& sampler) const override;
   bool replaces_gradient() const override { return true; }
   /// Returns 0, since the value follows from the sums of residuals.
   double add_slabs(const Step& step, const SlabBatch& batch, Scratch* scratch,

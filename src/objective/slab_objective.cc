@@ -4,11 +4,15 @@
 #include <iterator>
 #include <utility>
 
+#include "base/check.h"
 #include "base/parallel.h"
+#include "kernels/lanes.h"
 #include "objective/terms.h"
 
 namespace tomofield::objective {
 namespace {
+
+using kernels::kLanes;
 
 constexpr int kSlabsTogether = projection::SlabProjector::kSlabsTogether;
 
@@ -28,14 +32,22 @@ struct SlabObjective::Workspace {
   base::AlignedBuffer<float> samples, gradients;
   std::vector<std::unique_ptr<Term::Scratch>> of_terms;
 
-  void fit(std::size_t size, const std::vector<std::unique_ptr<Term>>& terms) {
-    while (of_terms.size() < terms.size())
-      of_terms.push_back(terms[of_terms.size()]->make_scratch());
-    // Padding has to start as zeros and stays so: a new layout needs new buffers.
-    if (samples.size() == size) return;
-    samples.reset(size);
-    gradients.reset(size);
+  // Makes what is not there yet. The padding of samples starts as zeros and stays so.
+  void prepare(const projection::SlabSampler& sampler, std::size_t slab_size,
+               const std::vector<std::unique_ptr<Term>>& terms) {
+    if (!samples.empty()) return;
+    for (const auto& term : terms) of_terms.push_back(term->make_scratch(sampler));
+    samples.reset(kSlabsTogether * slab_size);
+    gradients.reset(kSlabsTogether * slab_size);
   }
+};
+
+// Holds what the slabs of a step share.
+struct SlabObjective::Pass {
+  const Step& step;
+  const projection::ViewCrossings& crossings;
+  float* gradient;  // by all parameters
+  Sums& sums;
 };
 
 SlabObjective::SlabObjective(const SlabObjectiveContext& context) : SlabObjective(context, {}) {
@@ -49,8 +61,26 @@ SlabObjective::SlabObjective(const SlabObjectiveContext& context,
       measured_(context.measured),
       sampler_(make_sampler(context)),
       processes_(context.processes),
-      own_bands_(context.own_bands),
+      own_bands_(context.share.bands),
       terms_(std::move(terms)) {
+  const auto slabs_of = [&](std::int64_t rows) { return static_cast<int>(rows / kLanes); };
+  TOMOFIELD_CHECK(context.bin == 1 || context.share == context.share.without_help(),
+                  "processes help each other at full resolution alone");
+  if (context.share.rows_for_next > 0) {
+    const int first = sampler_.band(own_bands_.end).begin;
+    slabs_for_next_ = {first, first + slabs_of(context.share.rows_for_next)};
+  }
+  if (context.share.rows_by_previous > 0) {
+    const int first = sampler_.band(own_bands_.begin).begin;
+    slabs_by_previous_ = {first, first + slabs_of(context.share.rows_by_previous)};
+  }
+  for (int band = 0; band < sampler_.num_bands(); ++band) {
+    const base::Range slabs = sampler_.band(band);
+    for (int slab = slabs.begin; slab < slabs.end; ++slab) {
+      const bool begins_pair = (slab - slabs.begin) % kSlabsTogether == 0;
+      pair_of_slab_.push_back(pair_of_slab_.empty() ? 0 : pair_of_slab_.back() + begins_pair);
+    }
+  }
   for (int band = own_bands_.begin; band < own_bands_.end; ++band)
     std::ranges::copy(sampler_.leaves_of_band(band), std::back_inserter(own_leaves_));
 }
@@ -59,59 +89,110 @@ SlabObjective::~SlabObjective() = default;
 
 double SlabObjective::add_gradient(const Step& step, float* gradient,
                                    std::span<measurement::ViewSums> view_sums) const {
-  // Adds in the order of the bands, so that threads and processes do not change the bits.
-  double slab_grad_bias = 0.0;
-  std::vector<double> term_grad_bias(terms_.size());
-  for (const BandSums& band : add_bands(step, gradient)) {
+  // Adds in the order of slabs and bands, so that threads and processes do not change the bits.
+  const Sums sums = add_slabs_and_leaves(step, gradient);
+  double grad_bias = 0.0;
+  for (const PairSums& pair : sums.pairs) {
     for (std::size_t v = 0; v < step.views.size(); ++v)
-      view_sums[static_cast<std::size_t>(step.views[v])] += band.views[v];
-    slab_grad_bias += band.slab_grad_bias;
-    for (std::size_t t = 0; t < terms_.size(); ++t) term_grad_bias[t] += band.terms[t].grad_bias;
+      view_sums[static_cast<std::size_t>(step.views[v])] += pair.views[v];
+    grad_bias += pair.grad_bias;
   }
-  double grad_bias = slab_grad_bias;
-  for (const double of_term : term_grad_bias) grad_bias += of_term;
+  for (const std::vector<TermValue>& band : sums.bands)
+    for (const TermValue& term : band) grad_bias += term.grad_bias;
   for (const auto& term : terms_) grad_bias += term->add_field(step, gradient, view_sums).grad_bias;
   return grad_bias;
 }
 
-std::vector<SlabObjective::BandSums> SlabObjective::add_bands(const Step& step,
-                                                              float* gradient) const {
-  std::vector<BandSums> bands(static_cast<std::size_t>(sampler_.num_bands()));
-  for (BandSums& band : bands) {
-    band.views.resize(step.views.size());
-    band.terms.resize(terms_.size());
+SlabObjective::Sums SlabObjective::add_slabs_and_leaves(const Step& step, float* gradient) const {
+  Sums sums;
+  sums.pairs.resize(static_cast<std::size_t>(pair_of_slab_.back() + 1));
+  for (PairSums& pair : sums.pairs) {
+    pair.views.resize(step.views.size());
+    pair.terms.resize(terms_.size());
   }
+  sums.bands.resize(static_cast<std::size_t>(sampler_.num_bands()),
+                    std::vector<TermValue>(terms_.size()));
   const projection::ViewCrossings crossings = projector_.crossings(step.views);
-  base::parallel_for("bands", own_bands_.size(), [&](std::int64_t i) {
-    const int band = own_bands_.begin + static_cast<int>(i);
-    add_slabs(step, band, crossings, gradient, bands[static_cast<std::size_t>(band)]);
+  const Pass pass{step, crossings, gradient, sums};
+
+  const auto sending = add_slabs_of_next(pass);
+  const int num_shared = slabs_by_previous_.is_empty() ? 0 : 1;
+  const int first_band = own_bands_.begin + num_shared;
+  base::parallel_for("bands", own_bands_.size() - num_shared, [&](std::int64_t i) {
+    const int band = first_band + static_cast<int>(i);
+    add_slabs(pass, band, sampler_.band(band), *workspaces_.borrow());
   });
-  add_leaves(step, gradient, bands);
-  allreduce(bands);
-  return bands;
+  go_on_from_previous(pass);
+  add_leaves(step, gradient, sums);
+  allreduce(sums);
+  return sums;
 }
 
-void SlabObjective::add_slabs(const Step& step, int band,
-                              const projection::ViewCrossings& crossings, float* gradient,
-                              BandSums& sums) const {
+// Works on the first slabs of the next process's first band and starts to send what was found.
+distributed::Communicator::Sending SlabObjective::add_slabs_of_next(const Pass& pass) const {
+  std::vector<float> message;
+  if (!slabs_for_next_.is_empty()) {
+    const auto workspace = workspaces_.borrow();
+    add_slabs(pass, own_bands_.end, slabs_for_next_, *workspace);
+    for_each_handed_over(slabs_for_next_, *workspace, pass.gradient, [&](std::span<float> values) {
+      message.insert(message.end(), values.begin(), values.end());
+      std::ranges::fill(values, 0.0f);
+    });
+  }
+  return processes_.start_sending(std::move(message), processes_.rank() + 1);
+}
+
+// Takes over what the process before found in the first slabs of the first band, and adds the
+// others.
+void SlabObjective::go_on_from_previous(const Pass& pass) const {
+  if (slabs_by_previous_.is_empty()) return;
   const auto workspace = workspaces_.borrow();
-  workspace->fit(kSlabsTogether * projector_.grid().size(), terms_);
-  const base::Range slabs = sampler_.band(band);
+  workspace->prepare(sampler_, projector_.grid().size(), terms_);
+  std::size_t size = 0;
+  for_each_handed_over(slabs_by_previous_, *workspace, pass.gradient,
+                       [&](std::span<float> values) { size += values.size(); });
+  std::vector<float> message(size);
+  processes_.receive(std::span(message), processes_.rank() - 1);
+  const float* next = message.data();
+  for_each_handed_over(slabs_by_previous_, *workspace, pass.gradient, [&](std::span<float> values) {
+    std::copy_n(next, values.size(), values.data());
+    next += values.size();
+  });
+  const int band = own_bands_.begin;
+  add_slabs(pass, band, {slabs_by_previous_.end, sampler_.band(band).end}, *workspace);
+}
+
+// Calls body for all that the work on a band's later slabs begins with: what the terms carry, and
+// the gradient of the leaves of its first slabs.
+void SlabObjective::for_each_handed_over(base::Range slabs, Workspace& workspace, float* gradient,
+                                         const std::function<void(std::span<float>)>& body) const {
+  for (const auto& scratch : workspace.of_terms)
+    if (!scratch->carried().empty()) body(scratch->carried());
+  for (const int leaf : sampler_.leaves_of_slabs(slabs))
+    body({gradient + field_.offset(leaf), field_.offset(leaf + 1) - field_.offset(leaf)});
+}
+
+// Adds some slabs of a band, pair by pair. If they are not its first ones, the workspace and the
+// gradient hold what came before.
+void SlabObjective::add_slabs(const Pass& pass, int band, base::Range slabs,
+                              Workspace& workspace) const {
+  workspace.prepare(sampler_, projector_.grid().size(), terms_);
   for (int slab = slabs.begin; slab < slabs.end; slab += kSlabsTogether) {
-    add_batch(step,
+    const auto pair = static_cast<std::size_t>(pair_of_slab_[static_cast<std::size_t>(slab)]);
+    add_batch(pass,
               {.sampler = sampler_,
                .projector = projector_,
-               .crossings = crossings,
+               .crossings = pass.crossings,
                .slabs = {slab, std::min(slab + kSlabsTogether, slabs.end)},
-               .begins_band = slab == slabs.begin,
-               .all_samples = workspace->samples.data(),
-               .all_gradients = workspace->gradients.data()},
-              *workspace, gradient, sums);
+               .begins_band = slab == sampler_.band(band).begin,
+               .all_samples = workspace.samples.data(),
+               .all_gradients = workspace.gradients.data()},
+              workspace, pass.sums.pairs[pair]);
   }
 }
 
-void SlabObjective::add_batch(const Step& step, const SlabBatch& batch, Workspace& workspace,
-                              float* gradient, BandSums& sums) const {
+void SlabObjective::add_batch(const Pass& pass, const SlabBatch& batch, Workspace& workspace,
+                              PairSums& sums) const {
   std::vector<std::pair<int, int>> pieces;  // slab, piece
   for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab)
     for (int piece = 0; piece < sampler_.num_pieces(slab); ++piece)
@@ -124,8 +205,8 @@ void SlabObjective::add_batch(const Step& step, const SlabBatch& batch, Workspac
     std::fill_n(batch.all_gradients,
                 static_cast<std::size_t>(batch.slabs.size()) * projector_.grid().size(), 0.0f);
   for (std::size_t t = 0; t < terms_.size(); ++t)
-    sums.terms[t].value +=
-        terms_[t]->add_slabs(step, batch, workspace.of_terms[t].get(), sums.views);
+    sums.terms[t].value =
+        terms_[t]->add_slabs(pass.step, batch, workspace.of_terms[t].get(), sums.views);
 
   const std::vector<int> leaves = sampler_.leaves_of_slabs(batch.slabs);
   std::vector<double> grad_bias(leaves.size() * static_cast<std::size_t>(batch.slabs.size()));
@@ -134,36 +215,36 @@ void SlabObjective::add_batch(const Step& step, const SlabBatch& batch, Workspac
       const auto of_slab = static_cast<std::size_t>(slab - batch.slabs.begin) * leaves.size();
       grad_bias[of_slab + static_cast<std::size_t>(i)] =
           sampler_.decode_adjoint_of_leaf(leaves[static_cast<std::size_t>(i)], slab,
-                                          batch.samples(slab), batch.gradient(slab), gradient);
+                                          batch.samples(slab), batch.gradient(slab), pass.gradient);
     }
   });
-  for (const double of_leaf : grad_bias) sums.slab_grad_bias += of_leaf;
+  for (const double of_leaf : grad_bias) sums.grad_bias += of_leaf;
 }
 
-// Adds the terms that are computed leaf by leaf to the gradient and to the sums of the bands.
-void SlabObjective::add_leaves(const Step& step, float* gradient,
-                               std::vector<BandSums>& bands) const {
+// Adds the terms that are computed leaf by leaf.
+void SlabObjective::add_leaves(const Step& step, float* gradient, Sums& sums) const {
   for (std::size_t t = 0; t < terms_.size(); ++t) {
     std::vector<TermValue> of_leaf(own_leaves_.size());
     terms_[t]->add_leaves(step, own_leaves_, gradient, of_leaf);
     for (std::size_t i = 0; i < of_leaf.size(); ++i) {
       const auto band = static_cast<std::size_t>(field_.tree().band_of_leaf(own_leaves_[i]));
-      bands[band].terms[t] += of_leaf[i];
+      sums.bands[band][t] += of_leaf[i];
     }
   }
 }
 
-// Gives every process the sums of all bands, in one message.
-void SlabObjective::allreduce(std::vector<BandSums>& bands) const {
+// Gives every process the sums of all slabs and leaves, in one message.
+void SlabObjective::allreduce(Sums& sums) const {
   if (processes_.size() == 1) return;
   std::vector<double> numbers;
   const auto for_each_number = [&](const auto& body) {
-    for (BandSums& band : bands) {
-      for (measurement::ViewSums& s : band.views)
+    for (PairSums& pair : sums.pairs) {
+      for (measurement::ViewSums& s : pair.views)
         for (double* number : {&s.n, &s.p, &s.b, &s.pp, &s.pb, &s.bb}) body(*number);
-      body(band.slab_grad_bias);
-      for (TermValue& term : band.terms) body(term.grad_bias);
+      body(pair.grad_bias);
     }
+    for (std::vector<TermValue>& band : sums.bands)
+      for (TermValue& term : band) body(term.grad_bias);
   };
   for_each_number([&](double& number) { numbers.push_back(number); });
   processes_.allreduce_sum(std::span(numbers));

@@ -1,12 +1,14 @@
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "base/pool.h"
 #include "base/range.h"
 #include "distributed/communicator.h"
-#include "distributed/partition.h"
+#include "measurement/row_share.h"
 #include "objective/objective.h"
 
 namespace tomofield::objective {
@@ -21,8 +23,8 @@ struct SlabObjectiveContext {
   std::int64_t first_row = 0, num_rows = 0;    ///< of the slabs, in pixels of `full`
   geometry::Extent2 support;                   ///< where densities count
   bool has_factors = true;                     ///< the field has the factors that were asked for
-  base::Range own_bands;                       ///< bands of this process
-  base::Range own_leaves;                      ///< leaves of these bands
+  measurement::RowShare share;                 ///< rows of this process, in pixels of `full`
+  base::Range own_leaves;                      ///< leaves of its bands
   const ObjectiveOptions& options;
   const distributed::Communicator& processes = distributed::Communicator::alone();
 };
@@ -30,8 +32,10 @@ struct SlabObjectiveContext {
 /// Evaluates the terms on batches of slabs with the cores of this machine. A task works on the
 /// slabs of one band (a row of root cells); threads that have no band help with the parts of one. A
 /// band writes the gradient of its own leaves alone and only reads the parameters of its
-/// neighbours. A leaf adds up its slabs in order, so threads change no bit. Everything that the
-/// context refers to must outlive the objective. A new tree or stage needs a new objective.
+/// neighbours. A leaf adds up its slabs in order, so threads change no bit. If a process works on
+/// the first slabs of another one's band, it begins with them and hands over what it found; the
+/// owner goes on from there at last. Everything that the context refers to must outlive the
+/// objective. A new tree or stage needs a new objective.
 class SlabObjective : public Objective {
  public:
   explicit SlabObjective(const SlabObjectiveContext& context);
@@ -49,24 +53,34 @@ class SlabObjective : public Objective {
 
   const projection::SlabSampler& sampler() const { return sampler_; }
 
-  /// Holds the sums of a pass over a band.
-  struct BandSums {
+  /// Holds the sums of a pass over a pair of slabs.
+  struct PairSums {
     std::vector<measurement::ViewSums> views;  ///< one for each view of the step
-    double slab_grad_bias = 0.0;               ///< dL/d bias through the samples of slabs
-    std::vector<TermValue> terms;  ///< one for each term; grad_bias from Term::add_leaves alone
+    std::vector<TermValue> terms;              ///< Term::add_slabs() of each term; values alone
+    double grad_bias = 0.0;                    ///< dL/d bias through the samples
+  };
+  /// Holds the sums of all slabs and of all leaves.
+  struct Sums {
+    std::vector<PairSums> pairs;                ///< in the order of the slabs
+    std::vector<std::vector<TermValue>> bands;  ///< Term::add_leaves() of each term [band][term]
   };
   /// Adds the gradient of the own leaves, but for Term::add_field(), to `gradient` (all
-  /// parameters). Returns the sums of all bands, complete on every process.
-  std::vector<BandSums> add_bands(const Step& step, float* gradient) const;
+  /// parameters). Every process has the sums of all, but values only of its own part.
+  Sums add_slabs_and_leaves(const Step& step, float* gradient) const;
 
  private:
   struct Workspace;
-  void add_slabs(const Step& step, int band, const projection::ViewCrossings& crossings,
-                 float* gradient, BandSums& sums) const;
-  void add_batch(const Step& step, const SlabBatch& batch, Workspace& workspace, float* gradient,
-                 BandSums& sums) const;
-  void add_leaves(const Step& step, float* gradient, std::vector<BandSums>& bands) const;
-  void allreduce(std::vector<BandSums>& bands) const;
+  struct Pass;
+  std::vector<int> pairs_of_slabs() const;
+  void add_slabs(const Pass& pass, int band, base::Range slabs, Workspace& workspace) const;
+  void add_batch(const Pass& pass, const SlabBatch& batch, Workspace& workspace,
+                 PairSums& sums) const;
+  void add_leaves(const Step& step, float* gradient, Sums& sums) const;
+  distributed::Communicator::Sending add_slabs_of_next(const Pass& pass) const;
+  void go_on_from_previous(const Pass& pass) const;
+  void for_each_handed_over(base::Range slabs, Workspace& workspace, float* gradient,
+                            const std::function<void(std::span<float>)>& body) const;
+  void allreduce(Sums& sums) const;
 
   const field::Field& field_;
   const projection::SlabProjector& projector_;
@@ -74,7 +88,9 @@ class SlabObjective : public Objective {
   projection::SlabSampler sampler_;
   const distributed::Communicator& processes_;
   base::Range own_bands_;
+  base::Range slabs_for_next_, slabs_by_previous_;
   std::vector<int> own_leaves_;
+  std::vector<int> pair_of_slab_;
   std::vector<std::unique_ptr<Term>> terms_;
   mutable base::Pool<Workspace> workspaces_;
 };

@@ -70,8 +70,13 @@ class Term {
   /// What a term keeps for add_slabs() from one batch of a band to the next.
   struct Scratch {
     virtual ~Scratch() = default;
+    /// Returns what the next batch of the band depends on. Another process may go on from a copy.
+    virtual std::span<float> carried() { return {}; }
   };
-  virtual std::unique_ptr<Scratch> make_scratch() const { return nullptr; }
+  /// Makes the scratch of one band.
+  virtual std::unique_ptr<Scratch> make_scratch(const projection::SlabSampler& /*sampler*/) const {
+    return std::make_unique<Scratch>();
+  }
 
   /// Says whether add_slabs() replaces the batch's gradient, which then need not be cleared. Only
   /// the first term may do so.

@@ -68,14 +68,12 @@ kernels::SlabVariation DensityVariation::variation_of(const SlabBatch& batch, st
 }
 
 // Holds the row before a band, the row after a batch, and the flux along y from one slab to the
-// next. Padding starts as zeros and stays so.
+// next.
 struct DensityVariation::Rows : Scratch {
   base::AlignedBuffer<float> before, after, flux;
 
-  void fit(std::size_t size) {
-    for (base::AlignedBuffer<float>* row : {&before, &after, &flux})
-      if (row->size() != size) row->reset(size);
-  }
+  explicit Rows(std::size_t size) : before(size), after(size), flux(size) {}
+  std::span<float> carried() override { return flux; }
 
   // Decodes the rows beside the slabs of a batch, where there are such rows.
   void decode(const SlabBatch& batch) {
@@ -102,15 +100,15 @@ struct DensityVariation::SamplesOfSegment {
   base::Range x;
 };
 
-std::unique_ptr<Term::Scratch> DensityVariation::make_scratch() const {
-  return std::make_unique<Rows>();
+std::unique_ptr<Term::Scratch> DensityVariation::make_scratch(
+    const projection::SlabSampler& sampler) const {
+  return std::make_unique<Rows>(sampler.row_size());
 }
 
 double DensityVariation::add_slabs(const Step& step, const SlabBatch& batch, Scratch* scratch,
                                    std::span<measurement::ViewSums>) const {
   if (weight_ <= 0) return 0.0;
   auto& rows = static_cast<Rows&>(*scratch);
-  rows.fit(batch.sampler.row_size());
   rows.decode(batch);
   std::vector<SamplesOfSegment> parts;
   for (std::size_t s = 0; s < batch.projector.grid().segments().size(); ++s) {

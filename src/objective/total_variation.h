@@ -26,7 +26,7 @@ class DensityVariation : public Term {
   DensityVariation(double weight, const kernels::VariationPenalty& penalty, std::uint64_t seed)
       : weight_(weight), penalty_(penalty), seed_(seed) {}
 
-  std::unique_ptr<Scratch> make_scratch() const override;
+  std::unique_ptr<Scratch> make_scratch(const projection::SlabSampler& sampler) const override;
   double add_slabs(const Step& step, const SlabBatch& batch, Scratch* scratch,
                    std::span<measurement::ViewSums> view_sums) const override;
 

@@ -92,7 +92,7 @@ nlohmann::json processes_json(const fit::Fit& fit, double seconds) {
   std::vector<double> all(kNumbers * static_cast<std::size_t>(processes.size()));
   const auto own = all.begin() + static_cast<std::ptrdiff_t>(kNumbers) * processes.rank();
   const double steps = static_cast<double>(std::max<std::int64_t>(traffic.steps, 1));
-  std::ranges::copy(std::array<double, kNumbers>{static_cast<double>(fit.own_bands().size()),
+  std::ranges::copy(std::array<double, kNumbers>{static_cast<double>(fit.share().bands.size()),
                                                  static_cast<double>(fit.own_leaves().size()),
                                                  seconds - traffic.seconds, traffic.seconds,
                                                  static_cast<double>(traffic.bytes) / steps},

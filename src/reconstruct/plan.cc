@@ -7,7 +7,6 @@
 #include "base/check.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/range.h"
 #include "field/vm/factorise.h"
 #include "fit/domain.h"
 #include "fit/fit.h"
@@ -15,6 +14,7 @@
 #include "fit/stages.h"
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
+#include "measurement/row_share.h"
 #include "measurement/slab_views.h"
 #include "objective/ray_data_term.h"
 #include "projection/slab_projector.h"
@@ -77,10 +77,10 @@ std::size_t max_parameters(const fit::Domain& domain, const fit::FieldOptions& o
 double part_of_parameters(const fit::Domain& domain, FieldKind kind,
                           const distributed::Communicator& processes) {
   if (processes.size() == 1) return 1.0;
-  const base::Range bands =
-      measurement::own_bands(domain.num_rows, domain.tree.roots().cell_size, processes);
+  const measurement::RowShare share =
+      measurement::row_share(domain.num_rows, domain.tree.roots().cell_size, processes);
   std::vector<field::LeafShape> needed;
-  for (const int leaf : fit::needed_leaves(domain.tree, bands))
+  for (const int leaf : fit::needed_leaves(domain.tree, share))
     needed.push_back(domain.shapes[static_cast<std::size_t>(leaf)]);
   return static_cast<double>(field::count_parameters(kind, needed)) /
          static_cast<double>(field::count_parameters(kind, domain.shapes));
@@ -122,9 +122,12 @@ measurement::SlabViews::Shape own_part(measurement::SlabViews::Shape shape,
                                        const fit::Domain& domain,
                                        const distributed::Communicator& processes) {
   const std::int64_t band_rows = domain.tree.roots().cell_size;
-  const std::int64_t bands = (shape.num_rows + band_rows - 1) / band_rows;
-  const std::int64_t max_bands = (bands + processes.size() - 1) / processes.size();
-  shape.num_rows = std::min(shape.num_rows, max_bands * band_rows);
+  std::int64_t most = 0;
+  for (int rank = 0; rank < processes.size(); ++rank) {
+    const auto share = measurement::row_share(shape.num_rows, band_rows, rank, processes.size());
+    most = std::max(most, share.bands.size() * band_rows + share.rows_for_next);
+  }
+  shape.num_rows = std::min(shape.num_rows, most);
   return shape;
 }
 

@@ -47,7 +47,7 @@ nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& se
 
 // Returns the rows and the parameters that this process contributes to the volume.
 output::VolumeShare volume_share(const fit::Fit& fit, const measurement::Measurement& series) {
-  const base::Range slabs = series.rays->held();
+  const base::Range slabs = series.rays->own();
   const auto end_row =
       std::min<std::int64_t>(std::int64_t{slabs.end} * kernels::kLanes, series.roi.height());
   const base::Range leaves = fit.own_leaves();

@@ -111,21 +111,24 @@ class Problem {
                                    .full = measured_,
                                    .num_rows = kRows,
                                    .support = {},
-                                   .own_bands = {0, sampler_.num_bands()},
+                                   .share = {{0, sampler_.num_bands()}},
                                    .own_leaves = {0, field_->tree().num_leaves()},
                                    .options = options},
                                   std::move(terms));
     const Step step{.views = kViews, .models = models_, .multiplicity = kMultiplicity};
     Result result;
     result.gradient.resize(field_->num_parameters());
-    for (const SlabObjective::BandSums& b : objective.add_bands(step, result.gradient.data())) {
+    const SlabObjective::Sums sums = objective.add_slabs_and_leaves(step, result.gradient.data());
+    for (const SlabObjective::PairSums& pair : sums.pairs) {
       for (std::size_t v = 0; v < kViews.size(); ++v) {
         const measurement::ViewModel& m = models_[static_cast<std::size_t>(kViews[v])];
-        result.data += kMultiplicity * m.weight / 2 * b.views[v].squared_residual(m);
+        result.data += kMultiplicity * m.weight / 2 * pair.views[v].squared_residual(m);
       }
-      for (const TermValue& term : b.terms) result.variation += term.value;
-      result.grad_bias += b.slab_grad_bias;
+      for (const TermValue& term : pair.terms) result.variation += term.value;
+      result.grad_bias += pair.grad_bias;
     }
+    for (const std::vector<TermValue>& band : sums.bands)
+      for (const TermValue& term : band) result.variation += term.value;
     return result;
   }
 
