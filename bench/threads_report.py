@@ -14,7 +14,6 @@ MODELLED = (1, 2, 4, 8, 16, 32, 64, 128)
 EXPLAINED = (16, 64)  # threads whose losses are listed
 MOST_LISTED = 3
 LANES = 16
-HALF = 0.5
 
 
 class Results:
@@ -134,8 +133,8 @@ def print_steps(results):
           f"outer ones, in the order of their index, and taking one costs "
           f"{results.options.task_cost:g} µs. It knows no limit of the memory's bandwidth. A piece "
           "of work has the shortest of its times in the repeats. Serial is the step's time outside "
-          "of loops. The last but one column is the speed-up that no number of threads can exceed: "
-          "the step's time over its longest chain of work. Speed-up (efficiency):")
+          "of loops. Most is the speed-up that no number of threads can exceed: the step's time over "
+          "its longest chain of work. Speed-up (efficiency):")
     lines, losses = [], []
     for row, repeats in results.of_kind("step").values():
         for stage, step in merged_steps(results, repeats):
@@ -246,4 +245,4 @@ def draw_lanes(panel, lanes, colors):
         color = colors.setdefault(name, palette[len(colors) % len(palette)])
         panel.barh(thread, end - begin, left=begin, height=0.9 - 0.25 * min(depth, 2), color=color,
                    edgecolor="white", linewidth=0.3)
-    panel.set(ylabel="thread", ylim=(max((lane[0] for lane in lanes), default=0) + 0.6, -0.6))
+    panel.set(ylabel="thread", xlim=(0, None), ylim=(max((lane[0] for lane in lanes), default=0) + 0.6, -0.6))

@@ -101,9 +101,6 @@ class Trace:
         return Loop(event["name"],
                     [self._task(task, self.loops_of_task[task["args"]["task"]]) for task in tasks])
 
-    def end(self):
-        return max(end_of(event) for event in self.events)
-
 
 def shortest(trees):
     """Returns the tree of the same step of several runs, with the shortest time of each piece of

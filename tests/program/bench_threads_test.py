@@ -138,7 +138,7 @@ def test_instructions_are_counted_by_library():
     path = os.path.join(harness.fresh_directory("counts"), "callgrind.out")
     with open(path, "w", encoding="utf-8") as file:
         file.write("positions: line\nevents: Ir\nob=(1) /usr/bin/tomofield\nfl=(1) a.cc\nfn=(1) main\n"
-                   "12 100\n+3 20\ncfn=(2)\ncalls=1 5\n* 900\nob=(2) /lib/libtbb.so.12\nfn=(2) run\n"
+                   "12 100\n+3 20\ncob=(2) /lib/libtbb.so.12\ncfn=(2)\ncalls=1 5\n* 900\nob=(2)\nfn=(2) run\n"
                    "-2 7\nob=(1)\nfn=(3) other\n5 3\ntotals: 130\n")
     assert threads_rows.instructions_in(path) == {
         "total": 130, "objects": {"tomofield": 123, "libtbb.so.12": 7}}
