@@ -112,6 +112,9 @@ def test_trace_becomes_a_tree():
     assert span["ts"] == 10e6
     assert step == Task([1.0, loop("bands", [1.0, loop("views", 2, 2), 0.0], 3), 1.0]), step
     assert step.work() == 10 and step.span() == 5 and seconds(step, 2) == 7
+    assert step.chain() == {None: 2, "bands": 1, "views": 2}
+    assert Task([loop("outer", [1.0, loop("inner", 3, 2)], 2)]).chain() == {
+        None: 0, "outer": 1, "inner": 3}
     slower = Task([0.5, loop("bands", [2.0, loop("views", 3, 1), 0.0], 4), 3.0])
     assert shortest([step, slower]) == Task(
         [0.5, loop("bands", [1.0, loop("views", 2, 1), 0.0], 3), 1.0])
