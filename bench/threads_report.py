@@ -14,7 +14,6 @@ MODELLED = (1, 2, 4, 8, 16, 32, 64, 128)
 EXPLAINED = (16, 64)  # threads whose losses are listed
 MOST_LISTED = 3
 LANES = 16
-HALF = 0.5
 
 
 class Results:
@@ -134,8 +133,8 @@ def print_steps(results):
           f"outer ones, in the order of their index, and taking one costs "
           f"{results.options.task_cost:g} µs. It knows no limit of the memory's bandwidth. A piece "
           "of work has the shortest of its times in the repeats. Serial is the step's time outside "
-          "of loops. The last but one column is the speed-up that no number of threads can exceed: "
-          "the step's time over its longest chain of work. Speed-up (efficiency):")
+          "of loops. Most is the speed-up that no number of threads can exceed: the step's time over "
+          "its longest chain of work. Speed-up (efficiency):")
     lines, losses = [], []
     for row, repeats in results.of_kind("step").values():
         for stage, step in merged_steps(results, repeats):
@@ -147,17 +146,19 @@ def print_steps(results):
                           f"{100 * longest / alone:.1f} %",
                           *(speed_up(alone, schedules[n].seconds, n) for n in MODELLED[1:]),
                           f"{alone / step.span():.0f}"])
-            losses.append([*name, *(losses_text(step, schedules[n], n) for n in EXPLAINED)])
+            losses.append([*name, *(shares_text(limits(step, schedules[n], n)) for n in EXPLAINED),
+                           shares_text(step.chain(), step.span())])
     table(["fit", "stage", "ms of one thread", "serial", "longest outer task",
            *(f"{n} threads" for n in MODELLED[1:]), "most"], lines)
-    print("\nWhat the threads do not use, in parts of the time of all threads: while a loop runs out "
-          "of tasks, and during serial work.")
-    table(["fit", "stage", *(f"{n} threads" for n in EXPLAINED)], losses)
+    print("\nThe time of all threads that is not used: while an outermost loop has too few tasks for "
+          "them, and during serial work. The last column says what the longest chain of work is "
+          "made of.")
+    table(["fit", "stage", *(f"not used by {n} threads" for n in EXPLAINED), "longest chain"], losses)
 
 
-def losses_text(step, schedule, threads):
-    lost = sorted(limits(step, schedule, threads).items(), key=lambda item: -item[1])
-    return ", ".join(f"{name or 'serial'} {100 * share:.1f} %" for name, share in lost[:MOST_LISTED])
+def shares_text(parts, whole=1.0):
+    largest = sorted(parts.items(), key=lambda item: -item[1])[:MOST_LISTED]
+    return ", ".join(f"{name or 'serial'} {100 * part / whole:.1f} %" for name, part in largest)
 
 
 def print_runs(results):
@@ -205,7 +206,7 @@ def plot(results, folder):
         if title not in steps:
             continue
         stage, step = merged_steps(results, steps[title])[-1]
-        drawing, panels = pyplot.subplots(2, 1, figsize=(10, 6), constrained_layout=True,
+        drawing, panels = pyplot.subplots(2, 1, figsize=(12, 6), constrained_layout=True,
                                           height_ratios=(2, 5))
         schedule = results.schedule(step, LANES)
         colors = {}
@@ -216,7 +217,7 @@ def plot(results, folder):
         panels[1].set(title=f"the same step, modelled for {LANES} threads", xlabel="ms")
         for name, color in colors.items():
             panels[1].barh(0, 0, color=color, label=name)
-        panels[1].legend(loc="upper right", fontsize=8)
+        panels[1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
         drawing.savefig(os.path.join(folder, f"threads_{title.replace(' ', '_').replace('/', '_')}"
                                              ".png"), dpi=110)
         pyplot.close(drawing)
@@ -241,9 +242,10 @@ def draw_lanes(panel, lanes, colors):
     """Draws threads as lanes. Tasks of inner loops are narrower and lie on those around them."""
     from matplotlib import pyplot
 
-    palette = pyplot.get_cmap("tab10").colors
+    tab = pyplot.get_cmap("tab20").colors
+    palette = tab[::2] + tab[1::2]
     for thread, begin, end, name, depth in sorted(lanes, key=lambda lane: lane[4]):
         color = colors.setdefault(name, palette[len(colors) % len(palette)])
         panel.barh(thread, end - begin, left=begin, height=0.9 - 0.25 * min(depth, 2), color=color,
-                   edgecolor="white", linewidth=0.3)
-    panel.set(ylabel="thread", ylim=(max((lane[0] for lane in lanes), default=0) + 0.6, -0.6))
+                   edgecolor="white", linewidth=0.15)
+    panel.set(ylabel="thread", xlim=(0, None), ylim=(max((lane[0] for lane in lanes), default=0) + 0.6, -0.6))

@@ -194,11 +194,12 @@ def instructions_in(path):
     names, objects, current, is_call = {}, {}, "", False
     with open(path, encoding="utf-8") as file:
         for line in file:
-            if found := re.match(r"ob=\((\d+)\)(?: (.*))?", line):
-                number, name = found.groups()
-                if name:
+            if found := re.match(r"(c?)ob=\((\d+)\)(?: (.*))?", line):
+                called, number, name = found.groups()
+                if name:  # where the number is used first
                     names[number] = os.path.basename(name.strip())
-                current = names[number]
+                if not called:
+                    current = names[number]
             elif line.startswith("calls="):
                 is_call = True  # the next line has the instructions of what is called
             elif re.match(r"[+*-]?\d*[ ]", line) and line[0] in "+-*0123456789":

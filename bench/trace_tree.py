@@ -24,6 +24,11 @@ class Loop:
         """Returns the seconds that the loop takes with any number of threads at least."""
         return max((task.span() for task in self.tasks), default=0.0)
 
+    def chain(self):
+        """Returns {loop name: seconds} of the longest chain of work. It has one task of each loop."""
+        longest = max(self.tasks, key=Task.span, default=Task([]))
+        return longest.chain(self.name)
+
 
 @dataclasses.dataclass
 class Task:
@@ -34,6 +39,12 @@ class Task:
 
     def span(self):
         return sum(item.span() if isinstance(item, Loop) else item for item in self.items)
+
+    def chain(self, name=None):
+        seconds = collections.Counter({name: self.own()})
+        for loop in self.loops():
+            seconds.update(loop.chain())
+        return seconds
 
     def own(self):
         """Returns the seconds outside of loops."""
@@ -100,9 +111,6 @@ class Trace:
                              f"loop '{event['name']}'")
         return Loop(event["name"],
                     [self._task(task, self.loops_of_task[task["args"]["task"]]) for task in tasks])
-
-    def end(self):
-        return max(end_of(event) for event in self.events)
 
 
 def shortest(trees):

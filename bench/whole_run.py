@@ -7,7 +7,7 @@ says of the last step before it, or this one, whose tasks were recorded."""
 import bisect
 import dataclasses
 
-from trace_tree import MICROSECOND, begin_of, contains, end_of
+from trace_tree import MICROSECOND, begin_of, contains
 
 
 @dataclasses.dataclass
@@ -94,7 +94,3 @@ class WholeRun:
     def _model_step(self, node):
         recorded = max(0, bisect.bisect_right(self.begins, begin_of(node.event)) - 1)
         return {n: node.seconds() * self.gains[recorded][n] for n in self.threads}
-
-
-def end_of_trace(trace):
-    return MICROSECOND * max(end_of(event) for event in trace.events)

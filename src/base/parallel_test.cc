@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "base/processors.h"
@@ -130,6 +132,36 @@ TEST_F(DescribedThreads, ProcessesOfAJobShareTheMachine) {
       << describe_threads();
   EXPECT_TRUE(says("not bound to processors, since it shares the machine")) << describe_threads();
 }
+
+#if defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+// The suppressions that TBB needs (tests/thread_suppressions.txt) must not hide races of bodies.
+void run_a_race(bool is_in_inner_loop) {
+  set_thread_count(2);
+  std::int64_t sum = 0;
+  const auto add = [&](std::int64_t i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    sum += i;
+  };
+  for (int round = 0; round < 20; ++round) {
+    if (is_in_inner_loop)
+      parallel_for("outer", 2, [&](std::int64_t) { parallel_for("inner", 2, add); });
+    else
+      parallel_for("race", 2, add);
+  }
+  std::exit(0);
+}
+
+TEST(ThreadSanitizer, FindsRacesOfTasks) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  constexpr int kStatusOfReports = 66;
+  for (const bool is_in_inner_loop : {false, true}) {
+    EXPECT_EXIT(run_a_race(is_in_inner_loop), ::testing::ExitedWithCode(kStatusOfReports),
+                "data race.*parallel_test");
+  }
+}
+#endif
+#endif
 
 TEST(ThreadCount, ZeroMeansAllOfTheMachine) {
   set_thread_count(3);

@@ -112,6 +112,9 @@ def test_trace_becomes_a_tree():
     assert span["ts"] == 10e6
     assert step == Task([1.0, loop("bands", [1.0, loop("views", 2, 2), 0.0], 3), 1.0]), step
     assert step.work() == 10 and step.span() == 5 and seconds(step, 2) == 7
+    assert step.chain() == {None: 2, "bands": 1, "views": 2}
+    assert Task([loop("outer", [1.0, loop("inner", 3, 2)], 2)]).chain() == {
+        None: 0, "outer": 1, "inner": 3}
     slower = Task([0.5, loop("bands", [2.0, loop("views", 3, 1), 0.0], 4), 3.0])
     assert shortest([step, slower]) == Task(
         [0.5, loop("bands", [1.0, loop("views", 2, 1), 0.0], 3), 1.0])
@@ -138,7 +141,7 @@ def test_instructions_are_counted_by_library():
     path = os.path.join(harness.fresh_directory("counts"), "callgrind.out")
     with open(path, "w", encoding="utf-8") as file:
         file.write("positions: line\nevents: Ir\nob=(1) /usr/bin/tomofield\nfl=(1) a.cc\nfn=(1) main\n"
-                   "12 100\n+3 20\ncfn=(2)\ncalls=1 5\n* 900\nob=(2) /lib/libtbb.so.12\nfn=(2) run\n"
+                   "12 100\n+3 20\ncob=(2) /lib/libtbb.so.12\ncfn=(2)\ncalls=1 5\n* 900\nob=(2)\nfn=(2) run\n"
                    "-2 7\nob=(1)\nfn=(3) other\n5 3\ntotals: 130\n")
     assert threads_rows.instructions_in(path) == {
         "total": 130, "objects": {"tomofield": 123, "libtbb.so.12": 7}}
