@@ -1,8 +1,12 @@
 #include "base/parallel.h"
 
 #include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <stdexcept>
@@ -10,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/aligned_buffer.h"
 #include "base/processors.h"
 
 namespace tomofield::base {
@@ -168,6 +173,57 @@ TEST(ThreadCount, ZeroMeansAllOfTheMachine) {
   EXPECT_EQ(thread_count(), 3);
   set_thread_count(0);
   EXPECT_GE(thread_count(), 1);
+}
+
+// Keeps the thread busy, so that others have time to take a part of the loop.
+void work_a_little() {
+  volatile double sum = 0;
+  for (int i = 0; i < 20000; ++i) sum = sum + i;
+}
+
+// By chance, one of eight indices would meet the same thread again.
+TEST(ParallelLoops, AnIndexMeetsTheThreadOfTheLastTime) {
+  set_thread_count(8);
+  constexpr int kCount = 64, kRepeats = 40;
+  std::vector<int> last(kCount, -1);
+  std::atomic<int> same{0};
+  for (int repeat = 0; repeat < kRepeats; ++repeat) {
+    parallel_for("affinity", kCount, [&](std::int64_t i) {
+      work_a_little();
+      int& thread = last[static_cast<std::size_t>(i)];
+      same += thread == thread_index();
+      thread = thread_index();
+    });
+  }
+  set_thread_count(0);
+  EXPECT_GT(same.load(), kCount * (kRepeats - 1) / 4);
+}
+
+// Returns the NUMA node on which a page lies, or a negative error.
+int node_of(void* page) {
+  int node = -1;
+  if (syscall(SYS_move_pages, 0, 1UL, &page, nullptr, &node, 0) != 0) return -errno;
+  return node;
+}
+
+TEST(ParallelLoops, APageLiesOnTheNodeOfTheThreadThatWritesItFirst) {
+  constexpr std::size_t kBytes = std::size_t{2} << 20, kCount = 32;
+  AlignedBuffer<char> buffer(kBytes * kCount);
+  if (node_of(buffer.data()) != -ENOENT) GTEST_SKIP() << "the system does not say where pages lie";
+  set_thread_count(4);
+  std::vector<unsigned> node(kCount);
+  parallel_for("touch", kCount, [&](std::int64_t i) {
+    unsigned before = 0, after = 1;
+    while (before != after) {  // until the thread stays on its node meanwhile
+      getcpu(nullptr, &before);
+      buffer[static_cast<std::size_t>(i) * kBytes] = 1;
+      getcpu(nullptr, &after);
+    }
+    node[static_cast<std::size_t>(i)] = before;
+  });
+  set_thread_count(0);
+  for (std::size_t i = 0; i < kCount; ++i)
+    EXPECT_EQ(node_of(&buffer[i * kBytes]), static_cast<int>(node[i])) << i;
 }
 
 }  // namespace

@@ -92,6 +92,8 @@ class Fit {
   const distributed::Communicator& processes() const { return processes_; }
   /// Returns the rows that this process works on; one process alone has all of them.
   const measurement::RowShare& share() const { return share_; }
+  /// Returns the rows that all processes work on.
+  std::int64_t num_rows() const { return domain_.num_rows; }
   /// Returns the leaves of its bands.
   base::Range own_leaves() const { return leaves_of_bands(field_->tree(), share_.bands); }
   /// Returns the leaves of a tree whose parameters this process keeps; an empty list means all.

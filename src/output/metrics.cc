@@ -85,14 +85,23 @@ nlohmann::json metrics_json(const fit::Fit& fit, const measurement::Measurement&
           {"views", views}};
 }
 
+// Returns the rows whose slabs this process works on at full resolution.
+std::int64_t rows_worked_on(const fit::Fit& fit) {
+  const measurement::RowShare& share = fit.share();
+  const std::int64_t band = fit.field().tree().roots().cell_size;
+  const std::int64_t first = share.bands.begin * band + share.rows_by_previous;
+  return std::min(share.bands.end * band + share.rows_for_next, fit.num_rows()) - first;
+}
+
 nlohmann::json processes_json(const fit::Fit& fit, double seconds) {
   const distributed::Communicator& processes = fit.processes();
   const fit::Fit::Traffic traffic = fit.traffic();
-  constexpr std::size_t kNumbers = 5;
+  constexpr std::size_t kNumbers = 6;
   std::vector<double> all(kNumbers * static_cast<std::size_t>(processes.size()));
   const auto own = all.begin() + static_cast<std::ptrdiff_t>(kNumbers) * processes.rank();
   const double steps = static_cast<double>(std::max<std::int64_t>(traffic.steps, 1));
   std::ranges::copy(std::array<double, kNumbers>{static_cast<double>(fit.share().bands.size()),
+                                                 static_cast<double>(rows_worked_on(fit)),
                                                  static_cast<double>(fit.own_leaves().size()),
                                                  seconds - traffic.seconds, traffic.seconds,
                                                  static_cast<double>(traffic.bytes) / steps},
@@ -101,10 +110,11 @@ nlohmann::json processes_json(const fit::Fit& fit, double seconds) {
   nlohmann::json list = nlohmann::json::array();
   for (auto p = all.begin(); p != all.end(); p += kNumbers) {
     list.push_back({{"bands", std::lround(p[0])},
-                    {"leaves", std::lround(p[1])},
-                    {"seconds_computing", p[2]},
-                    {"seconds_communicating", p[3]},
-                    {"bytes_sent_per_step", p[4]}});
+                    {"rows", std::lround(p[1])},
+                    {"leaves", std::lround(p[2])},
+                    {"seconds_computing", p[3]},
+                    {"seconds_communicating", p[4]},
+                    {"bytes_sent_per_step", p[5]}});
   }
   return list;
 }

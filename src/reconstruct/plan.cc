@@ -28,16 +28,21 @@ namespace {
 constexpr std::size_t kProgram = std::size_t{20} << 20;  // the program with its libraries
 constexpr std::size_t kMpi = std::size_t{40} << 20;      // OpenMPI and its message buffers
 
-constexpr int kSlabsOfThread = projection::SlabProjector::kSlabsTogether;
+constexpr int kSlabsOfBand = projection::SlabProjector::kSlabsTogether;
+constexpr std::size_t kRow = kernels::kLanes * sizeof(float);
 
-// Returns the bytes of a thread: a pair of slabs with their gradient and the views of a step, rows
-// for the total variation, the vertices of a leaf, and later a part of the volume.
-std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domain& domain,
-                          int views_a_step) {
-  constexpr std::size_t kRow = kernels::kLanes * sizeof(float);
+// Returns the bytes of a band that is worked on: a pair of slabs with their gradient and the views
+// of a step, and rows for the total variation.
+std::size_t band_memory(const measurement::Measurement& plan, const fit::Domain& domain,
+                        int views_a_step) {
   const std::size_t slab = domain.grid.size() * sizeof(float);
   const std::size_t views =
       static_cast<std::size_t>(views_a_step) * static_cast<std::size_t>(plan.geometry.width) * kRow;
+  return kSlabsOfBand * (2 * slab + views) + 3 * slab / kernels::kLanes;
+}
+
+// Returns the bytes of a thread: the vertices of a leaf, and later a part of the volume.
+std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domain& domain) {
   std::size_t leaf = 0;
   for (const field::LeafShape& shape : domain.shapes)
     leaf = std::max(leaf, 2 * shape.vertices_xz() * kRow);
@@ -45,7 +50,7 @@ std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domai
       std::size_t{16} << 20,
       static_cast<std::size_t>(static_cast<double>(plan.roi.width()) * plan.geometry.thickness) *
           kRow);
-  return kSlabsOfThread * (2 * slab + views) + 2 * slab / kernels::kLanes + leaf + written;
+  return leaf + written;
 }
 
 int num_fitted_views(const measurement::Measurement& plan, const fit::FitOptions& options) {
@@ -142,7 +147,11 @@ std::size_t estimate_memory(const tilt_series::TiltSeries& series,
   const auto factorising =
       static_cast<std::size_t>(factorising_bytes(domain, run, options.field, processes));
   const SlabViews::Shape own_shape = own_part(plan.rays_shape(), domain, processes);
-  const int slabs_in_use = kSlabsOfThread * base::thread_count();
+  const std::int64_t num_bands =
+      (own_shape.num_rows + domain.tree.roots().cell_size - 1) / domain.tree.roots().cell_size;
+  const int bands_in_use =
+      static_cast<int>(std::min<std::int64_t>(base::thread_count(), num_bands));
+  const int slabs_in_use = kSlabsOfBand * bands_in_use;
   const std::size_t rays = SlabViews::resident_memory(own_shape, slabs_in_use);
   std::size_t coarse_rays = 0;  // of the last coarse stage, which has the most
   for (const fit::Stage& s : run.stages) {
@@ -152,8 +161,10 @@ std::size_t estimate_memory(const tilt_series::TiltSeries& series,
   }
   const int steps = steps_an_epoch(plan, options.fit);
   const int views_a_step = plan.ray_geometry ? 0 : (run.num_views + steps - 1) / steps;
-  const std::size_t fitting = parameters + static_cast<std::size_t>(base::thread_count()) *
-                                               thread_memory(plan, domain, views_a_step);
+  const std::size_t fitting =
+      parameters +
+      static_cast<std::size_t>(bands_in_use) * band_memory(plan, domain, views_a_step) +
+      static_cast<std::size_t>(base::thread_count()) * thread_memory(plan, domain);
   const std::size_t tracing =
       plan.ray_geometry ? objective::RayDataTerm::working_memory(*plan.ray_geometry, domain.tree,
                                                                  options.fit, plan.rays_shape())

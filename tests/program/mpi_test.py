@@ -37,18 +37,23 @@ def mpi():
         yield
 
 
-@pytest.fixture(scope="module")
-def series():
-    """Writes a series of ROWS rows and returns the arguments that hand it to reconstruct."""
-    directory = harness.fresh_directory("series")
+def write_series(name, size, rows):
+    """Writes a series of some rows and returns the arguments that hand it to reconstruct."""
+    directory = harness.fresh_directory(name)
     cell = os.path.join(directory, "cell")
-    harness.succeed("simulate", cell, "--size", 128, "--thickness", THICKNESS, "--seed", 3,
+    harness.succeed("simulate", cell, "--size", size, "--thickness", THICKNESS, "--seed", 3,
                     "--tilts=-60:60:6", "--noise", 0.03)
-    views = harness.read_volume(os.path.join(cell, "tilt_series.mrc"))[:, :ROWS, 44:44 + COLUMNS]
+    first = (size - COLUMNS) // 2
+    views = harness.read_volume(os.path.join(cell, "tilt_series.mrc"))
     stack, tlt = os.path.join(directory, "series.mrc"), os.path.join(directory, "series.tlt")
-    harness.write_stack(stack, views.astype(np.float32))
+    harness.write_stack(stack, views[:, :rows, first:first + COLUMNS].astype(np.float32))
     np.savetxt(tlt, harness.TILTS, fmt="%.1f")
     return [stack, "--tlt", tlt]
+
+
+@pytest.fixture(scope="module")
+def series():
+    return write_series("series", 128, ROWS)
 
 
 @pytest.fixture(scope="module", name="command")
@@ -115,6 +120,26 @@ def test_results_have_the_bytes_of_one_process(command):
             assert result.stdout.count("tomogram  ") == 1, result.stdout
             assert set(map(os.path.basename, glob.glob(os.path.dirname(shared.volume_path) + "/*"))) \
                 == set(map(os.path.basename, glob.glob(os.path.dirname(alone.volume_path) + "/*")))
+
+
+# Three bands of 64 rows, the last of which is not full, are six pairs of slabs. Each of two processes
+# works on three of them: the first one begins a band that the second one owns.
+def test_a_divided_band_has_the_bytes_of_one_process(command):
+    tall = write_series("tall_series", 192, 184)
+    with_margin = [word for word in FIT if word != "--no-margin"]
+    cases = {"grid": ["--field", "grid", "--leaf-size", 64],
+             "factors": ["--field", "vm", "--leaf-size", 32, "--vertex-epochs", 2,
+                         "--coarse-epochs", 2, "--hold-out", 5],
+             "smooth": ["--field", "vm", "--leaf-size", 32, "--tv-penalty", "smooth"]}
+    for name, options in cases.items():
+        alone, shared = fresh_results(f"tall_{name}"), fresh_results(f"tall_{name}2")
+        harness.succeed(*command(alone, *options, input=tall, fit=with_margin))
+        succeed(2, *command(shared, *options, input=tall, fit=with_margin))
+        assert shared.same_as(alone), name
+        assert metrics(shared) == metrics(alone), name
+        with open(shared.json_path) as file:
+            processes = json.load(file)["metrics"]["processes"]
+        assert [(p["bands"], p["rows"]) for p in processes] == [(1, 96), (2, 88)], processes
 
 
 # Each process looks for spots in its own views, and all must find the same tracks.
@@ -195,7 +220,7 @@ def step_of(results):
 
 def test_checkpoints_go_on_with_any_number_of_processes(command):
     undisturbed, results = fresh_results("undisturbed"), fresh_results("resumed")
-    long = ["--epochs", 120]  # to be stopped in, three times
+    long = ["--epochs", 400]  # to be stopped in, three times
     harness.succeed(*command(undisturbed, *long))
     steps = []
     # mpirun passes SIGUSR1 on. It answers SIGTERM itself and ends the processes with it.
@@ -207,7 +232,7 @@ def test_checkpoints_go_on_with_any_number_of_processes(command):
         errors = stop_after_a_step(run, number)
         assert run.returncode == status, (run.returncode, errors)
         steps.append(step_of(results))
-    assert 0 < steps[0] < steps[1] < steps[2] < 120 * 7, steps
+    assert 0 < steps[0] < steps[1] < steps[2] < 400 * 7, steps
     succeed(3, *command(results, "--resume", *long))
     assert results.same_as(undisturbed)
 
