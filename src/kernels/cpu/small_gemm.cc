@@ -121,8 +121,24 @@ HWY_INLINE std::ptrdiff_t single_vectors(D d, const SmallGemm& g, std::ptrdiff_t
   return col;
 }
 
+// Computes the product of rows with a single vector B, both without gaps, and returns true if its
+// shape suits; otherwise returns false and leaves C as it is.
+HWY_INLINE bool multiplied_by_dot_products(const SmallGemm& g) {
+  const hn::CappedTag<float, 8> d;  // factors have ranks that are multiples of 8
+  const auto lanes = static_cast<std::ptrdiff_t>(hn::Lanes(d));
+  if (g.width != 1 || g.a_col != 1 || g.b_row != 1 || g.depth % lanes != 0) return false;
+  for (std::ptrdiff_t row = 0; row < g.rows; ++row) {
+    const float* const a = g.a + row * g.a_row;
+    auto sum = hn::Zero(d);
+    for (std::ptrdiff_t n = 0; n < g.depth; n += lanes)
+      sum = hn::MulAdd(hn::LoadU(d, a + n), hn::LoadU(d, g.b + n), sum);
+    g.c[row * g.c_row] += hn::GetLane(hn::SumOfLanes(d, sum));
+  }
+  return true;
+}
+
 void small_gemm(const SmallGemm& g) {
-  if (multiplied_by_passes(g)) return;
+  if (multiplied_by_passes(g) || multiplied_by_dot_products(g)) return;
   const hn::ScalableTag<float> d;
   std::ptrdiff_t col = 0;
   const auto vectors_left = [&] {
