@@ -44,7 +44,7 @@ class Plan:
         ("grid", "--field grid --tv-penalty smooth --coarse-epochs 1 --epochs 1"),
         ("default", "--tv-penalty smooth --coarse-epochs 1 --vertex-epochs 1 --epochs 1"))
     step_repeats: int = 3
-    whole: tuple = ((256, 150), (("grid", "--field grid"), ("default", "")))
+    whole: tuple = ((512, 300), (("grid", "--field grid"), ("default", "")))
     instructed_size: tuple = (64, 38)
     instructed: str = "--tv-penalty smooth --coarse-epochs 2 --vertex-epochs 1 --epochs 2 --rank 8"
 

@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "base/parallel.h"
-
 namespace tomofield::fit {
 
 Adam::Adam(const field::Field& field, const AdamOptions& options) : options_(options) {
@@ -12,18 +10,15 @@ Adam::Adam(const field::Field& field, const AdamOptions& options) : options_(opt
   state_.leaf_steps.assign(static_cast<std::size_t>(field.tree().num_leaves()), 0);
 }
 
-void Adam::step(field::Field& field, const std::vector<int>& leaves,
-                base::AlignedBuffer<float>& gradient, double learning_rate) {
-  base::parallel_for("adam", static_cast<std::int64_t>(leaves.size()), [&](std::int64_t i) {
-    const int leaf = leaves[static_cast<std::size_t>(i)];
-    const double t = static_cast<double>(++state_.leaf_steps[static_cast<std::size_t>(leaf)]);
-    const std::size_t first = field.offset(leaf);
-    const kernels::AdamStep step =
-        kernels::corrected_step(options_.beta1, options_.beta2, learning_rate, t);
-    kernels::adam_step(step, static_cast<std::ptrdiff_t>(field.offset(leaf + 1) - first),
-                       field.parameters().data() + first, gradient.data() + first,
-                       state_.m.data() + first, state_.v.data() + first);
-  });
+void Adam::step(field::Field& field, int leaf, base::AlignedBuffer<float>& gradient,
+                double learning_rate) {
+  const double t = static_cast<double>(++state_.leaf_steps[static_cast<std::size_t>(leaf)]);
+  const std::size_t first = field.offset(leaf);
+  const kernels::AdamStep step =
+      kernels::corrected_step(options_.beta1, options_.beta2, learning_rate, t);
+  kernels::adam_step(step, static_cast<std::ptrdiff_t>(field.offset(leaf + 1) - first),
+                     field.parameters().data() + first, gradient.data() + first,
+                     state_.m.data() + first, state_.v.data() + first);
 }
 
 void Adam::step_bias(field::Field& field, double gradient, double learning_rate) {

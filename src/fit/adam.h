@@ -17,16 +17,16 @@ struct AdamOptions {
 };
 
 /// Optimises the parameters of a field's leaves and the bias of its decoder (Adam; Kingma and Ba
-/// 2015). Each leaf counts its own steps: its moments and its bias correction advance only in steps
-/// that list it.
+/// 2015). Each leaf counts its own steps: its moments and its bias correction advance only in its
+/// own steps.
 class Adam {
  public:
   Adam(const field::Field& field, const AdamOptions& options);
 
-  /// Takes one step on the listed leaves and clears their gradient. `gradient` has one entry for
-  /// each parameter of the field.
-  void step(field::Field& field, const std::vector<int>& leaves,
-            base::AlignedBuffer<float>& gradient, double learning_rate);
+  /// Takes one step on a leaf and clears its gradient. `gradient` has one entry for each parameter
+  /// of the field. Different leaves may be stepped at the same time.
+  void step(field::Field& field, int leaf, base::AlignedBuffer<float>& gradient,
+            double learning_rate);
   /// Takes one step on the bias; `gradient` is the derivative of the loss by it.
   void step_bias(field::Field& field, double gradient, double learning_rate);
 

@@ -52,7 +52,7 @@ void compare_with_plain_adam(const std::vector<std::vector<int>>& leaves_of_step
         expected[i] = plain[i].step(expected[i], static_cast<double>(g[i]), rate);
       }
     }
-    adam.step(*field, leaves_of_step[t], gradient, rate);
+    for (const int leaf : leaves_of_step[t]) adam.step(*field, leaf, gradient, rate);
     for (const float left : gradient) ASSERT_EQ(left, 0.0f) << "the gradient is used up";
   }
   for (std::size_t i = 0; i < expected.size(); ++i)
@@ -77,8 +77,8 @@ TEST(FieldAdam, CountsTheStepsOfEachLeaf) {
   const auto field = small_field();
   Adam adam(*field, {});
   base::AlignedBuffer<float> gradient(field->num_parameters());
-  adam.step(*field, {0, 2}, gradient, 0.1);
-  adam.step(*field, {2, 3}, gradient, 0.1);
+  for (const int leaf : {0, 2}) adam.step(*field, leaf, gradient, 0.1);
+  for (const int leaf : {2, 3}) adam.step(*field, leaf, gradient, 0.1);
   EXPECT_EQ(adam.state().leaf_steps, (std::vector<std::int64_t>{1, 0, 2, 1, 0, 0}));
 }
 
@@ -87,7 +87,7 @@ TEST(FieldAdam, ZeroGradientMovesNothing) {
   const std::vector<float> before(field->parameters().begin(), field->parameters().end());
   Adam adam(*field, {});
   base::AlignedBuffer<float> gradient(field->num_parameters());
-  adam.step(*field, {0, 1, 2, 3, 4, 5}, gradient, 0.1);
+  for (const int leaf : {0, 1, 2, 3, 4, 5}) adam.step(*field, leaf, gradient, 0.1);
   adam.step_bias(*field, 0.0, 0.1);
   EXPECT_TRUE(std::equal(before.begin(), before.end(), field->parameters().begin()));
   EXPECT_EQ(field->bias, 0.0f);
@@ -122,7 +122,7 @@ TEST(FieldAdam, GoesOnFromItsStateToTheSameBits) {
       }
       const auto g = testing::random_floats(field->num_parameters(), t);
       std::copy(g.begin(), g.end(), gradient.begin());
-      adam->step(*field, {0, 1, 2, 3, 4, 5}, gradient, 0.05);
+      for (const int leaf : {0, 1, 2, 3, 4, 5}) adam->step(*field, leaf, gradient, 0.05);
       adam->step_bias(*field, static_cast<double>(g[0]), 0.01);
     }
     std::vector<float> result(field->parameters().begin(), field->parameters().end());

@@ -267,11 +267,10 @@ void Fit::take_step() {
   const std::vector<int> views = views_of_step(progress_.step);
   const double multiplicity =
       static_cast<double>(fitted_views_.size()) / std::max(static_cast<double>(views.size()), 1.0);
-  const double grad_bias =
-      objective_->add_gradient({progress_.step, views, progress_.views, multiplicity},
-                               gradient_.data(), progress_.epoch_sums);
   const double rate = learning_rate(progress_.step);
-  optimizer_.step(*field_, objective_->own_leaves(), gradient_, rate);
+  const double grad_bias = objective_->add_gradient(
+      {progress_.step, views, progress_.views, multiplicity}, gradient_.data(),
+      progress_.epoch_sums, [&](int leaf) { optimizer_.step(*field_, leaf, gradient_, rate); });
   optimizer_.step_bias(*field_, grad_bias, kBiasRate * rate);
   halo_->refresh(*field_);
 }

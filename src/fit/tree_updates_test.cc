@@ -75,7 +75,7 @@ TEST(ApplyEdit, CarriesTheOptimisersStateWithTheLeaves) {
   const auto step = [&](const std::vector<int>& leaves) {
     gradient.reset(field->num_parameters());
     std::ranges::copy(testing::random_floats(gradient.size(), 3), gradient.begin());
-    adam.step(*field, leaves, gradient, 0.01);
+    for (const int leaf : leaves) adam.step(*field, leaf, gradient, 0.01);
   };
   step({0, 1, 3});
   step({1});

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <iterator>
 
-#include "base/parallel.h"
 #include "base/random.h"
 
 namespace tomofield::objective {
@@ -134,28 +133,51 @@ std::vector<std::size_t> BoundaryConsistency::faces_of(std::span<const int> leav
   return faces;
 }
 
-void BoundaryConsistency::add_leaves(const Step& step, std::span<const int> leaves, float* gradient,
-                                     std::span<TermValue> of_leaf) const {
-  if (options_.weight <= 0) return;
-  const std::vector<std::size_t> faces = faces_of(leaves);
-  std::vector<Samples> samples(faces.size());
-  base::parallel_for("jumps at faces", std::ssize(faces), [&](std::int64_t i) {
-    Samples& s = samples[static_cast<std::size_t>(i)];
-    s.value = face_gradient(faces[static_cast<std::size_t>(i)], step.number, s);
-  });
-  base::parallel_for("gradient at faces", std::ssize(leaves), [&](std::int64_t i) {
-    const int leaf = leaves[static_cast<std::size_t>(i)];
-    float* const of_parameters = gradient + field_.offset(leaf);
-    TermValue& term = of_leaf[static_cast<std::size_t>(i)];
-    for (const std::size_t face : faces_of_leaf_[static_cast<std::size_t>(leaf)]) {
-      const auto at = std::ranges::lower_bound(faces, face) - faces.begin();
-      const Samples& s = samples[static_cast<std::size_t>(at)];
-      const bool is_low = faces_[face].low == leaf;
-      if (is_low) term.value += s.value;
-      term.grad_bias += field_.point_gradient(leaf, s.points(), is_low ? s.low : s.high,
-                                              is_low ? s.grad_low : s.grad_high, of_parameters);
+// The jumps at the faces of some leaves. A reading evaluates a face.
+class BoundaryConsistency::Jumps : public LeafPass {
+ public:
+  Jumps(const BoundaryConsistency& term, std::int64_t step, std::span<const int> leaves)
+      : term_(term),
+        step_(step),
+        leaves_(leaves),
+        faces_(term.faces_of(leaves)),
+        samples_(faces_.size()) {}
+
+  std::int64_t num_readings() const override { return std::ssize(faces_); }
+
+  void read(std::int64_t index) override {
+    const auto face = static_cast<std::size_t>(index);
+    samples_[face].value = term_.face_gradient(faces_[face], step_, samples_[face]);
+  }
+
+  TermValue add_leaf(std::size_t index, float* gradient) override {
+    const field::Field& field = term_.field_;
+    const int leaf = leaves_[index];
+    TermValue result;
+    for (const std::size_t face : term_.faces_of_leaf_[static_cast<std::size_t>(leaf)]) {
+      const auto at = std::ranges::lower_bound(faces_, face) - faces_.begin();
+      const Samples& s = samples_[static_cast<std::size_t>(at)];
+      const bool is_low = term_.faces_[face].low == leaf;
+      if (is_low) result.value += s.value;
+      result.grad_bias +=
+          field.point_gradient(leaf, s.points(), is_low ? s.low : s.high,
+                               is_low ? s.grad_low : s.grad_high, gradient + field.offset(leaf));
     }
-  });
+    return result;
+  }
+
+ private:
+  const BoundaryConsistency& term_;
+  std::int64_t step_;
+  std::span<const int> leaves_;
+  std::vector<std::size_t> faces_;
+  std::vector<Samples> samples_;  // one for each of faces_
+};
+
+std::unique_ptr<Term::LeafPass> BoundaryConsistency::leaf_pass(const Step& step,
+                                                               std::span<const int> leaves) const {
+  if (options_.weight <= 0) return nullptr;
+  return std::make_unique<Jumps>(*this, step.number, leaves);
 }
 
 }  // namespace tomofield::objective

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -44,14 +45,14 @@ class BoundaryConsistency : public Term {
   BoundaryConsistency(const field::Field& field, std::span<const int> leaves,
                       const BoundaryOptions& options);
 
-  /// Adds the gradient of some of those leaves. The value of a face counts for its lower leaf. A
-  /// face between a leaf that is given and another one is evaluated too, so the other leaf may be
-  /// given to another process.
-  void add_leaves(const Step& step, std::span<const int> leaves, float* gradient,
-                  std::span<TermValue> of_leaf) const override;
+  /// Begins the work on some of those leaves. The value of a face counts for its lower leaf. A face
+  /// between one of them and another leaf is evaluated too, so the other leaf may be given to
+  /// another process.
+  std::unique_ptr<LeafPass> leaf_pass(const Step& step, std::span<const int> leaves) const override;
 
  private:
   struct Samples;
+  class Jumps;
   double face_gradient(std::size_t face, std::int64_t step, Samples& samples) const;
   void draw_points(std::size_t face, std::int64_t step, Samples& samples) const;
   std::vector<std::size_t> faces_of(std::span<const int> leaves) const;

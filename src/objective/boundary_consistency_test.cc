@@ -87,6 +87,16 @@ INSTANTIATE_TEST_SUITE_P(Kinds, EachBoundaryField,
 
 constexpr BoundaryOptions kOptions{.weight = 0.7, .spacing = 5.0, .epsilon = 0.02, .seed = 9};
 
+// Adds the gradient of some leaves and returns the sum of their terms.
+TermValue add_leaves(const BoundaryConsistency& boundary, std::int64_t step,
+                     const std::vector<int>& leaves, std::vector<float>& gradient) {
+  const auto pass = boundary.leaf_pass({.number = step, .views = {}, .models = {}}, leaves);
+  for (std::int64_t i = 0; i < pass->num_readings(); ++i) pass->read(i);
+  TermValue sum;
+  for (std::size_t i = 0; i < leaves.size(); ++i) sum += pass->add_leaf(i, gradient.data());
+  return sum;
+}
+
 struct Total {
   double value = 0.0, grad_bias = 0.0;
   std::vector<float> gradient;
@@ -97,13 +107,9 @@ Total evaluate(const field::Field& field, const BoundaryOptions& options, std::i
   total.gradient.resize(field.num_parameters());
   for (const int band : {1, 0}) {
     const std::vector<int> leaves = leaves_of(field.tree(), {band});
-    std::vector<TermValue> of_leaf(leaves.size());
-    boundary.add_leaves({.number = step, .views = {}, .models = {}}, leaves, total.gradient.data(),
-                        of_leaf);
-    for (const TermValue& term : of_leaf) {
-      total.value += term.value;
-      total.grad_bias += term.grad_bias;
-    }
+    const TermValue of_band = add_leaves(boundary, step, leaves, total.gradient);
+    total.value += of_band.value;
+    total.grad_bias += of_band.grad_bias;
   }
   return total;
 }
@@ -181,8 +187,7 @@ TEST_P(EachBoundaryField, LeavesThatAreNotGivenAreLeftAlone) {
     std::vector<int> leaves = leaves_of(field->tree(), {band});
     std::erase(leaves, 2);
     std::vector<float> own(field->num_parameters());
-    std::vector<TermValue> of_leaf(leaves.size());
-    boundary.add_leaves({}, leaves, own.data(), of_leaf);
+    add_leaves(boundary, 0, leaves, own);
     for (int leaf = 0; leaf < field->tree().num_leaves(); ++leaf) {
       const auto begin = own.begin() + static_cast<std::ptrdiff_t>(field->offset(leaf));
       const auto end = own.begin() + static_cast<std::ptrdiff_t>(field->offset(leaf + 1));

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <memory>
+#include <functional>
 #include <span>
-#include <vector>
 
 #include "measurement/held_out.h"
 #include "objective/term.h"
@@ -15,14 +14,15 @@ class Objective {
  public:
   virtual ~Objective() = default;
 
-  /// Adds the gradient by all parameters of the own leaves to `gradient`, and the sums of the
-  /// step's residuals to `view_sums` (one for every view). Returns the derivative by the bias.
+  /// Is called once for every leaf of this process when its gradient is complete, on any thread. It
+  /// may change the parameters of that leaf and its gradient.
+  using LeafDone = std::function<void(int leaf)>;
+  /// Adds the gradient by all parameters of this process's leaves to `gradient`, and the sums of
+  /// the step's residuals to `view_sums` (one for every view). Returns the derivative by the bias.
   /// Every process calls it; sums have the same bits for any number of threads and processes.
   virtual double add_gradient(const Step& step, float* gradient,
-                              std::span<measurement::ViewSums> view_sums) const = 0;
-
-  /// Returns the leaves whose gradient add_gradient() computes in this process.
-  virtual const std::vector<int>& own_leaves() const = 0;
+                              std::span<measurement::ViewSums> view_sums,
+                              const LeafDone& leaf_done) const = 0;
 
   /// Scores the field on views that it was not fitted to; `noise_weight` is 1 / variance of the
   /// noise of every view.

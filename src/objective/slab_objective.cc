@@ -20,6 +20,26 @@ projection::SlabSampler make_sampler(const SlabObjectiveContext& c) {
   return {c.field, c.projector.grid(), c.first_row, (c.num_rows + c.bin - 1) / c.bin, c.bin};
 }
 
+// Returns the slabs of the first rows of a band.
+base::Range first_slabs(const projection::SlabSampler& sampler, int band, std::int64_t rows) {
+  if (rows == 0) return {};
+  const int first = sampler.band(band).begin;
+  return {first, first + static_cast<int>(rows / kLanes)};
+}
+
+// Numbers the pairs of slabs of all bands and returns the number of each slab's pair.
+std::vector<int> pair_of_each_slab(const projection::SlabSampler& sampler) {
+  std::vector<int> pairs;
+  int next = 0;
+  for (int band = 0; band < sampler.num_bands(); ++band) {
+    const base::Range slabs = sampler.band(band);
+    for (int slab = slabs.begin; slab < slabs.end; ++slab)
+      pairs.push_back(next + (slab - slabs.begin) / kSlabsTogether);
+    next = pairs.back() + 1;
+  }
+  return pairs;
+}
+
 TermContext term_context(const SlabObjectiveContext& c, const projection::SlabSampler& sampler) {
   return {c.field,   sampler,       c.measured,   c.full,    c.bin,
           c.support, c.has_factors, c.own_leaves, c.options, c.processes};
@@ -46,8 +66,20 @@ struct SlabObjective::Workspace {
 struct SlabObjective::Pass {
   const Step& step;
   const projection::ViewCrossings& crossings;
-  float* gradient;  // by all parameters
+  float* gradient;                                           // by all parameters
+  std::vector<std::unique_ptr<Term::LeafPass>> leaf_passes;  // of each term, or nothing
   Sums& sums;
+
+  // Does part `index` of `count` of the readings of every term.
+  void read(std::int64_t index, std::int64_t count) const {
+    for (const auto& terms : leaf_passes) {
+      if (!terms) continue;
+      const std::int64_t first = terms->num_readings() * index / count;
+      const std::int64_t end = terms->num_readings() * (index + 1) / count;
+      base::parallel_for("read leaves", end - first,
+                         [&](std::int64_t i) { terms->read(first + i); });
+    }
+  }
 };
 
 SlabObjective::SlabObjective(const SlabObjectiveContext& context) : SlabObjective(context, {}) {
@@ -62,25 +94,12 @@ SlabObjective::SlabObjective(const SlabObjectiveContext& context,
       sampler_(make_sampler(context)),
       processes_(context.processes),
       own_bands_(context.share.bands),
+      slabs_for_next_(first_slabs(sampler_, own_bands_.end, context.share.rows_for_next)),
+      slabs_by_previous_(first_slabs(sampler_, own_bands_.begin, context.share.rows_by_previous)),
+      pair_of_slab_(pair_of_each_slab(sampler_)),
       terms_(std::move(terms)) {
-  const auto slabs_of = [&](std::int64_t rows) { return static_cast<int>(rows / kLanes); };
   TOMOFIELD_CHECK(context.bin == 1 || context.share == context.share.without_help(),
                   "processes help each other at full resolution alone");
-  if (context.share.rows_for_next > 0) {
-    const int first = sampler_.band(own_bands_.end).begin;
-    slabs_for_next_ = {first, first + slabs_of(context.share.rows_for_next)};
-  }
-  if (context.share.rows_by_previous > 0) {
-    const int first = sampler_.band(own_bands_.begin).begin;
-    slabs_by_previous_ = {first, first + slabs_of(context.share.rows_by_previous)};
-  }
-  for (int band = 0; band < sampler_.num_bands(); ++band) {
-    const base::Range slabs = sampler_.band(band);
-    for (int slab = slabs.begin; slab < slabs.end; ++slab) {
-      const bool begins_pair = (slab - slabs.begin) % kSlabsTogether == 0;
-      pair_of_slab_.push_back(pair_of_slab_.empty() ? 0 : pair_of_slab_.back() + begins_pair);
-    }
-  }
   for (int band = own_bands_.begin; band < own_bands_.end; ++band)
     std::ranges::copy(sampler_.leaves_of_band(band), std::back_inserter(own_leaves_));
 }
@@ -88,9 +107,10 @@ SlabObjective::SlabObjective(const SlabObjectiveContext& context,
 SlabObjective::~SlabObjective() = default;
 
 double SlabObjective::add_gradient(const Step& step, float* gradient,
-                                   std::span<measurement::ViewSums> view_sums) const {
+                                   std::span<measurement::ViewSums> view_sums,
+                                   const LeafDone& leaf_done) const {
   // Adds in the order of slabs and bands, so that threads and processes do not change the bits.
-  const Sums sums = add_slabs_and_leaves(step, gradient);
+  const Sums sums = add(step, gradient, view_sums, leaf_done);
   double grad_bias = 0.0;
   for (const PairSums& pair : sums.pairs) {
     for (std::size_t v = 0; v < step.views.size(); ++v)
@@ -99,11 +119,14 @@ double SlabObjective::add_gradient(const Step& step, float* gradient,
   }
   for (const std::vector<TermValue>& band : sums.bands)
     for (const TermValue& term : band) grad_bias += term.grad_bias;
-  for (const auto& term : terms_) grad_bias += term->add_field(step, gradient, view_sums).grad_bias;
-  return grad_bias;
+  return grad_bias + sums.field.grad_bias;
 }
 
-SlabObjective::Sums SlabObjective::add_slabs_and_leaves(const Step& step, float* gradient) const {
+// Threads meet but twice in a step, after the bands and after the leaves: on a machine with other
+// work, each meeting waits for the thread that is held up most.
+SlabObjective::Sums SlabObjective::add(const Step& step, float* gradient,
+                                       std::span<measurement::ViewSums> view_sums,
+                                       const LeafDone& leaf_done) const {
   Sums sums;
   sums.pairs.resize(static_cast<std::size_t>(pair_of_slab_.back() + 1));
   for (PairSums& pair : sums.pairs) {
@@ -112,20 +135,36 @@ SlabObjective::Sums SlabObjective::add_slabs_and_leaves(const Step& step, float*
   }
   sums.bands.resize(static_cast<std::size_t>(sampler_.num_bands()),
                     std::vector<TermValue>(terms_.size()));
-  const projection::ViewCrossings crossings = projector_.crossings(step.views);
-  const Pass pass{step, crossings, gradient, sums};
+  const auto crossings = crossings_of(step.views);
+  Pass pass{step, *crossings, gradient, {}, sums};
+  for (const auto& term : terms_) pass.leaf_passes.push_back(term->leaf_pass(step, own_leaves_));
 
   const auto sending = add_slabs_of_next(pass);
-  const int num_shared = slabs_by_previous_.is_empty() ? 0 : 1;
-  const int first_band = own_bands_.begin + num_shared;
-  base::parallel_for("bands", own_bands_.size() - num_shared, [&](std::int64_t i) {
-    const int band = first_band + static_cast<int>(i);
-    add_slabs(pass, band, sampler_.band(band), *workspaces_.borrow());
-  });
+  add_bands(pass);
   go_on_from_previous(pass);
-  add_leaves(step, gradient, sums);
+  for (const auto& term : terms_) sums.field += term->add_field(step, gradient, view_sums);
+  add_leaves(pass, leaf_done);
   allreduce(sums);
   return sums;
+}
+
+std::shared_ptr<const projection::ViewCrossings> SlabObjective::crossings_of(
+    std::span<const int> views) const {
+  auto& known = crossings_[{views.begin(), views.end()}];
+  if (!known) known = std::make_shared<projection::ViewCrossings>(projector_.crossings(views));
+  return known;
+}
+
+// Adds the slabs of the own bands, but for a first one that the process before has begun, and does
+// the readings of the leaves beside them.
+void SlabObjective::add_bands(const Pass& pass) const {
+  const int num_begun = slabs_by_previous_.is_empty() ? 0 : 1;
+  const std::int64_t num_bands = own_bands_.size();
+  base::parallel_for("bands", num_bands, [&](std::int64_t i) {
+    const int band = own_bands_.begin + static_cast<int>(i);
+    if (i >= num_begun) add_slabs(pass, band, sampler_.band(band), *workspaces_.borrow());
+    pass.read(i, num_bands);
+  });
 }
 
 // Works on the first slabs of the next process's first band and starts to send what was found.
@@ -221,15 +260,20 @@ void SlabObjective::add_batch(const Pass& pass, const SlabBatch& batch, Workspac
   for (const double of_leaf : grad_bias) sums.grad_bias += of_leaf;
 }
 
-// Adds the terms that are computed leaf by leaf.
-void SlabObjective::add_leaves(const Step& step, float* gradient, Sums& sums) const {
-  for (std::size_t t = 0; t < terms_.size(); ++t) {
-    std::vector<TermValue> of_leaf(own_leaves_.size());
-    terms_[t]->add_leaves(step, own_leaves_, gradient, of_leaf);
-    for (std::size_t i = 0; i < of_leaf.size(); ++i) {
-      const auto band = static_cast<std::size_t>(field_.tree().band_of_leaf(own_leaves_[i]));
-      sums.bands[band][t] += of_leaf[i];
-    }
+// Adds the terms that are computed leaf by leaf, which completes the gradient of a leaf.
+void SlabObjective::add_leaves(const Pass& pass, const LeafDone& leaf_done) const {
+  std::vector<TermValue> found(own_leaves_.size() * terms_.size());
+  base::parallel_for("leaves", std::ssize(own_leaves_), [&](std::int64_t i) {
+    const auto index = static_cast<std::size_t>(i);
+    for (std::size_t t = 0; t < terms_.size(); ++t)
+      if (pass.leaf_passes[t])
+        found[index * terms_.size() + t] = pass.leaf_passes[t]->add_leaf(index, pass.gradient);
+    leaf_done(own_leaves_[index]);
+  });
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const int leaf = own_leaves_[i / terms_.size()];
+    const auto band = static_cast<std::size_t>(field_.tree().band_of_leaf(leaf));
+    pass.sums.bands[band][i % terms_.size()] += found[i];
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <span>
 #include <vector>
@@ -44,9 +45,8 @@ class SlabObjective : public Objective {
 
   ~SlabObjective() override;
 
-  double add_gradient(const Step& step, float* gradient,
-                      std::span<measurement::ViewSums> view_sums) const override;
-  const std::vector<int>& own_leaves() const override { return own_leaves_; }
+  double add_gradient(const Step& step, float* gradient, std::span<measurement::ViewSums> view_sums,
+                      const LeafDone& leaf_done) const override;
   measurement::ViewErrors held_out_error(std::span<const double> noise_weight,
                                          bool fit_view_scale) const override;
   measurement::PredictedView predict(int view, const measurement::ViewModel& model) const override;
@@ -62,20 +62,23 @@ class SlabObjective : public Objective {
   /// Holds the sums of all slabs and of all leaves.
   struct Sums {
     std::vector<PairSums> pairs;                ///< in the order of the slabs
-    std::vector<std::vector<TermValue>> bands;  ///< Term::add_leaves() of each term [band][term]
+    std::vector<std::vector<TermValue>> bands;  ///< of the leaves, for each term [band][term]
+    TermValue field;                            ///< Term::add_field() of all terms
   };
-  /// Adds the gradient of the own leaves, but for Term::add_field(), to `gradient` (all
-  /// parameters). Every process has the sums of all, but values only of its own part.
-  Sums add_slabs_and_leaves(const Step& step, float* gradient) const;
+  /// Does what add_gradient() does, and returns the sums. Every process has the sums of all, but
+  /// values only of its own part.
+  Sums add(const Step& step, float* gradient, std::span<measurement::ViewSums> view_sums,
+           const LeafDone& leaf_done) const;
 
  private:
   struct Workspace;
   struct Pass;
-  std::vector<int> pairs_of_slabs() const;
   void add_slabs(const Pass& pass, int band, base::Range slabs, Workspace& workspace) const;
   void add_batch(const Pass& pass, const SlabBatch& batch, Workspace& workspace,
                  PairSums& sums) const;
-  void add_leaves(const Step& step, float* gradient, Sums& sums) const;
+  void add_bands(const Pass& pass) const;
+  void add_leaves(const Pass& pass, const LeafDone& leaf_done) const;
+  std::shared_ptr<const projection::ViewCrossings> crossings_of(std::span<const int> views) const;
   distributed::Communicator::Sending add_slabs_of_next(const Pass& pass) const;
   void go_on_from_previous(const Pass& pass) const;
   void for_each_handed_over(base::Range slabs, Workspace& workspace, float* gradient,
@@ -89,10 +92,12 @@ class SlabObjective : public Objective {
   const distributed::Communicator& processes_;
   base::Range own_bands_;
   base::Range slabs_for_next_, slabs_by_previous_;
-  std::vector<int> own_leaves_;
   std::vector<int> pair_of_slab_;
+  std::vector<int> own_leaves_;
   std::vector<std::unique_ptr<Term>> terms_;
   mutable base::Pool<Workspace> workspaces_;
+  // Those of the views of each step so far: the same subsets of views come again in every epoch.
+  mutable std::map<std::vector<int>, std::shared_ptr<const projection::ViewCrossings>> crossings_;
 };
 
 }  // namespace tomofield::objective

@@ -60,9 +60,9 @@ struct TermValue {
 };
 
 /// A term of the loss (eq. 9). It adds its value and its gradient where that is cheapest: to
-/// decoded samples of slabs, to the parameters of leaves, or to the whole field at once. Every
-/// function works on all threads, in pieces that do not depend on their number. Objects hold no
-/// state of a step.
+/// decoded samples of slabs, to the parameters of leaves, or to the whole field at once.
+/// add_slabs() and add_field() work on all threads, in pieces that do not depend on their number.
+/// Objects hold no state of a step.
 class Term {
  public:
   virtual ~Term() = default;
@@ -88,10 +88,26 @@ class Term {
                            std::span<measurement::ViewSums> /*view_sums*/) const {
     return 0.0;
   }
-  /// Adds the gradient by the parameters of some leaves, which are ascending, to `gradient` (all
-  /// parameters). Adds the term of each leaf to `of_leaf`, which has one element for each.
-  virtual void add_leaves(const Step& /*step*/, std::span<const int> /*leaves*/,
-                          float* /*gradient*/, std::span<TermValue> /*of_leaf*/) const {}
+  /// The work of a term on some leaves in one step.
+  class LeafPass {
+   public:
+    virtual ~LeafPass() = default;
+    /// Returns the number of readings: work that reads the parameters of any leaves.
+    virtual std::int64_t num_readings() const { return 0; }
+    /// Does a reading. All are done before the parameters change; different ones may be done at the
+    /// same time.
+    virtual void read(std::int64_t /*index*/) {}
+    /// Adds the gradient by the parameters of leaf number `index` to `gradient` (all parameters).
+    /// It comes after the readings, reads no parameters but those of the leaf, and may be called
+    /// for different leaves at the same time. Returns the term of the leaf.
+    virtual TermValue add_leaf(std::size_t index, float* gradient) = 0;
+  };
+  /// Begins the work on `leaves`, which are ascending and outlive it. Returns nothing if the term
+  /// has no part that belongs to leaves.
+  virtual std::unique_ptr<LeafPass> leaf_pass(const Step& /*step*/,
+                                              std::span<const int> /*leaves*/) const {
+    return nullptr;
+  }
   /// Adds the gradient by the parameters of all leaves of this process. Sums of residuals go to
   /// `view_sums` (one for every view). Every process calls it.
   virtual TermValue add_field(const Step& /*step*/, float* /*gradient*/,

@@ -148,14 +148,26 @@ double DensityVariation::add_samples(const Step& step, const SlabBatch& batch,
   return value;
 }
 
-void FactorVariation::add_leaves(const Step&, std::span<const int> leaves, float* gradient,
-                                 std::span<TermValue> of_leaf) const {
-  if (weight_ <= 0) return;
-  base::parallel_for("variation of factors", std::ssize(leaves), [&](std::int64_t i) {
-    const int leaf = leaves[static_cast<std::size_t>(i)];
-    of_leaf[static_cast<std::size_t>(i)].value +=
-        field_.parameter_variation(leaf, penalty_, weight_, gradient + field_.offset(leaf));
-  });
+class FactorVariation::OfLeaves : public LeafPass {
+ public:
+  OfLeaves(const FactorVariation& term, std::span<const int> leaves)
+      : term_(term), leaves_(leaves) {}
+
+  TermValue add_leaf(std::size_t index, float* gradient) override {
+    const field::Field& field = term_.field_;
+    const int leaf = leaves_[index];
+    return {.value = field.parameter_variation(leaf, term_.penalty_, term_.weight_,
+                                               gradient + field.offset(leaf))};
+  }
+
+ private:
+  const FactorVariation& term_;
+  std::span<const int> leaves_;
+};
+
+std::unique_ptr<Term::LeafPass> FactorVariation::leaf_pass(const Step&,
+                                                           std::span<const int> leaves) const {
+  return weight_ > 0 ? std::make_unique<OfLeaves>(*this, leaves) : nullptr;
 }
 
 }  // namespace tomofield::objective

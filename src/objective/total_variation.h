@@ -51,10 +51,11 @@ class FactorVariation : public Term {
                   const kernels::VariationPenalty& penalty)
       : field_(field), weight_(weight), penalty_(penalty) {}
 
-  void add_leaves(const Step& step, std::span<const int> leaves, float* gradient,
-                  std::span<TermValue> of_leaf) const override;
+  std::unique_ptr<LeafPass> leaf_pass(const Step& step, std::span<const int> leaves) const override;
 
  private:
+  class OfLeaves;
+
   const field::Field& field_;
   double weight_;
   kernels::VariationPenalty penalty_;

@@ -63,6 +63,20 @@ def test_baselines_say_it_too(series):
     assert metrics["threads_why"] + "\n" in run.stderr, metrics
 
 
+# All terms of the loss, margins, trials, held-out views and every kind of stage are in it.
+def test_bytes_are_the_same_for_any_number_of_threads(series):
+    with_margin = [word for word in harness.QUICK if word != "--no-margin"]
+    options = ["--leaf-size", 32, "--tv-penalty", "auto", "--tv-factors", 0.5, "--bcc", 5, "--ifp", 0.2,
+               "--hold-out", 5, "--epochs", 3, "--vertex-epochs", 2, "--coarse-epochs", 2]
+    runs = []
+    for threads in (1, 2, 3, 4, 8):
+        output = os.path.join(harness.fresh_directory(f"threads{threads}"), "out.mrc")
+        harness.succeed("reconstruct", *series.input, *harness.merge(with_margin, options), "-o",
+                        output, "--threads", threads)
+        runs.append(harness.Results(output))
+        assert runs[0].same_as(runs[-1]), threads
+
+
 @contextlib.contextmanager
 def competitors(processor):
     """Keeps a processor busy with other programs."""

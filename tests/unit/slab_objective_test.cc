@@ -118,7 +118,9 @@ class Problem {
     const Step step{.views = kViews, .models = models_, .multiplicity = kMultiplicity};
     Result result;
     result.gradient.resize(field_->num_parameters());
-    const SlabObjective::Sums sums = objective.add_slabs_and_leaves(step, result.gradient.data());
+    std::vector<measurement::ViewSums> view_sums(models_.size());
+    const SlabObjective::Sums sums =
+        objective.add(step, result.gradient.data(), view_sums, [](int) {});
     for (const SlabObjective::PairSums& pair : sums.pairs) {
       for (std::size_t v = 0; v < kViews.size(); ++v) {
         const measurement::ViewModel& m = models_[static_cast<std::size_t>(kViews[v])];
