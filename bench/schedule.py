@@ -1,8 +1,9 @@
-"""Models how threads share out the tasks of a step (trace_tree.Task), as src/base/parallel.cc does.
+"""Models how threads share out the tasks of a step (trace_tree.Task), as src/base/worker_threads.cc
+does.
 
 The rules: A loop's tasks are taken in the order of their index. The thread that runs into a loop
 works on the tasks of that loop alone until all are done, and has nothing to do while other threads
-do the last of them. A thread without a task takes one of the innermost loop that has some left, of
+do the last of them. A thread without a task takes one of the outermost loop that has some left, of
 the one that was opened first if there are several. Taking a task costs a fixed time. Nothing else
 costs anything: the threads do not compete for memory."""
 
@@ -72,7 +73,7 @@ class Schedule:
         stack = self.stacks[thread]
         while True:
             if not stack:
-                loop = self._innermost()
+                loop = self._next_loop()
                 if loop is None:
                     heapq.heappush(self.idle, thread)
                     return
@@ -95,8 +96,8 @@ class Schedule:
                     self.outer.append((None, item))
                 return self._resume(thread, now + item)
 
-    def _innermost(self):
-        for depth in sorted(self.open, reverse=True):
+    def _next_loop(self):
+        for depth in sorted(self.open):
             loops = self.open[depth]
             while loops and not loops[0].has_tasks():
                 loops.popleft()

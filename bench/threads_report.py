@@ -103,11 +103,9 @@ def print_instructions(results):
     rows = sorted(results.of_kind("instructions").values(), key=lambda pair: pair[0].facts["threads"])
     first, lines = rows[0][1][0], []
     for row, (counts,) in rows:
-        library = sum(n for name, n in counts["objects"].items() if "libtbb" in name)
         lines.append([row.facts["title"], str(row.facts["threads"]), f"{counts['total']:,}",
-                      f"{counts['total'] / first['total']:.3f}",
-                      f"{100 * library / counts['total']:.2f} %"])
-    table(["fit", "threads", "instructions", "over those of one thread", "in libtbb"], lines)
+                      f"{counts['total'] / first['total']:.3f}"])
+    table(["fit", "threads", "instructions", "over those of one thread"], lines)
 
 
 def stage_text(stage):

@@ -7,7 +7,6 @@ import functools
 import hashlib
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -176,7 +175,7 @@ def measure_trace(options, size, arguments, threads, scratch):
 
 
 def measure_instructions(options, plan, threads, scratch):
-    """Counts instructions with callgrind: all of them, and those of each library."""
+    """Counts instructions with callgrind."""
     counts = os.path.join(scratch, "callgrind.out")
     command = command_of(options, plan.instructed_size, plan.instructed, threads,
                          os.path.join(scratch, "volume.mrc"))
@@ -190,22 +189,9 @@ def measure_instructions(options, plan, threads, scratch):
 
 
 def instructions_in(path):
-    """Returns the instructions in a file of callgrind: {total, objects: {library: own}}."""
-    names, objects, current, is_call = {}, {}, "", False
+    """Returns the instructions in a file of callgrind: {total}."""
     with open(path, encoding="utf-8") as file:
         for line in file:
-            if found := re.match(r"(c?)ob=\((\d+)\)(?: (.*))?", line):
-                called, number, name = found.groups()
-                if name:  # where the number is used first
-                    names[number] = os.path.basename(name.strip())
-                if not called:
-                    current = names[number]
-            elif line.startswith("calls="):
-                is_call = True  # the next line has the instructions of what is called
-            elif re.match(r"[+*-]?\d*[ ]", line) and line[0] in "+-*0123456789":
-                if not is_call:
-                    objects[current] = objects.get(current, 0) + int(line.split()[1])
-                is_call = False
-            elif line.startswith(("summary:", "totals:")):
-                total = int(line.split()[1])
-    return {"total": total, "objects": objects}
+            if line.startswith("totals:"):
+                return {"total": int(line.split()[1])}
+    raise ValueError(f"{path} has no totals")

@@ -1,5 +1,4 @@
 # Third-party libraries, all from Debian 12 (packages.txt says why each is there).
-find_package(TBB REQUIRED)
 find_package(Threads REQUIRED)
 find_package(hwy REQUIRED)
 set(HDF5_PREFER_PARALLEL OFF)
@@ -17,7 +16,6 @@ set(TOMOFIELD_COMMON_LIBRARIES
   Threads::Threads fmt::fmt nlohmann_json::nlohmann_json)
 
 # The layer of that name alone compiles against these.
-set(TOMOFIELD_base_LIBRARIES TBB::tbb)
 set(TOMOFIELD_io_LIBRARIES HDF5::HDF5 PNG::PNG)
 set(TOMOFIELD_kernels_LIBRARIES hwy::hwy)
 set(TOMOFIELD_field_LIBRARIES $<BUILD_INTERFACE:Eigen3::Eigen>)

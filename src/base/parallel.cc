@@ -1,17 +1,10 @@
 #include "base/parallel.h"
 
 #include <fmt/format.h>
-#include <pthread.h>
 #include <sched.h>
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-#include <tbb/task_scheduler_observer.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cstdlib>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -19,24 +12,7 @@
 
 #include "base/processors.h"
 #include "base/trace.h"
-
-// Debian's TBB is built without the thread sanitizer, which therefore does not see that a task
-// begins after the loop and ends before it. These calls tell it. It leaves out the function that
-// calls them, which reads what TBB hands over before it can say so.
-#if defined(__has_feature)
-#if __has_feature(thread_sanitizer)
-extern "C" void __tsan_acquire(void* address);
-extern "C" void __tsan_release(void* address);
-#define TOMOFIELD_HAPPENS_BEFORE(address) __tsan_release(address)
-#define TOMOFIELD_HAPPENS_AFTER(address) __tsan_acquire(address)
-#define TOMOFIELD_NOT_CHECKED __attribute__((no_sanitize("thread")))
-#endif
-#endif
-#ifndef TOMOFIELD_HAPPENS_BEFORE
-#define TOMOFIELD_HAPPENS_BEFORE(address)
-#define TOMOFIELD_HAPPENS_AFTER(address)
-#define TOMOFIELD_NOT_CHECKED
-#endif
+#include "base/worker_threads.h"
 
 namespace tomofield::base {
 namespace {
@@ -106,93 +82,25 @@ std::string reason_not_to_bind(int count) {
   return "";
 }
 
-// Binds the threads of an arena to processors, while they are in it.
-class Binding : public tbb::task_scheduler_observer {
- public:
-  explicit Binding(tbb::task_arena& arena)
-      : tbb::task_scheduler_observer(arena), processors_(processors_in_mask()) {
-    observe(true);
-  }
-  ~Binding() override { observe(false); }
-
-  void on_scheduler_entry(bool) override {
-    const auto slot = static_cast<std::size_t>(tbb::this_task_arena::current_thread_index());
-    if (slot < processors_.size()) bind_to({processors_[slot]});
-  }
-  void on_scheduler_exit(bool) override { bind_to(processors_); }
-
- private:
-  static void bind_to(const std::vector<int>& processors) {
-    cpu_set_t mask;
-    CPU_ZERO(&mask);
-    for (const int cpu : processors) CPU_SET(cpu, &mask);
-    pthread_setaffinity_np(pthread_self(), sizeof mask, &mask);
-  }
-  std::vector<int> processors_;
-};
-
-// The threads of the process. TBB keeps them between loops, and those that find no work sleep.
+// The threads of the process, and why there are so many.
 class Threads {
  public:
   explicit Threads(Choice choice)
-      : count_(choice.count),
-        limit_(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(count_)),
-        arena_(count_, 1),
-        why_unbound_(reason_not_to_bind(count_)),
-        why_count_(std::move(choice.reason)) {
-    if (why_unbound_.empty()) binding_ = std::make_unique<Binding>(arena_);
-  }
+      : why_unbound_(reason_not_to_bind(choice.count)),
+        why_count_(std::move(choice.reason)),
+        workers_(choice.count, why_unbound_.empty() ? processors_in_mask() : std::vector<int>{}) {}
 
-  int count() const { return count_; }
+  WorkerThreads& workers() { return workers_; }
   std::string description() const {
-    return fmt::format("{} thread{}, {}; {}", count_, count_ == 1 ? "" : "s", why_count_,
+    const int count = workers_.count();
+    return fmt::format("{} thread{}, {}; {}", count, count == 1 ? "" : "s", why_count_,
                        why_unbound_.empty() ? "each is bound to a processor"
                                             : "not bound to processors, since " + why_unbound_);
   }
 
-  void run(const char* what, std::int64_t count, const auto& body) {
-    arena_.execute([&] {
-      // Without isolation, a thread that waits for an inner loop could take another index of the
-      // outer one, and with it the buffers of this thread.
-      tbb::this_task_arena::isolate([&] {
-        const tbb::blocked_range<std::int64_t> all(0, count, 1);
-        const OuterLoop outer(*this);
-        if (outer)
-          tbb::parallel_for(all, body, partitioner_of_[what]);
-        else
-          tbb::parallel_for(all, body, tbb::simple_partitioner());
-      });
-    });
-  }
-
  private:
-  // Tells whether a loop is the outermost one of the process. Inner loops and those of a second
-  // calling thread are not.
-  class OuterLoop {
-   public:
-    explicit OuterLoop(Threads& all)
-        : runs_(all.outer_loop_runs_), is_outer_(!runs_.test_and_set()) {}
-    ~OuterLoop() {
-      if (is_outer_) runs_.clear();
-    }
-    OuterLoop(const OuterLoop&) = delete;
-    OuterLoop& operator=(const OuterLoop&) = delete;
-    explicit operator bool() const { return is_outer_; }
-
-   private:
-    std::atomic_flag& runs_;
-    bool is_outer_;
-  };
-
-  int count_;
-  tbb::global_control limit_;
-  tbb::task_arena arena_;
   std::string why_unbound_, why_count_;
-  std::unique_ptr<Binding> binding_;
-  std::atomic_flag outer_loop_runs_ = ATOMIC_FLAG_INIT;
-  // Remembers which thread did which part of an outer loop the last time, so that the same thread
-  // works on the same memory, which lies near it.
-  std::map<const char*, tbb::affinity_partitioner> partitioner_of_;
+  WorkerThreads workers_;
 };
 
 std::unique_ptr<Threads>& current_threads() {
@@ -210,7 +118,7 @@ Threads& threads() {
 
 }  // namespace
 
-int thread_count() { return threads().count(); }
+int thread_count() { return threads().workers().count(); }
 
 void set_thread_count(int count) {
   g_asked_count = std::max(count, 0);
@@ -224,25 +132,24 @@ void share_machine_with(int processes) {
 
 std::string describe_threads() { return threads().description(); }
 
-int thread_index() { return std::max(0, tbb::this_task_arena::current_thread_index()); }
+int thread_index() { return WorkerThreads::number(); }
 
 void detail::run_loop(const char* what, std::int64_t count, void (*call)(void*, std::int64_t),
                       void* body) {
   if (count <= 0) return;
   TraceLoop loop(what, count);
-  Threads& all = threads();
-  if (all.count() == 1) {
-    for (std::int64_t i = 0; i < count; ++i) loop.run_task(i, 0, [&] { call(body, i); });
+  const auto run_index = [&](std::int64_t i) {
+    loop.run_task(i, thread_index(), [&] { call(body, i); });
+  };
+  WorkerThreads& workers = threads().workers();
+  if (workers.count() == 1 || count == 1) {
+    for (std::int64_t i = 0; i < count; ++i) run_index(i);
     return;
   }
-  TOMOFIELD_HAPPENS_BEFORE(body);
-  all.run(what, count, [&](const tbb::blocked_range<std::int64_t>& range) TOMOFIELD_NOT_CHECKED {
-    TOMOFIELD_HAPPENS_AFTER(body);
-    for (std::int64_t i = range.begin(); i < range.end(); ++i)
-      loop.run_task(i, thread_index(), [&] { call(body, i); });
-    TOMOFIELD_HAPPENS_BEFORE(&loop);
-  });
-  TOMOFIELD_HAPPENS_AFTER(&loop);
+  using Body = decltype(run_index);
+  workers.run(
+      count, [](const void* of_loop, std::int64_t i) { (*static_cast<const Body*>(of_loop))(i); },
+      &run_index);
 }
 
 }  // namespace tomofield::base

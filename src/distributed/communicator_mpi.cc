@@ -169,7 +169,7 @@ Communicator::Sending::~Sending() {
 }
 
 Communicator::Sending Communicator::start_sending(std::vector<float> values, int to) const {
-  auto state = std::make_unique<Sending::State>(*this, std::move(values));
+  std::unique_ptr<Sending::State> state(new Sending::State{*this, std::move(values), {}});
   traffic_.bytes += static_cast<std::int64_t>(state->values.size() * sizeof(float));
   for_each_piece(std::span(state->values), [&](std::span<float> piece) {
     MPI_Isend(piece.data(), static_cast<int>(piece.size()), MPI_FLOAT, to, kTag, kAll,
