@@ -128,8 +128,7 @@ std::vector<std::size_t> BoundaryConsistency::faces_of(std::span<const int> leav
   for (const int leaf : leaves)
     std::ranges::copy(faces_of_leaf_[static_cast<std::size_t>(leaf)], std::back_inserter(faces));
   std::ranges::sort(faces);
-  const auto repeated = std::ranges::unique(faces);
-  faces.erase(repeated.begin(), repeated.end());
+  faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
   return faces;
 }
 
