@@ -75,7 +75,8 @@ std::int64_t longest_axis(const base::Shape3& shape) {
 template <typename Body>
 auto sum_sections(std::int64_t nz, const Body& body) {
   std::vector<decltype(body(std::int64_t{}))> parts(static_cast<std::size_t>(nz));
-  base::parallel_for("sum sections", nz, [&](std::int64_t z) { parts[static_cast<std::size_t>(z)] = body(z); });
+  base::parallel_for("sum sections", nz,
+                     [&](std::int64_t z) { parts[static_cast<std::size_t>(z)] = body(z); });
   double sum = 0.0;
   for (const double part : parts) sum += part;
   return sum;

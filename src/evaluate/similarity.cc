@@ -24,16 +24,17 @@ std::array<double, N> sum_pairs(std::span<const float> xs, std::span<const float
                                 const Terms& terms) {
   const std::size_t num_chunks = (xs.size() + kChunk - 1) / kChunk;
   std::vector<std::array<double, N>> partial(num_chunks);
-  base::parallel_for("sum differences", static_cast<std::int64_t>(num_chunks), [&](std::int64_t chunk) {
-    const std::size_t first = static_cast<std::size_t>(chunk) * kChunk;
-    const std::size_t last = std::min(first + kChunk, xs.size());
-    std::array<double, N> sum{};
-    for (std::size_t i = first; i < last; ++i) {
-      const auto values = terms(static_cast<double>(xs[i]), static_cast<double>(ys[i]));
-      for (std::size_t n = 0; n < N; ++n) sum[n] += values[n];
-    }
-    partial[static_cast<std::size_t>(chunk)] = sum;
-  });
+  base::parallel_for(
+      "sum differences", static_cast<std::int64_t>(num_chunks), [&](std::int64_t chunk) {
+        const std::size_t first = static_cast<std::size_t>(chunk) * kChunk;
+        const std::size_t last = std::min(first + kChunk, xs.size());
+        std::array<double, N> sum{};
+        for (std::size_t i = first; i < last; ++i) {
+          const auto values = terms(static_cast<double>(xs[i]), static_cast<double>(ys[i]));
+          for (std::size_t n = 0; n < N; ++n) sum[n] += values[n];
+        }
+        partial[static_cast<std::size_t>(chunk)] = sum;
+      });
   std::array<double, N> total{};
   for (const auto& sum : partial)
     for (std::size_t n = 0; n < N; ++n) total[n] += sum[n];
