@@ -96,7 +96,8 @@ class SlabObjective : public Objective {
   std::vector<int> own_leaves_;
   std::vector<std::unique_ptr<Term>> terms_;
   mutable base::Pool<Workspace> workspaces_;
-  // Those of the views of each step so far: the same subsets of views come again in every epoch.
+  // Keeps the crossings of every list of views that a step had: each list comes again in every
+  // epoch.
   mutable std::map<std::vector<int>, std::shared_ptr<const projection::ViewCrossings>> crossings_;
 };
 

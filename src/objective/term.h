@@ -67,7 +67,7 @@ class Term {
  public:
   virtual ~Term() = default;
 
-  /// What a term keeps for add_slabs() from one batch of a band to the next.
+  /// Holds what a term keeps for add_slabs() from one batch of a band to the next.
   struct Scratch {
     virtual ~Scratch() = default;
     /// Returns what the next batch of the band depends on. Another process may go on from a copy.
