@@ -61,8 +61,8 @@ struct LineBlock {
   std::vector<PartialPixel> parts;  ///< by lines, then by views
 };
 
-/// Holds where the rays of a list of views cross the samples of a slab. It is the same for all slabs
-/// of a grid, so it is made once for all of them.
+/// Holds where the rays of a list of views cross the samples of a slab. It is the same for all
+/// slabs of a grid, so it is made once for all of them.
 class ViewCrossings {
  public:
   /// The lines of one kind of one segment.
