@@ -162,12 +162,37 @@ void WorkerThreads::run(std::int64_t count, Call call, const void* body) {
     std::erase(loops_, &loop);
     loop.left -= num_done;
   }
-  soon([&] { return loop.is_done(); });
+  if (loop.depth == 1)
+    help_until_done(loop);
+  else
+    soon([&] { return loop.is_done(); });
   {
     std::unique_lock lock(mutex_);
     loop.is_finished.wait(lock, [&] { return loop.is_done(); });
   }
   loop.throw_failure();
+}
+
+// Takes part in the loops inside of a loop that is in no other one. Its caller holds nothing that
+// they could need.
+void WorkerThreads::help_until_done(const Loop& loop) {
+  while (!loop.is_done()) {
+    const std::uint64_t num_begun = num_begun_;
+    if (Loop* const inner = join_a_loop()) {
+      leave(*inner, inner->take_part());
+      continue;
+    }
+    const auto has_changed = [&] { return num_begun_ != num_begun || loop.is_done(); };
+    if (!soon(has_changed)) sleep_until(has_changed);
+  }
+}
+
+// Sleeps until a loop begins or ends that changes a condition.
+void WorkerThreads::sleep_until(const std::function<bool()>& has_changed) {
+  std::unique_lock lock(mutex_);
+  ++num_asleep_;
+  has_work_.wait(lock, has_changed);
+  --num_asleep_;
 }
 
 void WorkerThreads::work(int number) {
@@ -180,12 +205,7 @@ void WorkerThreads::work(int number) {
     }
     // The loops that there are have no index left. Others may begin.
     const auto has_changed = [&] { return num_begun_ != num_begun || is_ending_; };
-    if (!soon(has_changed)) {
-      std::unique_lock lock(mutex_);
-      ++num_asleep_;
-      has_work_.wait(lock, has_changed);
-      --num_asleep_;
-    }
+    if (!soon(has_changed)) sleep_until(has_changed);
     if (is_ending_) return;
   }
 }
@@ -206,7 +226,9 @@ void WorkerThreads::leave(Loop& loop, std::int64_t num_done) {
   const std::lock_guard lock(mutex_);
   loop.left -= num_done;
   --loop.num_helpers;
-  if (loop.is_done()) loop.is_finished.notify_one();
+  if (!loop.is_done()) return;
+  loop.is_finished.notify_one();
+  if (loop.depth == 1) has_work_.notify_all();  // its caller may sleep among the workers
 }
 
 }  // namespace tomofield::base
