@@ -175,6 +175,28 @@ TEST(ThreadCount, ZeroMeansAllOfTheMachine) {
   EXPECT_GE(thread_count(), 1);
 }
 
+// Two callers have number 0 both, so neither may help in the other one's loop.
+TEST(ParallelLoops, ThreadsOfALoopHaveDifferentNumbersBesideOtherCallers) {
+  set_thread_count(3);
+  std::atomic<int> doubled{0};
+  const auto call = [&] {
+    for (int repeat = 0; repeat < 50; ++repeat) {
+      std::vector<std::atomic<int>> users(3);
+      parallel_for("numbers", 24, [&](std::int64_t) {
+        const auto number = static_cast<std::size_t>(thread_index());
+        doubled += ++users[number] > 1;
+        std::this_thread::sleep_for(std::chrono::microseconds(50));
+        --users[number];
+      });
+    }
+  };
+  std::thread other(call);
+  call();
+  other.join();
+  set_thread_count(0);
+  EXPECT_EQ(doubled.load(), 0);
+}
+
 // Two threads have half of the indices each, and take others only when they have none left.
 TEST(ParallelLoops, AnIndexMeetsTheThreadOfTheLastTime) {
   set_thread_count(2);

@@ -19,7 +19,6 @@ namespace {
 constexpr std::chrono::microseconds kPatience{20};
 
 thread_local int t_number = 0;
-thread_local int t_depth = 0;  // of the loop whose index this thread works on
 
 // Returns true as soon as `is_met` does, or false after some microseconds.
 template <typename Condition>
@@ -62,11 +61,15 @@ class alignas(64) Indices {
 
 }  // namespace
 
+// The loop whose index this thread works on.
+thread_local const WorkerThreads::Loop* WorkerThreads::t_loop = nullptr;
+
 class WorkerThreads::Loop {
  public:
   Loop(std::int64_t count, Call call, const void* body, int num_parts)
       : left(count),
-        depth(t_depth + 1),
+        outermost(t_loop ? t_loop->outermost : this),
+        depth(t_loop ? t_loop->depth + 1 : 1),
         call_(call),
         body_(body),
         num_parts_(num_parts),
@@ -83,14 +86,14 @@ class WorkerThreads::Loop {
   // Calls the body for indices that are left, those of this thread's part first, and returns their
   // number.
   std::int64_t take_part() {
-    const int outer_depth = std::exchange(t_depth, depth);
+    const Loop* const outer = std::exchange(t_loop, this);
     std::int64_t num_done = 0;
     for (int p = 0; p < num_parts_; ++p) {
       Indices& part = parts_[static_cast<std::size_t>((t_number + p) % num_parts_)];
       const bool is_own = p == 0 || num_parts_ == 1;
       for (std::int64_t i = part.take(is_own); i >= 0; i = part.take(is_own), ++num_done) run(i);
     }
-    t_depth = outer_depth;
+    t_loop = outer;
     return num_done;
   }
 
@@ -104,6 +107,7 @@ class WorkerThreads::Loop {
   std::condition_variable is_finished;  // nothing left, and no helpers
   bool is_done() const { return left == 0 && num_helpers == 0; }
 
+  const Loop* const outermost;  // of the loops that this one is in, itself included
   const int depth;
 
  private:
@@ -148,7 +152,7 @@ WorkerThreads::~WorkerThreads() {
 
 void WorkerThreads::run(std::int64_t count, Call call, const void* body) {
   TOMOFIELD_CHECK(count < std::int64_t{1} << 32, "a loop of fewer than 2^32 indices");
-  Loop loop(count, call, body, t_depth == 0 ? this->count() : 1);
+  Loop loop(count, call, body, t_loop ? 1 : this->count());
   {
     const std::lock_guard lock(mutex_);
     loops_.push_back(&loop);
@@ -174,11 +178,11 @@ void WorkerThreads::run(std::int64_t count, Call call, const void* body) {
 }
 
 // Takes part in the loops inside of a loop that is in no other one. Its caller holds nothing that
-// they could need.
+// they could need. It stays out of the loops of other callers, whose number is 0 as well.
 void WorkerThreads::help_until_done(const Loop& loop) {
   while (!loop.is_done()) {
     const std::uint64_t num_begun = num_begun_;
-    if (Loop* const inner = join_a_loop()) {
+    if (Loop* const inner = join_a_loop(&loop)) {
       leave(*inner, inner->take_part());
       continue;
     }
@@ -210,13 +214,15 @@ void WorkerThreads::work(int number) {
   }
 }
 
-// Joins the outermost loop that has indices left, the oldest of several; returns nothing if there
-// is none. Outer loops have larger pieces of work.
-WorkerThreads::Loop* WorkerThreads::join_a_loop() {
+// Joins the outermost loop that has indices left, the oldest of several, of those inside of a given
+// one, if any; returns nothing if there is none. Outer loops have larger pieces of work.
+WorkerThreads::Loop* WorkerThreads::join_a_loop(const Loop* outermost) {
   const std::lock_guard lock(mutex_);
   Loop* chosen = nullptr;
-  for (Loop* const loop : loops_)
+  for (Loop* const loop : loops_) {
+    if (outermost && loop->outermost != outermost) continue;
     if ((!chosen || loop->depth < chosen->depth) && loop->has_indices()) chosen = loop;
+  }
   if (chosen) ++chosen->num_helpers;
   return chosen;
 }

@@ -19,8 +19,8 @@ namespace tomofield::base {
 ///
 /// The caller of an inner loop, when it has no index left to take, waits for the threads that still
 /// have one. It does not take part in other loops meanwhile, so that what it holds is never needed
-/// twice. Other threads that have nothing to do, and the caller of an outermost loop, take part in
-/// the outermost loop that has indices left.
+/// twice. Other threads that have nothing to do, and the caller of an outermost loop within
+/// it, take part in the outermost loop that has indices left.
 class WorkerThreads {
  public:
   /// Starts `count` − 1 threads, for loops on `count` threads. With `processors`, one for each
@@ -44,8 +44,9 @@ class WorkerThreads {
 
  private:
   class Loop;
+  static thread_local const Loop* t_loop;
   void work(int number);
-  Loop* join_a_loop();
+  Loop* join_a_loop(const Loop* outermost = nullptr);
   void leave(Loop& loop, std::int64_t num_done);
   void help_until_done(const Loop& loop);
   void sleep_until(const std::function<bool()>& has_changed);
