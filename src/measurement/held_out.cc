@@ -27,17 +27,17 @@ class Predictor {
             std::span<const int> views)
       : sampler_(sampler),
         projector_(projector),
-        views_(views),
+        crossings_(projector.crossings(views)),
         buffers_(static_cast<std::size_t>(base::thread_count())) {}
 
   // Returns [view, x, lane], valid until this thread asks for another slab.
   float* rays_of(int slab) {
     Buffers& b = buffers_[static_cast<std::size_t>(base::thread_index())];
     b.samples.reserve(projector_.grid().size());
-    b.rays.reserve(projector_.detector_size(views_.size()));
+    b.rays.reserve(projector_.detector_size(crossings_.num_views()));
     b.rays.fill(0.0f);
     sampler_.decode(slab, b.samples.data());
-    projector_.forward(b.samples.data(), views_, b.rays.data());
+    projector_.forward(b.samples.data(), crossings_, b.rays.data());
     return b.rays.data();
   }
 
@@ -47,7 +47,7 @@ class Predictor {
   };
   const projection::SlabSampler& sampler_;
   const projection::SlabProjector& projector_;
-  std::span<const int> views_;
+  projection::ViewCrossings crossings_;  // of all slabs
   std::vector<Buffers> buffers_;
 };
 
