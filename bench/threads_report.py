@@ -126,10 +126,11 @@ def speed_up(alone, seconds, threads):
 
 def print_steps(results):
     print("\n### One step, modelled\n\nEach task of a step was timed with one thread. A model gives "
-          "them to more threads by the rules of `bench/schedule.py`: a thread that waits for an "
-          "inner loop works on that loop alone, others take tasks of inner loops before those of "
-          f"outer ones, in the order of their index, and taking one costs "
-          f"{results.options.task_cost:g} µs. It knows no limit of the memory's bandwidth. A piece "
+          "them to more threads by the rules of `bench/schedule.py`: a thread that waits for a "
+          "loop works on that loop alone, others take tasks of the outermost loop that has some "
+          f"left, in the order of their index, and taking one costs {results.options.task_cost:g} "
+          "µs. In the program the caller of an outermost loop also helps within it while it waits; "
+          "the model leaves that out. It knows no limit of the memory's bandwidth. A piece "
           "of work has the shortest of its times in the repeats. Serial is the step's time outside "
           "of loops. Most is the speed-up that no number of threads can exceed: the step's time over "
           "its longest chain of work. Speed-up (efficiency):")
