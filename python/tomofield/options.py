@@ -56,6 +56,7 @@ class Options(TypedDict, total=False):
     boundary: float
     fourier: float
     fourier_ring: Literal["mean", "max"]
+    keep_spikes: bool
     fit_view_scale: Optional[bool]
     hold_out: int
     tune: bool

@@ -127,6 +127,10 @@ class Field {
   virtual double parameter_variation(int leaf, const kernels::VariationPenalty& penalty,
                                      double weight, float* gradient) const = 0;
 
+  /// Moves vertices of a leaf that stand out from all but two of their neighbours in the leaf back
+  /// to these (kernels/spikes.h). A leaf of factors stays as it is.
+  virtual void limit_spikes(int leaf) = 0;
+
   /// Sets random starting values, uniform in ± scale, which make every density close to act(bias).
   void initialise(base::Random random, double scale);
 
@@ -177,6 +181,7 @@ class Field {
                           float* parameters) const = 0;
 
   const float* leaf_parameters(int leaf) const { return parameters_.data() + offset(leaf); }
+  float* leaf_parameters(int leaf) { return parameters_.data() + offset(leaf); }
   /// Fixes the parameter layout. The constructors of derived classes call it.
   void allocate();
 

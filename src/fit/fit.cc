@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "base/parallel.h"
 #include "base/random.h"
 #include "base/trace.h"
 #include "field/vm/factorise.h"
@@ -275,6 +276,19 @@ void Fit::take_step() {
   halo_->refresh(*field_);
 }
 
+// Moves the vertices of the own leaves back that stand out from their neighbours. This is the
+// plug-and-play step of a prior (Venkatakrishnan, Bouman and Wohlberg 2013): total variation makes
+// an isolated vertex cheap enough to fit the noise of some rays.
+void Fit::limit_spikes() {
+  if (options_.keep_spikes || field_->kind() != FieldKind::kGrid) return;
+  const base::TraceSpan span("limit spikes");
+  const base::Range own = own_leaves();
+  base::parallel_for("limit spikes", own.size(), [&](std::int64_t i) {
+    field_->limit_spikes(own.begin + static_cast<int>(i));
+  });
+  halo_->refresh(*field_);
+}
+
 void Fit::score_held_out() {
   const base::TraceSpan span("score held-out views");
   const measurement::ViewErrors error = held_out_error();
@@ -294,6 +308,7 @@ void Fit::end_epoch() {
   if (options_.fit_view_scale)
     measurement::fit_nuisances(measurement::NuisancePrior{}, progress_.epoch_sums, progress_.views);
   progress_.epoch_sums.assign(progress_.views.size(), {});
+  limit_spikes();
   if (!measurement_.held_out.empty()) score_held_out();
   const std::int64_t epochs_done = progress_.step / steps_per_epoch();
   if (tree_updates_.update(epochs_done, *field_, optimizer_.state(), progress_.tree)) follow_tree();

@@ -108,6 +108,7 @@ class Fit {
   void take_step();
   bool is_traced_in_detail() const;
   void end_epoch();
+  void limit_spikes();
   void score_held_out();
   std::vector<int> views_of_step(std::int64_t step) const;
   double learning_rate(std::int64_t step) const;

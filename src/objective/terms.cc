@@ -10,12 +10,14 @@
 namespace tomofield::objective {
 namespace {
 
-// Returns the penalty of both variations, in density units.
+// Returns the penalty of both variations, in density units. A pixel of the stage is the mean of
+// bin² pixels on a path bin times as long, so a voxel of it has a noise smaller by bin².
 kernels::VariationPenalty variation_penalty(const TermContext& c) {
   kernels::VariationPenalty penalty;
   penalty.epsilon = static_cast<float>(c.options.gradient_floor);
   if (c.options.penalty == Penalty::kConcave)
-    penalty.concavity = static_cast<float>(concavity(c.options.concavity, c.full.noise_sigma));
+    penalty.concavity = static_cast<float>(concavity(c.options.concavity, c.full.noise_sigma) /
+                                           (c.bin * c.bin));
   return penalty;
 }
 

@@ -184,6 +184,10 @@ constexpr Row kRows[] = {
     {.key = "fit.fourier_ring", .flag = "--ifp-ring", MEMBER(Options, fourier_ring),
      .group = Group::kFit,
      .help = "Compare the Fourier axes with the mean or the maximum of each ring"},
+    {.key = "fit.keep_spikes", .flag = "--keep-spikes", MEMBER(Options, keep_spikes),
+     .group = Group::kFit,
+     .help = "Keep plain vertices that stand out from all but two of their neighbours. By default "
+             "each epoch ends with moving them back"},
     {.key = "fit.fit_view_scale", .flag = "--view-scale", MEMBER(Options, fit_view_scale),
      .group = Group::kFit, .automatic = "on for dark contrast, else off",
      .help = "Fit a scale and an offset for every view"},

@@ -47,6 +47,7 @@ fit::FitOptions fit_options(const Options& options) {
   fit.fourier = options.fourier;
   fit.fourier_ring = options.fourier_ring;
   fit.penalty = options.penalty.value_or(fit.penalty);
+  fit.keep_spikes = options.keep_spikes;
   fit.fit_view_scale = options.fit_view_scale.value_or(fit.fit_view_scale);
   fit.seed = options.seed;
   fit.hold_out = options.hold_out;

@@ -8,6 +8,7 @@
 #include "field/sampling/resample.h"
 #include "kernels/column_interpolation.h"
 #include "kernels/small_gemm.h"
+#include "kernels/spikes.h"
 
 namespace tomofield::field {
 namespace {
@@ -144,6 +145,11 @@ double GridField::parameter_variation(int leaf, const kernels::VariationPenalty&
                                       double weight, float* gradient) const {
   const LeafShape& s = shape(leaf);
   return array_variation(leaf_parameters(leaf), s.nx, s.nz, s.ny, 1, penalty, weight, gradient);
+}
+
+void GridField::limit_spikes(int leaf) {
+  const LeafShape& s = shape(leaf);
+  kernels::limit_spikes({.nx = s.nx, .ny = s.ny, .nz = s.nz}, leaf_parameters(leaf));
 }
 
 void GridField::sample_quarter(const LeafShape& s, const float* leaf, double x0, double y0,

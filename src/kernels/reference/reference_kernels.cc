@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "kernels/lanes.h"
 
@@ -223,6 +224,39 @@ void adam_step(const AdamStep& s, std::ptrdiff_t count, double* p, double* g, do
     p[i] -= static_cast<double>(s.rate_m) * m[i] /
             (std::sqrt(v[i]) * static_cast<double>(s.rate_v) + static_cast<double>(s.epsilon));
     g[i] = 0.0;
+  }
+}
+
+namespace {
+
+// Returns the vertex that lies where `i` would lie if the outer layers were mirrored.
+int mirrored_vertex(int i, int n) {
+  if (n == 1) return 0;
+  if (i < 0) return -i;
+  return i < n ? i : 2 * (n - 1) - i;
+}
+
+}  // namespace
+
+void limit_spikes(const LatticeShape& s, double* values) {
+  const std::vector<double> before(values, values + s.size());
+  const auto at = [&](int x, int y, int z) {
+    return (static_cast<std::size_t>(mirrored_vertex(x, s.nx)) * static_cast<std::size_t>(s.nz) +
+            static_cast<std::size_t>(mirrored_vertex(z, s.nz))) *
+               static_cast<std::size_t>(s.ny) +
+           static_cast<std::size_t>(mirrored_vertex(y, s.ny));
+  };
+  for (int x = 0; x < s.nx; ++x) {
+    for (int z = 0; z < s.nz; ++z) {
+      for (int y = 0; y < s.ny; ++y) {
+        std::vector<double> around;
+        for (int i = 0; i < 27; ++i)
+          if (i != 13) around.push_back(before[at(x + i / 9 - 1, y + i / 3 % 3 - 1, z + i % 3 - 1)]);
+        std::sort(around.begin(), around.end());
+        values[at(x, y, z)] =
+            std::clamp(values[at(x, y, z)], around[kSpikeRank - 1], around[26 - kSpikeRank]);
+      }
+    }
   }
 }
 

@@ -8,6 +8,7 @@
 #include "kernels/ray_samples.h"
 #include "kernels/row_interpolation.h"
 #include "kernels/small_gemm.h"
+#include "kernels/spikes.h"
 #include "kernels/total_variation.h"
 
 /// Reference implementations of every slab kernel for tests. They are scalar, in double precision,
@@ -74,5 +75,8 @@ double spread_piece(const LeafVertices& leaf, Activation activation, const doubl
 /// Applies a step of Adam and sets the gradient to zero.
 void adam_step(const AdamStep& step, std::ptrdiff_t count, double* parameters, double* gradient,
                double* m, double* v);
+
+/// Moves values beyond the kSpikeRank-th of the 26 values around them to that one.
+void limit_spikes(const LatticeShape& shape, double* values);
 
 }  // namespace tomofield::kernels::reference
