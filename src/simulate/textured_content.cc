@@ -20,7 +20,7 @@ constexpr std::uint64_t kFilamentStream = 7;
 constexpr std::uint64_t kParticleStream = 8;
 // The content goes on this far beyond the field of view in Y, so that shifted views see it.
 constexpr double kBeyondField = 24.0;
-constexpr double kVoxelsPerFilament = 60'000.0;
+constexpr double kVoxelsPerFilament = 100'000.0;
 constexpr double kLatticeSpacing = 20.0;
 
 // Returns half of the lengths of the box that filaments and particles fill.
@@ -75,10 +75,13 @@ Vector3 direction_along_slab(base::Random& random) {
   return normalized(direction);
 }
 
-// Returns the blobs of a filament from a random point on, for as long as there is space.
+// Returns the blobs of a filament from a random point with space on, for as long as there is space.
 std::vector<Blob> random_filament(const FreeSpace& space, base::Random& random) {
   constexpr double kSigma = 1.3, kClearance = 7.0;
+  constexpr int kTries = 20;
   Vector3 at = random_point(space.half(), random);
+  for (int i = 1; i < kTries && !space.holds(at, kClearance); ++i)
+    at = random_point(space.half(), random);
   Vector3 direction = direction_along_slab(random), turn = direction_along_slab(random);
   const double curvature = random.below(2) == 0 ? 0.0 : random.uniform(0.004, 0.02);
   const auto most = static_cast<std::size_t>(random.uniform(60.0, 250.0) / kSigma);
@@ -145,7 +148,7 @@ void add_particles(const FreeSpace& space, base::Random random, Phantom& phantom
     if (random.uniform() < 0.3) continue;
     Vector3 center;
     for (std::size_t i = 0; i < 3; ++i)
-      center[i] = (static_cast<double>(at[i]) + random.uniform(0.25, 0.75)) * spacing[i] - half[i];
+      center[i] = (static_cast<double>(at[i]) + random.uniform()) * spacing[i] - half[i];
     for (const Blob& blob : random_particles(center, random))
       if (space.holds(blob.center, 2.0 * blob.sigma)) phantom.blobs.push_back(blob);
   }

@@ -23,14 +23,14 @@ namespace tomofield::simulate {
 ///   grain in the lumen      a blob for each 100 voxels, σ = U(1, 2), peak ± U(0.05, 0.11), where
 ///                           the magnitude is that of the vesicle
 ///
-/// Filaments: one is tried for each 60 000 voxels. It is a chain of blobs of σ = 1.3 (3 voxels
+/// Filaments: one is tried for each 100 000 voxels. It is a chain of blobs of σ = 1.3 (3 voxels
 /// wide at half height), σ apart, up to U(60, 250) voxels long. It ends near a membrane or a face
 /// and is dropped if it is shorter than 24 voxels. Half of them are straight, the others have a
 /// curvature of U(0.004, 0.02) per voxel whose direction drifts. Density: ice + U(0.2, 0.35).
 ///
 /// Particles: each cell of a lattice of 20 voxels holds nothing (30 %), a blob of σ = U(3, 6), a
 /// cluster of 3 to 5 blobs of σ = U(1.5, 3), or 3 single blobs of σ = U(1.5, 2), which are equally
-/// likely. The position in the cell is random. Blobs nearer to a membrane or a face than 2 σ are
+/// likely. Their centre is uniform in the cell. Blobs nearer to a membrane or a face than 2 σ are
 /// left out, so particles lie in the ice and in lumens.
 ///
 /// Walls, blobs and filaments have the same size in voxels at any size of the phantom: they are the

