@@ -140,7 +140,7 @@ bool is_clear_of_membranes(const std::vector<Vesicle>& vesicles, const Vector3& 
   for (const Vesicle& v : vesicles) {
     const double reach = v.radius + radius;
     if (distance_squared(position, v.center) > reach * reach) continue;
-    const Ellipsoid outer = membrane(v, 1.0, 0.0);
+    const Ellipsoid outer{.center = v.center, .q = v.q};
     const Vector3 p = moved(position, -1.0, v.center);
     const double scale = std::sqrt(outer.form(p[0], p[1], p[2]));  // 1 on the outermost surface
     const double margin = radius / std::min({v.semi_axes[0], v.semi_axes[1], v.semi_axes[2]});
