@@ -8,6 +8,7 @@
 
 #include "cli/commands.h"
 #include "cli/common_options.h"
+#include "cli/enum_option.h"
 #include "cli/number_checks.h"
 #include "simulate/simulate_series.h"
 #include "tomofield/error.h"
@@ -18,11 +19,13 @@ namespace {
 struct SimulateArguments {
   std::string directory;
   simulate::SimulationOptions options;
-  std::optional<std::string> yardstick;
+  std::optional<simulate::Yardstick> yardstick;
   std::optional<std::int64_t> thickness_px;
   std::optional<std::string> tilts;
   std::optional<std::string> contrast;
   std::optional<double> noise;
+  std::optional<double> gain_spread;
+  std::optional<std::int64_t> num_beads;
   double gold_diameter_A = 100.0;
   bool without_truth = false;
   bool overwrite = false;
@@ -56,31 +59,37 @@ Contrast resolve_contrast(const SimulateArguments& arguments) {
   return has_dose || arguments.contrast == "dark" ? Contrast::kDark : Contrast::kBright;
 }
 
-/// Sets the specimen's kind, thickness and tilts from the yardstick and from the options that were
-/// given; a thickness that was given wins over the yardstick's.
+/// Sets what a yardstick sets, from the yardstick and from the options that were given. An option
+/// that was given wins over the yardstick's.
 void resolve_specimen(SimulateArguments& arguments) {
   simulate::SimulationOptions& options = arguments.options;
   if (arguments.yardstick) {
-    simulate::apply_yardstick(
-        arguments.yardstick == "a" ? simulate::Yardstick::kA : simulate::Yardstick::kB, options);
+    simulate::apply_yardstick(*arguments.yardstick, options);
   } else {
     options.tilts = arguments.tilts ? parse_tilts(*arguments.tilts)
                                     : simulate::default_tilts(options.cell.is_extended);
   }
   options.cell.thickness_px = arguments.thickness_px.value_or(options.cell.thickness_px);
+  options.cell.num_beads = arguments.num_beads.value_or(options.cell.num_beads);
+  options.gain_spread = arguments.gain_spread.value_or(options.gain_spread);
 }
 
 /// Returns the command that reconstructs the series.
 std::string how_to_reconstruct(const std::filesystem::path& directory,
                                const simulate::SimulationOptions& options) {
   const auto file = [&](const char* name) { return (directory / name).string(); };
+  std::string more = options.cell.is_extended ? "" : " --no-margin";
+  if (options.gain_spread > 0.0) more += " --view-scale on";
+  if (options.cell.num_beads > 0)
+    more += fmt::format(" --bead-diameter {:g}",
+                        options.cell.bead_diameter_px * options.voxel_size_A / 10.0);
   return fmt::format(
       "reconstruct it with: tomofield reconstruct {} --tlt {}{} --thickness {} --contrast {}{} -o "
       "{}",
       file("tilt_series.mrc"), file("tilt_series.tlt"),
       options.shift_spread_px > 0 ? " --xf " + file("tilt_series.xf") : "",
-      options.cell.thickness_px, options.contrast == Contrast::kDark ? "dark" : "bright",
-      options.cell.is_extended ? "" : " --no-margin", file("tomogram.mrc"));
+      options.cell.thickness_px, options.contrast == Contrast::kDark ? "dark" : "bright", more,
+      file("tomogram.mrc"));
 }
 
 void run_simulate(SimulateArguments& arguments) {
@@ -93,13 +102,16 @@ void run_simulate(SimulateArguments& arguments) {
   options.write_truth = !arguments.without_truth;
   options.cell.bead_diameter_px = arguments.gold_diameter_A / options.voxel_size_A;
   const auto summary = simulate::simulate_series(arguments.directory, options, arguments.overwrite);
-  std::string line =
-      fmt::format("{} ellipsoids, {} views", summary.num_ellipsoids, summary.num_views);
+  std::string line = fmt::format("{} ellipsoids", summary.num_ellipsoids);
+  if (summary.num_blobs > 0) line += fmt::format(", {} Gaussian blobs", summary.num_blobs);
+  line += fmt::format(", {} views", summary.num_views);
   if (summary.num_beads > 0) line += fmt::format(", {} gold beads", summary.num_beads);
   if (summary.sigma) line += fmt::format(", sigma {:.4f}", *summary.sigma);
   if (options.dose) line += fmt::format(", {} electrons per pixel and view", *options.dose);
   if (summary.truth)
-    line += fmt::format(", truth max {:.3f} mean {:.3f}", summary.truth->max, summary.truth->mean);
+    line += fmt::format(", truth{} max {:.3f} mean {:.3f}",
+                        options.reference_has_beads ? "" : " without gold", summary.truth->max,
+                        summary.truth->mean);
   fmt::print("{}\n{}\n", line, how_to_reconstruct(arguments.directory, options));
 }
 
@@ -125,12 +137,12 @@ void add_simulate_command(CLI::App& program) {
   CLI::Option* tilts = command->add_option(
       "--tilts", arguments->tilts,
       "Tilt angles first:last:step in degrees (default: -70:69.5:1.5; with --extended -60:60:2)");
-  command
-      ->add_option("--yardstick", arguments->yardstick,
-                   "Phantom that the benchmarks use. a: a cell that ends in the field of view, 94 "
-                   "views from -70 to 69.5 degrees; b: an extended specimen, 61 views from -60 to "
-                   "60 degrees")
-      ->check(CLI::IsMember({"a", "b"}))
+  add_enum_option<simulate::Yardstick>(
+      *command, "--yardstick", arguments->yardstick,
+      "Phantom that the benchmarks use. a: a cell that ends in the field of view, 94 views from "
+      "-70 to 69.5 degrees; b: an extended specimen, 61 views from -60 to 60 degrees; c: as b, "
+      "with "
+      "thin membranes, filaments, particles and texture, gold, and gains. Its truth has no gold")
       ->excludes(extended, tilts);
   command->add_option("--voxel-size", options.voxel_size_A, "Voxel size in Å")
       ->capture_default_str();
@@ -147,17 +159,19 @@ void add_simulate_command(CLI::App& program) {
       ->add_option("--contrast", arguments->contrast,
                    "bright: line integrals (default); dark: an empty beam minus the line integrals")
       ->check(CLI::IsMember({"dark", "bright"}));
-  command
-      ->add_option("--gain", options.gain_spread,
-                   "Standard deviation of the logarithm of each view's random scale")
-      ->capture_default_str();
+  command->add_option(
+      "--gain", arguments->gain_spread,
+      "Standard deviation of the logarithm of each view's random scale (default: 0; "
+      "with --yardstick c 0.03)");
   command
       ->add_option(
           "--shifts", options.shift_spread_px,
           "Standard deviation of each view's random shift in pixels; an .xf file undoes it")
       ->capture_default_str();
-  command->add_option("--gold", options.cell.num_beads, "Number of gold beads in the field of view")
-      ->capture_default_str();
+  command->add_option(
+      "--gold", arguments->num_beads,
+      "Number of gold beads in the field of view (default: 0; with --yardstick c 12 "
+      "per 256 x 256 pixels)");
   command->add_option("--gold-diameter", arguments->gold_diameter_A, "Diameter of a gold bead in Å")
       ->capture_default_str();
   command

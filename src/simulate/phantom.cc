@@ -9,12 +9,12 @@
 #include <numbers>
 
 #include "base/random.h"
+#include "simulate/random_ellipsoid.h"
+#include "simulate/textured_content.h"
 #include "tomofield/error.h"
 
 namespace tomofield::simulate {
 namespace {
-
-using Vector3 = std::array<double, 3>;
 
 constexpr double kLargestSum = 1.18;  // slab 0.2 + the densest wall 0.98
 constexpr double kSlabDensity = 0.2;
@@ -22,27 +22,6 @@ constexpr std::uint64_t kCellStream = 1;
 constexpr std::uint64_t kBeadStream = 2;
 // The slab counts as full if a bead finds no free place in this number of tries.
 constexpr int kTriesPerBead = 1000;
-
-double dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-// Returns three orthonormal vectors with a uniformly distributed orientation, by Gram–Schmidt on
-// normal deviates.
-std::array<Vector3, 3> random_axes(base::Random& random) {
-  std::array<Vector3, 3> axes;
-  for (std::size_t i = 0; i < 3; ++i) {
-    double length = 0.0;
-    do {
-      for (double& v : axes[i]) v = random.normal();
-      for (std::size_t j = 0; j < i; ++j) {
-        const double overlap = dot(axes[i], axes[j]);
-        for (std::size_t k = 0; k < 3; ++k) axes[i][k] -= overlap * axes[j][k];
-      }
-      length = std::sqrt(dot(axes[i], axes[i]));
-    } while (length < 1e-3);  // nearly in the span of the others: rounding would show
-    for (double& v : axes[i]) v /= length;
-  }
-  return axes;
-}
 
 bool touches_any(const std::vector<Ellipsoid>& bodies, std::size_t first, const Vector3& center,
                  double radius) {
@@ -58,22 +37,14 @@ bool touches_any(const std::vector<Ellipsoid>& bodies, std::size_t first, const 
 
 // Draws an ellipsoid at the origin whose largest semi-axis is `radius`.
 Ellipsoid random_ellipsoid(double radius, base::Random& random) {
-  Vector3 semi_axes;
-  for (double& a : semi_axes) a = random.uniform(0.7 * radius, radius);
-  semi_axes[random.below(3)] = radius;
+  const Vector3 semi_axes = random_semi_axes(0.7 * radius, radius, random);
   const auto axes = random_axes(random);
   Ellipsoid e;
   e.radius = radius;
   e.ratio = random.uniform(0.85, 0.95);
   e.wall_density = random.uniform(0.5, 0.98) / kLargestSum;
   e.inside_density = random.uniform(0.1, 0.5) / kLargestSum;
-  constexpr std::array<std::array<std::size_t, 2>, 6> kEntries{
-      {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
-  for (std::size_t n = 0; n < kEntries.size(); ++n) {  // Q = Σ axis axisᵀ / semi_axis²
-    const auto [row, column] = kEntries[n];
-    for (std::size_t i = 0; i < 3; ++i)
-      e.q[n] += axes[i][row] * axes[i][column] / (semi_axes[i] * semi_axes[i]);
-  }
+  e.q = surface_form(axes, semi_axes);
   return e;
 }
 
@@ -123,7 +94,24 @@ void place_beads(const CellOptions& options, Phantom& phantom) {
   }
 }
 
+void place_hollow_ellipsoids(const CellOptions& options, Phantom& phantom) {
+  const double thickness = static_cast<double>(options.thickness_px);
+  const double half_field = static_cast<double>(options.size_px) / 2.0;
+  const double more_tries = options.is_extended ? 1.2 * phantom.half_width_px / half_field : 1.0;
+  base::Random random(options.seed, kCellStream);
+  place_ellipsoids(static_cast<int>(125 * more_tries), 0.15 * thickness, 0.4 * thickness, random,
+                   phantom);
+  place_ellipsoids(static_cast<int>(2000 * more_tries), 0.05 * thickness, 0.25 * thickness, random,
+                   phantom);
+}
+
 }  // namespace
+
+Phantom without_beads(Phantom phantom) {
+  phantom.bodies.resize(phantom.bodies.size() - static_cast<std::size_t>(phantom.num_beads));
+  phantom.num_beads = 0;
+  return phantom;
+}
 
 Phantom make_cell_phantom(const CellOptions& options) {
   const double size = static_cast<double>(options.size_px);
@@ -134,17 +122,15 @@ Phantom make_cell_phantom(const CellOptions& options) {
   phantom.is_extended = options.is_extended;
   phantom.slab_density = kSlabDensity / kLargestSum;
   phantom.half_width_px = size / 2.0;
-  double more_tries = 1.0;
   if (options.is_extended) {
     phantom.half_width_px =
         size / 2.0 / std::cos(max_tilt_rad) + thickness / 2.0 * std::tan(max_tilt_rad);
-    more_tries = 1.2 * phantom.half_width_px / (size / 2.0);
   }
-  base::Random random(options.seed, kCellStream);
-  place_ellipsoids(static_cast<int>(125 * more_tries), 0.15 * thickness, 0.4 * thickness, random,
-                   phantom);
-  place_ellipsoids(static_cast<int>(2000 * more_tries), 0.05 * thickness, 0.25 * thickness, random,
-                   phantom);
+  if (options.content == Content::kTextured) {
+    add_textured_content(options.seed, phantom);
+  } else {
+    place_hollow_ellipsoids(options, phantom);
+  }
   if (options.num_beads > 0) place_beads(options, phantom);
   return phantom;
 }

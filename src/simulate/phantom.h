@@ -22,6 +22,9 @@ struct Ellipsoid {
   double wall_density = 0.0;    ///< added between the two surfaces
   double inside_density = 0.0;  ///< added within the inner surface
 
+  /// Returns the largest distance from the centre at which the ellipsoid has a density.
+  double reach() const { return radius; }
+
   /// Returns pᵀ Q p of an offset p from the centre. It is below 1 inside the outer surface.
   double form(double dx, double dy, double dz) const {
     return q[0] * dx * dx + q[1] * dy * dy + q[2] * dz * dz +
@@ -59,19 +62,47 @@ inline Ellipsoid make_aligned_ellipsoid(const std::array<double, 3>& center,
           .inside_density = density};
 }
 
-/// A slab of constant density with ellipsoids added to it. project_phantom.h computes its exact
-/// projections, rasterize.h its voxels.
+/// A Gaussian blob. At a distance r from its centre it adds peak · exp(−r² / 2σ²) to the density.
+/// Lengths and positions are those of Ellipsoid.
+struct Blob {
+  std::array<double, 3> center{};
+  double sigma = 1.0;
+  double peak = 0.0;  ///< of either sign
+
+  /// Returns the distance along an axis from which on the blob is left out of images and volumes.
+  /// Its density there is below 1.6e-8 of the peak, less than the rounding error of a float.
+  double reach() const { return 6.0 * sigma; }
+
+  /// Returns the density that the blob adds at an offset from its centre.
+  double density(double dx, double dy, double dz) const {
+    return peak * std::exp(-0.5 * (dx * dx + dy * dy + dz * dz) / (sigma * sigma));
+  }
+};
+
+/// A slab of constant density with ellipsoids and blobs added to it. project_phantom.h computes
+/// its exact projections, rasterize.h its voxels.
 struct Phantom {
   base::Shape3 shape;             ///< voxels of the truth: field of view × thickness
   bool is_extended = false;       ///< the slab has no end in X and Y
   double half_width_px = 0.0;     ///< ellipsoids lie within |X| <= this
   double slab_density = 0.0;      ///< bounded: within `shape`; extended: within |Z| <= nz / 2
-  std::vector<Ellipsoid> bodies;  ///< the cell's ellipsoids, then the gold beads
+  std::vector<Ellipsoid> bodies;  ///< the specimen's ellipsoids, then the gold beads
   std::int64_t num_beads = 0;     ///< number of gold beads, which are the last of `bodies`
+  std::vector<Blob> blobs;        ///< cut off at the faces |Z| = nz / 2 of the slab
+};
+
+/// Returns the phantom without its gold beads.
+Phantom without_beads(Phantom phantom);
+
+/// Names what a slab is filled with.
+enum class Content {
+  kHollowEllipsoids,  ///< hollow ellipsoids of constant densities
+  kTextured,          ///< what textured_content.h places, in an extended slab only
 };
 
 /// Sets the phantom of make_cell_phantom().
 struct CellOptions {
+  Content content = Content::kHollowEllipsoids;
   std::int64_t size_px = 256;       ///< width and height of the field of view
   std::int64_t thickness_px = 150;  ///< of the slab
   bool is_extended = false;
@@ -82,8 +113,9 @@ struct CellOptions {
   double bead_density = 5.0;  ///< added to that of the cell, which is in [0, 1]
 };
 
-/// Makes the phantom that all scores of the project refer to, after Kniesel et al. 2022: ice with
-/// hollow ellipsoids that have a membrane and do not overlap. U(a, b) is a uniform random number.
+/// Makes a phantom of the yardsticks, which all scores of the project refer to. textured_content.h
+/// has the recipe of textured content. The other one is after Kniesel et al. 2022: ice with hollow
+/// ellipsoids that have a membrane and do not overlap. U(a, b) is a uniform random number.
 ///
 ///   slab density                            0.2
 ///   semi-axes of an ellipsoid of radius R   one is R, the others U(0.7 R, R)
@@ -99,9 +131,9 @@ struct CellOptions {
 /// in X as far as any ray up to max_tilt_deg reaches, and beyond the field of view in Y; it has
 /// more tries in proportion.
 ///
-/// Beads are solid spheres that do not touch each other: a third on each face of the slab and a
-/// third inside it. They have a random stream of their own, so a seed gives the same cell with and
-/// without beads. Throws Error if the beads do not fit.
+/// With either content, beads are solid spheres that do not touch each other: a third on each face
+/// of the slab and a third inside it. They have a random stream of their own, so a seed gives the
+/// same cell with and without beads. Throws Error if the beads do not fit.
 Phantom make_cell_phantom(const CellOptions& options);
 
 }  // namespace tomofield::simulate

@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "simulate/gaussian_rows.h"
 
 namespace tomofield::simulate {
 namespace {
@@ -43,11 +44,8 @@ void add_ellipsoid_to_row(const Ellipsoid& body, const Beam& beam, double y, dou
   const double half_width = std::sqrt(half_width_squared);
   const double center_u = body.center[0] * beam.cosine + body.center[2] * beam.sine;
   // Only pixels whose centres lie within the bounding sphere's chord of this row can change.
-  const double pixel_of_zero = -beam.x_of(0);
-  const double last_column = static_cast<double>(beam.view.width - 1);
-  const double first = std::max(std::ceil(center_u - half_width + pixel_of_zero), 0.0);
-  const double last = std::min(std::floor(center_u + half_width + pixel_of_zero), last_column);
-  if (first > last) return;
+  const IndexRange columns = indices_near(center_u, half_width, beam.x_of(0), beam.view.width);
+  if (columns.last <= columns.first) return;
 
   const auto& q = body.q;
   const double c = beam.cosine, s = beam.sine;
@@ -57,7 +55,7 @@ void add_ellipsoid_to_row(const Ellipsoid& body, const Beam& beam, double y, dou
   const double b_per_u = c * qd_x + s * qd_z, b_from_y = offset_y * qd_y;
   const double inner = body.ratio * body.ratio;
   const double step_in = body.inside_density - body.wall_density;
-  for (auto i = static_cast<std::int64_t>(first); i <= static_cast<std::int64_t>(last); ++i) {
+  for (std::int64_t i = columns.first; i < columns.last; ++i) {
     const double u = beam.x_of(i) - center_u;
     const double b = b_per_u * u + b_from_y;
     const double base = b * b - a * body.form(u * c, offset_y, u * s);
@@ -98,13 +96,29 @@ void add_slab_to_row(const Phantom& phantom, const Beam& beam, double y, double*
   }
 }
 
-// Returns the bodies that any of these rows can meet.
-std::vector<const Ellipsoid*> bodies_in_rows(std::span<const Ellipsoid> bodies, const Beam& beam,
-                                             std::int64_t first_row, std::int64_t num_rows) {
-  const double low = beam.y_of(first_row), high = beam.y_of(first_row + num_rows - 1);
-  std::vector<const Ellipsoid*> near;
-  for (const Ellipsoid& body : bodies) {
-    if (body.center[1] + body.radius < low || body.center[1] - body.radius > high) continue;
+// Adds one blob to rows. At the distance t along a ray from the point nearest to the blob's centre,
+// the blob has exp(−t² / 2σ²) of its density in that point. The ray x = u cos θ − t' sin θ,
+// z = u sin θ + t' cos θ is within the slab for |z| <= half_thickness.
+void add_blob(const Blob& blob, const Beam& beam, double half_thickness, const PixelRows& rows) {
+  const double c = beam.cosine, s = beam.sine;
+  const double center_u = blob.center[0] * c + blob.center[2] * s;
+  const double center_t = -blob.center[0] * s + blob.center[2] * c;
+  const double unit = std::numbers::sqrt2 * blob.sigma;
+  const double factor = blob.peak * blob.sigma * std::sqrt(std::numbers::pi / 2.0);
+  const auto integral = [&](double u) {
+    const double enter = (-half_thickness - u * s) / c - center_t;
+    const double leave = (half_thickness - u * s) / c - center_t;
+    return factor * (std::erf(leave / unit) - std::erf(enter / unit));
+  };
+  add_gaussian(center_u, blob.center[1], blob.sigma, blob.reach(), integral, rows);
+}
+
+// Returns the bodies that a row with y in [low, high] can meet.
+template <typename Body>
+std::vector<const Body*> bodies_between(std::span<const Body> bodies, double low, double high) {
+  std::vector<const Body*> near;
+  for (const Body& body : bodies) {
+    if (body.center[1] + body.reach() < low || body.center[1] - body.reach() > high) continue;
     near.push_back(&body);
   }
   return near;
@@ -127,16 +141,25 @@ void project_rows(const Phantom& phantom, const ViewFrame& view, std::int64_t fi
   TOMOFIELD_CHECK(static_cast<std::int64_t>(rows.size()) == num_rows * view.width,
                   "the rows' buffer has another size");
   const Beam beam(view);
-  const auto near = bodies_in_rows(phantom.bodies, beam, first_row, num_rows);
-  std::vector<double> sum(static_cast<std::size_t>(view.width));
+  const double low = beam.y_of(first_row), high = beam.y_of(first_row + num_rows - 1);
+  std::vector<double> sums(rows.size());
+  const auto ellipsoids = bodies_between<Ellipsoid>(phantom.bodies, low, high);
   for (std::int64_t row = 0; row < num_rows; ++row) {
-    std::fill(sum.begin(), sum.end(), 0.0);
+    double* const sum = sums.data() + row * view.width;
     const double y = beam.y_of(first_row + row);
-    add_slab_to_row(phantom, beam, y, sum.data());
-    for (const Ellipsoid* body : near) add_ellipsoid_to_row(*body, beam, y, sum.data());
-    std::transform(sum.begin(), sum.end(), rows.begin() + row * view.width,
-                   [](double value) { return static_cast<float>(value); });
+    add_slab_to_row(phantom, beam, y, sum);
+    for (const Ellipsoid* body : ellipsoids) add_ellipsoid_to_row(*body, beam, y, sum);
   }
+  const double half_thickness = static_cast<double>(phantom.shape.nz) / 2.0;
+  const PixelRows pixels{.origin_x = beam.x_of(0),
+                         .origin_y = beam.y_of(0),
+                         .first_row = first_row,
+                         .width = view.width,
+                         .values = sums};
+  for (const Blob* blob : bodies_between<Blob>(phantom.blobs, low, high))
+    add_blob(*blob, beam, half_thickness, pixels);
+  std::transform(sums.begin(), sums.end(), rows.begin(),
+                 [](double value) { return static_cast<float>(value); });
 }
 
 void project_view(const Phantom& phantom, const ViewFrame& view, std::span<float> image) {

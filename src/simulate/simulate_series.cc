@@ -178,6 +178,8 @@ Json options_json(const SimulationOptions& options) {
       {"gold_beads", cell.num_beads},
       {"gold_diameter_px", cell.bead_diameter_px},
       {"gold_density", cell.bead_density}};
+  if (cell.content == Content::kTextured) json["content"] = "textured";
+  if (!options.reference_has_beads) json["reference_has_gold"] = false;
   if (options.dose) {
     json["dose_per_px"] = *options.dose;
     json["absorption_per_A"] = options.absorption_per_A;
@@ -200,9 +202,16 @@ Json bead_json(const Ellipsoid& e) {
   return {{"center_px", e.center}, {"radius_px", e.radius}, {"density", e.inside_density}};
 }
 
-// Returns the record beside the series: the options, the views, and every ellipsoid, with doubles
-// that read back exactly. Positions and lengths are voxels relative to the volume's centre, (X, Y,
-// Z).
+// Returns each blob as X, Y, Z, σ, peak: objects with names would make the record twice as long.
+Json blobs_json(const std::vector<Blob>& blobs) {
+  Json rows = Json::array();
+  for (const Blob& b : blobs)
+    rows.push_back({b.center[0], b.center[1], b.center[2], b.sigma, b.peak});
+  return rows;
+}
+
+// Returns the record beside the series: the options, the views, and every body, with doubles that
+// read back exactly. Positions and lengths are voxels relative to the volume's centre, (X, Y, Z).
 nlohmann::json phantom_json(const SimulationOptions& options, const Phantom& phantom,
                             std::span<const SimulatedView> views,
                             const SimulationSummary& summary) {
@@ -233,6 +242,7 @@ nlohmann::json phantom_json(const SimulationOptions& options, const Phantom& pha
       json["gold_beads"].push_back(bead_json(body));
     }
   }
+  if (!phantom.blobs.empty()) json["blobs_x_y_z_sigma_peak"] = blobs_json(phantom.blobs);
   return json;
 }
 
@@ -249,18 +259,20 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
   for (const SimulatedView& view : views)
     cell.max_tilt_deg = std::max(cell.max_tilt_deg, std::abs(view.tilt_deg));
   const Phantom phantom = make_cell_phantom(cell);
+  const Phantom reference = options.reference_has_beads ? phantom : without_beads(phantom);
   prepare_directory(directory, files, overwrite);
 
   SimulationSummary summary;
   summary.num_beads = phantom.num_beads;
   summary.num_ellipsoids = static_cast<std::int64_t>(phantom.bodies.size()) - phantom.num_beads;
+  summary.num_blobs = static_cast<std::int64_t>(phantom.blobs.size());
   summary.num_views = static_cast<std::int64_t>(views.size());
   summary.empty_beam = Detector(options).empty_beam();
-  if (!options.dose) summary.sigma = noise_sigma(phantom, views, options.noise);
+  if (!options.dose) summary.sigma = noise_sigma(reference, views, options.noise);
   // Files of an earlier run that this one does not replace would contradict the others.
   fs::remove(files.transforms);
   if (options.write_truth) {
-    summary.truth = write_truth(files.truth, phantom, options);
+    summary.truth = write_truth(files.truth, reference, options);
   } else {
     fs::remove(files.truth);
   }

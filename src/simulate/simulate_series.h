@@ -13,7 +13,8 @@ struct SimulationSummary {
   struct Truth {
     double min = 0.0, max = 0.0, mean = 0.0;
   };
-  std::int64_t num_ellipsoids = 0;
+  std::int64_t num_ellipsoids = 0;  ///< without the gold beads
+  std::int64_t num_blobs = 0;
   std::int64_t num_beads = 0;
   std::int64_t num_views = 0;
   double empty_beam = 0.0;      ///< intensity without a specimen at gain 1; 0 if bright
@@ -25,10 +26,11 @@ struct SimulationSummary {
 ///
 ///   tilt_series.mrc  views × size × size   the series, with noise
 ///   clean.mrc        views × size × size   the series without noise
-///   truth.mrc        thickness × size × size, the density, high = dense
+///   truth.mrc        thickness × size × size, the density, high = dense; with or without gold
+///                    beads (SimulationOptions::reference_has_beads)
 ///   tilt_series.tlt  the true angles
 ///   tilt_series.xf   only with shifts: transforms that align the series
-///   phantom.json     options, views and every ellipsoid
+///   phantom.json     options, views and every ellipsoid, blob and bead
 ///
 /// With bright contrast, the views are line integrals in voxels. It keeps one view, or a few
 /// sections of the truth, in memory. The same options give the same bytes with any number of

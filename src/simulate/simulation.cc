@@ -51,9 +51,15 @@ TiltRange default_tilts(bool is_extended) {
 void apply_yardstick(Yardstick yardstick, SimulationOptions& options) {
   constexpr double kThicknessOfSize = 75.0 / 128.0;
   CellOptions& cell = options.cell;
-  cell.is_extended = yardstick == Yardstick::kB;
-  cell.thickness_px = std::llround(kThicknessOfSize * static_cast<double>(cell.size_px));
+  const auto size = static_cast<double>(cell.size_px);
+  cell.is_extended = yardstick != Yardstick::kA;
+  cell.thickness_px = std::llround(kThicknessOfSize * size);
   options.tilts = default_tilts(cell.is_extended);
+  if (yardstick != Yardstick::kC) return;
+  cell.content = Content::kTextured;
+  cell.num_beads = std::llround(12.0 * size * size / (256.0 * 256.0));
+  options.gain_spread = 0.03;
+  options.reference_has_beads = false;
 }
 
 std::vector<std::string> SimulationOptions::validate() const {

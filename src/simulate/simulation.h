@@ -1,10 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "simulate/phantom.h"
 #include "tilt_series/tilt_series.h"
 
@@ -19,10 +22,11 @@ struct TiltRange {
 /// Returns the usual tilts of a bounded or an extended specimen.
 TiltRange default_tilts(bool is_extended);
 
-/// Names the two phantoms that every score of the project refers to (docs/index.md).
+/// Names the phantoms that every score of the project refers to (docs/index.md).
 enum class Yardstick {
   kA,  ///< a cell that ends in the field of view, in 94 views from −70° to 69.5°
   kB,  ///< a specimen that goes on outside it, in 61 views from −60° to 60°
+  kC,  ///< as B, with textured content, gold beads, and gains that differ between views
 };
 
 /// Sets a simulated tilt series.
@@ -31,7 +35,7 @@ struct SimulationOptions {
   TiltRange tilts;
   double voxel_size_A = 10.0;
   /// Standard deviation of the Gaussian noise, the same in all views, divided by the range (0.5 to
-  /// 99.5 percentile) of the noise-free view nearest to zero tilt.
+  /// 99.5 percentile) of the noise-free view nearest to zero tilt, at gain 1.
   double noise = 0.05;
   /// Electrons per pixel and view of an empty beam. If given, views are Poisson counts of mean
   /// dose · exp(−absorption · ∫ density) and have no Gaussian noise.
@@ -39,6 +43,9 @@ struct SimulationOptions {
   /// Absorption per unit of density and Å. By default, the beam falls by a factor e over 0.3 µm of
   /// the slab (density 0.169), as it does in ice with an energy filter at 300 kV.
   double absorption_per_A = 0.002;
+  /// True if the gold beads belong to what is measured: truth.mrc shows them, and the range that
+  /// `noise` refers to includes them.
+  bool reference_has_beads = true;
   double gain_spread = 0.0;      ///< standard deviation of the logarithm of each view's scale
   double shift_spread_px = 0.0;  ///< standard deviation of each view's shift, in x and in y
   Contrast contrast = Contrast::kBright;
@@ -49,7 +56,9 @@ struct SimulationOptions {
 };
 
 /// Turns `options` into those of a yardstick. It sets the kind of specimen, the tilts, and the
-/// thickness, which is 75/128 of cell.size_px. It leaves noise, seed and all else as they are.
+/// thickness, which is 75/128 of cell.size_px. For C it also sets a gain spread of 0.03 and 12 gold
+/// beads for each 256 × 256 pixels, which are no part of the reference: a reconstruction masks
+/// them. It leaves noise, seed and all else as they are.
 void apply_yardstick(Yardstick yardstick, SimulationOptions& options);
 
 /// Holds the tilt, the shift and the gain of a simulated view.
@@ -83,3 +92,14 @@ class Detector {
 };
 
 }  // namespace tomofield::simulate
+
+namespace tomofield::base {
+
+template <>
+struct EnumNames<simulate::Yardstick> {
+  static constexpr std::array kNames{std::pair{simulate::Yardstick::kA, "a"},
+                                     std::pair{simulate::Yardstick::kB, "b"},
+                                     std::pair{simulate::Yardstick::kC, "c"}};
+};
+
+}  // namespace tomofield::base

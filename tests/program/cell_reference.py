@@ -5,6 +5,7 @@ The recipe is described in src/simulate/phantom.h. Lengths are voxels; positions
 the centre of the volume."""
 
 import numpy as np
+import scipy.special
 
 LARGEST_DENSITY = 0.2 + 0.98  # of a wall in the slab; all densities are divided by it
 SLAB = 0.2 / LARGEST_DENSITY
@@ -16,11 +17,12 @@ def centres(count):
 
 
 class Cell:
-    """Holds a slab with hollow ellipsoids. Each body is a dict with the keys of phantom.json."""
+    """Holds a slab with hollow ellipsoids and blobs. Each ellipsoid is a dict with the keys of
+    phantom.json, each blob a row (X, Y, Z, sigma, peak)."""
 
-    def __init__(self, size, thickness, is_extended, bodies):
+    def __init__(self, size, thickness, is_extended, bodies, blobs=()):
         self.size, self.thickness, self.is_extended = size, thickness, is_extended
-        self.bodies = bodies
+        self.bodies, self.blobs = bodies, blobs
 
     def truth(self):
         """Returns the density [z, y, x] at the voxel centres."""
@@ -34,6 +36,12 @@ class Cell:
             density[z, y, x] += np.select(
                 [form < body["inner_to_outer_ratio"] ** 2, form < 1],
                 [body["inside_density"], body["wall_density"]], 0)
+        for *middle, sigma, peak in self.blobs:
+            boxes = [near(axis, m, 6.5 * sigma) for axis, m in
+                     zip((along_z, across, across), middle[::-1])]
+            z, y, x = (gaussian(axis[box] - m, sigma) for axis, box, m in
+                       zip((along_z, across, across), boxes, middle[::-1]))
+            density[tuple(boxes)] += peak * z[:, None, None] * y[:, None] * x
         return density
 
     def view(self, tilt_deg):
@@ -54,6 +62,17 @@ class Cell:
             inner = chord_lengths(matrix(body), start, direction, body["inner_to_outer_ratio"])
             image[rows, columns] += (body["wall_density"] * (outer - inner)
                                      + body["inside_density"] * inner)
+        for *middle, sigma, peak in self.blobs:
+            columns = near(pixels, middle[0] * cos + middle[2] * sin, 6.5 * sigma)
+            rows = near(pixels, middle[1], 6.5 * sigma)
+            u = pixels[columns]
+            # The ray's distances from the faces of the slab to its point nearest to the blob.
+            nearest = middle[2] * cos - middle[0] * sin
+            ends = [(face - u * sin) / cos - nearest for face in (-self.thickness / 2, self.thickness / 2)]
+            lengths = np.subtract(*(scipy.special.ndtr(end / sigma) for end in ends[::-1]))
+            across = gaussian(u - middle[0] * cos - middle[2] * sin, sigma) * lengths
+            image[rows, columns] += (peak * sigma * np.sqrt(2 * np.pi)
+                                     * gaussian(pixels[rows] - middle[1], sigma)[:, None] * across)
         return image
 
     def slab_lengths(self, pixels, cos, sin):
@@ -82,6 +101,10 @@ class Cell:
 def near(axis, middle, radius):
     """Returns the slice of the axis within a radius of a position."""
     return slice(*np.searchsorted(axis, [middle - radius, middle + radius]))
+
+
+def gaussian(offset, sigma):
+    return np.exp(-0.5 * (offset / sigma) ** 2)
 
 
 def matrix(body):

@@ -4,6 +4,7 @@ import filecmp
 import io
 import json
 import os
+import re
 
 import mrcfile
 import numpy as np
@@ -95,6 +96,50 @@ def test_yardsticks_are_cells_with_the_projects_views_and_thickness():
             assert filecmp.cmp(ours.path(name), by_hand.path(name), shallow=False), name
     other = simulate("other_thickness", "--yardstick", "b", "--size", 32, "--thickness", 12)
     assert other.read("truth.mrc").shape == (12, 32, 32)
+
+
+def test_yardstick_c_is_what_its_record_says():
+    size, thickness = 64, 38
+    ours = simulate("textured", "--yardstick", "c", "--size", size, "--seed", 3)
+    beads, blobs = ours.record["gold_beads"], ours.record["blobs_x_y_z_sigma_peak"]
+    assert len(beads) > 0 and len(blobs) > 500 and len(ours.views) == 61
+    gains = np.array([view["gain"] for view in ours.views])
+    assert 0.02 < np.log(gains).std() < 0.04
+    specimen = cell_reference.Cell(size, thickness, True, ours.record["ellipsoids"], blobs)
+    truth = ours.read("truth.mrc")  # without gold
+    np.testing.assert_allclose(truth, specimen.truth(), atol=1e-6)
+    assert truth.min() > -0.1 and truth.max() < 1.3
+    np.testing.assert_allclose(ours.record["noise_sigma"], specimen.noise_sigma(0.05, [0]), rtol=1e-5)
+    clean = ours.read("clean.mrc")
+    for view in (0, 18, 30, 53):
+        gold = cell_reference.Cell(size, thickness, True, [solid(bead) for bead in beads])
+        gold = gold.view(-60 + 2 * view) - cell_reference.SLAB * thickness / np.cos(
+            np.radians(-60 + 2 * view))
+        expected = gains[view] * (specimen.view(-60 + 2 * view) + gold)
+        np.testing.assert_allclose(clean[view], expected, atol=5e-5, rtol=1e-6)
+
+
+def solid(bead):
+    """Returns a bead as an ellipsoid of the record."""
+    return {**bead, "q": np.eye(3) / bead["radius_px"] ** 2, "inner_to_outer_ratio": 0,
+            "wall_density": bead["density"], "inside_density": bead["density"]}
+
+
+def test_options_win_over_yardstick_c_and_the_content_stays():
+    usual = simulate("usual", "--yardstick", "c", "--size", 32)
+    plain = simulate("plain", "--yardstick", "c", "--size", 32, "--gold", 0, "--gain", 0)
+    assert not plain.record["gold_beads"] and all(view["gain"] == 1 for view in plain.views)
+    assert filecmp.cmp(usual.path("truth.mrc"), plain.path("truth.mrc"), shallow=False)
+    assert usual.record["noise_sigma"] == plain.record["noise_sigma"]
+
+
+def test_yardstick_c_says_how_it_is_reconstructed():
+    said = harness.succeed("simulate", harness.fresh_directory("said"), "--yardstick", "c", "--size",
+                           128, "--no-truth", "--noise", 0.05).stdout
+    assert re.search(r"\d+ ellipsoids, \d+ Gaussian blobs, 61 views, \d+ gold beads", said), said
+    command = said.split("reconstruct it with: tomofield ")[1].split()
+    assert "--view-scale on" in said and "--bead-diameter 10 " in said and "--no-margin" not in said
+    harness.succeed(*command, "--dry-run")
 
 
 SMALL = ["--size", 48, "--thickness", 30, "--tilts", "-60:60:10"]
@@ -203,7 +248,7 @@ def test_bad_options_are_named_and_nothing_is_written():
         (["--dose", "5", "--contrast", "bright"], "contrast"),
         (["--voxel-size", "0"], "voxel size"),
         (["--gold", "5", "--gold-diameter", "1e6"], "diameter"),
-        (["--yardstick", "c"], "yardstick"),
+        (["--yardstick", "d"], "yardstick"),
         (["--yardstick", "a", "--extended"], "--extended"),
         (["--yardstick", "b", "--tilts", "-60:60:3"], "--tilts"),
     ):
