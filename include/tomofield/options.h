@@ -70,7 +70,7 @@ struct Options {
   bool with_margin = true;       ///< false: the specimen ends inside the field of view
 
   // Field
-  FieldKind field = FieldKind::kVm;
+  std::optional<FieldKind> field;  ///< default: grid, unless other options are for factors
   std::optional<int> leaf_size;  ///< side of a leaf in binned pixels, a multiple of 16
   TreeKind tree = TreeKind::kUniform;
   int leaf_budget = 0;          ///< most leaves of an adaptive tree; 0: as many as at the start

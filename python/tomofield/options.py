@@ -31,7 +31,7 @@ class Options(TypedDict, total=False):
     with_margin: bool
 
     # Field
-    field: Literal["vm", "grid"]
+    field: Optional[Literal["vm", "grid"]]
     leaf_size: Optional[int]
     tree: Literal["uniform", "adaptive"]
     leaf_budget: int

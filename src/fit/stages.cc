@@ -33,7 +33,7 @@ std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
 int Schedule::vertex_epochs_of(int fine) const { return std::min(fine, epochs); }
 
 int Schedule::coarse_epochs_of(int fine) const {
-  constexpr double kCoarseEpochs = 80;
+  constexpr double kCoarseEpochs = 160;
   const double part = std::clamp(static_cast<double>(fine) / epochs, 0.0, 1.0);
   return static_cast<int>(std::round(kCoarseEpochs * part));
 }

@@ -106,6 +106,7 @@ constexpr Row kRows[] = {
 
     // Field
     {.key = "field.kind", .flag = "--field", MEMBER(Options, field), .group = Group::kField,
+     .automatic = "grid; vm with --tree adaptive or --vertex-epochs",
      .help = "vm: vector-matrix factors in every leaf; grid: plain vertices"},
     {.key = "field.leaf_size", .flag = "--leaf-size", MEMBER(Options, leaf_size),
      .group = Group::kField, .unit = kBinned, .range = Range::multiple_of(kLeafStep, kMaxLeaf),
@@ -140,7 +141,7 @@ constexpr Row kRows[] = {
              "are then factorised. 0: fit factors from the start"},
     {.key = "fit.coarse_epochs", .flag = "--coarse-epochs", MEMBER(Options, coarse_epochs),
      .group = Group::kFit, .range = Range::between(0, kMaxCount),
-     .automatic = "80; fewer in proportion where --epochs is below its own default",
+     .automatic = "160; fewer in proportion where --epochs is below its own default",
      .help = "Passes over binned views, before all passes at full resolution. 0: none"},
     {.key = "fit.coarse_bin", .flag = "--coarse-bin", MEMBER(Options, coarse_bin),
      .group = Group::kFit, .unit = "pixels on each axis", .range = Range::between(2, 64),

@@ -17,7 +17,7 @@ namespace {
 
 fit::FieldOptions field_options(const Options& options) {
   fit::FieldOptions field;
-  field.kind = options.field;
+  field.kind = options.field.value_or(field.kind);
   field.tree = options.tree;
   field.leaf_size = options.leaf_size.value_or(fit::usual_leaf_size(field));
   field.depth = fit::usual_depth(field);
@@ -73,6 +73,12 @@ void choose_schedule(Options& options) {
   if (!options.learning_rate) options.learning_rate = usual.learning_rate;
 }
 
+// Chooses plain vertices, unless other options are for factors.
+void choose_field(Options& options) {
+  const bool is_for_factors = options.tree == TreeKind::kAdaptive || options.vertex_epochs > 0;
+  if (!options.field) options.field = is_for_factors ? FieldKind::kVm : FieldKind::kGrid;
+}
+
 void choose_variation(Options& options) {
   if (!options.penalty && options.density_variation) options.penalty = fit::FitOptions{}.penalty;
   if (options.penalty && !options.density_variation)
@@ -84,6 +90,7 @@ void choose_variation(Options& options) {
 Options resolve(const Options& requested) {
   Options options = requested;
   option_table::choose_by_contrast(options);
+  choose_field(options);
   options.leaf_size = field_options(options).leaf_size;
   choose_schedule(options);
   choose_variation(options);
