@@ -8,8 +8,8 @@
 #include "io/image_stack.h"
 #include "io/mrc.h"
 #include "tilt_series/fixed_pattern/fixed_pattern.h"
-#include "tilt_series/image.h"
 #include "tilt_series/fixed_pattern/pattern_search.h"
+#include "tilt_series/image.h"
 #include "tilt_series/series_plan.h"
 #include "tomofield/options.h"
 

@@ -17,10 +17,10 @@
 #include "io/scratch_memory.h"
 #include "tilt_series/decode_view.h"
 #include "tilt_series/fixed_pattern/fixed_pattern.h"
+#include "tilt_series/fixed_pattern/pattern_search.h"
 #include "tilt_series/intensity.h"
 #include "tilt_series/masks/series_masks.h"
 #include "tilt_series/noise.h"
-#include "tilt_series/fixed_pattern/pattern_search.h"
 #include "tilt_series/series_plan.h"
 #include "tilt_series/view_check.h"
 #include "tilt_series/view_owner.h"
@@ -183,7 +183,8 @@ struct TiltSeries::Impl {
                     std::min_element(views.begin(), views.end(), has_lower_tilt)->tilt_deg,
                     std::max_element(views.begin(), views.end(), has_lower_tilt)->tilt_deg,
                     plan.angle_source, width, height, plan.pixel_size_A * plan.bin_factor));
-    if (fixed_pattern.is_any()) base::log_info("fixed pattern removed: " + describe_pattern(fixed_pattern));
+    if (fixed_pattern.is_any())
+      base::log_info("fixed pattern removed: " + describe_pattern(fixed_pattern));
   }
 
   // -------------------------------------------------------------- measuring

@@ -48,7 +48,8 @@ Lines lines_along_axis(const SeriesPlan& plan) {
 void share(std::int64_t num_lines, std::vector<LineProfiles>* views,
            const distributed::Communicator& processes) {
   for (LineProfiles& view : *views) {
-    if (view.empty()) view.assign(kLineParts, std::vector<float>(static_cast<std::size_t>(num_lines)));
+    if (view.empty())
+      view.assign(kLineParts, std::vector<float>(static_cast<std::size_t>(num_lines)));
     for (std::vector<float>& part : view) processes.allreduce_sum(std::span(part));
   }
 }

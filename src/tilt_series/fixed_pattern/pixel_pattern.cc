@@ -51,8 +51,7 @@ MaskedImage less_surroundings(const MaskedImage& image) {
         count += columns.counts[column];
       }
       result.valid[at] = image.valid[at] && count >= kFewestAround;
-      if (result.valid[at])
-        result.values[at] = static_cast<float>(image.values[at] - sum / count);
+      if (result.valid[at]) result.values[at] = static_cast<float>(image.values[at] - sum / count);
     }
   }
   return result;

@@ -26,8 +26,7 @@ class PixelPattern {
 
   /// Returns the indices of the pixels. Pixels that were measured in fewer than half of the
   /// `num_views` views are left out. All processes must call.
-  std::vector<std::size_t> find(std::size_t num_views,
-                                const distributed::Communicator& processes);
+  std::vector<std::size_t> find(std::size_t num_views, const distributed::Communicator& processes);
 
  private:
   void share(const distributed::Communicator& processes);

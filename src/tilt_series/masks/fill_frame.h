@@ -42,9 +42,9 @@ void visit_strips(const SampleGrid& grid, double angle_rad, const Visit& visit) 
   const double centre_row = 0.5 * static_cast<double>(grid.rows - 1);
   std::size_t index = 0;
   for (std::int64_t row = 0; row < grid.rows; ++row) {
-    const auto start = static_cast<float>(
-        middle + (static_cast<double>(row) - centre_row) * std::sin(angle_rad) -
-        centre_column * std::cos(angle_rad));
+    const auto start =
+        static_cast<float>(middle + (static_cast<double>(row) - centre_row) * std::sin(angle_rad) -
+                           centre_column * std::cos(angle_rad));
     for (std::int64_t column = 0; column < grid.columns; ++column, ++index) {
       visit(index, static_cast<std::size_t>(start + along_x * static_cast<float>(column)));
     }

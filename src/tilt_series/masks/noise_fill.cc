@@ -4,157 +4,63 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "base/percentile.h"
 #include "tilt_series/binning.h"
+#include "tilt_series/masks/correlation.h"
 
 namespace tomofield::tilt_series {
 namespace {
 
-constexpr std::int64_t kSmallestImage_px = 64;
-constexpr double kLargestImage_px = 512.0;
-constexpr std::int64_t kNear_px = 2;       // pixels around whose correlation counts
-constexpr std::int64_t kLocalMean_px = 10;  // reach of the mean that is subtracted
-constexpr int kBlocks = 8;                 // a side, of the image's middle
-constexpr double kMiddleBegins = 0.15;     // of the image's sides
+constexpr std::int64_t kSmallestImage_px = 128;
+constexpr double kLargestImage_px = 2048.0;  // a side; larger ones are binned
+constexpr double kMostCells = 512.0;         // a side
+constexpr int kBlocks = 8;                   // a side, of the image's middle
+constexpr double kMiddleBegins = 0.15;       // of the image's sides
 constexpr double kWeakestPercent = 25.0;
-constexpr double kMostNoises = 4.0;   // of one product
-constexpr double kVoteScale = 16.0;   // a noise
-constexpr double kClear = 8.0;        // standard errors
-constexpr double kMaxInFill = 0.2;    // correlation, relative to the image's
+constexpr double kLevel = 0.7;       // of the image's correlation, above which a product is image
+constexpr double kVoteScale = 16.0;  // a noise
+constexpr double kClear = 8.0;       // standard errors
+constexpr double kMaxInFill = 0.5;   // correlation, relative to the image's
 constexpr double kMinWithin = 0.5;
-constexpr int kSegments = 8;  // of a side
-constexpr double kMinSegments = 0.75;
-constexpr double kMinLength = 0.9;     // of all sides, relative to the image's shorter one
-constexpr double kMaxStep = 0.5;       // of the mean, in standard deviations of the image
-constexpr double kMaxVariances = 2.0;  // ratio of fill and image, either way
-constexpr std::int64_t kEdge_px = 4;
+constexpr int kSegments = 8;          // of a side
+constexpr int kMinSegments = 5;       // that are clearly correlated
+constexpr double kWhite = 0.15;       // as good as none
+constexpr int kMaxWhiteSegments = 1;  // within a side
+constexpr double kMinLength = 0.9;    // of all sides, relative to the image's shorter one
+constexpr double kMaxStep = 0.5;      // of the mean, in standard deviations of the image
+constexpr double kMinVariance = 0.5;  // of fill, relative to the image within
+constexpr double kMaxVariance = 4.0;
+constexpr std::int64_t kEdge_cells = 4;
 constexpr std::int64_t kBlurredStrips = 3;
 constexpr std::int64_t kJudgedStrips = 12;
-constexpr double kBlur_px = 2.0;  // binned
+constexpr double kBlur_cells = 2.0;
 
-/// Sums over the boxes of pixels within `reach` of each pixel, and their counts.
-struct BoxSums {
-  std::vector<double> values;
-  std::vector<std::int32_t> counts;
-};
-
-/// Adds up runs of 2 · reach + 1 elements around each element, `stride` apart.
-template <typename T>
-void run_sums(std::vector<T>* values, std::size_t first, std::size_t stride, std::int64_t count,
-              std::int64_t reach) {
-  std::vector<T> line;
-  const auto at = [&](std::int64_t i) { return first + static_cast<std::size_t>(i) * stride; };
-  for (std::int64_t i = 0; i < count; ++i) line.push_back((*values)[at(i)]);
-  T sum{};
-  for (std::int64_t i = 0; i < std::min(reach, count); ++i) sum += line[static_cast<std::size_t>(i)];
-  for (std::int64_t i = 0; i < count; ++i) {
-    if (i + reach < count) sum += line[static_cast<std::size_t>(i + reach)];
-    if (i - reach > 0) sum -= line[static_cast<std::size_t>(i - reach - 1)];
-    (*values)[at(i)] = sum;
-  }
+SampleGrid grid_of(const Correlation& pixels, double step_px) {
+  return {pixels.image.width, pixels.image.height, step_px};
 }
-
-BoxSums box_sums(const MaskedImage& image, std::int64_t reach) {
-  BoxSums sums{{image.values.begin(), image.values.end()}, {image.valid.begin(), image.valid.end()}};
-  for (std::int64_t y = 0; y < image.height; ++y) {
-    run_sums(&sums.values, image.index(0, y), 1, image.width, reach);
-    run_sums(&sums.counts, image.index(0, y), 1, image.width, reach);
-  }
-  const auto width = static_cast<std::size_t>(image.width);
-  for (std::int64_t x = 0; x < image.width; ++x) {
-    run_sums(&sums.values, image.index(x, 0), width, image.height, reach);
-    run_sums(&sums.counts, image.index(x, 0), width, image.height, reach);
-  }
-  return sums;
-}
-
-/// What tells noise from image at each pixel.
-struct Evidence {
-  MaskedImage image;            // binned
-  std::vector<float> detail;    // less a local mean
-  std::vector<float> products;  // with the mean of the pixels around, clipped
-  std::vector<std::uint8_t> known;
-  double product_noise = 0.0;  // standard deviation of a product of white noise
-
-  SampleGrid grid(double bin_factor) const { return {image.width, image.height, bin_factor}; }
-};
-
-double median_square(const std::vector<float>& values, const std::vector<std::uint8_t>& valid) {
-  std::vector<float> squares;
-  for (std::size_t i = 0; i < values.size(); ++i)
-    if (valid[i]) squares.push_back(values[i] * values[i]);
-  return squares.empty() ? 0.0 : base::percentile(std::move(squares), 50.0);
-}
-
-Evidence gather_evidence(MaskedImage binned) {
-  Evidence evidence;
-  evidence.image = std::move(binned);
-  const MaskedImage& image = evidence.image;
-  const BoxSums local = box_sums(image, kLocalMean_px);
-  MaskedImage detail = image;
-  for (std::size_t i = 0; i < detail.values.size(); ++i)
-    if (image.valid[i]) detail.values[i] -= static_cast<float>(local.values[i] / local.counts[i]);
-  const BoxSums around = box_sums(detail, kNear_px);
-  constexpr double kMedianOfSquare = 0.4549;  // of a normal distribution of variance 1
-  constexpr double kNumAround = (2 * kNear_px + 1) * (2 * kNear_px + 1) - 1;
-  const double variance = median_square(detail.values, image.valid) / kMedianOfSquare;
-  evidence.product_noise = variance / std::sqrt(kNumAround);
-  const double most = kMostNoises * evidence.product_noise;
-  for (std::size_t i = 0; i < detail.values.size(); ++i) {
-    const double own = detail.values[i], others = around.values[i] - own;
-    evidence.known.push_back(image.valid[i] && around.counts[i] > kNumAround / 2);
-    const double product = own * others / std::max(around.counts[i] - 1, 1);
-    evidence.products.push_back(static_cast<float>(std::clamp(product, -most, most)));
-  }
-  evidence.detail = std::move(detail.values);
-  return evidence;
-}
-
-/// Adds up what some pixels have.
-struct Sum {
-  double products = 0.0, values = 0.0, squares = 0.0, variance = 0.0, count = 0.0;
-
-  void add(const Evidence& evidence, std::size_t index) {
-    if (!evidence.known[index]) return;
-    const double value = evidence.image.values[index], detail = evidence.detail[index];
-    products += evidence.products[index];
-    values += value;
-    squares += value * value;
-    variance += detail * detail;
-    count += 1.0;
-  }
-  double product() const { return products / count; }
-  double mean() const { return values / count; }
-  double deviation() const {
-    return std::sqrt(std::max(0.0, squares / count - mean() * mean()));
-  }
-  /// Returns the standard error of product(); each pair of pixels is in two products.
-  double error(const Evidence& evidence) const {
-    return std::numbers::sqrt2 * evidence.product_noise / std::sqrt(count);
-  }
-};
 
 /// Returns the mean product that three quarters of the blocks of the image's middle exceed, or 0 if
 /// that is not clear of noise.
-double weak_product(const Evidence& evidence) {
+double weak_product(const Correlation& pixels) {
   const auto first_of = [](std::int64_t size, int block) {
     const double part = kMiddleBegins + (1.0 - 2.0 * kMiddleBegins) * block / kBlocks;
     return static_cast<std::int64_t>(part * static_cast<double>(size));
   };
-  const MaskedImage& image = evidence.image;
+  const MaskedImage& image = pixels.image;
   std::vector<float> products;
   double error = 0.0;
   for (int row = 0; row < kBlocks; ++row) {
     for (int column = 0; column < kBlocks; ++column) {
-      Sum sum;
+      CorrelationSum sum;
       for (std::int64_t y = first_of(image.height, row); y < first_of(image.height, row + 1); ++y)
         for (std::int64_t x = first_of(image.width, column); x < first_of(image.width, column + 1);
              ++x)
-          sum.add(evidence, image.index(x, y));
-      if (sum.count == 0.0) continue;
+          sum.add(pixels, image.index(x, y));
+      if (sum.count() == 0.0) continue;
       products.push_back(static_cast<float>(sum.product()));
-      error = std::max(error, sum.error(evidence));
+      error = std::max(error, sum.error(pixels));
     }
   }
   if (products.empty()) return 0.0;
@@ -163,123 +69,143 @@ double weak_product(const Evidence& evidence) {
 }
 
 /// Tells whether one of the image's four edges is uncorrelated, as it is where fill begins there.
-bool has_uncorrelated_edge(const Evidence& evidence, double weak) {
-  std::array<Sum, 4> edges;
-  const MaskedImage& image = evidence.image;
+bool has_uncorrelated_edge(const Correlation& pixels, double weak) {
+  std::array<CorrelationSum, 4> edges;
+  const MaskedImage& image = pixels.image;
   for (std::int64_t y = 0; y < image.height; ++y) {
     for (std::int64_t x = 0; x < image.width; ++x) {
       const std::array<std::int64_t, 4> depth{x, y, image.width - 1 - x, image.height - 1 - y};
       for (std::size_t edge = 0; edge < edges.size(); ++edge)
-        if (depth[edge] < kEdge_px) edges[edge].add(evidence, image.index(x, y));
+        if (depth[edge] < kEdge_cells) edges[edge].add(pixels, image.index(x, y));
     }
   }
-  return std::any_of(edges.begin(), edges.end(), [&](const Sum& edge) {
-    return edge.product() < 0.5 * weak + edge.error(evidence);
+  return std::any_of(edges.begin(), edges.end(), [&](const CorrelationSum& edge) {
+    return edge.product() < 0.5 * weak + edge.error(pixels);
   });
 }
 
-std::vector<int> vote(const Evidence& evidence, double weak) {
+std::vector<int> vote(const Correlation& pixels, double weak) {
   std::vector<int> votes;
-  for (std::size_t i = 0; i < evidence.products.size(); ++i) {
-    const double vote = (0.5 * weak - evidence.products[i]) * kVoteScale / evidence.product_noise;
-    votes.push_back(evidence.known[i] ? static_cast<int>(std::lround(vote)) : 0);
+  for (std::size_t i = 0; i < pixels.products.values.size(); ++i) {
+    const double vote = (kLevel * weak - pixels.products.values[i]) * kVoteScale / pixels.noise;
+    votes.push_back(pixels.image.valid[i] ? static_cast<int>(std::lround(vote)) : 0);
   }
   return votes;
 }
+
+/// Some strips along a side, in segments along it.
+struct Band {
+  std::array<CorrelationSum, kSegments> segments;
+  CorrelationSum all;
+};
 
 /// A side, and the pixels on both sides of its edge.
 struct JudgedSide {
   double angle_rad = 0.0;
   std::int64_t depth = 0;
-  double length = 0.0;  // pixels in the last strip of fill
-  Sum fill;             // all of it
-  Sum fill_near;        // in the last strips
-  Sum image_near;       // in the first strips
-  std::array<Sum, kSegments> segments;  // of image_near, along the side
+  double length = 0.0;       // cells in the last strip of fill
+  CorrelationSum fill;       // all of it
+  CorrelationSum fill_near;  // the last strips
+  Band image_near;           // the first strips beyond them
 };
 
-JudgedSide judge_side(const Evidence& evidence, const std::vector<int>& votes, double angle_rad) {
-  const SampleGrid grid = evidence.grid(1.0);
-  JudgedSide side{angle_rad, depth_of_fill(grid, votes, angle_rad), {}, {}, {}, {}, {}};
-  if (side.depth == 0) return side;
-  const std::int64_t image_begin = side.depth + kBlurredStrips;
-  const auto position_along = [&](std::size_t index) {
+/// Adds up the strips [begin, end) of a side.
+Band add_up_band(const Correlation& pixels, double angle_rad, std::int64_t begin,
+                 std::int64_t end) {
+  const SampleGrid grid = grid_of(pixels, 1.0);
+  std::vector<std::pair<double, std::size_t>> places;  // along the side
+  visit_strips(grid, angle_rad, [&](std::size_t index, std::size_t strip) {
+    if (static_cast<std::int64_t>(strip) < begin || static_cast<std::int64_t>(strip) >= end) return;
+    if (!pixels.image.valid[index]) return;
     const auto x = static_cast<double>(static_cast<std::int64_t>(index) % grid.columns);
     const auto y = static_cast<double>(static_cast<std::int64_t>(index) / grid.columns);
-    return y * std::cos(angle_rad) - x * std::sin(angle_rad);
-  };
-  std::vector<std::size_t> near;
-  visit_strips(grid, angle_rad, [&](std::size_t index, std::size_t at) {
-    const auto strip = static_cast<std::int64_t>(at);
-    if (strip < side.depth) side.fill.add(evidence, index);
-    if (strip < side.depth && strip >= side.depth - kJudgedStrips)
-      side.fill_near.add(evidence, index);
-    side.length += strip == side.depth - 1 && evidence.known[index];
-    if (strip >= image_begin && strip < image_begin + kJudgedStrips && evidence.known[index])
-      near.push_back(index);
+    places.emplace_back(y * std::cos(angle_rad) - x * std::sin(angle_rad), index);
   });
-  if (near.empty()) return side;
-  double begin = position_along(near.front()), end = begin;
-  for (const std::size_t index : near) {
-    begin = std::min(begin, position_along(index));
-    end = std::max(end, position_along(index));
+  Band band;
+  if (places.empty()) return band;
+  const auto [first, last] = std::minmax_element(places.begin(), places.end());
+  const double length = std::max(last->first - first->first, 1.0), origin = first->first;
+  for (const auto& [place, index] : places) {
+    const int segment = static_cast<int>((place - origin) / length * kSegments);
+    band.segments[static_cast<std::size_t>(std::min(segment, kSegments - 1))].add(pixels, index);
+    band.all.add(pixels, index);
   }
-  for (const std::size_t index : near) {
-    const double part = (position_along(index) - begin) / std::max(end - begin, 1.0);
-    const int segment = std::min(static_cast<int>(part * kSegments), kSegments - 1);
-    side.segments[static_cast<std::size_t>(segment)].add(evidence, index);
-    side.image_near.add(evidence, index);
-  }
+  return band;
+}
+
+JudgedSide judge_side(const Correlation& pixels, const std::vector<int>& votes, double angle_rad) {
+  const SampleGrid grid = grid_of(pixels, 1.0);
+  JudgedSide side{angle_rad, depth_of_fill(grid, votes, angle_rad), 0.0, {}, {}, {}};
+  if (side.depth == 0) return side;
+  visit_strips(grid, angle_rad, [&](std::size_t index, std::size_t strip) {
+    const auto outside = side.depth - static_cast<std::int64_t>(strip);  // 1: the last of the fill
+    if (outside >= 1) side.fill.add(pixels, index);
+    if (outside >= 1 && outside <= kJudgedStrips) side.fill_near.add(pixels, index);
+    side.length += outside == 1 && pixels.image.valid[index];
+  });
+  const std::int64_t image_begin = side.depth + kBlurredStrips;
+  side.image_near = add_up_band(pixels, angle_rad, image_begin, image_begin + kJudgedStrips);
   return side;
 }
 
-bool is_edge_of_image(const Evidence& evidence, const JudgedSide& side, double weak) {
-  int num_correlated = 0;
-  for (const Sum& segment : side.segments)
-    num_correlated += segment.count > 0.0 && segment.product() > kMinWithin * weak;
-  if (num_correlated < kMinSegments * kSegments) return false;
-  Sum all;
-  for (std::size_t i = 0; i < evidence.known.size(); ++i) all.add(evidence, i);
-  if (std::fabs(side.fill_near.mean() - side.image_near.mean()) > kMaxStep * all.deviation())
-    return false;
-  const double ratio = (side.fill_near.variance / side.fill_near.count) /
-                       (side.image_near.variance / side.image_near.count);
-  return ratio < kMaxVariances && ratio > 1.0 / kMaxVariances;
+/// Tells whether pixels have no more correlation than fill may have.
+bool is_uncorrelated(const Correlation& pixels, const CorrelationSum& sum, double weak) {
+  return sum.product() < kMaxInFill * weak + 2.0 * sum.error(pixels);
 }
 
-bool is_uncorrelated(const Evidence& evidence, const Sum& fill, double weak) {
-  return kClear * fill.error(evidence) < weak &&
-         std::fabs(fill.product()) < kMaxInFill * weak + 2.0 * fill.error(evidence);
+/// Tells whether one side of an edge is correlated nearly everywhere, and the other nowhere.
+bool is_edge_of_image(const Correlation& pixels, const JudgedSide& side, double weak) {
+  int num_correlated = 0, num_white = 0;
+  for (const CorrelationSum& segment : side.image_near.segments) {
+    if (segment.count() == 0.0) continue;
+    num_correlated += segment.product() > kMinWithin * weak;
+    num_white += segment.product() < kWhite * weak;
+  }
+  if (num_correlated < kMinSegments || num_white > kMaxWhiteSegments) return false;
+  return is_uncorrelated(pixels, side.fill_near, weak);
+}
+
+/// Tells whether pixels are alike on both sides of an edge but for their correlation.
+bool are_alike(const Correlation& pixels, const JudgedSide& side) {
+  CorrelationSum image;
+  for (std::size_t i = 0; i < pixels.image.valid.size(); ++i) image.add(pixels, i);
+  const CorrelationSum &outside = side.fill_near, &inside = side.image_near.all;
+  if (std::fabs(outside.mean() - inside.mean()) > kMaxStep * image.deviation()) return false;
+  const double ratio = outside.variance() / inside.variance();
+  return ratio > kMinVariance && ratio < kMaxVariance;
 }
 
 }  // namespace
 
 std::vector<FillSide> find_noise_fill(const MaskedImage& image) {
+  if (std::min(image.width, image.height) < kSmallestImage_px) return {};
   const auto larger = static_cast<double>(std::max(image.width, image.height));
   const double bin_factor = std::max(1.0, larger / kLargestImage_px);
-  const Evidence evidence = gather_evidence(reduce_image(image, bin_factor));
-  const std::int64_t shorter = std::min(evidence.image.width, evidence.image.height);
-  if (shorter < kSmallestImage_px) return {};
-  const double weak = weak_product(evidence);
-  if (!(weak > 0.0) || !has_uncorrelated_edge(evidence, weak)) return {};
-  const std::vector<int> votes = vote(evidence, weak);
-  const FillFrame frame = best_frame(evidence.grid(1.0), votes);
+  const double cell_factor = std::max(1.0, larger / bin_factor / kMostCells);
+  Correlation pixels(reduce_image(image, bin_factor));
+  pixels.reduce(cell_factor);
+  const double cell_px = bin_factor * cell_factor;
+  const std::int64_t shorter = std::min(pixels.image.width, pixels.image.height);
+  const double weak = weak_product(pixels);
+  if (!(weak > 0.0) || !has_uncorrelated_edge(pixels, weak)) return {};
+  const std::vector<int> votes = vote(pixels, weak);
+  const FillFrame frame = best_frame(grid_of(pixels, 1.0), votes);
   if (frame.votes == 0) return {};
   std::vector<FillSide> sides;
-  Sum fill;
+  CorrelationSum fill;
   double length = 0.0;
   for (const double quarter_rad : {0.0, 0.5, 1.0, 1.5}) {
     const JudgedSide side =
-        judge_side(evidence, votes, frame.rotation_rad + quarter_rad * std::numbers::pi);
-    if (side.depth == 0 || !is_edge_of_image(evidence, side, weak)) continue;
+        judge_side(pixels, votes, frame.rotation_rad + quarter_rad * std::numbers::pi);
+    if (side.depth == 0 || !is_edge_of_image(pixels, side, weak) || !are_alike(pixels, side))
+      continue;
     length += side.length;
-    fill.products += side.fill.products;
-    fill.count += side.fill.count;
-    sides.push_back({side.angle_rad, evidence.grid(bin_factor).offset_px(side.depth),
-                     kBlur_px * bin_factor});
+    fill += side.fill;
+    sides.push_back(
+        {side.angle_rad, grid_of(pixels, cell_px).offset_px(side.depth), kBlur_cells * cell_px});
   }
   if (length < kMinLength * static_cast<double>(shorter)) return {};
-  if (!is_uncorrelated(evidence, fill, weak)) return {};
+  if (kClear * fill.error(pixels) > weak || !is_uncorrelated(pixels, fill, weak)) return {};
   return sides;
 }
 

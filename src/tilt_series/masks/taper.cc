@@ -91,7 +91,7 @@ std::optional<std::int64_t> find_taper(const std::vector<Shell>& sums) {
     ++first;
   const Shell at_fill = mean_of(first, first + 2);
   for (std::int64_t reach = first; reach <= kLongestTaper_px; ++reach) {
-    const Shell here = mean_of(reach, reach + 1), beyond = mean_of(reach + 1, 2 * reach + 9);
+    const Shell here = mean_of(reach, reach + 3), beyond = mean_of(reach + 3, 2 * reach + 11);
     if (here.count < kFewestPixels || beyond.count < kFewestPixels) return std::nullopt;
     if (here.detail < kNearlyAll * beyond.detail) continue;
     const bool is_taper = reach - first >= kShortestTaper_px &&

@@ -9,8 +9,8 @@ namespace tomofield::tilt_series {
 
 /// Marks as no measurements what lies between fill and image if they fade into each other, as
 /// IMOD's TaperAtFill makes them: the image fades to the fill within its edge, or is continued
-/// beyond it. `is_fill` tells which pixels are fill of mean `fill_value`. The values of marked pixels
-/// stay.
+/// beyond it. `is_fill` tells which pixels are fill of mean `fill_value`. The values of marked
+/// pixels stay.
 ///
 /// Detail is the mean size of mixed second differences of neighbouring pixels, as a function of the
 /// distance from the fill. It and the difference from the fill grow from nearly nothing at the fill
