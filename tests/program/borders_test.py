@@ -32,7 +32,8 @@ def images():
     views = []
     for _ in TILTS:
         structure = scipy.ndimage.gaussian_filter(random.normal(size=(HEIGHT, WIDTH)), 3)
-        views.append(100 + structure / structure.std() + random.normal(size=structure.shape))
+        views.append(100 + structure / structure.std()
+                     + 0.5 * random.normal(size=structure.shape))
     return np.array(views)
 
 
