@@ -148,9 +148,14 @@ JudgedSide judge_side(const Correlation& pixels, const std::vector<int>& votes, 
   return side;
 }
 
-/// Tells whether pixels have no more correlation than fill may have.
-bool is_uncorrelated(const Correlation& pixels, const CorrelationSum& sum, double weak) {
+/// Tells whether cells have no more correlation than fill may have, as far as noise lets one see.
+bool may_be_fill(const Correlation& pixels, const CorrelationSum& sum, double weak) {
   return sum.product() < kMaxInFill * weak + 2.0 * sum.error(pixels);
+}
+
+/// Tells whether cells clearly have no more correlation than fill may have.
+bool is_fill(const Correlation& pixels, const CorrelationSum& sum, double weak) {
+  return kClear * sum.error(pixels) < weak && sum.product() < kMaxInFill * weak;
 }
 
 /// Tells whether one side of an edge is correlated nearly everywhere, and the other nowhere.
@@ -162,7 +167,7 @@ bool is_edge_of_image(const Correlation& pixels, const JudgedSide& side, double 
     num_white += segment.product() < kWhite * weak;
   }
   if (num_correlated < kMinSegments || num_white > kMaxWhiteSegments) return false;
-  return is_uncorrelated(pixels, side.fill_near, weak);
+  return may_be_fill(pixels, side.fill_near, weak);
 }
 
 /// Tells whether pixels are alike on both sides of an edge but for their correlation.
@@ -175,6 +180,23 @@ bool are_alike(const Correlation& pixels, const JudgedSide& side) {
   return ratio > kMinVariance && ratio < kMaxVariance;
 }
 
+bool stands(const Correlation& pixels, const JudgedSide& side, double weak) {
+  return side.depth > 0 && is_edge_of_image(pixels, side, weak) && are_alike(pixels, side);
+}
+
+/// Tells whether the sides that stand are together long enough, with fill beyond.
+bool are_convincing(const Correlation& pixels, const std::vector<JudgedSide>& sides, double weak) {
+  CorrelationSum fill;
+  double length = 0.0;
+  for (const JudgedSide& side : sides) {
+    if (!stands(pixels, side, weak)) continue;
+    length += side.length;
+    fill += side.fill;
+  }
+  const std::int64_t shorter = std::min(pixels.image.width, pixels.image.height);
+  return length >= kMinLength * static_cast<double>(shorter) && is_fill(pixels, fill, weak);
+}
+
 }  // namespace
 
 std::vector<FillSide> find_noise_fill(const MaskedImage& image) {
@@ -185,28 +207,24 @@ std::vector<FillSide> find_noise_fill(const MaskedImage& image) {
   Correlation pixels(reduce_image(image, bin_factor));
   pixels.reduce(cell_factor);
   const double cell_px = bin_factor * cell_factor;
-  const std::int64_t shorter = std::min(pixels.image.width, pixels.image.height);
   const double weak = weak_product(pixels);
   if (!(weak > 0.0) || !has_uncorrelated_edge(pixels, weak)) return {};
   const std::vector<int> votes = vote(pixels, weak);
   const FillFrame frame = best_frame(grid_of(pixels, 1.0), votes);
   if (frame.votes == 0) return {};
-  std::vector<FillSide> sides;
-  CorrelationSum fill;
-  double length = 0.0;
+  std::vector<JudgedSide> sides;
   for (const double quarter_rad : {0.0, 0.5, 1.0, 1.5}) {
-    const JudgedSide side =
-        judge_side(pixels, votes, frame.rotation_rad + quarter_rad * std::numbers::pi);
-    if (side.depth == 0 || !is_edge_of_image(pixels, side, weak) || !are_alike(pixels, side))
-      continue;
-    length += side.length;
-    fill += side.fill;
-    sides.push_back(
+    const double angle_rad = frame.rotation_rad + quarter_rad * std::numbers::pi;
+    sides.push_back(judge_side(pixels, votes, angle_rad));
+  }
+  if (!are_convincing(pixels, sides, weak)) return {};
+  std::vector<FillSide> found;
+  for (const JudgedSide& side : sides) {
+    if (!stands(pixels, side, weak) && !is_fill(pixels, side.fill, weak)) continue;
+    found.push_back(
         {side.angle_rad, grid_of(pixels, cell_px).offset_px(side.depth), kBlur_cells * cell_px});
   }
-  if (length < kMinLength * static_cast<double>(shorter)) return {};
-  if (kClear * fill.error(pixels) > weak || !is_uncorrelated(pixels, fill, weak)) return {};
-  return sides;
+  return found;
 }
 
 }  // namespace tomofield::tilt_series

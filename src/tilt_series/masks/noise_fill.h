@@ -24,7 +24,8 @@ namespace tomofield::tilt_series {
 /// - The means of both differ by at most half a standard deviation of the image, and the variances
 ///   of their pixels at most by factors of 2 and 4.
 ///
-/// The sides that stand must together be nearly as long as the image's shorter one. Images whose
+/// The sides that stand must together be nearly as long as the image's shorter one. Then the others
+/// are taken as well if their fill is clearly not correlated. Images whose
 /// weakest quarter has no correlation have empty space of their own, or too much noise to tell.
 /// Nothing is found there, and nothing in images below 128 pixels a side.
 std::vector<FillSide> find_noise_fill(const MaskedImage& image);
