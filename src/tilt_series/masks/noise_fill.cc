@@ -80,7 +80,7 @@ bool has_uncorrelated_edge(const Correlation& pixels, double weak) {
     }
   }
   return std::any_of(edges.begin(), edges.end(), [&](const CorrelationSum& edge) {
-    return edge.product() < 0.5 * weak + edge.error(pixels);
+    return edge.product() < kLevel * weak + edge.error(pixels);
   });
 }
 
