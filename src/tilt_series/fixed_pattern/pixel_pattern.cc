@@ -4,55 +4,27 @@
 #include <cmath>
 #include <span>
 
+#include "tilt_series/box_sums.h"
 #include "tilt_series/masks/bad_pixels.h"
 
 namespace tomofield::tilt_series {
 namespace {
 
 constexpr std::int64_t kReach = 2;       // of the pixels around
-constexpr double kFewestAround = 12.0;   // of 24
+constexpr float kFewestAround = 12.0f;   // of 24
 constexpr double kSteps = 16.0;          // a standard deviation
 constexpr double kMostDeviations = 8.0;  // so that one view does not decide
-
-/// Adds up the pixels of 2 · kReach + 1 rows by column.
-struct ColumnSums {
-  std::vector<double> values, counts;
-
-  explicit ColumnSums(std::int64_t width)
-      : values(static_cast<std::size_t>(width)), counts(values.size()) {}
-
-  void add_row(const MaskedImage& image, std::int64_t y, double sign) {
-    if (y < 0 || y >= image.height) return;
-    for (std::size_t x = 0; x < values.size(); ++x) {
-      const std::size_t at = image.index(static_cast<std::int64_t>(x), y);
-      if (!image.valid[at]) continue;
-      values[x] += sign * image.values[at];
-      counts[x] += sign;
-    }
-  }
-};
 
 /// Returns each pixel less the mean of the pixels around it. Pixels with too few measurements
 /// around them are no measurements.
 MaskedImage less_surroundings(const MaskedImage& image) {
+  const std::vector<float> sums = box_sums(image.values, image.width, kReach);
+  const std::vector<float> counts = box_sums(image.valid, image.width, kReach);
   MaskedImage result(image.width, image.height);
-  ColumnSums columns(image.width);
-  for (std::int64_t y = 0; y < kReach; ++y) columns.add_row(image, y, 1.0);
-  for (std::int64_t y = 0; y < image.height; ++y) {
-    columns.add_row(image, y + kReach, 1.0);
-    columns.add_row(image, y - kReach - 1, -1.0);
-    for (std::int64_t x = 0; x < image.width; ++x) {
-      const std::size_t at = image.index(x, y);
-      const auto first = static_cast<std::size_t>(std::max<std::int64_t>(x - kReach, 0));
-      const auto last = static_cast<std::size_t>(std::min(x + kReach, image.width - 1));
-      double sum = -static_cast<double>(image.values[at]), count = -1.0;
-      for (std::size_t column = first; column <= last; ++column) {
-        sum += columns.values[column];
-        count += columns.counts[column];
-      }
-      result.valid[at] = image.valid[at] && count >= kFewestAround;
-      if (result.valid[at]) result.values[at] = static_cast<float>(image.values[at] - sum / count);
-    }
+  for (std::size_t i = 0; i < image.values.size(); ++i) {
+    const float own = image.values[i], around = counts[i] - 1.0f;
+    result.valid[i] = image.valid[i] && around >= kFewestAround;
+    if (result.valid[i]) result.values[i] = own - (sums[i] - own) / around;
   }
   return result;
 }

@@ -29,6 +29,7 @@ HalfPlane beyond(const FillSide& side, const MaskedImage& image) {
 }
 
 void mask_beyond_sides(const std::vector<FillSide>& sides, MaskedImage* image) {
+  if (sides.empty()) return;
   std::vector<HalfPlane> planes;
   for (const FillSide& side : sides) planes.push_back(beyond(side, *image));
   for (std::int64_t y = 0; y < image->height; ++y) {

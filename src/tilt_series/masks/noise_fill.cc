@@ -14,7 +14,7 @@ namespace tomofield::tilt_series {
 namespace {
 
 constexpr std::int64_t kSmallestImage_px = 128;
-constexpr double kLargestImage_px = 2048.0;  // a side; larger ones are binned
+constexpr double kLargestImage_px = 1536.0;  // a side; larger ones are binned
 constexpr double kMostCells = 512.0;         // a side
 constexpr int kBlocks = 8;                   // a side, of the image's middle
 constexpr double kMiddleBegins = 0.15;       // of the image's sides

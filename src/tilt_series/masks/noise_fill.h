@@ -11,7 +11,7 @@ namespace tomofield::tilt_series {
 /// (Correct/GCorrPatchShift.cu), or around a mean. Neighbouring pixels of such fill are not
 /// correlated, while those of an image are (correlation.h).
 ///
-/// Images of more than 2048 pixels a side are binned first, and everything is averaged over cells,
+/// Images of more than 1536 pixels a side are binned first, and everything is averaged over cells,
 /// at most 512 a side. A cell's product counts against fill, and 0.7 of the product that three
 /// quarters of the image's middle exceed counts for it. (AreTomo2 takes pixels from 51 × 51 pixels,
 /// so its fill has the image's structure where that is coarser. More binning would leave nothing
