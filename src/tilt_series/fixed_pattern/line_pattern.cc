@@ -3,62 +3,21 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <numeric>
 #include <utility>
 
 #include "base/percentile.h"
+#include "tilt_series/fixed_pattern/known_mean.h"
 
 namespace tomofield::tilt_series {
 namespace {
 
-constexpr std::int64_t kMedianReach = 7;
-constexpr std::int64_t kFewestAround = 4;  // on each side
 constexpr std::size_t kFewestLines = 64;
 constexpr std::size_t kFirstMove = 8;   // lines: beyond the width of what the median lets pass
 constexpr std::size_t kLastMove = 128;  // enough to know what chance does
 constexpr double kClearOfMoves = 1.5;
 constexpr double kClearOfChance = 8.0;  // standard errors
-
-constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
-
-/// Returns the profile less its running median. Lines count in pairs, one on each side, so that a
-/// slope has no effect where others are missing.
-std::vector<float> without_median(const std::vector<float>& profile) {
-  const std::int64_t size = std::ssize(profile);
-  std::vector<float> result(profile.size(), kMissing), around;
-  const auto value_at = [&](std::int64_t line) { return profile[static_cast<std::size_t>(line)]; };
-  for (std::int64_t line = 0; line < size; ++line) {
-    around.assign(1, value_at(line));
-    for (std::int64_t away = 1; away <= std::min({kMedianReach, line, size - 1 - line}); ++away) {
-      const float before = value_at(line - away), after = value_at(line + away);
-      if (std::isnan(before) || std::isnan(after)) continue;
-      around.push_back(before);
-      around.push_back(after);
-    }
-    if (std::ssize(around) <= 2 * kFewestAround || std::isnan(around.front())) continue;
-    const auto middle = around.begin() + std::ssize(around) / 2;
-    std::nth_element(around.begin(), middle, around.end());
-    result[static_cast<std::size_t>(line)] = value_at(line) - *middle;
-  }
-  return result;
-}
-
-/// Adds up values that may be missing.
-struct Mean {
-  double sum = 0.0, count = 0.0;
-
-  void add(double value) {
-    if (std::isnan(value)) return;
-    sum += value;
-    count += 1.0;
-  }
-  /// Returns the mean, or NaN if there are fewer than `fewest` values.
-  double get(double fewest) const {
-    return count > 0.0 && count >= fewest ? sum / count : static_cast<double>(kMissing);
-  }
-};
 
 /// The profile of a view over the whole length of its lines: medians over the parts, 0 if missing.
 std::vector<double> whole_profile(const LineProfiles& parts) {
@@ -184,7 +143,7 @@ class Agreement {
 
   /// Returns the mean agreement of all parts, and its standard error.
   std::pair<double, double> of_all(std::size_t move) const {
-    Mean mean, squares;
+    KnownMean mean, squares;
     for (std::size_t part = 0; part < kLineParts; ++part) {
       const double value = of_part(part, move);
       mean.add(value);
@@ -218,9 +177,9 @@ double shrunk(double value, double variance) {
 
 /// Returns the mean over groups and parts of a line, shrunk by the variance between parts.
 double pattern_of_line(const std::vector<GroupProfiles>& groups, std::size_t line) {
-  Mean mean, squares;
+  KnownMean mean, squares;
   for (std::size_t part = 0; part < kLineParts; ++part) {
-    Mean of_part;
+    KnownMean of_part;
     for (const GroupProfiles& group : groups) of_part.add(group[part][line]);
     const double value = of_part.get(static_cast<double>(groups.size()));
     mean.add(value);
@@ -254,34 +213,6 @@ void move_pattern(const std::vector<double>& pattern, double strength, LineProfi
 }
 
 }  // namespace
-
-LineProfiles line_profiles(const MaskedImage& image, Lines lines) {
-  const bool are_columns = lines == Lines::kColumns;
-  const auto num_lines = static_cast<std::size_t>(are_columns ? image.width : image.height);
-  const std::int64_t length = are_columns ? image.height : image.width;
-  std::vector<Mean> means(kLineParts * num_lines);
-  for (std::int64_t y = 0; y < image.height; ++y) {
-    for (std::int64_t x = 0; x < image.width; ++x) {
-      const std::size_t at = image.index(x, y);
-      if (!image.valid[at]) continue;
-      const std::int64_t part = (are_columns ? y : x) * std::int64_t{kLineParts} / length;
-      const auto line = static_cast<std::size_t>(are_columns ? x : y);
-      Mean& mean = means[static_cast<std::size_t>(part) * num_lines + line];
-      mean.sum += image.values[at];
-      mean.count += 1.0;
-    }
-  }
-  LineProfiles profiles;
-  const double enough = 0.5 * static_cast<double>(length) / static_cast<double>(kLineParts);
-  for (auto first = means.begin(); first != means.end();
-       first += static_cast<std::ptrdiff_t>(num_lines)) {
-    std::vector<float> profile;
-    for (auto mean = first; mean != first + static_cast<std::ptrdiff_t>(num_lines); ++mean)
-      profile.push_back(static_cast<float>(mean->get(enough)));
-    profiles.push_back(without_median(profile));
-  }
-  return profiles;
-}
 
 std::vector<std::vector<float>> find_line_patterns(std::vector<LineProfiles> views,
                                                    std::span<const int> group_of_view,
