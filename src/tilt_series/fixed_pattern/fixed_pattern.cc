@@ -45,9 +45,14 @@ FixedPatternMetrics measure_pattern(const FixedPattern& pattern) {
 }
 
 std::string describe_pattern(const FixedPatternMetrics& pattern) {
-  return fmt::format(
-      "standard deviation {:.3g} over the columns and {:.3g} over the rows, {} single pixels",
-      pattern.column_deviation, pattern.row_deviation, pattern.num_pixels);
+  std::vector<std::string> parts;
+  if (pattern.column_deviation > 0.0)
+    parts.push_back(
+        fmt::format("columns with standard deviation {:.3g}", pattern.column_deviation));
+  if (pattern.row_deviation > 0.0)
+    parts.push_back(fmt::format("rows with standard deviation {:.3g}", pattern.row_deviation));
+  if (pattern.num_pixels > 0) parts.push_back(fmt::format("{} single pixels", pattern.num_pixels));
+  return fmt::format("{}", fmt::join(parts, ", "));
 }
 
 }  // namespace tomofield::tilt_series

@@ -32,7 +32,7 @@ struct FixedPatternMetrics {
 };
 
 FixedPatternMetrics measure_pattern(const FixedPattern& pattern);
-/// Returns a phrase for the log.
+/// Returns a phrase that names what was found, for the log.
 std::string describe_pattern(const FixedPatternMetrics& pattern);
 
 }  // namespace tomofield::tilt_series
