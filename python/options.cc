@@ -98,6 +98,7 @@ void add_views_and_specimen(Class& options) {
       .def_readwrite("pixel_size_A", &Options::pixel_size_A)
       .def_readwrite("take_log", &Options::take_log)
       .def_readwrite("bead_diameter_nm", &Options::bead_diameter_nm)
+      .def_readwrite("remove_fixed_pattern", &Options::remove_fixed_pattern)
       .def_readwrite("thickness", &Options::thickness)
       .def_readwrite("hand", &Options::hand)
       .def_readwrite("axis_x", &Options::axis_x)

@@ -60,6 +60,7 @@ struct Options {
   Contrast contrast = Contrast::kDark;
   bool take_log = false;  ///< −ln(I / I0) instead of I0 − I; dark contrast only
   std::optional<double> bead_diameter_nm;  ///< of gold beads to find and mask; 0: none
+  bool remove_fixed_pattern = true;        ///< what stays at one place of the detector
 
   // Specimen
   double thickness = 0;          ///< of the tomogram along Z; required

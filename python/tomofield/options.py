@@ -21,6 +21,7 @@ class Options(TypedDict, total=False):
     contrast: Literal["dark", "bright"]
     take_log: bool
     bead_diameter_nm: Optional[float]
+    remove_fixed_pattern: bool
 
     # Specimen
     thickness: float

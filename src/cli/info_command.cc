@@ -91,6 +91,9 @@ void print_series(const tilt_series::TiltSeriesOptions& options) {
   const tilt_series::MaskMetrics& masks = series.mask_metrics();
   fmt::print("  masked           {} beads of {:.3g} nm, {} hot or dead pixels\n", masks.num_beads,
              masks.bead_diameter_A / 10, masks.num_bad_pixels);
+  if (masks.fixed_pattern.is_any()) {
+    fmt::print("  fixed pattern    {}\n", tilt_series::describe_pattern(masks.fixed_pattern));
+  }
   fmt::print("  section  tilt/°  x-tilt/°  noise\n");
   for (std::size_t i = 0; i < series.views().size(); ++i) {
     const tilt_series::View& view = series.views()[i];

@@ -75,6 +75,10 @@ constexpr Row kRows[] = {
      .range = Range::at_least(0),
      .automatic = "estimated with --contrast dark if there clearly are beads, else none",
      .help = "Diameter of the gold beads to find and mask in every view. 0: none"},
+    {.key = "input.remove_fixed_pattern", .flag = "--no-fixed-pattern",
+     MEMBER(Options, remove_fixed_pattern), .group = Group::kMasks,
+     .help = "The detector has no pattern of its own; the program removes nothing that stays at one "
+             "place of all views"},
     {.key = "input.fiducials", .flag = "--fiducials", MEMBER(SeriesFiles, fiducials),
      .group = Group::kMasks,
      .help = "Positions of more beads to mask: IMOD's fiducial model of this stack as text "

@@ -54,6 +54,10 @@ nlohmann::json mask_json(const measurement::Measurement& series) {
   return {{"beads", masks.num_beads},
           {"bead_diameter_nm", masks.bead_diameter_A / 10},
           {"bad_pixels", masks.num_bad_pixels},
+          {"fixed_pattern",
+           {{"column_deviation", masks.fixed_pattern.column_deviation},
+            {"row_deviation", masks.fixed_pattern.row_deviation},
+            {"pixels", masks.fixed_pattern.num_pixels}}},
           {"masked_part", masked_part},
           {"views", views}};
 }

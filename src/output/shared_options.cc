@@ -36,6 +36,7 @@ tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Op
   series.contrast = options.contrast;
   series.take_log = options.take_log;
   series.bead_diameter_nm = options.bead_diameter_nm;
+  series.remove_fixed_pattern = options.remove_fixed_pattern;
   series.resample = options.engine == Engine::kSlab;
   series.scratch_dir = io::scratch_directory(options.output);
   return series;

@@ -6,7 +6,7 @@
 #include "tilt_series/align_image.h"
 #include "tilt_series/binning.h"
 #include "tilt_series/masks/bad_pixels.h"
-#include "tilt_series/masks/flat_fill.h"
+#include "tilt_series/masks/fill.h"
 #include "tilt_series/masks/series_masks.h"
 
 namespace tomofield::tilt_series {
@@ -60,15 +60,17 @@ std::size_t ViewDecoder::memory() const {
   return decoding_memory(static_cast<double>(header.nx * header.ny), plan_.bin_factor);
 }
 
-DecodedView ViewDecoder::decode(std::size_t view, Frames frames) const {
+DecodedView ViewDecoder::decode(std::size_t view, Frames frames, PatternSearch* search) const {
   const std::int64_t section = plan_.views[view].view.section;
   MaskedImage image(stack_.header().nx, stack_.header().ny);
   stack_.read_section(section, image.values);
   DecodedView decoded;
   decoded.census = mask_not_finite(&image);
-  if (!plan_.is_raw) mask_flat_fill(contrast_, &image);
+  if (!plan_.is_raw) mask_fill(contrast_, &image);
   if (mask_) apply_mask(*mask_, section, &image);
   decoded.census.num_bad = mask_bad_pixels(&image);
+  if (search) search->add(view, image);
+  pattern_.remove_from(view, &image);
   if (frames.recorded) decoded.recorded = frames.aligned ? binned(image) : binned(std::move(image));
   if (frames.aligned) decoded.aligned = binned(aligned(std::move(image), view));
   return decoded;

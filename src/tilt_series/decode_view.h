@@ -3,9 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "io/image_stack.h"
 #include "io/mrc.h"
+#include "tilt_series/fixed_pattern/fixed_pattern.h"
+#include "tilt_series/fixed_pattern/pattern_search.h"
 #include "tilt_series/image.h"
 #include "tilt_series/series_plan.h"
 #include "tomofield/options.h"
@@ -44,9 +47,14 @@ class ViewDecoder {
   ViewDecoder(const io::ImageStack& stack, const SeriesPlan& plan, Contrast contrast,
               std::optional<io::MrcReader> mask);
 
+  /// From now on, decode() removes this pattern. No other thread may use the decoder meanwhile.
+  void set_fixed_pattern(FixedPattern pattern) { pattern_ = std::move(pattern); }
+
   /// Reads the section of a view, masks what is no measurement (NaN, infinity, fill, the user's
-  /// mask, hot and dead pixels), aligns and bins it. Throws Error if the stack cannot be read.
-  DecodedView decode(std::size_t view, Frames frames) const;
+  /// mask, hot and dead pixels), removes the fixed pattern, aligns and bins it. The view is added
+  /// to `search` before its pattern is removed, unless that is null. Throws Error if the stack
+  /// cannot be read.
+  DecodedView decode(std::size_t view, Frames frames, PatternSearch* search = nullptr) const;
 
   /// Returns about the bytes that decode() and what is done with its result take.
   std::size_t memory() const;
@@ -65,6 +73,7 @@ class ViewDecoder {
   const SeriesPlan& plan_;
   Contrast contrast_;
   std::optional<io::MrcReader> mask_;
+  FixedPattern pattern_;
 };
 
 }  // namespace tomofield::tilt_series

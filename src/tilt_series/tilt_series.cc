@@ -16,10 +16,13 @@
 #include "io/mrc.h"
 #include "io/scratch_memory.h"
 #include "tilt_series/decode_view.h"
+#include "tilt_series/fixed_pattern/fixed_pattern.h"
+#include "tilt_series/fixed_pattern/pattern_search.h"
 #include "tilt_series/intensity.h"
 #include "tilt_series/masks/series_masks.h"
 #include "tilt_series/noise.h"
 #include "tilt_series/series_plan.h"
+#include "tilt_series/view_check.h"
 #include "tilt_series/view_owner.h"
 #include "tilt_series/view_store.h"
 #include "tilt_series/views_at_once.h"
@@ -27,20 +30,6 @@
 
 namespace tomofield::tilt_series {
 namespace {
-
-constexpr double kMaxPartNotFinite = 0.01;
-
-/// Facts that are checked in a view; integers, to be summed over processes.
-struct ViewCheck {
-  std::int64_t num_not_finite = 0;
-  std::int64_t num_bad = 0;
-  std::int64_t is_constant = 0;
-  std::int64_t has_measurements = 0;
-};
-
-bool has_measurements(const MaskedImage& image) {
-  return std::find(image.valid.begin(), image.valid.end(), 1) != image.valid.end();
-}
 
 bool has_lower_tilt(const View& a, const View& b) { return a.tilt_deg < b.tilt_deg; }
 
@@ -62,6 +51,7 @@ struct TiltSeries::Impl {
   IntensityScale intensity;
   std::vector<double> noise_sigma;
   std::int64_t num_bad_pixels = 0;
+  FixedPatternMetrics fixed_pattern;
   BeadMasks beads;  // without discs until they have been found
 
   // Decoded views of this process, as stored intensities without discs of beads.
@@ -82,7 +72,6 @@ struct TiltSeries::Impl {
 
   /// Decodes every view, checks and measures it.
   void look_over(const distributed::Communicator& processes) {
-    make_stores(processes);
     decode_views(processes);
     if (options.take_log) measure_logarithms(processes);
     find_beads(processes);
@@ -104,6 +93,8 @@ struct TiltSeries::Impl {
     const auto make = [&](std::int64_t view_width, std::int64_t view_height) {
       return std::make_unique<ViewStore>(views.size(), capacity, view_width, view_height, dir);
     };
+    measured.reset();
+    aligned.reset();
     processes.run_collectively([&] {
       if (stores_measured()) measured = make(width, height);
       if (stores_aligned()) aligned = make(decoder.aligned_width(), decoder.aligned_height());
@@ -121,29 +112,47 @@ struct TiltSeries::Impl {
     processes.run_collectively([&] { for_views(what, own, at_once, body); });
   }
 
-  /// Decodes every view once: stores it, refuses what cannot be used, finds I0 and the noise. The
-  /// noise of I0 − I is that of I; only logarithms need I0 first.
+  /// Decodes every view, and once more without a fixed pattern if they have one.
   void decode_views(const distributed::Communicator& processes) {
+    const bool searches =
+        options.remove_fixed_pattern && views.size() >= PatternSearch::kFewestViews;
+    std::optional<PatternSearch> search;
+    if (searches) search.emplace(views.size(), stack->header().nx, stack->header().ny);
+    check(decode_once(searches ? &*search : nullptr, processes), processes);
+    if (!searches) return;
+    FixedPattern pattern = search->find(plan, processes);
+    if (pattern.is_empty()) return;
+    search.reset();
+    fixed_pattern = measure_pattern(pattern);
+    decoder.set_fixed_pattern(std::move(pattern));
+    decode_once(nullptr, processes);
+  }
+
+  /// Decodes every view: stores it, finds I0 and the noise, and adds it to `search`, if there is
+  /// one. The noise of I0 − I is that of I; only logarithms need I0 first.
+  std::vector<ViewCheck> decode_once(PatternSearch* search,
+                                     const distributed::Communicator& processes) {
+    make_stores(processes);
     std::vector<ViewCheck> checks(views.size());
     std::vector<std::vector<float>> block_means(views.size());
     noise_sigma.assign(views.size(), 0.0);
     const base::TraceSpan span("decode views");
     for_own_views("decode views", processes, [&](std::size_t view) {
       const DecodedView decoded = decoder.decode(
-          view, {.recorded = !options.resample, .aligned = options.resample || aligned != nullptr});
+          view, {.recorded = !options.resample, .aligned = options.resample || aligned != nullptr},
+          search);
       const MaskedImage& image = options.resample ? decoded.aligned : decoded.recorded;
       if (measured) measured->write(view, image);
       if (aligned) aligned->write(view, decoded.aligned);
-      const bool is_measured = has_measurements(image);
-      checks[view] = {decoded.census.num_not_finite, decoded.census.num_bad,
-                      decoded.census.is_constant, is_measured};
+      checks[view] = check_view(decoded.census, image);
       if (options.contrast == Contrast::kDark) append_block_means(image, &block_means[view]);
-      if (!options.take_log && is_measured) noise_sigma[view] = estimate_noise_sigma(image);
+      if (!options.take_log && checks[view].has_measurements)
+        noise_sigma[view] = estimate_noise_sigma(image);
     });
-    check(std::move(checks), processes);
     processes.allreduce_sum(std::span(noise_sigma));
     if (options.contrast == Contrast::kDark)
       intensity.empty_beam = estimate_empty_beam(block_means, processes);
+    return checks;
   }
 
   // --------------------------------------------------------------- checking
@@ -159,37 +168,11 @@ struct TiltSeries::Impl {
                             &ViewCheck::is_constant, &ViewCheck::has_measurements);
     processes.run_collectively([&] {
       for (std::size_t view = 0; view < views.size(); ++view) {
-        require_measurements(view, checks[view]);
+        require_usable(checks[view], describe(view), views[view].section + 1,
+                       stack->header().nx * stack->header().ny);
         num_bad_pixels += checks[view].num_bad;
       }
     });
-  }
-
-  void require_measurements(std::size_t view, const ViewCheck& found) const {
-    const auto num_pixels = static_cast<double>(stack->header().nx * stack->header().ny);
-    const double part = static_cast<double>(found.num_not_finite) / num_pixels;
-    if (part > kMaxPartNotFinite) {
-      throw Error(
-          fmt::format("{} has {} NaN or infinite pixels, {:.1f} % of all and more than the "
-                      "1 % that can be left out; repair it or give --exclude {}",
-                      describe(view), found.num_not_finite, 100.0 * part, views[view].section + 1));
-    }
-    if (found.is_constant) {
-      throw Error(
-          fmt::format("{} is constant: every pixel has the same value; leave it out with "
-                      "--exclude {}",
-                      describe(view), views[view].section + 1));
-    }
-    if (!found.has_measurements) {
-      throw Error(
-          fmt::format("{} has no pixel left: its alignment moves it out of the view, it is all "
-                      "flat fill, or --mask is zero all over it; leave it out with --exclude {}",
-                      describe(view), views[view].section + 1));
-    }
-    if (found.num_not_finite > 0) {
-      base::log_warning(fmt::format("{} has {} NaN or infinite pixels, which are left out",
-                                    describe(view), found.num_not_finite));
-    }
   }
 
   void log_series() const {
@@ -200,6 +183,8 @@ struct TiltSeries::Impl {
                     std::min_element(views.begin(), views.end(), has_lower_tilt)->tilt_deg,
                     std::max_element(views.begin(), views.end(), has_lower_tilt)->tilt_deg,
                     plan.angle_source, width, height, plan.pixel_size_A * plan.bin_factor));
+    if (fixed_pattern.is_any())
+      base::log_info("fixed pattern removed: " + describe_pattern(fixed_pattern));
   }
 
   // -------------------------------------------------------------- measuring
@@ -246,6 +231,7 @@ struct TiltSeries::Impl {
     bead_views.at_once = views_at_once(decoder.memory(), processes);
     beads = find_bead_masks(options, plan, *stack, bead_views, processes);
     beads.metrics.num_bad_pixels = num_bad_pixels;
+    beads.metrics.fixed_pattern = fixed_pattern;
     aligned.reset();
     if (options.resample) return;
     for (std::size_t view = 0; view < views.size(); ++view) {

@@ -11,6 +11,7 @@
 #include "distributed/communicator.h"
 #include "geometry/raw_from_aligned.h"
 #include "io/image_stack.h"
+#include "tilt_series/fixed_pattern/fixed_pattern.h"
 #include "tomofield/options.h"
 
 namespace tomofield::tilt_series {
@@ -41,6 +42,8 @@ struct TiltSeriesOptions {
   /// Diameter of the gold beads that are looked for and masked; 0: none are. Without it, the
   /// diameter is estimated in dark series, and nothing is looked for in bright ones.
   std::optional<double> bead_diameter_nm;
+  /// Whether what stays at one place of the detector in all views is found and removed.
+  bool remove_fixed_pattern = true;
 };
 
 /// Counts of what was masked beside the fill of rotated images.
@@ -50,6 +53,7 @@ struct MaskMetrics {
   std::vector<std::size_t> beads_found;   ///< [view]: beads with a spot of their own
   std::vector<std::size_t> beads_masked;  ///< [view]: discs, also from tracks and --fiducials
   std::int64_t num_bad_pixels = 0;        ///< hot and dead pixels of all sections
+  FixedPatternMetrics fixed_pattern;      ///< what was removed from all views
 };
 
 /// One view of the series.

@@ -122,6 +122,23 @@ def test_results_have_the_bytes_of_one_process(command):
                 == set(map(os.path.basename, glob.glob(os.path.dirname(alone.volume_path) + "/*")))
 
 
+# Each process sees some of the views, and the pattern is what all of them have in common.
+def test_a_fixed_pattern_has_the_bytes_of_one_process(command):
+    random = np.random.default_rng(5)
+    views = 100 + random.normal(size=(len(harness.TILTS), 64, 96)) + random.normal(size=96)
+    views[:, 30, 50] += 3
+    directory = harness.fresh_directory("fixed_pattern")
+    stack, tlt = os.path.join(directory, "a.mrc"), os.path.join(directory, "a.tlt")
+    harness.write_stack(stack, views.astype(np.float32))
+    np.savetxt(tlt, harness.TILTS, fmt="%.1f")
+    alone, shared = fresh_results("pattern_alone"), fresh_results("pattern_shared")
+    harness.succeed(*command(alone, input=[stack, "--tlt", tlt]))
+    succeed(2, *command(shared, input=[stack, "--tlt", tlt]))
+    pattern = metrics(alone)["mask"]["fixed_pattern"]
+    assert pattern["column_deviation"] > 0.5 and pattern["pixels"] == 1, pattern
+    assert shared.same_as(alone) and metrics(shared) == metrics(alone)
+
+
 # Three bands of 64 rows, the last of which is not full, are six pairs of slabs. Each of two processes
 # works on three of them: the first one begins a band that the second one owns.
 def test_a_divided_band_has_the_bytes_of_one_process(command):

@@ -10,7 +10,7 @@
 #include "io/alignment_files.h"
 #include "io/mrc.h"
 #include "shared_data.h"
-#include "tilt_series/masks/flat_fill.h"
+#include "tilt_series/masks/fill.h"
 
 namespace tomofield::tilt_series {
 namespace {
@@ -148,7 +148,7 @@ struct SharedSeries {
     views.read = [this, contrast, stride](std::size_t view) {
       MaskedImage image(stack.header().nx, stack.header().ny);
       stack.read_section(static_cast<std::int64_t>(view) * stride, image.values);
-      mask_flat_fill(contrast, &image);
+      mask_fill(contrast, &image);
       if (contrast == Contrast::kDark) {
         for (float& value : image.values) value = -value;
       }

@@ -105,7 +105,7 @@ void append_strip(const MaskedImage& image, float value, bool is_rows, bool from
 
 }  // namespace
 
-std::int64_t mask_constant_fill(Contrast contrast, MaskedImage* image) {
+void mask_constant_fill(Contrast contrast, MaskedImage* image) {
   const float empty = empty_value(contrast, *image);
   RegionFinder finder(*image);
   std::vector<std::size_t> fill;
@@ -121,13 +121,7 @@ std::int64_t mask_constant_fill(Contrast contrast, MaskedImage* image) {
     append_strip(*image, empty, is_rows, false, &fill);
     append_strip(*image, empty, is_rows, true, &fill);
   }
-  std::int64_t num_marked = 0;
-  for (const std::size_t at : fill) {
-    num_marked += image->valid[at];
-    image->valid[at] = 0;
-    image->values[at] = 0.0f;
-  }
-  return num_marked;
+  for (const std::size_t at : fill) image->valid[at] = 0;
 }
 
 }  // namespace tomofield::tilt_series

@@ -14,8 +14,8 @@ namespace tomofield::tilt_series {
 /// Space without specimen looks the same where there is no noise. A region at
 /// its value (the smallest of a bright image, the largest of a dark one) is
 /// therefore kept, except for whole rows or columns at the edge that end at a
-/// line of differing pixels, as a shift leaves them. Returns the number of
-/// pixels marked.
-std::int64_t mask_constant_fill(Contrast contrast, MaskedImage* image);
+/// line of differing pixels, as a shift leaves them. The values of marked
+/// pixels stay.
+void mask_constant_fill(Contrast contrast, MaskedImage* image);
 
 }  // namespace tomofield::tilt_series

@@ -13,7 +13,6 @@ constexpr std::int64_t kRim_px = 2;  // often blurred, never looked at
 constexpr std::int64_t kCorner_px = 8;
 constexpr std::int64_t kMaxSamples = 512;  // a side
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kMaxRotation_deg = 15.0;
 constexpr int kPenalty = 10;         // so fill is strips with > 10/11 of it
 constexpr double kMaxSpread = 0.3;   // of a corner, in standard deviations of the image
 constexpr double kMinDarker = 0.05;  // part of a bright image that is darker than fill
@@ -23,17 +22,15 @@ constexpr double kMaxAlikeOneSide = 0.85;   // beside others that are clear
 constexpr double kMaxRoughness = 0.85;      // relative to the rest of the image
 constexpr std::int64_t kBlurredStrips = 4;  // between fill and what is judged within
 constexpr std::int64_t kJudgedStrips = 8;
+// Sides are found where 5 × 5 means stop being flat, 2 px before the fill ends,
+// to about 1 px; 2 px of blur come on top.
+constexpr double kEdge_px = 2.0 + 1.0 + 2.0;
 
 /// The box means of an image on a grid of pixels.
 struct Samples {
-  std::int64_t columns = 0;
-  std::int64_t rows = 0;
-  std::int64_t step_px = 1;
+  SampleGrid grid;
   std::vector<float> means;         // [row, column]
   std::vector<std::uint8_t> known;  // whether the whole box was measured
-
-  double centre_column() const { return 0.5 * static_cast<double>(columns - 1); }
-  double centre_row() const { return 0.5 * static_cast<double>(rows - 1); }
 };
 
 struct Statistics {
@@ -68,15 +65,16 @@ Samples take_samples(const MaskedImage& image) {
   constexpr std::int64_t box_px = 2 * kBoxRadius_px + 1;
   const std::int64_t width = image.width - 2 * kRim_px - box_px;
   const std::int64_t height = image.height - 2 * kRim_px - box_px;
-  samples.step_px = std::max<std::int64_t>(1, (std::max(width, height) - 1) / kMaxSamples + 1);
-  samples.columns = width / samples.step_px + 1;
-  samples.rows = height / samples.step_px + 1;
-  const std::int64_t x0 = (image.width - box_px - (samples.columns - 1) * samples.step_px) / 2;
-  const std::int64_t y0 = (image.height - box_px - (samples.rows - 1) * samples.step_px) / 2;
-  for (std::int64_t row = 0; row < samples.rows; ++row) {
-    for (std::int64_t column = 0; column < samples.columns; ++column) {
+  const std::int64_t step_px =
+      std::max<std::int64_t>(1, (std::max(width, height) - 1) / kMaxSamples + 1);
+  const std::int64_t columns = width / step_px + 1, rows = height / step_px + 1;
+  samples.grid = {columns, rows, static_cast<double>(step_px)};
+  const std::int64_t x0 = (image.width - box_px - (columns - 1) * step_px) / 2;
+  const std::int64_t y0 = (image.height - box_px - (rows - 1) * step_px) / 2;
+  for (std::int64_t row = 0; row < rows; ++row) {
+    for (std::int64_t column = 0; column < columns; ++column) {
       const Statistics box =
-          box_statistics(image, x0 + column * samples.step_px, y0 + row * samples.step_px, box_px);
+          box_statistics(image, x0 + column * step_px, y0 + row * step_px, box_px);
       samples.means.push_back(static_cast<float>(box.mean));
       samples.known.push_back(box.num_invalid == 0);
     }
@@ -146,79 +144,6 @@ std::vector<int> vote(const Samples& samples, const std::vector<Statistics>& cor
   return votes;
 }
 
-std::int64_t num_strips(const Samples& samples) {
-  return static_cast<std::int64_t>(std::hypot(samples.columns, samples.rows)) + 3;
-}
-
-/// Calls visit(index of the sample, its strip). Strips are one step wide; the
-/// first is at the far end of the direction opposite to `angle_rad`.
-template <typename Visit>
-void visit_strips(const Samples& samples, double angle_rad, const Visit& visit) {
-  const auto along_x = static_cast<float>(std::cos(angle_rad));
-  const double middle = 0.5 * static_cast<double>(num_strips(samples));
-  std::size_t index = 0;
-  for (std::int64_t row = 0; row < samples.rows; ++row) {
-    const auto start = static_cast<float>(
-        middle + (static_cast<double>(row) - samples.centre_row()) * std::sin(angle_rad) -
-        samples.centre_column() * std::cos(angle_rad));
-    for (std::int64_t column = 0; column < samples.columns; ++column, ++index) {
-      visit(index, static_cast<int>(start + along_x * static_cast<float>(column)));
-    }
-  }
-}
-
-/// The largest sum over the first elements of a sequence, and how many these are.
-struct Beginning {
-  std::int64_t sum = 0;
-  std::int64_t length = 0;
-};
-
-template <typename Iterator>
-Beginning best_beginning(Iterator first, Iterator last) {
-  Beginning best;
-  std::int64_t sum = 0, length = 0;
-  for (Iterator at = first; at != last; ++at) {
-    sum += *at;
-    ++length;
-    if (sum > best.sum) best = {sum, length};
-  }
-  return best;
-}
-
-/// Counts the votes for a rectangle at this rotation with the best four offsets.
-std::int64_t score_rotation(const Samples& samples, const std::vector<int>& votes,
-                            double rotation_rad) {
-  std::int64_t score = 0;
-  for (const double angle_rad : {rotation_rad, rotation_rad + 90.0 * kDegree}) {
-    std::vector<int> strips(static_cast<std::size_t>(num_strips(samples)));
-    visit_strips(samples, angle_rad,
-                 [&](std::size_t index, int strip) { strips[strip] += votes[index]; });
-    score += best_beginning(strips.begin(), strips.end()).sum;
-    score += best_beginning(strips.rbegin(), strips.rend()).sum;
-  }
-  return score;
-}
-
-struct Rotation {
-  double angle_rad = 0.0;
-  std::int64_t score = 0;
-};
-
-Rotation best_rotation(const Samples& samples, const std::vector<int>& votes) {
-  Rotation best;
-  const auto try_around = [&](double middle_rad, double reach_rad, double step_rad) {
-    const auto num_steps = std::lround(reach_rad / step_rad);
-    for (std::int64_t i = -num_steps; i <= num_steps; ++i) {
-      const double angle_rad = middle_rad + static_cast<double>(i) * step_rad;
-      const std::int64_t score = score_rotation(samples, votes, angle_rad);
-      if (score > best.score) best = {angle_rad, score};
-    }
-  };
-  try_around(0.0, kMaxRotation_deg * kDegree, 1.0 * kDegree);
-  try_around(best.angle_rad, 0.9 * kDegree, 0.1 * kDegree);
-  return best;
-}
-
 /// A side as it was found, in strips.
 struct FoundSide {
   double angle_rad = 0.0;
@@ -228,18 +153,17 @@ struct FoundSide {
 };
 
 FoundSide find_side(const Samples& samples, const std::vector<int>& votes, double angle_rad) {
-  const auto size = static_cast<std::size_t>(num_strips(samples));
-  std::vector<int> sums(size), num_known(size), num_alike(size);
-  visit_strips(samples, angle_rad, [&](std::size_t index, int strip) {
-    sums[strip] += votes[index];
+  const std::int64_t num_strips = samples.grid.num_strips();
+  std::vector<int> num_known(static_cast<std::size_t>(num_strips)), num_alike(num_known.size());
+  visit_strips(samples.grid, angle_rad, [&](std::size_t index, std::size_t strip) {
     num_known[strip] += votes[index] != 0;
     num_alike[strip] += votes[index] == 1;
   });
-  FoundSide side{angle_rad, best_beginning(sums.begin(), sums.end()).length};
+  FoundSide side{angle_rad, depth_of_fill(samples.grid, votes, angle_rad)};
   if (side.depth == 0) return side;
   side.length = num_known[static_cast<std::size_t>(side.depth - 1)];
-  const std::int64_t first = std::min(side.depth + kBlurredStrips, num_strips(samples));
-  const std::int64_t last = std::min(first + kJudgedStrips, num_strips(samples));
+  const std::int64_t first = std::min(side.depth + kBlurredStrips, num_strips);
+  const std::int64_t last = std::min(first + kJudgedStrips, num_strips);
   double known = 0.0, alike = 0.0;
   for (auto strip = static_cast<std::size_t>(first); strip < static_cast<std::size_t>(last);
        ++strip) {
@@ -262,15 +186,16 @@ double median_or_zero(std::vector<float>* values) {
 double roughness_of_fill(const Samples& samples, const std::vector<FoundSide>& sides) {
   std::vector<std::uint8_t> is_fill(samples.means.size());
   for (const FoundSide& side : sides) {
-    visit_strips(samples, side.angle_rad, [&](std::size_t index, int strip) {
-      if (strip < side.depth) is_fill[index] = 1;
+    visit_strips(samples.grid, side.angle_rad, [&](std::size_t index, std::size_t strip) {
+      if (strip < static_cast<std::size_t>(side.depth)) is_fill[index] = 1;
     });
   }
-  const std::int64_t apart = 2 * kBoxRadius_px / samples.step_px + 1;
+  const auto step_px = static_cast<std::int64_t>(samples.grid.step_px);
+  const std::int64_t apart = 2 * kBoxRadius_px / step_px + 1;
   std::vector<float> in_fill, elsewhere;
-  for (std::int64_t row = 0; row < samples.rows; ++row) {
-    for (std::int64_t column = apart; column < samples.columns; ++column) {
-      const auto right = static_cast<std::size_t>(row * samples.columns + column);
+  for (std::int64_t row = 0; row < samples.grid.rows; ++row) {
+    for (std::int64_t column = apart; column < samples.grid.columns; ++column) {
+      const auto right = static_cast<std::size_t>(row * samples.grid.columns + column);
       const std::size_t left = right - static_cast<std::size_t>(apart);
       if (is_fill[left] != is_fill[right] || !samples.known[left] || !samples.known[right]) {
         continue;
@@ -295,7 +220,7 @@ std::vector<FoundSide> convincing_sides(const Samples& samples, const std::vecto
     length += side.length;
     alike += side.length * side.alike_within;
   }
-  const auto shorter = static_cast<double>(std::min(samples.columns, samples.rows));
+  const auto shorter = static_cast<double>(std::min(samples.grid.columns, samples.grid.rows));
   if (length < kMinLength * shorter || alike > kMaxAlikeWithin * length) return {};
   if (roughness_of_fill(samples, sides) > kMaxRoughness) return {};
   return sides;
@@ -309,25 +234,24 @@ std::vector<FillSide> find_straight_fill(Contrast contrast, const MaskedImage& i
   const Samples samples = take_samples(image);
   const std::vector<Statistics> corners = flat_corners(contrast, image, samples);
   std::vector<std::vector<int>> tried;
-  Rotation best;
+  FillFrame best;
   std::vector<int> best_votes;
   for (const Statistics& corner : corners) {
     const std::vector<int> votes = vote(samples, corners, corner);
     if (std::find(tried.begin(), tried.end(), votes) != tried.end()) continue;
-    const Rotation rotation = best_rotation(samples, votes);
-    if (rotation.score > best.score) {
-      best = rotation;
+    const FillFrame frame = best_frame(samples.grid, votes);
+    if (frame.votes > best.votes) {
+      best = frame;
       best_votes = votes;
     }
     tried.push_back(votes);
   }
-  if (best.score == 0) return {};
+  if (best.votes == 0) return {};
   std::vector<FillSide> sides;
-  const double middle = 0.5 * static_cast<double>(num_strips(samples));
-  const auto step_px = static_cast<double>(samples.step_px);
-  for (const FoundSide& side : convincing_sides(samples, best_votes, best.angle_rad)) {
-    const double offset_px = (static_cast<double>(side.depth) - middle) * step_px;
-    sides.push_back({side.angle_rad, offset_px + step_px - 1.0});  // the next strip may be mixed
+  for (const FoundSide& side : convincing_sides(samples, best_votes, best.rotation_rad)) {
+    // The next strip may be mixed.
+    const double offset_px = samples.grid.offset_px(side.depth + 1) - 1.0;
+    sides.push_back({side.angle_rad, offset_px, kEdge_px});
   }
   return sides;
 }

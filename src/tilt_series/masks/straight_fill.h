@@ -3,16 +3,10 @@
 #include <vector>
 
 #include "tilt_series/image.h"
+#include "tilt_series/masks/fill_frame.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::tilt_series {
-
-/// One straight side of a rotated image. Pixels with x·cos(angle) + y·sin(angle) < offset are fill,
-/// with x and y in pixels from the centre of the pixel grid.
-struct FillSide {
-  double angle_rad = 0.0;
-  double offset_px = 0.0;
-};
 
 /// Finds fill that is flat but not constant, as dither, lossy compression or
 /// filtering after the alignment leave it. There are up to four wedges along the sides
@@ -30,7 +24,7 @@ struct FillSide {
 /// The darkest places of a bright image are space without specimen and never
 /// fill. An image with a whole edge of one value has constant fill or no noise
 /// and is left to constant_fill.h. The result is empty if there is no fill. Offsets are of
-/// the flat part; a mask must add its blurred rim. Images below 64 pixels a
+/// the flat part; a mask must add their blur. Images below 64 pixels a
 /// side have none.
 std::vector<FillSide> find_straight_fill(Contrast contrast, const MaskedImage& image);
 

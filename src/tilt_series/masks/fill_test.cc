@@ -1,4 +1,4 @@
-#include "tilt_series/masks/flat_fill.h"
+#include "tilt_series/masks/fill.h"
 
 #include <gtest/gtest.h>
 
@@ -36,7 +36,7 @@ TEST(ConstantFill, ExactlyTheFillIsMasked) {
   const MaskedImage before = with_fill(100.25f);
   MaskedImage image = before;
   const auto fill = std::count(before.values.begin(), before.values.end(), 100.25f);
-  EXPECT_EQ(mask_flat_fill(Contrast::kDark, &image), fill);
+  EXPECT_EQ(mask_fill(Contrast::kDark, &image), fill);
   for (std::size_t i = 0; i < image.values.size(); ++i) {
     EXPECT_EQ(image.valid[i] == 0, before.values[i] == 100.25f);
   }
@@ -50,16 +50,16 @@ TEST(ConstantFill, SmallRegionsAndRegionsWithoutACornerStay) {
     if (x < 10 && y >= 15 && y < 25) image.values[i] = 7.0f;  // 100 pixels, at an edge
     if (x < 7 && y >= kSize - 9) image.values[i] = 8.0f;      // 63 in a corner
   }
-  EXPECT_EQ(mask_flat_fill(Contrast::kDark, &image), 0);
+  EXPECT_EQ(mask_fill(Contrast::kDark, &image), 0);
 }
 
 TEST(ConstantFill, SpaceWithoutSpecimenIsAMeasurement) {
   MaskedImage dark_is_empty = with_fill(0.0f);
-  EXPECT_EQ(mask_flat_fill(Contrast::kBright, &dark_is_empty), 0);
+  EXPECT_EQ(mask_fill(Contrast::kBright, &dark_is_empty), 0);
   MaskedImage bright_is_empty = with_fill(200.0f);
-  EXPECT_EQ(mask_flat_fill(Contrast::kDark, &bright_is_empty), 0);
+  EXPECT_EQ(mask_fill(Contrast::kDark, &bright_is_empty), 0);
   MaskedImage mean_fill = with_fill(100.25f);
-  EXPECT_GT(mask_flat_fill(Contrast::kBright, &mean_fill), 100);
+  EXPECT_GT(mask_fill(Contrast::kBright, &mean_fill), 100);
 }
 
 TEST(ConstantFill, StripsOfAShiftAreMaskedWhereNoiseBeginsBesideThem) {
@@ -73,8 +73,8 @@ TEST(ConstantFill, StripsOfAShiftAreMaskedWhereNoiseBeginsBesideThem) {
       noisy.values[noisy.index(x, y)] = static_cast<float>(100.0 + random.normal());
     }
   }
-  EXPECT_EQ(mask_flat_fill(Contrast::kBright, &noisy), 3 * kSize + 2 * kSize - 6);
-  EXPECT_EQ(mask_flat_fill(Contrast::kBright, &noiseless), 0);
+  EXPECT_EQ(mask_fill(Contrast::kBright, &noisy), 3 * kSize + 2 * kSize - 6);
+  EXPECT_EQ(mask_fill(Contrast::kBright, &noiseless), 0);
 }
 
 /// A frame of noise and structure, rotated and shifted, in dithered fill.
@@ -122,7 +122,7 @@ MaskedImage render(const Rotated& frame) {
 /// All uncovered pixels are masked, and hardly any other.
 void expect_masked(const Rotated& frame) {
   MaskedImage image = render(frame);
-  mask_flat_fill(Contrast::kDark, &image);
+  mask_fill(Contrast::kDark, &image);
   std::int64_t num_missed = 0, num_lost = 0;
   for (std::int64_t y = 2; y < kHeight - 2; ++y) {
     for (std::int64_t x = 2; x < kWidth - 2; ++x) {
@@ -171,7 +171,7 @@ TEST(StraightFill, LargeImagesAreSampled) {
 TEST(StraightFill, NothingIsMaskedWithoutFill) {
   const Rotated covers_all{.left = -30.0, .right = -30.0, .bottom = -30.0, .top = -30.0};
   MaskedImage image = render(covers_all);
-  EXPECT_EQ(mask_flat_fill(Contrast::kDark, &image), 0);
+  EXPECT_EQ(mask_fill(Contrast::kDark, &image), 0);
 }
 
 TEST(StraightFill, NoisySpaceBesideAStraightSpecimenStays) {
@@ -186,8 +186,8 @@ TEST(StraightFill, NoisySpaceBesideAStraightSpecimenStays) {
           static_cast<float>((is_beyond ? 900.0 : 600.0) + 40.0 * random.normal());
     }
   }
-  EXPECT_EQ(mask_flat_fill(Contrast::kBright, &vacuum), 0);
-  EXPECT_EQ(mask_flat_fill(Contrast::kDark, &ice), 0);
+  EXPECT_EQ(mask_fill(Contrast::kBright, &vacuum), 0);
+  EXPECT_EQ(mask_fill(Contrast::kDark, &ice), 0);
 }
 
 MaskedImage read_section(const io::MrcReader& stack, std::int64_t section) {
@@ -218,7 +218,7 @@ TEST(StraightFill, NoViewOfTheDarkFieldSeriesHas) {
     const io::MrcReader stack(path);
     for (std::int64_t section = 0; section < stack.header().nz; ++section) {
       MaskedImage image = read_section(stack, section);
-      EXPECT_EQ(mask_flat_fill(Contrast::kBright, &image), 0) << name << ' ' << section;
+      EXPECT_EQ(mask_fill(Contrast::kBright, &image), 0) << name << ' ' << section;
     }
   }
 }

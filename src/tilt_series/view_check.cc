@@ -1,0 +1,52 @@
+#include "tilt_series/view_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/log.h"
+#include "tomofield/error.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+constexpr double kMaxPartNotFinite = 0.01;
+
+}  // namespace
+
+bool has_measurements(const MaskedImage& image) {
+  return std::find(image.valid.begin(), image.valid.end(), 1) != image.valid.end();
+}
+
+ViewCheck check_view(const PixelCensus& census, const MaskedImage& image) {
+  return {census.num_not_finite, census.num_bad, census.is_constant, has_measurements(image)};
+}
+
+void require_usable(const ViewCheck& found, const std::string& name, std::int64_t section,
+                    std::int64_t num_pixels) {
+  const double part = static_cast<double>(found.num_not_finite) / static_cast<double>(num_pixels);
+  if (part > kMaxPartNotFinite) {
+    throw Error(
+        fmt::format("{} has {} NaN or infinite pixels, {:.1f} % of all and more than the "
+                    "1 % that can be left out; repair it or give --exclude {}",
+                    name, found.num_not_finite, 100.0 * part, section));
+  }
+  if (found.is_constant) {
+    throw Error(
+        fmt::format("{} is constant: every pixel has the same value; leave it out with "
+                    "--exclude {}",
+                    name, section));
+  }
+  if (!found.has_measurements) {
+    throw Error(
+        fmt::format("{} has no pixel left: its alignment moves it out of the view, it is all "
+                    "flat fill, or --mask is zero all over it; leave it out with --exclude {}",
+                    name, section));
+  }
+  if (found.num_not_finite > 0) {
+    base::log_warning(fmt::format("{} has {} NaN or infinite pixels, which are left out", name,
+                                  found.num_not_finite));
+  }
+}
+
+}  // namespace tomofield::tilt_series

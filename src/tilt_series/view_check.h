@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "tilt_series/decode_view.h"
+#include "tilt_series/image.h"
+
+namespace tomofield::tilt_series {
+
+/// Facts that are checked in a view; integers, to be summed over processes.
+struct ViewCheck {
+  std::int64_t num_not_finite = 0;
+  std::int64_t num_bad = 0;
+  std::int64_t is_constant = 0;
+  std::int64_t has_measurements = 0;
+};
+
+/// Tells whether any pixel is a measurement.
+bool has_measurements(const MaskedImage& image);
+
+ViewCheck check_view(const PixelCensus& census, const MaskedImage& image);
+
+/// Throws Error if a view cannot be used, and warns of pixels that are NaN or infinite. `name`
+/// names the view, `section` is its number counted from 1, and it has `num_pixels` as recorded.
+void require_usable(const ViewCheck& found, const std::string& name, std::int64_t section,
+                    std::int64_t num_pixels);
+
+}  // namespace tomofield::tilt_series
