@@ -1,6 +1,7 @@
 #include "base/memory.h"
 
 #include <fmt/core.h>
+#include <sys/resource.h>
 
 #include <fstream>
 #include <string>
@@ -20,6 +21,12 @@ std::size_t available_memory() {
     }
   }
   return 0;
+}
+
+std::size_t peak_memory() {
+  rusage usage{};
+  if (getrusage(RUSAGE_SELF, &usage) != 0) return 0;
+  return static_cast<std::size_t>(usage.ru_maxrss) << 10;  // Linux counts KiB
 }
 
 void require_memory(std::size_t needed, const char* noun, const char* advice) {

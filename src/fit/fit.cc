@@ -213,8 +213,7 @@ measurement::ViewErrors Fit::held_out_error() const {
   return objective_->held_out_error(weights, options_.fit_view_scale);
 }
 
-measurement::PredictedView Fit::predict_held_out(int view,
-                                                 const measurement::ViewModel& model) const {
+measurement::PredictedView Fit::predict(int view, const measurement::ViewModel& model) const {
   return objective_->predict(view, model);
 }
 

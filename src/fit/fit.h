@@ -80,7 +80,7 @@ class Fit {
   /// Scores the current field on the held-out views. There must be at least one.
   measurement::ViewErrors held_out_error() const;
   /// Predicts a view, scaled by `model`, beside the measured one.
-  measurement::PredictedView predict_held_out(int view, const measurement::ViewModel& model) const;
+  measurement::PredictedView predict(int view, const measurement::ViewModel& model) const;
 
   const field::Field& field() const { return *field_; }
   field::Field& field() { return *field_; }

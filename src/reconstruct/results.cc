@@ -13,6 +13,8 @@
 #include "base/parallel.h"
 #include "base/range.h"
 #include "base/trace.h"
+#include "evaluate/artefacts.h"
+#include "evaluate/field_artefacts.h"
 #include "io/json.h"
 #include "output/metrics.h"
 #include "output/shared_options.h"
@@ -29,7 +31,7 @@ measurement::PredictedView central_view(const fit::Fit& fit, const measurement::
     return std::abs(series.geometry.tilt_deg[static_cast<std::size_t>(view)]);
   });
   const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
-  return fit.predict_held_out(*nearest, model);
+  return fit.predict(*nearest, model);
 }
 
 // Returns the errors of the held-out views. Predicts one of these views if the run writes files.
@@ -45,15 +47,19 @@ nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& se
   return json;
 }
 
+// Returns the rows of the volume that this process works on. The views as recorded of a process
+// that is alone may have other rows.
+base::Range own_rows(const fit::Fit& fit, const measurement::Measurement& series) {
+  const auto num_rows = static_cast<int>(series.roi.height());
+  if (fit.processes().size() == 1) return {0, num_rows};
+  const base::Range slabs = series.rays->own();
+  return {slabs.begin * kernels::kLanes, std::min(slabs.end * kernels::kLanes, num_rows)};
+}
+
 // Returns the rows and the parameters that this process contributes to the volume.
 output::VolumeShare volume_share(const fit::Fit& fit, const measurement::Measurement& series) {
-  const base::Range slabs = series.rays->own();
-  const auto end_row =
-      std::min<std::int64_t>(std::int64_t{slabs.end} * kernels::kLanes, series.roi.height());
   const base::Range leaves = fit.own_leaves();
-  return {fit.processes(),
-          {slabs.begin * kernels::kLanes, static_cast<int>(end_row)},
-          fit.field().offset(leaves.begin),
+  return {fit.processes(), own_rows(fit, series), fit.field().offset(leaves.begin),
           fit.field().offset(leaves.end)};
 }
 
@@ -94,9 +100,12 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   std::optional<measurement::PredictedView> view;
   if (options.fit.hold_out > 0) metrics["held_out"] = score_fit(fit, series, options, view);
   metrics["processes"] = output::processes_json(fit, seconds);
+  const output::VolumeShare share = volume_share(fit, series);
+  const evaluate::FieldArtefacts artefacts =
+      evaluate::find_artefacts(fit.field(), series.roi, share.rows, share.processes);
+  metrics.update(evaluate::artefacts_json(artefacts.speckle, artefacts.faces));
   metrics["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
   const output::ModelInfo info = model_info(series, options);
-  const output::VolumeShare share = volume_share(fit, series);
   const bool writes_files = !options.resolved.output.empty();
   const OutputPaths paths = output_paths(options.resolved.output);
   const distributed::Communicator& processes = share.processes;
