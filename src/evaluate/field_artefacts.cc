@@ -21,14 +21,13 @@ using kernels::kLanes;
 // The voxels that a thread decodes at once, without those around them.
 constexpr std::int64_t kPartVoxels = std::int64_t{1} << 22;
 
-// Sums of the densities of some voxels, of their squares and of their cubes.
+// Sums of the densities of some voxels and of their squares.
 struct Moments {
-  double sum = 0.0, squares = 0.0, cubes = 0.0;
+  double sum = 0.0, squares = 0.0;
 
   Moments& operator+=(const Moments& other) {
     sum += other.sum;
     squares += other.squares;
-    cubes += other.cubes;
     return *this;
   }
 };
@@ -46,13 +45,13 @@ std::vector<Moments> section_moments(const field::Field& field, const field::Ori
       for (const float value : part.values.subspan(static_cast<std::size_t>(s * size),
                                                    static_cast<std::size_t>(size))) {
         const auto density = static_cast<double>(value);
-        sums += {density, density * density, density * density * density};
+        sums += {density, density * density};
       }
       all[static_cast<std::size_t>(part.first_row / kLanes * num_sections + part.first_section +
                                    s)] = sums;
     }
   });
-  processes.allreduce_sum(std::span(all), &Moments::sum, &Moments::squares, &Moments::cubes);
+  processes.allreduce_sum(std::span(all), &Moments::sum, &Moments::squares);
   std::vector<Moments> sections(static_cast<std::size_t>(num_sections));
   for (std::size_t i = 0; i < all.size(); ++i) sections[i % sections.size()] += all[i];
   return sections;
@@ -61,14 +60,6 @@ std::vector<Moments> section_moments(const field::Field& field, const field::Ori
 double deviation_of(const Moments& sums, double count) {
   const double mean = sums.sum / count;
   return std::sqrt(std::max(sums.squares / count - mean * mean, 0.0));
-}
-
-double skewness_of(const Moments& sums, double count) {
-  const double mean = sums.sum / count, deviation = deviation_of(sums, count);
-  if (deviation == 0.0) return 0.0;
-  const double third =
-      sums.cubes / count - 3 * mean * sums.squares / count + 2 * mean * mean * mean;
-  return third / (deviation * deviation * deviation);
 }
 
 // Counts the speckles and sums up the jumps of the slabs of a region. Thread-safe.
@@ -153,7 +144,6 @@ FieldArtefacts find_artefacts(const field::Field& field, const Rectangle& region
   }
   const double count = size * static_cast<double>(box.size[2]);
   found.deviation = deviation_of(whole, count);
-  found.skewness = skewness_of(whole, count);
   add_speckle_and_faces(field, box, region, rows, processes, found);
   return found;
 }

@@ -1,0 +1,156 @@
+#include "reconstruct/warnings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+
+namespace tomofield::reconstruction {
+namespace {
+
+// The limits are from the series of docs/verdict.md. Beside each stand the values of correct series
+// and of those with the fault.
+
+// Rise of the brightness with the rays' length: 0.1 … 11 where the contrast is right, and the
+// opposite where it is wrong. Views that are normalised one by one may have no rise.
+constexpr double kLeastFall = 1.0, kLeastCorrelation = 0.5;
+
+// Tilt order: at least 0.86 for the right angles, and at most 0.71 for shuffled ones. Views that
+// are displaced by more than a twentieth of their width have less than 0.7 too.
+constexpr double kLeastOrder = 0.75;
+
+// Usual displacement in pixels: up to 0.56, along the axis 0.33, for aligned views of which some
+// are off by a pixel; from 1.17 or 0.65 on for unaligned ones.
+constexpr double kMostDisplacement = 1.0, kMostDisplacementY = 0.5;
+
+// Correlation of the displacements with the shifts that were given.
+constexpr double kSameShifts = 0.5;
+
+// Variation at the faces: up to 0.5 where the thickness is right, and from 1.8 on where it is half
+// of that. What a fit cannot explain may gather at the faces as well: the volumes of two real
+// series have 1.7 and 3. Such a series has either almost no noise and so a large residual, or a
+// residual no larger than the noise.
+constexpr double kMostAtFaces = 1.5, kLeastResidual = 1.08, kMostResidual = 20.0;
+
+// Part of the sections that are empty: up to 0.29 where the thickness is right, and from 0.52 on
+// where it is twice that.
+constexpr double kMostEmpty = 0.4;
+
+// Beside the sections that are not empty, the suggested thickness has this part of them.
+constexpr double kRoom = 0.2;
+
+std::optional<Warning> wrong_contrast(const ViewAgreement& views, Contrast given) {
+  const PathEffect& path = views.path;
+  if (path.rise > -kLeastFall || path.correlation > -kLeastCorrelation) return std::nullopt;
+  const bool is_dark = given == Contrast::kDark;
+  return Warning{"contrast",
+                 fmt::format("the contrast seems wrong, because views count as thinner where their "
+                             "rays through the volume are longer: give --contrast {} if dense "
+                             "parts are {} in the stack",
+                             is_dark ? "bright" : "dark", is_dark ? "bright" : "dark")};
+}
+
+std::optional<Warning> shuffled(const ViewAgreement& views) {
+  if (!views.tilt_order || *views.tilt_order >= kLeastOrder) return std::nullopt;
+  return Warning{"tilt-order",
+                 "the angles seem to belong to other views, because neighbours in tilt are no more "
+                 "alike than any views: give one angle a section in the stack's order (--tlt)"};
+}
+
+// Returns where an aligned view would lie if its stack had been aligned before.
+std::array<double, 2> shift_of(const geometry::RawFromAligned& m) {
+  const double determinant = m.m11 * m.m22 - m.m12 * m.m21;
+  return {-(m.m22 * m.shift_x_px - m.m12 * m.shift_y_px) / determinant,
+          -(m.m11 * m.shift_y_px - m.m21 * m.shift_x_px) / determinant};
+}
+
+// Returns the correlation of the views' displacements with the shifts that the alignment applied.
+double correlation_with_shifts(const ViewAgreement& views,
+                               const std::vector<geometry::RawFromAligned>& alignment) {
+  const auto count = static_cast<double>(views.views.size());
+  double both = 0, shifts = 0, displacements = 0;
+  for (const std::size_t axis : {0, 1}) {
+    double mean_shift = 0, mean_displacement = 0;
+    const auto shift = [&](std::size_t i) {
+      return shift_of(alignment[static_cast<std::size_t>(views.views[i])])[axis];
+    };
+    for (std::size_t i = 0; i < views.views.size(); ++i) {
+      mean_shift += shift(i) / count;
+      mean_displacement += views.displacement_px[i][axis] / count;
+    }
+    for (std::size_t i = 0; i < views.views.size(); ++i) {
+      const double a = shift(i) - mean_shift;
+      const double b = views.displacement_px[i][axis] - mean_displacement;
+      both += a * b;
+      shifts += a * a;
+      displacements += b * b;
+    }
+  }
+  return shifts > 0 && displacements > 0 ? both / std::sqrt(shifts * displacements) : 0.0;
+}
+
+std::optional<Warning> misaligned(const ViewAgreement& views,
+                                  const std::vector<geometry::RawFromAligned>& alignment) {
+  const double any = views.usual_displacement_px(), along_y = views.usual_displacement_y_px();
+  // Shuffled angles displace views across the tilt axis, but not along it.
+  const bool has_order = !shuffled(views);
+  if (along_y <= kMostDisplacementY && !(has_order && any > kMostDisplacement)) return std::nullopt;
+  const std::string off =
+      fmt::format("views lie up to {:.1f} pixels from where the tomogram predicts them", any);
+  if (std::ranges::all_of(alignment, &geometry::RawFromAligned::is_identity))
+    return Warning{"unaligned",
+                   fmt::format("the stack seems not to be aligned, because {}: give its transforms "
+                               "(--xf or --aln), or an aligned stack",
+                               off)};
+  if (correlation_with_shifts(views, alignment) > kSameShifts)
+    return Warning{
+        "aligned-twice",
+        fmt::format("the stack seems to be aligned already, because {}, in the direction "
+                    "of the shifts that were given: leave --xf or --aln out, or give the "
+                    "raw stack",
+                    off)};
+  return Warning{"misaligned",
+                 fmt::format("the alignment seems not to belong to the stack, because {}: check "
+                             "that --xf or --aln has a line for each section, in its order",
+                             off)};
+}
+
+std::optional<Warning> thickness_warning(const Verdict& verdict, const GivenInput& input) {
+  const SectionProfile& sections = verdict.sections;
+  const bool is_explained = verdict.residual <= kLeastResidual || verdict.residual >= kMostResidual;
+  if (sections.faces > kMostAtFaces && !is_explained) {
+    return Warning{"thin",
+                   fmt::format("the thickness seems too small, because the density varies {:.1f} "
+                               "times as much at the faces of the volume as in its middle: try "
+                               "--thickness {:.0f}",
+                               sections.faces, 1.5 * input.thickness * input.bin_factor)};
+  }
+  if (sections.faces > kMostAtFaces || sections.empty_part <= kMostEmpty) return std::nullopt;
+  const double filled = (1 - sections.empty_part) * (1 + kRoom) * input.thickness;
+  return Warning{"thick",
+                 fmt::format("{:.0f} % of the volume's sections are almost empty: "
+                             "--thickness {:.0f} would take less time and memory",
+                             100 * sections.empty_part, std::ceil(filled) * input.bin_factor)};
+}
+
+}  // namespace
+
+std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& input) {
+  std::vector<Warning> warnings;
+  const auto add = [&](std::optional<Warning> found) {
+    if (found) warnings.push_back(std::move(*found));
+  };
+  if (verdict.views) {
+    add(wrong_contrast(*verdict.views, input.contrast));
+    const bool is_contrast_wrong = !warnings.empty();
+    add(shuffled(*verdict.views));
+    if (!is_contrast_wrong) add(misaligned(*verdict.views, input.alignment));
+  }
+  if (warnings.empty()) add(thickness_warning(verdict, input));
+  return warnings;
+}
+
+}  // namespace tomofield::reconstruction
