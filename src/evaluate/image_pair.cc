@@ -14,9 +14,9 @@ namespace {
 
 using Spectrum = std::vector<std::complex<float>>;
 
-// Returns the transform of an image without its mean, under the window that fades at the edges.
-// Pixels that one of the images lacks are 0.
-Spectrum spectrum_of(const Image& image, const Image& other, const base::Volume& window) {
+// Returns an image without its mean, under the window that fades at the edges. Pixels that one of
+// the images lacks are 0.
+std::vector<float> windowed(const Image& image, const Image& other, const base::Volume& window) {
   double sum = 0, weight = 0;
   const auto is_there = [&](std::size_t i) {
     return std::isfinite(image.values[i]) && std::isfinite(other.values[i]);
@@ -27,11 +27,10 @@ Spectrum spectrum_of(const Image& image, const Image& other, const base::Volume&
     weight += static_cast<double>(window.data[i]);
   }
   const auto mean = static_cast<float>(weight > 0 ? sum / weight : 0.0);
-  Spectrum spectrum(image.values.size());
-  for (std::size_t i = 0; i < spectrum.size(); ++i)
-    if (is_there(i)) spectrum[i] = window.data[i] * (image.values[i] - mean);
-  transform_volume(window.shape, spectrum);
-  return spectrum;
+  std::vector<float> values(image.values.size());
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (is_there(i)) values[i] = window.data[i] * (image.values[i] - mean);
+  return values;
 }
 
 // Returns the part of a frequency, in cycles over the image, that counts.
@@ -41,18 +40,27 @@ double high_pass(double cycles) {
 }
 
 // Returns the cross-correlation at every displacement; negative ones are at the end of an axis.
+// Both images are transformed together as R + iM: they are real, so their own transforms are R(k) =
+// (F(k) + conj F(−k)) / 2 and M(k) = (F(k) − conj F(−k)) / 2i.
 Spectrum cross_correlation(const Image& reference, const Image& moved) {
   const base::Shape3 shape{moved.width, moved.height, 1};
   const base::Volume window = edge_window(shape);
-  Spectrum product = spectrum_of(moved, reference, window);
-  const Spectrum other = spectrum_of(reference, moved, window);
+  const std::vector<float> real = windowed(reference, moved, window),
+                           imaginary = windowed(moved, reference, window);
+  Spectrum joint, product(real.size());
+  for (std::size_t i = 0; i < real.size(); ++i) joint.emplace_back(real[i], imaginary[i]);
+  transform_volume(shape, joint);
   for (std::int64_t y = 0; y < shape.ny; ++y) {
     for (std::int64_t x = 0; x < shape.nx; ++x) {
       const auto i = static_cast<std::size_t>(y * shape.nx + x);
+      const auto mirrored = static_cast<std::size_t>((shape.ny - y) % shape.ny * shape.nx +
+                                                     (shape.nx - x) % shape.nx);
+      const std::complex<float> f = joint[i], g = std::conj(joint[mirrored]);
+      const std::complex<float> r = 0.5f * (f + g), m = std::complex(0.0f, -0.5f) * (f - g);
       const auto kx = static_cast<double>(signed_frequency(x, shape.nx));
       const auto ky = static_cast<double>(signed_frequency(y, shape.ny));
-      product[i] = std::conj(product[i]) * other[i] *  // the conjugate transforms back
-                   static_cast<float>(high_pass(std::hypot(kx, ky)));
+      // Conjugated, because the transform back is that of the conjugate.
+      product[i] = std::conj(m) * r * static_cast<float>(high_pass(std::hypot(kx, ky)));
     }
   }
   transform_volume(shape, product);

@@ -7,12 +7,14 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "base/parallel.h"
 #include "base/range.h"
 #include "base/trace.h"
+#include "evaluate/artefacts.h"
 #include "io/json.h"
 #include "output/metrics.h"
 #include "output/shared_options.h"
@@ -30,7 +32,7 @@ measurement::PredictedView central_view(const fit::Fit& fit, const measurement::
     return std::abs(series.geometry.tilt_deg[static_cast<std::size_t>(view)]);
   });
   const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
-  return fit.predict(*nearest, model);
+  return fit.predict(std::span(&*nearest, 1), std::span(&model, 1)).front();
 }
 
 nlohmann::json held_out_json(const fit::Fit& fit, const measurement::Measurement& series,
@@ -105,6 +107,7 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   metrics["processes"] = output::processes_json(fit, record.fit_seconds);
   const output::VolumeShare share = volume_share(fit, series);
   Verdict verdict = judge({fit, series, options, record, share.rows}, errors);
+  metrics.update(evaluate::artefacts_json(verdict.artefacts.speckle, verdict.artefacts.faces));
   metrics["verdict"] = verdict_json(verdict);
   metrics["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
   const output::ModelInfo info = model_info(series, options);

@@ -88,7 +88,7 @@ std::string verdict_line(const Verdict& verdict) {
     parts.push_back(fmt::format("speckle {:.3f} %", 100 * *verdict.artefacts.speckle));
   if (verdict.artefacts.faces)
     parts.push_back(fmt::format("faces {:.2f}", verdict.artefacts.faces->both));
-  parts.push_back(fmt::format("{:.0f} s, {:.1f} GiB", verdict.seconds, verdict.peak_GiB));
+  parts.push_back(fmt::format("{:.1f} s, {:.2f} GiB", verdict.seconds, verdict.peak_GiB));
   return fmt::format("verdict: {}", fmt::join(parts, "; "));
 }
 

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <utility>
 
+#include "base/parallel.h"
 #include "base/percentile.h"
 #include "base/trace.h"
 #include "evaluate/image_pair.h"
@@ -89,6 +91,47 @@ class LineFit {
   double n_ = 0, x_ = 0, y_ = 0, xx_ = 0, xy_ = 0, yy_ = 0;
 };
 
+// What is known of a view after it was compared with its prediction.
+struct ComparedView {
+  std::array<double, 2> displacement_px{};
+  double correlation = 0.0;
+  std::vector<double> column_means;
+  Image small;  // without the means of its columns
+};
+
+ComparedView compare(measurement::PredictedView&& both) {
+  const Image measured{both.width, both.height, std::move(both.measured)};
+  const Image predicted{both.width, both.height, std::move(both.predicted)};
+  const std::int64_t block = block_for(measured, kSide);
+  const Image seen = reduced(measured, block), told = reduced(predicted, block);
+  auto displacement = evaluate::displacement(told, seen);
+  for (double& d : displacement) d *= static_cast<double>(block);
+  const Image small = reduced(seen, block_for(seen, kSmallSide));
+  return {displacement, evaluate::correlation(told, seen), evaluate::column_means(measured),
+          evaluate::without_column_means(small)};
+}
+
+std::vector<ComparedView> compare(const fit::Fit& fit, std::span<const int> views) {
+  std::vector<measurement::ViewModel> models;
+  for (const int view : views)
+    models.push_back(fit.progress().views[static_cast<std::size_t>(view)]);
+  std::vector<measurement::PredictedView> predicted = fit.predict(views, models);
+  std::vector<ComparedView> compared(views.size());
+  base::parallel_for("compare views", std::ssize(views), [&](std::int64_t i) {
+    const auto at = static_cast<std::size_t>(i);
+    compared[at] = compare(std::move(predicted[at]));
+  });
+  return compared;
+}
+
+// Returns the number of views of which the images may be in memory together.
+std::size_t views_at_once(const measurement::Measurement& series) {
+  constexpr std::int64_t kBytes = std::int64_t{1} << 26;
+  const std::int64_t of_view =
+      series.geometry.width * series.roi.height() * std::int64_t{2 * sizeof(float)};
+  return static_cast<std::size_t>(std::clamp<std::int64_t>(kBytes / of_view, 1, kViews));
+}
+
 double usual(std::vector<float> values) {
   return values.empty() ? 0.0 : base::percentile(std::move(values), 90);
 }
@@ -115,26 +158,27 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
   found.views = views_by_tilt(series.geometry.tilt_deg);
   LineFit brightness;
   std::vector<Image> small;
-  for (const int view : found.views) {
-    measurement::PredictedView both =
-        fit.predict(view, fit.progress().views[static_cast<std::size_t>(view)]);
-    const Image measured{both.width, both.height, std::move(both.measured)};
-    const Image predicted{both.width, both.height, std::move(both.predicted)};
-    const std::vector<double> means = evaluate::column_means(measured);
-    for (std::size_t x = 0; x < means.size(); ++x)
-      if (std::isfinite(means[x]))
-        brightness.add(ray_length(series, view, static_cast<double>(x) + 0.5, has_margin),
-                       means[x]);
-    const std::int64_t block = block_for(measured, kSide);
-    const Image seen = reduced(measured, block), told = reduced(predicted, block);
-    const auto [dx, dy] = evaluate::displacement(told, seen);
-    found.displacement_px.push_back(
-        {dx * static_cast<double>(block), dy * static_cast<double>(block)});
-    found.correlation.push_back(evaluate::correlation(told, seen));
-    small.push_back(evaluate::without_column_means(reduced(seen, block_for(seen, kSmallSide))));
+  const std::span<const int> views(found.views);
+  const std::size_t at_once = views_at_once(series);
+  for (std::size_t first = 0; first < views.size(); first += at_once) {
+    const std::size_t count = std::min(at_once, views.size() - first);
+    std::vector<ComparedView> compared = compare(fit, views.subspan(first, count));
+    for (std::size_t i = 0; i < count; ++i) {
+      ComparedView& view = compared[i];
+      found.displacement_px.push_back(view.displacement_px);
+      found.correlation.push_back(view.correlation);
+      for (std::size_t x = 0; x < view.column_means.size(); ++x) {
+        if (!std::isfinite(view.column_means[x])) continue;
+        const double length =
+            ray_length(series, views[first + i], static_cast<double>(x) + 0.5, has_margin);
+        brightness.add(length, view.column_means[x]);
+      }
+      small.push_back(std::move(view.small));
+    }
   }
   found.tilt_order = order_of(small);
   found.path = brightness.effect(series.contrast());
+  found.side_px = static_cast<double>(std::max(series.geometry.width, series.roi.height()));
   return found;
 }
 

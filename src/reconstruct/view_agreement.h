@@ -28,6 +28,7 @@ struct ViewAgreement {
   /// near 1 for the angles of the views, near ½ for shuffled ones. None if there are few views.
   std::optional<double> tilt_order;
   PathEffect path;
+  double side_px = 0.0;  ///< longest side of a view, in pixels of the fit
 
   /// Return the displacement that 9 of 10 views stay below, in any direction and along y alone.
   double usual_displacement_px() const;

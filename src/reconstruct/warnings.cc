@@ -18,16 +18,19 @@ namespace {
 // opposite where it is wrong. Views that are normalised one by one may have no rise.
 constexpr double kLeastFall = 1.0, kLeastCorrelation = 0.5;
 
-// Tilt order: at least 0.86 for the right angles, and at most 0.71 for shuffled ones. Views that
-// are displaced by more than a twentieth of their width have less than 0.7 too.
-constexpr double kLeastOrder = 0.75;
+// Tilt order: at least 0.86 for the right angles, and at most 0.71 for shuffled ones. Of views that
+// are displaced by several per cent of their width it is less clear: 0.55 to 0.85.
+constexpr double kLeastOrder = 0.75, kLeastOrderIfDisplaced = 0.6;
 
 // Usual displacement in pixels: up to 0.56, along the axis 0.33, for aligned views of which some
 // are off by a pixel; from 1.17 or 0.65 on for unaligned ones.
-constexpr double kMostDisplacement = 1.0, kMostDisplacementY = 0.5;
+// In larger views than those, as many blocks of pixels count: a raw stack is off by some per cent
+// of its width, and a good alignment of unbinned views by a pixel or more.
+constexpr double kMostDisplacement = 1.0, kMostDisplacementY = 0.5, kSideOfSmallViews = 512;
 
-// Correlation of the displacements with the shifts that were given.
-constexpr double kSameShifts = 0.5;
+// Correlation of the displacements with the shifts that were given: 0.72 to 0.96 for stacks that
+// were aligned before, and up to 0.74 for shifts of another stack of the same size.
+constexpr double kSameShifts = 0.75;
 
 // Variation at the faces: up to 0.5 where the thickness is right, and from 1.8 on where it is half
 // of that. What a fit cannot explain may gather at the faces as well: the volumes of two real
@@ -53,8 +56,19 @@ std::optional<Warning> wrong_contrast(const ViewAgreement& views, Contrast given
                              is_dark ? "bright" : "dark", is_dark ? "bright" : "dark")};
 }
 
+// Returns a limit for small views as it is for these views.
+double scaled(double limit, const ViewAgreement& views) {
+  return limit * std::max(1.0, views.side_px / kSideOfSmallViews);
+}
+
+// Only wrong alignment displaces views along the tilt axis.
+bool is_displaced_along_axis(const ViewAgreement& views) {
+  return views.usual_displacement_y_px() > scaled(kMostDisplacementY, views);
+}
+
 std::optional<Warning> shuffled(const ViewAgreement& views) {
-  if (!views.tilt_order || *views.tilt_order >= kLeastOrder) return std::nullopt;
+  const double least = is_displaced_along_axis(views) ? kLeastOrderIfDisplaced : kLeastOrder;
+  if (!views.tilt_order || *views.tilt_order >= least) return std::nullopt;
   return Warning{"tilt-order",
                  "the angles seem to belong to other views, because neighbours in tilt are no more "
                  "alike than any views: give one angle a section in the stack's order (--tlt)"};
@@ -94,10 +108,11 @@ double correlation_with_shifts(const ViewAgreement& views,
 
 std::optional<Warning> misaligned(const ViewAgreement& views,
                                   const std::vector<geometry::RawFromAligned>& alignment) {
-  const double any = views.usual_displacement_px(), along_y = views.usual_displacement_y_px();
-  // Shuffled angles displace views across the tilt axis, but not along it.
-  const bool has_order = !shuffled(views);
-  if (along_y <= kMostDisplacementY && !(has_order && any > kMostDisplacement)) return std::nullopt;
+  const double any = views.usual_displacement_px();
+  // Shuffled angles displace views across the axis.
+  if (!is_displaced_along_axis(views) &&
+      (shuffled(views) || any <= scaled(kMostDisplacement, views)))
+    return std::nullopt;
   const std::string off =
       fmt::format("views lie up to {:.1f} pixels from where the tomogram predicts them", any);
   if (std::ranges::all_of(alignment, &geometry::RawFromAligned::is_identity))
@@ -114,7 +129,8 @@ std::optional<Warning> misaligned(const ViewAgreement& views,
                     off)};
   return Warning{"misaligned",
                  fmt::format("the alignment seems not to belong to the stack, because {}: check "
-                             "that --xf or --aln has a line for each section, in its order",
+                             "that --xf or --aln has a line for each section, in its order, and "
+                             "that the stack is not aligned already",
                              off)};
 }
 
