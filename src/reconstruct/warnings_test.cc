@@ -90,6 +90,8 @@ TEST(Warnings, ThicknessIsJudgedByTheSections) {
   EXPECT_EQ(codes(verdict), "");
   verdict.residual = 60;  // whatever the model cannot explain
   EXPECT_EQ(codes(verdict), "");
+  verdict.sections.faces = 4.0;
+  EXPECT_EQ(codes(verdict), "thin ");
   verdict.sections = {.faces = 0.1, .empty_part = 0.5};
   const auto thick = find_warnings(verdict, aligned_input());
   ASSERT_EQ(codes(verdict), "thick ");
