@@ -9,18 +9,22 @@
 
 namespace tomofield::base {
 
-// Reads MemAvailable, which Linux reports.
-std::size_t available_memory() {
-  std::ifstream file("/proc/meminfo");
+namespace {
+
+// Returns the bytes of a line "KEY: n kB" of a file in /proc, or 0 if there is none.
+std::size_t bytes_in(const char* path, const std::string& key) {
+  std::ifstream file(path);
   std::string line;
-  constexpr const char* kKey = "MemAvailable:";
-  while (std::getline(file, line)) {
-    if (line.rfind(kKey, 0) == 0) {
-      return std::size_t{std::stoull(line.substr(std::string(kKey).size()))} << 10;
-    }
-  }
+  while (std::getline(file, line))
+    if (line.rfind(key, 0) == 0) return std::size_t{std::stoull(line.substr(key.size()))} << 10;
   return 0;
 }
+
+}  // namespace
+
+std::size_t available_memory() { return bytes_in("/proc/meminfo", "MemAvailable:"); }
+
+std::size_t peak_memory() { return bytes_in("/proc/self/status", "VmHWM:"); }
 
 void require_memory(std::size_t needed, const char* noun, const char* advice) {
   const std::size_t available = available_memory();

@@ -9,6 +9,7 @@
 #include "cli/common_options.h"
 #include "cli/evaluate_options.h"
 #include "cli/help_formatter.h"
+#include "evaluate/artefacts.h"
 #include "evaluate/fsc.h"
 #include "evaluate/reprojection.h"
 #include "evaluate/similarity.h"
@@ -118,6 +119,22 @@ void measure_contrast(const EvaluateArguments& arguments, const base::Volume& vo
   print_contrast(score, regions, chosen);
 }
 
+// Returns the ratio along one axis as text.
+std::string ratio_text(const std::optional<double>& ratio) {
+  return ratio ? fmt::format("{:.4f}", *ratio) : "none";
+}
+
+void measure_artefacts(const EvaluateArguments& arguments, const base::Volume& volume,
+                       Findings& findings) {
+  const evaluate::Artefacts found =
+      evaluate::find_artefacts(volume, arguments.volume, arguments.model);
+  findings.metrics.update(evaluate::artefacts_json(found.speckle, found.faces));
+  if (found.speckle) fmt::print("speckle {:.5f} %\n", 100 * *found.speckle);
+  if (found.faces)
+    fmt::print("face jump {:.4f} (along X {}, along Y {})\n", found.faces->both,
+               ratio_text(found.faces->x), ratio_text(found.faces->y));
+}
+
 // Computes the scores that need the volume alone.
 void examine(const EvaluateArguments& arguments, Findings& findings) {
   const bool has_profile = arguments.profile && !arguments.truth;
@@ -125,8 +142,8 @@ void examine(const EvaluateArguments& arguments, Findings& findings) {
       !arguments.truth && !arguments.fsc_with && !arguments.profile && !arguments.series;
   const bool has_contrast =
       arguments.contrast || !arguments.regions.foreground.empty() || nothing_asked;
-  if (!has_contrast && !has_profile) return;
   const base::Volume volume = evaluate::read_volume(arguments.volume);
+  measure_artefacts(arguments, volume, findings);
   if (has_contrast) measure_contrast(arguments, volume, findings);
   if (!has_profile) return;
   findings.profile_csv = evaluate::profile_csv(

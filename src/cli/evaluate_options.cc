@@ -122,6 +122,15 @@ void add_contrast_options(CLI::App& command, EvaluateArguments& arguments) {
   background->needs(foreground)->group(group);
 }
 
+void add_artefact_options(CLI::App& command, EvaluateArguments& arguments) {
+  command
+      .add_option("--model", arguments.model,
+                  "Model of VOLUME, whose leaves tell where the face jump is measured (default: "
+                  "VOLUME's name with .h5, if that is there)")
+      ->type_name("MODEL.h5")
+      ->group("Speckle and faces");
+}
+
 void add_profile_options(CLI::App& command, EvaluateArguments& arguments) {
   const char* group = "Line profile";
   CLI::Option* line =
@@ -186,7 +195,7 @@ void EvaluateArguments::check() const {
   base::require_no_faults(option_table::range_faults(series_options));
   std::vector<std::filesystem::path> inputs = io::input_files(choices.files), outputs;
   inputs.push_back(volume);
-  for (const auto& file : {truth, fsc_with, fsc_mask, series})
+  for (const auto& file : {truth, fsc_with, fsc_mask, series, model})
     if (file) inputs.push_back(*file);
   for (const auto& file : {json, fsc_csv, fsc_picture, profile_csv})
     if (file) outputs.push_back(*file);
@@ -198,6 +207,7 @@ void add_evaluate_options(CLI::App& command, EvaluateArguments& arguments) {
   add_comparison_options(command, arguments);
   add_fsc_options(command, arguments);
   add_contrast_options(command, arguments);
+  add_artefact_options(command, arguments);
   add_profile_options(command, arguments);
   add_reprojection_options(command, arguments);
   command.add_option("--json", arguments.json, "Write all metrics to this JSON file")

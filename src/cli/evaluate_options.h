@@ -24,6 +24,8 @@ struct EvaluateArguments {
   bool contrast = false;
   evaluate::Regions regions;  ///< empty: chosen automatically
 
+  std::optional<std::filesystem::path> model;  ///< default: the one beside the volume
+
   std::optional<evaluate::LineSegment> profile;
   std::optional<std::filesystem::path> profile_csv;
 

@@ -116,7 +116,8 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
     hooks.progress = make_progress_bar("reconstruct");
     hooks.tune_progress = make_progress_bar("tune");
   }
-  switch (reconstruction::reconstruct(series, options, hooks, processes).outcome) {
+  const auto run = reconstruction::reconstruct(series, options, hooks, processes);
+  switch (run.outcome) {
     case reconstruction::Outcome::kFinished:
       break;
     case reconstruction::Outcome::kStopped:
@@ -130,6 +131,8 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   write_pictures(paths.volume, series, paths.picture_prefix);
   if (options.field.tree == TreeKind::kAdaptive)
     write_tree_picture(paths.model, paths.tree_picture);
+  std::fflush(stdout);  // the verdict comes last
+  reconstruction::log_verdict(run.results->verdict);
 }
 
 }  // namespace tomofield::cli

@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 
+#include "evaluate/artefacts.h"
 #include "evaluate/contrast.h"
 #include "evaluate/fsc.h"
 #include "evaluate/similarity.h"
@@ -41,20 +42,25 @@ std::string boxes_text(const std::vector<base::Box>& boxes) {
   return fmt::format("{}", fmt::join(texts, " and "));
 }
 
-// Adds CNR and ENL, measured on the main method's regions. Returns a sentence that names the
-// regions.
-std::string add_contrast(std::span<const Row> rows, Table& table) {
+// Adds the scores of single volumes: speckle, the face jump of those that have a model, and CNR and
+// ENL on the main method's regions. Returns a sentence that names the regions.
+std::string add_scores_of_volumes(std::span<const Row> rows, Table& table) {
   evaluate::Regions regions;
-  Metrics cnr, enl;
+  Metrics cnr, enl, speckle_percent, face_jump;
   for (const Row& row : rows) {
     const base::Volume volume = evaluate::read_volume(row.volume);
     if (&row == &rows.front()) regions = evaluate::choose_regions(volume);
     const auto score = evaluate::contrast_score(volume, regions);
     cnr.push_back(score.cnr);
     enl.push_back(score.enl);
+    const auto found = evaluate::find_artefacts(volume, row.volume, std::nullopt);
+    speckle_percent.push_back(found.speckle ? std::optional(100 * *found.speckle) : std::nullopt);
+    face_jump.push_back(found.faces ? std::optional(found.faces->both) : std::nullopt);
   }
   table.add({"cnr", "CNR", Better::kHigher, 2}, cnr);
   table.add({"enl", "ENL", Better::kHigher, 1}, enl);
+  table.add({"speckle_percent", "speckle, %", Better::kLower, 3}, speckle_percent);
+  table.add({"face_jump", "face jump", Better::kNeither, 3}, face_jump);
   return fmt::format("CNR and ENL: foreground {}, background {} (x0,y0,z0,x1,y1,z1 in voxels).",
                      boxes_text(regions.foreground), boxes_text(regions.background));
 }
@@ -117,7 +123,7 @@ Scores add_scores(const CompareOptions& options, const std::vector<Purpose>& pur
                         {"fsc_truth_0.5_A", "FSC 0.5 with the truth, Å", Better::kLower, 1},
                         table));
   }
-  scores.remark = add_contrast(volumes, table);
+  scores.remark = add_scores_of_volumes(volumes, table);
   if (options.halves) {
     std::vector<fs::path> even;
     for (const Row& row : rows_for(Purpose::kEvenViews)) even.push_back(row.volume);

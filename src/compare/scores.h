@@ -20,7 +20,8 @@ struct Scores {
 
 /// Adds the columns of scores to a table with a row a method. If there is a truth, these are PSNR,
 /// SSIM and the resolution at which the shell correlation with it falls to 0.5. Contrast (CNR, ENL)
-/// is measured on regions that are chosen on the main method's volume. With halves, the resolution
+/// is measured on regions that are chosen on the main method's volume. Speckle is added, and the
+/// face jump of methods that have leaves. With halves, the resolution
 /// at which their correlation falls to 0.143 is added; with held-out views, their error. `rows` are
 /// [purpose][method].
 Scores add_scores(const CompareOptions& options, const std::vector<Purpose>& purposes,

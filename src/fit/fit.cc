@@ -214,9 +214,9 @@ measurement::ViewErrors Fit::held_out_error() const {
   return objective_->held_out_error(weights, options_.fit_view_scale);
 }
 
-measurement::PredictedView Fit::predict_held_out(int view,
-                                                 const measurement::ViewModel& model) const {
-  return objective_->predict(view, model);
+std::vector<measurement::PredictedView> Fit::predict(
+    std::span<const int> views, std::span<const measurement::ViewModel> models) const {
+  return objective_->predict(views, models);
 }
 
 void Fit::run(const AfterStep& after_step) {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -79,8 +80,10 @@ class Fit {
   double variation_gain() const;
   /// Scores the current field on the held-out views. There must be at least one.
   measurement::ViewErrors held_out_error() const;
-  /// Predicts a view, scaled by `model`, beside the measured one.
-  measurement::PredictedView predict_held_out(int view, const measurement::ViewModel& model) const;
+  /// Predicts some views, each scaled by its model, beside the measured ones. All of them are in
+  /// memory together.
+  std::vector<measurement::PredictedView> predict(
+      std::span<const int> views, std::span<const measurement::ViewModel> models) const;
 
   const field::Field& field() const { return *field_; }
   field::Field& field() { return *field_; }

@@ -77,6 +77,22 @@ SlabSums sums_of_slabs(const projection::SlabSampler& sampler,
   return sums;
 }
 
+// Copies the rows of a slab to a view; `rays` [x, lane] are the predicted ones.
+void copy_slab(const SlabViews& measured, int slab, int view, const ViewModel& model,
+               const float* rays, PredictedView& into) {
+  const std::int64_t rows = std::min<std::int64_t>(kLanes, into.height - slab * kLanes);
+  for (std::int64_t lane = 0; lane < rows; ++lane) {
+    for (std::int64_t x = 0; x < into.width; ++x) {
+      const std::int64_t y = slab * kLanes + lane;
+      const auto at = static_cast<std::size_t>(y * into.width + x);
+      const double p = static_cast<double>(rays[x * kLanes + lane]);
+      into.predicted[at] = static_cast<float>(model.scale * p + model.offset);
+      into.measured[at] = measured.counts(view, x, y) ? measured.ray(view, x, y)
+                                                      : std::numeric_limits<float>::quiet_NaN();
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every) {
@@ -120,35 +136,30 @@ nlohmann::json report_held_out(const ViewErrors& error, const std::vector<double
   return {{"error", error.total}, {"independent", !stopped_by_them}, {"views", views}};
 }
 
-PredictedView predicted_view(const projection::SlabSampler& sampler,
-                             const projection::SlabProjector& projector, const SlabViews& measured,
-                             int view, const ViewModel& model,
-                             const distributed::Communicator& processes) {
+std::vector<PredictedView> predicted_views(const projection::SlabSampler& sampler,
+                                           const projection::SlabProjector& projector,
+                                           const SlabViews& measured, std::span<const int> views,
+                                           std::span<const ViewModel> models,
+                                           const distributed::Communicator& processes) {
   const auto& shape = measured.shape();
   const auto size = static_cast<std::size_t>(shape.width * shape.num_rows);
-  PredictedView result{.width = shape.width,
-                       .height = shape.num_rows,
-                       .measured = std::vector<float>(size),
-                       .predicted = std::vector<float>(size)};
-  Predictor predictor(sampler, projector, std::span(&view, 1));
-  base::parallel_for("predict view", measured.own().size(), [&](std::int64_t s) {
+  std::vector<PredictedView> results(views.size(), {.width = shape.width,
+                                                    .height = shape.num_rows,
+                                                    .measured = std::vector<float>(size),
+                                                    .predicted = std::vector<float>(size)});
+  Predictor predictor(sampler, projector, views);
+  base::parallel_for("predict views", measured.own().size(), [&](std::int64_t s) {
     const int slab = measured.own().begin + static_cast<int>(s);
     const float* rays = predictor.rays_of(slab);
-    const std::int64_t rows = std::min<std::int64_t>(kLanes, shape.num_rows - slab * kLanes);
-    for (std::int64_t lane = 0; lane < rows; ++lane)
-      for (std::int64_t x = 0; x < shape.width; ++x) {
-        const std::int64_t y = slab * kLanes + lane;
-        const auto at = static_cast<std::size_t>(y * shape.width + x);
-        const double p = static_cast<double>(rays[x * kLanes + lane]);
-        result.predicted[at] = static_cast<float>(model.scale * p + model.offset);
-        result.measured[at] = measured.counts(view, x, y) ? measured.ray(view, x, y)
-                                                          : std::numeric_limits<float>::quiet_NaN();
-      }
+    for (std::size_t v = 0; v < views.size(); ++v, rays += shape.width * kLanes)
+      copy_slab(measured, slab, views[v], models[v], rays, results[v]);
     measured.release(slab);
   });
-  processes.allreduce_sum(std::span(result.measured));
-  processes.allreduce_sum(std::span(result.predicted));
-  return result;
+  for (PredictedView& view : results) {
+    processes.allreduce_sum(std::span(view.measured));
+    processes.allreduce_sum(std::span(view.predicted));
+  }
+  return results;
 }
 
 }  // namespace tomofield::measurement

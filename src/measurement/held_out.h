@@ -39,10 +39,10 @@ struct PredictedView {
   std::int64_t width = 0, height = 0;
   std::vector<float> measured, predicted;
 };
-/// Predicts a view, on every process, with the model that it is scored with.
-PredictedView predicted_view(
+/// Predicts some views, on every process, each with its model. All of them are in memory together.
+std::vector<PredictedView> predicted_views(
     const projection::SlabSampler& sampler, const projection::SlabProjector& projector,
-    const SlabViews& measured, int view, const ViewModel& model,
+    const SlabViews& measured, std::span<const int> views, std::span<const ViewModel> models,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
 }  // namespace tomofield::measurement

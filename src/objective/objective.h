@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <span>
+#include <vector>
 
 #include "measurement/held_out.h"
 #include "objective/term.h"
@@ -28,9 +29,9 @@ class Objective {
   /// noise of every view.
   virtual measurement::ViewErrors held_out_error(std::span<const double> noise_weight,
                                                  bool fit_view_scale) const = 0;
-  /// Predicts a view, beside what was measured.
-  virtual measurement::PredictedView predict(int view,
-                                             const measurement::ViewModel& model) const = 0;
+  /// Predicts some views, each with its model, beside what was measured.
+  virtual std::vector<measurement::PredictedView> predict(
+      std::span<const int> views, std::span<const measurement::ViewModel> models) const = 0;
 };
 
 }  // namespace tomofield::objective

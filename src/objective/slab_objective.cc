@@ -302,10 +302,10 @@ measurement::ViewErrors SlabObjective::held_out_error(std::span<const double> no
                                      noise_weight, fit_view_scale, processes_);
 }
 
-measurement::PredictedView SlabObjective::predict(int view,
-                                                  const measurement::ViewModel& model) const {
-  return measurement::predicted_view(sampler_, projector_, *measured_.rays, view, model,
-                                     processes_);
+std::vector<measurement::PredictedView> SlabObjective::predict(
+    std::span<const int> views, std::span<const measurement::ViewModel> models) const {
+  return measurement::predicted_views(sampler_, projector_, *measured_.rays, views, models,
+                                      processes_);
 }
 
 }  // namespace tomofield::objective

@@ -49,7 +49,8 @@ class SlabObjective : public Objective {
                       const LeafDone& leaf_done) const override;
   measurement::ViewErrors held_out_error(std::span<const double> noise_weight,
                                          bool fit_view_scale) const override;
-  measurement::PredictedView predict(int view, const measurement::ViewModel& model) const override;
+  std::vector<measurement::PredictedView> predict(
+      std::span<const int> views, std::span<const measurement::ViewModel> models) const override;
 
   const projection::SlabSampler& sampler() const { return sampler_; }
 

@@ -158,21 +158,19 @@ class ModelReader {
   // Keeps all leaves if `choose` is empty; then the training state has its floats too.
   Model read(TrainingState* training, const ChooseLeaves& choose) const {
     const Hdf5Group root = file_.root();
-    require_known_format(root);
     Model model;
-    model.x_tilt_deg = root.number("x_tilt_deg");
-    model.pixel_size_A = root.number("pixel_size_A");
-    model.density_unit = root.number("density_unit");
-    model.is_dark = root.text("contrast") == "dark";
-    model.options_json = root.text("options_json");
-    model.written_by = root.text("written_by");
-    require(std::isfinite(model.x_tilt_deg) && std::isfinite(model.pixel_size_A) &&
-                model.pixel_size_A > 0 && std::isfinite(model.density_unit),
-            "its pixel size or density unit is no usable number");
-    read_geometry(root.group("geometry"), model);
+    read_info(root, model);
     model.field = read_field(root.group("field"), choose);
     if (training != nullptr) *training = read_training(root, /*with_floats=*/!choose);
     return model;
+  }
+
+  ModelOutline read_outline() const {
+    const Hdf5Group root = file_.root();
+    ModelOutline outline;
+    read_info(root, outline);
+    name_file_in_faults([&] { outline.tree = read_tree(root.group("field").group("tree")); });
+    return outline;
   }
 
   void read_floats(const std::string& name, const field::Field& field,
@@ -216,6 +214,31 @@ class ModelReader {
     require(value >= std::numeric_limits<int>::min() && value <= std::numeric_limits<int>::max(),
             "a number is out of range");
     return static_cast<int>(value);
+  }
+
+  // Calls a function whose errors may not name the file yet.
+  void name_file_in_faults(const std::function<void()>& read) const {
+    try {
+      read();
+    } catch (const Error& error) {
+      const std::string what = error.what();
+      if (what.find(path_) != std::string::npos) throw;
+      fail(what);
+    }
+  }
+
+  void read_info(const Hdf5Group& root, ModelInfo& info) const {
+    require_known_format(root);
+    info.x_tilt_deg = root.number("x_tilt_deg");
+    info.pixel_size_A = root.number("pixel_size_A");
+    info.density_unit = root.number("density_unit");
+    info.is_dark = root.text("contrast") == "dark";
+    info.options_json = root.text("options_json");
+    info.written_by = root.text("written_by");
+    require(std::isfinite(info.x_tilt_deg) && std::isfinite(info.pixel_size_A) &&
+                info.pixel_size_A > 0 && std::isfinite(info.density_unit),
+            "its pixel size or density unit is no usable number");
+    read_geometry(root.group("geometry"), info);
   }
 
   void read_geometry(const Hdf5Group& group, ModelInfo& info) const {
@@ -294,21 +317,19 @@ class ModelReader {
     const double thickness = group.number("thickness");
     require(std::isfinite(thickness) && thickness > 0, "its thickness is no usable number");
     try {
-      field::Quadtree tree = read_tree(group.group("tree"));
-      auto shapes = read_shapes(group.group("leaves"), tree.num_leaves());
-      const std::string name = group.text("kind");
-      const auto kind = base::enum_named<FieldKind>(name);
-      if (!kind) fail(fmt::format("there is no field '{}'", name));
-      require(field::count_parameters(*kind, shapes) <= group.array_size("parameters"),
-              "its leaves need more parameters than it holds");
-      field = field::make_field(*kind, std::move(tree), thickness, std::move(shapes));
+      name_file_in_faults([&] {
+        field::Quadtree tree = read_tree(group.group("tree"));
+        auto shapes = read_shapes(group.group("leaves"), tree.num_leaves());
+        const std::string name = group.text("kind");
+        const auto kind = base::enum_named<FieldKind>(name);
+        if (!kind) fail(fmt::format("there is no field '{}'", name));
+        require(field::count_parameters(*kind, shapes) <= group.array_size("parameters"),
+                "its leaves need more parameters than it holds");
+        field = field::make_field(*kind, std::move(tree), thickness, std::move(shapes));
+      });
     } catch (const std::bad_alloc&) {
       throw Error(fmt::format("'{}' holds {} parameters, more than there is memory for", path_,
                               group.array_size("parameters")));
-    } catch (const Error& error) {
-      const std::string what = error.what();
-      if (what.find(path_) != std::string::npos) throw;
-      fail(what);
     }
     field->bias = static_cast<float>(group.number("bias"));
     field->activation.beta = static_cast<float>(group.number("softplus_beta"));
@@ -395,6 +416,10 @@ void save_model(const std::filesystem::path& path, const Model& model,
 
 Model load_model(const std::filesystem::path& path, TrainingState* training) {
   return ModelReader(path).read(training, {});
+}
+
+ModelOutline load_outline(const std::filesystem::path& path) {
+  return ModelReader(path).read_outline();
 }
 
 Model load_part(const std::filesystem::path& path, const ChooseLeaves& choose,

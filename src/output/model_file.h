@@ -36,6 +36,11 @@ struct Model : ModelInfo {
   std::unique_ptr<field::Field> field;
 };
 
+/// The place and the tree of a model, without its parameters.
+struct ModelOutline : ModelInfo {
+  field::Quadtree tree;
+};
+
 /// The arrays that a fit needs to continue bit for bit. A name may hold anything but '/'.
 struct TrainingState {
   std::map<std::string, std::vector<float>> floats;
@@ -83,6 +88,9 @@ void save_model(const std::filesystem::path& path, const Model& model,
 /// the model was saved without one. Throws Error, with the file and the reason, for anything but a
 /// whole model of a known version.
 Model load_model(const std::filesystem::path& path, TrainingState* training = nullptr);
+
+/// Reads the outline of a model, without its parameters. Throws Error as load_model() does.
+ModelOutline load_outline(const std::filesystem::path& path);
 
 /// Returns the leaves of a tree whose parameters shall be kept. An empty function keeps all.
 using ChooseLeaves = std::function<std::vector<int>(const field::Quadtree&)>;

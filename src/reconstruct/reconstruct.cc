@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/log.h"
 #include "base/parallel.h"
@@ -104,6 +105,14 @@ FitOrigin origin_of(const Run& run, std::optional<TunedFit> tuned) {
           .tuned = std::move(tuned)};
 }
 
+// Returns where each view comes from in the stack.
+std::vector<geometry::RawFromAligned> alignment_of(const tilt_series::TiltSeries& series) {
+  std::vector<geometry::RawFromAligned> alignment;
+  for (std::size_t view = 0; view < series.views().size(); ++view)
+    alignment.push_back(series.raw_from_aligned(view));
+  return alignment;
+}
+
 std::unique_ptr<fit::Fit> begin_fit(const Run& run) {
   const base::TraceSpan span("begin fit");
   return std::make_unique<fit::Fit>(run.measurement, run.options.field, run.options.fit,
@@ -172,6 +181,7 @@ bool run_with_checkpoints(const Run& run, const FitOrigin& origin, fit::Fit& fit
 
 RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
                       const ReconstructHooks& hooks, const distributed::Communicator& processes) {
+  RunRecord record{.origin = {}, .alignment = alignment_of(series)};
   base::log_info(base::describe_threads());
   Run run{.hooks = hooks,
           .processes = processes,
@@ -180,14 +190,16 @@ RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOp
           .measurement = prepare(series, options, processes)};
   std::optional<TunedFit> tuned;
   if (!choose_settings(run, tuned)) return {.outcome = Outcome::kStoppedTuning, .results = {}};
-  const FitOrigin origin = origin_of(run, std::move(tuned));
+  record.origin = origin_of(run, std::move(tuned));
   const std::unique_ptr<fit::Fit> fit = begin_fit(run);
-  if (options.resolved.resume) processes.run_collectively([&] { resume(run, origin, *fit); });
+  if (options.resolved.resume)
+    processes.run_collectively([&] { resume(run, record.origin, *fit); });
   const base::Stopwatch running;
-  if (!run_with_checkpoints(run, origin, *fit))
+  if (!run_with_checkpoints(run, record.origin, *fit))
     return {.outcome = Outcome::kStopped, .results = {}};
+  record.fit_seconds = running.seconds();
   return {.outcome = Outcome::kFinished,
-          .results = finish(*fit, run.measurement, run.options, origin, running.seconds())};
+          .results = finish(*fit, run.measurement, run.options, record)};
 }
 
 }  // namespace tomofield::reconstruction

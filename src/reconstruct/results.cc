@@ -7,16 +7,19 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "base/parallel.h"
 #include "base/range.h"
 #include "base/trace.h"
+#include "evaluate/artefacts.h"
 #include "io/json.h"
 #include "output/metrics.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
+#include "reconstruct/judge.h"
 #include "report/pictures.h"
 
 namespace tomofield::reconstruction {
@@ -29,31 +32,32 @@ measurement::PredictedView central_view(const fit::Fit& fit, const measurement::
     return std::abs(series.geometry.tilt_deg[static_cast<std::size_t>(view)]);
   });
   const auto model = error.models[static_cast<std::size_t>(nearest - error.views.begin())];
-  return fit.predict_held_out(*nearest, model);
+  return fit.predict(std::span(&*nearest, 1), std::span(&model, 1)).front();
 }
 
-// Returns the errors of the held-out views. Predicts one of these views if the run writes files.
-nlohmann::json score_fit(const fit::Fit& fit, const measurement::Measurement& series,
-                         const ReconstructOptions& options,
-                         std::optional<measurement::PredictedView>& view) {
-  const base::TraceSpan span("score held-out views");
-  const measurement::ViewErrors error = fit.held_out_error();
-  if (!options.resolved.output.empty()) view = central_view(fit, series, error);
+nlohmann::json held_out_json(const fit::Fit& fit, const measurement::Measurement& series,
+                             const ReconstructOptions& options,
+                             const std::optional<measurement::ViewErrors>& errors) {
+  if (!errors) return nullptr;
   nlohmann::json json =
-      measurement::report_held_out(error, series.geometry.tilt_deg, options.fit.patience > 0);
+      measurement::report_held_out(*errors, series.geometry.tilt_deg, options.fit.patience > 0);
   json["error_by_epoch"] = fit.progress().held_out_error;
   return json;
 }
 
+// Returns the rows of the volume that this process works on. The views as recorded of a process
+// that is alone may have other rows.
+base::Range own_rows(const fit::Fit& fit, const measurement::Measurement& series) {
+  const auto num_rows = static_cast<int>(series.roi.height());
+  if (fit.processes().size() == 1) return {0, num_rows};
+  const base::Range slabs = series.rays->own();
+  return {slabs.begin * kernels::kLanes, std::min(slabs.end * kernels::kLanes, num_rows)};
+}
+
 // Returns the rows and the parameters that this process contributes to the volume.
 output::VolumeShare volume_share(const fit::Fit& fit, const measurement::Measurement& series) {
-  const base::Range slabs = series.rays->own();
-  const auto end_row =
-      std::min<std::int64_t>(std::int64_t{slabs.end} * kernels::kLanes, series.roi.height());
   const base::Range leaves = fit.own_leaves();
-  return {fit.processes(),
-          {slabs.begin * kernels::kLanes, static_cast<int>(end_row)},
-          fit.field().offset(leaves.begin),
+  return {fit.processes(), own_rows(fit, series), fit.field().offset(leaves.begin),
           fit.field().offset(leaves.end)};
 }
 
@@ -88,16 +92,25 @@ output::ModelInfo model_info(const measurement::Measurement& series,
 }
 
 Results finish(fit::Fit& fit, const measurement::Measurement& series,
-               const ReconstructOptions& options, const FitOrigin& origin, double seconds) {
-  nlohmann::json metrics = output::metrics_json(fit, series, seconds);
-  metrics["held_out"] = nullptr;
+               const ReconstructOptions& options, const RunRecord& record) {
+  const FitOrigin& origin = record.origin;
+  const bool writes_files = !options.resolved.output.empty();
+  nlohmann::json metrics = output::metrics_json(fit, series, record.fit_seconds);
+  std::optional<measurement::ViewErrors> errors;
   std::optional<measurement::PredictedView> view;
-  if (options.fit.hold_out > 0) metrics["held_out"] = score_fit(fit, series, options, view);
-  metrics["processes"] = output::processes_json(fit, seconds);
+  if (options.fit.hold_out > 0) {
+    const base::TraceSpan span("score held-out views");
+    errors = fit.held_out_error();
+    if (writes_files) view = central_view(fit, series, *errors);
+  }
+  metrics["held_out"] = held_out_json(fit, series, options, errors);
+  metrics["processes"] = output::processes_json(fit, record.fit_seconds);
+  const output::VolumeShare share = volume_share(fit, series);
+  Verdict verdict = judge({fit, series, options, record, share.rows}, errors);
+  metrics.update(evaluate::artefacts_json(verdict.artefacts.speckle, verdict.artefacts.faces));
+  metrics["verdict"] = verdict_json(verdict);
   metrics["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
   const output::ModelInfo info = model_info(series, options);
-  const output::VolumeShare share = volume_share(fit, series);
-  const bool writes_files = !options.resolved.output.empty();
   const OutputPaths paths = output_paths(options.resolved.output);
   const distributed::Communicator& processes = share.processes;
   const output::TrainingState state = progress_state(fit, origin);
@@ -105,7 +118,8 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   Results results{.model = {info, fit.take_field()},
                   .metrics = {{"tomofield", TOMOFIELD_VERSION},
                               {"options", options_json(options)},
-                              {"metrics", std::move(metrics)}}};
+                              {"metrics", std::move(metrics)}},
+                  .verdict = std::move(verdict)};
   if (!writes_files) return results;
   Writers writers;
   if (processes.size() == 1)

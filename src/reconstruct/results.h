@@ -5,8 +5,9 @@
 #include "fit/fit.h"
 #include "measurement/prepare.h"
 #include "output/model_file.h"
-#include "reconstruct/checkpoint.h"
 #include "reconstruct/options.h"
+#include "reconstruct/run_record.h"
+#include "reconstruct/verdict.h"
 
 namespace tomofield::reconstruction {
 
@@ -18,12 +19,13 @@ output::ModelInfo model_info(const measurement::Measurement& series,
 struct Results {
   output::Model model;     ///< each process has the parameters of its own leaves
   nlohmann::json metrics;  ///< the content of the JSON file beside the volume
+  Verdict verdict;
 };
 
 /// Takes the results out of a finished fit, which loses its field. If options.resolved.output names
 /// the volume, it writes the volume, the model, the metrics, and a picture of a held-out view if
-/// there is one. `seconds` is the time of the fit. Every process calls it.
+/// there is one. Every process calls it.
 Results finish(fit::Fit& fit, const measurement::Measurement& series,
-               const ReconstructOptions& options, const FitOrigin& origin, double seconds);
+               const ReconstructOptions& options, const RunRecord& record);
 
 }  // namespace tomofield::reconstruction

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import subprocess
 
 import mrcfile
 import numpy as np
@@ -11,6 +12,8 @@ import skimage.io
 from skimage.metrics import structural_similarity
 
 import harness
+
+SEAM = os.path.abspath(os.path.join(os.path.dirname(__file__), "../../bench/seam.py"))
 
 
 def path(name):
@@ -404,6 +407,45 @@ def test_regions_are_chosen_by_the_rule_and_can_be_handed_on():
     assert again["contrast"]["cnr"] == found["cnr"] and again["contrast"]["enl"] == found["enl"]
     handed, _ = evaluate(save("b.mrc", other), path("a.mrc"), "--cnr", *options)
     assert handed["contrast"]["foreground"] == found["foreground"] and "psnr_raw_dB" in handed
+
+
+def test_speckle_against_scipy():
+    random = np.random.default_rng(12)
+    for shape in [(9, 30, 301), (20, 17, 40)]:
+        volume = random.gamma(0.5, size=shape).astype(np.float32) - 3
+        distance = np.abs(volume - scipy.ndimage.median_filter(volume, 3))[1:-1, 1:-1, 1:-1]
+        expected = np.mean(distance > volume.std(dtype=np.float64))
+        score, result = evaluate(save("a.mrc", volume))
+        assert 0.01 < expected and abs(score["speckle"] - expected) < 1e-4 * expected, score
+        assert f"speckle {100 * expected:.3f}" in result.stdout and score["face_jump"] is None
+    line = "--profile", "0,0,0,9,9,2", "--profile-csv", path("profile.csv")
+    thin, _ = evaluate(save("a.mrc", volume[:2]), *line)
+    assert thin["speckle"] is None
+
+
+def test_face_jump_is_that_of_the_bench_and_of_the_run():
+    series = harness.Series("faces")
+    fit = series.reconstruct("run", "--roi", "5,2,45,33", "--field", "grid", "--epochs", 3)
+    expected = json.loads(subprocess.run(["/usr/bin/python3", SEAM, fit.volume_path], check=True,
+                                         capture_output=True, text=True).stdout)
+    found, result = evaluate(fit.volume_path)
+    assert abs(found["face_jump"]["both"] - expected["ratio"]) < 1e-4, found
+    assert abs(found["face_jump"]["x"] - expected["ratio_x"]) < 1e-4, found
+    assert abs(found["face_jump"]["y"] - expected["ratio_y"]) < 1e-4, found
+    assert "face jump %.4f" % found["face_jump"]["both"] in result.stdout
+    with open(fit.json_path, encoding="utf-8") as file:
+        metrics = json.load(file)["metrics"]
+    assert abs(metrics["face_jump"]["both"] - found["face_jump"]["both"]) < 1e-5
+    assert abs(metrics["speckle"] - found["speckle"]) < 1e-4
+    # The leaves are those of --model, wherever it lies; a model of other voxels is refused.
+    with mrcfile.open(fit.volume_path) as file:
+        volume = file.data.copy()
+    alone = save("alone.mrc", volume)
+    assert evaluate(alone)[0]["face_jump"] is None
+    given, _ = evaluate(alone, "--model", fit.model_path)
+    assert given["face_jump"] == found["face_jump"]
+    refused = run(save("cut.mrc", volume[:, :, 1:]), "--model", fit.model_path)
+    assert refused.returncode == 2 and "39 × 31 × 24 voxels" in refused.stderr, refused.stderr
 
 
 def test_profile_against_scipy():

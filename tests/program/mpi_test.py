@@ -91,6 +91,8 @@ def metrics(results):
         found = json.load(file)["metrics"]
     for key in ("seconds", "processes", "threads", "threads_why"):  # of the run, not of the result
         found.pop(key)
+    for key in ("seconds", "peak_GiB"):
+        found["verdict"].pop(key)
     if found["tuning"]:
         for trial in found["tuning"]["trials"]:
             trial.pop("seconds")

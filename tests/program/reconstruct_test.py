@@ -318,7 +318,8 @@ def test_bar_on_a_terminal(series):
             shown += piece
         os.close(master)
         assert run.wait() == 0
-        draws = [draw for draw in shown.decode().split("\r\033[K") if draw.startswith("reconstr")]
+        bar = shown.decode().split("verdict:")[0]  # which comes after the bar
+        draws = [draw for draw in bar.split("\r\033[K") if draw.startswith("reconstr")]
         assert len(draws) >= 2, shown
         for draw in draws:
             assert len(draw.rstrip("\r\n")) < columns, draw  # a longer line would wrap

@@ -59,6 +59,13 @@ class KnownField : public ::testing::Test {
     return options;
   }
 
+  measurement::PredictedView predict(const measurement::SlabViews& measured, int view,
+                                     const measurement::ViewModel& model) const {
+    return measurement::predicted_views(*sampler_, projector_, measured, std::span(&view, 1),
+                                        std::span(&model, 1))
+        .front();
+  }
+
   // Measures scale · A f + offset + noise. Every 13th pixel is no measurement and far off.
   std::unique_ptr<measurement::SlabViews> measure(double scale, double offset) const {
     const auto num_views = static_cast<std::size_t>(geometry_.num_views());
@@ -68,8 +75,7 @@ class KnownField : public ::testing::Test {
     return std::make_unique<measurement::SlabViews>(
         shape, 1.0,
         [&](std::size_t v, std::span<float> image, std::span<std::uint8_t> valid) {
-          const auto clean = measurement::predicted_view(*sampler_, projector_, *empty,
-                                                         static_cast<int>(v), {scale, offset, 1.0});
+          const auto clean = predict(*empty, static_cast<int>(v), {scale, offset, 1.0});
           base::Random random(7, v);
           for (std::size_t i = 0; i < image.size(); ++i) {
             valid[i] = i % 13 != 0;
@@ -124,7 +130,7 @@ TEST_F(KnownField, PredictionsAreTheSameOnAnyNumberOfThreads) {
   const auto measured = measure(1.0, 0.0);
   const auto predict = [&](int threads) {
     base::set_thread_count(threads);
-    auto view = measurement::predicted_view(*sampler_, projector_, *measured, 4, {1.5, 2.0, 1.0});
+    auto view = this->predict(*measured, 4, {1.5, 2.0, 1.0});
     const measurement::ViewErrors errors = error(*measured, true);
     base::set_thread_count(0);
     return std::tuple(view.predicted, errors.total, errors.view_error);
@@ -134,8 +140,7 @@ TEST_F(KnownField, PredictionsAreTheSameOnAnyNumberOfThreads) {
 
 TEST_F(KnownField, MeasuredViewsAreShownAsTheyAre) {
   const auto measured = measure(1.0, 0.0);
-  const measurement::PredictedView view =
-      measurement::predicted_view(*sampler_, projector_, *measured, 4, {1.0, 0.0, 1.0});
+  const measurement::PredictedView view = predict(*measured, 4, {1.0, 0.0, 1.0});
   ASSERT_EQ(view.measured.size(), static_cast<std::size_t>(kWidth * kRows));
   double squares = 0, count = 0;
   for (std::size_t i = 0; i < view.measured.size(); ++i) {

@@ -1,0 +1,74 @@
+#include "evaluate/artefacts.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "evaluate/speckle.h"
+#include "output/model_file.h"
+#include "output/volume.h"
+#include "tomofield/error.h"
+
+namespace tomofield::evaluate {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Returns true if a volume has the voxels that reconstruct writes of a model: one a pixel of the
+// region, along the axes of the field.
+bool fits(const output::ModelOutline& model, const base::Shape3& shape) {
+  const field::OrientedBox box = output::region_box(model, 1.0);
+  return box.is_aligned() && box.size == std::array{shape.nx, shape.ny, shape.nz};
+}
+
+void require_fit(const output::ModelOutline& model, const fs::path& path,
+                 const base::Shape3& shape) {
+  if (fits(model, shape)) return;
+  const auto size = output::region_box(model, 1.0).size;
+  throw Error(fmt::format(
+      "the volume has {} × {} × {} voxels, but '{}' is a model of {} × {} × {}{}: give the model "
+      "that was written with the volume, and a volume with the axes X, Y, Z",
+      shape.nx, shape.ny, shape.nz, path.string(), size[0], size[1], size[2],
+      model.x_tilt_deg == 0.0 ? "" : ", turned by an x-axis tilt"));
+}
+
+// Returns the outline of the model beside a volume if it belongs to the volume.
+std::optional<output::ModelOutline> model_beside(const fs::path& volume,
+                                                 const base::Shape3& shape) {
+  const fs::path path = fs::path(volume).replace_extension(".h5");
+  if (!fs::exists(path)) return std::nullopt;
+  try {
+    output::ModelOutline model = output::load_outline(path);
+    if (fits(model, shape)) return model;
+  } catch (const Error&) {  // another program's file; nobody asked for it
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Artefacts find_artefacts(const base::Volume& volume, const fs::path& path,
+                         const std::optional<fs::path>& model) {
+  Artefacts found{.speckle = speckle(volume), .faces = {}};
+  std::optional<output::ModelOutline> outline;
+  if (model) {
+    outline = output::load_outline(*model);
+    require_fit(*outline, *model, volume.shape);
+  } else {
+    outline = model_beside(path, volume.shape);
+  }
+  if (outline) found.faces = face_jump(volume, LeafFaces(outline->tree, outline->roi));
+  return found;
+}
+
+nlohmann::json artefacts_json(const std::optional<double>& speckle,
+                              const std::optional<FaceJump>& faces) {
+  const auto value = [](const std::optional<double>& number) {
+    return number ? nlohmann::json(*number) : nlohmann::json(nullptr);
+  };
+  nlohmann::json jump = nullptr;
+  if (faces) jump = {{"both", faces->both}, {"x", value(faces->x)}, {"y", value(faces->y)}};
+  return {{"speckle", value(speckle)}, {"face_jump", jump}};
+}
+
+}  // namespace tomofield::evaluate

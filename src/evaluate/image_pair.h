@@ -1,0 +1,34 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace tomofield::evaluate {
+
+/// An image [y, x]; NaN where nothing was measured.
+struct Image {
+  std::int64_t width = 0, height = 0;
+  std::vector<float> values;
+};
+
+/// Returns the means over blocks of factor × factor pixels; those on the last columns and rows may
+/// be smaller. A block counts if at least half of its pixels do.
+Image reduced(const Image& image, std::int64_t factor);
+
+/// Returns the mean of each column; NaN where the column has no measurement.
+std::vector<double> column_means(const Image& image);
+
+/// Returns the image less the mean of each column.
+Image without_column_means(const Image& image);
+
+/// Returns Pearson's correlation over the pixels that both images have, which are of one size; 0 if
+/// there are none or if one of them is constant.
+double correlation(const Image& one, const Image& other);
+
+/// Returns how far, along x and y in pixels, the content of `moved` lies from that of `reference`:
+/// the maximum of their cross-correlation within a quarter of the image, between pixels by a
+/// parabola. Details larger than an eighth of the image do not count. Both have one size.
+std::array<double, 2> displacement(const Image& reference, const Image& moved);
+
+}  // namespace tomofield::evaluate

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <vector>
+
+#include "base/stopwatch.h"
+#include "geometry/raw_from_aligned.h"
+#include "reconstruct/checkpoint.h"
+
+namespace tomofield::reconstruction {
+
+/// What a run knows beside its fit.
+struct RunRecord {
+  FitOrigin origin;
+  /// Where the pixels of each aligned view come from in the stack.
+  std::vector<geometry::RawFromAligned> alignment;
+  base::Stopwatch since_start = {};  ///< runs from the start of reconstruct() on
+  double fit_seconds = 0.0;
+};
+
+}  // namespace tomofield::reconstruction

@@ -1,0 +1,185 @@
+#include "reconstruct/view_agreement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <span>
+#include <utility>
+
+#include "base/parallel.h"
+#include "base/percentile.h"
+#include "base/trace.h"
+#include "evaluate/image_pair.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+using evaluate::Image;
+
+constexpr int kViews = 16;
+// Fewer views are too far apart to tell an order: with 8 of them, those of correct series are no
+// more alike than those of some shuffled ones (docs/verdict.md).
+constexpr int kFewestOrderedViews = 12;
+// Sides of the images for displacements, and of those that tell which views are alike. The latter
+// are so small that detail moves by a pixel or two between views that are some degrees apart.
+constexpr std::int64_t kSide = 256, kSmallSide = 64;
+
+std::vector<int> views_by_tilt(const std::vector<double>& tilt_deg) {
+  std::vector<int> all(tilt_deg.size());
+  std::iota(all.begin(), all.end(), 0);
+  std::ranges::stable_sort(all, {}, [&](int v) { return tilt_deg[static_cast<std::size_t>(v)]; });
+  const int last = static_cast<int>(all.size()) - 1, count = std::min(kViews, last + 1);
+  std::vector<int> chosen;
+  for (int i = 0; i < count; ++i)
+    chosen.push_back(all[static_cast<std::size_t>(count == 1 ? 0 : i * last / (count - 1))]);
+  return chosen;
+}
+
+// Returns the side of the smallest blocks whose means make an image no larger than `side`.
+std::int64_t block_for(const Image& image, std::int64_t side) {
+  return (std::max(image.width, image.height) + side - 1) / side;
+}
+
+// Compares images that are in order of tilt.
+std::optional<double> order_of(const std::vector<Image>& images) {
+  if (std::ssize(images) < kFewestOrderedViews) return std::nullopt;
+  std::vector<double> neighbours, others;
+  for (std::size_t a = 0; a < images.size(); ++a)
+    for (std::size_t b = a + 1; b < images.size(); ++b)
+      (b == a + 1 ? neighbours : others).push_back(evaluate::correlation(images[a], images[b]));
+  double greater = 0;
+  for (const double likeness : neighbours)
+    greater += static_cast<double>(
+        std::ranges::count_if(others, [&](double other) { return likeness > other; }));
+  return greater / static_cast<double>(neighbours.size() * others.size());
+}
+
+// Returns the length of a ray in the volume, in pixels. Without a margin the volume ends at the
+// faces of the region.
+double ray_length(const measurement::Measurement& series, int view, double u, bool has_margin) {
+  const geometry::TiltGeometry& g = series.geometry;
+  const double length = g.thickness / g.cos_tilt(view);
+  if (has_margin) return length;
+  const auto [low, high] = std::minmax({g.ray_x(view, u, 0.0), g.ray_x(view, u, g.thickness)});
+  const double begin = std::max(low, static_cast<double>(series.roi.x0));
+  const double end = std::min(high, static_cast<double>(series.roi.x1));
+  if (high - low < 1e-9) return begin <= end ? length : 0.0;
+  return length * std::max(end - begin, 0.0) / (high - low);
+}
+
+// Fits a line through pairs of lengths and brightnesses.
+class LineFit {
+ public:
+  void add(double length, double brightness) {
+    shortest_ = std::min(shortest_, length);
+    longest_ = std::max(longest_, length);
+    n_ += 1;
+    x_ += length;
+    y_ += brightness;
+    xx_ += length * length;
+    xy_ += length * brightness;
+    yy_ += brightness * brightness;
+  }
+  PathEffect effect(double contrast) const {
+    const double vx = n_ * xx_ - x_ * x_, vy = n_ * yy_ - y_ * y_, xy = n_ * xy_ - x_ * y_;
+    if (!(vx > 1e-9 * n_ * xx_) || !(vy > 0)) return {};
+    return {xy / std::sqrt(vx * vy), xy / vx * (longest_ - shortest_) / contrast};
+  }
+
+ private:
+  double shortest_ = 1e300, longest_ = 0;
+  double n_ = 0, x_ = 0, y_ = 0, xx_ = 0, xy_ = 0, yy_ = 0;
+};
+
+// What is known of a view after it was compared with its prediction.
+struct ComparedView {
+  std::array<double, 2> displacement_px{};
+  double correlation = 0.0;
+  std::vector<double> column_means;
+  Image small;  // without the means of its columns
+};
+
+ComparedView compare(measurement::PredictedView&& both) {
+  const Image measured{both.width, both.height, std::move(both.measured)};
+  const Image predicted{both.width, both.height, std::move(both.predicted)};
+  const std::int64_t block = block_for(measured, kSide);
+  const Image seen = reduced(measured, block), told = reduced(predicted, block);
+  auto displacement = evaluate::displacement(told, seen);
+  for (double& d : displacement) d *= static_cast<double>(block);
+  const Image small = reduced(seen, block_for(seen, kSmallSide));
+  return {displacement, evaluate::correlation(told, seen), evaluate::column_means(measured),
+          evaluate::without_column_means(small)};
+}
+
+std::vector<ComparedView> compare(const fit::Fit& fit, std::span<const int> views) {
+  std::vector<measurement::ViewModel> models;
+  for (const int view : views)
+    models.push_back(fit.progress().views[static_cast<std::size_t>(view)]);
+  std::vector<measurement::PredictedView> predicted = fit.predict(views, models);
+  std::vector<ComparedView> compared(views.size());
+  base::parallel_for("compare views", std::ssize(views), [&](std::int64_t i) {
+    const auto at = static_cast<std::size_t>(i);
+    compared[at] = compare(std::move(predicted[at]));
+  });
+  return compared;
+}
+
+// Returns the number of views of which the images may be in memory together.
+std::size_t views_at_once(const measurement::Measurement& series) {
+  constexpr std::int64_t kBytes = std::int64_t{1} << 26;
+  const std::int64_t of_view =
+      series.geometry.width * series.roi.height() * std::int64_t{2 * sizeof(float)};
+  return static_cast<std::size_t>(std::clamp<std::int64_t>(kBytes / of_view, 1, kViews));
+}
+
+double usual(std::vector<float> values) {
+  return values.empty() ? 0.0 : base::percentile(std::move(values), 90);
+}
+
+}  // namespace
+
+double ViewAgreement::usual_displacement_px() const {
+  std::vector<float> lengths;
+  for (const auto& [x, y] : displacement_px)
+    lengths.push_back(static_cast<float>(std::hypot(x, y)));
+  return usual(std::move(lengths));
+}
+
+double ViewAgreement::usual_displacement_y_px() const {
+  std::vector<float> lengths;
+  for (const auto& both : displacement_px) lengths.push_back(static_cast<float>(std::abs(both[1])));
+  return usual(std::move(lengths));
+}
+
+ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement& series,
+                            bool has_margin) {
+  const base::TraceSpan span("compare views");
+  ViewAgreement found;
+  found.views = views_by_tilt(series.geometry.tilt_deg);
+  LineFit brightness;
+  std::vector<Image> small;
+  const std::span<const int> views(found.views);
+  const std::size_t at_once = views_at_once(series);
+  for (std::size_t first = 0; first < views.size(); first += at_once) {
+    const std::size_t count = std::min(at_once, views.size() - first);
+    std::vector<ComparedView> compared = compare(fit, views.subspan(first, count));
+    for (std::size_t i = 0; i < count; ++i) {
+      ComparedView& view = compared[i];
+      found.displacement_px.push_back(view.displacement_px);
+      found.correlation.push_back(view.correlation);
+      for (std::size_t x = 0; x < view.column_means.size(); ++x) {
+        if (!std::isfinite(view.column_means[x])) continue;
+        const double length =
+            ray_length(series, views[first + i], static_cast<double>(x) + 0.5, has_margin);
+        brightness.add(length, view.column_means[x]);
+      }
+      small.push_back(std::move(view.small));
+    }
+  }
+  found.tilt_order = order_of(small);
+  found.path = brightness.effect(series.contrast());
+  found.side_px = static_cast<double>(std::max(series.geometry.width, series.roi.height()));
+  return found;
+}
+
+}  // namespace tomofield::reconstruction

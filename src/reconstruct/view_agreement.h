@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "fit/fit.h"
+#include "measurement/measurement.h"
+
+namespace tomofield::reconstruction {
+
+/// How the brightness of the views follows the length of their rays in the volume.
+struct PathEffect {
+  double correlation = 0.0;
+  /// Line through the means of all columns: its rise from the shortest to the longest ray, over the
+  /// contrast of a view. It is positive for a specimen that is denser than what is around it.
+  double rise = 0.0;
+};
+
+/// How some views of a series agree with the field that was fitted to them, and with each other.
+struct ViewAgreement {
+  std::vector<int> views;           ///< those that were looked at, in order of tilt
+  std::vector<double> correlation;  ///< [i]: of measured and predicted view
+  /// [i]: how far the measured view lies from the predicted one, in pixels of the fit along x and
+  /// y. It is 0 for a view that is aligned with the others.
+  std::vector<std::array<double, 2>> displacement_px;
+  /// Probability that two views that are neighbours in tilt are more alike than two that are not:
+  /// near 1 for the angles of the views, near ½ for shuffled ones. None if there are few views.
+  std::optional<double> tilt_order;
+  PathEffect path;
+  double side_px = 0.0;  ///< longest side of a view, in pixels of the fit
+
+  /// Return the displacement that 9 of 10 views stay below, in any direction and along y alone.
+  double usual_displacement_px() const;
+  double usual_displacement_y_px() const;
+};
+
+/// Predicts up to 16 views, evenly spaced in order of tilt, and compares them with the measured
+/// ones. `has_margin` says that the specimen continues outside the volume. Every process calls it
+/// and gets the same. The series must be resampled, and the fit must be at full resolution.
+ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement& series,
+                            bool has_margin);
+
+}  // namespace tomofield::reconstruction

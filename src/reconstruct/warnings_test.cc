@@ -1,0 +1,102 @@
+#include "reconstruct/warnings.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace tomofield::reconstruction {
+namespace {
+
+// A verdict on a series without faults.
+Verdict good_verdict() {
+  Verdict verdict;
+  verdict.residual = 1.1;
+  verdict.sections = {.faces = 0.3, .empty_part = 0.1};
+  ViewAgreement views;
+  for (int i = 0; i < 16; ++i) {
+    views.views.push_back(i);
+    views.displacement_px.push_back({0.1, -0.1});
+  }
+  views.tilt_order = 0.95;
+  views.path = {.correlation = 0.9, .rise = 4.0};
+  verdict.views = views;
+  return verdict;
+}
+
+GivenInput aligned_input() {
+  return {.contrast = Contrast::kDark,
+          .alignment = std::vector<geometry::RawFromAligned>(16),
+          .thickness = 100,
+          .bin_factor = 2};
+}
+
+std::string codes(const Verdict& verdict, const GivenInput& input = aligned_input()) {
+  std::string all;
+  for (const Warning& warning : find_warnings(verdict, input)) all += warning.code + " ";
+  return all;
+}
+
+TEST(Warnings, AGoodRunHasNone) {
+  EXPECT_EQ(codes(good_verdict()), "");
+  Verdict raw_views = good_verdict();
+  raw_views.views = std::nullopt;
+  EXPECT_EQ(codes(raw_views), "");
+}
+
+TEST(Warnings, ContrastIsWrongIfLongRaysLookThin) {
+  Verdict verdict = good_verdict();
+  verdict.views->path = {.correlation = -0.9, .rise = -4.0};
+  verdict.sections.faces = 5.0;
+  EXPECT_EQ(codes(verdict), "contrast ");  // nothing is said of the thickness
+  const auto found = find_warnings(verdict, aligned_input());
+  EXPECT_NE(found.front().message.find("give --contrast bright"), std::string::npos);
+  verdict.sections.faces = 0.3;
+  verdict.views->path.rise = -0.3;  // normalised views may fall a little
+  EXPECT_EQ(codes(verdict), "");
+}
+
+TEST(Warnings, AnglesAreShuffledIfNeighboursAreNotAlike) {
+  Verdict verdict = good_verdict();
+  verdict.views->tilt_order = 0.5;
+  for (auto& displacement : verdict.views->displacement_px)
+    displacement[0] = 3.0;  // a result of it
+  EXPECT_EQ(codes(verdict), "tilt-order ");
+  verdict.views->tilt_order = std::nullopt;  // too few views to tell
+  EXPECT_EQ(codes(verdict), "unaligned ");
+}
+
+TEST(Warnings, DisplacedViewsAreBlamedOnTheAlignment) {
+  Verdict verdict = good_verdict();
+  GivenInput input = aligned_input();
+  for (std::size_t i = 0; i < 16; ++i) {
+    const double shift = i % 2 == 0 ? 4.0 : -4.0;
+    verdict.views->displacement_px[i] = {0.2, shift};
+    // A quarter turn maps (x, y) to (−y, x).
+    input.alignment[i] = {.m11 = 0, .m12 = -1, .m21 = 1, .m22 = 0, .shift_x_px = shift};
+  }
+  EXPECT_EQ(codes(verdict), "unaligned ");
+  EXPECT_EQ(codes(verdict, input), "aligned-twice ");
+  for (std::size_t i = 0; i < 16; ++i) input.alignment[i].shift_x_px = i < 8 ? 4.0 : -4.0;
+  EXPECT_EQ(codes(verdict, input), "misaligned ");
+}
+
+TEST(Warnings, ThicknessIsJudgedByTheSections) {
+  Verdict verdict = good_verdict();
+  verdict.sections.faces = 2.5;
+  const auto thin = find_warnings(verdict, aligned_input());
+  ASSERT_EQ(codes(verdict), "thin ");
+  EXPECT_NE(thin.front().message.find("--thickness 300"), std::string::npos);  // unbinned pixels
+  verdict.residual = 1.0;                                                      // nothing is missing
+  EXPECT_EQ(codes(verdict), "");
+  verdict.residual = 60;  // whatever the model cannot explain
+  EXPECT_EQ(codes(verdict), "");
+  verdict.sections.faces = 4.0;
+  EXPECT_EQ(codes(verdict), "thin ");
+  verdict.sections = {.faces = 0.1, .empty_part = 0.5};
+  const auto thick = find_warnings(verdict, aligned_input());
+  ASSERT_EQ(codes(verdict), "thick ");
+  EXPECT_NE(thick.front().message.find("--thickness 120"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tomofield::reconstruction
