@@ -32,7 +32,8 @@ Image details(std::int64_t width, std::int64_t height, double dx, double dy) {
 
 TEST(ImagePair, DisplacementIsThatOfTheContent) {
   const Image reference = details(60, 47, 0, 0);
-  for (const auto& [dx, dy] : {std::array{0.0, 0.0}, {3.0, -2.0}, {-5.4, 0.3}, {0.25, 6.5}}) {
+  for (const auto& [dx, dy] : {std::array{0.0, 0.0}, std::array{3.0, -2.0}, std::array{-5.4, 0.3},
+                               std::array{0.25, 6.5}}) {
     const auto found = displacement(reference, details(60, 47, dx, dy));
     EXPECT_NEAR(found[0], dx, 0.3);
     EXPECT_NEAR(found[1], dy, 0.3);

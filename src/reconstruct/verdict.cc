@@ -57,7 +57,7 @@ SectionProfile section_profile(const std::vector<double>& deviation) {
   const double bottom = std::accumulate(deviation.end() - outer, deviation.end(), 0.0);
   const double middle =
       base::percentile({values.begin() + count / 4, values.end() - count / 4}, 50);
-  const double limit = 0.3 * base::percentile(values, 90);
+  const double limit = 0.3 * base::percentile(values, 80);
   const auto empty = std::ranges::count_if(deviation, [&](double d) { return d < limit; });
   SectionProfile profile;
   if (middle > 0.0) profile.faces = std::min(top, bottom) / static_cast<double>(outer) / middle;

@@ -24,7 +24,8 @@ struct SectionProfile {
   /// Standard deviation in the outermost twentieth of the sections, at the face where it is
   /// smaller, over the median of the middle half.
   double faces = 0.0;
-  /// Fraction of sections that vary by less than three tenths of the most varied ones.
+  /// Fraction of sections that vary by less than three tenths of those of which a fifth vary more:
+  /// not of the most varied ones, because a layer of gold beads may vary much more than the rest.
   double empty_part = 0.0;
 };
 /// Returns the profile of the standard deviations of sections, from one face to the other.

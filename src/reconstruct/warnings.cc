@@ -18,8 +18,8 @@ namespace {
 // opposite where it is wrong. Views that are normalised one by one may have no rise.
 constexpr double kLeastFall = 1.0, kLeastCorrelation = 0.5;
 
-// Tilt order: at least 0.86 for the right angles, and at most 0.71 for shuffled ones. Of views that
-// are displaced by several per cent of their width it is less clear: 0.55 to 0.85.
+// Tilt order: at least 0.89 for the right angles, and at most 0.71 for shuffled ones. Of views that
+// are displaced by several per cent of their width it is less clear: 0.5 to 0.85.
 constexpr double kLeastOrder = 0.75, kLeastOrderIfDisplaced = 0.6;
 
 // Usual displacement in pixels: up to 0.56, along the axis 0.33, for aligned views of which some
@@ -39,7 +39,7 @@ constexpr double kSameShifts = 0.75;
 constexpr double kMostAtFaces = 1.5, kLeastResidual = 1.08;
 constexpr double kMostAtFacesOfBadFit = 3.0, kResidualOfBadFit = 1.5;
 
-// Part of the sections that are empty: up to 0.29 where the thickness is right, and from 0.52 on
+// Part of the sections that are empty: up to 0.34 where the thickness is right, and from 0.46 on
 // where it is twice that.
 constexpr double kMostEmpty = 0.4;
 
