@@ -187,10 +187,10 @@ TEST(Stages, FullResolutionIsShortIfTheCoarseOneHasAllVertices) {
   EXPECT_LT(usual(FieldKind::kVm, 4.0, 1, TreeKind::kAdaptive).epochs,
             usual(FieldKind::kVm, 1.0).epochs);
   EXPECT_LT(usual(FieldKind::kGrid, 1.0).epochs, usual(FieldKind::kVm, 1.0).epochs);
-  EXPECT_EQ(usual(FieldKind::kVm, 1.0).coarse_epochs_of(30), 80);
-  EXPECT_EQ(usual(FieldKind::kVm, 1.0).coarse_epochs_of(15), 40);
-  EXPECT_EQ(usual(FieldKind::kVm, 2.0).coarse_epochs_of(5), 80);
-  EXPECT_EQ(usual(FieldKind::kVm, 2.0).coarse_epochs_of(30), 80);
+  EXPECT_EQ(usual(FieldKind::kVm, 1.0).coarse_epochs_of(30), 160);
+  EXPECT_EQ(usual(FieldKind::kVm, 1.0).coarse_epochs_of(15), 80);
+  EXPECT_EQ(usual(FieldKind::kVm, 2.0).coarse_epochs_of(5), 160);
+  EXPECT_EQ(usual(FieldKind::kVm, 2.0).coarse_epochs_of(30), 160);
 }
 
 }  // namespace

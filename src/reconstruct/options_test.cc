@@ -90,15 +90,24 @@ TEST(ReconstructOptions, ABudgetIsForAdaptiveTrees) {
 
 TEST(ResolvedOptions, FollowOtherOptions) {
   const Options usual = resolve(good_options());
-  EXPECT_EQ(usual.leaf_size, 32);
+  EXPECT_EQ(usual.field, FieldKind::kGrid);
+  EXPECT_EQ(usual.leaf_size, 64);
   EXPECT_EQ(usual.epochs, 10);
-  EXPECT_EQ(usual.vertex_epochs, 10);
-  EXPECT_EQ(usual.coarse_epochs, 80);
-  EXPECT_EQ(usual.learning_rate, 0.05);
+  EXPECT_EQ(usual.vertex_epochs, 0);
+  EXPECT_EQ(usual.coarse_epochs, 160);
+  EXPECT_EQ(usual.learning_rate, 0.035);
   EXPECT_EQ(usual.activation, Activation::kIdentity);  // dark contrast
   EXPECT_EQ(usual.fit_view_scale, true);
 
   Options requested = good_options();
+  requested.field = FieldKind::kVm;
+  const Options factors = resolve(requested);
+  EXPECT_EQ(factors.leaf_size, 32);
+  EXPECT_EQ(factors.epochs, 10);
+  EXPECT_EQ(factors.vertex_epochs, 10);
+  EXPECT_EQ(factors.coarse_epochs, 160);
+  EXPECT_EQ(factors.learning_rate, 0.05);
+
   requested.field = FieldKind::kGrid;
   requested.epochs = 5;
   requested.contrast = Contrast::kBright;
@@ -106,14 +115,25 @@ TEST(ResolvedOptions, FollowOtherOptions) {
   EXPECT_EQ(grid.leaf_size, 64);
   EXPECT_EQ(grid.epochs, 5);
   EXPECT_EQ(grid.vertex_epochs, 0);
-  EXPECT_EQ(grid.coarse_epochs, 40);  // half of the usual, as the epochs are
+  EXPECT_EQ(grid.coarse_epochs, 80);  // half of the usual, as the epochs are
   EXPECT_EQ(grid.learning_rate, 0.035);
   EXPECT_EQ(grid.activation, Activation::kSoftplus);
   EXPECT_EQ(grid.fit_view_scale, false);
 }
 
+TEST(ResolvedOptions, HaveFactorsWhereOtherOptionsAreForThem) {
+  Options adaptive = good_options(), begun = good_options();
+  adaptive.tree = TreeKind::kAdaptive;
+  begun.vertex_epochs = 4;
+  EXPECT_EQ(resolve(adaptive).field, FieldKind::kVm);
+  EXPECT_EQ(resolve(begun).field, FieldKind::kVm);
+  begun.field = FieldKind::kGrid;
+  EXPECT_EQ(resolve(begun).field, FieldKind::kGrid);
+}
+
 TEST(ResolvedOptions, KeepWhatIsGiven) {
   Options requested = good_options();
+  requested.field = FieldKind::kVm;
   requested.leaf_size = 48;
   requested.epochs = 3;
   requested.vertex_epochs = 2;

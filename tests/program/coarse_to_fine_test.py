@@ -184,17 +184,17 @@ def test_the_usual_factors_begin_as_vertices(series):
     def epochs(*options):
         plan = harness.succeed("reconstruct", *series.input, "-o",
                                fresh_results("plan").volume_path, "--thickness", harness.THICKNESS,
-                               "--contrast", "bright", "--dry-run", *options).stdout
+                               "--contrast", "bright", "--field", "vm", "--dry-run", *options).stdout
         return next(line for line in plan.splitlines() if line.startswith("epochs: "))
 
     vertices, factors = " with plain vertices", " at full resolution"
-    assert epochs() == f"epochs: 80 of pixels 2 x 2{vertices}, 10{factors}{vertices}, 10{factors}"
+    assert epochs() == f"epochs: 160 of pixels 2 x 2{vertices}, 10{factors}{vertices}, 10{factors}"
     assert epochs("--epochs", 4) \
-        == f"epochs: 32 of pixels 2 x 2{vertices}, 4{factors}{vertices}, 4{factors}"
-    assert epochs("--vertex-epochs", 0) == f"epochs: 80 of pixels 2 x 2, 30{factors}"
-    assert epochs("--rank", 8) == f"epochs: 80 of pixels 2 x 2, 30{factors}"
+        == f"epochs: 64 of pixels 2 x 2{vertices}, 4{factors}{vertices}, 4{factors}"
+    assert epochs("--vertex-epochs", 0) == f"epochs: 160 of pixels 2 x 2, 30{factors}"
+    assert epochs("--rank", 8) == f"epochs: 160 of pixels 2 x 2, 30{factors}"
     assert epochs("--rank", 8, "--vertex-epochs", 3) \
-        == f"epochs: 80 of pixels 2 x 2{vertices}, 3{factors}{vertices}, 10{factors}"
+        == f"epochs: 160 of pixels 2 x 2{vertices}, 3{factors}{vertices}, 10{factors}"
 
 
 def test_vertices_have_no_variation_of_factors(command, with_vertices):

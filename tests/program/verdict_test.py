@@ -10,7 +10,7 @@ import pytest
 import harness
 
 THICKNESS = 38
-QUICK = ["--epochs", 12, "--vertex-epochs", 0, "--coarse-epochs", 8, "--rank", 8,
+QUICK = ["--field", "vm", "--epochs", 12, "--vertex-epochs", 0, "--coarse-epochs", 8, "--rank", 8,
          "--tv-penalty", "concave"]
 
 

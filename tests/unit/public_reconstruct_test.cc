@@ -207,7 +207,7 @@ TEST(PublicReconstruct, ResolvedOptionsGiveTheSameBits) {
   options.epochs = 4;
   const Options resolved = resolve_options(options);
   EXPECT_EQ(resolved.epochs, 4);
-  EXPECT_EQ(resolved.leaf_size, 32);
+  EXPECT_EQ(resolved.leaf_size, 64);
   EXPECT_EQ(resolved.activation, Activation::kSoftplus);
   EXPECT_EQ(resolved.fit_view_scale, false);
   EXPECT_TRUE(resolved.vertex_epochs && resolved.coarse_epochs && resolved.learning_rate);

@@ -14,6 +14,7 @@ Options tensorf_defaults() {
   const fit::FieldOptions field;
   const fit::FitOptions fit;
   Options options;
+  options.field = FieldKind::kVm;
   options.rank = 48;
   options.epochs = fit.epochs;
   options.vertex_epochs = 0;
