@@ -24,7 +24,7 @@ constexpr double kMaxViews = 1e9;
 
 struct Arguments {
   option_table::Choices choices;  // checked here, used by the methods
-  std::vector<std::string> names{"vm", "tv", "sirt", "wbp"};
+  std::vector<std::string> names{"grid", "tv", "sirt", "wbp"};
   std::vector<std::string> others;
   std::string truth, folder;
   bool tune = false, halves = false, overwrite = false;

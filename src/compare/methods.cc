@@ -70,14 +70,14 @@ std::vector<std::string> names_of(const std::vector<Method>& methods) {
 
 const std::vector<Method>& known_methods() {
   static const std::vector<Method> methods{
-      {.name = "vm",
+      {.name = "grid",
        .title = "tomofield",
        .arguments = {"reconstruct"},
        .resumes = true,
        .tunes = true},
-      {.name = "grid",
-       .title = "tomofield, plain vertices",
-       .arguments = {"reconstruct", "--field", "grid"},
+      {.name = "vm",
+       .title = "tomofield, factors",
+       .arguments = {"reconstruct", "--field", "vm"},
        .resumes = true,
        .tunes = true},
       {.name = "tv", .title = "total variation", .arguments = {"baseline", "tv"}, .tunes = true},

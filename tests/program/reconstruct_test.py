@@ -211,7 +211,7 @@ def test_config_file(plain, series):
             file.write(text)
         return path
 
-    config = write('thickness = 24\ncontrast = "bright"\nno-margin = true\nleaf-size = 16\n'
+    config = write('thickness = 24\ncontrast = "bright"\nno-margin = true\nfield = "vm"\nleaf-size = 16\n'
                    'rank = 6\nepochs = 3 # fewer\nsubsets = 7\nroi = [0, 0, 48, 36]\n'
                    'tv-penalty = "concave"\n'
                    'overwrite = false\n')
