@@ -72,7 +72,7 @@ struct Options {
 
   // Field
   std::optional<FieldKind> field;  ///< default: grid, unless other options are for factors
-  std::optional<int> leaf_size;  ///< side of a leaf in binned pixels, a multiple of 16
+  std::optional<int> leaf_size;    ///< side of a leaf in binned pixels, a multiple of 16
   TreeKind tree = TreeKind::kUniform;
   int leaf_budget = 0;          ///< most leaves of an adaptive tree; 0: as many as at the start
   double vertex_spacing = 1.0;  ///< binned pixels between vertices
@@ -96,7 +96,7 @@ struct Options {
   double boundary = 4.0;                    ///< weight of the boundary consistency (eq. 6)
   double fourier = 0.0;                     ///< weight of the isotropic Fourier prior (eq. 7)
   RingReference fourier_ring = RingReference::kMean;
-  bool keep_spikes = false;  ///< plain vertices may stand out from all their neighbours
+  bool keep_spikes = false;            ///< plain vertices may stand out from all their neighbours
   std::optional<bool> fit_view_scale;  ///< fit a scale and an offset a view
   int hold_out = 0;                    ///< keep every Nth view from the fit and score it; 0: none
   bool tune = false;                   ///< choose penalty, weight, rank and epochs by trials

@@ -42,9 +42,9 @@ class Ones {
 
 TEST(Spikes, AgreeWithTheReferenceForEveryShape) {
   for_each_simd_target([] {
-    for (const LatticeShape& shape : {LatticeShape{1, 1, 1}, LatticeShape{2, 2, 2},
-                                      LatticeShape{1, 40, 3}, LatticeShape{4, 33, 5},
-                                      LatticeShape{5, 3, 4}, LatticeShape{3, 17, 1}}) {
+    for (const LatticeShape& shape :
+         {LatticeShape{1, 1, 1}, LatticeShape{2, 2, 2}, LatticeShape{1, 40, 3},
+          LatticeShape{4, 33, 5}, LatticeShape{5, 3, 4}, LatticeShape{3, 17, 1}}) {
       std::vector<float> found = random_floats(shape.size(), 7);
       std::vector<double> expected = to_double(found);
       limit_spikes(shape, found.data());

@@ -16,8 +16,8 @@ kernels::VariationPenalty variation_penalty(const TermContext& c) {
   kernels::VariationPenalty penalty;
   penalty.epsilon = static_cast<float>(c.options.gradient_floor);
   if (c.options.penalty == Penalty::kConcave)
-    penalty.concavity = static_cast<float>(concavity(c.options.concavity, c.full.noise_sigma) /
-                                           (c.bin * c.bin));
+    penalty.concavity =
+        static_cast<float>(concavity(c.options.concavity, c.full.noise_sigma) / (c.bin * c.bin));
   return penalty;
 }
 

@@ -48,8 +48,7 @@ using Member = std::variant<
     bool Options::*, int Options::*, std::int64_t Options::*, std::uint64_t Options::*,
     double Options::*, std::string Options::*, std::filesystem::path Options::*,
     std::optional<bool> Options::*, std::optional<int> Options::*, std::optional<double> Options::*,
-    std::optional<Rectangle> Options::*, Contrast Options::*,
-    std::optional<FieldKind> Options::*,
+    std::optional<Rectangle> Options::*, Contrast Options::*, std::optional<FieldKind> Options::*,
     TreeKind Options::*, std::optional<Activation> Options::*, Engine Options::*,
     std::optional<Penalty> Options::*, RingReference Options::*, VoxelType Options::*,
     VolumeAxes Options::*>;

@@ -24,8 +24,9 @@ std::vector<const void*> members_of(const Choices& choices) {
                leaf_budget, vertex_spacing, rank, activation, margin_spacing, epochs, vertex_epochs,
                coarse_epochs, coarse_bin, subsets, engine, ray_samples, rays_per_step,
                learning_rate, density_variation, factor_variation, penalty, boundary, fourier,
-               fourier_ring, keep_spikes, fit_view_scale, hold_out, tune, patience, seed, voxel_type, axes,
-               invert, output, overwrite, resume, checkpoint_minutes] = choices.options;
+               fourier_ring, keep_spikes, fit_view_scale, hold_out, tune, patience, seed,
+               voxel_type, axes, invert, output, overwrite, resume, checkpoint_minutes] =
+      choices.options;
   return {&stack,
           &tlt,
           &xf,

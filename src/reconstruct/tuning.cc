@@ -96,7 +96,18 @@ TrialSettings choose_penalty(const TrialSettings& start, FitTrials& trials) {
   smooth.penalty = Penalty::kSmooth;
   for (TrialSettings* settings : {&concave, &smooth})
     settings->variation = objective::usual_variation(settings->penalty);
-  return trials.preferred_by_most_views(concave, smooth);
+  return trials.first_as_good({smooth, concave});
+}
+
+TrialSettings choose_variation(const TrialSettings& start, FitTrials& trials) {
+  const TrialSettings chosen = choose_penalty(start, trials);
+  if (chosen.penalty == Penalty::kConcave) return chosen;
+  std::vector<TrialSettings> candidates;
+  for (const double factor : {3.2, 1.8, 1.0, 0.56}) {
+    candidates.push_back(chosen);
+    candidates.back().variation *= factor;
+  }
+  return trials.first_as_good(candidates);
 }
 
 int expected_trials(const SearchSpace& space) {
@@ -167,7 +178,8 @@ std::optional<TunedFit> tune_penalty(const measurement::Measurement& measurement
   const fit::FitOptions shorter = penalty_trial_options(plain, field, fit);
   TrialFits fits(measurement, kPenaltyRows, plain, shorter, hooks, 2, processes);
   std::optional<TunedFit> tuned = searched(fits, nullptr, [&](FitTrials& trials) {
-    return choose_penalty({fit.penalty, fit.density_variation, field.rank, shorter.epochs}, trials);
+    return choose_variation({fit.penalty, fit.density_variation, field.rank, shorter.epochs},
+                            trials);
   });
   if (!tuned) return std::nullopt;
   log_trials(tuned->trials);

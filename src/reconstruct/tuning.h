@@ -33,10 +33,15 @@ struct SearchSpace {
 /// rounding count as equal.
 FitTrials make_trials(FitTrials::RunTrials run);
 
-/// Chooses the penalty of total variation that most held-out views prefer, each with its usual
-/// weight. If as many prefer either, it chooses the concave one. A concave penalty makes sharp
-/// edges, which are right for some specimens only.
+/// Chooses the penalty of total variation, each with its usual weight: the concave one if it
+/// predicts the held-out views better by more than the standard error of the difference, else the
+/// smooth one. A concave penalty makes sharp edges, which are right for some specimens only; where
+/// held-out views cannot tell, it paints flat regions that are none.
 TrialSettings choose_penalty(const TrialSettings& start, FitTrials& trials);
+
+/// Chooses the penalty by choose_penalty(). If it is the smooth one, chooses its weight as well,
+/// from 0.56 to 3.2 times the usual: the largest that is as good as the best.
+TrialSettings choose_variation(const TrialSettings& start, FitTrials& trials);
 
 /// Chooses the settings that predict held-out views best, one after another:
 ///
@@ -79,10 +84,10 @@ std::optional<TunedFit> tune(
     const TuneHooks& hooks,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
-/// Chooses the penalty alone by choose_penalty(), in two trials on half as many rows. The trials
-/// use plain vertices, whatever the field of the run: the right penalty depends on the specimen,
-/// and plain vertices converge in a fraction of the time. The trials take a few per cent of a fit
-/// of 256 rows. Returns nothing if a stop was requested. Every process calls it.
+/// Chooses penalty and weight by choose_variation(), in two to five trials on half as many rows.
+/// The trials use plain vertices, whatever the field of the run: the right penalty depends on the
+/// specimen, and plain vertices converge in a fraction of the time. The trials take a few per cent
+/// of a fit of 256 rows. Returns nothing if a stop was requested. Every process calls it.
 std::optional<TunedFit> tune_penalty(
     const measurement::Measurement& measurement, const fit::FieldOptions& field,
     const fit::FitOptions& fit, const TuneHooks& hooks,

@@ -44,9 +44,9 @@ class Extremes {
   V largest_[kSpikeRank], smallest_[kSpikeRank];
 };
 
-// Limits the values of vertices y, y + 1, … of a row. `rows` has the nine rows around it and itself,
-// which is number 4; each begins one vertex before the first. The bound is arithmetic: 26 values take 12
-// minima and maxima each.
+// Limits the values of vertices y, y + 1, … of a row. `rows` has the nine rows around it and
+// itself, which is number 4; each begins one vertex before the first. The bound is arithmetic: 26
+// values take 12 minima and maxima each.
 template <class D>
 HWY_INLINE void limit_vector(D d, const float* const* rows, int y, float* out) {
   Extremes extremes(d);
@@ -97,9 +97,9 @@ void limit_spikes(const LatticeShape& shape, float* values) {
     for (int z = 0; z < shape.nz; ++z, values += shape.ny) {
       const float* rows[9];
       for (int i = 0; i < 9; ++i) {
-        const int at_x = mirrored(x + i / 3 - 1, shape.nx), at_z = mirrored(z + i % 3 - 1, shape.nz);
-        rows[i] =
-            copy.data() + (static_cast<std::ptrdiff_t>(at_x) * shape.nz + at_z) * row_size;
+        const int at_x = mirrored(x + i / 3 - 1, shape.nx),
+                  at_z = mirrored(z + i % 3 - 1, shape.nz);
+        rows[i] = copy.data() + (static_cast<std::ptrdiff_t>(at_x) * shape.nz + at_z) * row_size;
       }
       HWY_DYNAMIC_DISPATCH(limit_row)(rows, shape.ny, values);
     }

@@ -251,7 +251,8 @@ void limit_spikes(const LatticeShape& s, double* values) {
       for (int y = 0; y < s.ny; ++y) {
         std::vector<double> around;
         for (int i = 0; i < 27; ++i)
-          if (i != 13) around.push_back(before[at(x + i / 9 - 1, y + i / 3 % 3 - 1, z + i % 3 - 1)]);
+          if (i != 13)
+            around.push_back(before[at(x + i / 9 - 1, y + i / 3 % 3 - 1, z + i % 3 - 1)]);
         std::sort(around.begin(), around.end());
         values[at(x, y, z)] =
             std::clamp(values[at(x, y, z)], around[kSpikeRank - 1], around[26 - kSpikeRank]);
