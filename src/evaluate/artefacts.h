@@ -9,7 +9,7 @@
 
 namespace tomofield::evaluate {
 
-/// What a volume shows of a reconstruction's faults.
+/// Holds the faults of a reconstruction that its volume shows.
 struct Artefacts {
   std::optional<double> speckle;  ///< none if the volume is too thin (speckle.h)
   std::optional<FaceJump> faces;  ///< none without a model, and if its leaves have no faces

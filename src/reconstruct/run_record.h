@@ -8,7 +8,7 @@
 
 namespace tomofield::reconstruction {
 
-/// What a run knows beside its fit.
+/// Holds what a run knows beside its fit.
 struct RunRecord {
   FitOrigin origin;
   /// Where the pixels of each aligned view come from in the stack.

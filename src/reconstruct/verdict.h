@@ -37,7 +37,7 @@ struct Warning {
   std::string message;  ///< one sentence
 };
 
-/// What a finished fit tells of itself and of its input.
+/// Holds what a finished fit tells of itself and of its input.
 struct Verdict {
   double residual = 0.0;  ///< mean squared residual over the noise variance
   std::optional<HeldOutSummary> held_out;

@@ -91,7 +91,7 @@ class LineFit {
   double n_ = 0, x_ = 0, y_ = 0, xx_ = 0, xy_ = 0, yy_ = 0;
 };
 
-// What is known of a view after it was compared with its prediction.
+// Holds what is known of a view after it was compared with its prediction.
 struct ComparedView {
   std::array<double, 2> displacement_px{};
   double correlation = 0.0;

@@ -8,7 +8,7 @@
 
 namespace tomofield::reconstruction {
 
-/// What the user said of the series.
+/// Holds what the user said of the series.
 struct GivenInput {
   Contrast contrast = Contrast::kDark;
   /// Where the pixels of each aligned view come from in the stack.

@@ -25,7 +25,7 @@ constexpr double kNoise = 1.0;
 
 double tilt_deg(int view) { return 5.0 * (view - kViews / 2); }
 
-/// What the detector adds to a pixel of a view.
+/// Returns what the detector adds to a pixel of a view.
 using Detector = std::function<double(std::int64_t x, std::int64_t y, int view)>;
 double nothing(std::int64_t, std::int64_t, int) { return 0.0; }
 
