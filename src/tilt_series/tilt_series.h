@@ -42,7 +42,7 @@ struct TiltSeriesOptions {
   /// Diameter of the gold beads that are looked for and masked; 0: none are. Without it, the
   /// diameter is estimated in dark series, and nothing is looked for in bright ones.
   std::optional<double> bead_diameter_nm;
-  /// Whether what stays at one place of the detector in all views is found and removed.
+  /// Finds and removes what stays at one place of the detector in all views.
   bool remove_fixed_pattern = true;
 };
 
