@@ -65,8 +65,8 @@ struct RotatedImage {
     return image;
   }
 
-  /// Says how right a mask is: the part of the fill that is masked, and the part of the image that is
-  /// masked though it lies more than `rim_px` from the fill.
+  /// Says how right a mask is: the part of the fill that is masked, and the part of the image that
+  /// is masked though it lies more than `rim_px` from the fill.
   struct Score {
     double found = 0.0, lost = 0.0;
   };
