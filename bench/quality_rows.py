@@ -214,11 +214,14 @@ def mean_and_spread(values, digits=2):
 
 
 def print_table(results):
-    print("| row | PSNR, dB | SSIM | parameters | core-s | seam / truth's | streaks / truth's |")
-    print("|-|-|-|-|-|-|-|")
+    print("| row | PSNR, dB | after scale and offset | SSIM | speckle, % | parameters | core-s "
+          "| seam / truth's | streaks / truth's |")
+    print("|-|-|-|-|-|-|-|-|-|")
     for name, rows in results.items():
         cells = [name, mean_and_spread([psnr(r) for r in rows]),
+                 mean_and_spread([r["scores"]["psnr_affine_dB"] for r in rows]),
                  mean_and_spread([ssim(r) for r in rows], 3),
+                 mean_and_spread([100 * (r["scores"]["speckle"] or 0) for r in rows], 3),
                  f"{rows[0].get('parameters', 0) / 1e6:.2f} M",
                  f"{statistics.median(r['core_seconds'] for r in rows):.0f}"]
         for key in ("seam", "streaks"):

@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "base/random.h"
+#include "io/image_stack.h"
 #include "tilt_series/masks/beads.h"
+#include "tomofield/options.h"
 
 namespace tomofield::testing {
 
@@ -88,6 +92,18 @@ struct BeadScene {
 
   tilt_series::BeadViews views() const {
     return {tilt_deg, [this](std::size_t index) { return view(index); }};
+  }
+
+  /// Returns the views as a stack in memory of 20 Å a pixel; dense parts are low in dark contrast.
+  std::shared_ptr<const io::ImageStack> stack(Contrast looks) const {
+    constexpr float kEmptyBeam = 50;
+    std::vector<float> values;
+    for (std::size_t index = 0; index < tilt_deg.size(); ++index) {
+      for (const float value : view(index).values)
+        values.push_back(looks == Contrast::kDark ? kEmptyBeam - value : value);
+    }
+    return io::image_stack_in_memory(std::move(values), width, height, tilt_deg,
+                                     /*pixel_size_A=*/20.0);
   }
 };
 

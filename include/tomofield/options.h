@@ -58,7 +58,8 @@ struct Options {
   std::optional<double> angpix;        ///< or to this pixel size in Å
   std::optional<double> pixel_size_A;  ///< overrides the header's pixel size
   Contrast contrast = Contrast::kDark;
-  bool take_log = false;  ///< −ln(I / I0) instead of I0 − I; dark contrast only
+  bool take_log = false;              ///< −ln(I / I0) instead of I0 − I; dark contrast only
+  std::optional<double> black_level;  ///< subtracted from bright intensities, in units of the stack
   std::optional<double> bead_diameter_nm;  ///< of gold beads to find and mask; 0: none
   bool remove_fixed_pattern = true;        ///< what stays at one place of the detector
 
@@ -97,6 +98,7 @@ struct Options {
   double fourier = 0.0;                     ///< weight of the isotropic Fourier prior (eq. 7)
   RingReference fourier_ring = RingReference::kMean;
   bool keep_spikes = false;            ///< plain vertices may stand out from all their neighbours
+  bool fit_noise = true;               ///< weight views by their residuals, and limit these
   std::optional<bool> fit_view_scale;  ///< fit a scale and an offset a view
   int hold_out = 0;                    ///< keep every Nth view from the fit and score it; 0: none
   bool tune = false;                   ///< choose penalty, weight, rank and epochs by trials

@@ -20,6 +20,7 @@ class Options(TypedDict, total=False):
     pixel_size_A: Optional[float]
     contrast: Literal["dark", "bright"]
     take_log: bool
+    black_level: Optional[float]
     bead_diameter_nm: Optional[float]
     remove_fixed_pattern: bool
 
@@ -58,6 +59,7 @@ class Options(TypedDict, total=False):
     fourier: float
     fourier_ring: Literal["mean", "max"]
     keep_spikes: bool
+    fit_noise: bool
     fit_view_scale: Optional[bool]
     hold_out: int
     tune: bool

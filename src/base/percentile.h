@@ -11,14 +11,15 @@ namespace tomofield::base {
 /// Returns the value below which `percent` of the values lie, interpolated linearly between
 /// neighbours as numpy does by default. Takes a copy, which it reorders. `values` must not be empty
 /// and must not contain NaN.
-inline double percentile(std::vector<float> values, double percent) {
+template <typename Value = float>
+double percentile(std::vector<Value> values, double percent) {
   TOMOFIELD_CHECK(!values.empty(), "percentile of nothing");
   const double position = percent / 100.0 * static_cast<double>(values.size() - 1);
   const auto low = static_cast<std::ptrdiff_t>(position);
   std::nth_element(values.begin(), values.begin() + low, values.end());
-  const double below = values[static_cast<std::size_t>(low)];
+  const auto below = static_cast<double>(values[static_cast<std::size_t>(low)]);
   if (low + 1 == static_cast<std::ptrdiff_t>(values.size())) return below;
-  const double above = *std::min_element(values.begin() + low + 1, values.end());
+  const auto above = static_cast<double>(*std::min_element(values.begin() + low + 1, values.end()));
   return below + (above - below) * (position - static_cast<double>(low));
 }
 

@@ -41,6 +41,7 @@ Record& record() {
 
 // The task that this thread runs. A loop in a task lets other threads run parts of that task.
 thread_local std::int64_t t_task = kNone;
+thread_local bool t_is_task_recorded = false;
 thread_local int t_thread = 0;
 
 std::int64_t now() {
@@ -130,9 +131,11 @@ TraceTasks::~TraceTasks() {
   if (is_wanted_) record().has_tasks = false;
 }
 
-// Without their tasks, loops inside of other loops would fill the record and tell little.
+// Without their tasks, loops inside of other loops would fill the record and tell little. Tasks
+// that began before others were wanted are not recorded, and so neither are the loops inside of
+// them.
 TraceLoop::TraceLoop(const char* name, std::int64_t count) : name_(name), count_(count) {
-  if (!trace::is_on || (t_task != kNone && !record().has_tasks)) return;
+  if (!trace::is_on || (t_task != kNone && !t_is_task_recorded)) return;
   id_ = record().next_id++;
   outer_task_ = t_task;
   begin_ = now();
@@ -161,17 +164,21 @@ TraceLoop::Task::Task(TraceLoop& of, std::int64_t i, int on_thread)
       outer_task(t_task),
       begin(now()),
       processor_begin(processor_now()),
-      thread(on_thread) {
+      thread(on_thread),
+      is_recorded(record().has_tasks),
+      is_outer_recorded(t_is_task_recorded) {
   t_task = id;
+  t_is_task_recorded = is_recorded;
   t_thread = thread;
 }
 
 TraceLoop::Task::~Task() {
   const std::int64_t end = now();
   t_task = outer_task;
+  t_is_task_recorded = is_outer_recorded;
   loop.busy_ += end - begin;
   raise(loop.longest_, end - begin);
-  if (!record().has_tasks) return;
+  if (!is_recorded) return;
   add({.kind = Event::Kind::kTask,
        .name = loop.name_,
        .begin = begin,

@@ -73,6 +73,7 @@ class TraceLoop {
     TraceLoop& loop;
     std::int64_t index, id, outer_task, begin, processor_begin;
     int thread;
+    bool is_recorded, is_outer_recorded;
   };
 
   const char* name_;

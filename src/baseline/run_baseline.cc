@@ -20,6 +20,7 @@
 #include "io/scratch_memory.h"
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
+#include "measurement/undecided_beads.h"
 #include "option_table/values.h"
 #include "output/metrics.h"
 #include "output/shared_options.h"
@@ -170,8 +171,10 @@ void write_results(const Solution& solution, const measurement::Measurement& ser
       {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"metrics", metrics}});
 }
 
-BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays) {
-  return {2 * solution.data_loss.back() / static_cast<double>(num_rays), last_decrease(solution)};
+BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays,
+                           const measurement::Measurement& series) {
+  return {2 * solution.data_loss.back() / static_cast<double>(num_rays), last_decrease(solution),
+          series.masks.bead_masking};
 }
 
 }  // namespace
@@ -229,8 +232,9 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   BaselineOptions options = requested;
   const BaselinePaths paths = baseline_paths(options.shared.output);
   const bool fit_view_scale = fits_view_scale(options);
-  const measurement::Measurement series = prepare_measurement(
+  measurement::Measurement series = prepare_measurement(
       tilt_series, output::specimen_options(options.shared), io::scratch_directory(paths.volume));
+  keep_beads(series);  // as bright particles may be the specimen
   const std::vector<int> held_out =
       measurement::held_out_views(series.geometry.tilt_deg, options.shared.hold_out);
   nlohmann::json tuning = nullptr;
@@ -257,7 +261,7 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   metrics["held_out"] = held_out_json(problem, held_out, fit_view_scale, solution.densities);
   metrics["tuning"] = tuning;
   write_results(solution, series, options, metrics, paths);
-  return summary_of(solution, problem.num_rays());
+  return summary_of(solution, problem.num_rays(), series);
 }
 
 }  // namespace tomofield::baseline

@@ -49,6 +49,7 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
 struct BaselineSummary {
   double mean_squared_residual = 0;     ///< in units of the noise's variance
   std::optional<double> last_decrease;  ///< last_decrease(), for iterative methods
+  tilt_series::BeadMasking bead_masking = tilt_series::BeadMasking::kNone;
 };
 
 /// The receivers of the progress of a run.

@@ -69,10 +69,11 @@ void run_method(const baseline::BaselineOptions& options, const baseline::Method
   if (shared.tune) fmt::print("short trials first, that choose settings by held-out views\n");
   std::fflush(stdout);  // the plan comes before other output, in a file too
   if (dry_run) return;
-  print_summary(baseline::run_baseline(series, options,
-                                       {make_progress_bar("tune"), make_progress_bar("baseline")}));
+  const baseline::BaselineSummary summary = baseline::run_baseline(
+      series, options, {make_progress_bar("tune"), make_progress_bar("baseline")});
+  print_summary(summary);
   fmt::print("tomogram  {}\nmetrics   {}\n", paths.volume.string(), paths.json.string());
-  write_pictures(paths.volume, series, paths.picture_prefix);
+  write_pictures(paths.volume, series, summary.bead_masking, paths.picture_prefix);
 }
 
 template <typename Method>

@@ -89,8 +89,13 @@ void print_series(const tilt_series::TiltSeriesOptions& options) {
     fmt::print("  empty beam       {:.7g}\n", series.empty_beam());
   }
   const tilt_series::MaskMetrics& masks = series.mask_metrics();
-  fmt::print("  masked           {} beads of {:.3g} nm, {} hot or dead pixels\n", masks.num_beads,
-             masks.bead_diameter_A / 10, masks.num_bad_pixels);
+  const bool is_undecided = masks.bead_masking == tilt_series::BeadMasking::kUndecided;
+  fmt::print("  masked           {}, {} hot or dead pixels\n",
+             is_undecided ? "no beads" : describe_beads(masks), masks.num_bad_pixels);
+  if (is_undecided) {
+    fmt::print("  found            {}, not masked: they may be the specimen\n",
+               describe_beads(masks));
+  }
   if (masks.fixed_pattern.is_any()) {
     fmt::print("  fixed pattern    {}\n", tilt_series::describe_pattern(masks.fixed_pattern));
   }

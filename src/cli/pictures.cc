@@ -14,7 +14,7 @@
 namespace tomofield::cli {
 
 void write_pictures(const std::filesystem::path& volume, const tilt_series::TiltSeries& series,
-                    const std::filesystem::path& prefix) {
+                    tilt_series::BeadMasking bead_masking, const std::filesystem::path& prefix) {
   const base::TraceSpan span("draw pictures");
   std::vector<std::filesystem::path> slices;
   const std::filesystem::path mask = prefix.string() + "_mask.png";
@@ -22,7 +22,7 @@ void write_pictures(const std::filesystem::path& volume, const tilt_series::Tilt
     if (i == 0)
       slices = report::write_slice_pictures(volume, prefix);
     else
-      report::write_mask_picture(series, mask);
+      report::write_mask_picture(series, bead_masking, mask);
   });
   fmt::print("pictures ");
   for (const std::filesystem::path& picture : slices) fmt::print(" {}", picture.string());

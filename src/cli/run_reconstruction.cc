@@ -128,7 +128,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   }
   if (!processes.is_root()) return;
   print_files(paths);
-  write_pictures(paths.volume, series, paths.picture_prefix);
+  write_pictures(paths.volume, series, run.results->bead_masking, paths.picture_prefix);
   if (options.field.tree == TreeKind::kAdaptive)
     write_tree_picture(paths.model, paths.tree_picture);
   std::fflush(stdout);  // the verdict comes last

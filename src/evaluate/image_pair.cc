@@ -134,6 +134,21 @@ double correlation(const Image& one, const Image& other) {
   return vx > 0 && vy > 0 ? (n * xy - x * y) / std::sqrt(vx * vy) : 0.0;
 }
 
+std::array<double, 2> neighbour_correlation(const Image& one, const Image& other) {
+  Image difference{one.width, one.height, {}};
+  for (std::size_t i = 0; i < one.values.size(); ++i)
+    difference.values.push_back(one.values[i] - other.values[i]);
+  Image along_x = difference, along_y = difference;
+  const auto width = static_cast<std::ptrdiff_t>(one.width);
+  std::ranges::fill(along_x.values, std::numeric_limits<float>::quiet_NaN());
+  along_y.values = along_x.values;
+  for (std::ptrdiff_t y = 0; y < one.height; ++y)
+    std::copy_n(difference.values.begin() + y * width + 1, width - 1,
+                along_x.values.begin() + y * width);
+  std::copy(difference.values.begin() + width, difference.values.end(), along_y.values.begin());
+  return {correlation(difference, along_x), correlation(difference, along_y)};
+}
+
 std::array<double, 2> displacement(const Image& reference, const Image& moved) {
   TOMOFIELD_CHECK(reference.width == moved.width && reference.height == moved.height,
                   "images of one size");

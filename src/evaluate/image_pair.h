@@ -26,6 +26,10 @@ Image without_column_means(const Image& image);
 /// there are none or if one of them is constant.
 double correlation(const Image& one, const Image& other);
 
+/// Returns the correlation of the differences of two images between neighbours along x and along y.
+/// It is 0 along an axis without neighbours that both images have, and for a constant difference.
+std::array<double, 2> neighbour_correlation(const Image& one, const Image& other);
+
 /// Returns how far, along x and y in pixels, the content of `moved` lies from that of `reference`:
 /// the maximum of their cross-correlation within a quarter of the image, between pixels by a
 /// parabola. Details larger than an eighth of the image do not count. Both have one size.

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
+
+#include "base/random.h"
 
 namespace tomofield::evaluate {
 namespace {
@@ -51,6 +54,28 @@ TEST(ImagePair, DisplacementIgnoresWhatOneImageLacks) {
   const auto found = displacement(reference, moved);
   EXPECT_NEAR(found[0], 2, 0.3);
   EXPECT_NEAR(found[1], 3, 0.3);
+}
+
+// The noise of each image is `blur` · its neighbour's along x + fresh noise.
+TEST(ImagePair, NeighboursOfCorrelatedNoiseAreAlike) {
+  for (const double blur : {0.0, 0.6}) {
+    const Image told = details(90, 70, 0, 0);
+    Image seen = told;
+    base::Random random(3);
+    for (std::int64_t y = 0; y < seen.height; ++y) {
+      double noise = 0;
+      for (std::int64_t x = 0; x < seen.width; ++x) {
+        noise = blur * noise + random.normal();
+        seen.values[static_cast<std::size_t>(y * seen.width + x)] += static_cast<float>(noise);
+      }
+    }
+    for (std::size_t i = 0; i < 500; ++i) seen.values[7 * i] = kNone;
+    const auto [x, y] = neighbour_correlation(seen, told);
+    EXPECT_NEAR(x, blur, 0.05);
+    EXPECT_NEAR(y, 0.0, 0.05);
+  }
+  const Image row{3, 1, {1, 4, 2}};
+  EXPECT_EQ(neighbour_correlation(row, row), (std::array{0.0, 0.0}));
 }
 
 TEST(ImagePair, ReducedImageHasTheMeansOfMeasuredPixels) {

@@ -13,6 +13,7 @@
 #include "evaluate/box.h"
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
+#include "measurement/undecided_beads.h"
 #include "projection/sample_grid.h"
 #include "projection/slab_projector.h"
 #include "tomofield/error.h"
@@ -164,8 +165,9 @@ VolumeScore score_volume(const VolumeScoreOptions& options) {
   measurement::SpecimenOptions specimen = options.specimen;
   specimen.thickness = static_cast<double>(volume.shape.nz) * series.bin_factor();
   check_volume(volume, measurement::plan_measurement(series, specimen), options.volume);
-  const measurement::Measurement prepared =
+  measurement::Measurement prepared =
       measurement::prepare_measurement(series, specimen, std::filesystem::temp_directory_path());
+  keep_beads(prepared);  // all volumes are scored on the same rays
   std::vector<double> noise_weight;
   for (const double sigma : prepared.noise_sigma) noise_weight.push_back(1.0 / (sigma * sigma));
   VolumeScore score;

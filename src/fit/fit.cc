@@ -11,6 +11,7 @@
 #include "base/random.h"
 #include "base/trace.h"
 #include "field/vm/factorise.h"
+#include "measurement/noise_fit.h"
 #include "objective/ray_data_term.h"
 #include "objective/slab_objective.h"
 #include "objective/terms.h"
@@ -95,8 +96,8 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
         "no coarse stage: leaves of this --leaf-size do not end with slabs of coarse pixels");
   enter_stage();
   if (stage().bin > 1) resample_field();
-  for (const double sigma : binned_->noise_sigma)
-    progress_.views.push_back({1.0, 0.0, 1.0 / (sigma * sigma)});
+  for (const double weight : binned_->noise_weights())
+    progress_.views.push_back({1.0, 0.0, weight});
   progress_.epoch_sums.resize(progress_.views.size());
   follow_tree();
 }
@@ -142,10 +143,11 @@ void Fit::refine() {
   enter_stage();
   resample_field();
   progress_.tree.is_frozen = true;
+  const std::vector<double> noise_weights = binned_->noise_weights();
   for (std::size_t v = 0; v < progress_.views.size(); ++v) {
-    const double sigma = binned_->noise_sigma[v];
-    progress_.views[v].weight = 1.0 / (sigma * sigma);
-    progress_.views[v].offset *= static_cast<double>(last_bin) / stage().bin;  // rays are longer
+    const measurement::ViewModel& last = progress_.views[v];
+    const double longer = static_cast<double>(last_bin) / stage().bin;  // rays are
+    progress_.views[v] = {last.scale, last.offset * longer, noise_weights[v]};
   }
   follow_tree();
   halo_->refresh(*field_);  // other vertices depend on more of the old ones
@@ -208,10 +210,8 @@ bool Fit::is_done() const {
   return errors.end() - best > options_.patience;
 }
 
-measurement::ViewErrors Fit::held_out_error() const {
-  std::vector<double> weights;
-  for (const measurement::ViewModel& view : progress_.views) weights.push_back(view.weight);
-  return objective_->held_out_error(weights, options_.fit_view_scale);
+measurement::ViewErrors Fit::held_out_error(bool fit_view_scale) const {
+  return objective_->held_out_error(binned_->noise_weights(), fit_view_scale);
 }
 
 std::vector<measurement::PredictedView> Fit::predict(
@@ -289,6 +289,13 @@ void Fit::limit_spikes() {
   halo_->refresh(*field_);
 }
 
+// Says whether the residuals of the last epoch are those of noise rather than of structure that is
+// still to come: in the second half of a fit, at full resolution.
+bool Fit::residuals_are_noise() const {
+  const std::int64_t epochs_done = progress_.step / steps_per_epoch();
+  return stage().bin == 1 && epochs_done > stage().first_epoch && 2 * epochs_done >= num_epochs();
+}
+
 void Fit::score_held_out() {
   const base::TraceSpan span("score held-out views");
   const measurement::ViewErrors error = held_out_error();
@@ -298,13 +305,15 @@ void Fit::score_held_out() {
 }
 
 void Fit::end_epoch() {
+  const std::vector<double> noise_weights = binned_->noise_weights();
   double squares = 0.0, rays = 0.0;
   for (std::size_t v = 0; v < progress_.views.size(); ++v) {
-    squares +=
-        progress_.views[v].weight * progress_.epoch_sums[v].squared_residual(progress_.views[v]);
+    squares += noise_weights[v] * progress_.epoch_sums[v].squared_residual(progress_.views[v]);
     rays += progress_.epoch_sums[v].n;
   }
   progress_.data_loss.push_back(squares / rays);
+  if (options_.fit_noise && residuals_are_noise())
+    measurement::fit_noise(noise_weights, fitted_views_, progress_.epoch_sums, progress_.views);
   if (options_.fit_view_scale)
     measurement::fit_nuisances(measurement::NuisancePrior{}, progress_.epoch_sums, progress_.views);
   progress_.epoch_sums.assign(progress_.views.size(), {});

@@ -28,7 +28,7 @@ namespace tomofield::fit {
 /// run continues from these three.
 struct Progress {
   std::int64_t step = 0;                          ///< number of steps done
-  std::vector<measurement::ViewModel> views;      ///< scale, offset and weight of each view
+  std::vector<measurement::ViewModel> views;      ///< models of each view
   std::vector<measurement::ViewSums> epoch_sums;  ///< sums of each view in the current epoch
   std::vector<double> data_loss;  ///< of each epoch: mean squared residual over the noise variance
   TreeProgress tree;
@@ -79,7 +79,10 @@ class Fit {
   /// Returns the factor on the weight of the density's variation (objective/terms.h).
   double variation_gain() const;
   /// Scores the current field on the held-out views. There must be at least one.
-  measurement::ViewErrors held_out_error() const;
+  measurement::ViewErrors held_out_error() const { return held_out_error(options_.fit_view_scale); }
+  /// Does the same, with a scale and an offset of each view if `fit_view_scale`, whatever the
+  /// options say.
+  measurement::ViewErrors held_out_error(bool fit_view_scale) const;
   /// Predicts some views, each scaled by its model, beside the measured ones. All of them are in
   /// memory together.
   std::vector<measurement::PredictedView> predict(
@@ -111,6 +114,7 @@ class Fit {
   void take_step();
   bool is_traced_in_detail() const;
   void end_epoch();
+  bool residuals_are_noise() const;
   void limit_spikes();
   void score_held_out();
   std::vector<int> views_of_step(std::int64_t step) const;

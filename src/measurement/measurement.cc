@@ -18,6 +18,12 @@ std::vector<T> chosen(const std::vector<T>& values, std::span<const int> indices
 
 }  // namespace
 
+std::vector<double> Measurement::noise_weights() const {
+  std::vector<double> weights;
+  for (const double sigma : noise_sigma) weights.push_back(1.0 / (sigma * sigma));
+  return weights;
+}
+
 SlabViews::Shape Measurement::rays_shape() const {
   const auto num_views = static_cast<std::size_t>(geometry.num_views());
   if (ray_geometry) {
@@ -39,6 +45,8 @@ Measurement binned(const Measurement& fine, int bin) {
   coarse.geometry.axis_x /= bin;
   coarse.geometry.axis_z /= bin;
   for (double& sigma : coarse.noise_sigma) sigma /= bin * bin;
+  for (auto& discs : coarse.undecided_beads)
+    for (auto& [x, y, radius] : discs) x /= bin, y /= bin, radius /= bin;
   return coarse;
 }
 
@@ -50,13 +58,17 @@ Measurement middle_rows(const Measurement& whole, std::int64_t max_rows, std::sp
   part.rays = whole.rays->middle_rows(max_rows, views, processes);
   const std::int64_t all_rows = whole.rays->shape().num_rows;
   const std::int64_t rows = part.rays->shape().num_rows;
-  part.roi.y0 += (all_rows - rows) / 2;
+  const std::int64_t first_row = (all_rows - rows) / 2;
+  part.roi.y0 += first_row;
   part.roi.y1 = part.roi.y0 + rows;
   part.geometry.tilt_deg = chosen(whole.geometry.tilt_deg, views);
   part.noise_sigma = chosen(whole.noise_sigma, views);
   part.masks.beads_found = chosen(whole.masks.beads_found, views);
   part.masks.beads_masked = chosen(whole.masks.beads_masked, views);
   part.masked_part = chosen(whole.masked_part, views);
+  part.undecided_beads = chosen(whole.undecided_beads, views);
+  for (auto& discs : part.undecided_beads)
+    for (tilt_series::MaskDisc& disc : discs) disc.y_px -= static_cast<double>(first_row);
   part.held_out.clear();
   for (int v = 0; v < static_cast<int>(views.size()); ++v) {
     if (std::ranges::binary_search(whole.held_out, views[static_cast<std::size_t>(v)]))

@@ -40,12 +40,21 @@ struct Measurement {
   double bin_factor = 1.0;  ///< of `pixel_size_A` to the stack's
   double x_tilt_deg = 0.0;  ///< the same for every view: a rotation of the volume about X
   double empty_beam = 0.0;  ///< I0 in data units (dark contrast)
+  /// The brightness of the emptiest places of a bright series, in density units times pixels, which
+  /// the rays still contain (background.h); 0 if it is small beside the specimen's.
+  double background = 0.0;
   tilt_series::MaskMetrics masks = {};
   std::vector<double> masked_part = {};  ///< [view]: the part of the rays that carries no loss
+  /// [view]: discs of beads whose rays count until hide_beads() or keep_beads() is called
+  /// (undecided_beads.h), in the pixels of the rays, with y from their first row. Empty if nothing
+  /// is undecided.
+  std::vector<std::vector<tilt_series::MaskDisc>> undecided_beads = {};
 
   /// Returns the contrast of the views near zero tilt, in density units times pixels: the standard
   /// deviation over their pixels that defines the unit.
   double contrast() const { return kContrastPerThickness * geometry.thickness; }
+  /// Returns 1 / σ² of each view.
+  std::vector<double> noise_weights() const;
   int num_fitted_views() const { return geometry.num_views() - static_cast<int>(held_out.size()); }
   /// Returns the views' size and which of their rows are fitted: those of the region of interest,
   /// or all rows of views as recorded.
@@ -53,12 +62,14 @@ struct Measurement {
 };
 
 /// Returns the measurement in pixels `bin` times as wide, for coarse stages. A density unit stays
-/// what it is. `roi` stays in fine pixels, as the field does.
+/// what it is. `roi` stays in fine pixels, as the field does. Discs of undecided beads are scaled;
+/// to mask a pixel by its fine pixels, decide before.
 Measurement binned(const Measurement& fine, int bin);
 
 /// Returns the measurement of these views alone (ascending), on at most `max_rows` rows in the
 /// middle, on every process. Views are counted anew, from 0; of the views held out, those that are
-/// left stay held out. It must be of resampled views, whose rays stay in their row.
+/// left stay held out. Undecided beads stay undecided. It must be of resampled views, whose rays
+/// stay in their row.
 Measurement middle_rows(
     const Measurement& whole, std::int64_t max_rows, std::span<const int> views,
     const distributed::Communicator& processes = distributed::Communicator::alone());

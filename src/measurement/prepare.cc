@@ -33,6 +33,9 @@ constexpr double kMaxThickness = 1e6;
 // specimen that ends in the field of view mostly show its faces.
 constexpr std::size_t kContrastViews = 5;
 
+// A background below this part of the mean brightness makes no difference.
+constexpr double kLeastBackground = 0.02;
+
 double common_x_tilt(const std::vector<tilt_series::View>& views, double thickness) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const tilt_series::View& view : views) {
@@ -95,8 +98,9 @@ geometry::RayGeometry ray_geometry(const tilt_series::TiltSeries& series,
   return g;
 }
 
-// Mean and noise-free standard deviation of the valid pixels of a view, in the rows that are
-// fitted.
+// Mean and noise-free standard deviation of the measured pixels of a view, in the rows that are
+// fitted, without those of undecided beads: they would count for much, and a decision about them
+// must not change the density unit.
 struct ViewBrightness {
   double mean = 0;
   double contrast = 0;
@@ -106,7 +110,7 @@ ViewBrightness view_brightness(std::span<const float> image, std::span<const std
                                double noise) {
   double n = 0, s = 0, ss = 0;
   for (std::size_t i = 0; i < image.size(); ++i) {
-    if (!valid[i]) continue;
+    if (valid[i] != tilt_series::kMeasurement) continue;
     const double b = static_cast<double>(image[i]);
     n += 1;
     s += b;
@@ -173,15 +177,16 @@ std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& s
   return views;
 }
 
-// Sets the density unit and the mean density from the series' brightness.
-void set_unit(const std::vector<ViewBrightness>& views, Measurement& prepared) {
+// Sets the density unit, the mean density and the background from the series' brightness.
+void set_unit(const std::vector<ViewBrightness>& views, double background, Measurement& prepared) {
   const geometry::TiltGeometry& g = prepared.geometry;
   std::vector<std::pair<double, double>> contrast_by_tilt;
-  double mean_density = 0;
+  double mean_density = 0, brightness = 0;
   for (int v = 0; v < g.num_views(); ++v) {
     const std::size_t view = static_cast<std::size_t>(v);
     const ViewBrightness& b = views[view];
     mean_density += b.mean * g.cos_tilt(v) / g.thickness / g.num_views();
+    brightness += b.mean;
     contrast_by_tilt.emplace_back(std::abs(g.tilt_deg[view]), b.contrast);
   }
   std::sort(contrast_by_tilt.begin(), contrast_by_tilt.end());
@@ -191,19 +196,20 @@ void set_unit(const std::vector<ViewBrightness>& views, Measurement& prepared) {
     contrast += contrast_by_tilt[i].second / static_cast<double>(used);
   prepared.unit = contrast / (kContrastPerThickness * g.thickness);
   prepared.mean_density = mean_density / prepared.unit;
+  const double mean = brightness / (g.num_views() * prepared.unit);
+  if (background / prepared.unit > kLeastBackground * mean)
+    prepared.background = background / prepared.unit;
 }
 
-std::vector<double> masked_parts(const SlabViews& rays,
-                                 const distributed::Communicator& processes) {
-  std::vector<std::int64_t> valid(rays.shape().num_views);
-  base::parallel_for("count rays", std::ssize(valid), [&](std::int64_t view) {
-    valid[static_cast<std::size_t>(view)] = rays.num_valid(static_cast<int>(view));
-  });
-  processes.allreduce_sum(std::span(valid));
-  const auto num_rays = static_cast<double>(rays.shape().width * rays.shape().num_rows);
-  std::vector<double> masked;
-  for (const std::int64_t n : valid) masked.push_back(1.0 - static_cast<double>(n) / num_rays);
-  return masked;
+// Returns the discs of undecided beads of each view, with y from the first row that is fitted; none
+// if there are no such beads.
+std::vector<std::vector<tilt_series::MaskDisc>> undecided_discs(
+    const tilt_series::TiltSeries& series, const SlabViews::Shape& shape) {
+  if (series.mask_metrics().bead_masking != tilt_series::BeadMasking::kUndecided) return {};
+  auto discs = series.undecided_beads();
+  for (auto& of_view : discs)
+    for (tilt_series::MaskDisc& disc : of_view) disc.y_px -= static_cast<double>(shape.first_row);
+  return discs;
 }
 
 void log_masks(const Measurement& prepared) {
@@ -212,12 +218,14 @@ void log_masks(const Measurement& prepared) {
   const int num_views = prepared.geometry.num_views();
   for (int v = 0; v < num_views; ++v)
     masked += prepared.masked_part[static_cast<std::size_t>(v)] / num_views;
-  const std::string beads =
-      masks.num_beads == 0
-          ? "no beads"
-          : fmt::format("{} beads of {:.3g} nm", masks.num_beads, masks.bead_diameter_A / 10);
+  const bool is_undecided = masks.bead_masking == tilt_series::BeadMasking::kUndecided;
   base::log_info(fmt::format("masked: {:.1f} % of all rays ({}, {} hot or dead pixels, fill)",
-                             100 * masked, beads, masks.num_bad_pixels));
+                             100 * masked, is_undecided ? "no beads" : describe_beads(masks),
+                             masks.num_bad_pixels));
+  if (!is_undecided) return;
+  base::log_info(fmt::format(
+      "found {} in a bright series, where they may be the specimen: a trial decides, or they stay",
+      describe_beads(masks)));
 }
 
 }  // namespace
@@ -283,7 +291,7 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
                                 const distributed::Communicator& processes) {
   Measurement prepared = plan_measurement(series, specimen);
   const SlabViews::Shape shape = prepared.rays_shape();
-  set_unit(brightness_of_views(series, shape, processes), prepared);
+  set_unit(brightness_of_views(series, shape, processes), series.background(), prepared);
   for (const double sigma : series.noise_sigma())
     prepared.noise_sigma.push_back(sigma / prepared.unit);
   const RowShare share = row_share(shape.num_rows, band_rows, processes);
@@ -299,7 +307,8 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
         scratch_dir);
   }
   prepared.masks = series.mask_metrics();
-  prepared.masked_part = masked_parts(*prepared.rays, processes);
+  prepared.undecided_beads = undecided_discs(series, shape);
+  prepared.masked_part = prepared.rays->masked_parts(processes);
   log_masks(prepared);
   return prepared;
 }

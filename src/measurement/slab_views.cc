@@ -245,6 +245,52 @@ std::int64_t SlabViews::num_valid(int view) const {
   return count;
 }
 
+std::vector<double> SlabViews::masked_parts(const distributed::Communicator& processes) const {
+  std::vector<std::int64_t> valid(shape_.num_views);
+  base::parallel_for("count rays", std::ssize(valid), [&](std::int64_t view) {
+    valid[static_cast<std::size_t>(view)] = num_valid(static_cast<int>(view));
+  });
+  processes.allreduce_sum(std::span(valid));
+  const auto num_rays = static_cast<double>(shape_.width * shape_.num_rows);
+  std::vector<double> masked;
+  for (const std::int64_t n : valid) masked.push_back(1.0 - static_cast<double>(n) / num_rays);
+  return masked;
+}
+
+void SlabViews::hide(std::span<const std::vector<tilt_series::MaskDisc>> discs) {
+  const Slabs held = holding_.all();
+  base::parallel_for("hide discs", std::ssize(discs), [&](std::int64_t view) {
+    for (const tilt_series::MaskDisc& disc : discs[static_cast<std::size_t>(view)]) {
+      tilt_series::for_pixels_in(disc, shape_.width, shape_.num_rows,
+                                 [&](std::int64_t x, std::int64_t y) {
+                                   const auto slab = static_cast<int>(y / kRows);
+                                   if (slab >= held.begin && slab < held.end)
+                                     clear_ray(static_cast<int>(view), x, y);
+                                 });
+    }
+  });
+  memory_.release(0, memory_.size());
+}
+
+void SlabViews::subtract(float value) {
+  const Slabs held = holding_.all();
+  base::parallel_for("subtract from rays", held.size(), [&](std::int64_t i) {
+    const int slab = held.begin + static_cast<int>(i);
+    for (std::size_t at = line(slab, 0); at < line(slab + 1, 0); ++at) {
+      for (std::size_t lane = 0; lane < kRows; ++lane)
+        if (mask_[at] >> lane & 1) rays_[at * kRows + lane] -= value;
+    }
+    release(slab);
+  });
+}
+
+void SlabViews::clear_ray(int view, std::int64_t x, std::int64_t y) {
+  const std::size_t at = line(static_cast<int>(y / kRows), view) + static_cast<std::size_t>(x);
+  const auto lane = static_cast<std::size_t>(y % kRows);
+  rays_[at * kRows + lane] = 0.0f;
+  mask_[at] = static_cast<std::uint16_t>(mask_[at] & ~(1u << lane));
+}
+
 std::uint64_t SlabViews::checksum_of(int slab) const {
   const std::size_t lines = line(slab + 1, 0) - line(slab, 0);
   base::Xxhash64 hash;

@@ -14,11 +14,12 @@
 #include "distributed/partition.h"
 #include "io/scratch_memory.h"
 #include "kernels/lanes.h"
+#include "tilt_series/masks/mask_disc.h"
 
 namespace tomofield::measurement {
 
-/// Copies a view as height × width floats, and which pixels are measurements. It is called for
-/// several views at once, on different threads.
+/// Copies a view as height × width floats, and which pixels are measurements (0: not). It is called
+/// for several views at once, on different threads.
 using ReadView =
     std::function<void(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid)>;
 
@@ -102,6 +103,14 @@ class SlabViews {
   }
   /// Counts the rays of a view that count, in the own slabs.
   std::int64_t num_valid(int view) const;
+  /// Returns the part of each view's rays that does not count, of all processes.
+  std::vector<double> masked_parts(
+      const distributed::Communicator& processes = distributed::Communicator::alone()) const;
+  /// Masks the rays of the pixels whose centres lie in the discs of their view, in all slabs that
+  /// this process holds. `discs` are [view], in pixels, with y from the first row.
+  void hide(std::span<const std::vector<tilt_series::MaskDisc>> discs);
+  /// Subtracts a value from all rays that count, in all slabs that this process holds.
+  void subtract(float value);
   /// Returns a hash of rays and masks of all slabs (XXH64 of the XXH64 of each slab), which tells
   /// one series from another.
   std::uint64_t checksum(
@@ -124,6 +133,7 @@ class SlabViews {
   void add_row(int view, std::int64_t y, int bin, std::span<double> sums,
                std::span<int> counts) const;
   void share(const distributed::Communicator& processes);
+  void clear_ray(int view, std::int64_t x, std::int64_t y);
   std::uint64_t checksum_of(int slab) const;
   int rows_of(int slab) const;
   int num_views() const { return static_cast<int>(shape_.num_views); }

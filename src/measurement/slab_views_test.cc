@@ -31,8 +31,9 @@ bool is_valid(std::size_t view, std::int64_t x, std::int64_t y) {
   return base::Random(11 + view, static_cast<std::uint64_t>(y * kShape.width + x)).below(4) > 0;
 }
 
-std::unique_ptr<SlabViews> make_views(const SlabViews::Holding& holding = {
-                                          SlabViews::all_slabs(kShape)}) {
+std::unique_ptr<SlabViews> make_views(
+    const SlabViews::Holding& holding = {SlabViews::all_slabs(kShape)},
+    std::size_t in_memory_bytes = std::size_t{1} << 30) {
   const auto read = [](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
     for (std::int64_t y = 0; y < kShape.height; ++y) {
       for (std::int64_t x = 0; x < kShape.width; ++x) {
@@ -42,7 +43,8 @@ std::unique_ptr<SlabViews> make_views(const SlabViews::Holding& holding = {
       }
     }
   };
-  return std::make_unique<SlabViews>(kShape, holding, kUnit, read_on_all_threads(read), "/tmp");
+  return std::make_unique<SlabViews>(kShape, holding, kUnit, read_on_all_threads(read), "/tmp",
+                                     in_memory_bytes);
 }
 
 TEST(SlabViews, SomeSlabsAreThoseOfTheWhole) {
@@ -84,6 +86,53 @@ TEST(SlabViews, MiddleRowsAreCopied) {
     }
   }
   EXPECT_EQ(all->middle_rows(100, every)->checksum(), all->checksum());
+}
+
+// A disc in the middle of two slabs, one that reaches over an edge, and one far outside.
+std::vector<std::vector<tilt_series::MaskDisc>> some_discs() {
+  return {{{10.2, 16.4, 3.7}, {0.3, 38.5, 2.0}}, {}, {{-40, 3, 4}, {15.5, 31.5, 4.0}}};
+}
+
+bool is_in_disc(std::size_t view, std::int64_t x, std::int64_t y) {
+  const double px = static_cast<double>(x) + 0.5, py = static_cast<double>(y) + 0.5;
+  return std::ranges::any_of(some_discs()[view], [&](const tilt_series::MaskDisc& disc) {
+    return std::hypot(px - disc.x_px, py - disc.y_px) <= disc.radius_px;
+  });
+}
+
+TEST(SlabViews, DiscsHideTheRaysInThem) {
+  const auto whole = make_views(), before = make_views();
+  whole->hide(some_discs());
+  std::vector<double> masked(3, 0.0);
+  for (std::size_t v = 0; v < 3; ++v) {
+    const int view = static_cast<int>(v);
+    for (std::int64_t y = 0; y < kShape.num_rows; ++y) {
+      for (std::int64_t x = 0; x < kShape.width; ++x) {
+        const bool counts = before->counts(view, x, y) && !is_in_disc(v, x, y);
+        ASSERT_EQ(whole->counts(view, x, y), counts);
+        ASSERT_EQ(whole->ray(view, x, y), counts ? before->ray(view, x, y) : 0.0f);
+        masked[v] += counts ? 0 : 1;
+      }
+    }
+    EXPECT_NEAR(whole->masked_parts()[v], masked[v] / (21 * 39), 1e-12);
+  }
+  EXPECT_GT(whole->masked_parts()[0], before->masked_parts()[0]);
+}
+
+TEST(SlabViews, DiscsHideTheSameRaysInAShareAndInAScratchFile) {
+  const auto whole = make_views();
+  whole->hide(some_discs());
+  for (const SlabViews::Holding& holding : {SlabViews::Holding{{0, 2}, 1}, {{2, 3}, 0}}) {
+    const auto share = make_views(holding);
+    share->hide(some_discs());
+    const SlabViews::Slabs held = holding.all();
+    for (std::int64_t y = held.begin * 16; y < std::min<std::int64_t>(held.end * 16, 39); ++y)
+      for (std::int64_t x = 0; x < kShape.width; ++x)
+        ASSERT_EQ(share->counts(2, x, y), whole->counts(2, x, y));
+  }
+  const auto in_file = make_views({SlabViews::all_slabs(kShape)}, /*in_memory_bytes=*/0);
+  in_file->hide(some_discs());
+  EXPECT_EQ(in_file->checksum(), whole->checksum());
 }
 
 TEST(SlabViews, AreTheSameOnAnyNumberOfThreads) {

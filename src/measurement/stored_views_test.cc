@@ -38,18 +38,8 @@ class CountingStack : public io::ImageStack {
   mutable std::vector<std::atomic<int>> reads_;
 };
 
-constexpr double kEmptyBeam = 50;
-
-// A stack of the views of a scene, dense parts low in dark contrast.
 std::shared_ptr<CountingStack> stack_of(const BeadScene& scene, Contrast contrast) {
-  std::vector<float> values;
-  for (std::size_t view = 0; view < scene.tilt_deg.size(); ++view) {
-    for (const float value : scene.view(view).values)
-      values.push_back(contrast == Contrast::kDark ? static_cast<float>(kEmptyBeam) - value
-                                                   : value);
-  }
-  return std::make_shared<CountingStack>(io::image_stack_in_memory(
-      std::move(values), scene.width, scene.height, scene.tilt_deg, /*pixel_size_A=*/20.0));
+  return std::make_shared<CountingStack>(scene.stack(contrast));
 }
 
 struct Case {
@@ -73,7 +63,7 @@ TEST_P(EachViewOnce, IsDecoded) {
   input.contrast = c.contrast;
   input.take_log = c.take_log;
   input.resample = c.resample;
-  if (c.contrast == Contrast::kBright && c.has_beads) input.bead_diameter_nm = 10.0;
+  if (std::string(c.name) == "bright_with_beads") input.bead_diameter_nm = 10.0;
   const TiltSeries series(input);
   EXPECT_EQ(series.mask_metrics().num_beads > 0, c.has_beads);
   const testing::ScratchDirectory scratch;
@@ -92,7 +82,9 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"dark_with_beads", Contrast::kDark, false, true, true},
                       Case{"logarithm", Contrast::kDark, true, true, true},
                       Case{"as_recorded", Contrast::kDark, false, false, true},
-                      Case{"as_recorded_bright", Contrast::kBright, false, false, false}),
+                      Case{"as_recorded_bright", Contrast::kBright, false, false, false},
+                      Case{"undecided", Contrast::kBright, false, true, true},
+                      Case{"undecided_as_recorded", Contrast::kBright, false, false, true}),
     [](const auto& series) { return std::string(series.param.name); });
 
 TEST(StoredViews, GivesTheRaysThatAViewDecodedAnewWouldGive) {

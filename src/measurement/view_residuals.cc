@@ -1,6 +1,7 @@
 #include "measurement/view_residuals.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <utility>
@@ -18,12 +19,13 @@ ViewSums& ViewSums::operator+=(const ViewSums& other) {
   pp += other.pp;
   pb += other.pb;
   bb += other.bb;
+  limited_squares += other.limited_squares;
   return *this;
 }
 
 void allreduce_sum(const distributed::Communicator& processes, std::span<ViewSums> sums) {
   processes.allreduce_sum(sums, &ViewSums::n, &ViewSums::p, &ViewSums::b, &ViewSums::pp,
-                          &ViewSums::pb, &ViewSums::bb);
+                          &ViewSums::pb, &ViewSums::bb, &ViewSums::limited_squares);
 }
 
 double ViewSums::squared_residual(const ViewModel& m) const {
@@ -35,36 +37,49 @@ ViewSums data_term(const ViewModel& model, double multiplicity, const float* mea
                    const std::uint16_t* mask, std::int64_t width, float* rays) {
   const float scale = static_cast<float>(model.scale);
   const float offset = static_cast<float>(model.offset);
+  const float limit = static_cast<float>(model.largest_residual);
   const float slope = static_cast<float>(multiplicity * model.weight * model.scale);
   ViewSums sums;
   for (std::int64_t x = 0; x < width; ++x) {
-    float n = 0, sp = 0, sb = 0, spp = 0, spb = 0, sbb = 0;
+    float sp = 0, sb = 0, spp = 0, spb = 0, sbb = 0, squares = 0;
     const unsigned bits = mask[x];
     for (int l = 0; l < kLanes; ++l) {
       const std::ptrdiff_t at = x * kLanes + l;
       const float counts = static_cast<float>(bits >> l & 1u);
       const float p = counts * rays[at];
       const float b = counts * measured[at];
-      rays[at] = slope * (scale * p + counts * offset - b);
-      n += counts;
+      const float residual = std::min(std::max(scale * p + counts * offset - b, -limit), limit);
+      rays[at] = slope * residual;
       sp += p;
       sb += b;
       spp += p * p;
       spb += p * b;
       sbb += b * b;
+      squares += residual * residual;
     }
-    sums += {static_cast<double>(n),   static_cast<double>(sp),  static_cast<double>(sb),
-             static_cast<double>(spp), static_cast<double>(spb), static_cast<double>(sbb)};
+    sums += {static_cast<double>(std::popcount(bits)),
+             static_cast<double>(sp),
+             static_cast<double>(sb),
+             static_cast<double>(spp),
+             static_cast<double>(spb),
+             static_cast<double>(sbb),
+             static_cast<double>(squares)};
   }
   return sums;
 }
 
 double ray_data_term(const ViewModel& model, double multiplicity, double measured, double predicted,
                      ViewSums& sums) {
-  sums +=
-      {1.0, predicted, measured, predicted * predicted, predicted * measured, measured * measured};
-  return multiplicity * model.weight * model.scale *
-         (model.scale * predicted + model.offset - measured);
+  const double residual = std::clamp(model.scale * predicted + model.offset - measured,
+                                     -model.largest_residual, model.largest_residual);
+  sums += {1.0,
+           predicted,
+           measured,
+           predicted * predicted,
+           predicted * measured,
+           measured * measured,
+           residual * residual};
+  return multiplicity * model.weight * model.scale * residual;
 }
 
 // Keeps the equations of a view without rays solvable: it gets scale 1, offset 0.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -14,12 +15,17 @@ struct ViewModel {
   double scale = 1.0;
   double offset = 0.0;
   double weight = 1.0;
+  /// A residual has at most this size in the gradient, whose loss is Huber's (1964): quadratic up
+  /// to here, then linear.
+  double largest_residual = std::numeric_limits<double>::infinity();
 };
 
 /// Sums over the rays of a view that count, p predicted and b measured. The loss is reported
 /// from them, and the closed-form nuisances are solved from them.
 struct ViewSums {
   double n = 0, p = 0, b = 0, pp = 0, pb = 0, bb = 0;
+  /// Sum of the squared residuals, of which none counts as larger than ViewModel::largest_residual.
+  double limited_squares = 0;
   ViewSums& operator+=(const ViewSums& other);
   /// Returns Σ (scale p + offset − b)².
   double squared_residual(const ViewModel& model) const;
@@ -27,10 +33,10 @@ struct ViewSums {
 /// Completes sums on all processes (Communicator::allreduce_sum); each element is nonzero on one.
 void allreduce_sum(const distributed::Communicator& processes, std::span<ViewSums> sums);
 
-/// Differentiates the data loss of one view of a slab, ½ · weight · Σ mask (scale p + offset − b)².
-/// `rays` holds p [x, lane] and is overwritten by multiplicity · dL/dp;
-/// multiplicity scales a subset of the views up to all of them. Masked rays
-/// get 0. Returns the sums.
+/// Differentiates the data loss of one view of a slab, ½ · weight · Σ mask (scale p + offset − b)²,
+/// or less than that for residuals larger than the model's limit. `rays` holds p [x, lane] and is
+/// overwritten by multiplicity · dL/dp; multiplicity scales a subset of the views up to all of
+/// them. Masked rays get 0. Returns the sums.
 ViewSums data_term(const ViewModel& model, double multiplicity, const float* measured,
                    const std::uint16_t* mask, std::int64_t width, float* rays);
 

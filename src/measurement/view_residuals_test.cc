@@ -33,19 +33,20 @@ bool counts(const std::vector<std::uint16_t>& mask, std::size_t ray) {
   return mask[ray / kLanes] >> (ray % kLanes) & 1u;
 }
 
-// ½ w Σ mask (a p + o − b)² in double.
+// ½ w Σ mask h(a p + o − b) in double, with Huber's h(r): r² up to the limit and linear beyond it.
 double loss_of(const ViewModel& m, const std::vector<double>& p, const std::vector<float>& b,
                const std::vector<std::uint16_t>& mask) {
   double sum = 0;
   for (std::size_t i = 0; i < p.size(); ++i) {
-    const double residual = m.scale * p[i] + m.offset - static_cast<double>(b[i]);
-    if (counts(mask, i)) sum += residual * residual;
+    if (!counts(mask, i)) continue;
+    const double size = std::abs(m.scale * p[i] + m.offset - static_cast<double>(b[i]));
+    const double limited = std::min(size, m.largest_residual);
+    sum += limited * (2 * size - limited);
   }
   return m.weight / 2 * sum;
 }
 
-TEST(DataTerm, GradientIsTheDerivativeOfTheLoss) {
-  const ViewModel model{.scale = 1.3, .offset = -0.4, .weight = 2.5};
+void expect_derivative_of_the_loss(const ViewModel& model) {
   constexpr double kMultiplicity = 8;
   const auto predicted = random_floats(kWidth * kLanes, 1, -2, 3);
   const auto measured = random_floats(kWidth * kLanes, 2, -2, 3);
@@ -65,6 +66,30 @@ TEST(DataTerm, GradientIsTheDerivativeOfTheLoss) {
       ASSERT_EQ(rays[i], 0.0f) << "masked ray " << i;
     }
   }
+}
+
+TEST(DataTerm, GradientIsTheDerivativeOfTheLoss) {
+  expect_derivative_of_the_loss({.scale = 1.3, .offset = -0.4, .weight = 2.5});
+}
+
+TEST(DataTerm, GradientOfLargeResidualsIsThatOfHubersLoss) {
+  expect_derivative_of_the_loss(
+      {.scale = 1.3, .offset = -0.4, .weight = 2.5, .largest_residual = 1.0});
+}
+
+TEST(DataTerm, ResidualsCountUpToTheirLimit) {
+  const std::vector<float> measured(kLanes, 0.0f);
+  std::vector<float> rays(kLanes, 0.5f);
+  rays[3] = 7.0f;
+  rays[5] = -9.0f;
+  const std::uint16_t mask = 0xffff;
+  const ViewSums sums =
+      data_term({.largest_residual = 2.0}, 1.0, measured.data(), &mask, 1, rays.data());
+  EXPECT_EQ(rays[3], 2.0f);
+  EXPECT_EQ(rays[5], -2.0f);
+  EXPECT_EQ(rays[0], 0.5f);
+  EXPECT_NEAR(sums.limited_squares, 14 * 0.25 + 2 * 4.0, 1e-6);
+  EXPECT_NEAR(sums.squared_residual({}), 14 * 0.25 + 49 + 81, 1e-4);  // the whole, as it was
 }
 
 TEST(DataTerm, SumsTellTheLossForAnyScaleAndOffset) {
@@ -97,7 +122,7 @@ TEST(DataTerm, MaskedRaysDoNotCountWhateverTheyHold) {
 }
 
 TEST(DataTerm, RayByRayIsTheSame) {
-  const ViewModel model{.scale = 1.3, .offset = -0.4, .weight = 2.5};
+  const ViewModel model{.scale = 1.3, .offset = -0.4, .weight = 2.5, .largest_residual = 1.5};
   const auto predicted = random_floats(kWidth * kLanes, 1, -2, 3);
   const auto measured = random_floats(kWidth * kLanes, 2, -2, 3);
   const auto mask = random_mask();
@@ -111,19 +136,21 @@ TEST(DataTerm, RayByRayIsTheSame) {
     ASSERT_NEAR(grad, rays[i], 1e-6 * (10 + std::abs(grad)));
   }
   EXPECT_EQ(sums.n, whole.n);
+  EXPECT_NEAR(sums.limited_squares, whole.limited_squares, 1e-5 * whole.limited_squares);
   EXPECT_NEAR(sums.squared_residual(model), whole.squared_residual(model),
               1e-5 * whole.squared_residual(model));
 }
 
 TEST(DataTerm, SumsOfPartsAdd) {
-  ViewSums total{1, 2, 3, 4, 5, 6};
-  total += {10, 20, 30, 40, 50, 60};
+  ViewSums total{1, 2, 3, 4, 5, 6, 7};
+  total += {10, 20, 30, 40, 50, 60, 70};
   EXPECT_EQ(total.n, 11);
   EXPECT_EQ(total.p, 22);
   EXPECT_EQ(total.b, 33);
   EXPECT_EQ(total.pp, 44);
   EXPECT_EQ(total.pb, 55);
   EXPECT_EQ(total.bb, 66);
+  EXPECT_EQ(total.limited_squares, 77);
 }
 
 // ------------------------------------------------------------- nuisances

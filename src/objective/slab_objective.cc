@@ -284,7 +284,8 @@ void SlabObjective::allreduce(Sums& sums) const {
   const auto for_each_number = [&](const auto& body) {
     for (PairSums& pair : sums.pairs) {
       for (measurement::ViewSums& s : pair.views)
-        for (double* number : {&s.n, &s.p, &s.b, &s.pp, &s.pb, &s.bb}) body(*number);
+        for (double* number : {&s.n, &s.p, &s.b, &s.pp, &s.pb, &s.bb, &s.limited_squares})
+          body(*number);
       body(pair.grad_bias);
     }
     for (std::vector<TermValue>& band : sums.bands)

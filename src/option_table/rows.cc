@@ -68,12 +68,17 @@ constexpr Row kRows[] = {
     {.key = "input.log", .flag = "--log", MEMBER(Options, take_log), .group = Group::kImages,
      .help = "Take the logarithm of the transmitted intensity instead of its linear approximation "
              "(with --contrast dark)"},
+    {.key = "input.black_level", .flag = "--black-level", MEMBER(Options, black_level),
+     .group = Group::kImages, .unit = "intensity",
+     .automatic = "what trials prefer, up to the intensity of the emptiest places; 0 without trials",
+     .help = "Intensity that the detector adds to every pixel of a bright series"},
 
     // Masks
     {.key = "input.bead_diameter_nm", .flag = "--bead-diameter",
      MEMBER(Options, bead_diameter_nm), .group = Group::kMasks, .unit = "nm",
      .range = Range::at_least(0),
-     .automatic = "estimated with --contrast dark if there clearly are beads, else none",
+     .automatic = "estimated if there clearly are beads, which are masked with --contrast dark, and "
+                  "with bright if trials prefer that",
      .help = "Diameter of the gold beads to find and mask in every view. 0: none"},
     {.key = "input.remove_fixed_pattern", .flag = "--no-fixed-pattern",
      MEMBER(Options, remove_fixed_pattern), .group = Group::kMasks,
@@ -193,8 +198,13 @@ constexpr Row kRows[] = {
      .group = Group::kFit,
      .help = "Keep plain vertices that stand out from all but two of their neighbours. By default "
              "each epoch ends with moving them back"},
+    {.key = "fit.fit_noise", .flag = "--no-noise-fit", MEMBER(Options, fit_noise),
+     .group = Group::kFit,
+     .help = "Weight each view by the noise measured on it alone, and residuals of any size fully. "
+             "By default views that the volume predicts worse than others count less, and a "
+             "residual counts at most as one of 4 standard deviations"},
     {.key = "fit.fit_view_scale", .flag = "--view-scale", MEMBER(Options, fit_view_scale),
-     .group = Group::kFit, .automatic = "on for dark contrast, else off",
+     .group = Group::kFit, .automatic = "what trials prefer; without trials on for dark contrast, else off",
      .help = "Fit a scale and an offset for every view"},
     {.key = "field.margin_spacing", .flag = "--margin-spacing", MEMBER(Options, margin_spacing),
      .group = Group::kFit, .unit = kBinned, .range = Range::between(1, 64),

@@ -19,14 +19,14 @@ namespace {
 // The addresses of all members. A member that is added does not compile here until it is named.
 std::vector<const void*> members_of(const Choices& choices) {
   const auto& [stack, tlt, xf, xtilt, aln, mdoc, mask, fiducials] = choices.files;
-  const auto& [exclude, bin, angpix, pixel_size, contrast, take_log, bead_diameter, fixed_pattern,
-               thickness, roi, hand, axis_x, axis_z, with_margin, field, leaf_size, tree,
-               leaf_budget, vertex_spacing, rank, activation, margin_spacing, epochs, vertex_epochs,
-               coarse_epochs, coarse_bin, subsets, engine, ray_samples, rays_per_step,
-               learning_rate, density_variation, factor_variation, penalty, boundary, fourier,
-               fourier_ring, keep_spikes, fit_view_scale, hold_out, tune, patience, seed,
-               voxel_type, axes, invert, output, overwrite, resume, checkpoint_minutes] =
-      choices.options;
+  const auto& [exclude, bin, angpix, pixel_size, contrast, take_log, black_level, bead_diameter,
+               fixed_pattern, thickness, roi, hand, axis_x, axis_z, with_margin, field, leaf_size,
+               tree, leaf_budget, vertex_spacing, rank, activation, margin_spacing, epochs,
+               vertex_epochs, coarse_epochs, coarse_bin, subsets, engine, ray_samples,
+               rays_per_step, learning_rate, density_variation, factor_variation, penalty, boundary,
+               fourier, fourier_ring, keep_spikes, fit_noise, fit_view_scale, hold_out, tune,
+               patience, seed, voxel_type, axes, invert, output, overwrite, resume,
+               checkpoint_minutes] = choices.options;
   return {&stack,
           &tlt,
           &xf,
@@ -41,6 +41,7 @@ std::vector<const void*> members_of(const Choices& choices) {
           &pixel_size,
           &contrast,
           &take_log,
+          &black_level,
           &bead_diameter,
           &fixed_pattern,
           &thickness,
@@ -73,6 +74,7 @@ std::vector<const void*> members_of(const Choices& choices) {
           &fourier,
           &fourier_ring,
           &keep_spikes,
+          &fit_noise,
           &fit_view_scale,
           &hold_out,
           &tune,

@@ -53,6 +53,7 @@ nlohmann::json mask_json(const measurement::Measurement& series) {
   }
   return {{"beads", masks.num_beads},
           {"bead_diameter_nm", masks.bead_diameter_A / 10},
+          {"bead_masking", base::name_of(masks.bead_masking)},
           {"bad_pixels", masks.num_bad_pixels},
           {"fixed_pattern",
            {{"column_deviation", masks.fixed_pattern.column_deviation},
@@ -70,7 +71,8 @@ nlohmann::json metrics_json(const fit::Fit& fit, const measurement::Measurement&
     views.push_back({{"tilt_deg", series.geometry.tilt_deg[v]},
                      {"scale", progress.views[v].scale},
                      {"offset", progress.views[v].offset * series.unit},
-                     {"noise_sigma", series.noise_sigma[v] * series.unit}});
+                     {"noise_sigma", series.noise_sigma[v] * series.unit},
+                     {"weight", progress.views[v].weight * std::pow(series.noise_sigma[v], 2)}});
   }
   return {{"parameters", fit.field().num_parameters()},
           {"leaves", fit.field().tree().num_leaves()},

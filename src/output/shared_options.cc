@@ -35,6 +35,7 @@ tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Op
   series.pixel_size_A = options.pixel_size_A;
   series.contrast = options.contrast;
   series.take_log = options.take_log;
+  series.background = options.black_level.value_or(0.0);
   series.bead_diameter_nm = options.bead_diameter_nm;
   series.remove_fixed_pattern = options.remove_fixed_pattern;
   series.resample = options.engine == Engine::kSlab;

@@ -28,18 +28,19 @@ nlohmann::json alignment_json(const geometry::RayGeometry& g) {
   return views;
 }
 
-// Writes six numbers for each view, in the order of the members.
+// Writes seven numbers for each view, in the order of the members.
 std::vector<double> flatten(const std::vector<measurement::ViewSums>& sums) {
   std::vector<double> flat;
   for (const measurement::ViewSums& s : sums)
-    flat.insert(flat.end(), {s.n, s.p, s.b, s.pp, s.pb, s.bb});
+    flat.insert(flat.end(), {s.n, s.p, s.b, s.pp, s.pb, s.bb, s.limited_squares});
   return flat;
 }
 
 std::vector<measurement::ViewSums> unflatten_sums(const std::vector<double>& flat) {
   std::vector<measurement::ViewSums> sums;
-  for (std::size_t i = 0; i + 6 <= flat.size(); i += 6) {
-    sums.push_back({flat[i], flat[i + 1], flat[i + 2], flat[i + 3], flat[i + 4], flat[i + 5]});
+  for (std::size_t i = 0; i + 7 <= flat.size(); i += 7) {
+    sums.push_back(
+        {flat[i], flat[i + 1], flat[i + 2], flat[i + 3], flat[i + 4], flat[i + 5], flat[i + 6]});
   }
   return sums;
 }
@@ -47,14 +48,14 @@ std::vector<measurement::ViewSums> unflatten_sums(const std::vector<double>& fla
 std::vector<double> flatten(const std::vector<measurement::ViewModel>& views) {
   std::vector<double> flat;
   for (const measurement::ViewModel& v : views)
-    flat.insert(flat.end(), {v.scale, v.offset, v.weight});
+    flat.insert(flat.end(), {v.scale, v.offset, v.weight, v.largest_residual});
   return flat;
 }
 
 std::vector<measurement::ViewModel> unflatten_views(const std::vector<double>& flat) {
   std::vector<measurement::ViewModel> views;
-  for (std::size_t i = 0; i + 3 <= flat.size(); i += 3)
-    views.push_back({flat[i], flat[i + 1], flat[i + 2]});
+  for (std::size_t i = 0; i + 4 <= flat.size(); i += 4)
+    views.push_back({flat[i], flat[i + 1], flat[i + 2], flat[i + 3]});
   return views;
 }
 
@@ -109,8 +110,7 @@ nlohmann::json without_times(const TunedFit& tuned) {
 // Returns the name that a user has for an entry of a fingerprint: a flag, or a part of the input.
 std::string name_of(const std::string& key) {
   // These entries are no options themselves; an option decides each.
-  static const std::map<std::string, std::string> derived{{"choose_penalty", "fit.penalty"},
-                                                          {"field.depth", "field.leaf_size"},
+  static const std::map<std::string, std::string> derived{{"field.depth", "field.leaf_size"},
                                                           {"bin_factor", "input.bin"}};
   const auto other = derived.find(key);
   const auto flag = option_table::flag_of(other == derived.end() ? key : other->second);

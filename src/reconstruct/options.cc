@@ -48,6 +48,7 @@ fit::FitOptions fit_options(const Options& options) {
   fit.fourier_ring = options.fourier_ring;
   fit.penalty = options.penalty.value_or(fit.penalty);
   fit.keep_spikes = options.keep_spikes;
+  fit.fit_noise = options.fit_noise;
   fit.fit_view_scale = options.fit_view_scale.value_or(fit.fit_view_scale);
   fit.seed = options.seed;
   fit.hold_out = options.hold_out;
@@ -90,6 +91,7 @@ void choose_variation(Options& options) {
 Options resolve(const Options& requested) {
   Options options = requested;
   option_table::choose_by_contrast(options);
+  options.fit_view_scale = requested.fit_view_scale;  // trials choose it
   choose_field(options);
   options.leaf_size = field_options(options).leaf_size;
   choose_schedule(options);
@@ -101,8 +103,13 @@ ReconstructOptions run_options(const SeriesFiles& files, const Options& requeste
   ReconstructOptions run;
   run.files = files;
   run.resolved = resolve(requested);
-  run.choose_penalty = !run.resolved.penalty;
-  if (run.choose_penalty) {
+  const bool is_bright = run.resolved.contrast == Contrast::kBright;
+  run.open = {.variation = !run.resolved.penalty,
+              .view_scale = !requested.fit_view_scale,
+              .background = is_bright && !requested.black_level,
+              .beads = is_bright && !requested.bead_diameter_nm};
+  option_table::choose_by_contrast(run.resolved);
+  if (run.open.variation) {
     run.resolved.penalty = fit::FitOptions{}.penalty;
     choose_variation(run.resolved);
   }
@@ -120,15 +127,16 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
   const auto with = [&](const char* extension) {
     return std::filesystem::path(stem.string() + extension);
   };
-  return {volume, with(".h5"),           with(".json"),     with("_tree.png"),
-          stem,   with("_held_out.png"), with("_tune.json")};
+  return {volume, with(".h5"),           with(".json"),       with("_tree.png"),
+          stem,   with("_held_out.png"), with("_choice.png"), with("_tune.json")};
 }
 
-int ReconstructOptions::num_trials(int num_fitted_views) const {
-  constexpr int kMinViews = 14;
+int ReconstructOptions::num_trials(int num_fitted_views, const OpenSettings& to_choose) const {
+  constexpr int kMinViews = 12;
   if (resolved.tune)
-    return expected_trials({.penalty = choose_penalty, .rank = field.kind == FieldKind::kVm});
-  return choose_penalty && fit.engine == Engine::kSlab && num_fitted_views >= kMinViews ? 2 : 0;
+    return expected_trials({.penalty = to_choose.variation, .rank = field.kind == FieldKind::kVm});
+  if (fit.engine != Engine::kSlab || num_fitted_views < kMinViews) return 0;
+  return usual_trials(to_choose);
 }
 
 std::vector<std::string> ReconstructOptions::faults() const {
@@ -184,6 +192,7 @@ void check_options(const ReconstructOptions& options) {
   if (options.field.tree == TreeKind::kAdaptive) results.push_back(paths.tree_picture);
   if (resolved.tune) results.push_back(paths.trials);
   if (options.fit.hold_out > 0) results.push_back(paths.held_out_picture);
+  if (resolved.tune || options.open.any()) results.push_back(paths.choice_picture);
   io::check_result_files(
       std::move(results), paths.picture_prefix, options.files, resolved.overwrite || resumes,
       resolved.resume ? "there is no checkpoint to resume, so give --overwrite to start over and "
@@ -195,7 +204,6 @@ void check_options(const ReconstructOptions& options) {
 nlohmann::json options_json(const ReconstructOptions& options) {
   nlohmann::json all = option_table::to_json(options.files, options.resolved);
   all.erase("running");  // says where the results are, not what they are made from
-  all["choose_penalty"] = options.choose_penalty;
   const fit::FieldOptions& field = options.field;
   all["field"].update({{"depth", field.depth},
                        {"margin_rank", field.margin_rank},

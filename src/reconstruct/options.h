@@ -8,6 +8,7 @@
 #include "fit/options.h"
 #include "measurement/prepare.h"
 #include "output/volume.h"
+#include "reconstruct/automatic_choice.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
 
@@ -23,8 +24,8 @@ Options resolve(const Options& requested);
 struct ReconstructOptions {
   SeriesFiles files;
   Options resolved;  ///< the options that are used
-  /// Trials choose the penalty. `resolved` has the penalty that they start from.
-  bool choose_penalty = false;
+  /// What is left to trials. `resolved` has the settings that they start from.
+  OpenSettings open;
   // The same options in the types of the layers below, with the constants of the method.
   tilt_series::TiltSeriesOptions input;
   measurement::SpecimenOptions specimen;
@@ -32,10 +33,10 @@ struct ReconstructOptions {
   fit::FitOptions fit;
   output::VolumeOptions volume;
 
-  /// Returns the expected number of trials before the fit; 0 means that nothing is to be chosen.
-  /// A series of few views cannot spare any of them for a choice of the penalty alone, and trials
-  /// cannot predict the rays of raw views.
-  int num_trials(int num_fitted_views) const;
+  /// Returns the expected number of trials before the fit, which choose the settings `to_choose`; 0
+  /// means that nothing is to be chosen. A series of few views cannot spare any of them for trials,
+  /// and trials cannot predict the rays of raw views.
+  int num_trials(int num_fitted_views, const OpenSettings& to_choose) const;
   /// Returns a sentence for each option that is out of range or does not go with another one.
   std::vector<std::string> faults() const;
   /// Returns a sentence for each option that a job of several processes cannot have.
@@ -52,6 +53,7 @@ struct OutputPaths {
   std::filesystem::path tree_picture;      ///< for adaptive trees
   std::filesystem::path picture_prefix;    ///< of the slices
   std::filesystem::path held_out_picture;  ///< if views are held out
+  std::filesystem::path choice_picture;    ///< of the trials, if there are any
   std::filesystem::path trials;            ///< trials of --tune (JSON)
 };
 /// Returns the paths of the files beside `volume`.

@@ -97,7 +97,7 @@ TEST(ResolvedOptions, FollowOtherOptions) {
   EXPECT_EQ(usual.coarse_epochs, 160);
   EXPECT_EQ(usual.learning_rate, 0.035);
   EXPECT_EQ(usual.activation, Activation::kIdentity);  // dark contrast
-  EXPECT_EQ(usual.fit_view_scale, true);
+  EXPECT_FALSE(usual.fit_view_scale);                  // trials choose it
 
   Options requested = good_options();
   requested.field = FieldKind::kVm;
@@ -118,7 +118,6 @@ TEST(ResolvedOptions, FollowOtherOptions) {
   EXPECT_EQ(grid.coarse_epochs, 80);  // half of the usual, as the epochs are
   EXPECT_EQ(grid.learning_rate, 0.035);
   EXPECT_EQ(grid.activation, Activation::kSoftplus);
-  EXPECT_EQ(grid.fit_view_scale, false);
 }
 
 TEST(ResolvedOptions, HaveFactorsWhereOtherOptionsAreForThem) {
@@ -158,23 +157,36 @@ TEST(ResolvedOptions, StayTheSameWhenResolvedAgain) {
   }
 }
 
-TEST(ResolvedOptions, TrialsChooseThePenaltyUnlessItOrItsWeightIsGiven) {
+TEST(ResolvedOptions, TrialsChooseWhatIsNotGiven) {
   const Options open = resolve(good_options());
   EXPECT_FALSE(open.penalty || open.density_variation);
   const ReconstructOptions run = run_options({}, good_options());
-  EXPECT_TRUE(run.choose_penalty);
+  EXPECT_TRUE(run.open.variation);
   EXPECT_EQ(run.resolved.penalty, Penalty::kConcave);  // the trials start from it
   EXPECT_EQ(run.fit.density_variation, 14);
 
   Options smooth = good_options();
   smooth.penalty = Penalty::kSmooth;
-  EXPECT_FALSE(run_options({}, smooth).choose_penalty);
+  EXPECT_FALSE(run_options({}, smooth).open.variation);
   EXPECT_EQ(run_options({}, smooth).fit.density_variation, 5);
 
   Options weighted = good_options();
   weighted.density_variation = 3;
-  EXPECT_FALSE(run_options({}, weighted).choose_penalty);
+  EXPECT_FALSE(run_options({}, weighted).open.variation);
   EXPECT_EQ(run_options({}, weighted).fit.penalty, Penalty::kConcave);
+
+  Options corrected = good_options();
+  EXPECT_TRUE(run_options({}, corrected).open.view_scale);
+  corrected.fit_view_scale = true;
+  EXPECT_FALSE(run_options({}, corrected).open.view_scale);
+  corrected.contrast = Contrast::kDark;
+  EXPECT_FALSE(run_options({}, corrected).open.background);
+  EXPECT_FALSE(run_options({}, corrected).open.beads);
+  corrected.contrast = Contrast::kBright;
+  EXPECT_TRUE(run_options({}, corrected).open.background);
+  EXPECT_TRUE(run_options({}, corrected).open.beads);
+  corrected.bead_diameter_nm = 0;
+  EXPECT_FALSE(run_options({}, corrected).open.beads);
 }
 
 }  // namespace

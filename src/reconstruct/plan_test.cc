@@ -91,9 +91,11 @@ TEST_F(Plan, AnEpochHasAtMostOneStepForEachFittedView) {
 
 TEST_F(Plan, CountsTheTrials) {
   EXPECT_EQ(plan().num_trials, 0);
-  options_.choose_penalty = true;
+  options_.open.view_scale = true;
   EXPECT_EQ(plan().num_trials, 2);
-  options_.fit.hold_out = 7;  // 13 views are left, and trials of the penalty need 14
+  options_.open.variation = true;
+  EXPECT_EQ(plan().num_trials, 5);
+  options_.fit.hold_out = 3;  // 10 views are left, and short trials need 12
   EXPECT_EQ(plan().num_trials, 0);
   options_.resolved.tune = true;
   EXPECT_GT(plan().num_trials, 2);

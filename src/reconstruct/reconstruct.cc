@@ -16,7 +16,9 @@
 #include "base/trace.h"
 #include "fit/fit.h"
 #include "io/scratch_memory.h"
+#include "measurement/background.h"
 #include "measurement/held_out.h"
+#include "measurement/undecided_beads.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/results.h"
 #include "reconstruct/tuning.h"
@@ -60,41 +62,59 @@ void read_checkpoint(const std::function<void()>& read) {
 }
 
 // Makes the trials and chooses settings by them. Returns nothing if a stop was requested.
-std::optional<TunedFit> choose_by_trials(const Run& run) {
+std::optional<TunedFit> choose_by_trials(const Run& run, const OpenSettings& open) {
   const ReconstructOptions& options = run.options;
   const TuneHooks hooks{.progress = run.hooks.tune_progress,
                         .stop_requested = run.hooks.stop_requested};
   if (!options.resolved.tune)
-    return tune_penalty(run.measurement, options.field, options.fit, hooks, run.processes);
+    return choose_by_short_trials(run.measurement, options.field, options.fit, open, hooks,
+                                  run.processes);
   const std::string fingerprint = fingerprint_of(options, run.measurement, run.processes);
   const std::filesystem::path path = run.writes_files() ? run.paths.trials : "";
   std::optional<selection::TrialFile> file;
   run.processes.run_collectively([&] { file.emplace(path, fingerprint, options.resolved.resume); });
-  return tune(run.measurement, options.field, options.fit, options.choose_penalty, *file, hooks,
-              run.processes);
+  return tune(run.measurement, options.field, options.fit, open, *file, hooks, run.processes);
 }
 
-void apply(const TrialSettings& settings, ReconstructOptions& options) {
+// Takes over what was chosen, and corrects the views as it says.
+void apply(const TrialSettings& settings, Run& run) {
+  ReconstructOptions& options = run.options;
   Options& resolved = options.resolved;
-  resolved.penalty = options.fit.penalty = settings.penalty;
-  resolved.density_variation = options.fit.density_variation = settings.variation;
-  resolved.epochs = options.fit.epochs = settings.epochs;
-  resolved.rank = options.field.rank = settings.rank;
+  if (options.open.variation) resolved.penalty = options.fit.penalty = settings.penalty;
+  if (options.open.variation || resolved.tune)
+    resolved.density_variation = options.fit.density_variation = settings.variation;
+  if (resolved.tune) {
+    resolved.epochs = options.fit.epochs = settings.epochs;
+    resolved.rank = options.field.rank = settings.rank;
+  }
+  if (options.open.view_scale)
+    resolved.fit_view_scale = options.fit.fit_view_scale = settings.fits_view_scale;
+  if (run.options.open.background) {
+    resolved.black_level =
+        settings.background_part * run.measurement.background * run.measurement.unit;
+    measurement::subtract_background(settings.background_part, run.measurement);
+  }
+  if (!run.measurement.undecided_beads.empty())
+    resolved.bead_diameter_nm =
+        settings.masks_beads ? run.measurement.masks.bead_diameter_A / 10 : 0.0;
+  if (settings.masks_beads) measurement::hide_beads(run.measurement, run.processes);
 }
 
-// Chooses the options that are left to trials. A resumed run takes those that its checkpoint has.
+// Chooses the settings that are left to trials. A resumed run takes those that its checkpoint has.
 // Returns false if a stop was requested.
 bool choose_settings(Run& run, std::optional<TunedFit>& tuned) {
   const base::TraceSpan span("choose settings");
-  if (run.options.num_trials(run.measurement.num_fitted_views()) == 0) return true;
-  if (run.options.resolved.resume && std::filesystem::exists(run.paths.model)) {
+  const OpenSettings open = open_settings(run.options.open, run.measurement);
+  const bool makes_trials = run.options.num_trials(run.measurement.num_fitted_views(), open) > 0;
+  if (makes_trials && run.options.resolved.resume && std::filesystem::exists(run.paths.model)) {
     run.processes.run_collectively(
         [&] { read_checkpoint([&] { tuned = stored_choice(run.paths.model); }); });
-  } else {
-    tuned = choose_by_trials(run);
+  } else if (makes_trials) {
+    tuned = choose_by_trials(run, open);
     if (!tuned) return false;
   }
-  if (tuned) apply(tuned->settings, run.options);
+  if (tuned) apply(tuned->settings, run);
+  measurement::keep_beads(run.measurement);
   return true;
 }
 

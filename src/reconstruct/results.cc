@@ -19,6 +19,7 @@
 #include "output/metrics.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
+#include "reconstruct/choice_plot.h"
 #include "reconstruct/judge.h"
 #include "report/pictures.h"
 
@@ -119,7 +120,8 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
                   .metrics = {{"tomofield", TOMOFIELD_VERSION},
                               {"options", options_json(options)},
                               {"metrics", std::move(metrics)}},
-                  .verdict = std::move(verdict)};
+                  .verdict = std::move(verdict),
+                  .bead_masking = series.masks.bead_masking};
   if (!writes_files) return results;
   Writers writers;
   if (processes.size() == 1)
@@ -130,6 +132,13 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
     writers.push_back([&] {
       processes.run_collectively([&] {
         if (processes.is_root()) report::write_held_out_picture(*view, paths.held_out_picture);
+      });
+    });
+  }
+  if (origin.tuned) {
+    writers.push_back([&] {
+      processes.run_collectively([&] {
+        if (processes.is_root()) write_choice_plot(*origin.tuned, paths.choice_picture);
       });
     });
   }

@@ -20,6 +20,7 @@ struct Results {
   output::Model model;     ///< each process has the parameters of its own leaves
   nlohmann::json metrics;  ///< the content of the JSON file beside the volume
   Verdict verdict;
+  tilt_series::BeadMasking bead_masking = tilt_series::BeadMasking::kNone;
 };
 
 /// Takes the results out of a finished fit, which loses its field. If options.resolved.output names

@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 
 #include "base/enum_names.h"
 #include "base/parallel.h"
 #include "base/trace.h"
+#include "evaluate/field_artefacts.h"
+#include "measurement/background.h"
+#include "measurement/undecided_beads.h"
 
 namespace tomofield::reconstruction {
 
@@ -28,8 +32,11 @@ class TrialFits::Running {
     options.penalty = settings_.penalty;
     options.density_variation = settings_.variation;
     options.epochs = settings_.epochs;
+    options.fit_view_scale = settings_.fits_view_scale;
     options.patience = 0;
-    fit_ = std::make_unique<fit::Fit>(trials.measurement_, field, options);
+    scores_with_view_scale_ = trials.scores_with_view_scale_;
+    measurement_ = &trials.measurement_for(settings_);
+    fit_ = std::make_unique<fit::Fit>(*measurement_, field, options);
     seconds_ += stopwatch.seconds();
   }
 
@@ -46,11 +53,10 @@ class TrialFits::Running {
         fmt::format("{} tv {:.3g}  rank {}  epochs {}  held out {}",
                     base::name_of(settings_.penalty), settings_.variation, settings_.rank,
                     settings_.epochs, errors.empty() ? "-" : fmt::format("{:.4f}", errors.back()));
-    measurement::ViewErrors error;
-    if (is_last) error = fit_->held_out_error();
+    if (is_last) finished_ = FitTrial{settings_, score(), 0.0};
     seconds_ += stopwatch.seconds();
     if (!is_last) return;
-    finished_ = FitTrial{settings_, {error.total, error.view_error}, seconds_};
+    finished_->seconds = seconds_;
     fit_.reset();
   }
 
@@ -61,8 +67,20 @@ class TrialFits::Running {
   const std::optional<FitTrial>& finished() const { return finished_; }
 
  private:
+  selection::HeldOutScore score() const {
+    measurement::ViewErrors error = fit_->held_out_error(scores_with_view_scale_);
+    const Rectangle& roi = measurement_->roi;
+    const evaluate::FieldArtefacts artefacts =
+        evaluate::find_artefacts(fit_->field(), roi, {0, static_cast<int>(roi.height())});
+    std::optional<double> face_jump;
+    if (artefacts.faces) face_jump = artefacts.faces->both;
+    return {error.total, std::move(error.view_error), artefacts.speckle, face_jump};
+  }
+
   std::size_t index_;
   TrialSettings settings_;
+  bool scores_with_view_scale_ = false;
+  const measurement::Measurement* measurement_ = nullptr;
   std::unique_ptr<fit::Fit> fit_;
   std::optional<FitTrial> finished_;
   bool took_step_ = false;
@@ -72,7 +90,7 @@ class TrialFits::Running {
 
 TrialFits::TrialFits(const measurement::Measurement& measurement, std::int64_t rows,
                      const fit::FieldOptions& field, const fit::FitOptions& fit,
-                     const TuneHooks& hooks, int num_expected,
+                     bool scores_with_view_scale, const TuneHooks& hooks, int num_expected,
                      const distributed::Communicator& processes)
     : views_(selection::trial_views(measurement.geometry.tilt_deg, measurement.held_out)),
       measurement_(selection::trial_measurement(measurement, views_, rows, processes)),
@@ -80,6 +98,7 @@ TrialFits::TrialFits(const measurement::Measurement& measurement, std::int64_t r
             static_cast<double>(measurement.rays->shape().num_rows)),
       field_(field),
       fit_(fit),
+      scores_with_view_scale_(scores_with_view_scale),
       hooks_(hooks),
       processes_(processes),
       num_expected_(num_expected) {}
@@ -87,6 +106,7 @@ TrialFits::TrialFits(const measurement::Measurement& measurement, std::int64_t r
 std::vector<FitTrial> TrialFits::run(const std::vector<TrialSettings>& batch,
                                      selection::TrialFile* file) {
   const base::TraceSpan span("trials");
+  correct_views(batch);
   Trials trials = known_trials(batch, file);
   const Trials known = trials;
   auto own = own_part(batch, trials);
@@ -105,6 +125,25 @@ std::vector<FitTrial> TrialFits::run(const std::vector<TrialSettings>& batch,
   std::vector<FitTrial> all;
   for (const auto& trial : trials) all.push_back(trial.value());
   return all;
+}
+
+// Makes the measurements that these trials need. Beads are hidden in the predicted views of all, so
+// that all predict the same rays.
+void TrialFits::correct_views(const std::vector<TrialSettings>& batch) {
+  std::vector<int> all_views(static_cast<std::size_t>(measurement_.geometry.num_views()));
+  std::iota(all_views.begin(), all_views.end(), 0);
+  for (const TrialSettings& s : batch) {
+    if (corrected_.contains({s.masks_beads, s.background_part})) continue;
+    measurement::Measurement corrected = measurement::with_beads_hidden(
+        measurement_, s.masks_beads ? all_views : measurement_.held_out);
+    if (s.background_part > 0)
+      corrected = measurement::without_background(s.background_part, corrected);
+    corrected_.emplace(std::pair(s.masks_beads, s.background_part), std::move(corrected));
+  }
+}
+
+const measurement::Measurement& TrialFits::measurement_for(const TrialSettings& s) const {
+  return corrected_.at({s.masks_beads, s.background_part});
 }
 
 // Returns the trials that the root finds in its file.
@@ -166,8 +205,9 @@ bool TrialFits::report(const std::vector<std::unique_ptr<Running>>& own, std::si
     if (hooks_.stop_requested && hooks_.stop_requested()) return true;
     if (!hooks_.progress) continue;
     const double done = num_done_ + of_batch * static_cast<double>(batch_size);
+    part_done_ = std::max(part_done_, done / expected);  // more trials than expected may follow
     hooks_.progress(base::progress_at(
-        done / expected, running_.seconds(),
+        part_done_, running_.seconds(),
         fmt::format("trial {}/{}  {}", num_done_ + static_cast<int>(trial->index()) + 1, expected,
                     trial->detail())));
   }

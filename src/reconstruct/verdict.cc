@@ -32,6 +32,7 @@ nlohmann::json views_json(const ViewAgreement& agreement) {
   return {{"tilt_order", order},
           {"path_correlation", agreement.path.correlation},
           {"path_rise", agreement.path.rise},
+          {"residual_correlation", agreement.residual_correlation},
           {"usual_displacement_px", agreement.usual_displacement_px()},
           {"usual_displacement_y_px", agreement.usual_displacement_y_px()},
           {"compared", views}};
@@ -83,6 +84,10 @@ nlohmann::json verdict_json(const Verdict& verdict) {
 std::string verdict_line(const Verdict& verdict) {
   std::vector<std::string> parts{
       fmt::format("residual {:.2f} of the noise's variance", verdict.residual)};
+  if (verdict.views) {
+    const auto [x, y] = verdict.views->residual_correlation;
+    parts.push_back(fmt::format("correlation of neighbours {:.2f}, {:.2f}", x, y));
+  }
   if (verdict.held_out) parts.push_back(held_out_text(*verdict.held_out));
   if (verdict.artefacts.speckle)
     parts.push_back(fmt::format("speckle {:.3f} %", 100 * *verdict.artefacts.speckle));

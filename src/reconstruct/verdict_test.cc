@@ -14,10 +14,13 @@ TEST(Verdict, LineNamesWhatThereIs) {
             "verdict: residual 1.02 of the noise's variance; 83.4 s, 0.93 GiB");
   verdict.held_out = HeldOutSummary{.median = 1.05, .worst = 1.31, .worst_tilt_deg = 54};
   verdict.artefacts.speckle = 0.0001;
+  verdict.views = ViewAgreement{};
+  verdict.views->residual_correlation = {0.35, -0.02};
   verdict.artefacts.faces = evaluate::FaceJump{.both = 1.03, .x = {}, .y = {}};
   EXPECT_EQ(verdict_line(verdict),
-            "verdict: residual 1.02 of the noise's variance; held out: median 1.05, worst 1.31 (at "
-            "54.0°); speckle 0.010 %; faces 1.03; 83.4 s, 0.93 GiB");
+            "verdict: residual 1.02 of the noise's variance; correlation of neighbours 0.35, "
+            "-0.02; held out: median 1.05, worst 1.31 (at 54.0°); speckle 0.010 %; faces 1.03; "
+            "83.4 s, 0.93 GiB");
 }
 
 TEST(Verdict, SectionsAreComparedWithTheMiddle) {

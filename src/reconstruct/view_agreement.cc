@@ -95,6 +95,7 @@ class LineFit {
 struct ComparedView {
   std::array<double, 2> displacement_px{};
   double correlation = 0.0;
+  std::array<double, 2> residual_correlation{};
   std::vector<double> column_means;
   Image small;  // without the means of its columns
 };
@@ -107,7 +108,8 @@ ComparedView compare(measurement::PredictedView&& both) {
   auto displacement = evaluate::displacement(told, seen);
   for (double& d : displacement) d *= static_cast<double>(block);
   const Image small = reduced(seen, block_for(seen, kSmallSide));
-  return {displacement, evaluate::correlation(told, seen), evaluate::column_means(measured),
+  return {displacement, evaluate::correlation(told, seen),
+          evaluate::neighbour_correlation(measured, predicted), evaluate::column_means(measured),
           evaluate::without_column_means(small)};
 }
 
@@ -158,6 +160,7 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
   found.views = views_by_tilt(series.geometry.tilt_deg);
   LineFit brightness;
   std::vector<Image> small;
+  std::vector<float> along_x, along_y;
   const std::span<const int> views(found.views);
   const std::size_t at_once = views_at_once(series);
   for (std::size_t first = 0; first < views.size(); first += at_once) {
@@ -167,6 +170,8 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
       ComparedView& view = compared[i];
       found.displacement_px.push_back(view.displacement_px);
       found.correlation.push_back(view.correlation);
+      along_x.push_back(static_cast<float>(view.residual_correlation[0]));
+      along_y.push_back(static_cast<float>(view.residual_correlation[1]));
       for (std::size_t x = 0; x < view.column_means.size(); ++x) {
         if (!std::isfinite(view.column_means[x])) continue;
         const double length =
@@ -176,6 +181,7 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
       small.push_back(std::move(view.small));
     }
   }
+  found.residual_correlation = {base::percentile(along_x, 50), base::percentile(along_y, 50)};
   found.tilt_order = order_of(small);
   found.path = brightness.effect(series.contrast());
   found.side_px = static_cast<double>(std::max(series.geometry.width, series.roi.height()));

@@ -24,6 +24,9 @@ struct ViewAgreement {
   /// [i]: how far the measured view lies from the predicted one, in pixels of the fit along x and
   /// y. It is 0 for a view that is aligned with the others.
   std::vector<std::array<double, 2>> displacement_px;
+  /// Correlation of what the field leaves of a view between pixels that are neighbours along x and
+  /// along y: the median of the views. It is about 0 for white noise.
+  std::array<double, 2> residual_correlation{};
   /// Probability that two views that are neighbours in tilt are more alike than two that are not:
   /// near 1 for the angles of the views, near ½ for shuffled ones. None if there are few views.
   std::optional<double> tilt_order;

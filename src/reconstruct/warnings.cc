@@ -43,6 +43,11 @@ constexpr double kMostAtFacesOfBadFit = 3.0, kResidualOfBadFit = 1.5;
 // where it is twice that.
 constexpr double kMostEmpty = 0.4;
 
+// Correlation of the residual between neighbours, along the axis where it is smaller: up to 0.4 for
+// views as recorded or interpolated once, and 0.8 for denoised ones. A residual of much more than
+// the noise is structure, which is smooth in any case.
+constexpr double kMostCorrelated = 0.6;
+
 // Beside the sections that are not empty, the suggested thickness has this part of them.
 constexpr double kRoom = 0.2;
 
@@ -155,6 +160,18 @@ std::optional<Warning> thickness_warning(const Verdict& verdict, const GivenInpu
                              100 * sections.empty_part, std::ceil(filled) * input.bin_factor)};
 }
 
+std::optional<Warning> correlated_noise(const Verdict& verdict, double bin_factor) {
+  const auto [x, y] = verdict.views->residual_correlation;
+  if (verdict.residual > kResidualOfBadFit || std::min(x, y) <= kMostCorrelated)
+    return std::nullopt;
+  return Warning{
+      "correlated-noise",
+      fmt::format("the noise of neighbouring pixels is alike (correlation {:.2f}), as in "
+                  "views that were smoothed or enlarged, and the fit may take it for "
+                  "structure: give views as recorded, or --bin {:g}",
+                  std::min(x, y), 2 * bin_factor)};
+}
+
 }  // namespace
 
 std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& input) {
@@ -168,7 +185,10 @@ std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& inp
     add(shuffled(*verdict.views));
     if (!is_contrast_wrong) add(misaligned(*verdict.views, input.alignment));
   }
-  if (warnings.empty()) add(thickness_warning(verdict, input));
+  if (warnings.empty()) {
+    add(thickness_warning(verdict, input));
+    if (verdict.views) add(correlated_noise(verdict, input.bin_factor));
+  }
   return warnings;
 }
 

@@ -98,5 +98,17 @@ TEST(Warnings, ThicknessIsJudgedByTheSections) {
   EXPECT_NE(thick.front().message.find("--thickness 120"), std::string::npos);
 }
 
+TEST(Warnings, NoiseIsCorrelatedIfNeighboursAreAlikeOnBothAxes) {
+  Verdict verdict = good_verdict();
+  verdict.views->residual_correlation = {0.9, 0.5};
+  EXPECT_EQ(codes(verdict), "");
+  verdict.views->residual_correlation = {0.9, 0.8};
+  EXPECT_EQ(codes(verdict), "correlated-noise ");
+  EXPECT_NE(find_warnings(verdict, aligned_input()).front().message.find("--bin 4"),
+            std::string::npos);
+  verdict.residual = 60;  // this is structure
+  EXPECT_EQ(codes(verdict), "");
+}
+
 }  // namespace
 }  // namespace tomofield::reconstruction

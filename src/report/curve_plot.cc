@@ -34,7 +34,7 @@ constexpr std::array<Colour, 12> kColours = {{{0x00, 0x72, 0xb2},
                                               {0x90, 0x90, 0x90},
                                               {0x00, 0x44, 0x1b}}};
 constexpr Colour kGrid{0xdd, 0xdd, 0xdd};
-constexpr double kCurveWidth = 1.6;
+constexpr double kCurveWidth = 1.6, kHalfMark = 4;
 
 using Range = std::pair<double, double>;
 using Coordinate = double std::pair<double, double>::*;
@@ -106,6 +106,7 @@ class Plot {
     for (std::size_t i = 0; i < curves_.size(); ++i) {
       const Colour& colour = kColours[i % kColours.size()];
       draw_curve(curves_[i], colour);
+      draw_errors(curves_[i], colour);
       surface_.draw_line({{kRight + 15, y - 5}, {kRight + 40, y - 5}}, 3, colour);
       for (const std::string& line : legend_[i]) {
         surface_.draw_text({kNames, y}, Anchor::kStart, line);
@@ -144,6 +145,19 @@ class Plot {
         end_piece();
     }
     end_piece();
+  }
+
+  // Draws marks and error bars, if the curve has errors.
+  void draw_errors(const Curve& curve, const Colour& colour) const {
+    for (std::size_t i = 0; i < curve.errors.size(); ++i) {
+      const auto [x, y] = curve.points[i];
+      const auto in_area = [&](double value) { return std::clamp(at_y(value), kTop, bottom_); };
+      surface_.draw_line(
+          {{at_x(x), in_area(y - curve.errors[i])}, {at_x(x), in_area(y + curve.errors[i])}},
+          kCurveWidth, colour);
+      surface_.draw_line({{at_x(x) - kHalfMark, in_area(y)}, {at_x(x) + kHalfMark, in_area(y)}},
+                         2 * kHalfMark, colour);
+    }
   }
 
   double at_x(double x) const {

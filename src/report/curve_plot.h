@@ -7,10 +7,12 @@
 
 namespace tomofield::report {
 
-/// A named line through points (x, y), in order.
+/// A named line through points (x, y), in order. With errors, one of each point, the points have
+/// marks and bars of y ± error.
 struct Curve {
   std::string name;
   std::vector<std::pair<double, double>> points;
+  std::vector<double> errors = {};
 };
 
 /// A place on an axis that has a label.

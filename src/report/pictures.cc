@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::int64_t kMinMaskWidth_px = 512;
 constexpr Colour kMasked{220, 60, 60};
+constexpr Colour kFoundOnly{70, 120, 220};  // beads that are not masked
 constexpr Colour kLeafBorder{255, 140, 0};
 constexpr std::int64_t kPanelGap_px = 4;  // white pixels between panels of a held-out view
 
@@ -85,12 +86,15 @@ std::uint8_t grey_of(double value, double black, double range) {
 
 }  // namespace
 
-void write_mask_picture(const tilt_series::TiltSeries& series, const std::filesystem::path& path) {
+void write_mask_picture(const tilt_series::TiltSeries& series,
+                        tilt_series::BeadMasking bead_masking, const std::filesystem::path& path) {
   const std::int64_t width = series.width(), height = series.height();
   std::vector<float> image(static_cast<std::size_t>(width * height));
   std::vector<std::uint8_t> valid(image.size());
   series.read_view(lowest_tilt(series), image, valid);
   const std::vector<std::uint8_t> grey = grey_values(image, valid);
+  const bool masks_beads = bead_masking == tilt_series::BeadMasking::kMasked;
+  const Colour of_undecided = masks_beads ? kMasked : kFoundOnly;
   const std::int64_t zoom = std::max<std::int64_t>(1, (kMinMaskWidth_px + width - 1) / width);
   std::vector<std::uint8_t> pixels;
   pixels.reserve(static_cast<std::size_t>(width * height * zoom * zoom * 3));
@@ -98,7 +102,10 @@ void write_mask_picture(const tilt_series::TiltSeries& series, const std::filesy
     const std::int64_t y = height - 1 - row / zoom;  // the first row is at the bottom
     for (std::int64_t column = 0; column < width * zoom; ++column) {
       const auto at = static_cast<std::size_t>(y * width + column / zoom);
-      const Colour colour = valid[at] ? Colour{grey[at], grey[at], grey[at]} : kMasked;
+      const Colour colour = valid[at] == tilt_series::kNoMeasurement ? kMasked
+                            : valid[at] == tilt_series::kUndecidedBead
+                                ? of_undecided
+                                : Colour{grey[at], grey[at], grey[at]};
       pixels.insert(pixels.end(), colour.begin(), colour.end());
     }
   }

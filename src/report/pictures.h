@@ -11,9 +11,11 @@
 namespace tomofield::report {
 
 /// Draws the view of lowest tilt with its masked pixels in red, so that one look tells whether
-/// beads and fill were found. Dense parts are dark; y runs upwards. Small views are enlarged by
-/// whole pixels. Replaces the file.
-void write_mask_picture(const tilt_series::TiltSeries& series, const std::filesystem::path& path);
+/// beads and fill were found. Beads of a bright series that were undecided are red if
+/// `bead_masking` says that they were masked, else blue. Dense parts are dark; y runs upwards.
+/// Small views are enlarged by whole pixels. Replaces the file.
+void write_mask_picture(const tilt_series::TiltSeries& series,
+                        tilt_series::BeadMasking bead_masking, const std::filesystem::path& path);
 
 /// Draws the leaves of a model: the central XY slice of its region of interest in grey (x to the
 /// right, y upwards; greys as in write_slice_pictures(), densities as the model holds them), with

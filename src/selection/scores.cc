@@ -4,12 +4,18 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <utility>
+
+#include "base/percentile.h"
 
 namespace tomofield::selection {
 namespace {
 
 // The maximum number of coarse steps to one side: a factor of 256.
 constexpr int kMaxSteps = 4;
+
+// The standard deviation of a normal distribution, in units of its median absolute deviation.
+constexpr double kDeviationPerMedian = 1.4826;
 
 }  // namespace
 
@@ -20,26 +26,32 @@ bool most_views_prefer(const HeldOutScore& a, const HeldOutScore& b) {
   return 2 * prefer_a > n;
 }
 
-double standard_error_of_difference(const HeldOutScore& a, const HeldOutScore& b) {
-  const std::size_t n = std::min(a.view_error.size(), b.view_error.size());
-  if (n < 2) return 0;
-  double sum = 0, squares = 0;
-  for (std::size_t v = 0; v < n; ++v) {
-    const double difference = a.view_error[v] - b.view_error[v];
-    sum += difference;
-    squares += difference * difference;
+Difference difference(const HeldOutScore& a, const HeldOutScore& b) {
+  std::vector<double> ratios;
+  for (std::size_t v = 0; v < std::min(a.view_error.size(), b.view_error.size()); ++v) {
+    if (a.view_error[v] > 0 && b.view_error[v] > 0)
+      ratios.push_back(std::log(a.view_error[v] / b.view_error[v]));
   }
-  const double count = static_cast<double>(n);
-  const double variance = std::max(squares - sum * sum / count, 0.0) / (count - 1);
-  return std::sqrt(variance / count);
+  if (ratios.empty()) return {a.error > 0 && b.error > 0 ? std::log(a.error / b.error) : 0.0, 0.0};
+  std::vector<double> means;
+  for (std::size_t i = 0; i < ratios.size(); ++i)
+    for (std::size_t j = i; j < ratios.size(); ++j) means.push_back((ratios[i] + ratios[j]) / 2);
+  const double centre = base::percentile(ratios, 50);
+  const double location = base::percentile(std::move(means), 50);
+  for (double& ratio : ratios) ratio = std::abs(ratio - centre);
+  const double count = static_cast<double>(ratios.size());
+  return {location,
+          kDeviationPerMedian * base::percentile(std::move(ratios), 50) / std::sqrt(count)};
 }
 
-std::size_t first_as_good_as_the_best(const std::vector<HeldOutScore>& scores) {
-  const HeldOutScore& best = *std::ranges::min_element(scores, {}, &HeldOutScore::error);
-  const auto first = std::ranges::find_if(scores, [&](const HeldOutScore& s) {
-    return s.error - best.error <= standard_error_of_difference(s, best);
-  });
-  return static_cast<std::size_t>(first - scores.begin());
+std::vector<std::size_t> as_good_as_the_best(const std::vector<HeldOutScore>& scores,
+                                             double num_errors) {
+  const HeldOutScore& best = *std::ranges::min_element(
+      scores, {}, [&](const HeldOutScore& s) { return difference(s, scores.front()).log_ratio; });
+  std::vector<std::size_t> as_good;
+  for (std::size_t i = 0; i < scores.size(); ++i)
+    if (!difference(scores[i], best).is_beyond(num_errors)) as_good.push_back(i);
+  return as_good;
 }
 
 double search_weight(double first, const ScoreOfWeight& score, const ExpectWeights& expect) {
@@ -70,7 +82,7 @@ double search_weight(double first, const ScoreOfWeight& score, const ExpectWeigh
     weights.push_back(weight);
     scores.push_back(its_score);
   }
-  return weights[first_as_good_as_the_best(scores)];
+  return weights[as_good_as_the_best(scores).front()];
 }
 
 }  // namespace tomofield::selection

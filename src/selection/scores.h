@@ -1,14 +1,18 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
+#include <optional>
 #include <vector>
 
 namespace tomofield::selection {
 
-/// Says how well a trial predicts the held-out views.
+/// Says how well a trial predicts the held-out views, and how clean its volume is.
 struct HeldOutScore {
-  double error = 0;                     ///< mean squared residual over the noise variance
-  std::vector<double> view_error = {};  ///< the same of each held-out view
+  double error = 0;                      ///< mean squared residual over the noise variance
+  std::vector<double> view_error = {};   ///< the same of each held-out view
+  std::optional<double> speckle = {};    ///< evaluate/speckle.h; none if it was not measured
+  std::optional<double> face_jump = {};  ///< evaluate/face_jump.h; none if no face is in the volume
 };
 
 /// Says whether `a` predicts more than half of the held-out views better than `b`. One view at the
@@ -16,14 +20,22 @@ struct HeldOutScore {
 /// this.
 bool most_views_prefer(const HeldOutScore& a, const HeldOutScore& b);
 
-/// Returns the standard error of the mean difference of two trials over the held-out views. The
-/// noise of the views themselves is the same in both trials and cancels.
-double standard_error_of_difference(const HeldOutScore& a, const HeldOutScore& b);
+/// Says how much worse one trial predicts the held-out views than another.
+struct Difference {
+  double log_ratio = 0;       ///< of the errors; 0.01 is about one per cent
+  double standard_error = 0;  ///< of `log_ratio`
+  bool is_beyond(double num_errors) const { return log_ratio > num_errors * standard_error; }
+};
+/// Compares `a` with `b` view by view. The noise of the views themselves is the same in both trials
+/// and cancels. `log_ratio` is the estimate of Hodges and Lehmann (Ann. Math. Stat. 34, 598, 1963),
+/// the median of all means of two views; the standard error is from the median absolute deviation.
+/// So a view at the end of the tilt range, which every trial predicts badly, does not decide.
+Difference difference(const HeldOutScore& a, const HeldOutScore& b);
 
-/// Returns the index of the first trial that the best one does not beat by more than the standard
-/// error of their difference. `scores` are in order of preference. Held-out views cannot tell such
-/// a trial from the best one.
-std::size_t first_as_good_as_the_best(const std::vector<HeldOutScore>& scores);
+/// Returns the indices of the trials that the best one does not beat by more than `num_errors`
+/// standard errors of their difference, ascending. Held-out views cannot tell them from the best.
+std::vector<std::size_t> as_good_as_the_best(const std::vector<HeldOutScore>& scores,
+                                             double num_errors = 1);
 
 /// Returns the score of a weight, and always the same one for the same weight.
 using ScoreOfWeight = std::function<HeldOutScore(double weight)>;
@@ -35,7 +47,7 @@ constexpr int kUsualWeights = 7;
 
 /// Returns the weight of a regulariser that predicts held-out views best. It searches on a
 /// logarithmic scale: in factors of 4 (up to 256) from `first`, then 2 and √2 about the best. Of
-/// all tried weights that are as good as the best (first_as_good_as_the_best()), it takes the
+/// all tried weights that are as good as the best (as_good_as_the_best()), it takes the
 /// largest. That one makes the smoothest volume: where held-out views cannot tell, less noise is
 /// the better guess.
 double search_weight(double first, const ScoreOfWeight& score, const ExpectWeights& expect = {});

@@ -20,11 +20,30 @@ TEST(MostViewsPrefer, CountsViewsWhateverTheirErrors) {
   EXPECT_FALSE(most_views_prefer(half, with_errors({1.0, 5.0, 2.0, 9.0})));
 }
 
-TEST(StandardErrorOfDifference, IgnoresWhatTrialsShare) {
-  const HeldOutScore a = with_errors({1.0, 5.0, 2.0}), b = with_errors({1.1, 5.1, 2.1}),
-                     c = with_errors({2.0, 5.0, 2.0});
-  EXPECT_NEAR(standard_error_of_difference(a, b), 0.0, 1e-7);
-  EXPECT_NEAR(standard_error_of_difference(a, c), 1.0 / 3, 1e-12);  // s = 1/√3, over √3
+TEST(Difference, IgnoresWhatTrialsShare) {
+  const HeldOutScore a = with_errors({1.0, 5.0, 2.0}), worse = with_errors({1.1, 5.5, 2.2});
+  EXPECT_NEAR(difference(worse, a).log_ratio, std::log(1.1), 1e-12);
+  EXPECT_NEAR(difference(worse, a).standard_error, 0.0, 1e-12);
+  EXPECT_TRUE(difference(worse, a).is_beyond(2));
+  EXPECT_FALSE(difference(a, worse).is_beyond(2));
+}
+
+TEST(Difference, GrowsUnsureWithTheScatterOfTheViews) {
+  const HeldOutScore a = with_errors({1, 1, 1, 1, 1}),
+                     b = with_errors({std::exp(-2), std::exp(-1), 1, std::exp(1), std::exp(2)});
+  EXPECT_NEAR(difference(b, a).log_ratio, 0.0, 1e-12);
+  EXPECT_NEAR(difference(b, a).standard_error, 1.4826 / std::sqrt(5), 1e-4);
+}
+
+// In yardstick B a view at 60° is worse by 5 % with a penalty that predicts all others better.
+TEST(Difference, OneViewAtTheEndOfTheTiltsDoesNotDecide) {
+  const HeldOutScore smooth = with_errors({1.283, 1.031, 0.961, 0.926, 0.949, 0.967, 1.018}),
+                     concave = with_errors({1.450, 0.965, 0.927, 0.899, 0.916, 0.929, 1.013});
+  EXPECT_TRUE(difference(smooth, concave).is_beyond(2));
+}
+
+TEST(Difference, ComparesTheTotalsOfTrialsWithoutViews) {
+  EXPECT_NEAR(difference({2.0, {}}, {1.0, {}}).log_ratio, std::log(2.0), 1e-12);
 }
 
 // Returns an error that grows with the distance from the best weight, the same for all views.
@@ -52,16 +71,18 @@ TEST(SearchWeight, TakesTheLargestOfThoseThatViewsCannotTellApart) {
   const auto score = [](double weight) -> HeldOutScore {
     const double error = weight > 15 ? 2 : 1 + 1e-3 * std::abs(std::log2(weight / 5));
     const double spread = weight > 15 ? 0 : 0.1 * std::sin(100 * weight);
-    return {error, {error + spread, error - spread}};
+    return {error, {error + spread, error, error - spread}};
   };
   const double found = search_weight(5.0, score);
   EXPECT_EQ(found, 10.0);
 }
 
-TEST(FirstAsGoodAsTheBest, CountsWhatViewsCannotTellApartAsEqual) {
-  const HeldOutScore best{1.0, {0.5, 1.5}}, unsure{1.1, {1.0, 1.2}}, surely_worse{1.2, {0.7, 1.7}};
-  EXPECT_EQ(first_as_good_as_the_best({surely_worse, unsure, best}), 1u);
-  EXPECT_EQ(first_as_good_as_the_best({surely_worse, best}), 1u);
+TEST(AsGoodAsTheBest, CountsWhatViewsCannotTellApartAsEqual) {
+  const HeldOutScore best{1.0, {0.5, 1.5, 1.0}}, unsure{1.1, {0.6, 1.4, 1.05}},
+      surely_worse{1.2, {0.6, 1.8, 1.2}};
+  using Indices = std::vector<std::size_t>;
+  EXPECT_EQ(as_good_as_the_best({surely_worse, unsure, best}, 2), (Indices{1, 2}));
+  EXPECT_EQ(as_good_as_the_best({surely_worse, best}), Indices{1});
 }
 
 }  // namespace

@@ -28,11 +28,17 @@ json trial_json(json settings, const HeldOutScore& score, double seconds) {
   settings.update({{"held_out_error", score.error},
                    {"held_out_error_by_view", score.view_error},
                    {"seconds", seconds}});
+  if (score.speckle) settings["speckle"] = *score.speckle;
+  if (score.face_jump) settings["face_jump"] = *score.face_jump;
   return settings;
 }
 
 HeldOutScore score_from(const json& trial) {
-  return {trial.at("held_out_error"), trial.at("held_out_error_by_view")};
+  const auto measured = [&](const char* name) {
+    return trial.contains(name) ? std::optional<double>(trial[name]) : std::nullopt;
+  };
+  return {trial.at("held_out_error"), trial.at("held_out_error_by_view"), measured("speckle"),
+          measured("face_jump")};
 }
 
 TrialFile::TrialFile(std::filesystem::path path, std::string fingerprint, bool reuse)

@@ -79,13 +79,21 @@ class Trials {
     return most_views_prefer(of_other, of_usual) ? other : usual;
   }
 
-  /// Returns the first of these candidates, in order of preference, that the best one does not
-  /// beat by more than the standard error of their difference.
-  Settings first_as_good(const std::vector<Settings>& candidates) {
+  /// Returns those of these candidates that the best one does not beat by more than `num_errors`
+  /// standard errors of their difference, in their order.
+  std::vector<Settings> as_good(const std::vector<Settings>& candidates, double num_errors = 1) {
     make(candidates);
     std::vector<HeldOutScore> scores;
     for (const Settings& settings : candidates) scores.push_back(trial(settings).score);
-    return candidates[first_as_good_as_the_best(scores)];
+    std::vector<Settings> good;
+    for (const std::size_t i : as_good_as_the_best(scores, num_errors))
+      good.push_back(candidates[i]);
+    return good;
+  }
+
+  /// Returns the first of these candidates, in order of preference, that is as good as the best.
+  Settings first_as_good(const std::vector<Settings>& candidates, double num_errors = 1) {
+    return as_good(candidates, num_errors).front();
   }
 
   /// Returns `settings` with the weight that search_weight() finds. set_weight(settings, weight)

@@ -18,7 +18,7 @@ class Together : public ::testing::Test {
                            batches_.push_back(numbers);
                            std::vector<Trial<double>> made;
                            for (const double x : numbers) {
-                             const double error = std::abs(std::log(x / best_));
+                             const double error = 1 + std::abs(std::log(x / best_));
                              made.push_back({x, {error, {error, error}}});
                            }
                            return made;

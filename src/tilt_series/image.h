@@ -6,7 +6,16 @@
 
 namespace tomofield::tilt_series {
 
-/// An image [y, x] and which of its pixels are measurements; the others are 0.
+/// Tells what a pixel of a view is. Everything but 0 is a measurement.
+enum PixelState : std::uint8_t {
+  kNoMeasurement = 0,
+  kMeasurement = 1,
+  /// It belongs to a bead of which nobody has decided yet whether it is masked. Statistics of the
+  /// specimen leave such pixels out.
+  kUndecidedBead = 2,
+};
+
+/// An image [y, x] and which of its pixels are measurements (PixelState); the others are 0.
 struct MaskedImage {
   std::int64_t width = 0;
   std::int64_t height = 0;

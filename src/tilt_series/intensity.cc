@@ -11,7 +11,9 @@
 namespace tomofield::tilt_series {
 namespace {
 
-constexpr double kEmptyBeamFraction = 0.995;
+// The parts of the block means that are not brighter than an empty place, in dark and in bright
+// series.
+constexpr double kEmptyBeamFraction = 0.995, kBackgroundFraction = 0.005;
 constexpr double kMinTransmission = 1e-3;
 constexpr std::int64_t kMaxBlock = 8;
 
@@ -30,17 +32,30 @@ std::vector<float> gather(const std::vector<std::vector<float>>& values_of_views
   return all;
 }
 
-double percentile_in_place(std::vector<float>& values, double fraction) {
+// Returns the value of all views below which a fraction lies; 0 if there are no values.
+double value_at(double fraction, const std::vector<std::vector<float>>& values_of_views,
+                const distributed::Communicator& processes) {
+  std::vector<float> values = gather(values_of_views, processes);
+  if (values.empty()) return 0.0;
   const auto rank =
       static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1) + 0.5);
   std::nth_element(values.begin(), values.begin() + rank, values.end());
-  return values[static_cast<std::size_t>(rank)];
+  return static_cast<double>(values[static_cast<std::size_t>(rank)]);
+}
+
+void subtract_background(double background, MaskedImage* image) {
+  if (background == 0.0) return;
+  for (std::size_t i = 0; i < image->values.size(); ++i)
+    if (image->valid[i]) image->values[i] -= static_cast<float>(background);
 }
 
 }  // namespace
 
 std::int64_t IntensityScale::convert(MaskedImage* image) const {
-  if (contrast == Contrast::kBright) return 0;
+  if (contrast == Contrast::kBright) {
+    subtract_background(background, image);
+    return 0;
+  }
   std::int64_t num_raised = 0;
   for (std::size_t i = 0; i < image->values.size(); ++i) {
     if (!image->valid[i]) continue;
@@ -67,8 +82,12 @@ void append_block_means(const MaskedImage& image, std::vector<float>* means) {
 
 double estimate_empty_beam(const std::vector<std::vector<float>>& means_of_views,
                            const distributed::Communicator& processes) {
-  std::vector<float> means = gather(means_of_views, processes);
-  return means.empty() ? 0.0 : percentile_in_place(means, kEmptyBeamFraction);
+  return value_at(kEmptyBeamFraction, means_of_views, processes);
+}
+
+double estimate_background(const std::vector<std::vector<float>>& means_of_views,
+                           const distributed::Communicator& processes) {
+  return value_at(kBackgroundFraction, means_of_views, processes);
 }
 
 }  // namespace tomofield::tilt_series

@@ -13,7 +13,8 @@ namespace tomofield::tilt_series {
 struct IntensityScale {
   Contrast contrast = Contrast::kDark;
   bool take_log = false;    ///< −ln(I / I0) instead of I0 − I; dark only
-  double empty_beam = 0.0;  ///< I0; bright intensities stay as they are and need none
+  double empty_beam = 0.0;  ///< I0; bright intensities need none
+  double background = 0.0;  ///< is subtracted from bright intensities
 
   /// Converts the valid pixels. A transmission I / I0 below 1e-3 is raised to it before the
   /// logarithm: nothing so low is ever measured, it comes from noise and subtraction. Returns how
@@ -30,6 +31,10 @@ void append_block_means(const MaskedImage& image, std::vector<float>* means);
 /// intensity of the thinnest half per cent of what was seen, beyond the reach of single hot
 /// pixels; 0 if there are no means. `means` of views that another process owns are empty.
 double estimate_empty_beam(const std::vector<std::vector<float>>& means_of_views,
+                           const distributed::Communicator& processes);
+
+/// Returns the background of a bright series: the percentile 0.5 of the same means.
+double estimate_background(const std::vector<std::vector<float>>& means_of_views,
                            const distributed::Communicator& processes);
 
 }  // namespace tomofield::tilt_series

@@ -145,6 +145,8 @@ void require_compatible(const TiltSeriesOptions& options) {
     throw Error(fmt::format("'{}' (--xf) and '{}' (--aln) both align the views; give one of them",
                             options.xf->string(), options.aln->string()));
   }
+  if (options.background != 0 && options.contrast == Contrast::kDark)
+    throw Error("--black-level is for --contrast bright: leave it out");
   if (options.take_log && options.contrast == Contrast::kBright) {
     throw Error("--log is for transmitted intensities (--contrast dark); bright data need none");
   }

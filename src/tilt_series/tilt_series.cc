@@ -49,6 +49,7 @@ struct TiltSeries::Impl {
   std::vector<View> views;
   std::int64_t width, height;
   IntensityScale intensity;
+  double background = 0.0;
   std::vector<double> noise_sigma;
   std::int64_t num_bad_pixels = 0;
   FixedPatternMetrics fixed_pattern;
@@ -65,9 +66,10 @@ struct TiltSeries::Impl {
         decoder(*stack, plan, given.contrast, open_mask_of(given, *stack)),
         width(given.resample ? decoder.aligned_width() : decoder.recorded_width()),
         height(given.resample ? decoder.aligned_height() : decoder.recorded_height()),
-        intensity{given.contrast, given.take_log, 0.0} {
+        intensity{given.contrast, given.take_log, 0.0, given.background} {
     for (const PlannedView& planned : plan.views) views.push_back(planned.view);
     beads.discs.resize(views.size());
+    beads.undecided.resize(views.size());
   }
 
   /// Decodes every view, checks and measures it.
@@ -75,6 +77,7 @@ struct TiltSeries::Impl {
     decode_views(processes);
     if (options.take_log) measure_logarithms(processes);
     find_beads(processes);
+    measure_noise_beside_beads(processes);
     if (!options.keep_views) measured.reset();
     log_series();
   }
@@ -145,13 +148,15 @@ struct TiltSeries::Impl {
       if (measured) measured->write(view, image);
       if (aligned) aligned->write(view, decoded.aligned);
       checks[view] = check_view(decoded.census, image);
-      if (options.contrast == Contrast::kDark) append_block_means(image, &block_means[view]);
+      append_block_means(image, &block_means[view]);
       if (!options.take_log && checks[view].has_measurements)
         noise_sigma[view] = estimate_noise_sigma(image);
     });
     processes.allreduce_sum(std::span(noise_sigma));
     if (options.contrast == Contrast::kDark)
       intensity.empty_beam = estimate_empty_beam(block_means, processes);
+    else
+      background = estimate_background(block_means, processes) - options.background;
     return checks;
   }
 
@@ -234,9 +239,30 @@ struct TiltSeries::Impl {
     beads.metrics.fixed_pattern = fixed_pattern;
     aligned.reset();
     if (options.resample) return;
-    for (std::size_t view = 0; view < views.size(); ++view) {
-      for (MaskDisc& disc : beads.discs[view]) disc = as_recorded(disc, view);
+    for (auto* discs : {&beads.discs, &beads.undecided}) {
+      for (std::size_t view = 0; view < views.size(); ++view)
+        for (MaskDisc& disc : (*discs)[view]) disc = as_recorded(disc, view);
     }
+  }
+
+  /// Measures the noise of stored views with beads once more, without the pixels of these.
+  void measure_noise_beside_beads(const distributed::Communicator& processes) {
+    const auto has_beads = [&](std::size_t view) {
+      return !beads.discs[view].empty() || !beads.undecided[view].empty();
+    };
+    std::vector<double> beside(views.size(), 0.0);
+    for_own_views("measure noise", processes, [&](std::size_t view) {
+      if (!measured || !has_beads(view)) return;
+      MaskedImage image = measured->read(view);
+      mask_discs(beads.discs[view], &image);
+      mask_discs(beads.undecided[view], &image);
+      if (options.take_log) intensity.convert(&image);
+      if (std::ranges::count(image.valid, kMeasurement) > 0)
+        beside[view] = estimate_noise_sigma(image);
+    });
+    processes.allreduce_sum(std::span(beside));
+    for (std::size_t view = 0; view < views.size(); ++view)
+      if (beside[view] > 0.0) noise_sigma[view] = beside[view];
   }
 
   /// Moves a disc of an aligned, binned view into the view as it was recorded.
@@ -249,7 +275,7 @@ struct TiltSeries::Impl {
             disc.radius_px * std::sqrt(std::abs(m.m11 * m.m22 - m.m12 * m.m21))};
   }
 
-  /// Returns a view as line integrals, without what beads and fiducials hide.
+  /// Returns a view as line integrals, without what masked beads and fiducials hide.
   MaskedImage line_integrals(std::size_t view) const {
     MaskedImage image;
     if (measured && measured->holds(view)) {
@@ -260,10 +286,16 @@ struct TiltSeries::Impl {
       image = std::move(options.resample ? decoded.aligned : decoded.recorded);
     }
     mask_discs(beads.discs[view], &image);
+    mark_undecided(beads.undecided[view], &image);
     intensity.convert(&image);
     return image;
   }
 };
+
+std::string describe_beads(const MaskMetrics& masks) {
+  if (masks.num_beads == 0) return "no beads";
+  return fmt::format("{} beads of {:.3g} nm", masks.num_beads, masks.bead_diameter_A / 10);
+}
 
 TiltSeries::TiltSeries(const TiltSeriesOptions& options,
                        const distributed::Communicator& processes) {
@@ -286,7 +318,12 @@ double TiltSeries::pixel_size_A() const { return impl_->plan.pixel_size_A * bin_
 double TiltSeries::bin_factor() const { return impl_->plan.bin_factor; }
 const std::vector<double>& TiltSeries::noise_sigma() const { return impl_->noise_sigma; }
 double TiltSeries::empty_beam() const { return impl_->intensity.empty_beam; }
+
+double TiltSeries::background() const { return impl_->background; }
 const MaskMetrics& TiltSeries::mask_metrics() const { return impl_->beads.metrics; }
+const std::vector<std::vector<MaskDisc>>& TiltSeries::undecided_beads() const {
+  return impl_->beads.undecided;
+}
 
 void TiltSeries::read_view(std::size_t view, std::span<float> image,
                            std::span<std::uint8_t> valid) const {

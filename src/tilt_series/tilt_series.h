@@ -8,10 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "base/enum_names.h"
 #include "distributed/communicator.h"
 #include "geometry/raw_from_aligned.h"
 #include "io/image_stack.h"
 #include "tilt_series/fixed_pattern/fixed_pattern.h"
+#include "tilt_series/masks/mask_disc.h"
 #include "tomofield/options.h"
 
 namespace tomofield::tilt_series {
@@ -31,6 +33,7 @@ struct TiltSeriesOptions {
   std::optional<double> pixel_size_A;          ///< overrides the header's pixel size
   Contrast contrast = Contrast::kDark;
   bool take_log = false;  ///< −ln(I / I0) instead of I0 − I; dark only
+  double background = 0;  ///< is subtracted from bright intensities, in the stack's units
   bool resample = true;   ///< false: views stay as they were recorded, with their alignment beside
   /// False: decoded views are given up as soon as they have been checked and measured.
   bool keep_views = true;
@@ -40,10 +43,19 @@ struct TiltSeriesOptions {
   std::optional<std::filesystem::path> mask;       ///< MRC as the stack: 0 is no measurement
   std::optional<std::filesystem::path> fiducials;  ///< text of model2point, stack coordinates
   /// Diameter of the gold beads that are looked for and masked; 0: none are. Without it, the
-  /// diameter is estimated in dark series, and nothing is looked for in bright ones.
+  /// diameter is estimated if there clearly are beads. They are masked in dark series, and
+  /// undecided in bright ones.
   std::optional<double> bead_diameter_nm;
   /// Finds and removes what stays at one place of the detector in all views.
   bool remove_fixed_pattern = true;
+};
+
+/// Says what is done with the pixels of beads that were found.
+enum class BeadMasking {
+  kNone,       ///< no beads were found, or nobody looked for them
+  kMasked,     ///< they carry no loss
+  kUndecided,  ///< they count until a decision is made; statistics leave them out
+  kUnmasked,   ///< they count as all others do
 };
 
 /// Counts of what was masked beside the fill of rotated images.
@@ -52,9 +64,13 @@ struct MaskMetrics {
   double bead_diameter_A = 0.0;           ///< given or estimated; 0: no beads
   std::vector<std::size_t> beads_found;   ///< [view]: beads with a spot of their own
   std::vector<std::size_t> beads_masked;  ///< [view]: discs, also from tracks and --fiducials
-  std::int64_t num_bad_pixels = 0;        ///< hot and dead pixels of all sections
-  FixedPatternMetrics fixed_pattern;      ///< what was removed from all views
+  BeadMasking bead_masking = BeadMasking::kNone;
+  std::int64_t num_bad_pixels = 0;    ///< hot and dead pixels of all sections
+  FixedPatternMetrics fixed_pattern;  ///< what was removed from all views
 };
+
+/// Describes the beads in a few words: "12 beads of 10 nm", or "no beads".
+std::string describe_beads(const MaskMetrics& masks);
 
 /// One view of the series.
 struct View {
@@ -93,8 +109,9 @@ class TiltSeries {
 
   /// Copies view `view` (an index into views()) as height × width line integrals in
   /// the data's units (I0 − I, −ln(I/I0), or as stored), and which pixels are
-  /// measurements: false for NaN, infinity, hot and dead pixels, fill outside a
-  /// rotated image, beads, fiducials and what the user's mask leaves out.
+  /// measurements (PixelState): 0 for NaN, infinity, hot and dead pixels, fill
+  /// outside a rotated image, masked beads, fiducials and what the user's mask leaves out, and
+  /// kUndecidedBead for beads that are undecided.
   /// Pixels that are not measurements are 0. A view that is not in this process's store is
   /// decoded anew. Thread-safe.
   void read_view(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) const;
@@ -107,14 +124,22 @@ class TiltSeries {
   /// Returns about the bytes that reading one view takes, if it is decoded anew.
   std::size_t decoding_memory() const;
 
-  /// Returns the standard deviation of each view's noise, in the units of read_view.
+  /// Returns the standard deviation of each view's noise, in the units of read_view. Beads, also
+  /// undecided ones, are left out.
   const std::vector<double>& noise_sigma() const;
 
   /// Returns the intensity of an empty beam (I0), in the stack's units; for
   /// kBright 0, where none is needed.
   double empty_beam() const;
 
+  /// Returns the intensity of the emptiest places of a bright series (intensity.h), in the units of
+  /// read_view; 0 for kDark.
+  double background() const;
+
   const MaskMetrics& mask_metrics() const;
+
+  /// Returns the discs of undecided beads in each view, in the pixels of read_view().
+  const std::vector<std::vector<MaskDisc>>& undecided_beads() const;
 
  private:
   struct Impl;
@@ -122,3 +147,12 @@ class TiltSeries {
 };
 
 }  // namespace tomofield::tilt_series
+
+template <>
+struct tomofield::base::EnumNames<tomofield::tilt_series::BeadMasking> {
+  using BeadMasking = tomofield::tilt_series::BeadMasking;
+  static constexpr std::array kNames{std::pair{BeadMasking::kNone, "none"},
+                                     std::pair{BeadMasking::kMasked, "masked"},
+                                     std::pair{BeadMasking::kUndecided, "undecided"},
+                                     std::pair{BeadMasking::kUnmasked, "unmasked"}};
+};

@@ -20,7 +20,8 @@ PIXEL_SIZE = 13.37
 TILTS = np.arange(-60, 61, 6.0)
 # A fit of a tenth of a second that still finds the specimen.
 QUICK = ["--thickness", THICKNESS, "--contrast", "bright", "--no-margin", "--field", "vm",
-         "--leaf-size", 16, "--rank", 6, "--epochs", 8, "--subsets", 7, "--tv-penalty", "concave"]
+         "--leaf-size", 16, "--rank", 6, "--epochs", 8, "--subsets", 7, "--tv-penalty", "concave",
+         "--view-scale", "off"]
 
 
 def tomofield(*arguments, **keywords):

@@ -86,7 +86,7 @@ def masked_pixels(results):
 
 def test_beads_are_found_reported_and_shown(beads):
     results, mask, run = reconstruct("found", beads)
-    assert mask["beads"] == len(BEADS), mask
+    assert mask["beads"] == len(BEADS) and mask["bead_masking"] == "masked", mask
     assert 0.8 * DIAMETER < mask["bead_diameter_nm"] < 1.1 * DIAMETER, mask["bead_diameter_nm"]
     assert [view["beads_masked"] for view in mask["views"]] == [len(BEADS)] * len(TILTS)
     assert all(view["beads_found"] >= len(BEADS) - 1 for view in mask["views"])
@@ -97,6 +97,39 @@ def test_beads_are_found_reported_and_shown(beads):
     assert masked[distance < DIAMETER / 2].all() and not masked[distance > 2 * DIAMETER].any()
     lowest = mask["views"][list(TILTS).index(0)]
     np.testing.assert_allclose(lowest["masked_part"], masked.mean(), atol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def bright(write_series):
+    """Returns the arguments of a bright series with beads."""
+    return write_series("bright", -views_of(14)) + ["--contrast", "bright"]
+
+
+def test_beads_of_a_bright_series_are_found_and_shown_but_not_masked_without_trials(bright):
+    results, mask, run = reconstruct("bright_sirt", bright, command=["baseline", "sirt"],
+                                     quick=["--thickness", 24, "--iterations", 2])
+    assert mask["beads"] == len(BEADS) and mask["bead_masking"] == "unmasked"
+    assert mask["masked_part"] == 0 and not masked_pixels(results).any()
+    assert f"found {len(BEADS)} beads" in run.stdout + run.stderr
+    assert "--bead-diameter" in run.stdout + run.stderr
+    picture = skimage.io.imread(results.mask_picture)
+    zoom = picture.shape[1] // WIDTH
+    blue = (picture[..., 2] > picture[..., 0])[::-1][zoom // 2 :: zoom, zoom // 2 :: zoom]
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH] + 0.5
+    distance = np.min([np.hypot(x - bx, y - by) for bx, by in bead_places(0)], axis=0)
+    assert blue[distance < DIAMETER / 2].all() and not blue[distance > 2 * DIAMETER].any()
+
+
+def test_a_trial_masks_the_beads_of_a_bright_series(bright):
+    results, mask, run = reconstruct("bright_tried", bright)
+    record = json.load(open(results.json_path))
+    tried = {trial["masks_beads"] for trial in record["metrics"]["tuning"]["trials"]}
+    assert tried == {False, True} and mask["bead_masking"] == "masked", tried
+    assert "beads not masked" in run.stderr and "are masked" in run.stderr
+    diameter = record["options"]["input"]["bead_diameter_nm"]
+    given, mask, _ = reconstruct("bright_given", bright, "--bead-diameter", diameter)
+    assert mask["bead_masking"] == "masked" and mask["masked_part"] > 0
+    np.testing.assert_array_equal(given.volume, results.volume)
 
 
 def test_voxel_baselines_mask_beads_too(beads):

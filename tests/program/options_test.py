@@ -17,7 +17,7 @@ COMMON = {"stack", "--tlt", "--xf", "--aln", "--bin", "--contrast", "--thickness
 def flags_of_keys():
     """Returns the flag of every key in docs/options.md."""
     rows = {key: flags.split(",")[-1] for flags, key in ROW.findall(PAGE.read_text("utf-8"))}
-    assert len(rows) == 58, len(rows)
+    assert len(rows) == 60, len(rows)
     return rows
 
 
@@ -60,7 +60,7 @@ def test_a_file_says_what_the_command_line_says():
     with open(file, "w", encoding="utf-8") as config:
         config.write('roi = [2, 3, 40, 30]\nifp = 0.5\ncenter = [23.5, 11]\ntv-penalty = "smooth"\n'
                      'view-scale = "on"\nrank = 7\n')
-    quick = harness.merge(harness.QUICK, ["--tv-penalty", "smooth"])[:-2]
+    quick = harness.merge(harness.QUICK, ["--tv-penalty", "smooth", "--view-scale", "on"])[:-4]
     output = os.path.join(harness.fresh_directory("configured"), "out.mrc")
     harness.succeed("reconstruct", *series.input, "-o", output, *harness.merge(quick, ["--rank", 5]),
                     "--config", file)

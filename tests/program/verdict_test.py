@@ -62,7 +62,10 @@ def test_right_input_has_no_warning(cell, slab):
     check_codes(verdict, result)
     errors = verdict["held_out"]
     assert 0.8 < errors["median"] <= errors["worst"] < 2 and not errors["of_trials"], errors
-    expected = (f"residual {verdict['residual']:.2f} of the noise's variance; held out: median "
+    along_x, along_y = verdict["views"]["residual_correlation"]
+    assert abs(along_x) < 0.2 and abs(along_y) < 0.2  # white noise
+    expected = (f"residual {verdict['residual']:.2f} of the noise's variance; correlation of "
+                f"neighbours {along_x:.2f}, {along_y:.2f}; held out: median "
                 f"{errors['median']:.2f}, worst {errors['worst']:.2f} "
                 f"(at {errors['worst_tilt_deg']:.1f}°); speckle {100 * verdict['speckle']:.3f} %; "
                 f"faces {verdict['face_jump']['both']:.2f}; {verdict['seconds']:.1f} s, ")

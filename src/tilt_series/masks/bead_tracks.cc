@@ -106,6 +106,8 @@ class TrackFinder {
   }
 
  private:
+  bool is_strong(const Spot& spot) const { return spot.strength >= rules_.seed_strength; }
+
   bool stands(const BeadTrack& track) const {
     return track.num_found >= rules_.min_views && std::fabs(track.z_px) <= rules_.max_z_px &&
            static_cast<double>(track.num_found) >=
@@ -118,12 +120,13 @@ class TrackFinder {
   }
 
   void count(BeadTrack* track) const {
-    track->num_visible = track->num_found = 0;
+    track->num_visible = track->num_found = track->num_strong = 0;
     for (std::size_t view = 0; view < views_.tilt_deg.size(); ++view) {
       const double x = track_x(*track, views_.middle_x_px, views_.tilt_deg[view]);
-      const bool is_found = spot_of(*track, view).has_value();
-      track->num_found += is_found;
-      track->num_visible += is_found || views_.is_measured(view, x, track->y_px);
+      const auto spot = spot_of(*track, view);
+      track->num_found += spot.has_value();
+      track->num_strong += spot && is_strong(index_.of_view(view)[*spot]);
+      track->num_visible += spot || views_.is_measured(view, x, track->y_px);
     }
   }
 
@@ -168,10 +171,10 @@ class TrackFinder {
                     std::vector<BeadTrack>* candidates) const {
     const auto& others = index_.of_view(second);
     for (const Spot& a : index_.of_view(first)) {
-      if (a.strength < rules_.seed_strength) continue;
+      if (!is_strong(a)) continue;
       for (std::size_t i = index_.first_at(second, a.y_px - rules_.tolerance_px);
            i < others.size() && others[i].y_px <= a.y_px + rules_.tolerance_px; ++i) {
-        if (others[i].strength < rules_.seed_strength) continue;
+        if (!is_strong(others[i])) continue;
         TrackFit fit;
         fit.add(radians(views_.tilt_deg[first]), a.x_px - views_.middle_x_px, a.y_px);
         fit.add(radians(views_.tilt_deg[second]), others[i].x_px - views_.middle_x_px,

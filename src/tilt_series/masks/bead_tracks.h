@@ -14,6 +14,7 @@ struct BeadTrack {
   double x_px = 0.0, y_px = 0.0, z_px = 0.0;
   std::size_t num_visible = 0;  ///< views in which its place was measured
   std::size_t num_found = 0;    ///< of these, where a spot was found there
+  std::size_t num_strong = 0;   ///< of these spots, those as strong as seeds
 };
 
 /// The views that tracks are looked for in, in the order of their spots.

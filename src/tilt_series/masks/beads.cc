@@ -27,6 +27,10 @@ constexpr double kDiameterStep = 1.4142135623730951;  // between the diameters t
 // Beads are taken as found if this many of them have spots in this part of all views each.
 constexpr std::size_t kMinBeads = 3;
 constexpr double kPartOfViews = 0.5;
+// Beads that few views see count if so many of these views, and this part of them, show a strong
+// spot. A chance track has strong spots in fewer.
+constexpr std::size_t kMinStrongViews = 8;
+constexpr double kStrongPartOfVisible = 0.75;
 
 // The maximum number of spots of a view that are followed. Nobody adds more beads, and with this
 // limit the tracks of a view full of ice crystals are found in seconds.
@@ -170,11 +174,24 @@ std::optional<double> estimate_diameter(const BeadViews& views, const BeadSearch
   return best->profile.diameter_px();
 }
 
+/// Tells whether at least three beads have a spot in at least half of all views each, or as many
+/// strong spots together: beads beside the field of view come into few views, and all views that
+/// see them show them clearly.
 bool is_evident(const std::vector<BeadTrack>& tracks, std::size_t num_views) {
-  const auto num_clear = std::count_if(tracks.begin(), tracks.end(), [&](const BeadTrack& track) {
-    return static_cast<double>(track.num_found) >= kPartOfViews * static_cast<double>(num_views);
-  });
-  return num_clear >= static_cast<std::ptrdiff_t>(kMinBeads);
+  const double half_of_views = kPartOfViews * static_cast<double>(num_views);
+  std::size_t num_lasting = 0, num_clear = 0, num_strong_spots = 0;
+  for (const BeadTrack& track : tracks) {
+    num_lasting += static_cast<double>(track.num_found) >= half_of_views;
+    const bool is_clear = track.num_strong >= kMinStrongViews &&
+                          static_cast<double>(track.num_strong) >=
+                              kStrongPartOfVisible * static_cast<double>(track.num_visible);
+    if (!is_clear) continue;
+    ++num_clear;
+    num_strong_spots += track.num_strong;
+  }
+  return num_lasting >= kMinBeads ||
+         (num_clear >= kMinBeads &&
+          static_cast<double>(num_strong_spots) >= half_of_views * static_cast<double>(kMinBeads));
 }
 
 /// Returns tracks of beads; none if evidence is wanted and there is not enough.
@@ -305,21 +322,19 @@ double mask_radius_px(double diameter_px) { return 1.2 * diameter_px; }
 
 void mask_discs(const std::vector<MaskDisc>& discs, MaskedImage* image) {
   for (const MaskDisc& disc : discs) {
-    const auto low = [&](double at) {
-      return std::max<std::int64_t>(static_cast<std::int64_t>(std::floor(at - disc.radius_px)), 0);
-    };
-    const auto high = [&](double at, std::int64_t size) {
-      return std::min(static_cast<std::int64_t>(std::ceil(at + disc.radius_px)), size);
-    };
-    for (std::int64_t y = low(disc.y_px); y < high(disc.y_px, image->height); ++y) {
-      for (std::int64_t x = low(disc.x_px); x < high(disc.x_px, image->width); ++x) {
-        const double distance = std::hypot(static_cast<double>(x) + 0.5 - disc.x_px,
-                                           static_cast<double>(y) + 0.5 - disc.y_px);
-        if (distance > disc.radius_px) continue;
-        image->valid[image->index(x, y)] = 0;
-        image->values[image->index(x, y)] = 0.0f;
-      }
-    }
+    for_pixels_in(disc, image->width, image->height, [&](std::int64_t x, std::int64_t y) {
+      image->valid[image->index(x, y)] = kNoMeasurement;
+      image->values[image->index(x, y)] = 0.0f;
+    });
+  }
+}
+
+void mark_undecided(const std::vector<MaskDisc>& discs, MaskedImage* image) {
+  for (const MaskDisc& disc : discs) {
+    for_pixels_in(disc, image->width, image->height, [&](std::int64_t x, std::int64_t y) {
+      std::uint8_t& valid = image->valid[image->index(x, y)];
+      if (valid != kNoMeasurement) valid = kUndecidedBead;
+    });
   }
 }
 

@@ -8,15 +8,9 @@
 
 #include "distributed/communicator.h"
 #include "tilt_series/image.h"
+#include "tilt_series/masks/mask_disc.h"
 
 namespace tomofield::tilt_series {
-
-/// A round part of a view that is not to be fitted.
-struct MaskDisc {
-  double x_px = 0.0;  ///< pixel i covers [i, i + 1)
-  double y_px = 0.0;
-  double radius_px = 0.0;
-};
 
 /// A series to be searched: tilts and images of one size, dense parts high.
 struct BeadViews {
@@ -46,9 +40,10 @@ struct BeadSearch {
 /// spots as strong as those of beads get one as well although no track has
 /// them (beads that few views see).
 ///
-/// Without a diameter it is estimated from the views of lowest tilt, and beads
-/// are believed in only if at least three have a spot far beyond noise and
-/// specimen in most views.
+/// Without a diameter it is estimated from the views of lowest tilt, and beads are believed in only
+/// if the evidence is clear. Either at least three have a spot in most views; or at least three
+/// have a spot far beyond noise and specimen in most of the views that see them, and all together
+/// they have as many such spots.
 ///
 /// Each process looks for spots in the views that it owns; all get the same result.
 BeadSearch find_beads(
@@ -60,5 +55,8 @@ double mask_radius_px(double diameter_px);
 
 /// Marks the pixels whose centres lie in a disc as no measurements.
 void mask_discs(const std::vector<MaskDisc>& discs, MaskedImage* image);
+
+/// Marks the measurements whose centres lie in a disc as those of undecided beads.
+void mark_undecided(const std::vector<MaskDisc>& discs, MaskedImage* image);
 
 }  // namespace tomofield::tilt_series

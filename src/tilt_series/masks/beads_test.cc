@@ -106,6 +106,17 @@ TEST(Beads, SpotsThatKeepNoPlaceInTheSpecimenAreNone) {
   EXPECT_EQ(find_beads(views, {}).num_beads, 0u);
 }
 
+TEST(Beads, ThatFewViewsSeeAreEvidenceIfTheyShowThemClearly) {
+  BeadScene scene;
+  scene.beads = {{-20, 30, 5}, {30, 100, -20}};  // in all views
+  EXPECT_EQ(find_beads(scene.views(), {}).num_beads, 0u) << "two beads are no clear evidence";
+  // These come in from the sides as the tilt grows.
+  scene.beads.insert(scene.beads.end(), {{95, 20, 10}, {-98, 70, -15}, {92, 50, 20}});
+  const BeadSearch search = find_beads(scene.views(), {});
+  EXPECT_EQ(search.num_beads, 5u);
+  expect_discs_on_beads(scene, search, 2.5);
+}
+
 TEST(Beads, AGivenDiameterFindsASingleBead) {
   BeadScene scene;
   scene.scatter_beads(1, 3);
@@ -131,6 +142,17 @@ TEST(Beads, DiscsMaskThePixelsWhoseCentresTheyHold) {
       ASSERT_EQ(image.values[image.index(x, y)], is_in ? 0.0f : 1.0f);
     }
   }
+}
+
+TEST(Beads, UndecidedOnesKeepTheirValuesAndAreMarked) {
+  MaskedImage image(20, 10);
+  std::fill(image.values.begin(), image.values.end(), 1.0f);
+  image.valid[image.index(6, 4)] = kNoMeasurement;
+  mark_undecided({{6.2, 4.7, 2.5}}, &image);
+  EXPECT_EQ(image.valid[image.index(6, 4)], kNoMeasurement);
+  EXPECT_EQ(image.valid[image.index(7, 4)], kUndecidedBead);
+  EXPECT_EQ(image.valid[image.index(9, 4)], kMeasurement);
+  EXPECT_EQ(std::count(image.values.begin(), image.values.end(), 1.0f), 200);
 }
 
 /// Every `stride`-th view of a series of the shared data, dense parts high.

@@ -100,6 +100,22 @@ std::vector<std::vector<MaskDisc>> place_fiducials(const std::filesystem::path& 
   return places;
 }
 
+/// Searches the views and keeps what is found as masks or as undecided.
+void add_beads(const TiltSeriesOptions& options, const SeriesPlan& plan, const BeadViews& views,
+               const distributed::Communicator& processes, BeadMasks* masks) {
+  BeadSearchOptions how;
+  processes.run_collectively([&] { how = search_options(options, plan); });
+  BeadSearch search = find_beads(views, how, processes);
+  MaskMetrics& metrics = masks->metrics;
+  metrics.beads_found = std::move(search.num_found);
+  metrics.num_beads = search.num_beads;
+  metrics.bead_diameter_A = search.diameter_px * binned_pixel_A(plan);
+  if (search.num_beads == 0) return;
+  const bool is_undecided = options.contrast == Contrast::kBright && !options.bead_diameter_nm;
+  metrics.bead_masking = is_undecided ? BeadMasking::kUndecided : BeadMasking::kMasked;
+  (is_undecided ? masks->undecided : masks->discs) = std::move(search.discs);
+}
+
 void add_fiducials(const TiltSeriesOptions& options, const SeriesPlan& plan,
                    const io::ImageStack& stack, BeadMasks* masks) {
   if (!options.fiducials) return;
@@ -142,26 +158,16 @@ void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* im
   }
 }
 
-bool searches_beads(const TiltSeriesOptions& options) {
-  return options.bead_diameter_nm ? *options.bead_diameter_nm != 0.0
-                                  : options.contrast == Contrast::kDark;
-}
+bool searches_beads(const TiltSeriesOptions& options) { return options.bead_diameter_nm != 0.0; }
 
 BeadMasks find_bead_masks(const TiltSeriesOptions& options, const SeriesPlan& plan,
                           const io::ImageStack& stack, const BeadViews& views,
                           const distributed::Communicator& processes) {
   BeadMasks masks;
   masks.discs.resize(plan.views.size());
+  masks.undecided.resize(plan.views.size());
   masks.metrics.beads_found.assign(plan.views.size(), 0);
-  if (searches_beads(options)) {
-    BeadSearchOptions how;
-    processes.run_collectively([&] { how = search_options(options, plan); });
-    BeadSearch search = find_beads(views, how, processes);
-    masks.discs = std::move(search.discs);
-    masks.metrics.beads_found = std::move(search.num_found);
-    masks.metrics.num_beads = search.num_beads;
-    masks.metrics.bead_diameter_A = search.diameter_px * binned_pixel_A(plan);
-  }
+  if (searches_beads(options)) add_beads(options, plan, views, processes, &masks);
   processes.run_collectively([&] { add_fiducials(options, plan, stack, &masks); });
   for (const auto& discs : masks.discs) masks.metrics.beads_masked.push_back(discs.size());
   return masks;

@@ -12,10 +12,11 @@
 
 namespace tomofield::tilt_series {
 
-/// Discs that hide beads and fiducials, in the aligned, binned pixels of each view.
+/// Discs of beads and fiducials, in the aligned, binned pixels of each view.
 struct BeadMasks {
-  std::vector<std::vector<MaskDisc>> discs;
-  MaskMetrics metrics;  ///< of the beads
+  std::vector<std::vector<MaskDisc>> discs;      ///< hide what is masked
+  std::vector<std::vector<MaskDisc>> undecided;  ///< of beads that may be masked later
+  MaskMetrics metrics;                           ///< of the beads
 };
 
 /// Opens the user's mask (--mask). Throws Error if it is not as large as the stack.
@@ -28,6 +29,8 @@ void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* im
 bool searches_beads(const TiltSeriesOptions& options);
 
 /// Finds the beads that the options ask for in the aligned `views`, and adds the user's fiducials.
+/// Beads that a bright series turns out to have, without a diameter from the user, stay undecided:
+/// bright particles may be the specimen itself.
 /// Throws Error for a diameter that cannot be, or a fiducial file that does not fit the stack.
 BeadMasks find_bead_masks(const TiltSeriesOptions& options, const SeriesPlan& plan,
                           const io::ImageStack& stack, const BeadViews& views,

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <functional>
+#include <numeric>
 
 #include "bead_series.h"
 #include "io/mrc.h"
@@ -230,27 +231,55 @@ TEST(SeriesMasks, BeadsOfDarkSeriesAreMaskedUnlessTurnedOff) {
   EXPECT_EQ(std::count(all.begin(), all.end(), 0), 0);
 }
 
-TEST(SeriesMasks, BrightSeriesAreSearchedOnlyWhenAsked) {
-  const ScratchDirectory scratch;
+TEST(SeriesMasks, BeadsOfBrightSeriesStayUndecidedUnlessAskedFor) {
   BeadScene scene;
   scene.scatter_beads(6, 2);
-  scene.contrast = 10;
-  TiltSeriesOptions options = dark_series(scratch, scene);
-  options.stack = write_stack(
-      scratch / "bright.st", scene.width, scene.height,
-      static_cast<std::int64_t>(scene.tilt_deg.size()),
-      [&, view = std::size_t{0}, image = scene.view(0)](std::int64_t x, std::int64_t y,
-                                                        std::int64_t z) mutable {
-        if (static_cast<std::size_t>(z) != view) {
-          image = scene.view(view = static_cast<std::size_t>(z));
-        }
-        return image.values[image.index(x, y)];
-      },
-      kPixelSize);
+  TiltSeriesOptions options;
+  options.images = scene.stack(Contrast::kBright);
   options.contrast = Contrast::kBright;
-  EXPECT_EQ(TiltSeries(options).mask_metrics().num_beads, 0u);
-  options.bead_diameter_nm = 4.0;
-  EXPECT_EQ(TiltSeries(options).mask_metrics().num_beads, 6u);
+  const TiltSeries found(options);
+  EXPECT_EQ(found.mask_metrics().num_beads, 6u);
+  EXPECT_EQ(found.mask_metrics().bead_masking, BeadMasking::kUndecided);
+  EXPECT_EQ(found.mask_metrics().beads_masked, std::vector<std::size_t>(31, 0));
+  options.bead_diameter_nm = found.mask_metrics().bead_diameter_A / 10;
+  const TiltSeries asked(options);
+  EXPECT_EQ(asked.mask_metrics().num_beads, 6u);
+  EXPECT_EQ(asked.mask_metrics().bead_masking, BeadMasking::kMasked);
+  EXPECT_EQ(asked.noise_sigma(), found.noise_sigma()) << "neither sees the beads";
+  const auto pixels = static_cast<std::size_t>(found.width() * found.height());
+  std::vector<float> image(pixels);
+  std::vector<std::uint8_t> valid(pixels);
+  for (const std::size_t view : {0, 15, 22}) {
+    ASSERT_FALSE(found.undecided_beads()[view].empty());
+    found.read_view(view, image, valid);
+    EXPECT_EQ(image, scene.view(view).values);
+    const auto masked = valid_of(asked, view);
+    for (std::size_t i = 0; i < pixels; ++i)
+      ASSERT_EQ(valid[i], masked[i] == kNoMeasurement ? kUndecidedBead : kMeasurement);
+  }
+  options.bead_diameter_nm = 0.0;
+  const TiltSeries off(options);
+  EXPECT_EQ(off.mask_metrics().num_beads, 0u);
+  EXPECT_EQ(off.mask_metrics().bead_masking, BeadMasking::kNone);
+}
+
+TEST(SeriesMasks, TheNoiseIsThatBesideTheBeads) {
+  BeadScene scene;
+  scene.specimen = 0;
+  scene.diameter_px = 8;
+  scene.contrast = 300;
+  TiltSeriesOptions options;
+  options.contrast = Contrast::kBright;
+  const auto mean_noise = [&] {
+    options.images = scene.stack(Contrast::kBright);
+    const TiltSeries series(options);
+    const std::vector<double>& sigma = series.noise_sigma();
+    return std::reduce(sigma.begin(), sigma.end()) / static_cast<double>(sigma.size());
+  };
+  const double without_beads = mean_noise();
+  scene.scatter_beads(8, 3);
+  // Among the beads it would be 1.03 times as large.
+  EXPECT_NEAR(mean_noise(), without_beads, 0.005);
 }
 
 }  // namespace

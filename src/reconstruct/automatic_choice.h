@@ -1,0 +1,54 @@
+#pragma once
+
+#include "reconstruct/trial_settings.h"
+
+namespace tomofield::reconstruction {
+
+/// Says which settings a run leaves to trials.
+struct OpenSettings {
+  bool variation = false;   ///< penalty and weight of total variation
+  bool view_scale = false;  ///< scales and offsets of the views
+  bool background = false;  ///< subtraction of the series' background
+  bool beads = false;       ///< masks of the beads that were found
+  bool any() const { return variation || view_scale || background || beads; }
+  bool operator==(const OpenSettings&) const = default;
+};
+
+/// Number of standard errors beyond which one trial counts as better than another. Trials predict
+/// few views, so that one standard error is passed by chance too often.
+constexpr double kClearErrors = 2;
+
+/// Returns `settings` with all corrections of the views that are open: scales and masks of beads
+/// do no harm where they are not needed, while a wrong penalty can be chosen without them.
+TrialSettings with_safe_corrections(TrialSettings settings, const OpenSettings& open);
+
+/// Chooses the penalty of total variation, each with its usual weight: the concave one if it is
+/// clearly better, else the smooth one. A concave penalty makes sharp edges, which are right for
+/// some specimens only; where held-out views cannot tell, it paints flat regions that are none.
+TrialSettings choose_penalty(const TrialSettings& start, FitTrials& trials);
+
+/// Chooses penalty and weight of total variation:
+///
+///   1. The penalty, by choose_penalty().
+///   2. The weight of that penalty, in factors of 1.8 about the usual one, until the best has a
+///      worse one on either side. Of the weights that are as good as the best it takes the largest
+///      of the smooth penalty, and of the concave one the usual unless another is better by 1 %:
+///      a smaller one leaves isolated voxels, and a larger one paints.
+///
+/// A weight that is as good, and whose volume is clearly cleaner (fewer than half of the isolated
+/// voxels, or leaves that do not show), goes before.
+TrialSettings choose_variation(const TrialSettings& start, FitTrials& trials);
+
+/// Chooses the corrections of the views that are open, each by trials that differ in it alone.
+/// Scales are fitted if that is clearly better. Beads are masked unless a fit to them is clearly
+/// better: they were found because they clearly are beads, few trials show how they streak, and
+/// particles that are the specimen help to predict what is around them. Of the background, trials
+/// subtract half, and all of it if that is better; the part that is subtracted is interpolated
+/// between them.
+TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings& open,
+                                 FitTrials& trials);
+
+/// Returns the number of trials that choose_variation() and choose_corrections() usually make.
+int usual_trials(const OpenSettings& open);
+
+}  // namespace tomofield::reconstruction

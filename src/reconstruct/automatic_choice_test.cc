@@ -1,0 +1,135 @@
+#include "reconstruct/automatic_choice.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "objective/options.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+const TrialSettings kStart{Penalty::kConcave, 3, 24, 3, true, 0, true};
+
+// The relative error of a trial with some settings.
+using Error = std::function<double(const TrialSettings&)>;
+
+// Makes trials of seven views that differ by what `error` says, and by `scatter` from view to view.
+FitTrials trials_with(Error error, double scatter = 1e-3,
+                      std::function<double(const TrialSettings&)> speckle = {}) {
+  return make_trials([=, num_trials = 0](const std::vector<TrialSettings>& batch) mutable {
+    std::vector<FitTrial> trials;
+    for (const TrialSettings& settings : batch) {
+      FitTrial trial{settings, {error(settings), {}}};
+      ++num_trials;
+      for (int view = 0; view < 7; ++view) {
+        const double random = std::sin(1e3 * (view + 1) * num_trials);
+        trial.score.view_error.push_back((1 + 0.2 * view) * error(settings) *
+                                         (1 + scatter * random));
+      }
+      if (speckle) trial.score.speckle = speckle(settings);
+      trials.push_back(std::move(trial));
+    }
+    return trials;
+  });
+}
+
+// An error that grows with the distance from the best weight, and by `of_concave` with the concave
+// penalty.
+Error weights_error(double best_smooth, double best_concave, double of_concave) {
+  return [=](const TrialSettings& s) {
+    const bool is_smooth = s.penalty == Penalty::kSmooth;
+    const double steps = std::log(s.variation / (is_smooth ? best_smooth : best_concave));
+    return 1 + 0.05 * steps * steps + (is_smooth ? 0 : of_concave);
+  };
+}
+
+TEST(ChoosePenalty, PrefersTheSmoothOneWhereViewsCannotTell) {
+  FitTrials unsure = trials_with(weights_error(5, 14, -0.01), 0.1);
+  EXPECT_EQ(choose_penalty(kStart, unsure).penalty, Penalty::kSmooth);
+  FitTrials sure = trials_with(weights_error(5, 14, -0.01));
+  EXPECT_EQ(choose_penalty(kStart, sure).penalty, Penalty::kConcave);
+}
+
+TEST(ChooseVariation, FindsTheWeightOfTheSmoothPenalty) {
+  for (const double best : {1.6, 2.8, 5.0, 9.0, 16.0}) {
+    FitTrials trials = trials_with(weights_error(best, 14, 0.5));
+    const TrialSettings found = choose_variation(kStart, trials);
+    EXPECT_EQ(found.penalty, Penalty::kSmooth);
+    EXPECT_LT(std::abs(std::log(found.variation / best)), std::log(1.8) / 2) << found.variation;
+    EXPECT_LE(trials.made().size(), 6u);
+  }
+}
+
+TEST(ChooseVariation, TakesTheLargestSmoothWeightOfThoseThatViewsCannotTellApart) {
+  FitTrials trials = trials_with(weights_error(5, 14, 0.5), 0.05);
+  EXPECT_NEAR(choose_variation(kStart, trials).variation, 9, 1e-9);
+}
+
+TEST(ChooseVariation, KeepsTheUsualConcaveWeightUnlessAnotherIsClearlyBetter) {
+  FitTrials unsure = trials_with(weights_error(5, 20, -0.5), 0.05);
+  EXPECT_EQ(choose_variation(kStart, unsure).variation, 14);
+  FitTrials sure = trials_with(weights_error(5, 25, -0.5));
+  EXPECT_NEAR(choose_variation(kStart, sure).variation, 14 * 1.8, 1e-9);
+}
+
+TEST(ChooseVariation, DoesNotGoFarBelowTheUsualConcaveWeight) {
+  FitTrials trials = trials_with(weights_error(5, 1, -0.9));
+  EXPECT_NEAR(choose_variation(kStart, trials).variation, 14 / 1.8, 1e-9);
+}
+
+TEST(ChooseVariation, PrefersAWeightThatIsAsGoodAndClearlyCleaner) {
+  const auto speckle = [](const TrialSettings& s) { return s.variation > 20 ? 0.001 : 0.01; };
+  FitTrials trials = trials_with(weights_error(5, 20, -0.5), 0.05, speckle);
+  EXPECT_NEAR(choose_variation(kStart, trials).variation, 14 * 1.8, 1e-9);
+}
+
+TEST(ChooseCorrections, FitsScalesIfThatIsBetterAndMasksBeadsUnlessThatIsWorse) {
+  const OpenSettings open{.view_scale = true, .beads = true};
+  const auto scales_help = [](const TrialSettings& s) { return s.fits_view_scale ? 1.0 : 1.2; };
+  FitTrials scales = trials_with(scales_help);
+  TrialSettings chosen = choose_corrections(kStart, open, scales);
+  EXPECT_TRUE(chosen.fits_view_scale);
+  EXPECT_TRUE(chosen.masks_beads);
+  const auto masks_harm = [](const TrialSettings& s) { return s.masks_beads ? 1.2 : 1.0; };
+  FitTrials masks = trials_with(masks_harm);
+  chosen = choose_corrections(kStart, open, masks);
+  EXPECT_FALSE(chosen.fits_view_scale);
+  EXPECT_FALSE(chosen.masks_beads);
+  EXPECT_EQ(masks.made().size(), 3u);
+}
+
+TEST(ChooseCorrections, LeaveWhatIsNotOpenAsItIs) {
+  FitTrials trials = trials_with([](const TrialSettings&) { return 1.0; });
+  EXPECT_EQ(choose_corrections(kStart, {}, trials), kStart);
+  EXPECT_TRUE(trials.made().empty());
+}
+
+TEST(ChooseCorrections, InterpolateThePartOfTheBackground) {
+  const OpenSettings open{.view_scale = true, .background = true};
+  for (const double best : {0.3, 0.5, 0.8, 1.0}) {
+    FitTrials trials = trials_with([&](const TrialSettings& s) {
+      const double left = s.background_part - best;
+      return s.fits_view_scale ? 1.5 : 1 + left * left;
+    });
+    EXPECT_NEAR(choose_corrections(kStart, open, trials).background_part, best, 0.02);
+  }
+  FitTrials none =
+      trials_with([](const TrialSettings& s) { return 1 + s.background_part * s.background_part; });
+  EXPECT_EQ(choose_corrections(kStart, open, none).background_part, 0);
+}
+
+TEST(WithSafeCorrections, MakesThoseThatAreOpen) {
+  const TrialSettings safe =
+      with_safe_corrections({}, {.view_scale = true, .background = true, .beads = true});
+  EXPECT_TRUE(safe.fits_view_scale);
+  EXPECT_TRUE(safe.masks_beads);
+  EXPECT_EQ(safe.background_part, 0);
+  EXPECT_EQ(with_safe_corrections({}, {}), TrialSettings{});
+}
+
+}  // namespace
+}  // namespace tomofield::reconstruction

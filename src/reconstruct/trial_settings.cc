@@ -1,0 +1,92 @@
+#include "reconstruct/trial_settings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/enum_names.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+using nlohmann::json;
+
+TrialSettings settings_from(const json& entry) {
+  return {.penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>()).value(),
+          .variation = entry.at("tv"),
+          .rank = entry.at("rank"),
+          .epochs = entry.at("epochs"),
+          .fits_view_scale = entry.at("view_scale"),
+          .background_part = entry.at("background_part"),
+          .masks_beads = entry.at("masks_beads")};
+}
+
+}  // namespace
+
+FitTrials make_trials(FitTrials::RunTrials run) {
+  constexpr double kRounding = 1e-9;
+  return {std::move(run), [](const TrialSettings& a, const TrialSettings& b) {
+            TrialSettings same_weight = a;
+            same_weight.variation = b.variation;
+            return same_weight == b &&
+                   std::abs(a.variation - b.variation) <= kRounding * std::abs(b.variation);
+          }};
+}
+
+selection::Difference difference_to_best(const FitTrial& trial, const TunedFit& tuned) {
+  const FitTrial& best = *std::ranges::min_element(tuned.trials, {}, [&](const FitTrial& t) {
+    return selection::difference(t.score, tuned.trials.front().score).log_ratio;
+  });
+  return selection::difference(trial.score, best.score);
+}
+
+std::string describe(const TrialSettings& settings, const TrialSettings& usual) {
+  std::string text =
+      fmt::format("{} tv {:.3g}", base::name_of(settings.penalty), settings.variation);
+  if (settings.fits_view_scale != usual.fits_view_scale)
+    text += settings.fits_view_scale ? ", view scales" : ", no view scales";
+  if (settings.masks_beads != usual.masks_beads)
+    text += settings.masks_beads ? ", beads masked" : ", beads not masked";
+  if (settings.background_part != usual.background_part)
+    text += fmt::format(", {:.0f} % of the background subtracted", 100 * settings.background_part);
+  return text;
+}
+
+json settings_json(const TrialSettings& s) {
+  return {{"tv_penalty", base::name_of(s.penalty)},
+          {"tv", s.variation},
+          {"rank", s.rank},
+          {"epochs", s.epochs},
+          {"view_scale", s.fits_view_scale},
+          {"background_part", s.background_part},
+          {"masks_beads", s.masks_beads}};
+}
+
+FitTrial trial_from(const json& entry) {
+  return {.settings = settings_from(entry),
+          .score = selection::score_from(entry),
+          .seconds = entry.value("seconds", 0.0)};
+}
+
+json tuning_json(const TunedFit& tuned) {
+  json tuning = selection::tuned_json(tuned, settings_json);
+  for (std::size_t i = 0; i < tuned.trials.size(); ++i) {
+    const selection::Difference d = difference_to_best(tuned.trials[i], tuned);
+    tuning["trials"][i].update({{"above_best", d.log_ratio}, {"standard_error", d.standard_error}});
+  }
+  return tuning;
+}
+
+TunedFit tuned_from(const json& tuning) {
+  TunedFit tuned{.settings = settings_from(tuning.at("chosen")),
+                 .trials = {},
+                 .predicted_views = tuning.at("predicted_views")};
+  for (const json& trial : tuning.at("trials")) tuned.trials.push_back(trial_from(trial));
+  return tuned;
+}
+
+}  // namespace tomofield::reconstruction

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "selection/trial_file.h"
+#include "selection/trials.h"
+#include "tomofield/options.h"
+
+namespace tomofield::reconstruction {
+
+/// Holds the settings that trials choose. They replace options of the run.
+struct TrialSettings {
+  Penalty penalty = Penalty::kConcave;  ///< FitOptions::penalty
+  double variation = 0;                 ///< FitOptions::density_variation
+  int rank = 0;                         ///< FieldOptions::rank
+  int epochs = 0;                       ///< FitOptions::epochs; the learning rate decays over these
+  bool fits_view_scale = false;         ///< FitOptions::fit_view_scale
+  double background_part = 0;           ///< that is subtracted (measurement/background.h)
+  bool masks_beads = false;             ///< whose search left that open (undecided_beads.h)
+  bool operator==(const TrialSettings&) const = default;
+};
+using FitTrial = selection::Trial<TrialSettings>;
+using FitTrials = selection::Trials<TrialSettings>;
+using TunedFit = selection::Tuned<TrialSettings>;
+
+/// Prepares the trials of a search; `run` makes some trials. Settings whose weights differ by
+/// rounding count as equal.
+FitTrials make_trials(FitTrials::RunTrials run);
+
+/// Compares a trial with the one of a search that predicts best.
+selection::Difference difference_to_best(const FitTrial& trial, const TunedFit& tuned);
+
+/// Describes settings as in "smooth tv 5", and which corrections of the views differ from those of
+/// `usual`.
+std::string describe(const TrialSettings& settings, const TrialSettings& usual);
+
+/// Writes settings in the form that trial files and metrics have.
+nlohmann::json settings_json(const TrialSettings& settings);
+/// Reads a trial that selection::trial_json() has written with such settings.
+FitTrial trial_from(const nlohmann::json& entry);
+/// Writes the chosen settings and all trials, each with its difference to the best.
+nlohmann::json tuning_json(const TunedFit& tuned);
+/// Reads what tuning_json() has written. Throws nlohmann::json::exception if it is damaged.
+TunedFit tuned_from(const nlohmann::json& tuning);
+
+}  // namespace tomofield::reconstruction
