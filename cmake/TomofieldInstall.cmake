@@ -1,8 +1,9 @@
-# cmake --install: the program, its man pages, the library, its headers and a CMake package.
+# cmake --install: the program, its bill of materials, its man pages, the library, its headers and a CMake package.
 include(CMakePackageConfigHelpers)
 set(tomofield_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/tomofield)
 
 install(TARGETS tomofield RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(FILES ${tomofield_materials} DESTINATION ${CMAKE_INSTALL_DATADIR}/tomofield)
 install(TARGETS tomofield_library EXPORT TomofieldTargets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/tomofield ${PROJECT_BINARY_DIR}/include/tomofield

@@ -49,8 +49,11 @@ Choice choose_count() {
   const Processors& p = processors();
   if (g_asked_count > 0) return {g_asked_count, "as asked for"};
   const char* variable = std::getenv("OMP_NUM_THREADS");
-  if (const int wanted = variable ? std::atoi(variable) : 0; wanted > 0)
-    return {wanted, "as OMP_NUM_THREADS says"};
+  if (const long wanted = variable ? std::strtol(variable, nullptr, 10) : 0; wanted > 0) {
+    if (wanted <= kMostThreads) return {static_cast<int>(wanted), "as OMP_NUM_THREADS says"};
+    return {kMostThreads,
+            fmt::format("the most there can be, since OMP_NUM_THREADS says {}", wanted)};
+  }
   if (p.are_all_usable() && g_processes_on_machine > 1) {
     return {std::max(1, p.online / g_processes_on_machine),
             fmt::format("the share of each of {} processes on this machine with {} processors",
@@ -86,19 +89,22 @@ std::string reason_not_to_bind(int count) {
 class Threads {
  public:
   explicit Threads(Choice choice)
-      : why_unbound_(reason_not_to_bind(choice.count)),
+      : wanted_(choice.count),
+        why_unbound_(reason_not_to_bind(choice.count)),
         why_count_(std::move(choice.reason)),
         workers_(choice.count, why_unbound_.empty() ? processors_in_mask() : std::vector<int>{}) {}
 
   WorkerThreads& workers() { return workers_; }
   std::string description() const {
     const int count = workers_.count();
-    return fmt::format("{} thread{}, {}; {}", count, count == 1 ? "" : "s", why_count_,
+    return fmt::format("{} thread{}, {}{}; {}", count, count == 1 ? "" : "s", why_count_,
+                       count < wanted_ ? fmt::format(" (the system grants no {})", wanted_) : "",
                        why_unbound_.empty() ? "each is bound to a processor"
                                             : "not bound to processors, since " + why_unbound_);
   }
 
  private:
+  int wanted_;
   std::string why_unbound_, why_count_;
   WorkerThreads workers_;
 };

@@ -6,6 +6,9 @@
 
 namespace tomofield::base {
 
+/// The largest number of threads that can be asked for.
+inline constexpr int kMostThreads = 1024;
+
 /// Returns the number of threads that parallel_for uses. By default it is OMP_NUM_THREADS, or else
 /// the processors that this process may use (processors.h).
 int thread_count();

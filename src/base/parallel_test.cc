@@ -118,6 +118,15 @@ TEST_F(DescribedThreads, NumberOfTheEnvironment) {
   EXPECT_TRUE(says("5 threads, as OMP_NUM_THREADS says; ")) << describe_threads();
 }
 
+TEST_F(DescribedThreads, HugeNumbersOfTheEnvironmentAreCut) {
+  for (const char* text : {"99999999", "1000000000000000000000000"}) {
+    setenv("OMP_NUM_THREADS", text, 1);
+    set_thread_count(0);
+    EXPECT_LE(thread_count(), kMostThreads) << text;
+    EXPECT_TRUE(says("the most there can be, since OMP_NUM_THREADS says 9")) << describe_threads();
+  }
+}
+
 TEST_F(DescribedThreads, NumbersThatAreNoneDoNotCount) {
   set_thread_count(0);
   const int usual = thread_count();

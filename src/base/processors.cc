@@ -6,8 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <sstream>
 #include <vector>
+
+#include "base/control_groups.h"
 
 namespace tomofield::base {
 namespace {
@@ -40,46 +41,6 @@ std::optional<double> quota_of_version_1(const fs::path& group) {
   return quota / period;
 }
 
-// Returns the smallest quota of a group and of all groups around it. A container sees its own group
-// at the root, whatever its path outside is, so groups that do not exist are passed over.
-template <typename QuotaOfGroup>
-std::optional<double> smallest_quota(const fs::path& root, fs::path group,
-                                     const QuotaOfGroup& quota_of) {
-  std::optional<double> smallest;
-  for (group = group.relative_path();; group = group.parent_path()) {
-    const std::optional<double> quota = quota_of(root / group);
-    if (quota) smallest = std::min(smallest.value_or(*quota), *quota);
-    if (group.empty()) return smallest;
-  }
-}
-
-bool lists(const std::string& controllers, const std::string& wanted) {
-  std::stringstream names(controllers);
-  for (std::string name; std::getline(names, name, ',');)
-    if (name == wanted) return true;
-  return false;
-}
-
-// Reads /proc/self/cgroup, whose lines are "number:controllers:path" (cgroups(7)). Version 2 has no
-// controllers in its line.
-std::optional<double> control_group_quota(const fs::path& root) {
-  std::ifstream groups(root / "proc/self/cgroup");
-  std::optional<double> smallest;
-  for (std::string line; std::getline(groups, line);) {
-    const std::size_t first = line.find(':'), second = line.find(':', first + 1);
-    if (first == std::string::npos || second == std::string::npos) continue;
-    const std::string controllers = line.substr(first + 1, second - first - 1);
-    const fs::path path = line.substr(second + 1);
-    std::optional<double> quota;
-    if (controllers.empty())
-      quota = smallest_quota(root / "sys/fs/cgroup", path, quota_of_version_2);
-    else if (lists(controllers, "cpu"))
-      quota = smallest_quota(root / "sys/fs/cgroup/cpu", path, quota_of_version_1);
-    if (quota) smallest = std::min(smallest.value_or(*quota), *quota);
-  }
-  return smallest;
-}
-
 }  // namespace
 
 int Processors::usable() const {
@@ -92,7 +53,7 @@ Processors processors_of_this_process(const fs::path& root) {
   processors.online = std::max(1, static_cast<int>(sysconf(_SC_NPROCESSORS_ONLN)));
   processors.allowed =
       std::clamp(processors_in_affinity_mask(processors.online), 1, std::max(1, processors.online));
-  processors.quota = control_group_quota(root);
+  processors.quota = smallest_group_limit(root, {"cpu", quota_of_version_1, quota_of_version_2});
   return processors;
 }
 

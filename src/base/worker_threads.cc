@@ -8,6 +8,7 @@
 #include <chrono>
 #include <exception>
 #include <memory>
+#include <system_error>
 #include <utility>
 
 #include "base/check.h"
@@ -132,7 +133,11 @@ int WorkerThreads::number() { return t_number; }
 
 WorkerThreads::WorkerThreads(int count, const std::vector<int>& processors) {
   for (int number = 1; number < count; ++number) {
-    workers_.emplace_back([this, number] { work(number); });
+    try {
+      workers_.emplace_back([this, number] { work(number); });
+    } catch (const std::system_error&) {
+      return;  // those that there are do the same work
+    }
     if (processors.empty()) continue;
     cpu_set_t mask;
     CPU_ZERO(&mask);

@@ -23,8 +23,9 @@ namespace tomofield::base {
 /// it, take part in the outermost loop that has indices left.
 class WorkerThreads {
  public:
-  /// Starts `count` − 1 threads, for loops on `count` threads. With `processors`, one for each
-  /// thread, thread i stays on processor i, but for the calling one.
+  /// Starts `count` − 1 threads, for loops on `count` threads, or as many as the system grants.
+  /// With `processors`, one for each thread, thread i stays on processor i, but for the calling
+  /// one.
   WorkerThreads(int count, const std::vector<int>& processors);
   /// Ends the threads. No loop may run.
   ~WorkerThreads();

@@ -193,6 +193,11 @@ void check_options(const BaselineOptions& options) {
                          "give --overwrite to replace it, or another name with -o");
 }
 
+std::vector<io::OutputLock> claim_outputs(const BaselineOptions& options) {
+  const BaselinePaths paths = baseline_paths(options.shared.output);
+  return io::claim_outputs({paths.volume, paths.json}, [&] { check_options(options); });
+}
+
 BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {
   const measurement::Measurement planned =
       plan_measurement(series, output::specimen_options(options.shared));

@@ -2,9 +2,11 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "base/progress.h"
 #include "baseline/method.h"
+#include "io/output_lock.h"
 #include "measurement/prepare.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
@@ -29,6 +31,10 @@ BaselinePaths baseline_paths(const std::filesystem::path& volume);
 /// Checks the options and the output files. Throws Error for options out of range, and if results
 /// would replace existing ones without `overwrite` or cannot be written.
 void check_options(const BaselineOptions& options);
+
+/// Checks the options and locks the files of a run against other runs. The run holds the locks to
+/// its end. Throws Error as check_options() does, or if another run writes these files.
+std::vector<io::OutputLock> claim_outputs(const BaselineOptions& options);
 
 /// The plan of a run. Making it allocates and writes nothing.
 struct BaselinePlan {

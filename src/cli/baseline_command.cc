@@ -1,10 +1,9 @@
-#include <fmt/core.h>
-
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/enum_names.h"
 #include "base/parallel.h"
@@ -12,6 +11,7 @@
 #include "baseline/tune.h"
 #include "cli/commands.h"
 #include "cli/common_options.h"
+#include "cli/console.h"
 #include "cli/enum_option.h"
 #include "cli/fit_options.h"
 #include "cli/help_formatter.h"
@@ -22,6 +22,7 @@
 #include "cli/tensorf_command.h"
 #include "cli/trace_option.h"
 #include "distributed/communicator.h"
+#include "io/output_set.h"
 #include "output/shared_options.h"
 
 namespace tomofield::cli {
@@ -42,7 +43,7 @@ void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts&
                 VolumeAxes axes) {
   print_sizes({plan.num_views, plan.geometry.width, plan.geometry.height, plan.pixel_size_A,
                plan.roi, plan.geometry.thickness, axes});
-  fmt::print(
+  print(
       "{} voxels with the margins, {} parameters; {} iteration{} on {} threads; about {:.2f} GiB "
       "of memory\n",
       plan.num_voxels, plan.num_parameters, method.iterations, method.iterations == 1 ? "" : "s",
@@ -50,12 +51,12 @@ void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts&
 }
 
 void print_summary(const baseline::BaselineSummary& summary) {
-  fmt::print("mean squared residual {:.4f} of the noise's variance", summary.mean_squared_residual);
+  print("mean squared residual {:.4f} of the noise's variance", summary.mean_squared_residual);
   if (summary.last_decrease) {
-    fmt::print("; the objective fell by {:.2g} % in the last tenth of the iterations",
-               100 * *summary.last_decrease);
+    print("; the objective fell by {:.2g} % in the last tenth of the iterations",
+          100 * *summary.last_decrease);
   }
-  fmt::print("\n");
+  print("\n");
 }
 
 // Runs a baseline whose options have been checked.
@@ -66,14 +67,18 @@ void run_method(const baseline::BaselineOptions& options, const baseline::Method
   input.keep_views = !dry_run;
   const tilt_series::TiltSeries series(input);
   print_plan(baseline::plan_baseline(series, options), method, shared.axes);
-  if (shared.tune) fmt::print("short trials first, that choose settings by held-out views\n");
-  std::fflush(stdout);  // the plan comes before other output, in a file too
+  if (shared.tune) print("short trials first, that choose settings by held-out views\n");
+  flush_output();  // the plan comes before other output, in a file too
   if (dry_run) return;
+  io::OutputSet results;
   const baseline::BaselineSummary summary = baseline::run_baseline(
       series, options, {make_progress_bar("tune"), make_progress_bar("baseline")});
+  const auto pictures = write_pictures(results.location_of(paths.volume), series,
+                                       summary.bead_masking, paths.picture_prefix);
+  results.commit();
   print_summary(summary);
-  fmt::print("tomogram  {}\nmetrics   {}\n", paths.volume.string(), paths.json.string());
-  write_pictures(paths.volume, series, summary.bead_masking, paths.picture_prefix);
+  print("tomogram  {}\nmetrics   {}\n", paths.volume.string(), paths.json.string());
+  print_pictures(pictures);
 }
 
 template <typename Method>
@@ -83,7 +88,11 @@ void run(Arguments<Method>& arguments) {
   if constexpr (requires { method.non_negative; })
     method.non_negative = arguments.non_negative.value_or(shared.contrast != Contrast::kDark);
   const baseline::BaselineOptions options{arguments.choices.files, shared, method};
-  baseline::check_options(options);
+  std::vector<io::OutputLock> locks;
+  if (arguments.dry_run)
+    baseline::check_options(options);
+  else
+    locks = baseline::claim_outputs(options);
   const baseline::BaselinePaths paths = baseline::baseline_paths(shared.output);
   check_trace_file(arguments.trace, {paths.volume, paths.json}, options.files, shared.overwrite);
   run_traced(arguments.dry_run ? std::nullopt : arguments.trace, distributed::Communicator::alone(),

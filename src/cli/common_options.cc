@@ -9,11 +9,10 @@ namespace tomofield::cli {
 
 void add_common_options(CLI::App& command) {
   const char* group = "Running";
-  constexpr int kMaxThreads = 1024;
   command
       .add_option_function<int>("--threads", base::set_thread_count,
                                 "Number of threads; the result is the same for any")
-      ->check(number_between(1, kMaxThreads))
+      ->check(number_between(1, base::kMostThreads))
       ->type_name("N")
       ->default_str("the processors that this process may use, or OMP_NUM_THREADS")
       ->group(group);

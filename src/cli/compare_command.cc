@@ -10,12 +10,15 @@
 #include "base/log.h"
 #include "cli/commands.h"
 #include "cli/common_options.h"
+#include "cli/config_file.h"
+#include "cli/console.h"
 #include "cli/exit_status.h"
 #include "cli/help_formatter.h"
 #include "cli/number_checks.h"
 #include "cli/stop_signal.h"
 #include "cli/table_options.h"
 #include "compare/comparison.h"
+#include "tomofield/error.h"
 
 namespace tomofield::cli {
 namespace {
@@ -51,6 +54,27 @@ std::vector<std::string> series_words(const CLI::App& command,
   return words;
 }
 
+// Refuses an option that would write another file than those of the comparison.
+void require_no_trace(const compare::Method& method) {
+  for (const std::string& word : method.expanded)
+    if (word == "--trace" || word.starts_with("--trace="))
+      throw Error(fmt::format("{}: a comparison writes no trace: run `tomofield {}` by itself",
+                              method.name, fmt::join(method.arguments, " ")));
+}
+
+// Reads the configuration files of methods, for the files that these name.
+void expand_methods(const CLI::App& program, std::vector<compare::Method>& methods) {
+  for (compare::Method& method : methods) {
+    method.expanded = method.arguments;
+    try {
+      expand_config_file(program, method.expanded);
+    } catch (const Error& error) {
+      throw Error(fmt::format("{}: {}", method.name, error.what()));
+    }
+    require_no_trace(method);
+  }
+}
+
 ExitStatus stopped(compare::Outcome outcome, const Arguments& arguments) {
   if (outcome == compare::Outcome::kStoppedBeforeRuns)
     return {stop_status(), "stopped before the first run; nothing has been made or removed"};
@@ -67,6 +91,7 @@ void run(const CLI::App& command, const Arguments& arguments,
   options.series = arguments.choices.options;
   options.series_words = series_words(command, own_options);
   options.methods = compare::choose_methods(arguments.names, arguments.others);
+  expand_methods(*command.get_parent(), options.methods);
   if (!arguments.truth.empty()) options.truth = arguments.truth;
   options.tune = arguments.tune;
   options.halves = arguments.halves;
@@ -85,9 +110,9 @@ void run(const CLI::App& command, const Arguments& arguments,
       .stop_requested = stop_was_requested};
   const compare::Outcome outcome = compare::compare_methods(options, hooks);
   if (outcome != compare::Outcome::kFinished) throw stopped(outcome, arguments);
-  fmt::print(
-      "report    {}\nmetrics   {}\ntable     {}\n", (options.folder / "report.html").string(),
-      (options.folder / "comparison.json").string(), (options.folder / "comparison.csv").string());
+  print("report    {}\nmetrics   {}\ntable     {}\n", (options.folder / "report.html").string(),
+        (options.folder / "comparison.json").string(),
+        (options.folder / "comparison.csv").string());
 }
 
 std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments) {

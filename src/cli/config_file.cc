@@ -5,12 +5,12 @@
 #include <toml++/toml.h>
 #include <algorithm>
 #include <cstdint>
-#include <filesystem>
-#include <fstream>
 #include <optional>
 #include <utility>
 
 #include "cli/help_formatter.h"
+#include "io/output_files.h"
+#include "io/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
@@ -37,12 +37,34 @@ std::optional<std::string> take_config_path(std::vector<std::string>& arguments)
   return path;
 }
 
-toml::table read_toml(const std::string& path) {
-  std::ifstream file(path);
-  if (!file || !std::filesystem::is_regular_file(path))
-    throw Error(fmt::format("--config '{}' cannot be read: check its path", path));
+std::string read_config(const std::string& path) {
   try {
-    return toml::parse(file, path);
+    return io::read_text_file(path);
+  } catch (const Error& error) {
+    throw Error(
+        fmt::format("--config '{}' cannot be read: check its path ({})", path, error.what()));
+  }
+}
+
+// Refuses characters beyond ASCII before the first quote or comment of a line. TOML has none there,
+// and toml++ 3.3 runs into undefined behaviour for some of them.
+void require_ascii_outside_texts(const std::string& text, const std::string& path) {
+  int line = 1;
+  bool is_outside = true;
+  for (const char c : text) {
+    if (c == '\n') ++line;
+    is_outside = c == '\n' || (is_outside && c != '"' && c != '\'' && c != '#');
+    if (is_outside && static_cast<unsigned char>(c) >= 0x80)
+      throw Error(fmt::format("'{}', line {}: put text with other than ASCII letters in quotes",
+                              path, line));
+  }
+}
+
+toml::table read_toml(const std::string& path) {
+  const std::string text = read_config(path);
+  require_ascii_outside_texts(text, path);
+  try {
+    return toml::parse(text, path);
   } catch (const toml::parse_error& error) {
     throw Error(fmt::format("'{}', line {}: {}", path, error.source().begin.line,
                             std::string(error.description())));
@@ -124,6 +146,7 @@ const CLI::App* find_command(const CLI::App& program, const std::vector<std::str
 void expand_config_file(const CLI::App& program, std::vector<std::string>& arguments) {
   const std::optional<std::string> path = take_config_path(arguments);
   if (!path) return;
+  io::add_input(*path);
   const CLI::App* command = find_command(program, arguments);
   const std::vector<std::string> given = arguments;
   for (const auto& [key, node] : read_toml(*path)) {

@@ -1,12 +1,14 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "base/utf8.h"
 #include "cli/commands.h"
 #include "cli/common_options.h"
+#include "cli/console.h"
 #include "cli/evaluate_options.h"
 #include "cli/help_formatter.h"
 #include "evaluate/artefacts.h"
@@ -15,6 +17,7 @@
 #include "evaluate/similarity.h"
 #include "io/atomic_file.h"
 #include "io/json.h"
+#include "io/output_set.h"
 #include "output/shared_options.h"
 #include "report/pictures.h"
 
@@ -31,13 +34,13 @@ struct Findings {
 void print_comparison(const evaluate::Comparison& comparison) {
   const auto& [psnr, ssim, box] = comparison;
   const base::Shape3 shape = box.shape();
-  fmt::print("              raw    affine\n");
-  fmt::print("PSNR (dB) {:8.3f}  {:8.3f}\n", psnr.raw_dB, psnr.affine_dB);
-  fmt::print("SSIM      {:8.5f}  {:8.5f}\n", ssim.raw, ssim.affine);
-  fmt::print("correlation {:.5f}, scale {:.5f}, offset {:.5f}, peak {:.5f}\n", psnr.correlation,
-             psnr.scale, psnr.offset, psnr.peak);
-  fmt::print("box {} × {} × {} voxels from {},{},{} of the truth\n", shape.nx, shape.ny, shape.nz,
-             box.begin[0], box.begin[1], box.begin[2]);
+  print("              raw    affine\n");
+  print("PSNR (dB) {:8.3f}  {:8.3f}\n", psnr.raw_dB, psnr.affine_dB);
+  print("SSIM      {:8.5f}  {:8.5f}\n", ssim.raw, ssim.affine);
+  print("correlation {:.5f}, scale {:.5f}, offset {:.5f}, peak {:.5f}\n", psnr.correlation,
+        psnr.scale, psnr.offset, psnr.peak);
+  print("box {} × {} × {} voxels from {},{},{} of the truth\n", shape.nx, shape.ny, shape.nz,
+        box.begin[0], box.begin[1], box.begin[2]);
 }
 
 // Returns the resolution at which a curve falls below a threshold, or why there is none.
@@ -51,12 +54,12 @@ std::string crossing_text(const evaluate::Fsc& fsc, const evaluate::FscCurve& cu
 }
 
 void print_crossings(const char* name, const evaluate::Fsc& fsc, const evaluate::FscCurve& curve) {
-  fmt::print("{:<14} {:>10} {:>10}\n", name, crossing_text(fsc, curve, 0.5),
-             crossing_text(fsc, curve, 0.143));
+  print("{:<14} {:>10} {:>10}\n", name, crossing_text(fsc, curve, 0.5),
+        crossing_text(fsc, curve, 0.143));
 }
 
 void print_fsc(const evaluate::Fsc& fsc) {
-  fmt::print("FSC falls below {:>8} {:>10}\n", "0.5", "0.143");
+  print("FSC falls below {:>8} {:>10}\n", "0.5", "0.143");
   print_crossings("everywhere", fsc, fsc.all);
   if (fsc.measured) print_crossings("measured", fsc, *fsc.measured);
   if (fsc.missing) print_crossings("missing wedge", fsc, *fsc.missing);
@@ -64,12 +67,12 @@ void print_fsc(const evaluate::Fsc& fsc) {
 
 void print_contrast(const evaluate::ContrastScore& score, const evaluate::Regions& regions,
                     bool chosen) {
-  fmt::print("CNR {:.4f}, ENL {:.4f} (normalised to [0, 1] from {:.6g} … {:.6g})\n", score.cnr,
-             score.enl, score.low, score.high);
-  fmt::print("regions {}:", chosen ? "chosen" : "given");
-  for (const auto& box : regions.foreground) fmt::print(" --foreground {}", evaluate::to_text(box));
-  for (const auto& box : regions.background) fmt::print(" --background {}", evaluate::to_text(box));
-  fmt::print("\n");
+  print("CNR {:.4f}, ENL {:.4f} (normalised to [0, 1] from {:.6g} … {:.6g})\n", score.cnr,
+        score.enl, score.low, score.high);
+  print("regions {}:", chosen ? "chosen" : "given");
+  for (const auto& box : regions.foreground) print(" --foreground {}", evaluate::to_text(box));
+  for (const auto& box : regions.background) print(" --background {}", evaluate::to_text(box));
+  print("\n");
 }
 
 void compare_with_truth(const EvaluateArguments& arguments, Findings& findings) {
@@ -103,10 +106,10 @@ void reproject(const EvaluateArguments& arguments, Findings& findings) {
                                              output::specimen_options(chosen), arguments.hold_out};
   const evaluate::VolumeScore score = evaluate::score_volume(options);
   findings.metrics["reprojection"] = evaluate::volume_score_json(score, options);
-  fmt::print("reprojection error {:.4f} of the noise's variance in {} views\n", score.errors.total,
-             score.errors.views.size());
+  print("reprojection error {:.4f} of the noise's variance in {} views\n", score.errors.total,
+        score.errors.views.size());
   for (std::size_t v = 0; v < score.tilt_deg.size(); ++v)
-    fmt::print("  {:7.2f}°  {:.4f}\n", score.tilt_deg[v], score.errors.view_error[v]);
+    print("  {:7.2f}°  {:.4f}\n", score.tilt_deg[v], score.errors.view_error[v]);
 }
 
 void measure_contrast(const EvaluateArguments& arguments, const base::Volume& volume,
@@ -129,10 +132,10 @@ void measure_artefacts(const EvaluateArguments& arguments, const base::Volume& v
   const evaluate::Artefacts found =
       evaluate::find_artefacts(volume, arguments.volume, arguments.model);
   findings.metrics.update(evaluate::artefacts_json(found.speckle, found.faces));
-  if (found.speckle) fmt::print("speckle {:.5f} %\n", 100 * *found.speckle);
+  if (found.speckle) print("speckle {:.5f} %\n", 100 * *found.speckle);
   if (found.faces)
-    fmt::print("face jump {:.4f} (along X {}, along Y {})\n", found.faces->both,
-               ratio_text(found.faces->x), ratio_text(found.faces->y));
+    print("face jump {:.4f} (along X {}, along Y {})\n", found.faces->both,
+          ratio_text(found.faces->x), ratio_text(found.faces->y));
 }
 
 // Computes the scores that need the volume alone.
@@ -153,16 +156,18 @@ void examine(const EvaluateArguments& arguments, Findings& findings) {
 }
 
 void write_findings(const EvaluateArguments& arguments, const Findings& findings) {
+  io::OutputSet results;
   if (arguments.json) io::write_json(*arguments.json, findings.metrics);
   if (arguments.fsc_csv) io::write_text_file(*arguments.fsc_csv, evaluate::fsc_csv(*findings.fsc));
   if (arguments.fsc_picture) report::write_fsc_picture(*findings.fsc, *arguments.fsc_picture);
   if (arguments.profile_csv) io::write_text_file(*arguments.profile_csv, findings.profile_csv);
+  results.commit();
 }
 
 void run_evaluate(const EvaluateArguments& arguments) {
-  arguments.check();
+  const std::vector<io::OutputLock> locks = arguments.claim_outputs();
   Findings findings;
-  findings.metrics["reconstruction"] = arguments.volume.string();
+  findings.metrics["reconstruction"] = base::utf8_text(arguments.volume.string());
   if (arguments.truth) compare_with_truth(arguments, findings);
   if (arguments.fsc_with) correlate(arguments, findings);
   if (arguments.series) reproject(arguments, findings);

@@ -182,7 +182,7 @@ void add_reprojection_options(CLI::App& command, EvaluateArguments& arguments) {
 
 }  // namespace
 
-void EvaluateArguments::check() const {
+std::vector<io::OutputLock> EvaluateArguments::claim_outputs() const {
   if (box && !truth && !fsc_with)
     throw Error("--box restricts a comparison: name a truth to compare with, or give --fsc");
   if (tilts && !(tilts->low_deg < tilts->high_deg))
@@ -195,12 +195,15 @@ void EvaluateArguments::check() const {
   base::require_no_faults(option_table::range_faults(series_options));
   std::vector<std::filesystem::path> inputs = io::input_files(choices.files), outputs;
   inputs.push_back(volume);
+  if (!model) inputs.push_back(std::filesystem::path(volume).replace_extension(".h5"));
   for (const auto& file : {truth, fsc_with, fsc_mask, series, model})
     if (file) inputs.push_back(*file);
   for (const auto& file : {json, fsc_csv, fsc_picture, profile_csv})
     if (file) outputs.push_back(*file);
-  io::check_output_files(outputs, inputs, overwrite,
-                         "give another name, or --overwrite to replace it");
+  return io::claim_outputs(outputs, [&] {
+    io::check_output_files(outputs, inputs, overwrite,
+                           "give another name, or --overwrite to replace it");
+  });
 }
 
 void add_evaluate_options(CLI::App& command, EvaluateArguments& arguments) {

@@ -3,11 +3,13 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "evaluate/box.h"
 #include "evaluate/contrast.h"
 #include "evaluate/fsc.h"
 #include "evaluate/profile.h"
+#include "io/output_lock.h"
 #include "option_table/values.h"
 
 namespace tomofield::cli {
@@ -36,9 +38,9 @@ struct EvaluateArguments {
   std::optional<std::filesystem::path> json;
   bool overwrite = false;
 
-  /// Checks the arguments. Throws Error for options that need others, and for outputs that must not
-  /// be written.
-  void check() const;
+  /// Checks the arguments and locks the outputs. Throws Error for options that need others, and for
+  /// outputs that must not be written.
+  std::vector<io::OutputLock> claim_outputs() const;
 };
 
 /// Registers all options of `evaluate`. `arguments` must outlive the parsing.

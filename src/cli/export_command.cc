@@ -1,4 +1,4 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <array>
 #include <cmath>
@@ -10,10 +10,12 @@
 
 #include "cli/commands.h"
 #include "cli/common_options.h"
+#include "cli/console.h"
 #include "cli/help_formatter.h"
 #include "cli/number_checks.h"
 #include "cli/table_options.h"
-#include "io/atomic_file.h"
+#include "io/output_files.h"
+#include "io/output_lock.h"
 #include "output/model_file.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
@@ -36,15 +38,12 @@ struct ExportArguments {
   bool overwrite = false;
 };
 
-void check_output(const ExportArguments& arguments) {
-  std::error_code ignored;
-  if (std::filesystem::equivalent(arguments.model, arguments.output, ignored))
-    throw Error(fmt::format("'{}' is the model itself: give the volume another name with -o",
-                            arguments.output.string()));
-  if (!arguments.overwrite && std::filesystem::exists(arguments.output))
-    throw Error(fmt::format("'{}' exists: give another name, or --overwrite to replace it",
-                            arguments.output.string()));
-  const io::AtomicFile probe(arguments.output);  // throws where nothing can be written
+// Checks that the volume can be written, and locks it.
+std::vector<io::OutputLock> claim_output(const ExportArguments& arguments) {
+  return io::claim_outputs({arguments.output}, [&] {
+    io::check_output_files({arguments.output}, {arguments.model}, arguments.overwrite,
+                           "give another name, or --overwrite to replace it");
+  });
 }
 
 field::Point point(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
@@ -70,7 +69,7 @@ OrientedBox unrotated_box(const ExportArguments& arguments, const Model& model) 
 }
 
 void run_export(ExportArguments& arguments) {
-  check_output(arguments);
+  const std::vector<io::OutputLock> locks = claim_output(arguments);
   const Model model = output::load_model(arguments.model);
   OrientedBox box = unrotated_box(arguments, model);
   const auto& angles = arguments.rotation;
@@ -79,10 +78,9 @@ void run_export(ExportArguments& arguments) {
   output::VolumeOptions volume = output::volume_options(arguments.choices.options);
   volume.box = box;
   output::write_volume(model, volume, arguments.output);
-  fmt::print("{}: {} × {} × {} voxels (x, y, z) of {:.6g} Å about {:.6g}, {:.6g}, {:.6g} px\n",
-             arguments.output.string(), box.size[0], box.size[1], box.size[2],
-             box.voxel_px * model.pixel_size_A, box.centre_px[0], box.centre_px[1],
-             box.centre_px[2]);
+  print("{}: {} × {} × {} voxels (x, y, z) of {:.6g} Å about {:.6g}, {:.6g}, {:.6g} px\n",
+        arguments.output.string(), box.size[0], box.size[1], box.size[2],
+        box.voxel_px * model.pixel_size_A, box.centre_px[0], box.centre_px[1], box.centre_px[2]);
 }
 
 void add_box_options(CLI::App& command, ExportArguments& arguments) {

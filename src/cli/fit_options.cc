@@ -1,11 +1,10 @@
 #include "cli/fit_options.h"
 
-#include <fmt/core.h>
-
 #include <cmath>
 #include <string>
 #include <utility>
 
+#include "cli/console.h"
 #include "cli/number_checks.h"
 #include "cli/table_options.h"
 
@@ -42,9 +41,9 @@ void print_sizes(const Sizes& sizes) {
   std::int64_t ny = sizes.roi.height(), nz = std::llround(sizes.thickness);
   const bool swaps = sizes.axes == VolumeAxes::kXzy;
   if (swaps) std::swap(ny, nz);
-  fmt::print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {} voxels{}\n",
-             sizes.num_views, sizes.view_width, sizes.view_height, sizes.pixel_size_A,
-             sizes.roi.width(), ny, nz, swaps ? " (x, z, y)" : "");
+  print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {} voxels{}\n", sizes.num_views,
+        sizes.view_width, sizes.view_height, sizes.pixel_size_A, sizes.roi.width(), ny, nz,
+        swaps ? " (x, z, y)" : "");
 }
 
 }  // namespace tomofield::cli

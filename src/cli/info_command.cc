@@ -12,6 +12,7 @@
 
 #include "base/enum_names.h"
 #include "cli/commands.h"
+#include "cli/console.h"
 #include "cli/help_formatter.h"
 #include "cli/table_options.h"
 #include "io/mrc.h"
@@ -44,85 +45,80 @@ FileKind kind_of(const std::filesystem::path& path) {
 void print_voxel_size(const io::MrcHeader& header) {
   const auto& size_A = header.voxel_size_A;
   if (std::all_of(size_A.begin(), size_A.end(), [](double size) { return size == 0.0; })) {
-    fmt::print("  voxel size       not given\n");
+    print("  voxel size       not given\n");
     return;
   }
-  fmt::print("  voxel size       {:.7g} × {:.7g} × {:.7g} Å\n", size_A[0], size_A[1], size_A[2]);
+  print("  voxel size       {:.7g} × {:.7g} × {:.7g} Å\n", size_A[0], size_A[1], size_A[2]);
 }
 
 void print_extended_header(const io::MrcHeader& header) {
   if (header.extended_header_bytes == 0) {
-    fmt::print("  extended header  none\n");
+    print("  extended header  none\n");
     return;
   }
-  fmt::print("  extended header  {} bytes of type '{}'\n", header.extended_header_bytes,
-             header.extended_header_type);
+  print("  extended header  {} bytes of type '{}'\n", header.extended_header_bytes,
+        header.extended_header_type);
   const auto& tilts = header.extended_tilt_deg;
   if (tilts.empty()) return;
   const auto [low, high] = std::minmax_element(tilts.begin(), tilts.end());
-  fmt::print("  tilt angles      {} in the extended header, {}° to {}°\n", tilts.size(), *low,
-             *high);
+  print("  tilt angles      {} in the extended header, {}° to {}°\n", tilts.size(), *low, *high);
 }
 
 void print_mrc(const std::filesystem::path& path) {
   const io::MrcReader reader(path);
   const io::MrcHeader& header = reader.header();
-  fmt::print("{}: MRC {}\n", path.string(), header.is_volume ? "volume" : "image stack");
-  fmt::print("  size             {} × {} × {} (x, y, sections)\n", header.nx, header.ny, header.nz);
-  fmt::print("  values           {}{}, {}-endian\n", io::describe(header.mode),
-             header.bytes_are_unsigned ? " read as unsigned (IMOD's stamp)" : "",
-             header.is_byte_swapped ? "big" : "little");
+  print("{}: MRC {}\n", path.string(), header.is_volume ? "volume" : "image stack");
+  print("  size             {} × {} × {} (x, y, sections)\n", header.nx, header.ny, header.nz);
+  print("  values           {}{}, {}-endian\n", io::describe(header.mode),
+        header.bytes_are_unsigned ? " read as unsigned (IMOD's stamp)" : "",
+        header.is_byte_swapped ? "big" : "little");
   print_voxel_size(header);
-  fmt::print("  origin           {:.7g}, {:.7g}, {:.7g} Å\n", header.origin_A[0],
-             header.origin_A[1], header.origin_A[2]);
-  fmt::print("  in the header    minimum {:.7g}, maximum {:.7g}, mean {:.7g}, rms {:.7g}\n",
-             header.min, header.max, header.mean, header.rms);
+  print("  origin           {:.7g}, {:.7g}, {:.7g} Å\n", header.origin_A[0], header.origin_A[1],
+        header.origin_A[2]);
+  print("  in the header    minimum {:.7g}, maximum {:.7g}, mean {:.7g}, rms {:.7g}\n", header.min,
+        header.max, header.mean, header.rms);
   print_extended_header(header);
-  for (const std::string& label : header.labels) fmt::print("  label            {}\n", label);
+  for (const std::string& label : header.labels) print("  label            {}\n", label);
 }
 
 void print_series(const tilt_series::TiltSeriesOptions& options) {
   const tilt_series::TiltSeries series(options);
-  fmt::print("  as a tilt series {} views of {} × {} pixels of {:.7g} Å, tilt axis along y\n",
-             series.views().size(), series.width(), series.height(), series.pixel_size_A());
+  print("  as a tilt series {} views of {} × {} pixels of {:.7g} Å, tilt axis along y\n",
+        series.views().size(), series.width(), series.height(), series.pixel_size_A());
   if (options.contrast == Contrast::kDark) {
-    fmt::print("  empty beam       {:.7g}\n", series.empty_beam());
+    print("  empty beam       {:.7g}\n", series.empty_beam());
   }
   const tilt_series::MaskMetrics& masks = series.mask_metrics();
   const bool is_undecided = masks.bead_masking == tilt_series::BeadMasking::kUndecided;
-  fmt::print("  masked           {}, {} hot or dead pixels\n",
-             is_undecided ? "no beads" : describe_beads(masks), masks.num_bad_pixels);
+  print("  masked           {}, {} hot or dead pixels\n",
+        is_undecided ? "no beads" : describe_beads(masks), masks.num_bad_pixels);
   if (is_undecided) {
-    fmt::print("  found            {}, not masked: they may be the specimen\n",
-               describe_beads(masks));
+    print("  found            {}, not masked: they may be the specimen\n", describe_beads(masks));
   }
   if (masks.fixed_pattern.is_any()) {
-    fmt::print("  fixed pattern    {}\n", tilt_series::describe_pattern(masks.fixed_pattern));
+    print("  fixed pattern    {}\n", tilt_series::describe_pattern(masks.fixed_pattern));
   }
-  fmt::print("  section  tilt/°  x-tilt/°  noise\n");
+  print("  section  tilt/°  x-tilt/°  noise\n");
   for (std::size_t i = 0; i < series.views().size(); ++i) {
     const tilt_series::View& view = series.views()[i];
-    fmt::print("  {:7}  {:6.2f}  {:8.2f}  {:.5g}\n", view.section + 1, view.tilt_deg,
-               view.x_tilt_deg, series.noise_sigma()[i]);
+    print("  {:7}  {:6.2f}  {:8.2f}  {:.5g}\n", view.section + 1, view.tilt_deg, view.x_tilt_deg,
+          series.noise_sigma()[i]);
   }
 }
 
 void print_geometry(const output::ModelInfo& model) {
   const geometry::TiltGeometry& g = model.geometry;
   const Rectangle& roi = model.roi;
-  fmt::print("  pixel size       {:.7g} Å\n", model.pixel_size_A);
-  fmt::print("  view             {} × {} px, thickness {:.6g} px\n", g.width, g.height,
-             g.thickness);
-  fmt::print("  region           {} × {} px from {},{}\n", roi.width(), roi.height(), roi.x0,
-             roi.y0);
+  print("  pixel size       {:.7g} Å\n", model.pixel_size_A);
+  print("  view             {} × {} px, thickness {:.6g} px\n", g.width, g.height, g.thickness);
+  print("  region           {} × {} px from {},{}\n", roi.width(), roi.height(), roi.x0, roi.y0);
   if (!g.tilt_deg.empty()) {
     const auto [low, high] = std::minmax_element(g.tilt_deg.begin(), g.tilt_deg.end());
-    fmt::print("  tilts            {} views from {:.6g}° to {:.6g}°\n", g.num_views(), *low, *high);
+    print("  tilts            {} views from {:.6g}° to {:.6g}°\n", g.num_views(), *low, *high);
   }
-  fmt::print("  tilt axis        x = {:.6g} px, z = {:.6g} px, hand {:+}\n", g.axis_x, g.axis_z,
-             g.hand);
-  fmt::print("  contrast         {}, 1 density unit is {:.6g} units of the series\n",
-             model.is_dark ? "dark" : "bright", model.density_unit);
+  print("  tilt axis        x = {:.6g} px, z = {:.6g} px, hand {:+}\n", g.axis_x, g.axis_z, g.hand);
+  print("  contrast         {}, 1 density unit is {:.6g} units of the series\n",
+        model.is_dark ? "dark" : "bright", model.density_unit);
 }
 
 std::string describe(const LeafShape& shape) {
@@ -142,20 +138,19 @@ void print_leaves(const Field& field) {
   }
   for (const auto& [kind, count] : kinds) {
     const auto& [is_margin, size, shape] = kind;
-    fmt::print("    {:6} of {} px: {}{}\n", count, -size, shape, is_margin ? " (margin)" : "");
+    print("    {:6} of {} px: {}{}\n", count, -size, shape, is_margin ? " (margin)" : "");
   }
 }
 
 void print_field(const Field& field) {
   const field::RootGrid& roots = field.tree().roots();
-  fmt::print("  field            {}, {} parameters, bias {:.6g}, {}\n", base::name_of(field.kind()),
-             field.num_parameters(), field.bias,
-             field.activation.beta > 0
-                 ? fmt::format("softplus of sharpness {:.6g}", field.activation.beta)
-                 : "no activation");
-  fmt::print("  quadtree         {} × {} root cells of {} px from {},{}; {} leaves\n",
-             roots.columns, roots.rows, roots.cell_size, roots.x0, roots.y0,
-             field.tree().num_leaves());
+  print("  field            {}, {} parameters, bias {:.6g}, {}\n", base::name_of(field.kind()),
+        field.num_parameters(), field.bias,
+        field.activation.beta > 0
+            ? fmt::format("softplus of sharpness {:.6g}", field.activation.beta)
+            : "no activation");
+  print("  quadtree         {} × {} root cells of {} px from {},{}; {} leaves\n", roots.columns,
+        roots.rows, roots.cell_size, roots.x0, roots.y0, field.tree().num_leaves());
   print_leaves(field);
 }
 
@@ -168,18 +163,18 @@ void print_training(const output::TrainingState& state) {
   append(state.floats);
   append(state.doubles);
   append(state.integers);
-  fmt::print("  training state   {}\n", names.empty() ? "none" : names);
+  print("  training state   {}\n", names.empty() ? "none" : names);
 }
 
 // Prints the contents of a model file.
 void print_model(const std::filesystem::path& path) {
   output::TrainingState training;
   const output::Model model = output::load_model(path, &training);
-  fmt::print("{}: model, written by {}\n", path.string(), model.written_by);
+  print("{}: model, written by {}\n", path.string(), model.written_by);
   print_geometry(model);
   print_field(*model.field);
   print_training(training);
-  fmt::print("  options          {}\n", model.options_json);
+  print("  options          {}\n", model.options_json);
 }
 
 void print_info(const tilt_series::TiltSeriesOptions& options) {

@@ -1,6 +1,6 @@
 #include "cli/program.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <memory>
 #include <new>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,15 +18,17 @@
 #include "base/version.h"
 #include "cli/commands.h"
 #include "cli/config_file.h"
+#include "cli/console.h"
 #include "cli/exit_status.h"
 #include "cli/help_formatter.h"
+#include "io/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
 namespace {
 
 void print_log(base::LogLevel level, std::string_view message) {
-  fmt::print(stderr, "{}{}\n", level == base::LogLevel::kWarning ? "warning: " : "", message);
+  say("{}{}\n", level == base::LogLevel::kWarning ? "warning: " : "", message);
 }
 
 void add_commands(CLI::App& program, const distributed::Communicator& processes) {
@@ -83,7 +86,56 @@ void require_shared_command(const std::vector<std::string>& arguments,
                   processes.size(), arguments.front()));
 }
 
-// Parses the command line and runs the command. Returns 0, or throws.
+// Says whether what the command prints is its result. Other commands write files.
+bool prints_its_result(const CLI::App& program) {
+  const CLI::App& command = called_command(program);
+  const CLI::Option* dry_run = command.get_option_no_throw("--dry-run");
+  return &command == &program || command.get_name() == "info" || command.get_name() == "evaluate" ||
+         (dry_run != nullptr && dry_run->count() > 0);
+}
+
+// Says so if something that was printed is lost. That is a failure if it was the command's result.
+// Returns the exit status.
+int report_output(bool is_result) {
+  const std::string fault = output_fault();
+  if (fault.empty()) return 0;
+  say("{} what was printed cannot be written: {}{}\n", is_result ? "tomofield:" : "warning:", fault,
+      is_result ? "" : "; the files are whole");
+  return is_result ? 1 : 0;
+}
+
+// Returns the bill of materials, which the build writes beside the program and `cmake --install`
+// puts into share/tomofield.
+std::string materials() {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
+  for (const char* place : {"materials.txt", "../share/tomofield/materials.txt"}) {
+    if (fs::exists(folder / place)) return io::read_text_file(folder / place);
+  }
+  return fmt::format("The packages of this program are not known: '{}' is missing.",
+                     (folder / "materials.txt").string());
+}
+
+void add_version_flag(CLI::App& program) {
+  CLI::Option* verbose =
+      program.add_flag("--verbose")
+          ->description("With --version: list the packages of the program and their licences, too");
+  const auto version = [verbose] {
+    const std::string name =
+        fmt::format("tomofield " TOMOFIELD_VERSION " ({})", base::source_commit());
+    return verbose->count() == 0 ? name : name + "\n\n" + materials();
+  };
+  verbose->needs(program.set_version_flag("--version", version));
+}
+
+// Prints what --help or --version ask for.
+void print_answer(const CLI::App& program, const CLI::ParseError& request) {
+  std::ostringstream answer;
+  program.exit(request, answer, answer);
+  print_text(answer.str());
+}
+
+// Parses the command line and runs the command. Returns the exit status, or throws.
 int run_command(CLI::App& program, std::vector<std::string> arguments,
                 const distributed::Communicator& processes) {
   processes.run_collectively([&] {
@@ -94,13 +146,15 @@ int run_command(CLI::App& program, std::vector<std::string> arguments,
   std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them last first
   try {
     program.parse(arguments);
-  } catch (const CLI::ParseError& error) {                       // the same in all processes
-    if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
-    throw distributed::SharedError(fmt::format("{}; `{} {}` lists the options", error.what(),
-                                               command_name(program),
-                                               help_flag_of(called_command(program))));
+  } catch (const CLI::ParseError& error) {  // the same in all processes
+    if (error.get_exit_code() != 0)
+      throw distributed::SharedError(fmt::format("{}; `{} {}` lists the options", error.what(),
+                                                 command_name(program),
+                                                 help_flag_of(called_command(program))));
+    print_answer(program, error);
+    return report_output(/*is_result=*/true);
   }
-  return 0;
+  return report_output(prints_its_result(program));
 }
 
 // Reports a fault of one process alone and ends the others, which wait for it.
@@ -109,7 +163,7 @@ int fail_alone(const distributed::Session& session, int status, const std::strin
                               ? ""
                               : fmt::format(" process {} of {}:", session.communicator().rank() + 1,
                                             session.communicator().size());
-  fmt::print(stderr, "tomofield:{} {}\n", who, message);
+  say("tomofield:{} {}\n", who, message);
   std::fflush(nullptr);
   session.abort(status);
   return status;
@@ -123,24 +177,23 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
   if (!processes.is_root() && std::freopen("/dev/null", "w", stdout) == nullptr) return 1;
   if (processes.is_root()) base::set_log_sink(print_log);
   base::share_machine_with(processes.size_on_machine());
-  const auto say = [&](const char* message) {
-    if (processes.is_root()) fmt::print(stderr, "tomofield: {}\n", message);
+  const auto tell = [&](const char* message) {
+    if (processes.is_root()) say("tomofield: {}\n", message);
   };
   CLI::App program{
       "tomofield: clean tomograms from aligned tilt series by continuous density fields",
       "tomofield"};
-  program.set_version_flag(
-      "--version", fmt::format("tomofield " TOMOFIELD_VERSION " ({})", base::source_commit()));
+  add_version_flag(program);
   program.formatter(std::make_shared<HelpFormatter>());
   program.require_subcommand(1);
   add_commands(program, processes);
   try {
     return run_command(program, {argv + 1, argv + argc}, processes);
   } catch (const distributed::SharedError& error) {
-    say(error.what());
+    tell(error.what());
     return 2;
   } catch (const ExitStatus& exit) {
-    say(exit.what());
+    tell(exit.what());
     return exit.status();
   } catch (const Error& error) {
     return fail_alone(session, 2, error.what());

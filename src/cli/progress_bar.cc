@@ -1,12 +1,12 @@
 #include "cli/progress_bar.h"
+#include "cli/console.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <string_view>
 
@@ -52,7 +52,7 @@ struct Display {
   Display(const Display&) = delete;
   Display& operator=(const Display&) = delete;
   ~Display() {
-    if (line_is_open) std::fputs("\n", stderr);
+    if (line_is_open) say("\n");
   }
 };
 
@@ -76,13 +76,12 @@ base::ProgressSink make_progress_bar(const std::string& title) {
     const std::string state = fmt::format("{:3.0f} %  {}  {} left", 100 * report.fraction_done,
                                           report.detail, format_duration(report.seconds_left));
     if (terminal) {
-      fmt::print(stderr, "\r\033[K{}{}", terminal_line(title, report.fraction_done, state),
-                 finished ? "\n" : "");
+      say("\r\033[K{}", terminal_line(title, report.fraction_done, state));
+      if (finished) say("\n");
       display->line_is_open = !finished;
     } else {
-      fmt::print(stderr, "{} {}\n", title, state);
+      say("{} {}\n", title, state);
     }
-    std::fflush(stderr);
   };
 }
 

@@ -1,6 +1,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "cli/commands.h"
 #include "cli/common_options.h"
@@ -25,8 +26,9 @@ struct Arguments {
 void run(const Arguments& arguments, const distributed::Communicator& processes) {
   reconstruction::ReconstructOptions options =
       reconstruction::run_options(arguments.choices.files, arguments.choices.options);
+  std::vector<io::OutputLock> locks;
   processes.run_collectively([&] {
-    reconstruction::check_options(options);
+    locks = claim_run(options, arguments.dry_run || !processes.is_root());
     const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
     check_trace_file(arguments.trace, {paths.volume, paths.model, paths.json}, options.files,
                      options.resolved.overwrite);

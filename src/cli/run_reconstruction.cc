@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -13,12 +12,16 @@
 #include "base/enum_names.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
+#include "base/trace.h"
+#include "cli/console.h"
 #include "cli/exit_status.h"
 #include "cli/fit_options.h"
 #include "cli/pictures.h"
 #include "cli/progress_bar.h"
 #include "cli/stop_signal.h"
 #include "cli/table_options.h"
+#include "report/pictures.h"
+#include "tomofield/error.h"
 
 namespace tomofield::cli {
 namespace {
@@ -35,13 +38,11 @@ std::function<void()> tell_if_stuck(const std::filesystem::path& model,
     if (!*since) since->emplace();
     if ((*since)->seconds() < kSecondsToAnswer) return;
     *is_told = true;
-    fmt::print(stderr,
-               "tomofield: asked to stop, but other processes do not answer yet; if one of them "
-               "died, {}\n",
-               std::filesystem::exists(model)
-                   ? fmt::format("continue from '{}' with --resume", model.string())
-                   : "there is no checkpoint yet");
-    std::fflush(stderr);
+    say("tomofield: asked to stop, but other processes do not answer yet; if one of them "
+        "died, {}\n",
+        std::filesystem::exists(model)
+            ? fmt::format("continue from '{}' with --resume", model.string())
+            : "there is no checkpoint yet");
   };
 }
 
@@ -63,22 +64,21 @@ void print_plan(const reconstruction::ReconstructOptions& options,
   print_sizes({plan.num_views, plan.view_width, plan.view_height, plan.pixel_size_A, plan.roi,
                plan.thickness, options.volume.axes});
   if (plan.num_trials > 0)
-    fmt::print("about {} short trials first, that choose settings by held-out views\n",
-               plan.num_trials);
+    print("about {} short trials first, that choose settings by held-out views\n", plan.num_trials);
   const std::string processes =
       num_processes == 1 ? "" : fmt::format(" of each of {} processes", num_processes);
-  fmt::print(
-      "{} field, {} {}, {} parameters; {} steps on {} threads{}; about {:.2f} GiB of memory{}\n",
-      base::name_of(options.field.kind), plan.num_leaves, plan.num_leaves == 1 ? "leaf" : "leaves",
-      plan.num_parameters, plan.num_steps, base::thread_count(), processes,
-      static_cast<double>(plan.memory_bytes) / (1 << 30), num_processes == 1 ? "" : " each");
-  fmt::print("epochs: {}\n", epochs_text(plan.stages));
-  std::fflush(stdout);  // the plan comes before other output, in a file too
+  print("{} field, {} {}, {} parameters; {} steps on {} threads{}; about {:.2f} GiB of memory{}\n",
+        base::name_of(options.field.kind), plan.num_leaves,
+        plan.num_leaves == 1 ? "leaf" : "leaves", plan.num_parameters, plan.num_steps,
+        base::thread_count(), processes, static_cast<double>(plan.memory_bytes) / (1 << 30),
+        num_processes == 1 ? "" : " each");
+  print("epochs: {}\n", epochs_text(plan.stages));
+  flush_output();  // the plan comes before other output, in a file too
 }
 
 void print_files(const reconstruction::OutputPaths& paths) {
-  fmt::print("tomogram  {}\nmodel     {}\nmetrics   {}\n", paths.volume.string(),
-             paths.model.string(), paths.json.string());
+  print("tomogram  {}\nmodel     {}\nmetrics   {}\n", paths.volume.string(), paths.model.string(),
+        paths.json.string());
 }
 
 ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
@@ -99,6 +99,14 @@ void add_run_options(CLI::App& command, option_table::Choices& choices, bool& dr
       ->group(std::string(title_of(option_table::Group::kRun)));
 }
 
+std::vector<io::OutputLock> claim_run(const reconstruction::ReconstructOptions& options,
+                                      bool check_alone) {
+  if (options.resolved.output.empty()) throw Error("-o '' names no file: name the tomogram");
+  if (!check_alone) return reconstruction::claim_outputs(options);
+  reconstruction::check_options(options);
+  return {};
+}
+
 void run_reconstruction(const tilt_series::TiltSeries& series,
                         const reconstruction::ReconstructOptions& options, bool dry_run,
                         const distributed::Communicator& processes) {
@@ -110,8 +118,16 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   const bool is_job = processes.size() > 1;
   stop_on_signals(is_job);
   if (is_job) processes.set_waiting_callback(tell_if_stuck(paths.model, processes));
+  std::vector<std::filesystem::path> pictures;
   reconstruction::ReconstructHooks hooks{
       .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};
+  hooks.write_more = [&](const reconstruction::Results& results,
+                         const std::filesystem::path& volume) {
+    pictures = write_pictures(volume, series, results.bead_masking, paths.picture_prefix);
+    if (options.field.tree != TreeKind::kAdaptive) return;
+    const base::TraceSpan span("draw tree");
+    report::write_tree_picture(results.model, paths.tree_picture);
+  };
   if (processes.is_root()) {
     hooks.progress = make_progress_bar("reconstruct");
     hooks.tune_progress = make_progress_bar("tune");
@@ -128,10 +144,10 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   }
   if (!processes.is_root()) return;
   print_files(paths);
-  write_pictures(paths.volume, series, run.results->bead_masking, paths.picture_prefix);
+  print_pictures(pictures);
   if (options.field.tree == TreeKind::kAdaptive)
-    write_tree_picture(paths.model, paths.tree_picture);
-  std::fflush(stdout);  // the verdict comes last
+    print("tree      {}\n", paths.tree_picture.string());
+  flush_output();  // the verdict comes last
   reconstruction::log_verdict(run.results->verdict);
 }
 

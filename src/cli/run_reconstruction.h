@@ -12,10 +12,15 @@ namespace tomofield::cli {
 /// Registers -o, --overwrite, --resume, --checkpoint-minutes and --dry-run.
 void add_run_options(CLI::App& command, option_table::Choices& choices, bool& dry_run);
 
+/// Checks the options of a run, which needs an output, and returns the locks of its files
+/// (reconstruction::claim_outputs()). With `check_alone` it locks nothing.
+std::vector<io::OutputLock> claim_run(const reconstruction::ReconstructOptions& options,
+                                      bool check_alone);
+
 /// Prints the plan of a reconstruction, runs it with a progress bar, and writes its pictures. With
-/// `dry_run` it prints the plan alone. The caller has called reconstruction::check_options()
-/// before. If a signal stops it, it throws an ExitStatus that says how to continue. Every process
-/// that shares the run calls it; the root prints and writes pictures.
+/// `dry_run` it prints the plan alone. The caller has called claim_run() before. If a signal stops
+/// it, it throws an ExitStatus that says how to continue. Every process that shares the run calls
+/// it; the root prints and writes pictures.
 void run_reconstruction(
     const tilt_series::TiltSeries& series, const reconstruction::ReconstructOptions& options,
     bool dry_run, const distributed::Communicator& processes = distributed::Communicator::alone());

@@ -1,4 +1,4 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <charconv>
 #include <memory>
@@ -8,6 +8,7 @@
 
 #include "cli/commands.h"
 #include "cli/common_options.h"
+#include "cli/console.h"
 #include "cli/enum_option.h"
 #include "cli/number_checks.h"
 #include "simulate/simulate_series.h"
@@ -112,7 +113,7 @@ void run_simulate(SimulateArguments& arguments) {
     line += fmt::format(", truth{} max {:.3f} mean {:.3f}",
                         options.reference_has_beads ? "" : " without gold", summary.truth->max,
                         summary.truth->mean);
-  fmt::print("{}\n{}\n", line, how_to_reconstruct(arguments.directory, options));
+  print("{}\n{}\n", line, how_to_reconstruct(arguments.directory, options));
 }
 
 }  // namespace

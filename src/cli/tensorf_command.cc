@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "baseline/neural/tensorf.h"
 #include "cli/common_options.h"
@@ -38,7 +39,7 @@ void run(Arguments& arguments) {
   reconstruction::ReconstructOptions options =
       reconstruction::run_options(arguments.choices.files, requested);
   options.field.depth = 0;  // the tree is one node
-  reconstruction::check_options(options);
+  const std::vector<io::OutputLock> locks = claim_run(options, arguments.dry_run);
   const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
   check_trace_file(arguments.trace, {paths.volume, paths.model, paths.json}, options.files,
                    options.resolved.overwrite);

@@ -6,6 +6,7 @@
 
 #include "base/log.h"
 #include "base/trace.h"
+#include "cli/console.h"
 #include "cli/help_formatter.h"
 #include "io/atomic_file.h"
 #include "io/output_files.h"
@@ -20,7 +21,7 @@ void write_trace(const fs::path& path) {
   io::AtomicFile file(path);
   base::trace::write(file.temporary_path());
   file.commit();
-  fmt::print("trace     {}\n", path.string());
+  print("trace     {}\n", path.string());
 }
 
 // Writes the record of a run that throws. Its own exception matters more than one of the trace.

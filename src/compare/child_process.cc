@@ -3,10 +3,12 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
-#include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -17,8 +19,6 @@
 #include "base/stopwatch.h"
 #include "tomofield/error.h"
 
-extern char** environ;
-
 namespace tomofield::compare {
 namespace {
 
@@ -26,19 +26,41 @@ double seconds(const timeval& t) {
   return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
 }
 
+// Becomes the program, in the new process. Returns errno if that is not possible. The parent may
+// have other threads, so that only system calls are allowed here.
+int become(char* const* arguments, const char* log, pid_t parent) {
+  // If compare is killed, its child is asked to stop. It may have been killed just before.
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  if (getppid() != parent) _exit(1);
+  const int output = open(log, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (output < 0 || dup2(output, STDOUT_FILENO) < 0 || dup2(output, STDERR_FILENO) < 0)
+    return errno;
+  execv(arguments[0], arguments);
+  return errno;
+}
+
 pid_t start(const std::vector<std::string>& command, const std::filesystem::path& log) {
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log.c_str(),
-                                   O_WRONLY | O_CREAT | O_TRUNC, 0644);
-  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  pid_t child = 0;
-  const int fault = posix_spawn(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
+  std::array<int, 2> faults{};  // a pipe that closes when the program has started
+  int fault = pipe2(faults.data(), O_CLOEXEC) == 0 ? 0 : errno;
+  const pid_t parent = getpid();
+  const pid_t child = fault == 0 ? fork() : -1;
+  if (child == 0) {
+    fault = become(arguments.data(), log.c_str(), parent);
+    (void)!write(faults[1], &fault, sizeof fault);
+    _exit(127);
+  }
+  if (fault == 0) {
+    if (child < 0) fault = errno;
+    close(faults[1]);
+    while (child > 0 && read(faults[0], &fault, sizeof fault) < 0 && errno == EINTR) {
+    }
+    close(faults[0]);
+  }
   if (fault != 0) {
+    if (child > 0) waitpid(child, nullptr, 0);
     throw Error(fmt::format("'{}' cannot be run with its output in '{}': {}", command[0],
                             log.string(), std::strerror(fault)));
   }

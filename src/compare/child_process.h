@@ -19,6 +19,8 @@ struct ChildResult {
 /// Runs `command` (the program's path first) to its end and writes all its output to the file
 /// `log`. It runs as its own process, so that its time and memory are its own. Asks
 /// `stop_requested` often; once it returns true, asks the child to stop (SIGTERM) and waits for it.
+/// If this process is killed, the system asks the child to stop; then a reconstruct saves a
+/// checkpoint first. The child is in the same process group, so that the terminal stops both.
 /// Throws Error if the log cannot be written or the program cannot be started.
 ChildResult run_child(const std::vector<std::string>& command, const std::filesystem::path& log,
                       const std::function<bool()>& stop_requested);

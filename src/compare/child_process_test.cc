@@ -1,10 +1,14 @@
 #include "compare/child_process.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <fstream>
 #include <iterator>
+#include <string>
 
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -41,6 +45,40 @@ TEST_F(ChildProcess, MeasuresWhatItTook) {
 
 TEST_F(ChildProcess, IsStoppedOnRequest) {
   EXPECT_EQ(run("exec sleep 100", [] { return true; }).exit_status, 128 + SIGTERM);
+}
+
+// Returns true for a process that runs, and not for one that nobody has waited for yet.
+bool is_alive(::pid_t process) {
+  std::ifstream status(fmt::format("/proc/{}/stat", process));
+  std::string number, name, state;
+  return status >> number >> name >> state && state != "Z";
+}
+
+// Returns true if a process ends within some seconds.
+bool ends(::pid_t process) {
+  for (int i = 0; i < 500 && is_alive(process); ++i) ::usleep(20'000);
+  return !is_alive(process);
+}
+
+TEST_F(ChildProcess, EndsWithItsParent) {
+  for (const int signal : {SIGKILL, SIGTERM, SIGINT}) {
+    std::filesystem::remove(directory_ / "id");
+    const ::pid_t parent = ::fork();
+    if (parent == 0) {
+      ::signal(signal, SIG_DFL);
+      run(fmt::format("echo $$ > {0}.part; mv {0}.part {0}; exec sleep 100",
+                      (directory_ / "id").string())
+              .c_str());
+      ::_exit(0);
+    }
+    while (!std::filesystem::exists(directory_ / "id")) ::usleep(1000);
+    ::pid_t child = 0;
+    std::ifstream(directory_ / "id") >> child;
+    ASSERT_GT(child, 0);
+    ::kill(parent, signal);
+    ::waitpid(parent, nullptr, 0);
+    EXPECT_TRUE(ends(child)) << signal;
+  }
 }
 
 TEST_F(ChildProcess, HasFailedForWhatItSaysInItsOwnName) {

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 
+#include "base/utf8.h"
+#include "compare/folder.h"
 #include "compare/pictures.h"
 #include "compare/runs.h"
 #include "compare/scores.h"
@@ -13,6 +15,9 @@
 #include "io/atomic_file.h"
 #include "io/json.h"
 #include "io/mrc.h"
+#include "io/output_folder.h"
+#include "io/output_lock.h"
+#include "io/output_set.h"
 #include "output/shared_options.h"
 #include "report/html.h"
 #include "report/pictures.h"
@@ -113,21 +118,14 @@ nlohmann::json comparison_json(const CompareOptions& options, const std::vector<
                                const Table& table) {
   nlohmann::json methods = table_json(table);
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    methods[i]["command"] = rows[i].run.command;
-    methods[i]["volume"] = rows[i].volume.string();
+    methods[i]["command"] = utf8_texts(rows[i].run.command);
+    methods[i]["volume"] = base::utf8_text(rows[i].volume.string());
   }
-  return {{"tomofield", TOMOFIELD_VERSION},
-          {"series", options.files.stack.string()},
-          {"truth", options.truth ? nlohmann::json(options.truth->string()) : nullptr},
-          {"methods", methods}};
-}
-
-// Removes all old results, so that no old report stands beside new volumes, even if the comparison
-// stops before it is finished.
-void remove_all_results(const fs::path& folder, const std::vector<Row>& rows) {
-  for (const char* file : {"report.html", "comparison.json", "comparison.csv"})
-    fs::remove(folder / file);
-  remove_results(rows);
+  return {
+      {"tomofield", TOMOFIELD_VERSION},
+      {"series", base::utf8_text(options.files.stack.string())},
+      {"truth", options.truth ? nlohmann::json(base::utf8_text(options.truth->string())) : nullptr},
+      {"methods", methods}};
 }
 
 }  // namespace
@@ -144,19 +142,24 @@ Outcome compare_methods(const CompareOptions& options, const RunHooks& hooks) {
   checked.keep_views = false;  // the runs read them
   const tilt_series::TiltSeries series(checked);
   const PlannedRuns plan = plan_runs(options, series);
+  const io::OutputFolder folder(options.folder);
+  const io::OutputLock lock(options.folder / "comparison.json");
   std::vector<Row> rows = options.overwrite ? new_rows(plan.runs, options.folder)
                                             : stored_rows(plan.runs, options.folder);
+  check_folder(options, rows);
   if (!rehearse(options, hooks, rows)) return Outcome::kStoppedBeforeRuns;
-  fs::create_directories(options.folder);
-  if (options.overwrite) remove_all_results(options.folder, rows);
+  if (options.overwrite) remove_results(options, rows);
   if (!run_rows(options.program, hooks, rows)) return Outcome::kStopped;
   const std::vector<Row> volumes(
       rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(options.methods.size()));
   Table table = table_of_costs(volumes);
   const Scores scores = add_scores(options, plan.purposes, rows, table);
+  const std::string page = report_page(options, volumes, table, scores);
+  io::OutputSet results;
   io::write_json(options.folder / "comparison.json", comparison_json(options, volumes, table));
   io::write_text_file(options.folder / "comparison.csv", table_csv(table));
-  io::write_text_file(options.folder / "report.html", report_page(options, volumes, table, scores));
+  io::write_text_file(options.folder / "report.html", page);
+  results.commit();
   return Outcome::kFinished;
 }
 

@@ -10,7 +10,10 @@ struct Method {
   std::string name;   ///< also the name of its files
   std::string title;  ///< its name in the report
   std::vector<std::string>
-      arguments;         ///< words of tomofield before the series: command and options
+      arguments;  ///< words of tomofield before the series: command and options
+  /// The same words with those of a configuration file in the place of --config. They name files
+  /// that the method reads. Empty if the method has no --config.
+  std::vector<std::string> expanded = {};
   bool resumes = false;  ///< true if --resume continues an interrupted run
   bool tunes = false;    ///< true if --tune chooses its weights
 };

@@ -4,12 +4,15 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <fstream>
+#include <cstdint>
 
 #include "base/log.h"
+#include "base/plausible.h"
+#include "base/utf8.h"
 #include "compare/child_process.h"
 #include "compare/grid.h"
 #include "io/json.h"
+#include "io/json_numbers.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {
@@ -29,9 +32,10 @@ auto read_json(const fs::path& path, Read&& read) {
                              kAdvice));
   };
   try {
-    std::ifstream file(path);
-    return read(json::parse(file));
+    return read(io::read_json(path));
   } catch (const json::exception& fault) {
+    throw fail(fault.what());
+  } catch (const Error& fault) {
     throw fail(fault.what());
   }
 }
@@ -122,27 +126,35 @@ Costs operator+(const Costs& one, const Costs& other) {
           std::max(one.peak_bytes, other.peak_bytes)};
 }
 
+std::vector<std::string> utf8_texts(const std::vector<std::string>& words) {
+  std::vector<std::string> texts;
+  for (const std::string& word : words) texts.push_back(base::utf8_text(word));
+  return texts;
+}
+
 json origin_of(const std::vector<std::string>& command, const std::vector<fs::path>& inputs) {
   json files = json::object();
   for (const fs::path& path : inputs) {
-    files[fs::absolute(path).string()] = {
+    files[base::utf8_text(fs::absolute(path).string())] = {
         {"bytes", fs::file_size(path)},
         {"written", fs::last_write_time(path).time_since_epoch().count()}};
   }
-  return {{"tomofield", TOMOFIELD_VERSION}, {"command", command}, {"files", files}};
+  return {{"tomofield", TOMOFIELD_VERSION}, {"command", utf8_texts(command)}, {"files", files}};
 }
 
 RowState read_row(const fs::path& file, const json& origin) {
   if (!fs::exists(file)) return {};
-  return read_json(file, [&](const json& row) {
-    const std::vector<std::string> differences = changes(row.at("origin"), origin);
-    if (!differences.empty()) {
-      throw Error(fmt::format("what '{}' tells of cannot be kept: {}: {}", file.string(),
-                              fmt::join(differences, "; "), kAdvice));
-    }
+  std::vector<std::string> differences;
+  const RowState state = read_json(file, [&](const json& row) {
+    differences = changes(row.at("origin"), origin);
     return RowState{row.at("progress"),
-                    {row.at("core_seconds"), row.at("wall_seconds"), row.at("peak_bytes")}};
+                    {io::number_at(row, "core_seconds", 0, base::kLargestNumber),
+                     io::number_at(row, "wall_seconds", 0, base::kLargestNumber),
+                     io::integer_at(row, "peak_bytes", 0, INT64_MAX)}};
   });
+  if (differences.empty()) return state;
+  throw Error(fmt::format("what '{}' tells of cannot be kept: {}: {}", file.string(),
+                          fmt::join(differences, "; "), kAdvice));
 }
 
 void write_row(const fs::path& file, const json& origin, const RowState& state) {
@@ -188,11 +200,12 @@ std::vector<std::string> full_command(const fs::path& program, const Row& row,
   return command;
 }
 
-void remove_results(const std::vector<Row>& rows) {
-  for (const Row& row : rows) {
-    for (const char* suffix : {".row.json", ".mrc", ".h5", ".json", "_tune.json", ".log"})
-      fs::remove(file_of(row, suffix));
-  }
+std::vector<fs::path> files_of(const Row& row) {
+  std::vector<fs::path> files;
+  for (const char* suffix : {".row.json", ".log", ".mrc", ".h5", ".json", "_tune.json", "_xy.png",
+                             "_xz.png", "_yz.png", "_mask.png", "_tree.png", "_held_out.png"})
+    files.push_back(file_of(row, suffix));
+  return files;
 }
 
 bool run_rows(const fs::path& program, const RunHooks& hooks, std::vector<Row>& rows) {

@@ -32,6 +32,9 @@ struct RowState {
   Costs costs;
 };
 
+/// Returns words as UTF-8, which JSON needs (base/utf8.h).
+std::vector<std::string> utf8_texts(const std::vector<std::string>& words);
+
 /// Returns what decides a run's results: the version of tomofield, the command, and the path, size
 /// and time of the files that it reads. Size and time tell whether a file has changed without
 /// reading it.
@@ -86,8 +89,8 @@ bool is_done(const Row& row);
 std::vector<std::string> full_command(const std::filesystem::path& program, const Row& row,
                                       const std::filesystem::path& volume);
 
-/// Removes all files of the rows and their runs.
-void remove_results(const std::vector<Row>& rows);
+/// Returns the files that a run and its comparison write, whether they exist or not.
+std::vector<std::filesystem::path> files_of(const Row& row);
 
 /// Makes every run that is not done with `program`, one after the other. Returns false if it was
 /// stopped. Throws Error if a run fails, with its message and the place of its log, and for a

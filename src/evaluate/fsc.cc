@@ -15,6 +15,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/utf8.h"
 #include "evaluate/volume_pair.h"
 #include "io/mrc.h"
 #include "tomofield/error.h"
@@ -331,11 +332,12 @@ Fsc correlate_files(const FscFiles& files) {
 }
 
 nlohmann::json fsc_json(const Fsc& fsc, const FscFiles& files) {
-  nlohmann::json json = {{"first", files.first.string()},
-                         {"second", files.second.string()},
+  nlohmann::json json = {{"first", base::utf8_text(files.first.string())},
+                         {"second", base::utf8_text(files.second.string())},
                          {"frequency_per_A", fsc.frequency_per_A},
                          {"all", curve_json(fsc, fsc.all)}};
-  json["mask"] = files.mask ? nlohmann::json(files.mask->string()) : nlohmann::json();
+  json["mask"] =
+      files.mask ? nlohmann::json(base::utf8_text(files.mask->string())) : nlohmann::json();
   if (files.box) {
     json["box_first"] = files.box->begin;
     json["box_last"] = files.box->end;

@@ -10,6 +10,7 @@
 #include "base/aligned_buffer.h"
 #include "base/check.h"
 #include "base/parallel.h"
+#include "base/utf8.h"
 #include "evaluate/box.h"
 #include "kernels/lanes.h"
 #include "measurement/held_out.h"
@@ -190,7 +191,7 @@ nlohmann::json volume_score_json(const VolumeScore& score, const VolumeScoreOpti
                      {"scale", score.errors.models[v].scale * score.unit},
                      {"offset", score.errors.models[v].offset * score.unit}});
   }
-  return {{"series", options.input.stack.string()},
+  return {{"series", base::utf8_text(options.input.stack.string())},
           {"hold_out", options.hold_out},
           {"error", score.errors.total},
           {"views", views}};

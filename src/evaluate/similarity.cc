@@ -10,6 +10,7 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "base/utf8.h"
 #include "tomofield/error.h"
 
 namespace tomofield::evaluate {
@@ -247,8 +248,8 @@ Comparison compare(const VolumePair& pair) {
 nlohmann::json comparison_json(const Comparison& comparison,
                                const std::filesystem::path& reconstruction,
                                const std::filesystem::path& truth) {
-  return {{"reconstruction", reconstruction.string()},
-          {"truth", truth.string()},
+  return {{"reconstruction", base::utf8_text(reconstruction.string())},
+          {"truth", base::utf8_text(truth.string())},
           {"psnr_raw_dB", comparison.psnr.raw_dB},
           {"psnr_affine_dB", comparison.psnr.affine_dB},
           {"ssim_raw", comparison.ssim.raw},

@@ -88,6 +88,7 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
                                 of_kind(field_options, stages_.front().field_kind), options.seed,
                                 leaves_to_keep(processes, domain_.tree, share_))),
       optimizer_(*field_, AdamOptions{}),
+      may_change_tree_(field_options.tree != TreeKind::kUniform),
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())),
       fitted_views_(views_but(measurement.geometry.num_views(), measurement.held_out)),
       steps_per_epoch_(steps_per_epoch_of(measurement, options_)) {
@@ -102,8 +103,8 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
   follow_tree();
 }
 
-const Stage& Fit::stage() const {
-  const std::int64_t epoch = progress_.step / steps_per_epoch();
+const Stage& Fit::stage_at(std::int64_t step) const {
+  const std::int64_t epoch = step / steps_per_epoch();
   return *std::find_if(stages_.rbegin(), stages_.rend(),
                        [&](const Stage& s) { return epoch >= s.first_epoch; });
 }

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -59,8 +60,12 @@ class Fit {
   using AfterStep = std::function<bool(const Fit&)>;
   /// Takes steps until the fit is done or `after_step` stops it.
   void run(const AfterStep& after_step);
-  /// Takes over the progress and the field of another fit with the same options. The optimiser
-  /// starts anew; the caller can restore its state.
+  /// Says why a tree, or a progress and a field, that were read from a file are no state of this
+  /// fit. Returns an empty text if they are one.
+  std::string fault_of(const field::Quadtree& tree) const;
+  std::string fault_of(const Progress& progress, const field::Field& field) const;
+  /// Takes over the progress and the field of another fit with the same options, which must have no
+  /// fault. The optimiser starts anew; the caller can restore its state.
   void go_on_from(Progress progress, std::unique_ptr<field::Field> field);
 
   const Progress& progress() const { return progress_; }
@@ -119,7 +124,8 @@ class Fit {
   void score_held_out();
   std::vector<int> views_of_step(std::int64_t step) const;
   double learning_rate(std::int64_t step) const;
-  const Stage& stage() const;
+  const Stage& stage() const { return stage_at(progress_.step); }
+  const Stage& stage_at(std::int64_t step) const;
   measurement::RowShare share_of_stage() const;
   void enter_stage();
   void resample_field();
@@ -134,6 +140,7 @@ class Fit {
   measurement::RowShare share_;
   std::unique_ptr<field::Field> field_;
   Adam optimizer_;
+  bool may_change_tree_;
   TreeUpdates tree_updates_;
   Progress progress_;
   std::vector<int> fitted_views_;

@@ -12,16 +12,23 @@
 namespace tomofield::io {
 namespace {
 
-/// Cuts a line for an error message, because a file that is no text table may have very long ones.
-std::string quote(std::string_view text) {
-  constexpr std::size_t kLongest = 60;
-  return text.size() <= kLongest ? std::string(text) : std::string(text.substr(0, kLongest)) + "…";
-}
-
 [[noreturn]] void throw_line_error(const std::filesystem::path& path, const TextLine& line,
                                    std::string_view expected) {
   throw Error(fmt::format("'{}', line {}: '{}' is not {}", path.string(), line.number,
                           quote(line.text), expected));
+}
+
+/// Tells whether a matrix is invertible and stretches no direction by less than 1 / kLargestStretch
+/// or more than kLargestStretch. `determinant` is positive or, with a mirror, negative.
+bool is_plausible_matrix(const ImodTransform& t) {
+  constexpr double kLargestStretch = 100.0;
+  const double determinant = std::fabs(t.a11 * t.a22 - t.a12 * t.a21);
+  const double squares = t.a11 * t.a11 + t.a12 * t.a12 + t.a21 * t.a21 + t.a22 * t.a22;
+  // The singular values: their squares have the sum `squares` and the product determinant².
+  const double difference =
+      std::sqrt(std::max(squares * squares - 4 * determinant * determinant, 0.0));
+  const double largest = std::sqrt((squares + difference) / 2);
+  return determinant > 0 && largest <= kLargestStretch && determinant >= largest / kLargestStretch;
 }
 
 }  // namespace
@@ -30,9 +37,16 @@ std::vector<NumberLine> read_number_column(const std::filesystem::path& path,
                                            std::string_view quantity) {
   std::vector<NumberLine> numbers;
   for (const TextLine& line : read_text_lines(path)) {
-    const auto value = parse_number(split_words(line.text).front());
-    if (!value || !std::isfinite(*value)) {
-      throw_line_error(path, line, fmt::format("a finite number ({})", quantity));
+    const auto words = split_words(line.text);
+    if (words.size() > 1) {
+      throw_line_error(path, line,
+                       fmt::format("one number: the file must have one column ({}); with several, "
+                                   "keep the right one alone",
+                                   quantity));
+    }
+    const auto value = parse_number(words.front(), base::kLargestAngle_deg);
+    if (!value) {
+      throw_line_error(path, line, fmt::format("{} from -360 to 360", quantity));
     }
     numbers.push_back({*value, line.number});
   }
@@ -46,17 +60,19 @@ std::vector<ImodTransform> read_imod_transforms(const std::filesystem::path& pat
     std::array<double, 6> values{};
     bool is_valid = words.size() == values.size();
     for (std::size_t i = 0; is_valid && i < values.size(); ++i) {
-      const auto value = parse_number(words[i]);
-      is_valid = value && std::isfinite(*value);
+      const auto value = parse_number(words[i], base::kLargestPosition_px);
+      is_valid = value.has_value();
       values[i] = value.value_or(0.0);
     }
     if (!is_valid)
       throw_line_error(path, line, "a transform of six numbers: A11 A12 A21 A22 DX DY");
     const auto [a11, a12, a21, a22, dx, dy] = values;
-    if (std::fabs(a11 * a22 - a12 * a21) < 1e-6) {
-      throw_line_error(path, line, "an invertible transform: A11 A22 - A12 A21 is 0");
-    }
     transforms.push_back({a11, a12, a21, a22, dx, dy});
+    if (!is_plausible_matrix(transforms.back())) {
+      throw_line_error(path, line,
+                       "an alignment: A11 A12 A21 A22 must keep every direction, and stretch none "
+                       "by less than 0.01 or more than 100");
+    }
   }
   return transforms;
 }

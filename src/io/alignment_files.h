@@ -19,9 +19,10 @@ struct NumberLine {
   int line = 0;
 };
 
-/// Reads a .tlt, .rawtlt or .xtilt file: the first number of each line, one line a section. Throws
-/// Error for a line without a finite number; the message says that `quantity` ("tilt angle in
-/// degrees") was expected.
+/// Reads a .tlt, .rawtlt or .xtilt file: one number a line, one line a section. Throws Error for a
+/// line with several columns, because nothing says which one counts, and for a line without a
+/// number from −360 to 360; the message says that `quantity` ("a tilt angle in degrees") was
+/// expected.
 std::vector<NumberLine> read_number_column(const std::filesystem::path& path,
                                            std::string_view quantity);
 
@@ -33,7 +34,8 @@ struct ImodTransform {
   double shift_x_px = 0.0, shift_y_px = 0.0;
 };
 
-/// Reads an .xf file: `A11 A12 A21 A22 DX DY`, one line a section. Throws Error for a singular A.
+/// Reads an .xf file: `A11 A12 A21 A22 DX DY`, one line a section. Throws Error for a singular A,
+/// and for one that stretches a direction by less than 0.01 or more than 100.
 std::vector<ImodTransform> read_imod_transforms(const std::filesystem::path& path);
 
 /// The entries of one [ZValue = n] section that tomofield uses.

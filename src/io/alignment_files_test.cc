@@ -20,7 +20,7 @@ void expect_parts(const std::string& message, const std::vector<std::string>& pa
 
 TEST(NumberColumn, ReadsAnglesWithTheirLines) {
   const ScratchDirectory scratch;
-  const auto path = scratch.write("a.tlt", "  -60.5\r\n+3 extra words\n\n1e1\n");
+  const auto path = scratch.write("a.tlt", "  -60.5\r\n+3 \n\n1e1\n");
   const auto numbers = read_number_column(path, "an angle");
   ASSERT_EQ(numbers.size(), 3u);
   EXPECT_EQ(numbers[0].value, -60.5);
@@ -31,7 +31,7 @@ TEST(NumberColumn, ReadsAnglesWithTheirLines) {
 
 TEST(NumberColumn, NamesFileLineAndText) {
   const ScratchDirectory scratch;
-  for (const std::string bad : {"abc", "1.5x", "nan", "inf", "1,5", "--3", "1e999"}) {
+  for (const std::string bad : {"abc", "1.5x", "nan", "inf", "1,5", "--3", "1e999", "361", "1 2"}) {
     const auto path = scratch.write("a.tlt", "1\n" + bad + "\n");
     expect_parts(message_of<Error>([&] { read_number_column(path, "an angle"); }),
                  {"a.tlt", "line 2", bad, "an angle"});
@@ -39,6 +39,26 @@ TEST(NumberColumn, NamesFileLineAndText) {
   EXPECT_THROW(read_number_column(scratch / "absent.tlt", "an angle"), Error);
   EXPECT_THROW(read_number_column(scratch.write("b.tlt", std::string(2000, '\0')), "an angle"),
                Error);
+}
+
+TEST(NumberColumn, QuotesLongLinesInPart) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.tlt", std::string(1 << 20, 'x'));
+  const auto said = message_of<Error>([&] { read_number_column(path, "an angle"); });
+  EXPECT_LT(said.size(), 400u);
+  expect_parts(said, {"a.tlt", "line 1", "xxx"});
+}
+
+TEST(NumberColumn, RefusesFilesThatAreTooLarge) {
+  const ScratchDirectory scratch;
+  const auto read = [&](const std::string& text) {
+    const auto path = scratch.write("a.tlt", text);
+    return message_of<Error>([&] { read_number_column(path, "an angle"); });
+  };
+  std::string lines;
+  for (int i = 0; i < (1 << 20) + 1; ++i) lines += "1\n";
+  expect_parts(read(lines), {"a.tlt", "lines"});
+  expect_parts(read(std::string((16 << 20) + 1, '\n')), {"a.tlt", "16777217", "16 MiB"});
 }
 
 TEST(ImodTransforms, ReadsSixNumbersALine) {
@@ -52,9 +72,18 @@ TEST(ImodTransforms, ReadsSixNumbersALine) {
   EXPECT_EQ(transforms[0].shift_y_px, -3.0);
 }
 
+TEST(ImodTransforms, ReadsMirrorsAndChangesOfScale) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.xf", "-1 0 0 1 0 0\n4 0 0 4 0 0\n0.25 0 0 0.3 9999 0\n");
+  EXPECT_EQ(read_imod_transforms(path).size(), 3u);
+}
+
 TEST(ImodTransforms, RefusesMalformedLines) {
   const ScratchDirectory scratch;
-  for (const std::string bad : {"1 0 0 1 0", "1 0 0 1 0 0 0", "1 0 0 1 0 nan", "1 2 2 4 0 0"}) {
+  for (const std::string bad :
+       {"1 0 0 1 0", "1 0 0 1 0 0 0", "1 0 0 1 0 nan", "1 2 2 4 0 0", "0 0 0 0 0 0",
+        "1e200 1e200 1e200 2e200 0 0", "1e-160 0 0 1e160 0 0", "1e9 0 0 1e9 0 0",
+        "1000 999.999 999.999 1000 0 0", "1e-3 0 0 1e-3 0 0", "1 0 0 1 1e300 0"}) {
     const auto path = scratch.write("a.xf", "1 0 0 1 0 0\n" + bad + "\n");
     expect_parts(message_of<Error>([&] { read_imod_transforms(path); }), {"a.xf", "line 2", bad});
   }
@@ -93,7 +122,10 @@ TEST(Mdoc, RefusesWhatContradictsItself) {
   expect_parts(message_of<Error>(
                    [&] { read_mdoc(scratch.write("a.mdoc", "[ZValue = 0]\n[ZValue = 0]\n")); }),
                {"a.mdoc", "line 2", "twice"});
-  EXPECT_THROW(read_mdoc(scratch.write("a.mdoc", "[ZValue = first]\n")), Error);
+  for (const char* bad : {"[ZValue = first]\n", "[ZValue = 0]\nTiltAngle = nan\n",
+                          "[ZValue = 0]\nTiltAngle = 1e300\n", "PixelSpacing = inf\n[ZValue = 0]\n",
+                          "[ZValue = 9999999999999]\n"})
+    EXPECT_THROW(read_mdoc(scratch.write("a.mdoc", bad)), Error) << bad;
 }
 
 std::string aln_row(int section) {
@@ -127,8 +159,10 @@ TEST(AreTomoAlignment, ReadsHeaderGlobalAndLocalRows) {
 
 TEST(AreTomoAlignment, RefusesMalformedRows) {
   const ScratchDirectory scratch;
-  for (const std::string bad : {"0 85 1 2 3 4 5 6 7", "x 85 1 0 0 0 0 0 0 10",
-                                "0 85 1 0 0 0 0 0 0 steep", "-1 85 1 0 0 0 0 0 0 10"}) {
+  for (const std::string bad :
+       {"0 85 1 2 3 4 5 6 7", "x 85 1 0 0 0 0 0 0 10", "0 85 1 0 0 0 0 0 0 steep",
+        "-1 85 1 0 0 0 0 0 0 10", "0 1e300 1 0 0 0 0 0 0 10", "0 85 1 1e300 0 0 0 0 0 10",
+        "0 85 1 0 0 0 0 0 0 inf", "99999999999 85 1 0 0 0 0 0 0 10"}) {
     const auto path = scratch.write("a.aln", aln_row(0) + bad + "\n");
     expect_parts(message_of<Error>([&] { read_aretomo_alignment(path); }),
                  {"a.aln", "line 2", bad});
@@ -136,6 +170,8 @@ TEST(AreTomoAlignment, RefusesMalformedRows) {
   EXPECT_THROW(read_aretomo_alignment(scratch.write("a.aln", "# RawSize = 1 2 3\n")), Error);
   EXPECT_THROW(read_aretomo_alignment(scratch.write("a.aln", "# RawSize = 1 2\n" + aln_row(0))),
                Error);
+  EXPECT_THROW(
+      read_aretomo_alignment(scratch.write("a.aln", "# RawSize = 1e30 2 3\n" + aln_row(0))), Error);
 }
 
 Sections assign(const Sections& rows, const Sections& dark, std::int64_t num_sections) {

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 #include <set>
 #include <string>
@@ -15,8 +14,8 @@ namespace {
 
 [[noreturn]] void throw_row_error(const std::filesystem::path& path, const TextLine& line,
                                   std::string_view expected) {
-  throw Error(fmt::format("'{}', line {}: '{}' is not {}", path.string(), line.number, line.text,
-                          expected));
+  throw Error(fmt::format("'{}', line {}: '{}' is not {}", path.string(), line.number,
+                          quote(line.text), expected));
 }
 
 /// Returns the words of a line as finite numbers, or nothing if any word is not one.
@@ -24,7 +23,7 @@ std::vector<double> parse_numbers(std::string_view text) {
   std::vector<double> numbers;
   for (const std::string_view word : split_words(text)) {
     const auto number = parse_number(word);
-    if (!number || !std::isfinite(*number)) return {};
+    if (!number) return {};
     numbers.push_back(*number);
   }
   return numbers;
@@ -66,10 +65,13 @@ AreTomoRow parse_row(const std::filesystem::path& path, const TextLine& line) {
   // The middle columns are image statistics, which may be nan and are not used.
   std::array<double, 5> used{};
   constexpr std::array<std::size_t, 5> kUsedColumns{1, 2, 3, 4, 9};
+  constexpr std::array<double, 5> kLargest{base::kLargestAngle_deg, base::kLargestNumber,
+                                           base::kLargestPosition_px, base::kLargestPosition_px,
+                                           base::kLargestAngle_deg};
   bool is_valid = words.size() == kColumns && section && *section >= 0;
   for (std::size_t i = 0; is_valid && i < used.size(); ++i) {
-    const auto number = parse_number(words[kUsedColumns[i]]);
-    is_valid = number && std::isfinite(*number);
+    const auto number = parse_number(words[kUsedColumns[i]], kLargest[i]);
+    is_valid = number.has_value();
     used[i] = number.value_or(0.0);
   }
   if (!is_valid) {

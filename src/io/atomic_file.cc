@@ -1,18 +1,14 @@
 #include "io/atomic_file.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <signal.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
-#include <string>
-#include <system_error>
 #include <utility>
 
+#include "io/output_set.h"
+#include "io/output_target.h"
 #include "io/positioned_file.h"
 #include "tomofield/error.h"
 
@@ -20,107 +16,61 @@ namespace tomofield::io {
 namespace fs = std::filesystem;
 namespace {
 
-/// Returns the file to replace. It follows a symbolic link, because replacing a link would lose it.
-fs::path resolve_target(const fs::path& path) {
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (fs::exists(status) && !fs::is_regular_file(status)) {
-    throw Error(
-        fmt::format("cannot write '{}': it exists and is not a regular file", path.string()));
-  }
-  if (path.filename().empty()) {
-    throw Error(fmt::format("cannot write '{}': a file name is missing", path.string()));
-  }
-  if (!fs::is_symlink(path, error)) return path;
-  const fs::path target = fs::weakly_canonical(path, error);
-  return error ? path : target;
+constexpr mode_t kPermissions = 07777;
+
+std::optional<struct stat> status_of(const fs::path& file) {
+  struct stat status {};
+  return ::stat(file.c_str(), &status) == 0 ? std::optional(status) : std::nullopt;
 }
 
-fs::path directory_of(const fs::path& file) {
-  return file.has_parent_path() ? file.parent_path() : fs::path(".");
-}
-
-std::string temporary_prefix(const fs::path& target) {
-  return fmt::format(".{}.tmp-", target.filename().string());
-}
-
-/// Removes temporary files of this target whose process was killed. Nothing else would remove them,
-/// and a volume may have gigabytes.
-void remove_abandoned(const fs::path& target) {
-  const std::string prefix = temporary_prefix(target);
-  std::error_code error;
-  for (fs::directory_iterator it(directory_of(target), error), end; !error && it != end;
-       it.increment(error)) {
-    const std::string name = it->path().filename().string();
-    if (name.rfind(prefix, 0) != 0) continue;
-    const char* const after_prefix = name.data() + prefix.size();
-    ::pid_t process = 0;
-    const auto [rest, fault] = std::from_chars(after_prefix, name.data() + name.size(), process);
-    const bool is_ours = fault == std::errc() && process > 0 && *rest == '-';
-    if (is_ours && ::kill(process, 0) != 0 && errno == ESRCH) ::unlink(it->path().c_str());
-  }
-}
-
-/// Creates an empty file that no other process uses. Permissions come from the umask, which mkstemp
-/// would not honour.
-fs::path create_temporary(const fs::path& target) {
-  static std::atomic<unsigned> counter{0};
-  remove_abandoned(target);
-  while (true) {
-    const fs::path candidate =
-        directory_of(target) /
-        fmt::format("{}{}-{}", temporary_prefix(target), ::getpid(), counter.fetch_add(1));
-    const int descriptor = ::open(candidate.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0666);
-    if (descriptor >= 0) {
-      ::close(descriptor);
-      return candidate;
-    }
-    if (errno == EEXIST) {
-      ::unlink(candidate.c_str());  // left by a killed process that had the same process id
-    } else {
-      throw Error(fmt::format("cannot write '{}': no file can be created in the directory '{}': {}",
-                              target.string(), directory_of(target).string(),
-                              std::strerror(errno)));
-    }
-  }
-}
-
-void flush_to_disk(const fs::path& path, int open_flags) {
-  const int descriptor = ::open(path.c_str(), open_flags | O_CLOEXEC);
-  const bool flushed = descriptor >= 0 && ::fsync(descriptor) == 0;
-  // Some file systems cannot flush a directory; then the rename alone must suffice.
-  const bool unsupported = descriptor >= 0 && !flushed && (errno == EINVAL || errno == ENOTSUP);
-  const int error = errno;
-  if (descriptor >= 0) ::close(descriptor);
-  if (!flushed && !unsupported) {
-    throw Error(
-        fmt::format("cannot write '{}' to the disk: {}", path.string(), std::strerror(error)));
-  }
+// Gives a file the owner and the permissions of another, as far as that is allowed.
+void take_after(const struct stat& other, mode_t more_permissions, int descriptor) {
+  if (::fchown(descriptor, other.st_uid, other.st_gid) != 0)
+    (void)!::fchown(descriptor, static_cast<uid_t>(-1), other.st_gid);
+  (void)!::fchmod(descriptor, (other.st_mode & kPermissions) | more_permissions);
 }
 
 }  // namespace
 
 AtomicFile::AtomicFile(const fs::path& path)
-    : path_(path), target_(resolve_target(path)), temporary_path_(create_temporary(target_)) {}
+    : path_(path), target_(output_target(path)), lock_(target_), replaced_(status_of(target_)) {
+  TemporaryFile temporary = create_temporary(target_);
+  temporary_path_ = std::move(temporary.path);
+  descriptor_ = temporary.descriptor;
+  // Others must not read meanwhile what they may not read later; this process must write it.
+  if (replaced_) take_after(*replaced_, S_IRUSR | S_IWUSR, descriptor_);
+}
 
 AtomicFile::~AtomicFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
   if (!temporary_path_.empty()) ::unlink(temporary_path_.c_str());
 }
 
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept
     : path_(std::move(other.path_)),
       target_(std::move(other.target_)),
+      lock_(std::move(other.lock_)),
+      replaced_(other.replaced_),
+      descriptor_(std::exchange(other.descriptor_, -1)),
       temporary_path_(std::exchange(other.temporary_path_, {})) {}
 
+void AtomicFile::flush() {
+  if (replaced_) take_after(*replaced_, 0, descriptor_);
+  const bool is_flushed = ::fsync(descriptor_) == 0 || errno == EINVAL || errno == ENOTSUP;
+  const int flush_error = errno;
+  // Some file systems say only when a file is closed that it has no room.
+  const bool is_closed = ::close(std::exchange(descriptor_, -1)) == 0;
+  if (is_flushed && is_closed) return;
+  throw Error(fmt::format("cannot write '{}' to the disk: {}", path_.string(),
+                          std::strerror(is_flushed ? errno : flush_error)));
+}
+
 void AtomicFile::commit() {
-  flush_to_disk(temporary_path_, O_RDWR);
-  std::error_code error;
-  fs::rename(temporary_path_, target_, error);
-  if (error) {
-    throw Error(fmt::format("cannot replace '{}': {}", path_.string(), error.message()));
-  }
-  temporary_path_.clear();
-  flush_to_disk(directory_of(target_), O_RDONLY | O_DIRECTORY);
+  flush();
+  if (OutputSet* const collecting = OutputSet::active()) return collecting->add(std::move(*this));
+  OutputSet alone(OutputSet::kOneFile);
+  alone.add(std::move(*this));
+  alone.commit();
 }
 
 void write_text_file(const fs::path& path, std::string_view text) {

@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "io/json.h"
@@ -35,7 +34,7 @@ TEST(AtomicFile, LeavesNothingBehindWithoutCommit) {
     AtomicFile file(path);
     std::ofstream(file.temporary_path()) << "half of the n";
     AtomicFile moved(std::move(file));
-    EXPECT_EQ(scratch.num_files(), 2u);
+    EXPECT_EQ(scratch.num_files(), 3u) << "the old file, the new one, and the lock";
   }
   EXPECT_EQ(read_whole_file(path), "old");
   EXPECT_EQ(scratch.num_files(), 1u);
@@ -62,24 +61,54 @@ TEST(AtomicFile, WritesThroughSymbolicLinks) {
 
 TEST(AtomicFile, RemovesWhatKilledProcessesLeft) {
   const ScratchDirectory scratch;
-  const ::pid_t killed = ::fork();
-  if (killed == 0) ::_exit(0);
-  ::waitpid(killed, nullptr, 0);
-  const auto left_by = [&](const char* target, ::pid_t process, unsigned number) {
+  const auto left_by = [&](const char* target, ::pid_t process, const char* number) {
     const auto path = scratch / fmt::format(".{}.tmp-{}-{}", target, process, number);
     std::ofstream(path) << "half a result";
     return path;
   };
-  const auto abandoned = left_by("result.txt", killed, 3);
-  const auto in_use = left_by("result.txt", ::getppid(), 0);
-  const auto of_another_target = left_by("other.txt", killed, 0);
-  const auto not_ours = scratch / ".result.txt.tmp-backup";
-  std::ofstream(not_ours) << "the user's";
+  // Processes of other containers and machines may have any number.
+  const auto abandoned = left_by("result.txt", 99999999, "3");
+  const auto of_a_number_in_use = left_by("result.txt", ::getppid(), "0");
+  const auto of_another_target = left_by("other.txt", 99999999, "0");
+  const auto not_ours = left_by("result.txt", 99999999, "backup");
   write_text_file(scratch / "result.txt", "whole");
   EXPECT_FALSE(std::filesystem::exists(abandoned));
-  EXPECT_TRUE(std::filesystem::exists(in_use));
+  EXPECT_FALSE(std::filesystem::exists(of_a_number_in_use));
   EXPECT_TRUE(std::filesystem::exists(of_another_target));
   EXPECT_TRUE(std::filesystem::exists(not_ours));
+}
+
+mode_t mode_of(const std::filesystem::path& path) {
+  struct stat status {};
+  EXPECT_EQ(::stat(path.c_str(), &status), 0);
+  return status.st_mode & 07777u;
+}
+
+TEST(AtomicFile, KeepsThePermissionsOfTheFileThatItReplaces) {
+  const ScratchDirectory scratch;
+  for (const mode_t mode : {0600u, 0444u, 0664u, 0755u}) {
+    const auto path = scratch.write("result.txt", "old");
+    ASSERT_EQ(::chmod(path.c_str(), mode), 0);
+    AtomicFile file(path);
+    EXPECT_EQ(mode_of(file.temporary_path()), mode | 0600u) << "nobody else may read it meanwhile";
+    std::ofstream(file.temporary_path()) << "new";
+    file.commit();
+    EXPECT_EQ(mode_of(path), mode);
+    EXPECT_EQ(read_whole_file(path), "new");
+    std::filesystem::remove(path);
+  }
+}
+
+TEST(AtomicFile, KeepsTheOwnerWhereThatIsAllowed) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root may give files away";
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("result.txt", "old");
+  ASSERT_EQ(::chown(path.c_str(), 1234, 2345), 0);
+  write_text_file(path, "new");
+  struct stat status {};
+  ASSERT_EQ(::stat(path.c_str(), &status), 0);
+  EXPECT_EQ(status.st_uid, 1234u);
+  EXPECT_EQ(status.st_gid, 2345u);
 }
 
 TEST(AtomicFile, RefusesWhatCannotBeWrittenAtOnce) {

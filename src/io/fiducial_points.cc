@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "io/text_lines.h"
 #include "tomofield/error.h"
@@ -18,16 +17,16 @@ constexpr std::size_t kMinColumns = 3, kMaxColumns = 5;
   throw Error(
       fmt::format("'{}', line {}: '{}' {}; a line of a fiducial model is 'x y z', 'contour "
                   "x y z' or 'object contour x y z', as model2point writes it",
-                  path.string(), line.number, line.text, fault));
+                  path.string(), line.number, quote(line.text), fault));
 }
 
 FiducialPoint parse_point(const std::filesystem::path& path, const TextLine& line,
                           const std::vector<std::string_view>& words) {
   std::vector<double> numbers;
   for (const std::string_view word : words) {
-    const auto number = parse_number(word);
-    if (!number || !std::isfinite(*number)) {
-      refuse(path, line, fmt::format("has '{}', which is no number", word));
+    const auto number = parse_number(word, base::kLargestPosition_px);
+    if (!number) {
+      refuse(path, line, fmt::format("has '{}', which is no position", quote(word)));
     }
     numbers.push_back(*number);
   }

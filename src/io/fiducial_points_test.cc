@@ -33,7 +33,10 @@ TEST(FiducialPoints, FaultyLinesAreNamed) {
   for (const Case& c :
        {Case{"1 2 3\n4 5\n", "2 columns", "line 2"}, Case{"1 2 3 4 5 6\n", "6 columns", "line 1"},
         Case{"1 2 3\n\n1 1 2 3\n", "have 3", "line 3"}, Case{"1 x 3\n", "'x'", "line 1"},
-        Case{"1 nan 3\n", "'nan'", "line 1"}, Case{"", "no fiducial", "f.txt"}}) {
+        Case{"1 nan 3\n", "'nan'", "line 1"}, Case{"1 1e300 3\n", "'1e300'", "line 1"},
+        Case{"1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27\n", "…",
+             "line 1"},
+        Case{"", "no fiducial", "f.txt"}}) {
     const auto path = scratch.write("f.txt", c.text);
     const std::string message = message_of<Error>([&] { read_fiducial_points(path); });
     for (const char* part : {c.what, c.line, "f.txt"}) {

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 
 #include "io/alignment_files.h"
@@ -23,11 +22,11 @@ KeyValue split_key_value(std::string_view text) {
 }
 
 double require_number(const std::filesystem::path& path, const TextLine& line,
-                      std::string_view word) {
-  const auto value = parse_number(word);
-  if (value && std::isfinite(*value)) return *value;
-  throw Error(fmt::format("'{}', line {}: '{}' does not give a finite number", path.string(),
-                          line.number, line.text));
+                      std::string_view word, double largest) {
+  const auto value = parse_number(word, largest);
+  if (value) return *value;
+  throw Error(fmt::format("'{}', line {}: '{}' does not give a number from -{} to {}",
+                          path.string(), line.number, quote(line.text), largest, largest));
 }
 
 /// Returns n of "[ZValue = n]", and nothing for other heads such as "[T = …]" and
@@ -40,7 +39,7 @@ std::optional<std::int64_t> parse_section_head(const std::filesystem::path& path
   const auto section = parse_integer(head.value);
   if (section && *section >= 0) return *section;
   throw Error(fmt::format("'{}', line {}: '{}' does not give a section number", path.string(),
-                          line.number, line.text));
+                          line.number, quote(line.text)));
 }
 
 void sort_and_require_unique(const std::filesystem::path& path, Mdoc* mdoc) {
@@ -71,11 +70,12 @@ Mdoc read_mdoc(const std::filesystem::path& path) {
     }
     const KeyValue entry = split_key_value(line.text);
     if (entry.key == "PixelSpacing") {
-      const double spacing_A = require_number(path, line, entry.value);
+      const double spacing_A = require_number(path, line, entry.value, base::kLargestNumber);
       if (!mdoc.pixel_spacing_A) mdoc.pixel_spacing_A = spacing_A;
       if (is_in_section) mdoc.sections.back().pixel_spacing_A = spacing_A;
     } else if (entry.key == "TiltAngle" && is_in_section) {
-      mdoc.sections.back().tilt_deg = require_number(path, line, entry.value);
+      mdoc.sections.back().tilt_deg =
+          require_number(path, line, entry.value, base::kLargestAngle_deg);
       mdoc.sections.back().line = line.number;
     }
   }

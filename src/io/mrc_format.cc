@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "base/check.h"
+#include "base/plausible.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -125,12 +126,13 @@ void require_axis_order(const Fields& fields, const std::string& name) {
       name, axes[0], axes[1], axes[2]));
 }
 
-/// Returns cell length over number of samples, never rounded; 0 if the header has none.
+/// Returns cell length over number of samples, never rounded; 0 if the header has none, or one that
+/// cannot be.
 double decode_voxel_size(const Fields& fields, std::size_t axis) {
   const double cell_A = fields.float32(kCell + 4 * axis);
   const auto samples = static_cast<double>(fields.int32(kSampling + 4 * axis));
   const double size_A = samples > 0 ? cell_A / samples : 0.0;
-  return std::isfinite(size_A) && size_A > 0 ? size_A : 0.0;
+  return base::is_plausible_pixel_size(size_A) ? size_A : 0.0;
 }
 
 /// Returns the bytes a section that SerialEM's flags announce (IMOD's description of the header).

@@ -5,12 +5,40 @@
 #include <algorithm>
 #include <system_error>
 
-#include "io/atomic_file.h"
+#include "io/output_target.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
 
 namespace fs = std::filesystem;
+namespace {
+
+std::vector<fs::path>& other_inputs() {
+  static std::vector<fs::path> files;
+  return files;
+}
+
+void require_no_input(const fs::path& result, const std::vector<fs::path>& inputs) {
+  for (const fs::path& file : inputs) {
+    std::error_code absent;
+    if (!fs::equivalent(result, file, absent)) continue;
+    throw Error(
+        fmt::format("the result '{}' would replace the input '{}': give another name or directory",
+                    result.string(), file.string()));
+  }
+}
+
+}  // namespace
+
+void add_input(const fs::path& file) { other_inputs().push_back(file); }
+
+void require_no_input_is_replaced(const std::vector<fs::path>& results,
+                                  const std::vector<fs::path>& inputs) {
+  for (const fs::path& result : results) {
+    require_no_input(result, inputs);
+    require_no_input(result, other_inputs());
+  }
+}
 
 void check_output_files(const std::vector<fs::path>& results, const std::vector<fs::path>& inputs,
                         bool may_replace, const std::string& advice) {
@@ -21,18 +49,12 @@ void check_output_files(const std::vector<fs::path>& results, const std::vector<
                       "ends in .mrc)",
                       it->string()));
     }
-    for (const fs::path& file : inputs) {
-      std::error_code absent;
-      if (!fs::equivalent(*it, file, absent)) continue;
-      throw Error(fmt::format(
-          "the result '{}' would replace the input '{}': give another name or directory",
-          it->string(), file.string()));
-    }
   }
+  require_no_input_is_replaced(results, inputs);
   for (const fs::path& result : results) {
     if (!may_replace && fs::exists(result))
       throw Error(fmt::format("'{}' exists: {}", result.string(), advice));
-    const AtomicFile probe(result);
+    require_writable(result);
   }
 }
 

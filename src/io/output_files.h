@@ -8,10 +8,18 @@
 
 namespace tomofield::io {
 
+/// Names a file that the program reads beside those of a series, as that of --config. It counts
+/// as an input of everything that the process writes from then on.
+void add_input(const std::filesystem::path& file);
+
+/// Throws Error if a result would replace one of the `inputs` or of add_input().
+void require_no_input_is_replaced(const std::vector<std::filesystem::path>& results,
+                                  const std::vector<std::filesystem::path>& inputs);
+
 /// Checks before any work that results can be written. Throws Error if two results would be one
-/// file, if one would replace one of the `inputs` (even if it may replace results), if one cannot
-/// be written at its place, or, unless `may_replace`, if one exists. In the last case, `advice`
-/// tells the user what to do instead.
+/// file, if one would replace one of the `inputs` or of add_input() (even if it may replace
+/// results), if one cannot be written at its place, or, unless `may_replace`, if one exists. In the
+/// last case, `advice` tells the user what to do instead.
 void check_output_files(const std::vector<std::filesystem::path>& results,
                         const std::vector<std::filesystem::path>& inputs, bool may_replace,
                         const std::string& advice);

@@ -13,21 +13,9 @@ namespace tomofield::io {
 namespace {
 
 constexpr std::string_view kWhiteSpace = " \t\r\n\v\f";
-constexpr std::int64_t kLargestTextFile = std::int64_t{64} << 20;
-
-std::string read_text(const std::filesystem::path& path) {
-  const PositionedFile file(path, PositionedFile::Access::kRead);
-  const std::int64_t bytes = file.size();
-  std::string text;
-  if (bytes <= kLargestTextFile) {
-    text.resize(static_cast<std::size_t>(bytes));
-    file.read_at(0, text.data(), text.size());
-  }
-  if (bytes > kLargestTextFile || text.find('\0') != std::string::npos) {
-    throw Error(fmt::format("'{}' is not a text file ({} bytes)", path.string(), bytes));
-  }
-  return text;
-}
+// A fiducial model with 1,000 points in each of 200 sections has 8 MiB and 200,000 lines.
+constexpr std::int64_t kLargestTextFile = std::int64_t{16} << 20;
+constexpr int kMostLines = 1 << 20;
 
 template <typename T>
 std::optional<T> parse_whole(std::string_view word) {
@@ -39,6 +27,23 @@ std::optional<T> parse_whole(std::string_view word) {
 }
 
 }  // namespace
+
+std::string read_text_file(const std::filesystem::path& path) {
+  const PositionedFile file(path, PositionedFile::Access::kRead);
+  const std::int64_t bytes = file.size();
+  std::string text;
+  if (bytes <= kLargestTextFile) {
+    text.resize(static_cast<std::size_t>(bytes));
+    file.read_at(0, text.data(), text.size());
+  }
+  if (bytes > kLargestTextFile || text.find('\0') != std::string::npos) {
+    throw Error(fmt::format(
+        "'{}' is no text file of a tilt series ({} bytes): give one of at most {} MiB, without "
+        "zero bytes",
+        path.string(), bytes, kLargestTextFile >> 20));
+  }
+  return text;
+}
 
 std::string_view trim(std::string_view text) {
   const std::size_t first = text.find_first_not_of(kWhiteSpace);
@@ -58,23 +63,38 @@ std::vector<std::string_view> split_words(std::string_view text) {
 }
 
 std::vector<TextLine> read_text_lines(const std::filesystem::path& path) {
-  const std::string text = read_text(path);
+  const std::string text = read_text_file(path);
   std::vector<TextLine> lines;
   int number = 0;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
     const std::string_view line = trim(std::string_view(text).substr(at, end - at));
-    ++number;
+    if (++number > kMostLines) {
+      throw Error(fmt::format("'{}' has more than {} lines, so it is no file of a tilt series",
+                              path.string(), kMostLines));
+    }
     if (!line.empty()) lines.push_back({number, std::string(line)});
     at = end + 1;
   }
   return lines;
 }
 
-std::optional<double> parse_number(std::string_view word) { return parse_whole<double>(word); }
+std::optional<double> parse_number(std::string_view word, double largest) {
+  const auto value = parse_whole<double>(word);
+  return value && base::is_plausible(*value, largest) ? value : std::nullopt;
+}
 
-std::optional<long long> parse_integer(std::string_view word) {
-  return parse_whole<long long>(word);
+std::optional<std::int64_t> parse_integer(std::string_view word) {
+  const auto value = parse_whole<std::int64_t>(word);
+  return value && base::is_plausible(static_cast<double>(*value)) ? value : std::nullopt;
+}
+
+std::string quote(std::string_view text) {
+  constexpr std::size_t kLongest = 60;
+  if (text.size() <= kLongest) return std::string(text);
+  std::size_t end = kLongest;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
+  return std::string(text.substr(0, end)) + "…";
 }
 
 }  // namespace tomofield::io

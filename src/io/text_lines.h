@@ -1,12 +1,19 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "base/plausible.h"
+
 namespace tomofield::io {
+
+/// Returns the bytes of a small text file. Throws Error if it cannot be read, is no regular file (a
+/// pipe would never end), has zero bytes, or is larger than the text files of any series.
+std::string read_text_file(const std::filesystem::path& path);
 
 /// One line of a text file, without white space at its ends; `number` counts from 1.
 struct TextLine {
@@ -15,16 +22,21 @@ struct TextLine {
 };
 
 /// Returns the lines of a small text file without the empty ones. Either kind of line end is
-/// accepted. Throws Error if the file cannot be read or is no text (larger than any alignment file,
-/// or with zero bytes).
+/// accepted. Throws Error if the file cannot be read or is no text: if it has zero bytes, or more
+/// bytes or lines than an alignment of any series.
 std::vector<TextLine> read_text_lines(const std::filesystem::path& path);
 
 std::string_view trim(std::string_view text);
 std::vector<std::string_view> split_words(std::string_view text);
 
-/// Parses a whole word as a number. Returns nothing if any character is left over. "nan" and "inf"
-/// are numbers here.
-std::optional<double> parse_number(std::string_view word);
-std::optional<long long> parse_integer(std::string_view word);
+/// Parses a whole word as a finite number from −`largest` to `largest`. Returns nothing if the word
+/// is another number or none, or if any character is left over. All readers of text files get their
+/// numbers from here, so none of them ever sees a value that is not finite or not plausible.
+std::optional<double> parse_number(std::string_view word, double largest = base::kLargestNumber);
+/// Parses a whole word as an integer from −1e9 to 1e9.
+std::optional<std::int64_t> parse_integer(std::string_view word);
+
+/// Returns text from a file as a message quotes it: at most 60 bytes, and no half characters.
+std::string quote(std::string_view text);
 
 }  // namespace tomofield::io

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "base/plausible.h"
 
 namespace tomofield::option_table {
 namespace {
@@ -13,6 +14,7 @@ namespace {
 constexpr double kMaxCount = 1e9;
 constexpr double kLeafStep = 16;  // rows of a slab (kernels/lanes.h): leaves have whole slabs
 constexpr double kMaxLeaf = 4096;
+constexpr Range kPixelSizes = Range::between(base::kSmallestPixel_A, base::kLargestPixel_A);
 
 constexpr std::string_view kUnbinned = "unbinned pixels";
 constexpr std::string_view kBinned = "binned pixels";
@@ -54,10 +56,10 @@ constexpr Row kRows[] = {
      .label = "FACTOR", .range = Range::at_least(1),
      .help = "Bin the views by this factor, whole or fractional", .is_common = true},
     {.key = "input.angpix", .flag = "--angpix", MEMBER(Options, angpix),
-     .group = Group::kImages, .unit = "Å", .range = Range::above(0), .automatic = "as --bin says",
+     .group = Group::kImages, .unit = "Å", .range = kPixelSizes, .automatic = "as --bin says",
      .help = "Bin the views to this pixel size instead"},
     {.key = "input.pixel_size_A", .flag = "--pixel-size", MEMBER(Options, pixel_size_A),
-     .group = Group::kImages, .unit = "Å", .range = Range::above(0),
+     .group = Group::kImages, .unit = "Å", .range = kPixelSizes,
      .automatic = "that of the stack's header, else of --mdoc",
      .help = "Pixel size of the unbinned stack, if its header has none or a wrong one"},
     {.key = "input.contrast", .flag = "--contrast", MEMBER(Options, contrast),
@@ -267,9 +269,9 @@ bool Range::contains(double value) const {
     case Kind::kZeroOrBetween:
       return value == 0 || is_between;
     case Kind::kAbove:
-      return value > low;
+      return value > low && base::is_plausible(value);
     case Kind::kAtLeast:
-      return value >= low;
+      return value >= low && base::is_plausible(value);
     case Kind::kMultiple:
       return is_between && std::fmod(value, low) == 0;
     case Kind::kEither:

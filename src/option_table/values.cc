@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <type_traits>
 
 #include "base/enum_names.h"
+#include "base/plausible.h"
+#include "base/utf8.h"
 #include "tomofield/error.h"
 
 namespace tomofield::option_table {
@@ -163,7 +166,9 @@ json json_of(const T& value) {
   if constexpr (kIsOptional<T>)
     return value ? json_of(*value) : json(nullptr);
   else if constexpr (std::is_same_v<T, std::filesystem::path>)
-    return value.string();
+    return base::utf8_text(value.string());
+  else if constexpr (std::is_same_v<T, std::string>)
+    return base::utf8_text(value);
   else if constexpr (std::is_same_v<T, Rectangle>)
     return {value.x0, value.y0, value.x1, value.y1};
   else if constexpr (std::is_same_v<T, VoxelType>)
@@ -273,8 +278,11 @@ std::vector<std::string> range_faults(const Options& options) {
       if constexpr (kIsNumber<Value>) {
         const auto require = [&](Value number) {
           if (row.range.contains(static_cast<double>(number))) return;
-          faults.push_back(
-              fmt::format("{} must be {}, not {}", flag_of(row.key), row.range.text(), number));
+          const auto as_real = static_cast<double>(number);
+          const bool is_huge = std::isfinite(as_real) && as_real > base::kLargestNumber;
+          faults.push_back(fmt::format(
+              "{} must be {}{}, not {}", flag_of(row.key), row.range.text(),
+              is_huge ? fmt::format(" and at most {:g}", base::kLargestNumber) : "", number));
         };
         if constexpr (kIsOptional<T>) {
           if (value) require(*value);

@@ -250,6 +250,18 @@ TEST(OptionTable, EveryNumberIsCheckedAgainstItsRange) {
   EXPECT_GT(num_numbers, 20);
 }
 
+TEST(OptionTable, NumbersWithoutUpperLimitAreStillPlausible) {
+  EXPECT_TRUE(Range::at_least(0).contains(1e9));
+  EXPECT_FALSE(Range::at_least(0).contains(1e10));
+  EXPECT_FALSE(Range::above(0).contains(1e300));
+  Options options;
+  options.thickness = 20;
+  options.density_variation = 1e300;
+  const std::vector<std::string> faults = range_faults(options);
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_NE(faults[0].find("at most 1e+09"), std::string::npos) << faults[0];
+}
+
 TEST(OptionTable, RangesHoldTheirLimits) {
   EXPECT_TRUE(Range::between(1, 256).contains(256));
   EXPECT_FALSE(Range::between(1, 256).contains(257));

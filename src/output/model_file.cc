@@ -10,9 +10,11 @@
 
 #include "base/enum_names.h"
 #include "base/parallel.h"
+#include "base/plausible.h"
 #include "base/trace.h"
 #include "io/atomic_file.h"
 #include "io/hdf5_file.h"
+#include "io/hdf5_reader.h"
 #include "tomofield/error.h"
 #include "tomofield/version.h"
 
@@ -20,6 +22,7 @@ namespace tomofield::output {
 namespace {
 
 using io::Hdf5Group;
+using io::StoredGroup;
 using Integers = std::vector<std::int64_t>;
 
 // Both values are in files: do not change either without a new version.
@@ -152,21 +155,31 @@ void write_training(Hdf5Group group, const TrainingState& state, const FloatArra
 // Reads a model. Every fault is an Error that names the file.
 class ModelReader {
  public:
-  explicit ModelReader(const std::filesystem::path& path)
-      : path_(path.string()), file_(io::Hdf5File::open(path)) {}
+  explicit ModelReader(const std::filesystem::path& path) : path_(path.string()), file_(path) {}
 
-  // Keeps all leaves if `choose` is empty; then the training state has its floats too.
+  // Keeps all leaves if `choose` is empty.
   Model read(TrainingState* training, const ChooseLeaves& choose) const {
-    const Hdf5Group root = file_.root();
+    const StoredGroup root = file_.root();
     Model model;
     read_info(root, model);
     model.field = read_field(root.group("field"), choose);
-    if (training != nullptr) *training = read_training(root, /*with_floats=*/!choose);
+    if (training != nullptr) *training = read_training(/*with_floats=*/true);
     return model;
   }
 
+  TrainingState read_training(bool with_floats) const {
+    const StoredGroup root = file_.root();
+    require_known_format(root);
+    if (!root.has("training")) return {};
+    const StoredGroup group = root.group("training");
+    using Floats = std::map<std::string, std::vector<float>>;
+    return {.floats = with_floats ? read_arrays<float>(group.group("floats")) : Floats{},
+            .doubles = read_arrays<double>(group.group("doubles")),
+            .integers = read_arrays<std::int64_t>(group.group("integers"))};
+  }
+
   ModelOutline read_outline() const {
-    const Hdf5Group root = file_.root();
+    const StoredGroup root = file_.root();
     ModelOutline outline;
     read_info(root, outline);
     name_file_in_faults([&] { outline.tree = read_tree(root.group("field").group("tree")); });
@@ -175,14 +188,14 @@ class ModelReader {
 
   void read_floats(const std::string& name, const field::Field& field,
                    std::span<float> values) const {
-    const Hdf5Group root = file_.root();
+    const StoredGroup root = file_.root();
     const bool is_there = root.has("training") && root.group("training").has("floats") &&
                           root.group("training").group("floats").has(name);
     if (!is_there) {
       throw Error(fmt::format(
           "'{}' holds no optimiser state ('{}' is missing), so it is no checkpoint", path_, name));
     }
-    const Hdf5Group floats = root.group("training").group("floats");
+    const StoredGroup floats = root.group("training").group("floats");
     if (floats.array_size(name) != values.size()) {
       throw Error(fmt::format("'{}' holds {} of the {} moments of its parameters, so it is damaged",
                               path_, floats.array_size(name), values.size()));
@@ -198,7 +211,7 @@ class ModelReader {
     if (!condition) fail(what);
   }
 
-  void require_known_format(const Hdf5Group& root) const {
+  void require_known_format(const StoredGroup& root) const {
     if (!root.has_attribute("format") || root.text("format") != kFormat)
       throw Error(fmt::format("'{}' is an HDF5 file, but no model of tomofield", path_));
     const std::int64_t version = root.integer("format_version");
@@ -227,7 +240,7 @@ class ModelReader {
     }
   }
 
-  void read_info(const Hdf5Group& root, ModelInfo& info) const {
+  void read_info(const StoredGroup& root, ModelInfo& info) const {
     require_known_format(root);
     info.x_tilt_deg = root.number("x_tilt_deg");
     info.pixel_size_A = root.number("pixel_size_A");
@@ -235,13 +248,14 @@ class ModelReader {
     info.is_dark = root.text("contrast") == "dark";
     info.options_json = root.text("options_json");
     info.written_by = root.text("written_by");
-    require(std::isfinite(info.x_tilt_deg) && std::isfinite(info.pixel_size_A) &&
-                info.pixel_size_A > 0 && std::isfinite(info.density_unit),
+    require(base::is_plausible(info.x_tilt_deg, base::kLargestAngle_deg) &&
+                base::is_plausible_pixel_size(info.pixel_size_A) &&
+                std::isfinite(info.density_unit),
             "its pixel size or density unit is no usable number");
     read_geometry(root.group("geometry"), info);
   }
 
-  void read_geometry(const Hdf5Group& group, ModelInfo& info) const {
+  void read_geometry(const StoredGroup& group, ModelInfo& info) const {
     geometry::TiltGeometry& g = info.geometry;
     g.width = group.integer("width");
     g.height = group.integer("height");
@@ -253,10 +267,10 @@ class ModelReader {
     const auto roi = group.read_array<std::int64_t>("roi");
     require(roi.size() == 4, "its region of interest has no four corners");
     info.roi = {roi[0], roi[1], roi[2], roi[3]};
-    constexpr std::int64_t kFar = std::int64_t{1} << 30;
-    require(g.width > 0 && g.height > 0 && g.width <= kFar && g.height <= kFar &&
-                std::isfinite(g.thickness) && g.thickness > 0 && (g.hand == 1 || g.hand == -1) &&
-                std::isfinite(g.axis_x) && std::isfinite(g.axis_z) &&
+    constexpr std::int64_t kFar = std::int64_t{1} << 20;  // in pixels; no detector is wider
+    require(g.width > 0 && g.height > 0 && g.width <= kFar && g.height <= kFar && g.thickness > 0 &&
+                g.thickness <= kFar && (g.hand == 1 || g.hand == -1) &&
+                base::is_plausible(g.axis_x) && base::is_plausible(g.axis_z) &&
                 std::all_of(g.tilt_deg.begin(), g.tilt_deg.end(),
                             [](double angle) { return std::abs(angle) < 90; }),
             "its geometry makes no sense");
@@ -265,7 +279,7 @@ class ModelReader {
             "its region of interest is not inside the view");
   }
 
-  field::Quadtree read_tree(const Hdf5Group& group) const {
+  field::Quadtree read_tree(const StoredGroup& group) const {
     field::RootGrid roots;
     roots.x0 = group.integer("x0");
     roots.y0 = group.integer("y0");
@@ -291,7 +305,7 @@ class ModelReader {
     return field::Quadtree(roots, std::move(nodes));
   }
 
-  std::vector<field::LeafShape> read_shapes(const Hdf5Group& group, int num_leaves) const {
+  std::vector<field::LeafShape> read_shapes(const StoredGroup& group, int num_leaves) const {
     std::vector<field::LeafShape> shapes(static_cast<std::size_t>(num_leaves));
     const auto read = [&](const char* name, int field::LeafShape::*member, std::int64_t min) {
       Integers column(shapes.size());
@@ -311,20 +325,33 @@ class ModelReader {
     return shapes;
   }
 
-  std::unique_ptr<field::Field> read_field(const Hdf5Group& group,
+  // Counts leaf by leaf, since the sum of all leaves could wrap.
+  void require_enough_parameters(FieldKind kind, const std::vector<field::LeafShape>& shapes,
+                                 std::size_t stored) const {
+    std::size_t left = stored;
+    for (const field::LeafShape& shape : shapes) {
+      const std::size_t needed = field::count_parameters(kind, {shape});
+      require(needed <= left, "its leaves need more parameters than it holds");
+      left -= needed;
+    }
+  }
+
+  std::unique_ptr<field::Field> read_field(const StoredGroup& group,
                                            const ChooseLeaves& choose) const {
     std::unique_ptr<field::Field> field;
+    std::vector<int> kept;
     const double thickness = group.number("thickness");
-    require(std::isfinite(thickness) && thickness > 0, "its thickness is no usable number");
+    require(thickness > 0 && base::is_plausible(thickness), "its thickness is no usable number");
     try {
       name_file_in_faults([&] {
         field::Quadtree tree = read_tree(group.group("tree"));
+        if (choose) kept = choose(tree);
         auto shapes = read_shapes(group.group("leaves"), tree.num_leaves());
         const std::string name = group.text("kind");
         const auto kind = base::enum_named<FieldKind>(name);
         if (!kind) fail(fmt::format("there is no field '{}'", name));
-        require(field::count_parameters(*kind, shapes) <= group.array_size("parameters"),
-                "its leaves need more parameters than it holds");
+        require_enough_parameters(*kind, shapes, group.array_size("parameters"));
+        if (!choose) group.require_room("parameters");
         field = field::make_field(*kind, std::move(tree), thickness, std::move(shapes));
       });
     } catch (const std::bad_alloc&) {
@@ -339,7 +366,7 @@ class ModelReader {
     if (choose) {
       require(group.array_size("parameters") == field->num_parameters(),
               "its parameters are not those of its leaves");
-      field->keep_only(choose(field->tree()));
+      field->keep_only(kept);
       group.read_floats("parameters", KeptCopy(*field, field->parameters()));
     } else {
       group.read_array<float>("parameters", field->parameters());
@@ -349,23 +376,14 @@ class ModelReader {
   }
 
   template <typename T>
-  static std::map<std::string, std::vector<T>> read_arrays(const Hdf5Group& group) {
+  static std::map<std::string, std::vector<T>> read_arrays(const StoredGroup& group) {
     std::map<std::string, std::vector<T>> arrays;
     for (const std::string& name : group.names()) arrays[name] = group.read_array<T>(name);
     return arrays;
   }
 
-  static TrainingState read_training(const Hdf5Group& root, bool with_floats) {
-    if (!root.has("training")) return {};
-    const Hdf5Group group = root.group("training");
-    using Floats = std::map<std::string, std::vector<float>>;
-    return {.floats = with_floats ? read_arrays<float>(group.group("floats")) : Floats{},
-            .doubles = read_arrays<double>(group.group("doubles")),
-            .integers = read_arrays<std::int64_t>(group.group("integers"))};
-  }
-
   std::string path_;
-  io::Hdf5File file_;
+  io::Hdf5Reader file_;
 };
 
 }  // namespace
@@ -422,9 +440,12 @@ ModelOutline load_outline(const std::filesystem::path& path) {
   return ModelReader(path).read_outline();
 }
 
-Model load_part(const std::filesystem::path& path, const ChooseLeaves& choose,
-                TrainingState& training) {
-  return ModelReader(path).read(&training, choose);
+Model load_part(const std::filesystem::path& path, const ChooseLeaves& choose) {
+  return ModelReader(path).read(nullptr, choose);
+}
+
+TrainingState load_training(const std::filesystem::path& path) {
+  return ModelReader(path).read_training(/*with_floats=*/false);
 }
 
 void load_floats(const std::filesystem::path& path, const std::string& name,

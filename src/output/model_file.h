@@ -94,10 +94,11 @@ ModelOutline load_outline(const std::filesystem::path& path);
 
 /// Returns the leaves of a tree whose parameters shall be kept. An empty function keeps all.
 using ChooseLeaves = std::function<std::vector<int>(const field::Quadtree&)>;
-/// Reads a model and keeps only some of its leaves (Field::keep_only). Reads its training state
-/// without the floats.
-Model load_part(const std::filesystem::path& path, const ChooseLeaves& choose,
-                TrainingState& training);
+/// Reads a model and keeps only some of its leaves (Field::keep_only). `choose` sees the tree
+/// before anything is made from it, and may throw.
+Model load_part(const std::filesystem::path& path, const ChooseLeaves& choose);
+/// Reads the training state of a model without its floats.
+TrainingState load_training(const std::filesystem::path& path);
 /// Reads one array of floats of a training state, one a parameter, into `values`: only those of the
 /// leaves that `field` keeps. Throws Error if there is no such array or if it has another size.
 void load_floats(const std::filesystem::path& path, const std::string& name,

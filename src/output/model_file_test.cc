@@ -14,7 +14,9 @@
 
 #include "base/enum_names.h"
 #include "base/random.h"
+#include "hdf5_edits.h"
 #include "io/hdf5_file.h"
+#include "io/hdf5_objects.h"
 #include "python_script.h"
 #include "tomofield/error.h"
 #include "tomofield/version.h"
@@ -121,10 +123,8 @@ TEST(ModelFile, SomeLeavesComeBackWithTheirMoments) {
   EXPECT_TRUE(read_whole_file(scratch / "whole.h5") == read_whole_file(scratch / "pieces.h5"));
 
   const std::vector<int> kept{1, field.tree().num_leaves() - 1};
-  TrainingState loaded_state;
-  const Model part = load_part(
-      scratch / "pieces.h5", [&](const field::Quadtree&) { return kept; }, loaded_state);
-  EXPECT_EQ(loaded_state, state);
+  const Model part = load_part(scratch / "pieces.h5", [&](const field::Quadtree&) { return kept; });
+  EXPECT_EQ(load_training(scratch / "pieces.h5"), state);
   std::vector<float> loaded(moments.size());
   load_floats(scratch / "pieces.h5", "m", *part.field, loaded);
   for (int leaf = 0; leaf < field.tree().num_leaves(); ++leaf) {
@@ -228,7 +228,7 @@ TEST(ModelFile, RefusesForeignFiles) {
   expect_refusal(scratch / "absent.h5", "does not exist");
   expect_refusal(scratch.write("text.h5", "a text"), "no HDF5 file");
   expect_refusal(scratch.write("empty.h5", ""), "no HDF5 file");
-  expect_refusal(scratch.path(), "no file");
+  expect_refusal(scratch.path(), "not a regular file");
   auto file = io::Hdf5File::create(scratch / "foreign.h5");
   file.root().write_number("voltage", 300.0);
   file.close();
@@ -306,12 +306,17 @@ TEST(ModelFile, RefusesWhatIsConsistentHdf5ButNoSoundModel) {
       {"f['field'].attrs['bias'] = float('inf')", "decoder"},
       {"f['field/leaves/nx'][2] = 1", "impossible shape"},
       {"f['field/leaves/nz'][2] = 60000", "more parameters"},
+      {"for n in 'nx', 'ny', 'nz': f['field/leaves/' + n][:] = 65536", "more parameters"},
+      {"f['geometry'].attrs['thickness'] = 1e300", "geometry"},
+      {"f['field'].attrs['thickness'] = 1e300", "thickness"},
+      {"f['geometry'].attrs['axis_x'] = 1e300", "geometry"},
+      {"f.attrs.modify('pixel_size_A', 1e300)", "pixel size"},
       {"f['field/tree/node_size'][1] = 32", "quadtree"},
       {"f['field/tree'].attrs['columns'] = np.int64(1) << 40", "out of range"},
       {"f['geometry'].attrs['hand'] = 2", "geometry"},
       {"f['geometry/tilt_deg'][1] = float('nan')", "geometry"},
       {"f['geometry/roi'][2] = 1000", "region of interest"},
-      {"f.attrs['pixel_size_A'] = 0.0", "pixel size"},
+      {"f.attrs.modify('pixel_size_A', 0.0)", "pixel size"},
       {"del f['geometry']", "geometry"},
   };
   std::string script = kEditor;
@@ -323,6 +328,27 @@ TEST(ModelFile, RefusesWhatIsConsistentHdf5ButNoSoundModel) {
     SCOPED_TRACE(damages[i].change);
     expect_refusal(scratch / ("damaged-" + std::to_string(i) + ".h5"), damages[i].fact);
   }
+}
+
+TEST(ModelFile, RefusesLeavesWhoseNumberOfParametersWraps) {
+  const ScratchDirectory scratch;
+  Model model = uneven_model(FieldKind::kGrid);
+  constexpr int kSide = 256;  // 2^16 leaves, which need 2^48 parameters each
+  const field::RootGrid roots{.x0 = -60, .y0 = 0, .cell_size = 16, .columns = kSide, .rows = kSide};
+  model.field = make_field(
+      FieldKind::kGrid,
+      field::Quadtree(roots, std::vector<field::Region>(kSide * kSide, field::Region::kInterest)),
+      21.5, std::vector<field::LeafShape>(kSide * kSide, {.nx = 2, .ny = 2, .nz = 2}));
+  save_model(scratch / "model.h5", model);
+  testing::Hdf5Edits edits(read_whole_file(scratch / "model.h5"));
+  const auto file = io::read_hdf5_objects(
+      io::PositionedFile(scratch / "model.h5", io::PositionedFile::Access::kRead));
+  const io::Hdf5Object& leaves = file.children.at("field").children.at("leaves");
+  const std::vector<std::int64_t> counts(kSide * kSide, 65536);
+  for (const char* axis : {"nx", "ny", "nz"})
+    edits.put_data(static_cast<std::size_t>(leaves.children.at(axis).address),
+                   std::as_bytes(std::span(counts)));
+  expect_refusal(scratch.write("wrapped.h5", edits.bytes()), "more parameters");
 }
 
 TEST(ModelFile, ReplacesAModelAsAWholeOrNotAtAll) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -12,6 +13,7 @@
 #include "base/range.h"
 #include "base/trace.h"
 #include "distributed/gathered_arrays.h"
+#include "io/json_numbers.h"
 #include "option_table/rows.h"
 #include "tomofield/error.h"
 
@@ -38,6 +40,7 @@ std::vector<double> flatten(const std::vector<measurement::ViewSums>& sums) {
 
 std::vector<measurement::ViewSums> unflatten_sums(const std::vector<double>& flat) {
   std::vector<measurement::ViewSums> sums;
+  if (flat.size() % 7 != 0) return {};
   for (std::size_t i = 0; i + 7 <= flat.size(); i += 7) {
     sums.push_back(
         {flat[i], flat[i + 1], flat[i + 2], flat[i + 3], flat[i + 4], flat[i + 5], flat[i + 6]});
@@ -54,6 +57,7 @@ std::vector<double> flatten(const std::vector<measurement::ViewModel>& views) {
 
 std::vector<measurement::ViewModel> unflatten_views(const std::vector<double>& flat) {
   std::vector<measurement::ViewModel> views;
+  if (flat.size() % 4 != 0) return {};
   for (std::size_t i = 0; i + 4 <= flat.size(); i += 4)
     views.push_back({flat[i], flat[i + 1], flat[i + 2], flat[i + 3]});
   return views;
@@ -73,24 +77,29 @@ void store(const fit::TreeProgress& tree, output::TrainingState& state) {
   }
 }
 
-fit::TreeProgress unflatten_tree(const std::vector<std::int64_t>& numbers,
-                                 const std::vector<double>& errors) {
+// Returns nothing if the numbers are not what store() writes.
+std::optional<fit::TreeProgress> unflatten_tree(std::span<const std::int64_t> numbers,
+                                                std::span<const double> errors) {
+  constexpr std::size_t kNumbers = 4, kErrors = 2, kMostLevels = 64;
+  if (numbers.empty()) return std::nullopt;
   fit::TreeProgress tree;
-  tree.is_frozen = numbers.at(0) != 0;
-  for (std::size_t i = 1, e = 0; i < numbers.size(); e += 2) {
-    const std::size_t num_levels = static_cast<std::size_t>(numbers.at(i + 3));
-    fit::TreeUpdate update{.epoch = numbers.at(i),
-                           .splits = numbers.at(i + 1),
-                           .merges = numbers.at(i + 2),
-                           .error = errors.at(e),
-                           .predicted_error = errors.at(e + 1),
-                           .leaves_by_level = {}};
-    for (std::size_t level = 0; level < num_levels; ++level)
-      update.leaves_by_level.push_back(numbers.at(i + 4 + level));
-    i += 4 + num_levels;
-    tree.updates.push_back(std::move(update));
+  tree.is_frozen = numbers[0] != 0;
+  numbers = numbers.subspan(1);
+  while (!numbers.empty()) {
+    if (numbers.size() < kNumbers || errors.size() < kErrors) return std::nullopt;
+    const auto num_levels = static_cast<std::size_t>(numbers[3]);
+    if (num_levels > std::min(kMostLevels, numbers.size() - kNumbers)) return std::nullopt;
+    const auto levels = numbers.subspan(kNumbers, num_levels);
+    tree.updates.push_back({.epoch = numbers[0],
+                            .splits = numbers[1],
+                            .merges = numbers[2],
+                            .error = errors[0],
+                            .predicted_error = errors[1],
+                            .leaves_by_level = {levels.begin(), levels.end()}});
+    numbers = numbers.subspan(kNumbers + num_levels);
+    errors = errors.subspan(kErrors);
   }
-  return tree;
+  return errors.empty() ? std::optional(std::move(tree)) : std::nullopt;
 }
 
 std::vector<std::int64_t> as_numbers(const std::string& text) { return {text.begin(), text.end()}; }
@@ -125,7 +134,11 @@ std::string name_of(const std::string& key) {
 // read".
 std::string differences(const std::string& found, const std::string& wanted) {
   const auto parse = [](const std::string& text) {
-    return nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+    try {
+      return io::parse_json(text);
+    } catch (const Error&) {
+      return nlohmann::json();
+    }
   };
   std::set<std::string> names;
   for (const nlohmann::json& change : nlohmann::json::diff(parse(found), parse(wanted))) {
@@ -148,6 +161,62 @@ const typename Map::mapped_type& entry(const Map& map, const char* name, const s
         "'{}' holds no optimiser state ('{}' is missing), so it is no checkpoint", path, name));
   }
   return found->second;
+}
+
+// Returns the single number of an entry.
+std::int64_t single(const output::TrainingState& state, const char* name, const std::string& path) {
+  const auto& numbers = entry(state.integers, name, path);
+  if (numbers.size() != 1)
+    throw Error(fmt::format("'{}' is damaged: '{}' has {} numbers", path, name, numbers.size()));
+  return numbers.front();
+}
+
+fit::Progress progress_from(const output::TrainingState& state, const std::string& path) {
+  fit::Progress progress;
+  progress.step = single(state, "step", path);
+  progress.views = unflatten_views(entry(state.doubles, "views", path));
+  progress.epoch_sums = unflatten_sums(entry(state.doubles, "epoch_sums", path));
+  progress.data_loss = entry(state.doubles, "data_loss", path);
+  progress.held_out_error = entry(state.doubles, "held_out_error", path);
+  auto tree = unflatten_tree(entry(state.integers, "tree_updates", path),
+                             entry(state.doubles, "tree_errors", path));
+  if (!tree)
+    throw Error(fmt::format("'{}' is damaged: its updates of the tree are incomplete", path));
+  progress.tree = std::move(*tree);
+  return progress;
+}
+
+// Refuses an optimiser whose numbers no fit could have. Adam divides by the roots of the second
+// moments.
+void require_sound(const fit::Adam::State& adam, const fit::Fit& fit, const std::string& path) {
+  const auto is_count = [&](std::int64_t steps) {
+    return steps >= 0 && steps <= fit.progress().step;
+  };
+  const auto is_moment = [](auto value) { return std::isfinite(value); };
+  const auto is_square = [](auto value) { return std::isfinite(value) && value >= 0; };
+  if (std::ssize(adam.leaf_steps) == fit.field().tree().num_leaves() &&
+      std::ranges::all_of(adam.leaf_steps, is_count) && is_count(adam.bias_steps) &&
+      is_moment(adam.bias_m) && is_square(adam.bias_v) && std::ranges::all_of(adam.m, is_moment) &&
+      std::ranges::all_of(adam.v, is_square))
+    return;
+  throw Error(fmt::format("'{}' is damaged: the state of its optimiser is none of this fit", path));
+}
+
+void restore_optimizer(const std::filesystem::path& file, const output::TrainingState& state,
+                       fit::Fit& fit) {
+  const std::string path = file.string();
+  fit::Adam::State& adam = fit.optimizer().state();
+  const auto& bias_moments = entry(state.doubles, "bias_moments", path);
+  if (bias_moments.size() != 2)
+    throw Error(
+        fmt::format("'{}' is damaged: it has {} moments of the bias", path, bias_moments.size()));
+  adam.leaf_steps = entry(state.integers, "leaf_steps", path);
+  adam.bias_m = bias_moments[0];
+  adam.bias_v = bias_moments[1];
+  adam.bias_steps = single(state, "bias_steps", path);
+  output::load_floats(file, "adam_m", fit.field(), adam.m);
+  output::load_floats(file, "adam_v", fit.field(), adam.v);
+  require_sound(adam, fit, path);
 }
 
 // Prepares to gather arrays with one number for each parameter from the leaves of all processes.
@@ -227,46 +296,41 @@ void save_checkpoint(const std::filesystem::path& path, const fit::Fit& fit,
 }
 
 std::optional<TunedFit> stored_choice(const std::filesystem::path& path) {
-  output::TrainingState state;
-  output::load_part(
-      path, [](const field::Quadtree&) { return std::vector<int>(); }, state);
+  const output::TrainingState state = output::load_training(path);
   const auto tuning = state.integers.find("tuning");
   if (tuning == state.integers.end()) return std::nullopt;
+  const auto refuse = [&](const char* reason) {
+    return Error(fmt::format("'{}' is damaged: its tuning ({})", path.string(), reason));
+  };
   try {
-    return tuned_from(nlohmann::json::parse(as_text(tuning->second)));
+    return tuned_from(io::parse_json(as_text(tuning->second)));
   } catch (const nlohmann::json::exception& error) {
-    throw Error(fmt::format("'{}' is damaged: its tuning ({})", path.string(), error.what()));
+    throw refuse(error.what());
+  } catch (const Error& error) {
+    throw refuse(error.what());
   }
 }
 
 void restore_fit(const std::filesystem::path& file, const std::string& fingerprint, fit::Fit& fit) {
   const std::string path = file.string();
-  output::TrainingState state;
-  output::Model model = output::load_part(
-      file, [&](const field::Quadtree& tree) { return fit.kept_leaves(tree); }, state);
+  const output::TrainingState state = output::load_training(file);
   const std::string found = as_text(entry(state.integers, "fingerprint", path));
   if (found != fingerprint) {
     throw Error(
         fmt::format("'{}' was made from another series or with other options (these differ: {})",
                     path, differences(found, fingerprint)));
   }
-  fit::Progress progress;
-  progress.step = entry(state.integers, "step", path).at(0);
-  progress.views = unflatten_views(entry(state.doubles, "views", path));
-  progress.epoch_sums = unflatten_sums(entry(state.doubles, "epoch_sums", path));
-  progress.data_loss = entry(state.doubles, "data_loss", path);
-  progress.tree = unflatten_tree(entry(state.integers, "tree_updates", path),
-                                 entry(state.doubles, "tree_errors", path));
-  progress.held_out_error = entry(state.doubles, "held_out_error", path);
+  const auto require_no_fault = [&](const std::string& fault) {
+    if (!fault.empty()) throw Error(fmt::format("'{}' is no state of this fit: {}", path, fault));
+  };
+  output::Model model = output::load_part(file, [&](const field::Quadtree& tree) {
+    require_no_fault(fit.fault_of(tree));
+    return fit.kept_leaves(tree);
+  });
+  fit::Progress progress = progress_from(state, path);
+  require_no_fault(fit.fault_of(progress, *model.field));
   fit.go_on_from(std::move(progress), std::move(model.field));
-  if (fit.is_done()) return;
-  fit::Adam::State& adam = fit.optimizer().state();
-  output::load_floats(file, "adam_m", fit.field(), adam.m);
-  output::load_floats(file, "adam_v", fit.field(), adam.v);
-  adam.leaf_steps = entry(state.integers, "leaf_steps", path);
-  adam.bias_m = entry(state.doubles, "bias_moments", path).at(0);
-  adam.bias_v = entry(state.doubles, "bias_moments", path).at(1);
-  adam.bias_steps = entry(state.integers, "bias_steps", path).at(0);
+  if (!fit.is_done()) restore_optimizer(file, state, fit);
 }
 
 }  // namespace tomofield::reconstruction

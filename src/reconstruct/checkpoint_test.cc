@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -143,6 +145,109 @@ TEST_F(Checkpoint, TheSameFitGivesTheSameBytesWheneverItIsMade) {
   save_checkpoint(file_, *stopped, info_, {kFingerprint, tuned()});
   save_checkpoint(scratch_ / "again.h5", *stopped, info_, {kFingerprint, slower});
   EXPECT_EQ(testing::read_whole_file(file_), testing::read_whole_file(scratch_ / "again.h5"));
+}
+
+// Saves a checkpoint after seven steps with one change of its state, and returns why it is refused.
+template <typename Change>
+std::string refusal_after(const fit::Fit& stopped, fit::Fit& restored,
+                          const output::ModelInfo& info, const std::filesystem::path& file,
+                          Change&& change) {
+  save_checkpoint(file, stopped, info, {.fingerprint = kFingerprint, .tuned = {}});
+  output::TrainingState state;
+  const output::Model model = output::load_model(file, &state);
+  change(state);
+  output::save_model(file, model, &state);
+  return message_of<Error>([&] { restore_fit(file, kFingerprint, restored); });
+}
+
+TEST_F(Checkpoint, AStateThatTheSeriesAndTheOptionsCannotHaveIsRefused) {
+  const auto stopped = stopped_fit(7);
+  using State = output::TrainingState;
+  const double nan = std::nan("");
+  const std::vector<std::function<void(State&)>> changes = {
+      [](State& s) { s.integers["step"] = {}; },
+      [](State& s) { s.integers["step"] = {-1}; },
+      [](State& s) { s.integers["step"] = {1 << 30}; },
+      [](State& s) { s.integers["step"] = {1}; },  // with the loss of an epoch
+      [](State& s) {
+        s.integers["step"] = {7, 7};
+      },
+      [](State& s) { s.doubles["views"].pop_back(); },
+      [](State& s) { s.doubles["views"].resize(3); },
+      [&](State& s) { s.doubles["views"][0] = nan; },
+      [](State& s) { s.doubles["views"][2] = 0; },
+      [](State& s) { s.doubles["epoch_sums"].resize(6); },
+      [&](State& s) { s.doubles["epoch_sums"][1] = nan; },
+      [](State& s) { s.doubles["data_loss"].clear(); },
+      [](State& s) { s.doubles["held_out_error"] = {1}; },
+      [](State& s) { s.integers["tree_updates"] = {}; },
+      [](State& s) {
+        s.integers["tree_updates"] = {0, 1, 2, 3, -1};
+      },
+      [](State& s) {
+        s.integers["tree_updates"] = {0, 1, 2, 3, std::int64_t{1} << 62};
+      },
+      [](State& s) { s.doubles["tree_errors"] = {1}; },
+      [](State& s) {
+        s.integers["tree_updates"] = {0, 1, 2, 3, 0};
+        s.doubles["tree_errors"] = {1, 1};
+      },
+      [](State& s) { s.integers["leaf_steps"].pop_back(); },
+      [](State& s) { s.integers["leaf_steps"][0] = -1; },
+      [](State& s) { s.integers["leaf_steps"][0] = 8; },
+      [](State& s) { s.integers["bias_steps"] = {8}; },
+      [](State& s) { s.doubles["bias_moments"] = {1}; },
+      [](State& s) {
+        s.doubles["bias_moments"] = {0, -1};
+      },
+      [](State& s) { s.floats["adam_m"].pop_back(); },
+      [](State& s) { s.floats["adam_v"][1] = -1; },
+      [](State& s) { s.floats["adam_m"][1] = std::nanf(""); },
+      [](State& s) { s.floats.erase("adam_v"); },
+  };
+  EXPECT_EQ(refusal_after(*stopped, *make_fit(), info_, file_, [](State&) {}), "");
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    const std::string said = refusal_after(*stopped, *make_fit(), info_, file_, changes[i]);
+    EXPECT_NE(said.find(file_.string()), std::string::npos) << "change " << i << ": " << said;
+  }
+}
+
+TEST_F(Checkpoint, AFieldOfOtherLeavesIsRefused) {
+  const auto stopped = stopped_fit(7);
+  const auto refusal = [&](const fit::Fit& other) {
+    save_checkpoint(file_, other, info_, {.fingerprint = kFingerprint, .tuned = {}});
+    const auto restored = make_fit();
+    return message_of<Error>([&] { restore_fit(file_, kFingerprint, *restored); });
+  };
+  EXPECT_EQ(refusal(*stopped), "");
+  field_.leaf_size = 32;
+  const auto larger = stopped_fit(7);
+  field_.leaf_size = 16;
+  EXPECT_NE(refusal(*larger).find("root cells"), std::string::npos);
+  field_.rank = 3;
+  const auto richer = stopped_fit(7);
+  field_.rank = 2;
+  EXPECT_NE(refusal(*richer).find("ranks"), std::string::npos);
+  field_.kind = FieldKind::kGrid;
+  const auto other_kind = stopped_fit(7);
+  field_.kind = FieldKind::kVm;
+  EXPECT_NE(refusal(*other_kind).find("field"), std::string::npos);
+  // A leaf that has been split.
+  const field::Field& whole = stopped->field();
+  field_.leaf_size = 32;
+  const auto of_large = stopped_fit(7);
+  field::Quadtree split = of_large->field().tree();
+  split.split(0);
+  std::vector<field::LeafShape> shapes(static_cast<std::size_t>(split.num_leaves()),
+                                       of_large->field().shape(0));
+  output::Model model;
+  static_cast<output::ModelInfo&>(model) = info_;
+  model.field = field::make_field(whole.kind(), split, whole.thickness(), std::move(shapes));
+  const output::TrainingState state = progress_state(*of_large, {kFingerprint, {}});
+  output::save_model(file_, model, &state);
+  const auto restored = make_fit();
+  const std::string said = message_of<Error>([&] { restore_fit(file_, kFingerprint, *restored); });
+  EXPECT_NE(said.find("leaves"), std::string::npos) << said;
 }
 
 TEST_F(Checkpoint, ATornFileIsRefused) {

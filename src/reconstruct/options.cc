@@ -201,6 +201,13 @@ void check_options(const ReconstructOptions& options) {
                         "it, or another name with -o");
 }
 
+std::vector<io::OutputLock> claim_outputs(const ReconstructOptions& options) {
+  const OutputPaths paths = output_paths(options.resolved.output);
+  std::vector<std::filesystem::path> files{paths.volume, paths.model, paths.json};
+  if (options.resolved.output.empty()) files.clear();
+  return io::claim_outputs(files, [&] { check_options(options); });
+}
+
 nlohmann::json options_json(const ReconstructOptions& options) {
   nlohmann::json all = option_table::to_json(options.files, options.resolved);
   all.erase("running");  // says where the results are, not what they are made from

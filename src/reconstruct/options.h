@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "fit/options.h"
+#include "io/output_lock.h"
 #include "measurement/prepare.h"
 #include "output/volume.h"
 #include "reconstruct/automatic_choice.h"
@@ -62,6 +63,11 @@ OutputPaths output_paths(const std::filesystem::path& volume);
 /// Throws Error for faulty options. Throws Error also if a result would replace an input, or an
 /// existing file without --overwrite or --resume, or cannot be written at its path. Reads no file.
 void check_options(const ReconstructOptions& options);
+
+/// Checks the options and locks the files of a run against other runs. The run holds the locks to
+/// its end. Returns none if the options name no output. Throws Error as check_options() does, or if
+/// another run writes these files.
+std::vector<io::OutputLock> claim_outputs(const ReconstructOptions& options);
 
 /// Writes the resolved options and the constants of the method for the metrics and the model file.
 nlohmann::json options_json(const ReconstructOptions& options);

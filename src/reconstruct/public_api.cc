@@ -198,7 +198,7 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
                            const ProgressCallback& progress) {
   const OneAtATime turn;
   const reconstruction::ReconstructOptions internal = internal_options(series, options);
-  reconstruction::check_options(internal);
+  const auto locks = reconstruction::claim_outputs(internal);
   const tilt_series::TiltSeries views(internal.input);
   reconstruction::plan_run(views, internal);
   Listener listener(progress);

@@ -219,7 +219,7 @@ RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOp
     return {.outcome = Outcome::kStopped, .results = {}};
   record.fit_seconds = running.seconds();
   return {.outcome = Outcome::kFinished,
-          .results = finish(*fit, run.measurement, run.options, record)};
+          .results = finish(*fit, run.measurement, run.options, record, hooks.write_more)};
 }
 
 }  // namespace tomofield::reconstruction

@@ -22,6 +22,8 @@ struct ReconstructHooks {
   base::ProgressSink tune_progress;  ///< receives the progress of the trials before the fit
   /// Is asked after every step. If it returns true, the run saves a checkpoint and stops.
   std::function<bool()> stop_requested;
+  /// Writes more results, which appear together with the others.
+  WriteMore write_more = {};
 };
 
 /// Says how a run ended. A run that writes files can be resumed after a stop.
@@ -40,7 +42,7 @@ struct RunResult {
 /// Does the main job: prepares the views, chooses settings by trials if the options ask for it,
 /// fits a field and samples it. Writes the volume (MRC), the model (HDF5, which is also the
 /// checkpoint during the run), and the metrics with the resolved options (JSON). If Options::output
-/// is empty, it writes no file. Throws Error for bad input. The caller has called check_options()
+/// is empty, it writes no file. Throws Error for bad input. The caller has called claim_outputs()
 /// and plan_run() before.
 ///
 /// If several processes call it, they share the work. The results have the same bits as those of

@@ -1,5 +1,7 @@
 #include "reconstruct/results.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -8,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -16,12 +19,14 @@
 #include "base/trace.h"
 #include "evaluate/artefacts.h"
 #include "io/json.h"
+#include "io/output_set.h"
 #include "output/metrics.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
 #include "reconstruct/choice_plot.h"
 #include "reconstruct/judge.h"
 #include "report/pictures.h"
+#include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -83,6 +88,66 @@ void write_all(const Writers& writers, const distributed::Communicator& processe
     if (failure) std::rethrow_exception(failure);
 }
 
+// Writes the results of a fit into files.
+void write_results(Results& results, const ReconstructOptions& options,
+                   const std::optional<TunedFit>& tuned, const output::TrainingState& state,
+                   const output::VolumeShare& share,
+                   const std::optional<measurement::PredictedView>& held_out_view) {
+  const OutputPaths paths = output_paths(options.resolved.output);
+  const distributed::Communicator& processes = share.processes;
+  Writers writers;
+  if (processes.size() == 1)
+    writers.push_back([&] { output::save_model(paths.model, results.model, &state); });
+  writers.push_back(
+      [&] { output::write_volume(results.model, options.volume, paths.volume, share); });
+  if (held_out_view) {
+    writers.push_back([&] {
+      processes.run_collectively([&] {
+        if (processes.is_root())
+          report::write_held_out_picture(*held_out_view, paths.held_out_picture);
+      });
+    });
+  }
+  if (tuned) {
+    writers.push_back([&] {
+      processes.run_collectively([&] {
+        if (processes.is_root()) write_choice_plot(*tuned, paths.choice_picture);
+      });
+    });
+  }
+  write_all(writers, processes);
+  processes.run_collectively([&] {
+    if (processes.is_root()) io::write_json(paths.json, results.metrics);
+  });
+}
+
+// Puts the model of a run in place whose results cannot be written together: a finished fit is not
+// lost. `save_again` writes the model if it did not get onto the disk beside the other results.
+// Throws the exception that is being handled, and adds what the user can do.
+[[noreturn]] void keep_model(const std::filesystem::path& model, io::OutputSet& outputs,
+                             const std::function<void()>& save_again) {
+  bool is_kept = false;
+  try {
+    is_kept = outputs.commit_only(model);
+    if (!is_kept && save_again) {
+      save_again();
+      is_kept = outputs.commit_only(model);
+    }
+  } catch (const Error&) {  // the first failure says more
+  }
+  if (!is_kept) throw;
+  const std::string advice = fmt::format(
+      "; the finished fit is kept in '{}': the same command with --resume writes the results",
+      model.string());
+  try {
+    throw;
+  } catch (const distributed::SharedError& error) {
+    throw distributed::SharedError(error.what() + advice);
+  } catch (const Error& error) {
+    throw Error(error.what() + advice);
+  }
+}
+
 }  // namespace
 
 output::ModelInfo model_info(const measurement::Measurement& series,
@@ -93,7 +158,8 @@ output::ModelInfo model_info(const measurement::Measurement& series,
 }
 
 Results finish(fit::Fit& fit, const measurement::Measurement& series,
-               const ReconstructOptions& options, const RunRecord& record) {
+               const ReconstructOptions& options, const RunRecord& record,
+               const WriteMore& write_more) {
   const FitOrigin& origin = record.origin;
   const bool writes_files = !options.resolved.output.empty();
   nlohmann::json metrics = output::metrics_json(fit, series, record.fit_seconds);
@@ -115,6 +181,8 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   const OutputPaths paths = output_paths(options.resolved.output);
   const distributed::Communicator& processes = share.processes;
   const output::TrainingState state = progress_state(fit, origin);
+  std::optional<io::OutputSet> outputs;
+  if (writes_files) outputs.emplace();
   if (writes_files && processes.size() > 1) save_fit(paths.model, fit, info, state);
   Results results{.model = {info, fit.take_field()},
                   .metrics = {{"tomofield", TOMOFIELD_VERSION},
@@ -123,29 +191,19 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
                   .verdict = std::move(verdict),
                   .bead_masking = series.masks.bead_masking};
   if (!writes_files) return results;
-  Writers writers;
-  if (processes.size() == 1)
-    writers.push_back([&] { output::save_model(paths.model, results.model, &state); });
-  writers.push_back(
-      [&] { output::write_volume(results.model, options.volume, paths.volume, share); });
-  if (view) {
-    writers.push_back([&] {
-      processes.run_collectively([&] {
-        if (processes.is_root()) report::write_held_out_picture(*view, paths.held_out_picture);
-      });
+  try {
+    write_results(results, options, origin.tuned, state, share, view);
+    processes.run_collectively([&] {
+      if (!processes.is_root()) return;
+      if (write_more) write_more(results, outputs->location_of(paths.volume));
+      outputs->commit();
     });
+  } catch (...) {
+    std::function<void()> save_again;  // several processes have saved theirs together
+    if (processes.size() == 1)
+      save_again = [&] { output::save_model(paths.model, results.model, &state); };
+    keep_model(paths.model, *outputs, save_again);
   }
-  if (origin.tuned) {
-    writers.push_back([&] {
-      processes.run_collectively([&] {
-        if (processes.is_root()) write_choice_plot(*origin.tuned, paths.choice_picture);
-      });
-    });
-  }
-  write_all(writers, processes);
-  processes.run_collectively([&] {
-    if (processes.is_root()) io::write_json(paths.json, results.metrics);
-  });
   return results;
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "fit/fit.h"
@@ -23,10 +25,16 @@ struct Results {
   tilt_series::BeadMasking bead_masking = tilt_series::BeadMasking::kNone;
 };
 
+/// Writes more results of a run, whose volume is in the file `volume`.
+using WriteMore = std::function<void(const Results& results, const std::filesystem::path& volume)>;
+
 /// Takes the results out of a finished fit, which loses its field. If options.resolved.output names
 /// the volume, it writes the volume, the model, the metrics, and a picture of a held-out view if
-/// there is one. Every process calls it.
+/// there is one; then the root calls `write_more`, if there is one. All these files appear together
+/// (io::OutputSet). If one cannot be written, the model alone appears, because it is the checkpoint
+/// of the finished fit, and Error is thrown. Every process calls it.
 Results finish(fit::Fit& fit, const measurement::Measurement& series,
-               const ReconstructOptions& options, const RunRecord& record);
+               const ReconstructOptions& options, const RunRecord& record,
+               const WriteMore& write_more);
 
 }  // namespace tomofield::reconstruction

@@ -3,25 +3,33 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "base/enum_names.h"
+#include "base/plausible.h"
+#include "io/json_numbers.h"
+#include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
 namespace {
 
 using nlohmann::json;
 
+constexpr std::int64_t kMostOfAnything = 1000000000;
+
 TrialSettings settings_from(const json& entry) {
-  return {.penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>()).value(),
-          .variation = entry.at("tv"),
-          .rank = entry.at("rank"),
-          .epochs = entry.at("epochs"),
+  const auto penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>());
+  if (!penalty) throw Error("'tv_penalty' is no penalty");
+  return {.penalty = *penalty,
+          .variation = io::number_at(entry, "tv", 0, base::kLargestNumber),
+          .rank = static_cast<int>(io::integer_at(entry, "rank", 1, kMostOfAnything)),
+          .epochs = static_cast<int>(io::integer_at(entry, "epochs", 1, kMostOfAnything)),
           .fits_view_scale = entry.at("view_scale"),
-          .background_part = entry.at("background_part"),
+          .background_part = io::number_at(entry, "background_part", 0, 1),
           .masks_beads = entry.at("masks_beads")};
 }
 
@@ -69,7 +77,9 @@ json settings_json(const TrialSettings& s) {
 FitTrial trial_from(const json& entry) {
   return {.settings = settings_from(entry),
           .score = selection::score_from(entry),
-          .seconds = entry.value("seconds", 0.0)};
+          .seconds = entry.contains("seconds")
+                         ? io::number_at(entry, "seconds", 0, base::kLargestNumber)
+                         : 0.0};
 }
 
 json tuning_json(const TunedFit& tuned) {
@@ -82,9 +92,10 @@ json tuning_json(const TunedFit& tuned) {
 }
 
 TunedFit tuned_from(const json& tuning) {
-  TunedFit tuned{.settings = settings_from(tuning.at("chosen")),
-                 .trials = {},
-                 .predicted_views = tuning.at("predicted_views")};
+  TunedFit tuned{
+      .settings = settings_from(tuning.at("chosen")), .trials = {}, .predicted_views = {}};
+  for (const double view : io::numbers_at(tuning, "predicted_views", 0, base::kLargestNumber))
+    tuned.predicted_views.push_back(static_cast<int>(view));
   for (const json& trial : tuning.at("trials")) tuned.trials.push_back(trial_from(trial));
   return tuned;
 }

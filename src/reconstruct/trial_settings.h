@@ -41,7 +41,8 @@ nlohmann::json settings_json(const TrialSettings& settings);
 FitTrial trial_from(const nlohmann::json& entry);
 /// Writes the chosen settings and all trials, each with its difference to the best.
 nlohmann::json tuning_json(const TunedFit& tuned);
-/// Reads what tuning_json() has written. Throws nlohmann::json::exception if it is damaged.
+/// Reads what tuning_json() has written. Throws nlohmann::json::exception or Error if it is
+/// damaged.
 TunedFit tuned_from(const nlohmann::json& tuning);
 
 }  // namespace tomofield::reconstruction

@@ -287,7 +287,15 @@ TEST_F(Tuning, RefusesTrialsOfAnotherSeriesAndDamagedFiles) {
   EXPECT_NE(other.find(file_.string()), std::string::npos) << other;
   EXPECT_NE(other.find("--overwrite"), std::string::npos) << other;
   const std::string text = testing::read_whole_file(file_);
-  for (const std::string& damaged : {text.substr(0, text.size() / 2), std::string("[]")}) {
+  // Returns the file with another value for a key. What was its value follows a comma.
+  const auto with = [&](const std::string& key, const std::string& value) {
+    std::string changed = text;
+    return changed.insert(changed.find(key) + key.size(), value + ", \"rest\": ");
+  };
+  for (const std::string& damaged :
+       {text.substr(0, text.size() / 2), std::string("[]"), std::string(1 << 20, '['),
+        with("\"held_out_error\": ", "null"), with("\"held_out_error\": ", "-1"),
+        with("\"held_out_error_by_view\": ", "[1e300]"), with("\"seconds\": ", "\"long\"")}) {
     scratch_.write("trials.json", damaged);
     const std::string message = message_of<Error>([&] { open(); });
     EXPECT_NE(message.find("damaged"), std::string::npos) << message;
@@ -307,6 +315,24 @@ TEST(TunedFit, ComesBackFromItsJson) {
   EXPECT_EQ(read.trials[0].score.speckle, 0.01);
   EXPECT_EQ(read.trials[0].score.face_jump, std::nullopt);
   EXPECT_EQ(read.trials[0].seconds, 2.5);
+}
+
+TEST(TunedFit, ImplausibleOnesAreRefused) {
+  const TunedFit tuned{.settings = {Penalty::kConcave, 7.5, 12, 30},
+                       .trials = {{{Penalty::kSmooth, 5, 12, 30}, {1.25, {1.0, 1.5}}, 2.5}},
+                       .predicted_views = {3, 9}};
+  const nlohmann::json good = tuning_json(tuned);
+  const auto refusal = [&](const char* pointer, const nlohmann::json& value) {
+    nlohmann::json changed = good;
+    changed[nlohmann::json::json_pointer(pointer)] = value;
+    return message_of<Error>([&] { tuned_from(changed); });
+  };
+  EXPECT_NE(refusal("/chosen/tv_penalty", "none").find("tv_penalty"), std::string::npos);
+  EXPECT_NE(refusal("/chosen/tv", 1e300).find("tv"), std::string::npos);
+  EXPECT_NE(refusal("/chosen/rank", 1e12).find("rank"), std::string::npos);
+  EXPECT_NE(refusal("/chosen/epochs", -1).find("epochs"), std::string::npos);
+  EXPECT_NE(refusal("/predicted_views/0", -1).find("predicted_views"), std::string::npos);
+  EXPECT_NE(refusal("/trials/0/seconds", "long").find("seconds"), std::string::npos);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "base/utf8.h"
 #include "tomofield/error.h"
 
 namespace tomofield::report {
@@ -52,7 +53,7 @@ std::string base64(std::string_view bytes) {
 
 std::string html_text(std::string_view text) {
   std::string escaped;
-  for (const char c : text) {
+  for (const char c : base::utf8_text(text)) {
     switch (c) {
       case '&':
         escaped += "&amp;";

@@ -3,16 +3,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <utility>
 
+#include "base/plausible.h"
 #include "io/json.h"
+#include "io/json_numbers.h"
 #include "tomofield/error.h"
 
 namespace tomofield::selection {
 namespace {
 
 using nlohmann::json;
+
+// Errors are multiples of the noise's variance, and a fit that predicts nothing has large ones.
+constexpr double kLargestError = 1e30;
 
 // Says whether a trial has all of these settings.
 bool has_settings(const json& trial, const json& settings) {
@@ -35,9 +39,11 @@ json trial_json(json settings, const HeldOutScore& score, double seconds) {
 
 HeldOutScore score_from(const json& trial) {
   const auto measured = [&](const char* name) {
-    return trial.contains(name) ? std::optional<double>(trial[name]) : std::nullopt;
+    return trial.contains(name) ? std::optional(io::number_at(trial, name, 0, kLargestError))
+                                : std::nullopt;
   };
-  return {trial.at("held_out_error"), trial.at("held_out_error_by_view"), measured("speckle"),
+  return {io::number_at(trial, "held_out_error", 0, kLargestError),
+          io::numbers_at(trial, "held_out_error_by_view", 0, kLargestError), measured("speckle"),
           measured("face_jump")};
 }
 
@@ -45,21 +51,26 @@ TrialFile::TrialFile(std::filesystem::path path, std::string fingerprint, bool r
     : path_(std::move(path)), fingerprint_(std::move(fingerprint)) {
   if (!reuse || !std::filesystem::exists(path_)) return;
   const char* advice = "give --overwrite instead of --resume to start over";
-  std::ifstream file(path_);
-  const json document = json::parse(file, nullptr, /*allow_exceptions=*/false);
+  std::string found;
   try {
-    if (document.at("fingerprint").get<std::string>() != fingerprint_) {
-      throw Error(fmt::format(
-          "cannot resume: the trials in '{}' are of another series or of other options; {}",
-          path_.string(), advice));
-    }
+    const json document = io::read_json(path_);
+    found = document.at("fingerprint").get<std::string>();
     for (const json& trial : document.at("trials")) {
       score_from(trial);  // throws if it is damaged
+      io::number_at(trial, "seconds", 0, base::kLargestNumber);
       trials_.push_back(trial);
     }
   } catch (const json::exception& error) {
     throw Error(fmt::format("cannot resume: '{}' is damaged ({}); {}", path_.string(), error.what(),
                             advice));
+  } catch (const Error& error) {
+    throw Error(fmt::format("cannot resume: '{}' is damaged ({}); {}", path_.string(), error.what(),
+                            advice));
+  }
+  if (found != fingerprint_) {
+    throw Error(fmt::format(
+        "cannot resume: the trials in '{}' are of another series or of other options; {}",
+        path_.string(), advice));
   }
 }
 

@@ -12,7 +12,7 @@ namespace tomofield::selection {
 
 /// Adds score and time of a trial to its settings.
 nlohmann::json trial_json(nlohmann::json settings, const HeldOutScore& score, double seconds);
-/// Reads the score of a trial.
+/// Reads the score of a trial. Throws Error if it has none, or one that cannot be.
 HeldOutScore score_from(const nlohmann::json& trial);
 
 /// Writes trials as JSON; settings_json(settings) writes the settings of one.

@@ -14,6 +14,10 @@
 #include "io/atomic_file.h"
 #include "io/json.h"
 #include "io/mrc.h"
+#include "io/output_files.h"
+#include "io/output_folder.h"
+#include "io/output_lock.h"
+#include "io/output_set.h"
 #include "simulate/noise.h"
 #include "simulate/phantom.h"
 #include "simulate/project_phantom.h"
@@ -40,19 +44,13 @@ struct OutputFiles {
   fs::path series, clean, truth, angles, transforms, record;
 };
 
-void prepare_directory(const fs::path& directory, const OutputFiles& files, bool overwrite) {
-  for (const fs::path* file : {&files.series, &files.clean, &files.truth, &files.angles,
-                               &files.transforms, &files.record}) {
-    if (!overwrite && fs::exists(*file))
-      throw Error(fmt::format("'{}' exists: give another directory, or --overwrite to replace it",
-                              file->string()));
-  }
-  std::error_code error;
-  fs::create_directories(directory, error);
-  if (error || !fs::is_directory(directory))
-    throw Error(fmt::format("cannot make the directory '{}' ({}): give one that can be written",
-                            directory.string(),
-                            error ? error.message() : "something else has that name"));
+// Checks that the files can be written, and locks the series, which every simulation writes.
+std::vector<io::OutputLock> claim_files(const OutputFiles& files, bool overwrite) {
+  return io::claim_outputs({files.series}, [&] {
+    io::check_output_files(
+        {files.series, files.clean, files.truth, files.angles, files.transforms, files.record}, {},
+        overwrite, "give another directory, or --overwrite to replace it");
+  });
 }
 
 io::MrcSpec mrc_spec(std::int64_t nx, std::int64_t ny, std::int64_t nz, bool is_volume,
@@ -260,7 +258,9 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
     cell.max_tilt_deg = std::max(cell.max_tilt_deg, std::abs(view.tilt_deg));
   const Phantom phantom = make_cell_phantom(cell);
   const Phantom reference = options.reference_has_beads ? phantom : without_beads(phantom);
-  prepare_directory(directory, files, overwrite);
+  const io::OutputFolder folder(directory);
+  const std::vector<io::OutputLock> locks = claim_files(files, overwrite);
+  io::OutputSet results;
 
   SimulationSummary summary;
   summary.num_beads = phantom.num_beads;
@@ -270,16 +270,18 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
   summary.empty_beam = Detector(options).empty_beam();
   if (!options.dose) summary.sigma = noise_sigma(reference, views, options.noise);
   // Files of an earlier run that this one does not replace would contradict the others.
-  fs::remove(files.transforms);
-  if (options.write_truth) {
+  if (options.write_truth)
     summary.truth = write_truth(files.truth, reference, options);
-  } else {
-    fs::remove(files.truth);
-  }
+  else
+    results.remove_old(files.truth);
   write_views(files, phantom, views, options, summary.sigma);
   write_angles(files.angles, views);
-  if (options.shift_spread_px > 0.0) write_transforms(files.transforms, views);
+  if (options.shift_spread_px > 0.0)
+    write_transforms(files.transforms, views);
+  else
+    results.remove_old(files.transforms);
   io::write_json(files.record, phantom_json(options, phantom, views, summary));
+  results.commit();
   return summary;
 }
 

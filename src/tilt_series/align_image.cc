@@ -21,7 +21,7 @@ Taps make_taps(double position, std::int64_t size) {
   // Rounding must not cost the outermost pixels of an image that is only shifted.
   constexpr double kRounding = 1e-6;
   const auto last = static_cast<double>(size - 1);
-  if (position < -kRounding || position > last + kRounding) return {};
+  if (!(position >= -kRounding && position <= last + kRounding)) return {};
   position = std::clamp(position, 0.0, last);
   const auto base = static_cast<std::int64_t>(position);
   const double t = position - static_cast<double>(base);

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/log.h"
+#include "base/plausible.h"
 #include "io/alignment_files.h"
 #include "tilt_series/binning.h"
 #include "tilt_series/tilt_angles.h"
@@ -97,14 +98,14 @@ InPlaneAlignment alignment_of_aretomo(const AreTomoSections& aretomo) {
 double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& stack,
                        const std::optional<io::Mdoc>& mdoc) {
   if (options.pixel_size_A) {
-    if (std::isfinite(*options.pixel_size_A) && *options.pixel_size_A > 0) {
-      return *options.pixel_size_A;
-    }
-    throw Error(fmt::format("the pixel size {} Å is not a positive number", *options.pixel_size_A));
+    if (base::is_plausible_pixel_size(*options.pixel_size_A)) return *options.pixel_size_A;
+    throw Error(fmt::format("the pixel size {} Å (--pixel-size) is not from {} to {} Å",
+                            *options.pixel_size_A, base::kSmallestPixel_A, base::kLargestPixel_A));
   }
   const double in_header_A = stack.header().voxel_size_A[0];
   const bool is_default = in_header_A == 0.0 || in_header_A == 1.0;
-  if (is_default && mdoc && mdoc->pixel_spacing_A.value_or(0.0) > 0) return *mdoc->pixel_spacing_A;
+  if (is_default && mdoc && base::is_plausible_pixel_size(mdoc->pixel_spacing_A.value_or(0.0)))
+    return *mdoc->pixel_spacing_A;
   if (in_header_A > 0.0) return in_header_A;
   base::log_warning(fmt::format(
       "'{}' has no pixel size; 1 Å is assumed (give it with --pixel-size)", stack.name()));

@@ -16,6 +16,8 @@ cmake --install "$build" --prefix "$scratch/prefix" >"$scratch/install.log"
 
 "$scratch/prefix/bin/tomofield" --version | grep -qx "tomofield $version ([^()]\+)" ||
   fail "the installed program does not say that it is version $version and of which commit"
+"$scratch/prefix/bin/tomofield" --version --verbose | grep -q "^\(libc6 \|The packages .* without dpkg\)" ||
+  fail "the installed program does not print its bill of materials"
 
 man=$scratch/prefix/share/man/man1
 grep -q 'tomofield-reconstruct (1)' "$man/tomofield.1" || fail "tomofield.1 does not list the commands"

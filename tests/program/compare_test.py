@@ -253,11 +253,16 @@ def test_what_a_row_was_made_from_is_watched(series):
     with open(os.path.join(folder, "few.row.json"), "w") as file:
         json.dump(row, file)
     refused("0.0.1", "few.row.json")
+    huge = dict(before["few"], peak_bytes=1e300)
     del row["origin"], row["wall_seconds"]
-    for text in (json.dumps(row), "{", "[]"):
+    for text in (json.dumps(row), json.dumps(huge), "{", "[]"):
         with open(os.path.join(folder, "few.row.json"), "w") as file:
             file.write(text)
         refused("few.row.json")
+    os.remove(os.path.join(folder, "few.row.json"))
+    os.mkfifo(os.path.join(folder, "few.row.json"))
+    refused("few.row.json", "not a regular file")
+    os.remove(os.path.join(folder, "few.row.json"))
     assert row_of(folder, "wbp") == before["wbp"]
     assert os.path.exists(os.path.join(folder, "few.mrc"))
 
@@ -303,6 +308,8 @@ def test_mistakes_are_named_before_anything_is_made(compare, refuse, series):
         refuse(folder, [fact], *options)
     refuse(folder, ["bad: ", "--weight"], "--also", "bad=baseline tv --weight -1")
     refuse(folder, ["bad: ", "--magic"], "--also", "bad=reconstruct --magic")
+    refuse(folder, ["bad: ", "no trace"], "--also", "bad=reconstruct --trace x.json")
+    refuse(folder, ["bad: ", "nowhere.toml"], "--also", "bad=reconstruct --config nowhere.toml")
     refuse(folder, ["part", "24 × 24 × 24", "sirt", "48 × 36 × 24"],
            "--also", "part=baseline sirt --roi 0,0,24,24")
     refuse(folder, ["turned", "48 × 24 × 36", "sirt", "48 × 36 × 24"],
@@ -348,8 +355,111 @@ def test_chromium_shows_every_picture_without_errors(compare):
     page = os.path.join(folder, "checked.html")
     with open(page, "w", encoding="utf-8") as file:
         file.write(read(folder, "report.html").replace("</body>", script))
-    shown = subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
-                            "--enable-logging=stderr", "--user-data-dir=" + folder + "/profile",
+    without_sandbox = ["--no-sandbox"] if os.geteuid() == 0 else []  # root cannot have one
+    shown = subprocess.run(["chromium", "--headless", *without_sandbox, "--disable-gpu",
+                            "--dump-dom", "--enable-logging=stderr", "--user-data-dir=" + folder + "/profile",
                             "file://" + page], capture_output=True, text=True, timeout=120)
     assert "<title>12 shown</title>" in shown.stdout, shown.stdout[:2000]
     assert "CONSOLE" not in shown.stderr, shown.stderr
+
+
+def refused(folder, facts, *command):
+    """Checks that a comparison stops with these facts before it writes anything."""
+    before = harness.contents(folder)
+    result = harness.tomofield("compare", *command, *QUICK, "-o", folder)
+    assert result.returncode == 2, result
+    for fact in facts:
+        assert fact in result.stderr, (fact, result.stderr)
+    assert harness.contents(folder) == before
+
+
+def test_files_that_it_has_not_made_are_kept(series):
+    folder = harness.fresh_directory("others")
+    os.mkdir(os.path.join(folder, "pictures"))
+    command = [*series.input, "--methods", "wbp,sirt", "--hold-out", 4]
+    for name in ("wbp.mrc", "wbp.h5", "sirt.json", "sirt.log", "wbp_xy.png", "wbp_mask.png",
+                 "sirt.held_out.mrc", "wbp.held_out.log", "report.html", "comparison.csv",
+                 "pictures/wbp_detail.png"):
+        path = os.path.join(folder, name)
+        with open(path, "w") as file:
+            file.write("years of work")
+        refused(folder, [path, "--overwrite"], *command)
+        os.remove(path)
+    os.mkdir(os.path.join(folder, "wbp.log"))
+    refused(folder, ["wbp.log"], *command, "--overwrite")
+    os.rmdir(os.path.join(folder, "wbp.log"))
+    harness.succeed("compare", *command, *QUICK, "-o", folder)
+    os.remove(os.path.join(folder, "wbp.mrc"))
+    harness.succeed("compare", *command, *QUICK, "-o", folder)
+    # What a new method would write is not the comparison's either.
+    with open(os.path.join(folder, "tv.log"), "w") as file:
+        file.write("years of work")
+    refused(folder, ["tv.log"], *series.input, "--methods", "wbp,sirt,tv", "--hold-out", 4)
+    harness.succeed("compare", *command, *QUICK, "-o", folder, "--overwrite")
+
+
+def test_its_inputs_are_never_replaced(series, truth):
+    folder = harness.fresh_directory("own_inputs")
+
+    def copy(source, name):
+        return shutil.copyfile(source, os.path.join(folder, name))
+
+    also = ["--methods", "wbp", "--also", "tilt=baseline wbp"]
+    for name in ("tilt.log", "tilt.row.json", "wbp.json", "report.html", "tilt_mask.png"):
+        angles = copy(series.tlt, name)
+        for options in ([], ["--overwrite"]):
+            refused(folder, ["input", angles], series.stack, "--tlt", angles, *also, *options)
+        os.remove(angles)
+    known = copy(truth, "wbp.mrc")
+    refused(folder, ["input", known], *series.input, *also, "--truth", known, "--overwrite")
+    os.remove(known)
+    config = os.path.join(folder, "tilt.json")
+    for text in ("iterations = 3\n", f"fiducials = \"{folder}/wbp.log\"\n"):
+        with open(config, "w") as file:
+            file.write(text)
+        with open(os.path.join(folder, "wbp.log"), "w") as file:
+            file.write("1 1 1\n")
+        # The file of a method, one that it names, and the comparison's own.
+        refused(folder, ["input", "wbp.log" if "fid" in text else config], *series.input,
+                "--methods", "wbp" if "fid" in text else "sirt", "--also",
+                ("other" if "fid" in text else "tilt") + "=baseline sirt --config " + config,
+                "--overwrite")
+    with open(config, "w") as file:
+        file.write("hand = -1\n")
+    refused(folder, ["input", config], *series.input, *also, "--config", config, "--overwrite")
+
+
+def test_two_comparisons_do_not_share_a_folder(compare):
+    folder = harness.fresh_directory("shared")
+    run = compare(folder, epochs=20000, run=harness.start)
+    wait_for_line(run, "ours: running")
+    for options in ([], ["--overwrite"]):
+        result = compare(folder, *options, run=harness.tomofield)
+        assert result.returncode == 2, result
+        assert f"process {run.pid} " in result.stderr and folder in result.stderr, result.stderr
+    stop(run)
+    assert not [name for name in os.listdir(folder) if name.startswith(".")], os.listdir(folder)
+
+
+def is_alive(process):
+    """Returns true for a process that runs; one that nobody has waited for yet has ended."""
+    try:
+        with open(f"/proc/{process}/stat", encoding="ascii") as file:
+            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_no_child_outlives_it(compare, number):
+    folder = harness.fresh_directory("killed")
+    run = compare(folder, epochs=20000, run=harness.start)
+    wait_for_line(run, "ours: running")
+    wait_until(lambda: os.path.exists(os.path.join(folder, "ours.log"))
+               and "epoch" in read(folder, "ours.log"))
+    with open(f"/proc/{run.pid}/task/{run.pid}/children", encoding="ascii") as file:
+        child = int(file.read())
+    run.send_signal(number)
+    run.communicate()
+    wait_until(lambda: not is_alive(child))
+    assert os.path.exists(os.path.join(folder, "ours.h5")), "the child saved its checkpoint"

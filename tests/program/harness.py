@@ -111,6 +111,12 @@ def read_bytes(path):
         return file.read()
 
 
+def contents(folder):
+    """Returns the bytes of every file in a folder and in those below."""
+    return {os.path.join(path, name): read_bytes(os.path.join(path, name))
+            for path, _, names in os.walk(folder) for name in names}
+
+
 class Series:
     """Holds the views [tilt, y, x] of a simulated cell, which are wider than high, its truth
     [z, y, x], and the arguments that hand the series to reconstruct."""

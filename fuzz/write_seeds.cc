@@ -1,0 +1,139 @@
+// Writes the files that the fuzz targets begin with: write_seeds FOLDER makes FOLDER/TARGET/….
+
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "base/parallel.h"
+#include "io/mrc.h"
+#include "reconstruct/checkpoint.h"
+#include "reconstruct/tuning.h"
+#include "selection/trial_file.h"
+#include "small_fit.h"
+#include "uneven_model.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace tomofield;
+
+constexpr int kViews = 5, kWidth = 24, kHeight = 20;
+
+const std::string kAngles = "-40\n-20\n0\n+20.5\n4e1\n";
+const std::string kTransforms =
+    "1 0 0 1 0 0\n0.9 0.1 -0.1 0.9 1.5 -2\n1 0 0 1 0 0\n1 0 0 1 0.25 0\n-1 0 0 1 0 0\n";
+const std::string kXTilts = "0.5\n0.5\n0.5\n0.5\n0.5\n";
+const std::string kAreTomo =
+    "# AreTomo Alignment\n# RawSize = 24 20 5\n# NumPatches = 1\n# DarkFrame = 1 1 -20\n"
+    "# AlphaOffset = 1.5\n# BetaOffset = 0.25\n"
+    "0 5 1.0 1 -2 nan 1 1 0 -40\n2 5 1.0 1 -2 1 1 1 0 0\n3 5 1.0 1 -2 1 1 1 0 20\n"
+    "4 5 1.0 1 -2 1 1 1 0 40\n# Local Alignment\n0 0 1.0 2.0 0.1 0.2 1.0\n";
+const std::string kMdoc =
+    "PixelSpacing = 2.17\n[T = Tilt axis angle = 85.9]\n\n[ZValue = 0]\nTiltAngle = -40\n"
+    "[ZValue = 1]\nTiltAngle = -20\n[ZValue = 2]\nTiltAngle = 0\n[ZValue = 3]\nTiltAngle = 20\n"
+    "[ZValue = 4]\nTiltAngle = 40\nPixelSpacing = 2.17\n";
+const std::string kFiducials = "1 1 5 6 0\n1 1 5.5 6 1\n1 2 12 10 2\n1 2 13 10 3\n";
+const std::string kConfig =
+    "thickness = 24\ntv = 1.5\nfield = \"grid\"\nroi = [0, 0, 16, 16]\nno-margin = true\n"
+    "center = \"12,10\"\nmode = 12\nseed = 7\n";
+
+void write(const fs::path& path, const std::string& contents) {
+  fs::create_directories(path.parent_path());
+  std::ofstream(path, std::ios::binary) << contents;
+}
+
+std::string contents_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void write_stack(const fs::path& path, io::MrcMode mode) {
+  fs::create_directories(path.parent_path());
+  io::MrcSpec spec;
+  spec.nx = kWidth;
+  spec.ny = kHeight;
+  spec.nz = kViews;
+  spec.mode = mode;
+  spec.voxel_size_A.fill(10);
+  spec.label = "a seed";
+  io::MrcWriter file(path, spec);
+  base::Random random(1);
+  for (int section = 0; section < kViews; ++section) {
+    std::vector<float> values(static_cast<std::size_t>(kWidth * kHeight));
+    for (float& value : values) value = static_cast<float>(random.uniform(50, 100));
+    file.write_rows(section, 0, kHeight, values);
+  }
+  file.close();
+}
+
+// Returns one file of a series in the form that series_fuzz reads.
+std::string part(int kind, const std::string& contents) {
+  const auto length = static_cast<std::uint32_t>(contents.size());
+  return std::string(1, static_cast<char>(kind)) +
+         std::string(reinterpret_cast<const char*>(&length), sizeof length) + contents;
+}
+
+void write_series(const fs::path& folder, const std::string& stack) {
+  const std::string head = part(0, stack);
+  write(folder / "imod", head + part(1, kAngles) + part(2, kTransforms) + part(3, kXTilts));
+  write(folder / "aretomo", head + part(4, kAreTomo));
+  write(folder / "mdoc", head + part(5, kMdoc) + part(6, kFiducials));
+  write(folder / "mask", head + part(1, kAngles) + part(7, stack));
+}
+
+void write_trials(const fs::path& folder) {
+  using namespace reconstruction;
+  const TrialSettings settings{Penalty::kSmooth, 5, 12, 30};
+  const selection::HeldOutScore score{1.25, {1.0, 1.5}};
+  const nlohmann::json trial = selection::trial_json(settings_json(settings), score, 2.5);
+  write(folder / "file", nlohmann::json{{"fingerprint", "{}"}, {"trials", {trial, trial}}}.dump());
+  const TunedFit tuned{
+      .settings = settings, .trials = {{settings, score, 2.5}}, .predicted_views = {3, 9}};
+  write(folder / "tuning", tuning_json(tuned).dump());
+}
+
+void write_models(const fs::path& folder) {
+  fs::create_directories(folder / "model");
+  fs::create_directories(folder / "checkpoint");
+  for (const FieldKind kind : {FieldKind::kVm, FieldKind::kGrid})
+    output::save_model(folder / "model" / (kind == FieldKind::kVm ? "vm" : "grid"),
+                       testing::uneven_model(kind));
+  const fuzz::SmallFit series;
+  for (const int steps : {1, 7, 12}) {
+    const auto fit = series.make();
+    fit->run([&](const fit::Fit& f) { return f.progress().step != steps; });
+    const fs::path path = folder / "checkpoint" / std::to_string(steps);
+    reconstruction::save_checkpoint(path, *fit, series.info(),
+                                    {.fingerprint = fuzz::SmallFit::kFingerprint, .tuned = {}});
+    fs::copy_file(path, folder / "model" / ("checkpoint" + std::to_string(steps)),
+                  fs::copy_options::overwrite_existing);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: write_seeds FOLDER\n");
+    return 2;
+  }
+  base::set_thread_count(1);
+  const fs::path folder = argv[1];
+  write(folder / "angles" / "tlt", kAngles);
+  write(folder / "transforms" / "xf", kTransforms);
+  write(folder / "aretomo" / "aln", kAreTomo);
+  write(folder / "mdoc" / "mdoc", kMdoc);
+  write(folder / "fiducials" / "text", kFiducials);
+  write(folder / "config" / "toml", kConfig);
+  write_trials(folder / "trials");
+  for (const io::MrcMode mode : {io::MrcMode::kInt8, io::MrcMode::kInt16, io::MrcMode::kUint16,
+                                 io::MrcMode::kFloat16, io::MrcMode::kFloat32})
+    write_stack(folder / "mrc" / std::to_string(static_cast<int>(mode)), mode);
+  write_series(folder / "series", contents_of(folder / "mrc" / "0"));
+  write_models(folder);
+  return 0;
+}

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "base/utf8.h"
+
+namespace tomofield::cli {
+
+/// Makes the standard streams safe to write to. Opens those that are closed, so that no file of a
+/// run gets their number. Lets a write to a pipe that nobody reads, or beyond the limit of a file's
+/// size (ulimit -f), fail instead of ending the program.
+void open_console();
+
+/// Returns an argument of a message as it is shown: a text, which may be the name or the content of
+/// a file, does not control the terminal (base/utf8.h).
+template <typename T>
+auto shown(const T& value) {
+  if constexpr (std::is_convertible_v<const T&, std::string_view>)
+    return base::printable(value);
+  else
+    return value;
+}
+
+/// Writes text to standard output, and remembers whether that failed. Never throws: a run goes on
+/// although nobody can read what it says.
+void print_text(std::string_view text);
+template <typename... Args>
+void print(fmt::format_string<Args...> format, Args&&... args) {
+  print_text(fmt::vformat(format, fmt::make_format_args(shown(args)...)));
+}
+/// Hands to the system what has been printed, so that it comes before other output.
+void flush_output();
+/// Flushes standard output. Returns why something that was printed is lost, or an empty text.
+std::string output_fault();
+
+/// Writes text to standard error. Text that cannot be written is lost. Never throws.
+void say_text(std::string_view text);
+template <typename... Args>
+void say(fmt::format_string<Args...> format, Args&&... args) {
+  say_text(fmt::vformat(format, fmt::make_format_args(shown(args)...)));
+}
+
+}  // namespace tomofield::cli

@@ -1,0 +1,74 @@
+#include "compare/folder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <iterator>
+#include <string>
+
+#include "io/output_files.h"
+#include "io/output_target.h"
+#include "tomofield/error.h"
+
+namespace tomofield::compare {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Returns the files of the report and its pictures (pictures.h).
+std::vector<fs::path> report_files(const CompareOptions& options) {
+  std::vector<fs::path> files;
+  for (const char* name : {"report.html", "comparison.json", "comparison.csv"})
+    files.push_back(options.folder / name);
+  std::vector<std::string> shown = names_of(options.methods);
+  shown.emplace_back("truth");
+  for (const std::string& name : shown) {
+    for (const char* suffix : {"_xy.png", "_xz.png", "_yz.png", "_detail.png"})
+      files.push_back(options.folder / "pictures" / (name + suffix));
+  }
+  return files;
+}
+
+void require_new(const std::vector<fs::path>& files) {
+  for (const fs::path& file : files) {
+    if (!fs::exists(fs::symlink_status(file))) continue;
+    throw Error(
+        fmt::format("'{}' exists, and this comparison has not made it: give another folder with "
+                    "-o, or --overwrite to replace it",
+                    file.string()));
+  }
+}
+
+}  // namespace
+
+void check_folder(const CompareOptions& options, const std::vector<Row>& rows) {
+  std::vector<fs::path> inputs, results = report_files(options);
+  if (options.truth) inputs.push_back(*options.truth);
+  for (const Row& row : rows) {
+    std::ranges::copy(row.run.inputs, std::back_inserter(inputs));
+    std::ranges::copy(files_of(row), std::back_inserter(results));
+  }
+  io::require_no_input_is_replaced(results, inputs);
+  for (const fs::path& file : results) io::output_target(file);  // throws for what is no file
+  const fs::path pictures = options.folder / "pictures";
+  if (fs::exists(pictures) && !fs::is_directory(pictures))
+    throw Error(
+        fmt::format("'{}' must be a folder: give another folder with -o", pictures.string()));
+  if (options.overwrite) return;
+  const auto is_new = [](const Row& row) { return row.state.progress == Progress::kNone; };
+  for (const Row& row : rows)
+    if (is_new(row)) require_new(files_of(row));
+  if (std::ranges::all_of(rows, is_new)) require_new(report_files(options));
+}
+
+void remove_results(const CompareOptions& options, const std::vector<Row>& rows) {
+  for (const fs::path& file : report_files(options)) fs::remove(file);
+  for (const Row& row : rows) {
+    std::vector<fs::path> files = files_of(row);
+    std::ranges::reverse(files);  // the row goes last: it says whose the others are
+    for (const fs::path& file : files) fs::remove(file);
+  }
+}
+
+}  // namespace tomofield::compare

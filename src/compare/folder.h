@@ -1,0 +1,20 @@
+#pragma once
+
+#include <vector>
+
+#include "compare/comparison.h"
+#include "compare/rows.h"
+
+namespace tomofield::compare {
+
+/// Checks the folder of a comparison before anything is written there. Throws Error if a file that
+/// the comparison or one of its runs writes would replace or remove a file that one of them reads.
+/// Unless `options.overwrite`, throws Error also if a file exists that this comparison has not
+/// made: a run has made its files once it has a row there, and the report is of the first row on.
+void check_folder(const CompareOptions& options, const std::vector<Row>& rows);
+
+/// Removes all files of the runs and of the report, so that no old report stands beside new
+/// volumes, even if the comparison stops before it is finished.
+void remove_results(const CompareOptions& options, const std::vector<Row>& rows);
+
+}  // namespace tomofield::compare

@@ -1,0 +1,74 @@
+#include "io/json_numbers.h"
+
+#include <fmt/format.h>
+
+#include <string>
+
+#include "io/text_lines.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kDeepest = 32;
+
+const json& entry(const json& object, const char* key) {
+  const auto found = object.is_object() ? object.find(key) : object.end();
+  if (!object.is_object() || found == object.end())
+    throw Error(fmt::format("there is no '{}'", key));
+  return *found;
+}
+
+// `value` has an accepted depth, since parse_json() made it.
+std::string text_of(const json& value) {
+  return quote(value.dump(-1, ' ', false, json::error_handler_t::replace));
+}
+
+double number_in(const json& value, const char* key, double low, double high) {
+  const double number = value.is_number() ? value.get<double>() : low - 1;
+  if (number >= low && number <= high) return number;
+  throw Error(
+      fmt::format("'{}' is {}, not a number from {} to {}", key, text_of(value), low, high));
+}
+
+}  // namespace
+
+json parse_json(std::string_view text) {
+  const auto refuse_depth = [](int depth, json::parse_event_t, json&) {
+    if (depth > kDeepest) throw Error(fmt::format("it is nested deeper than {} levels", kDeepest));
+    return true;
+  };
+  try {
+    return json::parse(text.begin(), text.end(), refuse_depth);
+  } catch (const json::exception& error) {
+    throw Error(quote(error.what()));
+  }
+}
+
+json read_json(const std::filesystem::path& path) { return parse_json(read_text_file(path)); }
+
+double number_at(const json& object, const char* key, double low, double high) {
+  return number_in(entry(object, key), key, low, high);
+}
+
+std::int64_t integer_at(const json& object, const char* key, std::int64_t low, std::int64_t high) {
+  const json& value = entry(object, key);
+  const bool fits = value.is_number_unsigned() ? value.get<std::uint64_t>() <= INT64_MAX
+                                               : value.is_number_integer();
+  const std::int64_t number = fits ? value.get<std::int64_t>() : low;
+  if (fits && number >= low && number <= high) return number;
+  throw Error(
+      fmt::format("'{}' is {}, not a whole number from {} to {}", key, text_of(value), low, high));
+}
+
+std::vector<double> numbers_at(const json& object, const char* key, double low, double high) {
+  const json& values = entry(object, key);
+  if (!values.is_array()) throw Error(fmt::format("'{}' is no array of numbers", key));
+  std::vector<double> numbers;
+  for (const json& value : values) numbers.push_back(number_in(value, key, low, high));
+  return numbers;
+}
+
+}  // namespace tomofield::io

@@ -1,0 +1,154 @@
+#include "io/output_set.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <set>
+#include <utility>
+
+#include "base/check.h"
+#include "base/log.h"
+#include "io/output_target.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace fs = std::filesystem;
+namespace {
+
+std::atomic<OutputSet*> g_active{nullptr};
+
+[[noreturn]] void throw_cannot_replace(const fs::path& target) {
+  const int error = errno;
+  throw Error(fmt::format("cannot replace '{}': {}", target.string(), std::strerror(error)));
+}
+
+bool rename_file(const fs::path& from, const fs::path& to) {
+  return std::rename(from.c_str(), to.c_str()) == 0;
+}
+
+// Flushes a folder, so that a power cut does not undo a rename. Some file systems cannot do that;
+// then the rename alone must suffice.
+void flush_folder(const fs::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool is_flushed = descriptor >= 0 && ::fsync(descriptor) == 0;
+  const int error = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!is_flushed && error != EINVAL && error != ENOTSUP && error != EACCES)
+    base::log_warning(fmt::format("the folder '{}' cannot be flushed to the disk: {}",
+                                  folder.string(), std::strerror(error)));
+}
+
+}  // namespace
+
+// A file that got its name, or that was removed, and the file that had the name before.
+struct OutputSet::Change {
+  fs::path target;
+  fs::path old;  // empty: there was none
+  bool is_removal = false;
+
+  // Keeps the file that is there under another name: as a second name where the file system has
+  // that, so that the first is never missing.
+  static Change begin(const fs::path& target, bool is_removal) {
+    Change change{target, {}, is_removal};
+    std::error_code absent;
+    const fs::file_status status = fs::symlink_status(target, absent);
+    if (!fs::exists(status)) return change;
+    errno = EISDIR;
+    if (fs::is_directory(status)) throw_cannot_replace(target);
+    change.old = unused_temporary_name(target);
+    const bool has_second_name = !is_removal && ::link(target.c_str(), change.old.c_str()) == 0;
+    if (!has_second_name && !rename_file(target, change.old)) throw_cannot_replace(target);
+    return change;
+  }
+
+  // Gives back the old file. Returns false if that is not possible.
+  bool undo() const {
+    if (old.empty()) return is_removal || ::unlink(target.c_str()) == 0 || errno == ENOENT;
+    if (!rename_file(old, target)) return false;
+    ::unlink(old.c_str());  // is still there if both were names of one file
+    return true;
+  }
+};
+
+OutputSet::OutputSet() {
+  OutputSet* none = nullptr;
+  is_active_ = g_active.compare_exchange_strong(none, this);
+  TOMOFIELD_CHECK(is_active_, "there is another set of results already");
+}
+
+OutputSet::~OutputSet() {
+  if (is_active_) g_active = nullptr;
+}
+
+OutputSet* OutputSet::active() { return g_active; }
+
+void OutputSet::add(AtomicFile file) {
+  const std::lock_guard guard(mutex_);
+  files_.push_back(std::move(file));
+}
+
+void OutputSet::remove_old(const fs::path& path) {
+  const std::lock_guard guard(mutex_);
+  to_remove_.push_back(path);
+}
+
+fs::path OutputSet::location_of(const fs::path& path) const {
+  const std::lock_guard guard(mutex_);
+  for (const AtomicFile& file : files_)
+    if (file.path() == path) return file.temporary_path();
+  return path;
+}
+
+void OutputSet::make_changes(std::vector<Change>& changes) const {
+  for (const fs::path& path : to_remove_) changes.push_back(Change::begin(path, true));
+  for (const AtomicFile& file : files_) {
+    changes.push_back(Change::begin(file.target_, false));
+    if (!rename_file(file.temporary_path_, file.target_)) throw_cannot_replace(file.path_);
+  }
+}
+
+void OutputSet::commit() {
+  const std::lock_guard guard(mutex_);
+  std::vector<Change> changes;
+  try {
+    make_changes(changes);
+  } catch (const Error& error) {
+    std::string lost;
+    for (auto change = changes.rbegin(); change != changes.rend(); ++change) {
+      if (!change->undo())
+        lost += fmt::format("; '{}' is new, and '{}' is what it replaced", change->target.string(),
+                            change->old.string());
+    }
+    throw Error(error.what() + lost);
+  }
+  std::set<fs::path> folders;
+  for (const Change& change : changes) folders.insert(folder_of(change.target));
+  for (const fs::path& folder : folders) flush_folder(folder);
+  for (const Change& change : changes)
+    if (!change.old.empty()) ::unlink(change.old.c_str());
+  for (AtomicFile& file : files_) file.temporary_path_.clear();
+  files_.clear();
+  to_remove_.clear();
+}
+
+bool OutputSet::commit_only(const fs::path& path) {
+  bool is_in_set = false;
+  {
+    const std::lock_guard guard(mutex_);
+    std::vector<AtomicFile> kept;
+    for (AtomicFile& file : files_)
+      if (file.path() == path) kept.push_back(std::move(file));
+    is_in_set = !kept.empty();
+    files_.swap(kept);
+    to_remove_.clear();
+  }
+  if (is_in_set) commit();
+  return is_in_set;
+}
+
+}  // namespace tomofield::io

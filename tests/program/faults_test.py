@@ -1,0 +1,52 @@
+"""Tests that a run in which a call of the system fails, that is killed or whose disk fills up says one
+sentence, leaves old or new files, and is repeated with the same bits. `python3
+tests/program/faults.py` tries every call; these tests try some of each kind."""
+
+import pytest
+
+import faults
+import harness
+
+
+@pytest.fixture(scope="module")
+def sweep(tmp_path_factory):
+    """Returns the runs of which single calls fail."""
+    if harness.is_sanitized():
+        pytest.skip("the sanitizers have calls of their own")
+    folder = tmp_path_factory.mktemp("faults")
+    library = faults.build(folder)
+    if library is None:
+        pytest.skip("there is no C compiler")
+    return faults.Sweep(folder, library)
+
+
+@pytest.mark.parametrize("kind", faults.KINDS)
+def test_a_call_that_fails_ends_in_one_sentence(kind, sweep):
+    count = sweep.count(kind)
+    assert count > 5, "the library sees the calls"
+    ends = [sweep.check(faults.Fault(kind, number, mode), has_old_results).returncode
+            for number, mode, has_old_results in ((count // 3, "once", True), (2, "from", False),
+                                                  (count - 1, "from", True))]
+    assert any(ends), "no fault was noticed"
+
+
+def test_no_write_of_a_result_fails_unnoticed(sweep):
+    # The values of a small array of a model are written when HDF5 closes it.
+    for number in range(1, sweep.count("write") + 1, 12)[-10:]:
+        sweep.check(faults.Fault("write", number, "once"), True)
+
+
+def test_a_killed_run_leaves_whole_files(sweep):
+    count = sweep.count("io")
+    for i, number in enumerate(faults.moments(count - 1, 6)):
+        killed = sweep.check(faults.Fault("io", number, "kill"), i % 2 == 1)
+        assert killed.returncode == -9, number
+
+
+def test_a_full_disk_ends_in_one_sentence(sweep):
+    if not faults.can_mount():
+        pytest.skip("only root can mount a small disk")
+    for has_old_results in (False, True):
+        for size in faults.disk_sizes(sweep, has_old_results, 3)[:2]:
+            ended = faults.check_full_disk(sweep, size, has_old_results)
+            assert ended.returncode == 2, (size, ended)
