@@ -4,6 +4,8 @@
 
 #include <toml++/toml.h>
 #include <algorithm>
+#include <cctype>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <utility>
@@ -46,28 +48,44 @@ std::string read_config(const std::string& path) {
   }
 }
 
-// Refuses characters beyond ASCII before the first quote or comment of a line. TOML has none there,
-// and toml++ 3.3 runs into undefined behaviour for some of them.
-void require_ascii_outside_texts(const std::string& text, const std::string& path) {
-  int line = 1;
-  bool is_outside = true;
+// Writes each byte beyond ASCII, and each '%', as '%' and two digits. toml++ 3.3 runs into
+// undefined behaviour for some characters outside of texts, so it sees none of them.
+std::string encoded(const std::string& text) {
+  std::string ascii;
   for (const char c : text) {
-    if (c == '\n') ++line;
-    is_outside = c == '\n' || (is_outside && c != '"' && c != '\'' && c != '#');
-    if (is_outside && static_cast<unsigned char>(c) >= 0x80)
-      throw Error(fmt::format("'{}', line {}: put text with other than ASCII letters in quotes",
-                              path, line));
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte >= 0x80 || c == '%')
+      ascii += fmt::format("%{:02X}", byte);
+    else
+      ascii += c;
   }
+  return ascii;
+}
+
+// Returns the text that encoded() has written.
+std::string decoded(const std::string& ascii) {
+  std::string text;
+  for (std::size_t i = 0; i < ascii.size(); ++i) {
+    const auto is_digit = [&](std::size_t at) {
+      return at < ascii.size() && std::isxdigit(static_cast<unsigned char>(ascii[at])) != 0;
+    };
+    const bool is_code = ascii[i] == '%' && is_digit(i + 1) && is_digit(i + 2);
+    text += is_code ? static_cast<char>(std::stoi(ascii.substr(i + 1, 2), nullptr, 16)) : ascii[i];
+    if (is_code) i += 2;
+  }
+  return text;
 }
 
 toml::table read_toml(const std::string& path) {
   const std::string text = read_config(path);
-  require_ascii_outside_texts(text, path);
   try {
-    return toml::parse(text, path);
+    return toml::parse(encoded(text), path);
   } catch (const toml::parse_error& error) {
-    throw Error(fmt::format("'{}', line {}: {}", path, error.source().begin.line,
-                            std::string(error.description())));
+    const bool is_ascii =
+        std::ranges::all_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x80; });
+    throw Error(fmt::format("'{}', line {}: {}{}", path, error.source().begin.line,
+                            std::string(error.description()),
+                            is_ascii ? "" : "; put text with other than ASCII letters in quotes"));
   }
 }
 
@@ -105,7 +123,7 @@ class Entry {
 
  private:
   std::string text_of(const toml::node& node) const {
-    if (const auto text = node.value_exact<std::string>()) return *text;
+    if (const auto text = node.value_exact<std::string>()) return decoded(*text);
     if (const auto integer = node.value_exact<std::int64_t>()) return fmt::format("{}", *integer);
     if (const auto number = node.value_exact<double>()) return fmt::format("{}", *number);
     fail("must be a number, a text, true or false, or an array of numbers or texts");
@@ -150,7 +168,7 @@ void expand_config_file(const CLI::App& program, std::vector<std::string>& argum
   const CLI::App* command = find_command(program, arguments);
   const std::vector<std::string> given = arguments;
   for (const auto& [key, node] : read_toml(*path)) {
-    const Entry entry(*path, std::string(key.str()), node);
+    const Entry entry(*path, decoded(std::string(key.str())), node);
     const CLI::Option* option = command->get_option_no_throw("--" + entry.name());
     if (option == nullptr || option->check_name(kConfigFlag) || option->check_name("--help") ||
         option->check_name("--help-all")) {

@@ -75,7 +75,8 @@ def test_a_large_or_long_text_file(series):
 
 
 def test_a_configuration_with_other_than_ascii_letters_outside_of_texts(series):
-    for contents in (b"N\xef\xb4\xbf", b"thickness = 24\n\xef\xb4\xbf = 1\n"):
+    for contents in (b"N\xef\xb4\xbf", b"thickness = 24\n\xef\xb4\xbf = 1\n",
+                     b"roi = [0, 0, 16, +0'''''\xcf\xa4, 16]\n"):
         config = write("letters.toml", contents)
         refuse([config, "ASCII"], "reconstruct", *series.input, "--thickness", 24, "-o", "out.mrc",
                "--config", config)
