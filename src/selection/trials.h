@@ -65,9 +65,8 @@ class Trials {
     for (Trial<Settings>& trial : run_(missing)) made_.push_back(std::move(trial));
   }
 
-  /// Returns the trial with these settings and makes it if there is none yet. The reference is
-  /// valid until the next trial is made.
-  const Trial<Settings>& trial(const Settings& settings) {
+  /// Returns the trial with these settings and makes it if there is none yet.
+  Trial<Settings> trial(const Settings& settings) {
     make({settings});
     return *find(settings);
   }
