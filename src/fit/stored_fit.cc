@@ -20,7 +20,8 @@ bool is_sound(const measurement::ViewModel& view) {
 }
 
 bool is_sound(const measurement::ViewSums& sums) {
-  return are_finite({sums.n, sums.p, sums.b, sums.pp, sums.pb, sums.bb}) && sums.n >= 0;
+  return are_finite({sums.n, sums.p, sums.b, sums.pp, sums.pb, sums.bb, sums.limited_squares}) &&
+         sums.n >= 0;
 }
 
 template <typename Items>
