@@ -1,11 +1,6 @@
 #include "measurement/background.h"
 
-#include <memory>
-#include <numeric>
-#include <utility>
-#include <vector>
-
-#include "base/check.h"
+#include "measurement/own_rays.h"
 
 namespace tomofield::measurement {
 namespace {
@@ -23,18 +18,13 @@ double density_of(double brightness, const Measurement& measurement) {
 void subtract_background(double part, Measurement& measurement) {
   const double subtracted = part * measurement.background;
   if (subtracted == 0.0) return;
-  TOMOFIELD_CHECK(measurement.rays.use_count() == 1, "a copy of the measurement shares its rays");
-  // Nobody else sees these rays, which were not made constant.
-  std::const_pointer_cast<SlabViews>(measurement.rays)->subtract(static_cast<float>(subtracted));
+  own_rays(measurement).subtract(static_cast<float>(subtracted));
   measurement.mean_density -= density_of(subtracted, measurement);
   measurement.background -= subtracted;
 }
 
 Measurement without_background(double part, const Measurement& measurement) {
-  Measurement copy = measurement;
-  std::vector<int> views(static_cast<std::size_t>(measurement.geometry.num_views()));
-  std::iota(views.begin(), views.end(), 0);
-  copy.rays = measurement.rays->middle_rows(measurement.rays->shape().num_rows, views);
+  Measurement copy = with_own_rays(measurement);
   subtract_background(part, copy);
   return copy;
 }

@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <memory>
 #include <numeric>
 #include <utility>
 #include <vector>
 
-#include "base/check.h"
 #include "base/log.h"
+#include "measurement/own_rays.h"
 
 namespace tomofield::measurement {
 namespace {
@@ -39,9 +38,7 @@ std::vector<int> all_views(const Measurement& measurement) {
 
 void hide_beads(Measurement& measurement, const distributed::Communicator& processes) {
   if (measurement.undecided_beads.empty()) return;
-  TOMOFIELD_CHECK(measurement.rays.use_count() == 1, "a copy of the measurement shares its rays");
-  // Nobody else sees these rays, which were not made constant.
-  std::const_pointer_cast<SlabViews>(measurement.rays)->hide(measurement.undecided_beads);
+  own_rays(measurement).hide(measurement.undecided_beads);
   record_masks(all_views(measurement), processes, measurement);
   base::log_info(fmt::format(
       "the {} are masked: {:.1f} % of all rays carry no loss", describe_beads(measurement.masks),
@@ -59,17 +56,14 @@ void keep_beads(Measurement& measurement) {
 }
 
 Measurement with_beads_hidden(const Measurement& measurement, std::span<const int> views) {
-  Measurement copy = measurement;
-  if (measurement.undecided_beads.empty()) return copy;
+  if (measurement.undecided_beads.empty()) return measurement;
   std::vector<std::vector<MaskDisc>> discs(measurement.undecided_beads.size());
   for (const int v : views) {
     const auto view = static_cast<std::size_t>(v);
     discs[view] = measurement.undecided_beads[view];
   }
-  std::unique_ptr<SlabViews> rays =
-      measurement.rays->middle_rows(measurement.rays->shape().num_rows, all_views(measurement));
-  rays->hide(discs);
-  copy.rays = std::move(rays);
+  Measurement copy = with_own_rays(measurement);
+  own_rays(copy).hide(discs);
   record_masks(views, distributed::Communicator::alone(), copy);
   return copy;
 }
