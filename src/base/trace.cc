@@ -131,10 +131,11 @@ TraceTasks::~TraceTasks() {
   if (is_wanted_) record().has_tasks = false;
 }
 
-// Without their tasks, loops inside of other loops would fill the record and tell little. Tasks
-// that began before others were wanted are not recorded, and so neither are the loops inside of
-// them.
-TraceLoop::TraceLoop(const char* name, std::int64_t count) : name_(name), count_(count) {
+// Without their tasks, loops inside of other loops would fill the record and tell little. All tasks
+// of a loop are recorded, or none: one of them may be what begins to want tasks (TraceTasks). A
+// loop inside of a task that is not recorded is not recorded either.
+TraceLoop::TraceLoop(const char* name, std::int64_t count)
+    : name_(name), count_(count), has_tasks_(record().has_tasks) {
   if (!trace::is_on || (t_task != kNone && !t_is_task_recorded)) return;
   id_ = record().next_id++;
   outer_task_ = t_task;
@@ -165,10 +166,9 @@ TraceLoop::Task::Task(TraceLoop& of, std::int64_t i, int on_thread)
       begin(now()),
       processor_begin(processor_now()),
       thread(on_thread),
-      is_recorded(record().has_tasks),
       is_outer_recorded(t_is_task_recorded) {
   t_task = id;
-  t_is_task_recorded = is_recorded;
+  t_is_task_recorded = loop.has_tasks_;
   t_thread = thread;
 }
 
@@ -178,7 +178,7 @@ TraceLoop::Task::~Task() {
   t_is_task_recorded = is_outer_recorded;
   loop.busy_ += end - begin;
   raise(loop.longest_, end - begin);
-  if (!is_recorded) return;
+  if (!loop.has_tasks_) return;
   add({.kind = Event::Kind::kTask,
        .name = loop.name_,
        .begin = begin,

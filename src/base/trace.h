@@ -38,7 +38,8 @@ class TraceSpan {
   std::int64_t begin_, processor_begin_ = 0;
 };
 
-/// Records each task of parallel_for while it exists, if `is_wanted`. One at a time.
+/// Records each task of the loops of parallel_for that begin while it exists, if `is_wanted`. One
+/// at a time.
 class TraceTasks {
  public:
   explicit TraceTasks(bool is_wanted);
@@ -73,11 +74,12 @@ class TraceLoop {
     TraceLoop& loop;
     std::int64_t index, id, outer_task, begin, processor_begin;
     int thread;
-    bool is_recorded, is_outer_recorded;
+    bool is_outer_recorded;
   };
 
   const char* name_;
   std::int64_t count_, id_ = -1, outer_task_ = -1, begin_ = 0, processor_begin_ = 0;
+  bool has_tasks_;
   std::atomic<std::int64_t> busy_ = 0, longest_ = 0;  // nanoseconds
 };
 

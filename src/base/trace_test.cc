@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "base/parallel.h"
@@ -133,6 +135,18 @@ TEST_P(TraceThreads, WithoutTasksOnlyOutermostLoopsAreRecorded) {
   EXPECT_EQ(loops[0]["name"], "plain outer");
   EXPECT_EQ(loops[0]["args"]["tasks"], 4);
   EXPECT_GT(loops[0]["args"]["busy_s"].get<double>(), 0);
+  EXPECT_TRUE(recording.events("task").empty());
+}
+
+// The tasks of one loop are recorded together: here one of them begins to want tasks.
+TEST_P(TraceThreads, LoopThatBeganBeforeTasksWereWantedHasNone) {
+  const Recording recording("late");
+  parallel_for("late outer", 8, [](std::int64_t i) {
+    if (i != 0) return;
+    const TraceTasks tasks(true);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  });
+  EXPECT_EQ(recording.events("loop").size(), 1);
   EXPECT_TRUE(recording.events("task").empty());
 }
 

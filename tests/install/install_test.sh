@@ -14,9 +14,10 @@ rm -rf "$scratch"
 mkdir -p "$scratch"
 cmake --install "$build" --prefix "$scratch/prefix" >"$scratch/install.log"
 
-"$scratch/prefix/bin/tomofield" --version | grep -qx "tomofield $version ([^()]\+)" ||
+says=$("$scratch/prefix/bin/tomofield" --version --verbose) || fail "--version --verbose fails"
+grep -qx "tomofield $version ([^()]\+)" <<<"$says" ||
   fail "the installed program does not say that it is version $version and of which commit"
-"$scratch/prefix/bin/tomofield" --version --verbose | grep -q "^\(libc6 \|The packages .* without dpkg\)" ||
+grep -q "^\(libc6 \|The packages .* without dpkg\)" <<<"$says" ||
   fail "the installed program does not print its bill of materials"
 
 man=$scratch/prefix/share/man/man1
