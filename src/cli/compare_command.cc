@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/log.h"
+#include "base/program_path.h"
 #include "cli/commands.h"
 #include "cli/common_options.h"
 #include "cli/config_file.h"
@@ -86,7 +87,7 @@ ExitStatus stopped(compare::Outcome outcome, const Arguments& arguments) {
 void run(const CLI::App& command, const Arguments& arguments,
          const std::vector<std::string>& own_options) {
   compare::CompareOptions options;
-  options.program = std::filesystem::read_symlink("/proc/self/exe");
+  options.program = base::program_path();
   options.files = arguments.choices.files;
   options.series = arguments.choices.options;
   options.series_words = series_words(command, own_options);

@@ -1,4 +1,5 @@
 #include "cli/program.h"
+#include "base/program_path.h"
 
 #include <fmt/format.h>
 
@@ -108,7 +109,7 @@ int report_output(bool is_result) {
 // puts into share/tomofield.
 std::string materials() {
   namespace fs = std::filesystem;
-  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
+  const fs::path folder = base::program_path().parent_path();
   for (const char* place : {"materials.txt", "../share/tomofield/materials.txt"}) {
     if (fs::exists(folder / place)) return io::read_text_file(folder / place);
   }

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <hdf5.h>
 
+#include <cstdlib>
+#include <new>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -56,6 +58,18 @@ std::string last_reason() {
     reason = said.substr(0, said.find('\''));
   }
   return reason.empty() ? "unknown reason" : reason;
+}
+
+// Throws std::bad_alloc unless there is the memory that HDF5 takes for a file. HDF5 1.10 crashes if
+// it cannot allocate its cache, which has about 200 KiB. It keeps the cache of the first file for
+// those that follow.
+void require_memory_of_a_file() {
+  constexpr int kBytes = 1 << 20;
+  void* memory = std::malloc(kBytes);
+  if (memory == nullptr) throw std::bad_alloc();
+  *static_cast<volatile char*>(memory) = 0;  // else the compiler leaves the allocation out
+  std::free(memory);
+  H5set_free_list_limits(kBytes, kBytes, 0, 0, 0, 0);
 }
 
 // Owns a handle of any kind.
@@ -268,6 +282,7 @@ template void Hdf5Group::write_array(const std::string&, std::span<const float>)
 template void Hdf5Group::write_array(const std::string&, std::span<const double>);
 template void Hdf5Group::write_array(const std::string&, std::span<const std::int64_t>);
 Hdf5File Hdf5File::create(const std::filesystem::path& path) {
+  require_memory_of_a_file();
   const QuietErrors quiet;
   const Handle access = file_access();
   const Handle properties = creation(H5P_FILE_CREATE);

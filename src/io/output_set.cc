@@ -69,9 +69,9 @@ struct OutputSet::Change {
   // Gives back the old file. Returns false if that is not possible.
   bool undo() const {
     if (old.empty()) return is_removal || ::unlink(target.c_str()) == 0 || errno == ENOENT;
-    if (!rename_file(old, target)) return false;
-    ::unlink(old.c_str());  // is still there if both were names of one file
-    return true;
+    std::error_code absent;
+    if (fs::equivalent(old, target, absent)) return ::unlink(old.c_str()) == 0;
+    return rename_file(old, target);
   }
 };
 
@@ -120,9 +120,11 @@ void OutputSet::commit() {
   } catch (const Error& error) {
     std::string lost;
     for (auto change = changes.rbegin(); change != changes.rend(); ++change) {
-      if (!change->undo())
-        lost += fmt::format("; '{}' is new, and '{}' is what it replaced", change->target.string(),
-                            change->old.string());
+      if (change->undo()) continue;
+      lost += change->old.empty()
+                  ? fmt::format("; '{}' is new, and cannot be removed", change->target.string())
+                  : fmt::format("; what was in '{}' is now in '{}'", change->target.string(),
+                                change->old.string());
     }
     throw Error(error.what() + lost);
   }

@@ -178,6 +178,7 @@ TEST_F(Checkpoint, AStateThatTheSeriesAndTheOptionsCannotHaveIsRefused) {
       [](State& s) { s.doubles["views"][2] = 0; },
       [](State& s) { s.doubles["epoch_sums"].resize(6); },
       [&](State& s) { s.doubles["epoch_sums"][1] = nan; },
+      [&](State& s) { s.doubles["epoch_sums"][6] = nan; },  // the limited squares of the first view
       [](State& s) { s.doubles["data_loss"].clear(); },
       [](State& s) { s.doubles["held_out_error"] = {1}; },
       [](State& s) { s.integers["tree_updates"] = {}; },

@@ -121,7 +121,7 @@ class Sweep:
         after = self.contents()
         # If the system refuses to give the old files back, the message names what lies where. Files
         # that could not get their names stay as well until the next run.
-        may_mix = ended.returncode == -9 or "is what it replaced" in ended.stderr
+        may_mix = ended.returncode == -9 or "what was in" in ended.stderr
         hidden = {name for name in after if name.startswith(".")}
         assert may_mix or not hidden, (str(fault), hidden, ended)
         if ended.returncode == 0:
