@@ -23,13 +23,25 @@ constexpr const char* kChecksum = "xxh64";
 constexpr std::size_t kLongestAttribute = 60000;
 constexpr int kMostOfAGroup = 8;  // HDF5's default for compact storage
 
+constexpr int kMemoryOfAFile = 1 << 20;  // bytes; the cache of a file has about 200 KiB
+
+// Sets up HDF5 once, before any other call of it.
+void set_up_library() {
+  [[maybe_unused]] static const bool is_done = [] {
+    // HDF5 1.10 crashes at program exit if a file could not be closed for lack of disk space.
+    // Files are closed here explicitly, so HDF5 has nothing to do at exit.
+    H5dont_atexit();
+    // The cache of the first file is kept for those that follow.
+    H5set_free_list_limits(kMemoryOfAFile, kMemoryOfAFile, 0, 0, 0, 0);
+    return true;
+  }();
+}
+
 // Silences HDF5, which prints its errors by default; a library must never print.
 class QuietErrors {
  public:
   QuietErrors() {
-    // HDF5 1.10 crashes at program exit if a file could not be closed for lack of disk space.
-    // Files are closed here explicitly, so HDF5 has nothing to do at exit.
-    [[maybe_unused]] static const herr_t never_at_exit = H5dont_atexit();
+    set_up_library();
     H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   }
@@ -61,15 +73,12 @@ std::string last_reason() {
 }
 
 // Throws std::bad_alloc unless there is the memory that HDF5 takes for a file. HDF5 1.10 crashes if
-// it cannot allocate its cache, which has about 200 KiB. It keeps the cache of the first file for
-// those that follow.
+// it cannot allocate its cache.
 void require_memory_of_a_file() {
-  constexpr int kBytes = 1 << 20;
-  void* memory = std::malloc(kBytes);
+  void* memory = std::malloc(kMemoryOfAFile);
   if (memory == nullptr) throw std::bad_alloc();
   *static_cast<volatile char*>(memory) = 0;  // else the compiler leaves the allocation out
   std::free(memory);
-  H5set_free_list_limits(kBytes, kBytes, 0, 0, 0, 0);
 }
 
 // Owns a handle of any kind.
