@@ -57,6 +57,21 @@ cmp program.mrc example.mrc || fail "examples/reconstruct_stack gives another to
   fail "examples/query_plane failed"
 [ "$(wc -c <plane.pgm)" -eq $((32 * 32 + 13)) ] || fail "plane.pgm has another size"
 
+# The portable folder runs with its own libraries alone, also through a link, and names itself.
+"$source_dir/tools/portable_folder" "$scratch/prefix" "$scratch/portable"
+lib=$scratch/portable/lib
+loaded=$("$lib/ld-linux-x86-64.so.2" --library-path "$lib" --list "$lib/tomofield")
+if sed -n 's/.*=> \([^ ]*\) .*/\1/p' <<<"$loaded" | grep -v "^$lib/" >&2; then
+  fail "the portable program loads the libraries above"
+fi
+ln -s "$scratch/portable/bin/tomofield" "$scratch/linked"
+says=$(env -i "$scratch/linked" --version --verbose) || fail "the portable program fails"
+grep -q "^\(libc6 \|The packages .* without dpkg\)" <<<"$says" ||
+  fail "the portable program does not find its bill of materials"
+env -i PATH=/usr/bin:/bin "$scratch/linked" compare cell/tilt_series.mrc --tlt cell/tilt_series.tlt \
+  --thickness 16 --contrast bright --no-margin --methods wbp -o compared >/dev/null ||
+  fail "the portable program cannot start itself"
+
 python_package=("$scratch"/prefix/lib/python3*/dist-packages)
 if [ -d "${python_package[0]}" ]; then
   PYTHONPATH=${python_package[0]} /usr/bin/python3 "$source_dir/examples/reconstruct.py" \
