@@ -4,6 +4,7 @@ find_package(hwy REQUIRED)
 set(HDF5_PREFER_PARALLEL OFF)
 find_package(HDF5 REQUIRED COMPONENTS C)
 find_package(PNG REQUIRED)
+find_package(TIFF 4.5 REQUIRED)
 find_package(kissfft REQUIRED COMPONENTS float SHARED)
 find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
@@ -16,7 +17,7 @@ set(TOMOFIELD_COMMON_LIBRARIES
   Threads::Threads fmt::fmt nlohmann_json::nlohmann_json)
 
 # The layer of that name alone compiles against these.
-set(TOMOFIELD_io_LIBRARIES HDF5::HDF5 PNG::PNG)
+set(TOMOFIELD_io_LIBRARIES HDF5::HDF5 PNG::PNG TIFF::TIFF)
 set(TOMOFIELD_kernels_LIBRARIES hwy::hwy)
 set(TOMOFIELD_field_LIBRARIES $<BUILD_INTERFACE:Eigen3::Eigen>)
 set(TOMOFIELD_objective_LIBRARIES kissfft::kissfft-float)

@@ -1,5 +1,7 @@
 // Writes the files that the fuzz targets begin with: write_seeds FOLDER makes FOLDER/TARGET/….
 
+#include <tiffio.h>
+
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
@@ -36,6 +38,14 @@ const std::string kMdoc =
     "PixelSpacing = 2.17\n[T = Tilt axis angle = 85.9]\n\n[ZValue = 0]\nTiltAngle = -40\n"
     "[ZValue = 1]\nTiltAngle = -20\n[ZValue = 2]\nTiltAngle = 0\n[ZValue = 3]\nTiltAngle = 20\n"
     "[ZValue = 4]\nTiltAngle = 40\nPixelSpacing = 2.17\n";
+const std::string kTiltCom =
+    "$setenv IMOD_OUTPUT_FORMAT MRC\n$tilt -StandardInput\nInputProjections TS_ali.mrc\n"
+    "IMAGEBINNED 2\nTILTFILE TS.tlt\nTHICKNESS 24\nXAXISTILT 1.5\nLOG 0.0\nFULLIMAGE 24 20\n"
+    "SUBSETSTART -2 0\nOFFSET 0.5 1\nSHIFT 2 -3\nWIDTH 12\nSLICE 2 9\nEXCLUDELIST2 1,3-4\n"
+    "XTILTFILE TS.xtilt\nMODE 1\n$if (-e ./savework) ./savework\n";
+const std::string kNewstCom =
+    "$newstack -StandardInput\nInputFile\tTS.st\nOutputFile\tTS_ali.mrc\nTransformFile\tTS.xf\n"
+    "SizeToOutputInXandY\t10,8\nOffsetsInXandY\t1.0,0.0\n#DistortionField\t.idf\nBinByFactor\t2\n";
 const std::string kFiducials = "1 1 5 6 0\n1 1 5.5 6 1\n1 2 12 10 2\n1 2 13 10 3\n";
 const std::string kConfig =
     "thickness = 24\ntv = 1.5\nfield = \"grid\"\nroi = [0, 0, 16, 16]\nno-margin = true\n"
@@ -68,6 +78,41 @@ void write_stack(const fs::path& path, io::MrcMode mode) {
     file.write_rows(section, 0, kHeight, values);
   }
   file.close();
+}
+
+// Writes TIFF files of two pages, in strips and in tiles, plain and compressed.
+void write_tiffs(const fs::path& folder) {
+  fs::create_directories(folder);
+  struct Kind {
+    const char* name;
+    std::uint16_t bits, format, compression;
+    bool is_tiled;
+  };
+  for (const Kind kind :
+       {Kind{"bytes", 8, SAMPLEFORMAT_UINT, COMPRESSION_NONE, false},
+        Kind{"shorts", 16, SAMPLEFORMAT_INT, COMPRESSION_LZW, false},
+        Kind{"floats", 32, SAMPLEFORMAT_IEEEFP, COMPRESSION_ADOBE_DEFLATE, true}}) {
+    TIFF* file = TIFFOpen((folder / kind.name).c_str(), "w");
+    for (int page = 0; page < 2; ++page) {
+      TIFFSetField(file, TIFFTAG_IMAGEWIDTH, kWidth);
+      TIFFSetField(file, TIFFTAG_IMAGELENGTH, kHeight);
+      TIFFSetField(file, TIFFTAG_BITSPERSAMPLE, kind.bits);
+      TIFFSetField(file, TIFFTAG_SAMPLEFORMAT, kind.format);
+      TIFFSetField(file, TIFFTAG_COMPRESSION, kind.compression);
+      TIFFSetField(file, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+      std::vector<char> values(static_cast<std::size_t>(32 * 32 * kind.bits / 8), 7);
+      if (kind.is_tiled) {
+        TIFFSetField(file, TIFFTAG_TILEWIDTH, 32);
+        TIFFSetField(file, TIFFTAG_TILELENGTH, 32);
+        TIFFWriteEncodedTile(file, 0, values.data(), TIFFTileSize(file));
+      } else {
+        TIFFSetField(file, TIFFTAG_ROWSPERSTRIP, kHeight);
+        TIFFWriteEncodedStrip(file, 0, values.data(), TIFFStripSize(file));
+      }
+      TIFFWriteDirectory(file);
+    }
+    TIFFClose(file);
+  }
 }
 
 // Returns one file of a series in the form that series_fuzz reads.
@@ -129,6 +174,9 @@ int main(int argc, char** argv) {
   write(folder / "mdoc" / "mdoc", kMdoc);
   write(folder / "fiducials" / "text", kFiducials);
   write(folder / "config" / "toml", kConfig);
+  write(folder / "command_file" / "tilt", kTiltCom);
+  write(folder / "command_file" / "both", kTiltCom + '\1' + kNewstCom);
+  write_tiffs(folder / "tiff");
   write_trials(folder / "trials");
   for (const io::MrcMode mode : {io::MrcMode::kInt8, io::MrcMode::kInt16, io::MrcMode::kUint16,
                                  io::MrcMode::kFloat16, io::MrcMode::kFloat32})

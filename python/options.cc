@@ -92,11 +92,15 @@ void add_files(py::module_& module) {
 }
 
 void add_views_and_specimen(Class& options) {
-  options.def_readwrite("exclude", &Options::exclude)
+  options.def_readwrite("tilt_offset_deg", &Options::tilt_offset_deg)
+      .def_readwrite("x_axis_tilt_deg", &Options::x_axis_tilt_deg)
+      .def_readwrite("exclude", &Options::exclude)
+      .def_readwrite("ignore", &Options::ignore)
       .def_readwrite("bin", &Options::bin)
       .def_readwrite("angpix", &Options::angpix)
       .def_readwrite("pixel_size_A", &Options::pixel_size_A)
       .def_readwrite("take_log", &Options::take_log)
+      .def_readwrite("log_base", &Options::log_base)
       .def_readwrite("black_level", &Options::black_level)
       .def_readwrite("bead_diameter_nm", &Options::bead_diameter_nm)
       .def_readwrite("remove_fixed_pattern", &Options::remove_fixed_pattern)
@@ -104,6 +108,7 @@ void add_views_and_specimen(Class& options) {
       .def_readwrite("hand", &Options::hand)
       .def_readwrite("axis_x", &Options::axis_x)
       .def_readwrite("axis_z", &Options::axis_z)
+      .def_readwrite("shift_z", &Options::shift_z)
       .def_readwrite("with_margin", &Options::with_margin);
   add_choice(options, "contrast", &Options::contrast);
   add_rectangle(options);

@@ -28,7 +28,7 @@ enum class VoxelType { kFloat32, kFloat16, kInt16 };
 
 /// The files that a tilt series is read from.
 struct SeriesFiles {
-  std::filesystem::path stack;                 ///< MRC stack, raw or aligned
+  std::filesystem::path stack;                 ///< MRC or TIFF stack, raw or aligned
   std::optional<std::filesystem::path> tlt;    ///< .tlt or .rawtlt: an angle in degrees a section
   std::optional<std::filesystem::path> xf;     ///< IMOD raw-to-aligned transforms
   std::optional<std::filesystem::path> xtilt;  ///< IMOD x-axis tilt, degrees a section
@@ -53,12 +53,16 @@ struct Rectangle {
 /// view; lengths of the field are binned pixels.
 struct Options {
   // Views
-  std::string exclude;                 ///< 1-based sections to leave out: "1-3,40"
-  double bin = 1.0;                    ///< reduce views by this factor, at least 1
-  std::optional<double> angpix;        ///< or to this pixel size in Å
+  double tilt_offset_deg = 0;    ///< added to all tilt angles
+  double x_axis_tilt_deg = 0;    ///< tilt of the specimen about X, which the volume turns back
+  std::string exclude;           ///< 1-based sections to leave out: "1-3,40"
+  std::string ignore;            ///< entries of other programs' files that are not applied
+  double bin = 1.0;              ///< reduce views by this factor, at least 1
+  std::optional<double> angpix;  ///< or to this pixel size in Å
   std::optional<double> pixel_size_A;  ///< overrides the header's pixel size
   Contrast contrast = Contrast::kDark;
   bool take_log = false;              ///< −ln(I / I0) instead of I0 − I; dark contrast only
+  double log_base = 0;                ///< added to intensities before the logarithm
   std::optional<double> black_level;  ///< subtracted from bright intensities, in units of the stack
   std::optional<double> bead_diameter_nm;  ///< of gold beads to find and mask; 0: none
   bool remove_fixed_pattern = true;        ///< what stays at one place of the detector
@@ -69,6 +73,7 @@ struct Options {
   int hand = 1;                  ///< 1: x = X cos + Z sin; −1: mirrored in Z
   std::optional<double> axis_x;  ///< tilt axis on the view; default: its centre
   std::optional<double> axis_z;  ///< tilt axis in the volume; default: its centre
+  double shift_z = 0;            ///< moves the specimen up in the volume
   bool with_margin = true;       ///< false: the specimen ends inside the field of view
 
   // Field

@@ -14,12 +14,16 @@ class Options(TypedDict, total=False):
     """
 
     # Views
+    tilt_offset_deg: float
+    x_axis_tilt_deg: float
     exclude: str
+    ignore: str
     bin: float
     angpix: Optional[float]
     pixel_size_A: Optional[float]
     contrast: Literal["dark", "bright"]
     take_log: bool
+    log_base: float
     black_level: Optional[float]
     bead_diameter_nm: Optional[float]
     remove_fixed_pattern: bool
@@ -30,6 +34,7 @@ class Options(TypedDict, total=False):
     hand: Literal[1, -1]
     axis_x: Optional[float]
     axis_z: Optional[float]
+    shift_z: float
     with_margin: bool
 
     # Field

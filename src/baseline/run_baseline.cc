@@ -166,9 +166,10 @@ void write_results(const Solution& solution, const measurement::Measurement& ser
   write_voxels(voxels_of(solution.densities), output::region_box(info, 1.0), info,
                fmt::format("baseline {}", facts_of(options.method).name),
                output::volume_options(options.shared), paths.volume);
-  io::write_json(
-      paths.json,
-      {{"tomofield", TOMOFIELD_VERSION}, {"options", options_json(options)}, {"metrics", metrics}});
+  io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
+                              {"options", options_json(options)},
+                              {"origins", option_table::to_json(options.origins)},
+                              {"metrics", metrics}});
 }
 
 BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays,

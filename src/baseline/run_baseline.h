@@ -8,6 +8,7 @@
 #include "baseline/method.h"
 #include "io/output_lock.h"
 #include "measurement/prepare.h"
+#include "option_table/setting.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
 
@@ -20,6 +21,8 @@ struct BaselineOptions {
   /// fit_view_scale, hold_out, tune (tune.h), volume, output and overwrite. Others have no effect.
   Options shared;
   Method method;
+  /// Settings that the files of a project made, for the metrics; they are among the options.
+  std::vector<option_table::Setting> origins = {};
 };
 
 /// The files of a run, named after its volume.

@@ -29,6 +29,7 @@ namespace tomofield::cli {
 namespace {
 
 using option_table::Group;
+using Origins = std::vector<option_table::Setting>;
 
 template <typename Method>
 struct Arguments {
@@ -82,12 +83,12 @@ void run_method(const baseline::BaselineOptions& options, const baseline::Method
 }
 
 template <typename Method>
-void run(Arguments<Method>& arguments) {
+void run(Arguments<Method>& arguments, const Origins& origins) {
   const Options& shared = arguments.choices.options;
   Method& method = arguments.method;
   if constexpr (requires { method.non_negative; })
     method.non_negative = arguments.non_negative.value_or(shared.contrast != Contrast::kDark);
-  const baseline::BaselineOptions options{arguments.choices.files, shared, method};
+  const baseline::BaselineOptions options{arguments.choices.files, shared, method, origins};
   std::vector<io::OutputLock> locks;
   if (arguments.dry_run)
     baseline::check_options(options);
@@ -133,7 +134,7 @@ void add_run_options(CLI::App& command, Arguments<Method>& arguments) {
 }
 
 template <typename Method>
-std::shared_ptr<Arguments<Method>> add_method(CLI::App& command) {
+std::shared_ptr<Arguments<Method>> add_method(CLI::App& command, const Origins& origins) {
   auto arguments = std::make_shared<Arguments<Method>>();
   add_input_options(command, arguments->choices);
   add_groups(command, arguments->choices, {Group::kSpecimen});
@@ -145,14 +146,14 @@ std::shared_ptr<Arguments<Method>> add_method(CLI::App& command) {
   add_common_options(command);
   add_trace_option(command, arguments->trace);
   add_help_all(command);
-  command.callback([arguments] { run(*arguments); });
+  command.callback([arguments, &origins] { run(*arguments, origins); });
   return arguments;
 }
 
-void add_wbp(CLI::App& baseline) {
+void add_wbp(CLI::App& baseline, const Origins& origins) {
   CLI::App& command = *baseline.add_subcommand(
       "wbp", "Weighted (filtered) back-projection: a ramp filter with a roll-off");
-  const auto arguments = add_method<baseline::WbpOptions>(command);
+  const auto arguments = add_method<baseline::WbpOptions>(command, origins);
   baseline::RampFilterOptions& filter = arguments->method.filter;
   const char* group = "Method";
   add_enum_option<baseline::RampWindow>(command, "--window", filter.window,
@@ -173,10 +174,10 @@ void add_wbp(CLI::App& baseline) {
       ->group(group);
 }
 
-void add_sirt(CLI::App& baseline) {
+void add_sirt(CLI::App& baseline, const Origins& origins) {
   CLI::App& command = *baseline.add_subcommand(
       "sirt", "Simultaneous iterative reconstruction, stopped before it fits the noise");
-  const auto arguments = add_method<baseline::SirtOptions>(command);
+  const auto arguments = add_method<baseline::SirtOptions>(command, origins);
   command
       .add_option("--relaxation", arguments->method.relaxation, "Length of a step, between 0 and 2")
       ->check(number_between(0.01, 1.99))
@@ -184,10 +185,10 @@ void add_sirt(CLI::App& baseline) {
       ->group("Method");
 }
 
-void add_sart_tv(CLI::App& baseline) {
+void add_sart_tv(CLI::App& baseline, const Origins& origins) {
   CLI::App& command = *baseline.add_subcommand(
       "sart-tv", "Ordered subsets of views, with steps down the total variation between passes");
-  const auto arguments = add_method<baseline::SartTvOptions>(command);
+  const auto arguments = add_method<baseline::SartTvOptions>(command, origins);
   baseline::SartTvOptions& method = arguments->method;
   const char* group = "Method";
   command.add_option("--subsets", method.subsets, "Interleaved subsets of the views in a pass")
@@ -214,10 +215,10 @@ void add_sart_tv(CLI::App& baseline) {
       ->group(group);
 }
 
-void add_tv(CLI::App& baseline) {
+void add_tv(CLI::App& baseline, const Origins& origins) {
   CLI::App& command = *baseline.add_subcommand(
       "tv", "Least squares with total variation, by Chambolle and Pock's method");
-  const auto arguments = add_method<baseline::TvOptions>(command);
+  const auto arguments = add_method<baseline::TvOptions>(command, origins);
   baseline::TvOptions& method = arguments->method;
   const char* group = "Method";
   command
@@ -258,10 +259,10 @@ void add_network_options(CLI::App& command, baseline::NetworkOptions& method) {
   add_seed(command, method.seed, group);
 }
 
-void add_ingp(CLI::App& baseline) {
+void add_ingp(CLI::App& baseline, const Origins& origins) {
   CLI::App& command = *baseline.add_subcommand(
       "ingp", "A multi-resolution hash grid and a small network, as in Instant-NGP");
-  const auto arguments = add_method<baseline::IngpOptions>(command);
+  const auto arguments = add_method<baseline::IngpOptions>(command, origins);
   add_network_options(command, arguments->method);
   baseline::HashGridOptions& grid = arguments->method.grid;
   const char* group = "Method";
@@ -291,10 +292,10 @@ void add_ingp(CLI::App& baseline) {
       ->group(group);
 }
 
-void add_implicit(CLI::App& baseline) {
+void add_implicit(CLI::App& baseline, const Origins& origins) {
   CLI::App& command = *baseline.add_subcommand(
       "implicit", "A network of coordinates, which learns the noise of each view");
-  const auto arguments = add_method<baseline::ImplicitOptions>(command);
+  const auto arguments = add_method<baseline::ImplicitOptions>(command, origins);
   add_network_options(command, arguments->method);
   command
       .add_option("--features", arguments->method.features,
@@ -312,17 +313,17 @@ void add_implicit(CLI::App& baseline) {
 
 }  // namespace
 
-void add_baseline_command(CLI::App& program) {
+void add_baseline_command(CLI::App& program, const Origins& origins) {
   CLI::App& command =
       *program.add_subcommand("baseline", "Reconstruct by another method, to compare with");
   command.require_subcommand(1);
-  add_wbp(command);
-  add_sirt(command);
-  add_sart_tv(command);
-  add_tv(command);
-  add_tensorf(command);
-  add_ingp(command);
-  add_implicit(command);
+  add_wbp(command, origins);
+  add_sirt(command, origins);
+  add_sart_tv(command, origins);
+  add_tv(command, origins);
+  add_tensorf(command, origins);
+  add_ingp(command, origins);
+  add_implicit(command, origins);
 }
 
 }  // namespace tomofield::cli

@@ -1,21 +1,26 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <vector>
 
 #include "distributed/communicator.h"
+#include "option_table/setting.h"
 
 namespace tomofield::cli {
 
 // Each adds one subcommand to the program; the subcommand's callback does the
 // work and throws tomofield::Error for the user's mistakes. One file each:
 // src/cli/NAME_command.cc.
-void add_baseline_command(CLI::App& program);
+/// The metrics list `origins`, the settings that come from a project (project_arguments.h). They
+/// may change until the command runs.
+void add_baseline_command(CLI::App& program, const std::vector<option_table::Setting>& origins);
 void add_compare_command(CLI::App& program);
 void add_evaluate_command(CLI::App& program);
 void add_export_command(CLI::App& program);
 void add_info_command(CLI::App& program);
 /// The only one that several processes may share.
-void add_reconstruct_command(CLI::App& program, const distributed::Communicator& processes);
+void add_reconstruct_command(CLI::App& program, const distributed::Communicator& processes,
+                             const std::vector<option_table::Setting>& origins);
 void add_simulate_command(CLI::App& program);
 
 }  // namespace tomofield::cli

@@ -70,7 +70,8 @@ std::string notes_of(const CLI::Option& option) {
 bool is_shown(const CLI::Option& option, CLI::AppFormatMode mode) {
   if (mode == CLI::AppFormatMode::All) return true;
   const option_table::Row* row = row_of_option(option);
-  return row == nullptr ? option.get_group() != kHelpAllGroup : row->is_common;
+  const std::string& group = option.get_group();
+  return row == nullptr ? group != kHelpAllGroup && group != kProjectGroup : row->is_common;
 }
 
 std::string usage_of(const CLI::App& command, const std::string& name) {

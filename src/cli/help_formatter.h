@@ -5,8 +5,9 @@
 
 namespace tomofield::cli {
 
-/// The group of options outside of the table that --help-all alone shows.
+/// The groups of options outside of the table that --help-all alone shows.
 inline constexpr const char* kHelpAllGroup = "Diagnosis";
+inline constexpr const char* kProjectGroup = "Projects of other programs";
 
 /// Formats help texts for a screen of 100 columns. --help shows the common options of the table
 /// (option_table/rows.h) and those outside of it, --help-all shows all.

@@ -18,8 +18,10 @@
 #include "io/mrc.h"
 #include "io/mrc_format.h"
 #include "io/positioned_file.h"
+#include "io/tiff_stack.h"
 #include "output/model_file.h"
 #include "output/shared_options.h"
+#include "tilt_series/open_views.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::cli {
@@ -28,10 +30,14 @@ namespace {
 using field::Field;
 using field::LeafShape;
 
-enum class FileKind { kMrc, kHdf5 };
+enum class FileKind { kMrc, kHdf5, kOtherImages };
 
-/// Returns the kind of a file by its first bytes, never by its name.
+/// Returns the kind of a file by its first bytes. The images that an .mdoc names, and those of a
+/// folder, are no file.
 FileKind kind_of(const std::filesystem::path& path) {
+  if (path.extension() == ".mdoc" || std::filesystem::is_directory(path))
+    return FileKind::kOtherImages;
+  if (io::is_tiff(path)) return FileKind::kOtherImages;
   constexpr std::string_view kHdf5Signature = "\x89HDF\r\n\x1a\n";
   const io::PositionedFile file(path, io::PositionedFile::Access::kRead);
   std::array<char, kHdf5Signature.size()> start{};
@@ -79,6 +85,15 @@ void print_mrc(const std::filesystem::path& path) {
         header.max, header.mean, header.rms);
   print_extended_header(header);
   for (const std::string& label : header.labels) print("  label            {}\n", label);
+}
+
+/// Prints what is known of a TIFF stack, or of images in several files.
+void print_other_images(const tilt_series::TiltSeriesOptions& options) {
+  const auto stack = tilt_series::open_views(options);
+  const io::MrcHeader& header = stack->header();
+  print("{}: image stack\n", stack->name());
+  print("  size             {} × {} × {} (x, y, sections)\n", header.nx, header.ny, header.nz);
+  print_voxel_size(header);
 }
 
 void print_series(const tilt_series::TiltSeriesOptions& options) {
@@ -181,10 +196,15 @@ void print_info(const tilt_series::TiltSeriesOptions& options) {
   switch (kind_of(options.stack)) {
     case FileKind::kHdf5:
       return print_model(options.stack);
+    case FileKind::kOtherImages:
+      print_other_images(options);
+      break;
     case FileKind::kMrc:
+      tilt_series::open_views(options);  // refuses other files of a series, with advice
       print_mrc(options.stack);
-      if (options.tlt || options.aln || options.mdoc) print_series(options);
+      break;
   }
+  if (options.tlt || options.aln || options.mdoc) print_series(options);
 }
 
 }  // namespace

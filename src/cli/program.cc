@@ -22,6 +22,7 @@
 #include "cli/console.h"
 #include "cli/exit_status.h"
 #include "cli/help_formatter.h"
+#include "cli/project_arguments.h"
 #include "io/text_lines.h"
 #include "tomofield/error.h"
 
@@ -32,9 +33,10 @@ void print_log(base::LogLevel level, std::string_view message) {
   say("{}{}\n", level == base::LogLevel::kWarning ? "warning: " : "", message);
 }
 
-void add_commands(CLI::App& program, const distributed::Communicator& processes) {
-  add_reconstruct_command(program, processes);
-  add_baseline_command(program);
+void add_commands(CLI::App& program, const distributed::Communicator& processes,
+                  const std::vector<option_table::Setting>& origins) {
+  add_reconstruct_command(program, processes, origins);
+  add_baseline_command(program, origins);
   add_export_command(program);
   add_evaluate_command(program);
   add_compare_command(program);
@@ -136,13 +138,16 @@ void print_answer(const CLI::App& program, const CLI::ParseError& request) {
   print_text(answer.str());
 }
 
-// Parses the command line and runs the command. Returns the exit status, or throws.
+// Parses the command line and runs the command. `origins` gets the settings that a project makes.
+// Returns the exit status, or throws.
 int run_command(CLI::App& program, std::vector<std::string> arguments,
-                const distributed::Communicator& processes) {
+                const distributed::Communicator& processes,
+                std::vector<option_table::Setting>& origins) {
   processes.run_collectively([&] {
     require_known_command(program, arguments);
     require_shared_command(arguments, processes);
     expand_config_file(program, arguments);
+    origins = expand_project(program, arguments);
   });
   std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them last first
   try {
@@ -187,9 +192,10 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
   add_version_flag(program);
   program.formatter(std::make_shared<HelpFormatter>());
   program.require_subcommand(1);
-  add_commands(program, processes);
+  std::vector<option_table::Setting> origins;
+  add_commands(program, processes, origins);
   try {
-    return run_command(program, {argv + 1, argv + argc}, processes);
+    return run_command(program, {argv + 1, argv + argc}, processes, origins);
   } catch (const distributed::SharedError& error) {
     tell(error.what());
     return 2;

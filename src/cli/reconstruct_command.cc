@@ -23,9 +23,11 @@ struct Arguments {
   std::optional<std::filesystem::path> trace;
 };
 
-void run(const Arguments& arguments, const distributed::Communicator& processes) {
+void run(const Arguments& arguments, const distributed::Communicator& processes,
+         const std::vector<option_table::Setting>& origins) {
   reconstruction::ReconstructOptions options =
       reconstruction::run_options(arguments.choices.files, arguments.choices.options);
+  options.origins = origins;
   std::vector<io::OutputLock> locks;
   processes.run_collectively([&] {
     locks = claim_run(options, arguments.dry_run || !processes.is_root());
@@ -42,7 +44,8 @@ void run(const Arguments& arguments, const distributed::Communicator& processes)
 
 }  // namespace
 
-void add_reconstruct_command(CLI::App& program, const distributed::Communicator& processes) {
+void add_reconstruct_command(CLI::App& program, const distributed::Communicator& processes,
+                             const std::vector<option_table::Setting>& origins) {
   CLI::App& command = *program.add_subcommand(
       "reconstruct", "Reconstruct a tomogram and a model from a tilt series");
   auto arguments = std::make_shared<Arguments>();
@@ -56,7 +59,7 @@ void add_reconstruct_command(CLI::App& program, const distributed::Communicator&
   command.footer(
       "Example: tomofield reconstruct series.mrc --tlt series.tlt --xf series.xf --bin 4 \\\n"
       "           --thickness 1200 -o tomogram.mrc");
-  command.callback([arguments, &processes] { run(*arguments, processes); });
+  command.callback([arguments, &processes, &origins] { run(*arguments, processes, origins); });
 }
 
 }  // namespace tomofield::cli

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "cli/project_arguments.h"
+
 namespace tomofield::cli {
 namespace {
 
@@ -93,6 +95,7 @@ void add_series_options(CLI::App& command, Choices& choices) {
 
 void add_input_options(CLI::App& command, Choices& choices) {
   add_groups(command, choices, {Group::kSeries});
+  add_project_options(command);
   add_series_options(command, choices);
 }
 

@@ -32,12 +32,13 @@ void add_method_options(CLI::App& command, Arguments& arguments) {
   add_non_negative(command, arguments.non_negative);
 }
 
-void run(Arguments& arguments) {
+void run(Arguments& arguments, const std::vector<option_table::Setting>& origins) {
   Options& requested = arguments.choices.options;
   if (arguments.non_negative)
     requested.activation = *arguments.non_negative ? Activation::kSoftplus : Activation::kIdentity;
   reconstruction::ReconstructOptions options =
       reconstruction::run_options(arguments.choices.files, requested);
+  options.origins = origins;
   options.field.depth = 0;  // the tree is one node
   const std::vector<io::OutputLock> locks = claim_run(options, arguments.dry_run);
   const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
@@ -56,7 +57,7 @@ void run(Arguments& arguments) {
 
 }  // namespace
 
-void add_tensorf(CLI::App& baseline) {
+void add_tensorf(CLI::App& baseline, const std::vector<option_table::Setting>& origins) {
   CLI::App& command = *baseline.add_subcommand(
       "tensorf", "One factorised tensor for the whole region, coarse to fine, as in TensoRF");
   const auto arguments = std::make_shared<Arguments>();
@@ -69,7 +70,7 @@ void add_tensorf(CLI::App& baseline) {
   add_common_options(command);
   add_trace_option(command, arguments->trace);
   add_help_all(command);
-  command.callback([arguments] { run(*arguments); });
+  command.callback([arguments, &origins] { run(*arguments, origins); });
 }
 
 }  // namespace tomofield::cli

@@ -44,17 +44,31 @@ struct MdocSection {
   int line = 0;              ///< line of the tilt angle, or of the section's head without one
   std::optional<double> tilt_deg;
   std::optional<double> pixel_spacing_A;
+  std::optional<double> prior_dose;    ///< PriorRecordDose: electrons / Å² before this section
+  std::optional<std::int64_t> time_s;  ///< DateTime, in seconds from some day on
+  std::string frame_name;              ///< SubFramePath without its folders
 };
+
+/// The tilt axis of the images, counter-clockwise from +Y, and the line that says so.
+using AxisAngle = NumberLine;
 
 /// The contents of SerialEM's .mdoc, with sections in ascending order of n.
 struct Mdoc {
   std::optional<double> pixel_spacing_A;  ///< value of the series, or of its first section
+  /// "[T = Tilt axis angle = X]", else TiltAxisAngle. RotationAngle is another angle.
+  std::optional<AxisAngle> tilt_axis_deg;
+  std::string image_file;  ///< ImageFile: the stack, without its folders
   std::vector<MdocSection> sections;
 };
 
 /// Reads an .mdoc file. Skips unknown keys, because SerialEM adds new ones every year. Throws Error
 /// for a section that comes twice.
 Mdoc read_mdoc(const std::filesystem::path& path);
+
+/// Returns the indices of the sections of an .mdoc in the order in which they were recorded: by
+/// DateTime, else by PriorRecordDose, else by their numbers. A key counts if all sections have it
+/// and no two are equal.
+std::vector<std::size_t> acquisition_order(const Mdoc& mdoc);
 
 /// AreTomo's global alignment of one section: raw − centre = R(rotation) q + shift.
 struct AreTomoRow {
@@ -70,8 +84,10 @@ struct AreTomoRow {
 struct AreTomoAlignment {
   std::optional<std::array<std::int64_t, 3>> raw_size;  ///< size of the stack that was aligned
   std::vector<std::int64_t> dark_sections;              ///< second number of each # DarkFrame line
+  std::vector<double> dark_tilt_deg;                    ///< its third number, if every line has one
   double alpha_offset_deg = 0.0;                        ///< already included in the rows' angles
   double beta_offset_deg = 0.0;
+  std::optional<double> thickness;  ///< of the specimen, in pixels; none if it was not measured
   std::vector<AreTomoRow> rows;
   std::int64_t num_local_rows = 0;  ///< number of rows for patches, which are not used
 };
@@ -81,8 +97,9 @@ AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path);
 
 /// Returns the zero-based section of the stack for each row. AreTomo's versions count SEC from 0 or
 /// from 1, and before or after the removal of dark frames; the stack may also be the one before or
-/// after the removal. The only numbering in which all rows fit `num_sections` is taken. Throws
-/// Error with both numbers and both files if there is none.
+/// after the removal. The only numbering in which all rows fit `num_sections` is taken. Where 0
+/// stands for the section of every dark frame, their tilts tell where they are among the rows.
+/// Throws Error with both numbers and both files if there is no such numbering.
 std::vector<std::int64_t> assign_aretomo_sections(const AreTomoAlignment& alignment,
                                                   const std::filesystem::path& aln,
                                                   std::int64_t num_sections,

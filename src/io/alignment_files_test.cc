@@ -128,6 +128,61 @@ TEST(Mdoc, RefusesWhatContradictsItself) {
     EXPECT_THROW(read_mdoc(scratch.write("a.mdoc", bad)), Error) << bad;
 }
 
+TEST(Mdoc, AxisComesFromTheTitleAndNeverFromRotationAngle) {
+  const ScratchDirectory scratch;
+  const auto axis = [&](const std::string& text) {
+    return read_mdoc(scratch.write("a.mdoc", text + "\n[ZValue = 0]\nRotationAngle = 175\n"))
+        .tilt_axis_deg;
+  };
+  const std::string title = "[T =     Tilt axis angle = -94.8, binning = 1  spot = 8  camera = 0]";
+  EXPECT_EQ(axis(title)->value, -94.8);
+  EXPECT_EQ(axis("TiltAxisAngle = 176.5\n" + title)->value, -94.8);
+  EXPECT_EQ(axis("TiltAxisAngle = 176.5\n" + title)->line, 2);
+  EXPECT_EQ(axis(title + "\nTiltAxisAngle = 176.5")->value, -94.8);
+  EXPECT_EQ(axis("TiltAxisAngle = 176.5")->value, 176.5);
+  EXPECT_EQ(axis("[T = SerialEM: Digitized on EMBL Krios]"), std::nullopt);
+  expect_parts(message_of<Error>([&] { axis("[T = Tilt axis angle = steep, binning = 1]"); }),
+               {"a.mdoc", "line 1", "steep"});
+}
+
+std::vector<std::size_t> order_of(const std::vector<std::string>& entries) {
+  const ScratchDirectory scratch;
+  std::string text;
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    text += "[ZValue = " + std::to_string(i) + "]\n" + entries[i] + "\n";
+  return acquisition_order(read_mdoc(scratch.write("a.mdoc", text)));
+}
+
+TEST(Mdoc, OrderIsByTimeElseByDoseElseByNumber) {
+  using Order = std::vector<std::size_t>;
+  EXPECT_EQ(order_of({"DateTime = 01-Mar-21  00:00:03\nPriorRecordDose = 0",
+                      "DateTime = 28-Feb-21  23:59:59\nPriorRecordDose = 6",
+                      "DateTime = 01-Mar-21  00:00:01\nPriorRecordDose = 3"}),
+            (Order{1, 2, 0}));
+  EXPECT_EQ(order_of({"DateTime = 2024-03-01 00:00:03", "DateTime = 2024-02-29 23:59:59"}),
+            (Order{1, 0}));
+  // One of the times is none, or two are the same.
+  EXPECT_EQ(order_of({"DateTime = 31-Feb-21 00:00:01\nPriorRecordDose = 3",
+                      "DateTime = 01-Feb-21 00:00:01\nPriorRecordDose = 0"}),
+            (Order{1, 0}));
+  EXPECT_EQ(order_of({"DateTime = 01-Feb-21 00:00:01\nPriorRecordDose = 3",
+                      "DateTime = 01-Feb-21 00:00:01\nPriorRecordDose = 0"}),
+            (Order{1, 0}));
+  EXPECT_EQ(order_of({"PriorRecordDose = 0", "PriorRecordDose = 0"}), (Order{0, 1}));
+  EXPECT_EQ(order_of({"PriorRecordDose = 5", ""}), (Order{0, 1}));
+}
+
+TEST(Mdoc, FilesAreNamedWithoutTheirFolders) {
+  const ScratchDirectory scratch;
+  const Mdoc mdoc = read_mdoc(scratch.write(
+      "a.mdoc",
+      "ImageFile = D:\\data\\a.st\n[ZValue = 0]\nSubFramePath = X:\\fr ames\\a_1.eer\n"
+      "[ZValue = 1]\nSubFramePath = /mnt/a_2.tif\n"));
+  EXPECT_EQ(mdoc.image_file, "a.st");
+  EXPECT_EQ(mdoc.sections[0].frame_name, "a_1.eer");
+  EXPECT_EQ(mdoc.sections[1].frame_name, "a_2.tif");
+}
+
 std::string aln_row(int section) {
   return std::to_string(section) + " 85.5 1.0 3.5 -2.25 nan 1.0 1.0 0.0 " +
          std::to_string(10 * section - 20) + "\n";
@@ -141,6 +196,7 @@ TEST(AreTomoAlignment, ReadsHeaderGlobalAndLocalRows) {
 # DarkFrame =     0    1   -10.00
 # AlphaOffset =     1.50
 # BetaOffset =     0.25
+# Thickness = 1240
 # SEC     ROT         GMAG       TX          TY      SMEAN     SFIT    SCALE     BASE     TILT
 )" + aln_row(0) + aln_row(2) + "# Local Alignment\n0 0 1.0 2.0 0.1 0.2 1.0\n1 0 1 2 0 0 1\n");
   const AreTomoAlignment alignment = read_aretomo_alignment(path);
@@ -148,6 +204,8 @@ TEST(AreTomoAlignment, ReadsHeaderGlobalAndLocalRows) {
   EXPECT_EQ(alignment.dark_sections, Sections{1});
   EXPECT_EQ(alignment.alpha_offset_deg, 1.5);
   EXPECT_EQ(alignment.beta_offset_deg, 0.25);
+  EXPECT_EQ(alignment.dark_tilt_deg, std::vector<double>{-10});
+  EXPECT_EQ(alignment.thickness, 1240);
   ASSERT_EQ(alignment.rows.size(), 2u);
   EXPECT_EQ(alignment.rows[1].section, 2);
   EXPECT_EQ(alignment.rows[1].rotation_deg, 85.5);
@@ -194,6 +252,33 @@ TEST(AreTomoSections, EveryWayOfCounting) {
   EXPECT_EQ(assign({1, 2, 3}, {2}, 4), (Sections{0, 2, 3}));  // after removal, from 1
   EXPECT_EQ(assign({0, 2, 3}, {1}, 3), (Sections{0, 1, 2}));  // dark frames removed from the stack
   EXPECT_EQ(assign({0, 1, 2}, {1}, 3), (Sections{0, 1, 2}));
+}
+
+/// Assigns rows of these tilts, numbered from `first`, beside dark frames whose section is 0.
+Sections assign_by_tilt(const std::vector<double>& tilts, const std::vector<double>& dark,
+                        std::int64_t first, double alpha_deg = 0) {
+  AreTomoAlignment alignment;
+  alignment.alpha_offset_deg = alpha_deg;
+  alignment.dark_sections.assign(dark.size(), 0);
+  alignment.dark_tilt_deg = dark;
+  for (const double tilt_deg : tilts) {
+    alignment.rows.emplace_back();
+    alignment.rows.back().section = first + std::ssize(alignment.rows) - 1;
+    alignment.rows.back().tilt_deg = tilt_deg;
+  }
+  return assign_aretomo_sections(alignment, "a.aln", std::ssize(tilts) + std::ssize(dark), "a.st");
+}
+
+TEST(AreTomoSections, DarkFramesWithoutSectionsAreFoundByTilt) {
+  for (const std::int64_t first : {0, 1, 3}) {
+    EXPECT_EQ(assign_by_tilt({-20, 0, 20}, {-10, 30}, first), (Sections{0, 2, 3}));
+    EXPECT_EQ(assign_by_tilt({20, 0, -20}, {-10, 30}, first), (Sections{1, 2, 4}));
+    EXPECT_EQ(assign_by_tilt({-18, 2, 22}, {-10, 30}, first, 2), (Sections{0, 2, 3}));
+  }
+  // The offset decides, rows are in no order, or a tilt is there twice.
+  EXPECT_THROW(assign_by_tilt({-18, 2, 22}, {1}, 1, 2), Error);
+  EXPECT_THROW(assign_by_tilt({0, -20, 20}, {10}, 1), Error);
+  EXPECT_THROW(assign_by_tilt({-20, 0, 20}, {20}, 1), Error);
 }
 
 TEST(AreTomoSections, NeverAssumes) {

@@ -1,8 +1,6 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <numeric>
-#include <set>
+#include <array>
 #include <string>
 
 #include "io/alignment_files.h"
@@ -49,12 +47,16 @@ void parse_header_line(const std::filesystem::path& path, const TextLine& line,
   } else if (name == "DarkFrame") {
     require(2);
     alignment->dark_sections.push_back(integer(1));
+    if (numbers.size() > 2) alignment->dark_tilt_deg.push_back(numbers[2]);
   } else if (name == "AlphaOffset") {
     require(1);
     alignment->alpha_offset_deg = numbers[0];
   } else if (name == "BetaOffset") {
     require(1);
     alignment->beta_offset_deg = numbers[0];
+  } else if (name == "Thickness") {
+    require(1);
+    if (numbers[0] > 0) alignment->thickness = numbers[0];
   }
 }
 
@@ -80,23 +82,6 @@ AreTomoRow parse_row(const std::filesystem::path& path, const TextLine& line) {
   return {*section, line.number, used[0], used[1], used[2], used[3], used[4]};
 }
 
-/// Returns true if the numbers are exactly first, …, first + count − 1 in some order.
-bool are_consecutive(const std::set<std::int64_t>& numbers, std::int64_t first, std::size_t count) {
-  return numbers.size() == count && !numbers.empty() && *numbers.begin() == first &&
-         *numbers.rbegin() == first + static_cast<std::int64_t>(count) - 1;
-}
-
-std::vector<std::int64_t> all_but(const std::vector<std::int64_t>& left_out, std::int64_t offset,
-                                  std::int64_t count) {
-  std::vector<std::int64_t> kept;
-  for (std::int64_t section = 0; section < count; ++section) {
-    if (std::find(left_out.begin(), left_out.end(), section + offset) == left_out.end()) {
-      kept.push_back(section);
-    }
-  }
-  return kept;
-}
-
 }  // namespace
 
 AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path) {
@@ -116,63 +101,6 @@ AreTomoAlignment read_aretomo_alignment(const std::filesystem::path& path) {
     throw Error(fmt::format("'{}' has no rows of an AreTomo alignment", path.string()));
   }
   return alignment;
-}
-
-std::vector<std::int64_t> assign_aretomo_sections(const AreTomoAlignment& alignment,
-                                                  const std::filesystem::path& aln,
-                                                  std::int64_t num_sections,
-                                                  const std::filesystem::path& stack) {
-  const auto& rows = alignment.rows;
-  const auto num_rows = static_cast<std::int64_t>(rows.size());
-  const auto num_dark = static_cast<std::int64_t>(alignment.dark_sections.size());
-  const bool stack_is_complete = num_rows + num_dark == num_sections;
-  const bool stack_is_reduced = num_rows == num_sections;
-  if (!stack_is_complete && !stack_is_reduced) {
-    throw Error(fmt::format(
-        "'{}' has {} aligned sections{} but '{}' has {}; give the stack that AreTomo "
-        "aligned",
-        aln.string(), num_rows, num_dark > 0 ? fmt::format(" and {} dark ones", num_dark) : "",
-        stack.string(), num_sections));
-  }
-  std::set<std::int64_t> numbers;
-  for (const AreTomoRow& row : rows) numbers.insert(row.section);
-  std::set<std::int64_t> with_dark = numbers;
-  with_dark.insert(alignment.dark_sections.begin(), alignment.dark_sections.end());
-  const auto total = rows.size() + alignment.dark_sections.size();
-
-  // The numbering is from before the removal if rows and dark frames together are complete, and
-  // from after it if the rows alone are.
-  const bool is_before =
-      are_consecutive(with_dark, 0, total) || are_consecutive(with_dark, 1, total);
-  const bool is_after =
-      are_consecutive(numbers, 0, rows.size()) || are_consecutive(numbers, 1, rows.size());
-  if (!is_before && !is_after) {
-    throw Error(
-        fmt::format("'{}': the section numbers (SEC) of {} rows and {} dark frames are "
-                    "neither complete nor each there once, so no section of '{}' can be "
-                    "told for them",
-                    aln.string(), num_rows, num_dark, stack.string()));
-  }
-  std::vector<std::int64_t> sections;
-  if (is_before && stack_is_complete) {
-    for (const AreTomoRow& row : rows) sections.push_back(row.section - *with_dark.begin());
-    return sections;
-  }
-  // Otherwise only the order of the rows counts. In a reduced stack it gives the section directly;
-  // in a complete one it gives the place among the sections that are not dark.
-  std::vector<std::int64_t> kept(rows.size());
-  std::iota(kept.begin(), kept.end(), 0);
-  if (stack_is_complete) kept = all_but(alignment.dark_sections, *numbers.begin(), num_sections);
-  if (kept.size() != rows.size()) {
-    throw Error(
-        fmt::format("'{}': the numbers of the dark frames do not fit the {} sections of '{}'",
-                    aln.string(), num_sections, stack.string()));
-  }
-  for (const AreTomoRow& row : rows) {
-    const auto rank = std::distance(numbers.begin(), numbers.find(row.section));
-    sections.push_back(kept[static_cast<std::size_t>(rank)]);
-  }
-  return sections;
 }
 
 }  // namespace tomofield::io

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string_view>
 #include <utility>
 
+#include "io/mdoc_images.h"
+#include "io/tiff_stack.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -40,9 +43,40 @@ class MemoryStack : public ImageStack {
   MrcHeader header_;
 };
 
+/// A kind of file that belongs to a tilt series and is no stack.
+struct OtherFile {
+  std::string_view extension, what, how_to_give;
+};
+constexpr OtherFile kOtherFiles[] = {
+    {".tlt", "a list of tilt angles", "give the stack, and this file with --tlt"},
+    {".rawtlt", "a list of tilt angles", "give the stack, and this file with --tlt"},
+    {".xtilt", "a list of x-axis tilts", "give the stack, and this file with --xtilt"},
+    {".xf", "a list of IMOD's transforms", "give the raw stack, and this file with --xf"},
+    {".aln", "AreTomo's alignment", "give the raw stack, and this file with --aln"},
+    {".com", "a command file of IMOD",
+     "`tomofield reconstruct` reads eTomo's tilt.com and what it names"},
+    {".star", "a STAR file", "`tomofield reconstruct` reads those of a project alone"},
+    {".tomostar", "a tilt series of Warp", "`tomofield reconstruct` reads it in its project"},
+    {".xml", "metadata of Warp", "`tomofield reconstruct` reads it in its project"},
+    {".toml", "a configuration file", "give the stack, and this file with --config"},
+};
+
+/// Throws Error for a file whose name says that it is no stack.
+void refuse_other_file(const std::filesystem::path& path, std::string_view extension) {
+  for (const OtherFile& other : kOtherFiles) {
+    if (extension != other.extension) continue;
+    throw Error(fmt::format("'{}' is {}, not a stack of images: {}", path.string(), other.what,
+                            other.how_to_give));
+  }
+}
+
 }  // namespace
 
 std::shared_ptr<const ImageStack> open_image_stack(const std::filesystem::path& path) {
+  const std::string extension = path.extension().string();
+  if (extension == ".mdoc") return open_mdoc_images(path, path.parent_path());
+  refuse_other_file(path, extension);
+  if (is_tiff(path)) return open_tiff_stack(path);
   return std::make_shared<FileStack>(path);
 }
 

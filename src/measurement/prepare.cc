@@ -77,10 +77,11 @@ void check_axis(const geometry::TiltGeometry& g, double factor) {
   for (const double offset :
        {g.axis_x - static_cast<double>(g.width) / 2, g.axis_z - g.thickness / 2}) {
     if (std::abs(offset) <= reach) continue;
-    throw Error(fmt::format(
-        "--center puts the tilt axis {:g} pixels from the middle of a view {:g} pixels wide: give "
-        "x[,z] in unbinned pixels of the aligned view and the volume",
-        offset * factor, static_cast<double>(g.width) * factor));
+    throw Error(
+        fmt::format("--center and --shift-z put the tilt axis {:g} pixels from the middle of a "
+                    "view {:g} pixels wide: give "
+                    "them in unbinned pixels of the aligned view and the volume",
+                    offset * factor, static_cast<double>(g.width) * factor));
   }
 }
 
@@ -264,6 +265,7 @@ Measurement plan_measurement(const tilt_series::TiltSeries& series,
   plan.geometry.hand = specimen.hand;
   if (specimen.axis_x) plan.geometry.axis_x = *specimen.axis_x / plan.bin_factor;
   if (specimen.axis_z) plan.geometry.axis_z = *specimen.axis_z / plan.bin_factor;
+  plan.geometry.axis_z += specimen.shift_z / plan.bin_factor;
   plan.roi = specimen.roi ? scaled_roi(*specimen.roi, plan.bin_factor)
                           : Rectangle{0, 0, plan.geometry.width, plan.geometry.height};
   check_roi(plan.roi, plan.geometry, plan.bin_factor);

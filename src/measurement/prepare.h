@@ -23,6 +23,7 @@ struct SpecimenOptions {
   int hand = 1;                  ///< 1 or −1 (TiltGeometry)
   std::optional<double> axis_x;  ///< tilt axis on the view; default: its centre
   std::optional<double> axis_z;  ///< and in the volume; default: its centre
+  double shift_z = 0;            ///< moves the specimen up in the volume
   bool with_margin = true;       ///< false: the specimen ends inside the field of view
   /// Returns every fault of these options, a sentence each.
   std::vector<std::string> faults() const;

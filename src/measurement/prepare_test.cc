@@ -142,12 +142,14 @@ TEST(PrepareSeries, BinnedViewsHaveABinnedGeometry) {
   files.options().bin = 2;
   SpecimenOptions options = specimen();
   options.axis_x = 15.0;
+  options.shift_z = 6.0;
   options.roi = Rectangle{4, 6, 30, 28};
   const Measurement prepared = files.prepared(options);
   EXPECT_EQ(prepared.geometry.width, kWidth / 2);
   EXPECT_EQ(prepared.geometry.height, kHeight / 2);
   EXPECT_EQ(prepared.geometry.thickness, kThickness / 2);
   EXPECT_EQ(prepared.geometry.axis_x, 7.5);
+  EXPECT_EQ(prepared.geometry.axis_z, prepared.geometry.thickness / 2 + 3);
   EXPECT_EQ(prepared.roi.x0, 2);
   EXPECT_EQ(prepared.roi.y1, 14);
   EXPECT_NEAR(prepared.pixel_size_A, 5.0, 1e-6);

@@ -28,7 +28,7 @@ constexpr Row kRows[] = {
     // The series
     {.key = "input.stack", .flag = "stack", MEMBER(SeriesFiles, stack), .group = Group::kSeries,
      .label = "STACK",
-     .help = "Tilt series: an MRC stack, raw or aligned", .is_common = true, .is_required = true},
+     .help = "Tilt series: a stack, raw or aligned, or a project", .is_common = true, .is_required = true},
 
     // Tilt angles and alignment
     {.key = "input.tlt", .flag = "--tlt", MEMBER(SeriesFiles, tlt), .group = Group::kAlignment,
@@ -47,9 +47,20 @@ constexpr Row kRows[] = {
      .group = Group::kAlignment,
      .help = "SerialEM's metadata (.mdoc): angles, and the pixel size if the stack has none. "
              "The angles of --tlt take precedence over those of --mdoc and --aln"},
+    {.key = "input.tilt_offset_deg", .flag = "--tilt-offset", MEMBER(Options, tilt_offset_deg),
+     .group = Group::kAlignment, .unit = "degrees", .range = Range::between(-90, 90),
+     .help = "Added to all tilt angles: the tilt of the specimen at the angle 0, as IMOD's OFFSET"},
+    {.key = "input.x_axis_tilt_deg", .flag = "--x-axis-tilt", MEMBER(Options, x_axis_tilt_deg),
+     .group = Group::kAlignment, .unit = "degrees", .range = Range::between(-60, 60),
+     .help = "Tilt of the specimen about the X axis, which the volume turns back, as IMOD's "
+             "XAXISTILT: subtracted from --xtilt"},
     {.key = "input.exclude", .flag = "--exclude", MEMBER(Options, exclude),
      .group = Group::kAlignment, .label = "LIST",
      .help = "Sections to leave out, counted from 1, as in 1-3,40"},
+    {.key = "input.ignore", .flag = "--ignore", MEMBER(Options, ignore),
+     .group = Group::kAlignment, .label = "NAMES",
+     .help = "Entries of other programs' files that are not applied, as in LOCALFILE,LOG (tilt.com) "
+             "or TiltAxisAngle (.mdoc)"},
 
     // Images
     {.key = "input.bin", .flag = "--bin", MEMBER(Options, bin), .group = Group::kImages,
@@ -70,6 +81,9 @@ constexpr Row kRows[] = {
     {.key = "input.log", .flag = "--log", MEMBER(Options, take_log), .group = Group::kImages,
      .help = "Take the logarithm of the transmitted intensity instead of its linear approximation "
              "(with --contrast dark)"},
+    {.key = "input.log_base", .flag = "--log-base", MEMBER(Options, log_base),
+     .group = Group::kImages, .unit = "intensity", .range = Range::between(-1e6, 1e6),
+     .help = "Added to all intensities before the logarithm, as IMOD's LOG (with --log)"},
     {.key = "input.black_level", .flag = "--black-level", MEMBER(Options, black_level),
      .group = Group::kImages, .unit = "intensity",
      .automatic = "what trials prefer, up to the intensity of the emptiest places; 0 without trials",
@@ -111,6 +125,9 @@ constexpr Row kRows[] = {
     {.key = "specimen.axis_z", .flag = "--center", MEMBER(Options, axis_z),
      .group = Group::kSpecimen, .label = "X[,Z]", .unit = kUnbinned, .automatic = "the centre",
      .help = "Height of the tilt axis in the volume: the second number of --center"},
+    {.key = "specimen.shift_z", .flag = "--shift-z", MEMBER(Options, shift_z),
+     .group = Group::kSpecimen, .unit = kUnbinned, .range = Range::between(-1e6, 1e6),
+     .help = "Moves the specimen up by so much in the volume (minus the Z of IMOD's SHIFT)"},
     {.key = "field.with_margin", .flag = "--no-margin", MEMBER(Options, with_margin),
      .group = Group::kSpecimen,
      .help = "The specimen ends inside the field of view; the program models nothing outside it"},

@@ -19,14 +19,15 @@ namespace {
 // The addresses of all members. A member that is added does not compile here until it is named.
 std::vector<const void*> members_of(const Choices& choices) {
   const auto& [stack, tlt, xf, xtilt, aln, mdoc, mask, fiducials] = choices.files;
-  const auto& [exclude, bin, angpix, pixel_size, contrast, take_log, black_level, bead_diameter,
-               fixed_pattern, thickness, roi, hand, axis_x, axis_z, with_margin, field, leaf_size,
-               tree, leaf_budget, vertex_spacing, rank, activation, margin_spacing, epochs,
-               vertex_epochs, coarse_epochs, coarse_bin, subsets, engine, ray_samples,
-               rays_per_step, learning_rate, density_variation, factor_variation, penalty, boundary,
-               fourier, fourier_ring, keep_spikes, fit_noise, fit_view_scale, hold_out, tune,
-               patience, seed, voxel_type, axes, invert, output, overwrite, resume,
-               checkpoint_minutes] = choices.options;
+  const auto& [tilt_offset, x_axis_tilt, exclude, ignore, bin, angpix, pixel_size, contrast,
+               take_log, log_base, black_level, bead_diameter, fixed_pattern, thickness, roi, hand,
+               axis_x, axis_z, shift_z, with_margin, field, leaf_size, tree, leaf_budget,
+               vertex_spacing, rank, activation, margin_spacing, epochs, vertex_epochs,
+               coarse_epochs, coarse_bin, subsets, engine, ray_samples, rays_per_step,
+               learning_rate, density_variation, factor_variation, penalty, boundary, fourier,
+               fourier_ring, keep_spikes, fit_noise, fit_view_scale, hold_out, tune, patience, seed,
+               voxel_type, axes, invert, output, overwrite, resume, checkpoint_minutes] =
+      choices.options;
   return {&stack,
           &tlt,
           &xf,
@@ -35,12 +36,16 @@ std::vector<const void*> members_of(const Choices& choices) {
           &mdoc,
           &mask,
           &fiducials,
+          &tilt_offset,
+          &x_axis_tilt,
           &exclude,
+          &ignore,
           &bin,
           &angpix,
           &pixel_size,
           &contrast,
           &take_log,
+          &log_base,
           &black_level,
           &bead_diameter,
           &fixed_pattern,
@@ -49,6 +54,7 @@ std::vector<const void*> members_of(const Choices& choices) {
           &hand,
           &axis_x,
           &axis_z,
+          &shift_z,
           &with_margin,
           &field,
           &leaf_size,
@@ -121,7 +127,7 @@ TEST(OptionTable, AutomaticDefaultsAreDescribed) {
   for (const Row& row : all_rows()) {
     const bool is_chosen = !text_of(row, choices).has_value();
     const bool is_file = label_of(row) == "FILE" || row.key == "input.stack";
-    const bool is_list = row.key == "input.exclude";
+    const bool is_list = row.key == "input.exclude" || row.key == "input.ignore";
     EXPECT_EQ(!row.automatic.empty(), is_chosen && !is_file && !is_list) << row.key;
   }
 }

@@ -29,12 +29,16 @@ tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Op
   series.mdoc = files.mdoc;
   series.mask = files.mask;
   series.fiducials = files.fiducials;
+  series.tilt_offset_deg = options.tilt_offset_deg;
+  series.x_axis_tilt_deg = options.x_axis_tilt_deg;
   series.exclude = options.exclude;
+  series.ignore = options.ignore;
   series.bin = options.bin;
   series.angpix = options.angpix;
   series.pixel_size_A = options.pixel_size_A;
   series.contrast = options.contrast;
   series.take_log = options.take_log;
+  series.log_base = options.log_base;
   series.background = options.black_level.value_or(0.0);
   series.bead_diameter_nm = options.bead_diameter_nm;
   series.remove_fixed_pattern = options.remove_fixed_pattern;
@@ -49,6 +53,7 @@ measurement::SpecimenOptions specimen_options(const Options& options) {
                                         .hand = options.hand,
                                         .axis_x = options.axis_x,
                                         .axis_z = options.axis_z,
+                                        .shift_z = options.shift_z,
                                         .with_margin = options.with_margin};
   if (const auto& roi = options.roi) specimen.roi = {roi->x0, roi->y0, roi->x1, roi->y1};
   return specimen;

@@ -8,6 +8,7 @@
 #include "fit/options.h"
 #include "io/output_lock.h"
 #include "measurement/prepare.h"
+#include "option_table/setting.h"
 #include "output/volume.h"
 #include "reconstruct/automatic_choice.h"
 #include "tilt_series/tilt_series.h"
@@ -33,6 +34,8 @@ struct ReconstructOptions {
   fit::FieldOptions field;
   fit::FitOptions fit;
   output::VolumeOptions volume;
+  /// Settings that the files of a project made, for the metrics; they are among the options.
+  std::vector<option_table::Setting> origins;
 
   /// Returns the expected number of trials before the fit, which choose the settings `to_choose`; 0
   /// means that nothing is to be chosen. A series of few views cannot spare any of them for trials,

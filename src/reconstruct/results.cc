@@ -20,6 +20,7 @@
 #include "evaluate/artefacts.h"
 #include "io/json.h"
 #include "io/output_set.h"
+#include "option_table/setting.h"
 #include "output/metrics.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
@@ -187,6 +188,7 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   Results results{.model = {info, fit.take_field()},
                   .metrics = {{"tomofield", TOMOFIELD_VERSION},
                               {"options", options_json(options)},
+                              {"origins", option_table::to_json(options.origins)},
                               {"metrics", std::move(metrics)}},
                   .verdict = std::move(verdict),
                   .bead_masking = series.masks.bead_masking};

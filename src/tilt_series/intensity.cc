@@ -64,7 +64,7 @@ std::int64_t IntensityScale::convert(MaskedImage* image) const {
       value = static_cast<float>(empty_beam - value);
       continue;
     }
-    const double transmission = value / empty_beam;
+    const double transmission = (value + log_base) / (empty_beam + log_base);
     if (transmission < kMinTransmission) ++num_raised;
     value = static_cast<float>(-std::log(std::max(transmission, kMinTransmission)));
   }

@@ -15,6 +15,7 @@ struct IntensityScale {
   bool take_log = false;    ///< −ln(I / I0) instead of I0 − I; dark only
   double empty_beam = 0.0;  ///< I0; bright intensities need none
   double background = 0.0;  ///< is subtracted from bright intensities
+  double log_base = 0.0;    ///< is added to I and I0 before the logarithm
 
   /// Converts the valid pixels. A transmission I / I0 below 1e-3 is raised to it before the
   /// logarithm: nothing so low is ever measured, it comes from noise and subtraction. Returns how

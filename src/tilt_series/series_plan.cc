@@ -10,6 +10,7 @@
 #include "base/log.h"
 #include "base/plausible.h"
 #include "io/alignment_files.h"
+#include "option_table/name_list.h"
 #include "tilt_series/binning.h"
 #include "tilt_series/tilt_angles.h"
 #include "tomofield/error.h"
@@ -141,6 +142,20 @@ std::vector<io::NumberLine> read_x_tilts(const TiltSeriesOptions& options,
   return x_tilts;
 }
 
+/// Throws Error for a raw stack without an alignment, as the tilt axis of the .mdoc shows it.
+void require_vertical_axis(const TiltSeriesOptions& options, const io::Mdoc& mdoc,
+                           const io::ImageStack& stack) {
+  constexpr double kVertical_deg = 1.0;
+  if (!mdoc.tilt_axis_deg) return;
+  const double axis_deg = mdoc.tilt_axis_deg->value;
+  if (std::fabs(std::remainder(axis_deg, 180.0)) <= kVertical_deg) return;
+  if (option_table::has_name(option_table::split_names(options.ignore), "TiltAxisAngle")) return;
+  throw Error(fmt::format(
+      "'{}', line {}: the tilt axis is turned by {}° from the vertical, so '{}' must be aligned: "
+      "give --xf or --aln, or --ignore TiltAxisAngle if its views are aligned already",
+      options.mdoc->string(), mdoc.tilt_axis_deg->line, axis_deg, stack.name()));
+}
+
 void require_compatible(const TiltSeriesOptions& options) {
   if (options.xf && options.aln) {
     throw Error(fmt::format("'{}' (--xf) and '{}' (--aln) both align the views; give one of them",
@@ -148,12 +163,25 @@ void require_compatible(const TiltSeriesOptions& options) {
   }
   if (options.background != 0 && options.contrast == Contrast::kDark)
     throw Error("--black-level is for --contrast bright: leave it out");
+  if (options.log_base != 0 && !options.take_log)
+    throw Error("--log-base is for the logarithm: give --log as well, or leave it out");
   if (options.take_log && options.contrast == Contrast::kBright) {
     throw Error("--log is for transmitted intensities (--contrast dark); bright data need none");
   }
 }
 
+std::array<std::int64_t, 2> aligned_size(const InPlaneAlignment& alignment,
+                                         const io::MrcHeader& header) {
+  if (alignment.swaps_sizes()) return {header.ny, header.nx};
+  return {header.nx, header.ny};
+}
+
 }  // namespace
+
+std::array<std::int64_t, 2> aligned_size(const std::filesystem::path& xf,
+                                         const io::ImageStack& stack) {
+  return aligned_size(alignment_of_imod(xf, stack), stack.header());
+}
 
 SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& stack) {
   require_compatible(options);
@@ -161,7 +189,9 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
   const auto mdoc = options.mdoc ? std::optional(io::read_mdoc(*options.mdoc)) : std::nullopt;
   const auto aretomo =
       options.aln ? std::optional(read_aretomo(*options.aln, stack)) : std::nullopt;
-  const TiltAngles angles = find_tilt_angles(options, stack, aretomo, mdoc);
+  TiltAngles angles = find_tilt_angles(options, stack, aretomo, mdoc);
+  for (auto& angle : angles.of_section)
+    if (angle) angle->value += options.tilt_offset_deg;
   if (mdoc && std::ssize(mdoc->sections) != header.nz) {
     base::log_warning(fmt::format("'{}' has {} sections and '{}' {}: are they of one series?",
                                   options.mdoc->string(), mdoc->sections.size(), stack.name(),
@@ -173,13 +203,14 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
   std::optional<InPlaneAlignment> alignment;
   if (options.xf) alignment = alignment_of_imod(*options.xf, stack);
   if (aretomo) alignment = alignment_of_aretomo(*aretomo);
+  if (mdoc && !alignment) require_vertical_axis(options, *mdoc, stack);
 
   SeriesPlan plan;
   plan.angle_source = angles.source;
   plan.is_raw = alignment.has_value();
-  const bool swaps_sizes = alignment && alignment->swaps_sizes();
-  plan.aligned_width = swaps_sizes ? header.ny : header.nx;
-  plan.aligned_height = swaps_sizes ? header.nx : header.ny;
+  const auto size = aligned_size(alignment.value_or(InPlaneAlignment{}), header);
+  plan.aligned_width = size[0];
+  plan.aligned_height = size[1];
   plan.pixel_size_A = find_pixel_size(options, stack, mdoc);
   plan.bin_factor = find_bin_factor(options, plan);
   for (std::int64_t section = 0; section < header.nz; ++section) {
@@ -187,7 +218,8 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
     const bool is_dark = alignment && !alignment->of_section[at];
     if (is_dark || std::binary_search(excluded.begin(), excluded.end(), section)) continue;
     PlannedView planned;
-    planned.view = {section, require_usable_tilt(angles, section), x_tilts[at].value};
+    planned.view = {section, require_usable_tilt(angles, section),
+                    x_tilts[at].value - options.x_axis_tilt_deg};
     if (alignment) planned.raw_from_aligned = *alignment->of_section[at];
     plan.views.push_back(planned);
   }

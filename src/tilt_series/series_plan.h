@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -26,6 +28,11 @@ struct SeriesPlan {
   double bin_factor = 1.0;
   std::string angle_source;  ///< for messages: a file name, or the stack's header
 };
+
+/// Returns the width and the height that IMOD's transforms give the aligned views, in unbinned
+/// pixels: those of the stack, exchanged if the tilt axis is nearer to X than to Y.
+std::array<std::int64_t, 2> aligned_size(const std::filesystem::path& xf,
+                                         const io::ImageStack& stack);
 
 /// Brings the options, the files that they name and the stack together.
 /// Throws Error where they do not fit each other or cannot be right.

@@ -21,6 +21,7 @@
 #include "tilt_series/intensity.h"
 #include "tilt_series/masks/series_masks.h"
 #include "tilt_series/noise.h"
+#include "tilt_series/open_views.h"
 #include "tilt_series/series_plan.h"
 #include "tilt_series/view_check.h"
 #include "tilt_series/view_owner.h"
@@ -61,12 +62,12 @@ struct TiltSeries::Impl {
 
   explicit Impl(const TiltSeriesOptions& given)
       : options(given),
-        stack(given.images ? given.images : io::open_image_stack(given.stack)),
+        stack(open_views(given)),
         plan(plan_series(given, *stack)),
         decoder(*stack, plan, given.contrast, open_mask_of(given, *stack)),
         width(given.resample ? decoder.aligned_width() : decoder.recorded_width()),
         height(given.resample ? decoder.aligned_height() : decoder.recorded_height()),
-        intensity{given.contrast, given.take_log, 0.0, given.background} {
+        intensity{given.contrast, given.take_log, 0.0, given.background, given.log_base} {
     for (const PlannedView& planned : plan.views) views.push_back(planned.view);
     beads.discs.resize(views.size());
     beads.undecided.resize(views.size());
@@ -195,11 +196,12 @@ struct TiltSeries::Impl {
   // -------------------------------------------------------------- measuring
 
   void measure_logarithms(const distributed::Communicator& processes) {
-    if (!(intensity.empty_beam > 0.0)) {
+    if (!(intensity.empty_beam + intensity.log_base > 0.0)) {
       throw distributed::SharedError(
           fmt::format("--log needs positive intensities, but the empty beam of '{}' is "
                       "found at {}; the data may be normalised or line integrals already: "
-                      "leave --log out",
+                      "leave --log out (--ignore LOG, if a tilt.com has it), or add to them with "
+                      "--log-base",
                       stack->name(), intensity.empty_beam));
     }
     const base::TraceSpan span("take logarithms");

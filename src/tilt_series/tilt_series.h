@@ -20,19 +20,23 @@ namespace tomofield::tilt_series {
 
 /// Names the files of a tilt series and says how its intensities are read.
 struct TiltSeriesOptions {
-  std::filesystem::path stack;                   ///< MRC stack, raw or aligned
+  std::filesystem::path stack;                   ///< MRC or TIFF stack, raw or aligned
   std::shared_ptr<const io::ImageStack> images;  ///< views in memory, in place of `stack`
   std::optional<std::filesystem::path> tlt;    ///< .tlt or .rawtlt, one angle in degrees a section
   std::optional<std::filesystem::path> xf;     ///< IMOD raw → aligned transforms
   std::optional<std::filesystem::path> xtilt;  ///< IMOD x-axis tilt, degrees a section
   std::optional<std::filesystem::path> aln;    ///< AreTomo alignment (angles, rotation, shifts)
   std::optional<std::filesystem::path> mdoc;   ///< SerialEM metadata (angles, pixel size)
+  double tilt_offset_deg = 0;                  ///< added to all tilt angles
+  double x_axis_tilt_deg = 0;                  ///< subtracted from all x-axis tilts
+  std::string ignore;                          ///< entries of files that are not applied
   std::string exclude;                         ///< 1-based sections left out: "1-3,40"
   double bin = 1.0;                            ///< reduce views by this factor, >= 1
   std::optional<double> angpix;                ///< or to this pixel size in Å
   std::optional<double> pixel_size_A;          ///< overrides the header's pixel size
   Contrast contrast = Contrast::kDark;
   bool take_log = false;  ///< −ln(I / I0) instead of I0 − I; dark only
+  double log_base = 0;    ///< is added to intensities before the logarithm
   double background = 0;  ///< is subtracted from bright intensities, in the stack's units
   bool resample = true;   ///< false: views stay as they were recorded, with their alignment beside
   /// False: decoded views are given up as soon as they have been checked and measured.

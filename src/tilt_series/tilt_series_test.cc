@@ -172,6 +172,9 @@ TEST(TiltSeries, ImpossibleAnglesAreRefused) {
 
 TEST(TiltSeries, OptionsThatExcludeEachOther) {
   const ScratchDirectory scratch;
+  TiltSeriesOptions linear = small_series(scratch);
+  linear.log_base = 5;
+  expect_parts(refusal(linear), {"--log-base", "--log "});
   TiltSeriesOptions options = small_series(scratch);
   options.take_log = true;
   expect_parts(refusal(options), {"--log", "dark"});
@@ -230,6 +233,80 @@ TEST(TiltSeries, AnMdocOfAnotherSeriesIsSaid) {
   expect_parts(warnings.text(), {"two.mdoc", "1 sections", "2"});
   options.mdoc = scratch.write("no.mdoc", "-60.0\n-58.0\n");
   expect_parts(refusal(options), {"no.mdoc", "ZValue"});
+}
+
+TEST(TiltSeries, AnglesAreMovedByTheOffsetAndTheSpecimensTilt) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  options.xtilt = scratch.write("a.xtilt", "0.5\n0.5\n0.5\n");
+  options.tilt_offset_deg = 1.25;
+  options.x_axis_tilt_deg = 2;
+  const TiltSeries series(options);
+  EXPECT_EQ(series.views()[0].tilt_deg, -18.75);
+  EXPECT_EQ(series.views()[2].tilt_deg, 1.25);
+  for (const View& view : series.views()) EXPECT_EQ(view.x_tilt_deg, -1.5);
+  options.tilt_offset_deg = 85;
+  expect_parts(refusal(options), {"85", "section 3"});
+}
+
+TEST(TiltSeries, ARawStackMustBeAlignedIfTheMdocSaysSo) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  const auto with_axis = [&](const std::string& axis) {
+    options.mdoc = scratch.write("a.mdoc", "[T = Tilt axis angle = " + axis +
+                                               ", binning = 1]\n[ZValue = 0]\n[ZValue = 1]\n"
+                                               "[ZValue = 2]\n");
+    return refusal(options);
+  };
+  expect_parts(with_axis("85.9"),
+               {"a.mdoc", "line 1", "85.9", "a.st", "--xf", "--aln", "--ignore"});
+  expect_parts(with_axis("-1.5"), {"-1.5"});
+  for (const char* vertical : {"0.9", "-0.4", "180.5", "-179.2"})
+    EXPECT_EQ(with_axis(vertical), "");
+  options.ignore = "LOG, tiltaxisangle";
+  EXPECT_EQ(with_axis("85.9"), "");
+  options.ignore = "";
+  options.xf = scratch.write("a.xf", "1 0 0 1 0 0\n1 0 0 1 0 0\n1 0 0 1 0 0\n");
+  EXPECT_EQ(with_axis("85.9"), "");
+}
+
+TEST(TiltSeries, ViewsMayLieInOneFileEach) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  const LoadedView expected = load(TiltSeries(options), 1);
+  const auto view = [&](int section) {
+    return [section](std::int64_t x, std::int64_t y, std::int64_t) {
+      return some_value(x, y, section);
+    };
+  };
+  std::filesystem::create_directory(scratch / "views");
+  write_stack(scratch / "views" / "a_1.mrc", 16, 12, 1, view(0));
+  write_stack(scratch / "views" / "a_10.mrc", 16, 12, 1, view(1));
+  write_stack(scratch / "views" / "a_2_DW.mrc", 16, 12, 1, view(2));
+  options.mdoc = scratch.write("a.mdoc",
+                               "[ZValue = 0]\nSubFramePath = D:\\f\\a_1.eer\n[ZValue = 1]\n"
+                               "SubFramePath = a_10.eer\n[ZValue = 2]\nSubFramePath = a_2.eer\n");
+  options.stack = scratch / "views";
+  EXPECT_EQ(load(TiltSeries(options), 1).image, expected.image);
+
+  write_stack(scratch / "views" / "a_2_EVN.mrc", 16, 12, 1, view(2));
+  expect_parts(refusal(options), {"a.mdoc", "ZValue = 2", "a_2_DW.mrc", "a_2_EVN.mrc"});
+  write_stack(scratch / "views" / "a_2.mrc", 16, 12, 2, view(2));
+  expect_parts(refusal(options), {"a_2.mrc", "2 images"});
+  write_stack(scratch / "views" / "a_2.mrc", 16, 13, 1, view(2));
+  expect_parts(refusal(options), {"a_2.mrc", "16 × 13", "16 × 12"});
+  std::filesystem::remove(scratch / "views" / "a_1.mrc");
+  expect_parts(refusal(options), {"a.mdoc", "ZValue = 0", "a_1"});
+}
+
+TEST(TiltSeries, OtherFilesOfASeriesAreNamed) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  for (const std::string name : {"a.tlt", "b.rawtlt", "c.xf", "d.xtilt", "e.aln", "f.com", "g.star",
+                                 "h.tomostar", "i.xml", "j.toml"}) {
+    options.stack = scratch.write(name, "1 2 3\n");
+    expect_parts(refusal(options), {name, "not a stack"});
+  }
 }
 
 TEST(TiltSeries, FewPixelsThatAreNoNumbersAreMasked) {
@@ -325,6 +402,21 @@ TEST(TiltSeries, IsTheSameOnAnyNumberOfThreads) {
       ASSERT_EQ(load(on_five, view).valid, load(on_one, view).valid);
     }
   }
+}
+
+TEST(TiltSeries, LogarithmIsThatOfIntensitiesWithTheBase) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch, 1);
+  const auto intensities = [&](float base) {
+    write_stack(options.stack, 32, 32, 1,
+                [base](auto x, auto y, auto z) { return some_value(x, y, z) - base; });
+    options.log_base = static_cast<double>(base);
+    return load(TiltSeries(options), 0).image;
+  };
+  options.contrast = Contrast::kDark;
+  options.take_log = true;
+  const std::vector<float> expected = intensities(0), found = intensities(128);
+  for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(found[i], expected[i], 1e-5);
 }
 
 TEST(TiltSeries, LogarithmNeverSeesZero) {

@@ -1,0 +1,54 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <system_error>
+
+#include "io/alignment_files.h"
+#include "projects/formats.h"
+#include "tomofield/error.h"
+
+namespace tomofield::projects {
+
+namespace fs = std::filesystem;
+namespace {
+
+/// Returns the stack beside an .aln file: AreTomo3 writes it under the same name, and AreTomo2
+/// names the .aln file after it.
+fs::path find_stack(const fs::path& aln) {
+  constexpr std::array kExtensions{".mrc", ".st", ".mrcs", ".tif", ".tiff"};
+  for (const char* extension : kExtensions) {
+    fs::path stack = aln;
+    stack.replace_extension(extension);
+    std::error_code absent;
+    if (fs::exists(stack, absent)) return stack;
+  }
+  fs::path expected = aln;
+  expected.replace_extension(kExtensions.front());
+  throw Error(fmt::format(
+      "'{}' is AreTomo's alignment, and the stack that it aligns is not beside it as '{}': give "
+      "the stack itself, with --aln {}",
+      aln.string(), expected.filename().string(), aln.string()));
+}
+
+}  // namespace
+
+void read_aretomo_project(Project& project) {
+  const fs::path aln = project.request().path;
+  const io::AreTomoAlignment alignment = io::read_aretomo_alignment(aln);
+  project.set("stack", find_stack(aln).string(), aln, "RawSize");
+  project.set("--aln", aln.string(), aln, "SEC");
+  if (alignment.thickness)
+    project.set("--thickness", fmt::format("{}", *alignment.thickness), aln, "Thickness");
+  if (alignment.alpha_offset_deg != 0) {
+    project.warn(fmt::format("'{}': the tilts of its rows include AlphaOffset, {}°, already",
+                             aln.string(), alignment.alpha_offset_deg));
+  }
+  if (alignment.beta_offset_deg != 0) {
+    project.warn(
+        fmt::format("'{0}': BetaOffset, {1}°, is not applied, as in AreTomo's own volumes "
+                    "(--x-axis-tilt turns the specimen about X)",
+                    aln.string(), alignment.beta_offset_deg));
+  }
+}
+
+}  // namespace tomofield::projects

@@ -1,0 +1,138 @@
+#include "projects/command_entries.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <utility>
+
+#include "io/text_lines.h"
+#include "tomofield/error.h"
+
+namespace tomofield::projects {
+
+namespace fs = std::filesystem;
+namespace {
+
+std::string upper_case(std::string_view text) {
+  std::string upper(text);
+  std::ranges::transform(upper, upper.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return upper;
+}
+
+io::Command find_command(const fs::path& file, std::string_view program) {
+  std::vector<io::Command> found = io::read_command_file(file);
+  std::erase_if(found, [&](const io::Command& command) { return command.program != program; });
+  if (found.size() != 1) {
+    throw Error(
+        fmt::format("'{}' has {} commands ${}, and one is expected: give the command file "
+                    "of one {}",
+                    file.string(), found.size(), program,
+                    program == "tilt" ? "reconstruction (tilt.com)" : "aligned stack"));
+  }
+  if (upper_case(found.front().arguments).find("-STANDARDINPUT") == std::string::npos) {
+    throw Error(
+        fmt::format("'{}', line {}: ${} does not read its entries from the lines below it "
+                    "(-StandardInput), so they cannot be told: write it as eTomo does",
+                    file.string(), found.front().line, program));
+  }
+  return std::move(found.front());
+}
+
+}  // namespace
+
+CommandEntries::CommandEntries(Project& project, const fs::path& file, std::string_view program)
+    : project_(project), file_(file), command_(find_command(file, program)) {
+  project.add_file(file);
+}
+
+const io::CommandEntry* CommandEntries::find(std::string_view name) {
+  const std::string wanted = upper_case(name);
+  known_.insert(wanted);
+  const io::CommandEntry* found = nullptr;
+  for (const io::CommandEntry& entry : command_.entries) {
+    if (upper_case(entry.name) != wanted) continue;
+    if (found != nullptr) {
+      throw Error(fmt::format("'{}', line {}: {} comes twice, after line {}: leave one out",
+                              file_.string(), entry.line, entry.name, found->line));
+    }
+    found = &entry;
+  }
+  return found == nullptr || project_.ignores(name) ? nullptr : found;
+}
+
+void CommandEntries::fail(const io::CommandEntry& entry, std::string_view expected) const {
+  throw Error(fmt::format("'{}', line {}: '{}' is not {}", file_.string(), entry.line,
+                          io::quote(fmt::format("{} {}", entry.name, entry.value)), expected));
+}
+
+std::optional<std::string> CommandEntries::text(std::string_view name) {
+  const io::CommandEntry* entry = find(name);
+  if (entry == nullptr) return std::nullopt;
+  if (entry->value.empty()) fail(*entry, "an entry with a value");
+  return entry->value;
+}
+
+std::optional<fs::path> CommandEntries::path(std::string_view name) {
+  const auto value = text(name);
+  if (!value) return std::nullopt;
+  return file_.parent_path() / *value;
+}
+
+std::optional<std::vector<double>> CommandEntries::numbers(std::string_view name,
+                                                           std::size_t fewest, std::size_t most) {
+  const io::CommandEntry* entry = find(name);
+  if (entry == nullptr) return std::nullopt;
+  std::string list = entry->value;
+  std::ranges::replace(list, ',', ' ');
+  std::vector<double> values;
+  for (const std::string_view word : io::split_words(list)) {
+    const auto value = io::parse_number(word, base::kLargestPosition_px);
+    if (!value)
+      fail(*entry, fmt::format("a number from -{0:g} to {0:g}", base::kLargestPosition_px));
+    values.push_back(*value);
+  }
+  if (values.size() < fewest || values.size() > most) {
+    fail(*entry, fewest == most ? fmt::format("an entry of {} numbers", most)
+                                : fmt::format("an entry of {} to {} numbers", fewest, most));
+  }
+  return values;
+}
+
+std::optional<double> CommandEntries::number(std::string_view name) {
+  const auto values = numbers(name, 1, 1);
+  return values ? std::optional(values->front()) : std::nullopt;
+}
+
+std::vector<std::string> CommandEntries::texts(std::string_view name) {
+  const std::string wanted = upper_case(name);
+  known_.insert(wanted);
+  std::vector<std::string> values;
+  for (const io::CommandEntry& entry : command_.entries)
+    if (upper_case(entry.name) == wanted && !project_.ignores(name)) values.push_back(entry.value);
+  return values;
+}
+
+void CommandEntries::refuse(std::string_view name, std::string_view why) {
+  const io::CommandEntry* entry = find(name);
+  if (entry == nullptr) return;
+  throw Error(fmt::format("'{}', line {}: {} {}; --ignore {} goes on without it", file_.string(),
+                          entry->line, entry->name, why, name));
+}
+
+void CommandEntries::know(std::span<const std::string_view> names) {
+  for (const std::string_view name : names) known_.insert(upper_case(name));
+}
+
+void CommandEntries::warn_about_others() {
+  for (const io::CommandEntry& entry : command_.entries) {
+    if (!known_.insert(upper_case(entry.name)).second || project_.ignores(entry.name)) continue;
+    project_.warn(
+        fmt::format("'{}', line {}: {} is not known to this program and has no effect "
+                    "(--ignore {} says that this is meant)",
+                    file_.string(), entry.line, io::quote(entry.name), io::quote(entry.name)));
+  }
+}
+
+}  // namespace tomofield::projects

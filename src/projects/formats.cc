@@ -1,0 +1,29 @@
+#include "projects/formats.h"
+
+namespace tomofield::projects {
+namespace {
+
+constexpr Format kFormats[] = {
+    {.name = "eTomo's tilt.com",
+     .extension = ".com",
+     .is_main_file =
+         [](std::string_view name) {
+           return name == "tilt.com" || name == "tilta.com" || name == "tiltb.com";
+         },
+     .read = read_imod_project},
+    {.name = "AreTomo's alignment (.aln)",
+     .extension = ".aln",
+     .is_main_file = [](std::string_view name) { return name.ends_with(".aln"); },
+     .read = read_aretomo_project},
+    {.name = "SerialEM's metadata (.mdoc)",
+     .extension = ".mdoc",
+     .is_main_file = [](std::string_view name) { return name.ends_with(".mdoc"); },
+     .read = read_mdoc_project,
+     .is_metadata = true},
+};
+
+}  // namespace
+
+std::span<const Format> all_formats() { return kFormats; }
+
+}  // namespace tomofield::projects

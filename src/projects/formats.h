@@ -1,0 +1,19 @@
+#pragma once
+
+#include "projects/project.h"
+
+namespace tomofield::projects {
+
+// Each reads one kind of project (Format::read) and has a file of its own.
+
+/// Reads eTomo's tilt.com and the newst.com beside it. Sets the raw stack and its transforms, or
+/// the aligned stack, and what the reconstruction needs.
+void read_imod_project(Project& project);
+
+/// Reads AreTomo's .aln. The stack lies beside it.
+void read_aretomo_project(Project& project);
+
+/// Reads SerialEM's .mdoc. The stack lies beside it, or the images of the views, a file each.
+void read_mdoc_project(Project& project);
+
+}  // namespace tomofield::projects

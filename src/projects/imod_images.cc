@@ -1,0 +1,225 @@
+#include "projects/imod_images.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "io/image_stack.h"
+#include "tilt_series/series_plan.h"
+#include "tomofield/error.h"
+
+namespace tomofield::projects {
+
+namespace fs = std::filesystem;
+namespace {
+
+// With these entries of newst.com the aligned stack is more than the transforms of the raw one.
+constexpr std::array<std::string_view, 14> kBeyondTransforms{
+    "DistortionField", "GradientFile",          "ExpandByFactor",    "ShrinkByFactor",
+    "RotateByAngle",   "SectionsToRead",        "ExcludeSections",   "UseTransformLines",
+    "FileOfInputs",    "SkipSectionIncrement",  "ApplyOffsetsFirst", "OneTransformPerFile",
+    "WarpingFile",     "TwoDirectionTiltSeries"};
+
+// These make no difference to views that this program aligns itself, or to where they lie. It masks
+// what IMOD fills and tapers.
+constexpr std::array<std::string_view, 16> kHarmless{
+    "OutputFile",       "AntialiasFilter", "AdjustOrigin",  "ImagesAreBinned",
+    "TaperAtFill",      "FillValue",       "ModeToOutput",  "LinearInterpolation",
+    "NearestNeighbor",  "MemoryLimit",     "VerboseOutput", "BytesSignedInOutput",
+    "StripExtraHeader", "NumberedFromOne", "ParameterFile", "TestLimits"};
+
+// These say how the aligned stack was made, which is read as it is.
+constexpr std::array<std::string_view, 4> kOfRawStack{"InputFile", "TransformFile",
+                                                      "SizeToOutputInXandY", "OffsetsInXandY"};
+
+// Programs that change the aligned stack after newstack, as its labels say.
+constexpr std::array<std::string_view, 3> kCorrections{"ctfphaseflip", "mtffilter", "ccderaser"};
+
+bool is_file(const fs::path& path) {
+  std::error_code absent;
+  return fs::is_regular_file(path, absent);
+}
+
+/// A file that an entry names.
+struct NamedFile {
+  fs::path path;
+  fs::path named_in;
+  std::string entry;
+};
+
+/// Returns the file where the entry says that it is, or beside the command file or above it, where
+/// it lies if the folder was moved. Nothing if it is in none of these places.
+std::optional<NamedFile> find_file(CommandEntries& entries, std::string_view name) {
+  const auto path = entries.path(name);
+  if (!path) return std::nullopt;
+  const fs::path folder = entries.file().parent_path();
+  for (const fs::path& place :
+       {*path, folder / path->filename(), folder / ".." / path->filename()}) {
+    if (is_file(place)) return NamedFile{place, entries.file(), std::string(name)};
+  }
+  return std::nullopt;
+}
+
+/// A raw stack and its transforms.
+struct RawFiles {
+  NamedFile stack, xf;
+};
+
+std::optional<RawFiles> raw_files_of(CommandEntries& newst) {
+  const auto stack = find_file(newst, "InputFile");
+  const auto xf = find_file(newst, "TransformFile");
+  if (!stack || !xf) return std::nullopt;
+  return RawFiles{*stack, *xf};
+}
+
+/// Tells whether the raw stack has pieces of montages, which blend.com aligns: blenda.com for
+/// tilta.com.
+bool is_montage(const fs::path& tilt) {
+  std::string name = tilt.filename().string();
+  constexpr std::string_view kTilt = "tilt";
+  if (name.starts_with(kTilt)) name.replace(0, kTilt.size(), "blend");
+  return is_file(tilt.parent_path() / name) && name != tilt.filename().string();
+}
+
+/// Finds the raw files by eTomo's names: NAME.st or NAME.mrc, and NAME.xf, for NAME_ali.mrc or
+/// NAME.ali.
+std::optional<RawFiles> usual_raw_files(Project& project, CommandEntries& tilt) {
+  const auto aligned = tilt.path("InputProjections");
+  if (!aligned || project.ignores("TransformFile") || is_montage(tilt.file())) return std::nullopt;
+  std::string name = aligned->filename().string();
+  for (const std::string_view end : {"_ali.mrc", ".ali"})
+    if (name.ends_with(end)) name.erase(name.size() - end.size());
+  const fs::path folder = aligned->parent_path();
+  const fs::path xf = folder / (name + ".xf");
+  if (!is_file(xf)) return std::nullopt;
+  for (const char* extension : {".st", ".mrc"}) {
+    const fs::path stack = folder / (name + extension);
+    if (is_file(stack) && stack != *aligned) {
+      return RawFiles{{stack, tilt.file(), "InputProjections"},
+                      {xf, tilt.file(), "InputProjections"}};
+    }
+  }
+  return std::nullopt;
+}
+
+/// Returns the first entry of newst.com that the raw stack cannot do without, or an empty text.
+std::string_view what_hinders_raw(CommandEntries* newst) {
+  if (newst == nullptr) return {};
+  const auto it =
+      std::ranges::find_if(kBeyondTransforms, [&](std::string_view n) { return newst->has(n); });
+  return it == kBeyondTransforms.end() ? std::string_view() : *it;
+}
+
+/// Warns if the aligned stack has corrections that the raw one does not have.
+void warn_of_corrections(Project& project, const fs::path& aligned) {
+  for (std::string label : io::open_image_stack(aligned)->header().labels) {
+    std::ranges::transform(label, label.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    for (const std::string_view program : kCorrections) {
+      if (label.find(program) == std::string::npos) continue;
+      project.warn(fmt::format(
+          "the aligned stack '{}' went through {}, which the raw stack that is read did not: "
+          "--ignore TransformFile reads the aligned stack",
+          aligned.string(), program));
+    }
+  }
+}
+
+/// Returns the binning of the aligned stack. Throws Error if the two command files differ.
+double find_bin(Project& project, CommandEntries& tilt, CommandEntries* newst, bool is_raw) {
+  const auto of_tilt = tilt.number("IMAGEBINNED");
+  const auto of_newst = newst == nullptr ? std::nullopt : newst->number("BinByFactor");
+  if (of_tilt && of_newst && *of_tilt != *of_newst) {
+    throw Error(fmt::format(
+        "'{}' has BinByFactor {} and '{}' IMAGEBINNED {}, so lengths cannot be told: align the "
+        "stack again in eTomo, or go on with --ignore BinByFactor or --ignore IMAGEBINNED",
+        newst->file().string(), *of_newst, tilt.file().string(), *of_tilt));
+  }
+  const double bin = of_newst.value_or(of_tilt.value_or(1.0));
+  if (!(bin >= 1))
+    throw Error(fmt::format("'{}': binning by {} is not 1 or more", tilt.file().string(), bin));
+  if (is_raw && (of_newst || of_tilt)) {
+    project.set("--bin", fmt::format("{}", bin), of_newst ? newst->file() : tilt.file(),
+                of_newst ? "BinByFactor" : "IMAGEBINNED");
+  }
+  return bin;
+}
+
+/// Fills in how the aligned stack that newst.com makes lies over the views.
+void place_aligned_stack(CommandEntries& newst, ImodImages& images) {
+  if (const auto size = newst.numbers("SizeToOutputInXandY", 2, 2)) {
+    images.imod_width = size->at(0) * images.bin;
+    images.imod_height = size->at(1) * images.bin;
+  }
+  if (const auto offset = newst.numbers("OffsetsInXandY", 2, 2)) {
+    images.imod_offset_x = offset->at(0);
+    images.imod_offset_y = offset->at(1);
+  }
+}
+
+ImodImages read_raw(Project& project, const RawFiles& raw, CommandEntries& tilt,
+                    CommandEntries* newst) {
+  const auto stack = io::open_image_stack(raw.stack.path);
+  const auto size = tilt_series::aligned_size(raw.xf.path, *stack);
+  project.set("stack", raw.stack.path.string(), raw.stack.named_in, raw.stack.entry);
+  project.set("--xf", raw.xf.path.string(), raw.xf.named_in, raw.xf.entry);
+  ImodImages images;
+  images.stack = raw.stack.path;
+  images.num_sections = stack->header().nz;
+  images.is_raw = true;
+  images.bin = find_bin(project, tilt, newst, true);
+  images.width = images.imod_width = static_cast<double>(size[0]);
+  images.height = images.imod_height = static_cast<double>(size[1]);
+  if (newst != nullptr) place_aligned_stack(*newst, images);
+  if (const auto aligned = find_file(tilt, "InputProjections"))
+    warn_of_corrections(project, aligned->path);
+  return images;
+}
+
+ImodImages read_aligned(Project& project, const NamedFile& aligned, CommandEntries& tilt,
+                        CommandEntries* newst) {
+  const auto stack = io::open_image_stack(aligned.path);
+  project.set("stack", aligned.path.string(), aligned.named_in, aligned.entry);
+  ImodImages images;
+  images.stack = aligned.path;
+  images.num_sections = stack->header().nz;
+  images.bin = images.unit = find_bin(project, tilt, newst, false);
+  images.width = images.imod_width = static_cast<double>(stack->header().nx) * images.unit;
+  images.height = images.imod_height = static_cast<double>(stack->header().ny) * images.unit;
+  if (newst != nullptr) newst->know(kOfRawStack);
+  return images;
+}
+
+}  // namespace
+
+ImodImages choose_imod_images(Project& project, CommandEntries& tilt, CommandEntries* newst) {
+  const std::string_view hindrance = what_hinders_raw(newst);
+  std::optional<RawFiles> raw;
+  if (newst != nullptr && hindrance.empty()) raw = raw_files_of(*newst);
+  if (!raw && hindrance.empty()) raw = usual_raw_files(project, tilt);
+  const auto aligned = find_file(tilt, "InputProjections");
+  if (newst != nullptr) newst->know(kHarmless);
+  if (raw) return read_raw(project, *raw, tilt, newst);
+  if (aligned) {
+    if (!hindrance.empty()) {
+      project.warn(fmt::format("'{}' has {}, so the aligned stack is read, and not the raw one",
+                               newst->file().string(), hindrance));
+    }
+    return read_aligned(project, *aligned, tilt, newst);
+  }
+  throw Error(fmt::format(
+      "'{}': {}, and the aligned stack (InputProjections {}) is not there either: put one of them "
+      "beside it, or give a stack itself with its options",
+      tilt.file().string(),
+      hindrance.empty()
+          ? "the raw stack or its transforms are not there"
+          : fmt::format("the raw stack cannot be read as newst.com has {}", hindrance),
+      tilt.text("InputProjections").value_or("is not named")));
+}
+
+}  // namespace tomofield::projects

@@ -1,0 +1,191 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "io/alignment_files.h"
+#include "io/text_lines.h"
+#include "projects/command_entries.h"
+#include "projects/formats.h"
+#include "projects/imod_images.h"
+#include "projects/imod_volume.h"
+#include "tomofield/error.h"
+
+namespace tomofield::projects {
+
+namespace fs = std::filesystem;
+namespace {
+
+// These choose how IMOD's tilt back-projects, filters and writes; this program's fit has options of
+// its own for what it has of them.
+constexpr std::array<std::string_view, 37> kHarmless{"OutputFile",
+                                                     "AdjustOrigin",
+                                                     "RADIAL",
+                                                     "FalloffIsTrueSigma",
+                                                     "SCALE",
+                                                     "PERPENDICULAR",
+                                                     "RotateBy90",
+                                                     "MODE",
+                                                     "TITLE",
+                                                     "ActionIfGPUFails",
+                                                     "UseGPU",
+                                                     "COSINTERP",
+                                                     "FBPINTERP",
+                                                     "XTILTINTERP",
+                                                     "DENSWEIGHT",
+                                                     "FlatFilterFraction",
+                                                     "FakeSIRTiterations",
+                                                     "SIRTIterations",
+                                                     "SIRTSubtraction",
+                                                     "StartingIteration",
+                                                     "ConstrainSign",
+                                                     "InternalSIRTSlices",
+                                                     "LeaveIterations",
+                                                     "HammingLikeFilter",
+                                                     "ExactFilterSize",
+                                                     "MASK",
+                                                     "MinMaxMean",
+                                                     "WeightAngleFile",
+                                                     "LOCALSCALE",
+                                                     "COMPFRACTION",
+                                                     "DebugOutput",
+                                                     "ParameterFile",
+                                                     "DONE",
+                                                     "VertForSIRTInput",
+                                                     "VertSliceOutputFile",
+                                                     "VertBoundaryFile",
+                                                     "BoundaryInfoFile"};
+
+/// An entry without which the reconstruction is another one.
+struct Refusal {
+  std::string_view entry, why;
+};
+constexpr Refusal kRefusals[] = {
+    {"ZFACTORFILE", "corrects the views by height, which this program cannot do"},
+    {"ANGLES", "lists the tilt angles in the command file: put them into a .tlt file (--tlt)"},
+    {"COMPRESS", "compresses the specimen view by view, which this program cannot do"},
+    {"REPLICATE", "repeats views at other angles, which this program cannot do"},
+    {"REPROJECT", "projects a volume instead of reconstructing one"},
+    {"RecFileToReproject", "projects a volume instead of reconstructing one"},
+    {"ProjectModel", "projects a model instead of reconstructing a volume"},
+    {"BaseRecFile", "adds to an earlier volume, which this program cannot do"},
+    {"TOTALSLICES", "belongs to one part of a volume: give the command file of the whole"},
+};
+
+/// Returns newst.com for tilt.com, newsta.com for tilta.com, or nothing if it is not there.
+std::optional<fs::path> find_newst(const fs::path& tilt) {
+  const std::string name = tilt.filename().string();
+  constexpr std::string_view kTilt = "tilt";
+  const std::string axis = name.starts_with(kTilt) ? name.substr(kTilt.size()) : ".com";
+  const fs::path newst = tilt.parent_path() / ("newst" + axis);
+  std::error_code absent;
+  if (!fs::exists(newst, absent)) return std::nullopt;
+  return newst;
+}
+
+void refuse_what_is_missing(Project& project, CommandEntries& tilt, CommandEntries* newst) {
+  for (const Refusal& refusal : kRefusals) tilt.refuse(refusal.entry, refusal.why);
+  const auto local = tilt.text("LOCALFILE");
+  const auto global = newst == nullptr ? std::nullopt : newst->text("TransformFile");
+  if (local && local == global) {
+    project.warn(
+        fmt::format("'{}': LOCALFILE names the transforms of the whole views, as AreTomo "
+                    "writes it; they are applied once",
+                    tilt.file().string()));
+  } else {
+    tilt.refuse("LOCALFILE",
+                "aligns parts of the views by themselves, which this program cannot do");
+  }
+  if (tilt.has("PARALLEL")) {
+    project.warn(
+        fmt::format("'{}': PARALLEL mirrors the volume, and this program does not (--axes "
+                    "and --hand say how it lies)",
+                    tilt.file().string()));
+  }
+  if (tilt.has("WeightFile")) {
+    project.warn(fmt::format("'{}': WeightFile is not applied: the fit weights each view itself",
+                             tilt.file().string()));
+  }
+}
+
+void set_angles(Project& project, CommandEntries& tilt) {
+  for (const char* name : {"TILTFILE", "AngleFile"}) {
+    if (const auto tlt = tilt.path(name)) {
+      project.set("--tlt", tlt->string(), tilt.file(), name);
+      break;
+    }
+  }
+  if (const auto xtilt = tilt.path("XTILTFILE"))
+    project.set("--xtilt", xtilt->string(), tilt.file(), "XTILTFILE");
+  const auto x_axis_tilt = tilt.number("XAXISTILT");
+  if (x_axis_tilt.value_or(0) != 0)
+    project.set("--x-axis-tilt", fmt::format("{}", *x_axis_tilt), tilt.file(), "XAXISTILT");
+}
+
+/// Joins lists of sections that are separated by commas or white space.
+std::string joined_lists(const std::vector<std::string>& lists) {
+  std::string all = fmt::format("{}", fmt::join(lists, ","));
+  std::ranges::replace(all, ',', ' ');
+  return fmt::format("{}", fmt::join(io::split_words(all), ","));
+}
+
+/// Returns the sections that are not in the list, as a list.
+std::string all_but(const std::string& included, std::int64_t num_sections) {
+  const auto kept = io::parse_section_list(included, num_sections);
+  std::vector<std::int64_t> others;
+  for (std::int64_t section = 0; section < num_sections; ++section)
+    if (!std::ranges::binary_search(kept, section)) others.push_back(section + 1);
+  return fmt::format("{}", fmt::join(others, ","));
+}
+
+void set_excluded(Project& project, CommandEntries& tilt, std::int64_t num_sections) {
+  std::vector<std::string> lists, names;
+  for (const char* name : {"EXCLUDE", "EXCLUDELIST", "EXCLUDELIST2"}) {
+    const auto found = tilt.texts(name);
+    if (!found.empty()) names.emplace_back(name);
+    lists.insert(lists.end(), found.begin(), found.end());
+  }
+  const auto included = tilt.texts("INCLUDE");
+  if (!included.empty() && !names.empty()) {
+    throw Error(fmt::format("'{}' has both INCLUDE and {}: leave one out (--ignore)",
+                            tilt.file().string(), names.front()));
+  }
+  const std::string excluded =
+      included.empty() ? joined_lists(lists) : all_but(joined_lists(included), num_sections);
+  if (excluded.empty()) return;
+  io::parse_section_list(excluded, num_sections);
+  project.set("--exclude", excluded, tilt.file(),
+              included.empty() ? fmt::format("{}", fmt::join(names, ", ")) : "INCLUDE");
+}
+
+void set_intensities(Project& project, CommandEntries& tilt) {
+  const auto base = tilt.number("LOG");
+  if (!base) return;
+  project.set("--log", "true", tilt.file(), "LOG");
+  if (*base != 0) project.set("--log-base", fmt::format("{}", *base), tilt.file(), "LOG");
+}
+
+}  // namespace
+
+void read_imod_project(Project& project) {
+  CommandEntries tilt(project, project.request().path, "tilt");
+  std::optional<CommandEntries> newst_com;
+  if (const auto path = find_newst(tilt.file())) newst_com.emplace(project, *path, "newstack");
+  CommandEntries* newst = newst_com ? &*newst_com : nullptr;
+  refuse_what_is_missing(project, tilt, newst);
+  const ImodImages images = choose_imod_images(project, tilt, newst);
+  set_angles(project, tilt);
+  set_imod_volume(project, tilt, images);
+  set_excluded(project, tilt, images.num_sections);
+  set_intensities(project, tilt);
+  tilt.know(kHarmless);
+  tilt.warn_about_others();
+  if (newst != nullptr) newst->warn_about_others();
+}
+
+}  // namespace tomofield::projects

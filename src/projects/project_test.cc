@@ -1,0 +1,326 @@
+#include "projects/project.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include "pixel_stack.h"
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+
+namespace tomofield::projects {
+namespace {
+
+using testing::message_of;
+using testing::ScratchDirectory;
+using testing::some_value;
+using testing::write_stack;
+using Values = std::map<std::string, std::string>;
+
+void expect_parts(const std::string& message, const std::vector<std::string>& parts) {
+  for (const auto& part : parts) {
+    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;
+  }
+}
+
+/// An eTomo folder of a raw stack of 40 × 60 pixels whose tilt axis lies along X: aligned views
+/// have 60 × 40 pixels.
+class ImodFolder {
+ public:
+  ImodFolder() {
+    write_stack(folder / "TS.st", 40, 60, 5, some_value);
+    std::string transforms;
+    for (int i = 0; i < 5; ++i) transforms += "-0.17 -0.98 0.98 -0.17 3 4\n";
+    folder.write("TS.xf", transforms);
+  }
+
+  /// Writes tilt.com, as eTomo lays it out, with more entries.
+  void write_tilt(const std::string& entries) const {
+    folder.write("tilt.com",
+                 "$setenv IMOD_OUTPUT_FORMAT MRC\n$tilt -StandardInput\nInputProjections "
+                 "TS_ali.mrc\nOutputFile TS_full_rec.mrc\nTILTFILE TS.tlt\n" +
+                     entries + "ActionIfGPUFails 1,2\n$if (-e ./savework) ./savework\n");
+  }
+  void write_newst(const std::string& entries) const {
+    folder.write("newst.com",
+                 "$setenv IMOD_OUTPUT_FORMAT MRC\n$newstack -StandardInput\nAntialiasFilter\t-1\n"
+                 "InputFile\tTS.st\nOutputFile\tTS_ali.mrc\nTransformFile\tTS.xf\n" +
+                     entries + "#DistortionField\t.idf\n$if (-e ./savework) ./savework\n");
+  }
+  Project read(const std::vector<std::string>& ignored = {}) const {
+    return *read_project({.path = folder.path(), .ignored = ignored});
+  }
+  /// Returns the values of the settings by their options.
+  Values values(const std::vector<std::string>& ignored = {}) const {
+    Values found;
+    const Project project = read(ignored);
+    for (const auto& setting : project.settings()) found[setting.option] = setting.value;
+    return found;
+  }
+  /// Returns the warnings, a line each.
+  std::string warnings(const std::vector<std::string>& ignored = {}) const {
+    return fmt::format("{}", fmt::join(read(ignored).warnings(), "\n"));
+  }
+  std::string refusal(const std::vector<std::string>& ignored = {}) const {
+    return message_of<Error>([&] { read(ignored); });
+  }
+
+  ScratchDirectory folder;
+};
+
+TEST(ImodProject, RawStackWithItsTransforms) {
+  const ImodFolder imod;
+  imod.write_newst("BinByFactor\t4\nSizeToOutputInXandY\t15,10\nOffsetsInXandY\t0.0,0.0\n");
+  imod.write_tilt(
+      "IMAGEBINNED 4\nTHICKNESS 900\nXAXISTILT 1.5\nXTILTFILE TS.xtilt\n"
+      "FULLIMAGE 60 40\nSUBSETSTART 0 0\nOFFSET -2.5\nSHIFT 0.0 12.0\nLOG 0.0\n"
+      "EXCLUDELIST2 1, 3\nEXCLUDELIST2 5\n");
+  const auto in = [&](const char* name) { return (imod.folder / name).string(); };
+  EXPECT_EQ(imod.values(), (Values{{"stack", in("TS.st")},
+                                   {"--xf", in("TS.xf")},
+                                   {"--tlt", in("TS.tlt")},
+                                   {"--xtilt", in("TS.xtilt")},
+                                   {"--bin", "4"},
+                                   {"--thickness", "900"},
+                                   {"--x-axis-tilt", "1.5"},
+                                   {"--tilt-offset", "-2.5"},
+                                   {"--shift-z", "-12"},
+                                   {"--exclude", "1,3,5"},
+                                   {"--log", "true"}}));
+  EXPECT_EQ(imod.warnings(), "");
+  const Project project = imod.read();
+  const auto& thickness =
+      *std::ranges::find(project.settings(), "--thickness", &option_table::Setting::option);
+  EXPECT_EQ(thickness.file, imod.folder / "tilt.com");
+  EXPECT_EQ(thickness.entry, "THICKNESS");
+}
+
+TEST(ImodProject, EntriesAreReadInAnyCaseAndLeftOutIfIgnored) {
+  const ImodFolder imod;
+  imod.write_tilt("thickness 20\nMode 2\nLOG 5\n");
+  EXPECT_EQ(imod.values().at("--thickness"), "20");
+  EXPECT_EQ(imod.values().at("--log-base"), "5");
+  const Values without = imod.values({"Thickness", "log"});
+  EXPECT_FALSE(without.contains("--thickness") || without.contains("--log") ||
+               without.contains("--log-base"));
+  expect_parts(imod.refusal({"THICKNES"}), {"--ignore THICKNES", "tilt.com"});
+}
+
+TEST(ImodProject, AlignedStackInItsOwnPixels) {
+  const ImodFolder imod;
+  std::filesystem::remove(imod.folder / "TS.st");
+  write_stack(imod.folder / "TS_ali.mrc", 15, 10, 5, some_value);
+  imod.write_newst("BinByFactor 4\nSizeToOutputInXandY 15,10\n");
+  imod.write_tilt("IMAGEBINNED 4\nTHICKNESS 900\nSHIFT 0 12\nWIDTH 40\nSLICE 8 31\n");
+  const Values values = imod.values();
+  EXPECT_EQ(values.at("stack"), (imod.folder / "TS_ali.mrc").string());
+  EXPECT_FALSE(values.contains("--xf") || values.contains("--bin"));
+  EXPECT_EQ(values.at("--thickness"), "225");
+  EXPECT_EQ(values.at("--shift-z"), "-3");
+  EXPECT_EQ(values.at("--roi"), "3,2,13,8");  // (60 − 40) / 2 / 4 = 2.5, rounded
+}
+
+TEST(ImodProject, IgnoringTheTransformsTakesTheAlignedStack) {
+  const ImodFolder imod;
+  imod.write_tilt("THICKNESS 20\n");
+  expect_parts(imod.refusal({"TransformFile"}), {"TS_ali.mrc"});
+  write_stack(imod.folder / "TS_ali.mrc", 15, 10, 5, some_value);
+  imod.write_newst("");
+  EXPECT_EQ(imod.values().at("stack"), (imod.folder / "TS.st").string());
+  EXPECT_EQ(imod.values({"TransformFile"}).at("stack"), (imod.folder / "TS_ali.mrc").string());
+}
+
+TEST(ImodProject, RawFilesAreFoundByTheirUsualNames) {
+  const ImodFolder imod;
+  imod.write_tilt("IMAGEBINNED 2\n");
+  EXPECT_EQ(imod.values().at("--xf"), (imod.folder / "TS.xf").string());
+  EXPECT_EQ(imod.values().at("--bin"), "2");
+  imod.folder.write("blend.com", "$blendmont -StandardInput\n");  // the raw stack is a montage
+  expect_parts(imod.refusal(), {"tilt.com", "TS_ali.mrc"});
+  std::filesystem::remove(imod.folder / "blend.com");
+  std::filesystem::remove(imod.folder / "TS.xf");
+  expect_parts(imod.refusal(), {"tilt.com", "TS_ali.mrc"});
+}
+
+TEST(ImodProject, SizesAndOffsetsBecomeARegion) {
+  const ImodFolder imod;
+  const auto roi = [&](const std::string& newst, const std::string& tilt) {
+    imod.write_newst("BinByFactor 2\n" + newst);
+    imod.write_tilt("IMAGEBINNED 2\n" + tilt);
+    const Values values = imod.values();
+    const auto found = values.find("--roi");
+    return found == values.end() ? "none" : found->second;
+  };
+  EXPECT_EQ(roi("SizeToOutputInXandY 30,20\n", ""), "none");
+  EXPECT_EQ(roi("SizeToOutputInXandY 31,20\n", ""), "none");  // one pixel beyond, by rounding
+  EXPECT_EQ(roi("SizeToOutputInXandY 20,10\n", ""), "10,10,50,30");
+  EXPECT_EQ(roi("SizeToOutputInXandY 20,10\nOffsetsInXandY 6,-4\n", ""), "16,6,56,26");
+  EXPECT_EQ(roi("", "WIDTH 40\n"), "10,0,50,40");
+  EXPECT_EQ(roi("", "WIDTH 40\nSHIFT 8 0\n"), "2,0,42,40");  // the volume shows what lies left
+  EXPECT_EQ(roi("", "SLICE 4 19\n"), "0,4,60,20");
+  EXPECT_EQ(roi("SizeToOutputInXandY 20,10\n", "WIDTH 20\nSLICE 2 5\n"), "20,12,40,16");
+  expect_parts(imod.warnings(), {""});
+  imod.write_tilt("IMAGEBINNED 2\nSHIFT 90 0\n");
+  expect_parts(imod.refusal(), {"tilt.com", "SHIFT", "no part"});
+  imod.write_tilt("IMAGEBINNED 2\nSHIFT 20 0\n");
+  expect_parts(imod.warnings(), {"SHIFT", "beyond"});
+}
+
+TEST(ImodProject, TheTiltAxisIsWhereTheSubsetHasIt) {
+  const ImodFolder imod;
+  const auto center = [&](const std::string& newst, const std::string& tilt) {
+    imod.write_newst("BinByFactor 2\n" + newst);
+    imod.write_tilt("IMAGEBINNED 2\n" + tilt);
+    const Values values = imod.values();
+    const auto found = values.find("--center");
+    return found == values.end() ? "none" : found->second;
+  };
+  EXPECT_EQ(center("", "FULLIMAGE 60 40\nSUBSETSTART 0 0\n"), "none");
+  // An aligned stack that is larger or smaller than the images, about the same centre.
+  EXPECT_EQ(center("SizeToOutputInXandY 31,20\n", "FULLIMAGE 60 40\nSUBSETSTART -1 0\n"), "none");
+  EXPECT_EQ(center("SizeToOutputInXandY 20,20\n", "FULLIMAGE 60 40\nSUBSETSTART 10 0\n"), "none");
+  // The part of the images that is aligned lies 6 pixels to the right: the axis stays in the middle
+  // of the views.
+  EXPECT_EQ(center("SizeToOutputInXandY 20,20\nOffsetsInXandY 6,0\n",
+                   "FULLIMAGE 60 40\nSUBSETSTART 16 0\n"),
+            "none");
+  // The entries of tilt.com put the axis elsewhere.
+  EXPECT_EQ(center("SizeToOutputInXandY 20,20\n", "FULLIMAGE 60 40\nSUBSETSTART 4 0\n"), "36");
+  EXPECT_EQ(center("", "OFFSET 0 -7\n"), "23");
+  imod.write_tilt("IMAGEBINNED 2\nSUBSETSTART 4 0\n");
+  expect_parts(imod.refusal(), {"SUBSETSTART", "FULLIMAGE"});
+}
+
+TEST(ImodProject, WhatCannotBeHonouredIsRefusedOrSaid) {
+  const ImodFolder imod;
+  for (const std::string entry : {"LOCALFILE", "ZFACTORFILE", "ANGLES", "COMPRESS", "REPLICATE",
+                                  "TOTALSLICES", "BaseRecFile"}) {
+    imod.write_tilt(entry + " 1 2\n");
+    expect_parts(imod.refusal(), {"tilt.com', line 6", entry, "--ignore " + entry});
+    EXPECT_EQ(imod.refusal({entry}), "");
+  }
+  imod.write_tilt("RADIAL 0.35 0.035\nSCALE 0 330\nPERPENDICULAR\nMODE 1\n");
+  EXPECT_EQ(imod.warnings(), "");
+  imod.write_tilt("WOBBLE 3\nPARALLEL\nWeightFile w.txt\n");
+  expect_parts(imod.warnings(), {"line 6", "WOBBLE", "PARALLEL", "WeightFile"});
+  EXPECT_EQ(imod.warnings({"WOBBLE", "PARALLEL", "WeightFile"}), "");
+  imod.write_newst("FloatDensities 2\n");
+  expect_parts(imod.warnings({"WOBBLE"}), {"newst.com", "FloatDensities"});
+  for (const std::string bad :
+       {"THICKNESS thick\n", "THICKNESS nan\n", "THICKNESS 1 2\n", "THICKNESS\n",
+        "THICKNESS 1e30\n", "SHIFT 1 2 3\n", "EXCLUDELIST2 0\n", "EXCLUDELIST2 2,6\n",
+        "IMAGEBINNED 0\n", "THICKNESS 2\nTHICKNESS 2\n", "INCLUDE 1\nEXCLUDELIST 2\n"}) {
+    imod.write_tilt(bad);
+    EXPECT_NE(imod.refusal(), "") << bad;
+  }
+}
+
+TEST(ImodProject, AreTomosLocalFileIsThatOfTheWholeViews) {
+  const ImodFolder imod;
+  imod.write_newst("");
+  imod.write_tilt("LOCALFILE TS.xf\n");
+  expect_parts(imod.warnings(), {"LOCALFILE", "AreTomo"});
+}
+
+TEST(ImodProject, ViewsToIncludeLeaveOutTheOthers) {
+  const ImodFolder imod;
+  imod.write_tilt("INCLUDE 2-3\nINCLUDE 5\n");
+  EXPECT_EQ(imod.values().at("--exclude"), "1,4");
+}
+
+TEST(ImodProject, BinningsThatDiffer) {
+  const ImodFolder imod;
+  imod.write_newst("BinByFactor 4\n");
+  imod.write_tilt("IMAGEBINNED 2\n");
+  expect_parts(imod.refusal(), {"BinByFactor 4", "IMAGEBINNED 2"});
+  EXPECT_EQ(imod.values({"BinByFactor"}).at("--bin"), "2");
+}
+
+TEST(ImodProject, ImagesThatTransformsDoNotMakeAreReadAligned) {
+  const ImodFolder imod;
+  imod.write_newst("SectionsToRead 1-4\n");
+  imod.write_tilt("");
+  expect_parts(imod.refusal(), {"SectionsToRead", "TS_ali.mrc"});
+  write_stack(imod.folder / "TS_ali.mrc", 60, 40, 4, some_value);
+  EXPECT_EQ(imod.values().at("stack"), (imod.folder / "TS_ali.mrc").string());
+  expect_parts(imod.warnings(), {"SectionsToRead", "aligned stack"});
+  EXPECT_EQ(imod.values({"SectionsToRead"}).at("stack"), (imod.folder / "TS.st").string());
+}
+
+TEST(ImodProject, OtherCommandFiles) {
+  const ImodFolder imod;
+  const auto refuse = [&](const std::string& text) {
+    imod.folder.write("tilt.com", text);
+    return imod.refusal();
+  };
+  expect_parts(refuse("$newstack -StandardInput\nInputFile a\n"), {"tilt.com", "$tilt"});
+  expect_parts(refuse("$tilt a.ali a.rec\nTHICKNESS 4\n"), {"line 1", "-StandardInput"});
+  EXPECT_NE(refuse("$tilt -StandardInput\n$tilt -StandardInput\n"), "");
+}
+
+TEST(ProjectFolder, HasOneProject) {
+  const ImodFolder imod;
+  const auto find = [&] {
+    return message_of<Error>([&] { read_project({.path = imod.folder.path()}); });
+  };
+  expect_parts(find(), {"no project", "tilt.com", ".aln"});
+  imod.write_tilt("");
+  imod.folder.write("TS.st.mdoc", "[ZValue = 0]\n");  // metadata, beside a project
+  EXPECT_EQ(find(), "");
+  for (const char* axis : {"tilta.com", "tiltb.com"})
+    std::filesystem::copy_file(imod.folder / "tilt.com", imod.folder / axis);
+  std::filesystem::remove(imod.folder / "tilt.com");
+  expect_parts(find(), {"2 projects", "tilta.com, tiltb.com"});
+  EXPECT_TRUE(read_project({.path = imod.folder / "tilta.com"}).has_value());
+  EXPECT_FALSE(read_project({.path = imod.folder / "TS.st"}).has_value());
+  EXPECT_FALSE(read_project({.path = imod.folder / "absent.com"}).has_value());
+}
+
+TEST(ProjectFolder, OfImagesAlone) {
+  const ScratchDirectory folder;
+  EXPECT_FALSE(read_project({.path = folder.path(), .has_mdoc = true}));
+}
+
+TEST(AreTomoProject, ThicknessAndStack) {
+  const ScratchDirectory folder;
+  const auto aln =
+      folder.write("TS.aln",
+                   "# RawSize = 16 12 2\n# AlphaOffset = 1.5\n# BetaOffset = -0.5\n"
+                   "# Thickness = 1240\n1 0 1 0 0 0 0 0 0 -10\n2 0 1 0 0 0 0 0 0 10\n");
+  expect_parts(message_of<Error>([&] { read_project({.path = aln}); }),
+               {"TS.aln", "TS.mrc", "--aln"});
+  write_stack(folder / "TS.mrc", 16, 12, 2, some_value);
+  const Project project = *read_project({.path = folder.path()});
+  ASSERT_EQ(project.settings().size(), 3u);
+  EXPECT_EQ(project.settings()[0].value, (folder / "TS.mrc").string());
+  EXPECT_EQ(project.settings()[2].value, "1240");
+  EXPECT_EQ(project.settings()[2].entry, "Thickness");
+  ASSERT_EQ(project.warnings().size(), 2u);
+  expect_parts(project.warnings()[0], {"AlphaOffset", "1.5"});
+  expect_parts(project.warnings()[1], {"BetaOffset", "-0.5"});
+}
+
+TEST(MdocProject, FindsTheStackOrTheImages) {
+  const ScratchDirectory folder;
+  const auto mdoc = folder.write("TS.mdoc",
+                                 "ImageFile = D:\\other.st\n[ZValue = 0]\nTiltAngle = 1\n"
+                                 "SubFramePath = D:\\m_1.eer\n");
+  const auto stack = [&] { return read_project({.path = mdoc})->settings()[0]; };
+  EXPECT_THROW(stack(), Error);
+  write_stack(folder / "m_1.mrc", 16, 12, 1, some_value);
+  EXPECT_EQ(stack().value, mdoc.string());
+  EXPECT_EQ(stack().entry, "SubFramePath");
+  write_stack(folder / "other.st", 16, 12, 1, some_value);
+  EXPECT_EQ(stack().value, (folder / "other.st").string());
+  write_stack(folder / "TS.mrc", 16, 12, 1, some_value);
+  EXPECT_EQ(stack().value, (folder / "TS.mrc").string());
+  std::filesystem::rename(mdoc, folder / "TS.mrc.mdoc");
+  EXPECT_EQ(read_project({.path = folder.path()})->settings()[0].value,
+            (folder / "TS.mrc").string());
+}
+
+}  // namespace
+}  // namespace tomofield::projects

@@ -1,0 +1,384 @@
+"""Tests reconstruct on what other programs write: folders of eTomo, AreTomo's .aln, SerialEM's .mdoc,
+single images and TIFF stacks. A project gives the same bits as its settings given by hand."""
+
+import json
+import os
+import pathlib
+import re
+import shlex
+import shutil
+
+import mrcfile
+import numpy as np
+import pytest
+import tifffile
+
+import harness
+from harness import HEIGHT, PIXEL_SIZE, QUICK, THICKNESS, TILTS, WIDTH, fresh_directory, merge
+
+PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs/projects.md"
+NUM_VIEWS = len(TILTS)
+SHIFTS = [f"1 0 0 1 {0.5 * (i % 3):.2f} -1.5" for i in range(NUM_VIEWS)]
+# All that a project of these tests does not say.
+REST = merge(QUICK, ["--thickness", 0])[:-2]
+
+
+def write(folder, name, *lines):
+    """Writes a text file and returns its path."""
+    path = os.path.join(folder, name)
+    with open(path, "w", encoding="utf-8") as file:
+        file.write("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def series():
+    return harness.Series("series")
+
+
+def write_etomo(folder, series, *entries, newst=()):
+    """Makes a folder in the layout of eTomo, with more entries in its command files."""
+    os.makedirs(folder, exist_ok=True)
+    shutil.copy(series.stack, os.path.join(folder, "TS_01.st"))
+    np.savetxt(os.path.join(folder, "TS_01.tlt"), TILTS, fmt="%.2f")
+    write(folder, "TS_01.xf", *SHIFTS)
+    write(folder, "TS_01.xtilt", *["0.0"] * NUM_VIEWS)
+    write(folder, "newst.com", "$setenv IMOD_OUTPUT_FORMAT MRC", "$newstack -StandardInput",
+          "AntialiasFilter\t-1", "InputFile\tTS_01.st", "OutputFile\tTS_01_ali.mrc",
+          "TransformFile\tTS_01.xf", "TaperAtFill\t1,1", "AdjustOrigin", "OffsetsInXandY\t0.0,0.0",
+          "#DistortionField\t.idf", "ImagesAreBinned\t1.0", *newst,
+          "$if (-e ./savework) ./savework")
+    write(folder, "tilt.com", "$setenv IMOD_OUTPUT_FORMAT MRC", "$tilt -StandardInput",
+          "InputProjections TS_01_ali.mrc", "OutputFile TS_01_full_rec.mrc", "TILTFILE TS_01.tlt",
+          "RADIAL 0.35 0.035", "FalloffIsTrueSigma 1", "SCALE 0.0 330.0", "PERPENDICULAR", "MODE 1",
+          "AdjustOrigin", "ActionIfGPUFails 1,2", *entries, "$if (-e ./savework) ./savework")
+    return folder
+
+
+def reconstruct(name, *words, run=harness.succeed):
+    """Runs reconstruct and returns its results and what it printed."""
+    output = os.path.join(fresh_directory(name), "out.mrc")
+    printed = run("reconstruct", *words, "-o", output)
+    return harness.Results(output), printed
+
+
+def origins(results):
+    with open(results.json_path, encoding="utf-8") as file:
+        return json.load(file)["origins"]
+
+
+def refuse(words, *arguments):
+    """Checks that reconstruct refuses its arguments with one sentence and writes nothing."""
+    folder = fresh_directory("refused")
+    result = harness.tomofield("reconstruct", *arguments, "-o", os.path.join(folder, "out.mrc"))
+    assert result.returncode == 2, result
+    sentence = result.stderr.splitlines()[-1]
+    assert sentence.startswith("tomofield: ") and len(sentence) < 700, result.stderr
+    for word in words:
+        assert word in sentence, (word, sentence)
+    assert os.listdir(folder) == []
+
+
+# ------------------------------------------------------------------------------------- eTomo
+
+def test_an_etomo_folder_is_its_settings_given_by_hand(series):
+    folder = write_etomo(fresh_directory("etomo"), series, "IMAGEBINNED 2", "THICKNESS 24",
+                         "XAXISTILT 0.0", "XTILTFILE TS_01.xtilt", "FULLIMAGE 48 36",
+                         "SUBSETSTART 4 0", "OFFSET -1.5", "SHIFT 0.0 2.0", "EXCLUDELIST2 1,20-21",
+                         newst=["BinByFactor\t2", "SizeToOutputInXandY\t20,18"])
+    imported, printed = reconstruct("imported", folder, *REST)
+
+    def path(name):
+        return os.path.join(folder, name)
+
+    by_hand, _ = reconstruct("by_hand", path("TS_01.st"), *REST, "--xf", path("TS_01.xf"), "--tlt",
+                             path("TS_01.tlt"), "--xtilt", path("TS_01.xtilt"), "--bin", 2,
+                             "--thickness", 24, "--tilt-offset=-1.5", "--shift-z=-2", "--exclude",
+                             "1,20-21", "--roi", "4,0,44,36")
+    assert imported.same_as(by_hand)
+    assert imported.volume.shape == (12, 18, 20)
+    lines = printed.stdout.splitlines()
+    assert f"--thickness 24 from {path('tilt.com')}: THICKNESS" in lines
+    assert f"stack {path('TS_01.st')} from {path('newst.com')}: InputFile" in lines
+    assert printed.stderr.count("warning") == 0, printed.stderr
+    assert {"option": "--thickness", "value": "24", "file": path("tilt.com"),
+            "entry": "THICKNESS"} in origins(imported)
+    assert origins(by_hand) == []
+    # The command file alone, and the folder from within.
+    for words, where in (([path("tilt.com")], None), (["."], folder)):
+        result = harness.succeed("reconstruct", *words, *REST, "--dry-run", "-o", "never.mrc",
+                                 cwd=where)
+        assert "tomogram 20 × 18 × 12 voxels" in result.stdout
+
+
+def test_options_and_configuration_files_win(series):
+    folder = write_etomo(fresh_directory("winners"), series, "THICKNESS 24", "OFFSET 5", "LOG 0")
+    config = write(folder, "mine.toml", "thickness = 16", "ignore = \"LOG\"")
+    results, printed = reconstruct("configured", folder, *REST, "--config", config, "--tilt-offset",
+                                   0.25)
+    assert results.volume.shape[0] == 16
+    assert re.search(r"--thickness 24 from .*THICKNESS \(not used: --thickness is", printed.stdout)
+    with open(results.json_path, encoding="utf-8") as file:
+        options = json.load(file)["options"]["input"]
+    assert options["tilt_offset_deg"] == 0.25 and options["log"] is False
+    used = {origin["option"] for origin in origins(results)}
+    assert used == {"stack", "--xf", "--tlt"}
+    # --angpix takes the place of --bin.
+    write_etomo(folder, series, "THICKNESS 24", "IMAGEBINNED 2")
+    planned = harness.succeed("reconstruct", folder, *REST, "--angpix", PIXEL_SIZE, "--dry-run", "-o",
+                              "never.mrc").stdout
+    assert "--bin 2" in planned and "(not used: --angpix is given)" in planned
+    assert f"tomogram {WIDTH} × {HEIGHT} × 24 voxels" in planned
+
+
+def test_a_baseline_and_info_take_the_folder_too(series):
+    folder = write_etomo(fresh_directory("others"), series, "THICKNESS 24", "IMAGEBINNED 1")
+    output = os.path.join(fresh_directory("wbp"), "out.mrc")
+    harness.succeed("baseline", "wbp", folder, "--contrast", "bright", "-o", output)
+    assert {"option": "--thickness", "value": "24", "file": os.path.join(folder, "tilt.com"),
+            "entry": "THICKNESS"} in origins(harness.Results(output))
+    info = harness.succeed("info", folder, "--contrast", "bright").stdout
+    assert "--thickness 24 from" in info and "as a tilt series 21 views" in info
+
+
+def test_what_cannot_be_honoured_is_refused_or_said(series):
+    folder = write_etomo(fresh_directory("refusals"), series, "THICKNESS 24",
+                         "LOCALFILE TS_01local.xf", "WOBBLE 3")
+    refuse(["tilt.com", "line 14", "LOCALFILE", "--ignore LOCALFILE"], folder, *REST)
+    _, printed = reconstruct("ignoring", folder, *REST, "--ignore", "LOCALFILE")
+    assert "warning: " in printed.stderr and "WOBBLE" in printed.stderr
+    refuse(["--ignore LOKALFILE"], folder, *REST, "--ignore", "LOCALFILE,LOKALFILE")
+    for axis in "ab":
+        shutil.copy(os.path.join(folder, "tilt.com"), os.path.join(folder, f"tilt{axis}.com"))
+    os.remove(os.path.join(folder, "tilt.com"))
+    refuse(["2 projects", "tilta.com, tiltb.com"], folder, *REST)
+    empty = fresh_directory("empty")
+    refuse([empty, "no project"], empty, *REST)
+    for name in ("TS_01.xf", "TS_01.tlt"):
+        refuse([name, "not a stack"], os.path.join(folder, name), "--thickness", 24, *REST)
+
+
+def imod_projection(x, y, row, tilt, alpha, shape, axis_offset, shift_z):
+    """Returns where IMOD's tilt takes the value of voxel (x, row, y) of its .rec from in a view, all
+    zero-based. It is the formula of its source, whose positions count from 1."""
+    width, height, thickness = shape
+    slice_position = (y + 1) - (height / 2 + 0.5)
+    z = (row + 1) - (thickness / 2 + 0.5 + shift_z)
+    sin_beta, cos_beta = -np.sin(np.radians(tilt)), np.cos(np.radians(tilt))
+    sin_alpha, cos_alpha = -np.sin(np.radians(alpha)), np.cos(np.radians(alpha))
+    centre = width / 2 + 0.5 + axis_offset
+    u = (((x + 1) - centre) * cos_beta + slice_position * sin_alpha * sin_beta
+         + z * cos_alpha * sin_beta + centre)
+    v = slice_position * cos_alpha - z * sin_alpha + height / 2 + 0.5
+    return u - 1, v - 1
+
+
+def test_the_volume_lies_over_that_of_imod():
+    """Beads that IMOD would reconstruct at some voxels of its .rec are found at the same voxels, after
+    the rotation of trimvol -rx, with every entry that moves them."""
+    width, height, thickness = 64, 48, 32
+    offset, axis_offset, x_axis_tilt, shift_z = 4.0, 3.0, 6.0, 5.0
+    beads = [(20, 12, 14), (44, 33, 18), (30, 24, 22)]  # x, y and row of the .rec
+    v, u = np.mgrid[:height, :width]
+    views = np.zeros((NUM_VIEWS, height, width), np.float32)
+    for view, tilt in zip(views, TILTS):
+        for x, y, row in beads:
+            at = imod_projection(x, y, row, tilt + offset, 0.5 - x_axis_tilt,
+                                 (width, height, thickness), axis_offset, shift_z)
+            view += 100 * np.exp(-((u - at[0]) ** 2 + (v - at[1]) ** 2) / (2 * 1.5 ** 2))
+    views += np.random.default_rng(1).normal(0, 1, views.shape)
+    folder = fresh_directory("imod")
+    harness.write_stack(os.path.join(folder, "TS_ali.mrc"), views)
+    np.savetxt(os.path.join(folder, "TS.tlt"), TILTS, fmt="%.2f")
+    write(folder, "TS.xtilt", *["0.5"] * NUM_VIEWS)
+    write(folder, "tilt.com", "$tilt -StandardInput", "InputProjections TS_ali.mrc",
+          "TILTFILE TS.tlt", "XTILTFILE TS.xtilt", f"THICKNESS {thickness}",
+          f"OFFSET {offset} {axis_offset}", f"XAXISTILT {x_axis_tilt}", f"SHIFT 0 {shift_z}")
+    results, _ = reconstruct("over_imod", folder, "--contrast", "bright", "--bead-diameter", 0,
+                             "--tv-penalty", "smooth", "--view-scale", "off", "--epochs", 10,
+                             "--exclude", f"1,{NUM_VIEWS}", "--no-fixed-pattern")
+    volume = results.volume
+    assert volume.shape == (thickness, height, width)
+    for x, y, row in beads:
+        z = thickness - 1 - row
+        around = volume[z - 4 : z + 5, y - 4 : y + 5, x - 4 : x + 5].clip(volume.max() / 5)
+        weight = around - around.min()
+        found = [np.average(np.arange(9) - 4, weights=weight.sum(tuple({0, 1, 2} - {axis})))
+                 for axis in range(3)]
+        assert np.abs(found).max() < 0.35, (x, y, row, found)
+
+
+# ----------------------------------------------------------------------------------- AreTomo
+
+def aretomo(folder, kept, sections, dark):
+    rows = [f"{section:5d} 2.5000 1.00000 {0.5 * i:9.3f} -1.000 1.00 1.00 1.00 0.00 {TILTS[i]:8.2f}"
+            for i, section in zip(kept, sections)]
+    return write(folder, "TS_01.aln", "# AreTomo Alignment / Priims bprmMn",
+                 f"# RawSize = {WIDTH} {HEIGHT} {NUM_VIEWS}", "# NumPatches = 1", *dark,
+                 "# AlphaOffset =     0.00", "# BetaOffset =     0.00", f"# Thickness = {THICKNESS}",
+                 "# SEC     ROT         GMAG       TX          TY      SMEAN     SFIT    SCALE     "
+                 "BASE     TILT", *rows, "# Local Alignment",
+                 "   0   0  -558.42   -802.00   -100.07     24.43   1.0")
+
+
+def test_an_alignment_of_aretomo_has_its_thickness_and_dark_frames(series):
+    folder = fresh_directory("aretomo")
+    stack = os.path.join(folder, "TS_01.mrc")
+    shutil.copy(series.stack, stack)
+    kept = [i for i in range(NUM_VIEWS) if i not in (0, 7)]
+    aln = aretomo(folder, kept, [i + 1 for i in kept],
+                  [f"# DarkFrame = {i:5d} {i + 1:4d} {TILTS[i]:8.2f}" for i in (0, 7)])
+    by_hand, _ = reconstruct("aligned", stack, "--aln", aln, "--thickness", THICKNESS, *REST)
+    # AreTomo3 leaves the sections of dark frames at 0.
+    aretomo(folder, kept, range(1, len(kept) + 1),
+            [f"# DarkFrame = {i:5d}    0 {TILTS[i]:8.2f}" for i in (0, 7)])
+    imported, printed = reconstruct("of_aretomo", folder, *REST)
+    assert imported.volume.shape[0] == THICKNESS
+    assert harness.read_bytes(imported.volume_path) == harness.read_bytes(by_hand.volume_path)
+    assert f"--thickness {THICKNESS} from {aln}: Thickness" in printed.stdout
+    assert "local alignment, which is not applied" in printed.stderr
+    os.remove(stack)
+    refuse(["TS_01.aln", "TS_01.mrc", "--aln"], aln, *REST)
+
+
+# ---------------------------------------------------------------------------------- SerialEM
+
+def write_mdoc(folder, name, axis, image_file=""):
+    sections = []
+    for i, tilt in enumerate(TILTS):
+        sections += [f"[ZValue = {i}]", f"TiltAngle = {tilt}", "RotationAngle = 175.2",
+                     f"SubFramePath = X:\\frames\\TS_01_{i:03d}.eer", ""]
+    return write(folder, name, f"PixelSpacing = {PIXEL_SIZE}", f"ImageFile = {image_file}", "",
+                 f"[T =     Tilt axis angle = {axis}, binning = 1  spot = 8  camera = 0]", "",
+                 *sections)
+
+
+def test_an_mdoc_brings_its_stack_its_angles_and_its_axis(series):
+    folder = fresh_directory("serialem")
+    stack = os.path.join(folder, "TS_01.st")
+    shutil.copy(series.stack, stack)
+    xf = write(folder, "TS_01.xf", *SHIFTS)
+    mdoc = write_mdoc(folder, "TS_01.st.mdoc", 84.7)
+    common = ["--thickness", THICKNESS, *REST]
+    refuse(["TS_01.st.mdoc", "84.7", "--xf", "--ignore TiltAxisAngle"], mdoc, *common)
+    refuse(["84.7"], stack, "--mdoc", mdoc, *common)
+    by_hand, _ = reconstruct("mdoc_by_hand", stack, "--tlt", series.tlt, "--xf", xf, *common)
+    imported, _ = reconstruct("of_mdoc", mdoc, "--xf", xf, *common)
+    assert harness.read_bytes(imported.volume_path) == harness.read_bytes(by_hand.volume_path)
+    aligned, _ = reconstruct("aligned_mdoc", folder, "--ignore", "TiltAxisAngle", *common)
+    plain, _ = reconstruct("plain", stack, "--tlt", series.tlt, *common)
+    assert harness.read_bytes(aligned.volume_path) == harness.read_bytes(plain.volume_path)
+
+
+def test_views_in_single_files_are_a_stack(series):
+    folder = fresh_directory("frames")
+    averages = fresh_directory("averages")
+    mdoc = write_mdoc(folder, "TS_01.mdoc", 0.4)
+    for i, view in enumerate(series.views.astype(np.float32)):
+        name = os.path.join(averages, f"TS_01_{i:03d}")
+        if i % 2:
+            tifffile.imwrite(name + ".tif", view[::-1], resolution=(1e8 / PIXEL_SIZE,) * 2,
+                             resolutionunit="CENTIMETER")
+        else:
+            with mrcfile.new(name + "_DW.mrc") as file:
+                file.set_data(view)
+                file.voxel_size = PIXEL_SIZE
+    common = ["--thickness", THICKNESS, *REST]
+    stacked, _ = reconstruct("stacked", series.stack, "--tlt", series.tlt, *common)
+    single, _ = reconstruct("single", averages, "--mdoc", mdoc, *common)
+    assert harness.read_bytes(single.volume_path) == harness.read_bytes(stacked.volume_path)
+    shutil.copy(mdoc, averages)
+    beside, printed = reconstruct("beside", averages, *common)
+    assert harness.read_bytes(beside.volume_path) == harness.read_bytes(stacked.volume_path)
+    assert "SubFramePath" in printed.stdout
+    os.remove(os.path.join(averages, "TS_01_003.tif"))
+    refuse(["TS_01.mdoc", "ZValue = 3", "TS_01_003"], averages, *common)
+
+
+# -------------------------------------------------------------------------------------- TIFF
+
+def test_tiff_stacks_of_every_kind(series):
+    folder = fresh_directory("tiff")
+    counts = np.round(3 * (series.views - series.views.min())).clip(0, 127)
+    whole = ["baseline", "wbp", "--thickness", THICKNESS, "--contrast", "bright", "--tlt", series.tlt,
+             "--pixel-size", PIXEL_SIZE, "--overwrite"]
+    output = os.path.join(folder, "out.mrc")
+
+    def volume(stack):
+        harness.succeed(*whole[:2], stack, *whole[2:], "-o", output)
+        return harness.read_bytes(output)
+
+    mrc = os.path.join(folder, "a.mrc")
+    harness.write_stack(mrc, counts.astype(np.float32))
+    expected = volume(mrc)
+    tif = os.path.join(folder, "a.tif")
+    for kind, options in (("uint8", {}), ("int8", {"compression": "zlib"}),
+                          ("uint16", {"compression": "zlib"}), ("int16", {"byteorder": ">"}),
+                          ("uint32", {"rowsperstrip": 7}), ("int32", {"bigtiff": True}),
+                          ("float32", {"tile": (16, 32), "compression": "zlib"})):
+        tifffile.imwrite(tif, counts[:, ::-1].astype(kind), photometric="minisblack", **options)
+        assert volume(tif) == expected, kind
+    info = harness.succeed("info", tif).stdout
+    assert f"{WIDTH} × {HEIGHT} × {NUM_VIEWS}" in info
+
+
+def test_tiff_files_that_are_no_stack(series):
+    folder = fresh_directory("bad_tiff")
+    tif = os.path.join(folder, "a.tif")
+    common = ["--tlt", series.tlt, "--thickness", THICKNESS, *REST]
+    tifffile.imwrite(tif, np.zeros((8, 8, 3), np.uint8), photometric="rgb")
+    refuse(["a.tif", "3 values of 8 bits"], tif, *common)
+    tifffile.imwrite(tif, np.zeros((8, 8), np.float64))
+    refuse(["a.tif", "64 bits"], tif, *common)
+    with tifffile.TiffWriter(tif) as writer:
+        for size in (8, 9):
+            writer.write(np.zeros((size, 8), np.uint8), photometric="minisblack")
+    refuse(["a.tif", "page 2", "8 × 9"], tif, *common)
+    tifffile.imwrite(tif, np.ones((NUM_VIEWS, HEIGHT, WIDTH), np.float32), photometric="minisblack")
+    with open(tif, "r+b") as file:
+        file.truncate(5000)
+    refuse(["a.tif"], tif, *common)
+    # The page says that it is 16 million pixels wide and high, in one strip.
+    tifffile.imwrite(tif, np.zeros((8, 8), np.uint8))
+    contents = bytearray(harness.read_bytes(tif))
+    for tag in (256, 257, 278):
+        at = re.search(tag.to_bytes(2, "little") + b"[\3\4]\0\1\0\0\0", contents).start()
+        contents[at + 2] = 4
+        contents[at + 8 : at + 12] = (1 << 24).to_bytes(4, "little")
+    pathlib.Path(tif).write_bytes(contents)
+    refuse(["a.tif", "16777216"], tif, *common)
+
+
+# -------------------------------------------------------------------------------------- page
+
+def prepare_page(folder, series):
+    """Makes the projects that the commands of docs/projects.md name."""
+    write_etomo(os.path.join(folder, "etomo"), series, "THICKNESS 24", "EXCLUDELIST2 3")
+    write_etomo(os.path.join(folder, "local"), series, "THICKNESS 24", "LOCALFILE TS_01local.xf")
+    for name in ("aretomo", "serialem", "averages"):
+        os.makedirs(os.path.join(folder, name))
+    shutil.copy(series.stack, os.path.join(folder, "aretomo/TS_01.mrc"))
+    aretomo(os.path.join(folder, "aretomo"), range(NUM_VIEWS), range(1, NUM_VIEWS + 1), [])
+    shutil.copy(series.stack, os.path.join(folder, "serialem/TS_01.mrc"))
+    write_mdoc(os.path.join(folder, "serialem"), "TS_01.mrc.mdoc", 84.7)
+    write_mdoc(os.path.join(folder, "serialem"), "TS_01.mdoc", 84.7)
+    write(os.path.join(folder, "serialem"), "TS_01.xf", *SHIFTS)
+    for i, view in enumerate(series.views.astype(np.float32)):
+        with mrcfile.new(os.path.join(folder, f"averages/TS_01_{i:03d}.mrc")) as file:
+            file.set_data(view)
+            file.voxel_size = PIXEL_SIZE
+
+
+def test_the_commands_of_the_page_run(series):
+    """Runs each command of docs/projects.md in a folder that has what it names."""
+    folder = fresh_directory("page")
+    prepare_page(folder, series)
+    commands = re.findall(r"^tomofield (.*)$", PAGE.read_text("utf-8"), re.MULTILINE)
+    assert len(commands) >= 6
+    for command in commands:
+        words = shlex.split(command)
+        quick = [] if words[0] == "info" else REST
+        harness.succeed(*words, *quick, cwd=folder)
+        if "-o" in words:
+            with mrcfile.open(os.path.join(folder, words[words.index("-o") + 1])) as file:
+                assert np.isfinite(file.data).all() and file.data.std() > 0
