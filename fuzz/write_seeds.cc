@@ -34,6 +34,8 @@ const std::string kAreTomo =
     "# AlphaOffset = 1.5\n# BetaOffset = 0.25\n"
     "0 5 1.0 1 -2 nan 1 1 0 -40\n2 5 1.0 1 -2 1 1 1 0 0\n3 5 1.0 1 -2 1 1 1 0 20\n"
     "4 5 1.0 1 -2 1 1 1 0 40\n# Local Alignment\n0 0 1.0 2.0 0.1 0.2 1.0\n";
+const std::string kTable =
+    "stack,path2,thickness,\"a \"\"b\"\"\"\r\n/dev/null,true,\"1,2\",\n\n/,, 5 ,false\n";
 const std::string kMdoc =
     "PixelSpacing = 2.17\n[T = Tilt axis angle = 85.9]\n\n[ZValue = 0]\nTiltAngle = -40\n"
     "[ZValue = 1]\nTiltAngle = -20\n[ZValue = 2]\nTiltAngle = 0\n[ZValue = 3]\nTiltAngle = 20\n"
@@ -46,6 +48,24 @@ const std::string kTiltCom =
 const std::string kNewstCom =
     "$newstack -StandardInput\nInputFile\tTS.st\nOutputFile\tTS_ali.mrc\nTransformFile\tTS.xf\n"
     "SizeToOutputInXandY\t10,8\nOffsetsInXandY\t1.0,0.0\n#DistortionField\t.idf\nBinByFactor\t2\n";
+const std::string kRelionViews =
+    "\n# version 50001\n\ndata_TS_01\n\nloop_\n_rlnMicrographName #1\n_rlnTomoYTilt #2\n"
+    "_rlnTomoZRot #3\n_rlnTomoXShiftAngst #4\n_rlnTomoYShiftAngst #5\n_rlnDefocusU #6\n"
+    "M/a.mrc -3.0 85.3 1.5 -2 30000\n2@s.mrcs 0.0 85.3 0 0 None\n";
+const std::string kRelionTomograms =
+    "data_global\n\nloop_\n_rlnTomoName #1\n_rlnTomoTiltSeriesStarFile #2\n_rlnTomoHand #3\n"
+    "_rlnTomoTiltSeriesPixelSize #4\n_rlnTomoSizeX #5\n_rlnTomoSizeY #6\n_rlnTomoSizeZ #7\n"
+    "TS_01 t/TS_01.star -1.0 2.39 4092 4000 1392\n\"TS 02\" t/TS_02.star 1 2.39 0 None 'x'\n";
+const std::string kTomostar =
+    "\ndata_\n\nloop_\n_wrpMovieName #1\n_wrpAngleTilt #2\n_wrpAxisAngle #3\n_wrpDose #4\n"
+    "_wrpAxisOffsetX #5\n_wrpAxisOffsetY #6\n../f/a.eer 45.01 83.94 116.1 3 -4\n";
+const std::string kWarpXml =
+    "<TiltSeries LevelAngleX=\"0.5\" LevelAngleY=\"-1\" VolumeDimensionsAngstrom=\"9, 9, 9\">\n"
+    "<Angles>-60\n-57.5</Angles><Dose>3\n0</Dose><UseTilt>True\nFalse</UseTilt>\n"
+    "<AxisAngle>-4.3\n-4.3</AxisAngle><AxisOffsetX>271.8\n1</AxisOffsetX>\n"
+    "<MoviePath>../2/a.tif\n../2/b.tif</MoviePath>\n"
+    "<GridMovementX Width=\"1\" Height=\"1\" Depth=\"2\"><Node X=\"0\" Y=\"0\" Z=\"0\" "
+    "Value=\"1\"/><Node X=\"0\" Y=\"0\" Z=\"1\" Value=\"2\"/></GridMovementX></TiltSeries>\n";
 const std::string kFiducials = "1 1 5 6 0\n1 1 5.5 6 1\n1 2 12 10 2\n1 2 13 10 3\n";
 const std::string kConfig =
     "thickness = 24\ntv = 1.5\nfield = \"grid\"\nroi = [0, 0, 16, 16]\nno-margin = true\n"
@@ -69,7 +89,7 @@ void write_stack(const fs::path& path, io::MrcMode mode) {
   spec.nz = kViews;
   spec.mode = mode;
   spec.voxel_size_A.fill(10);
-  spec.label = "a seed";
+  spec.labels = {"a seed"};
   io::MrcWriter file(path, spec);
   base::Random random(1);
   for (int section = 0; section < kViews; ++section) {
@@ -172,8 +192,13 @@ int main(int argc, char** argv) {
   write(folder / "transforms" / "xf", kTransforms);
   write(folder / "aretomo" / "aln", kAreTomo);
   write(folder / "mdoc" / "mdoc", kMdoc);
+  write(folder / "star" / "views", kRelionViews);
+  write(folder / "star" / "tomograms", kRelionTomograms);
+  write(folder / "star" / "tomostar", kTomostar);
+  write(folder / "warp_xml" / "series", kWarpXml);
   write(folder / "fiducials" / "text", kFiducials);
   write(folder / "config" / "toml", kConfig);
+  write(folder / "table" / "csv", kTable);
   write(folder / "command_file" / "tilt", kTiltCom);
   write(folder / "command_file" / "both", kTiltCom + '\1' + kNewstCom);
   write_tiffs(folder / "tiff");

@@ -88,7 +88,9 @@ void add_files(py::module_& module) {
       .def_readwrite("aln", &SeriesFiles::aln)
       .def_readwrite("mdoc", &SeriesFiles::mdoc)
       .def_readwrite("mask", &SeriesFiles::mask)
-      .def_readwrite("fiducials", &SeriesFiles::fiducials);
+      .def_readwrite("fiducials", &SeriesFiles::fiducials)
+      .def_readwrite("even", &SeriesFiles::even)
+      .def_readwrite("odd", &SeriesFiles::odd);
 }
 
 void add_views_and_specimen(Class& options) {
@@ -147,12 +149,16 @@ void add_field_and_fit(Class& options) {
   add_choice(options, "fourier_ring", &Options::fourier_ring);
 }
 
-void add_volume_and_run(Class& options) {
-  options.def_readwrite("invert", &Options::invert)
+void add_halves_volume_and_run(Class& options) {
+  options.def_readwrite("split_tilts", &Options::split_tilts)
+      .def_readwrite("denoising_halves", &Options::denoising_halves)
+      .def_readwrite("invert", &Options::invert)
+      .def_readwrite("zarr", &Options::zarr)
       .def_readwrite("output", &Options::output)
       .def_readwrite("overwrite", &Options::overwrite)
       .def_readwrite("resume", &Options::resume)
-      .def_readwrite("checkpoint_minutes", &Options::checkpoint_minutes);
+      .def_readwrite("checkpoint_minutes", &Options::checkpoint_minutes)
+      .def_readwrite("alignment_json", &Options::alignment_json);
   add_choice<VoxelType, VoxelTypeNames>(options, "voxel_type", &Options::voxel_type);
   add_choice(options, "axes", &Options::axes);
 }
@@ -165,7 +171,7 @@ void add_options(py::module_& module) {
   options.def(py::init());
   add_views_and_specimen(options);
   add_field_and_fit(options);
-  add_volume_and_run(options);
+  add_halves_volume_and_run(options);
 }
 
 }  // namespace tomofield::python

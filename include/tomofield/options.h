@@ -36,6 +36,8 @@ struct SeriesFiles {
   std::optional<std::filesystem::path> mdoc;   ///< SerialEM metadata (angles, pixel size)
   std::optional<std::filesystem::path> mask;   ///< MRC as the stack: 0 is no measurement
   std::optional<std::filesystem::path> fiducials;  ///< text of model2point, stack coordinates
+  std::optional<std::filesystem::path> even;       ///< MRC as the stack: the even frames alone
+  std::optional<std::filesystem::path> odd;        ///< and the odd frames
 };
 
 /// A rectangle [x0, x1) × [y0, y1) of pixels. A region of interest is one of the aligned view at
@@ -110,14 +112,20 @@ struct Options {
   int patience = 0;                    ///< epochs without a better held-out error; 0: never stop
   std::uint64_t seed = 1;
 
+  // Halves (docs/halves.md)
+  bool split_tilts = false;       ///< fit the even and the odd tilts separately
+  bool denoising_halves = false;  ///< write linear halves for denoisers as well
+
   // Volume and run
   VoxelType voxel_type = VoxelType::kFloat32;
   VolumeAxes axes = VolumeAxes::kXyz;
   bool invert = false;           ///< write the other contrast than the input's
+  bool zarr = false;             ///< write the volume as OME-Zarr as well
   std::filesystem::path output;  ///< the tomogram; empty: results stay in memory
   bool overwrite = false;        ///< replace existing results
   bool resume = false;           ///< continue from the model file, if there is one
   double checkpoint_minutes = 5;
+  bool alignment_json = false;  ///< write the alignment for the CryoET Data Portal as well
 };
 
 }  // namespace tomofield

@@ -55,8 +55,8 @@ struct Reconstruction {
   /// The density in the units and the contrast of the views, or in the other contrast with
   /// Options::invert. It is there only if Options::output is empty.
   std::optional<Tomogram> tomogram;
-  std::optional<Model> model;
-  std::string metrics;  ///< JSON: what `tomofield reconstruct` writes beside the volume
+  std::optional<Model> model;  ///< halves have none: their models are files beside the tomogram
+  std::string metrics;         ///< JSON: what `tomofield reconstruct` writes beside the volume
 };
 
 /// Fits a density field to a tilt series and samples it as a tomogram: the whole job of

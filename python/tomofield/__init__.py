@@ -111,6 +111,8 @@ def reconstruct(
     mdoc: Optional[Path] = None,
     mask: Optional[Path] = None,
     fiducials: Optional[Path] = None,
+    even: Optional[Path] = None,
+    odd: Optional[Path] = None,
     progress: Optional[Callable[[Progress], Optional[bool]]] = None,
     **options: Unpack[Options],
 ) -> Reconstruction:
@@ -120,6 +122,8 @@ def reconstruct(
         runs along y through the image centre.
     tilt_deg: an angle a view, for views in memory.
     tlt, xf, xtilt, aln, mdoc, mask, fiducials: files that belong to an MRC stack.
+    even, odd: MRC stacks of the even and the odd frames, for a reconstruction in halves. Its models
+        are files beside the tomogram, so `model` is None.
     progress: called after every step; returns False to stop.
     options: see tomofield.Options. `thickness` is required. With `output`, the tomogram, the model
         and the metrics are written as files; without it, nothing is written.
@@ -127,7 +131,7 @@ def reconstruct(
     KeyboardInterrupt stops it too; with `output`, both leave a checkpoint for `resume=True`.
     """
     files = {"tlt": tlt, "xf": xf, "xtilt": xtilt, "aln": aln, "mdoc": mdoc, "mask": mask,
-             "fiducials": fiducials}
+             "fiducials": fiducials, "even": even, "odd": odd}
     made = _core.reconstruct(_series(series, tilt_deg, files), _options(options), progress)
     return Reconstruction(
         made["is_finished"], made["tomogram"],

@@ -71,11 +71,17 @@ class Options(TypedDict, total=False):
     patience: int
     seed: int
 
+    # Halves
+    split_tilts: bool
+    denoising_halves: bool
+
     # Volume and run
     voxel_type: Literal["float32", "float16", "int16"]
     axes: Literal["xyz", "xzy"]
     invert: bool
+    zarr: bool
     output: _Path
     overwrite: bool
     resume: bool
     checkpoint_minutes: float
+    alignment_json: bool

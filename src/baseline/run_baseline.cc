@@ -159,13 +159,19 @@ AfterIteration report_to(const base::ProgressSink& progress, const MethodFacts& 
   };
 }
 
+void write_volume(const Solution& solution, const measurement::Measurement& series,
+                  const BaselineOptions& options, const std::filesystem::path& path) {
+  output::ModelInfo info = output::model_info(series, options.shared.contrast);
+  info.options_json = options_json(options).dump();
+  write_voxels(voxels_of(solution.densities), output::region_box(info, 1.0), info,
+               fmt::format("baseline {}", facts_of(options.method).name),
+               output::volume_options(options.shared), path);
+}
+
 void write_results(const Solution& solution, const measurement::Measurement& series,
                    const BaselineOptions& options, const nlohmann::json& metrics,
                    const BaselinePaths& paths) {
-  const output::ModelInfo info = output::model_info(series, options.shared.contrast);
-  write_voxels(voxels_of(solution.densities), output::region_box(info, 1.0), info,
-               fmt::format("baseline {}", facts_of(options.method).name),
-               output::volume_options(options.shared), paths.volume);
+  write_volume(solution, series, options, paths.volume);
   io::write_json(paths.json, {{"tomofield", TOMOFIELD_VERSION},
                               {"options", options_json(options)},
                               {"origins", option_table::to_json(options.origins)},
@@ -187,11 +193,12 @@ BaselinePaths baseline_paths(const std::filesystem::path& volume) {
 }
 
 void check_options(const BaselineOptions& options) {
+  constexpr const char* kAdvice = "give --overwrite to replace it, or another name with -o";
   base::require_no_faults(option_table::range_faults(options.shared));
   const BaselinePaths paths = baseline_paths(options.shared.output);
   io::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
-                         options.shared.overwrite,
-                         "give --overwrite to replace it, or another name with -o");
+                         options.shared.overwrite, kAdvice);
+  if (options.shared.zarr) output::check_zarr(paths.volume, options.shared.overwrite, kAdvice);
 }
 
 std::vector<io::OutputLock> claim_outputs(const BaselineOptions& options) {
@@ -268,6 +275,20 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   metrics["tuning"] = tuning;
   write_results(solution, series, options, metrics, paths);
   return summary_of(solution, problem.num_rays(), series);
+}
+
+void write_linear_volume(const measurement::Measurement& series, const Options& shared,
+                         const std::filesystem::path& path) {
+  const base::TraceSpan span("linear volume");
+  const BaselineOptions options{{}, shared, WbpOptions{}};
+  std::vector<int> unused = series.held_out;
+  unused.insert(unused.end(), series.left_out.begin(), series.left_out.end());
+  std::ranges::sort(unused);
+  const VoxelProblem problem(series.geometry, grid_of(series, options), *series.rays,
+                             series.noise_sigma, {unused, false});
+  write_volume(reconstruct_wbp(problem, WbpOptions{}, series.mean_density,
+                               [](const IterationReport&, VoxelVolume&) {}),
+               series, options, path);
 }
 
 }  // namespace tomofield::baseline

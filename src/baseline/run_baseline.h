@@ -72,4 +72,10 @@ struct BaselineProgress {
 BaselineSummary run_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options,
                              const BaselineProgress& progress);
 
+/// Reconstructs a prepared measurement by weighted back-projection, without held-out and left-out
+/// views and without scales of views, so that the result is linear in the rays. Writes the volume
+/// alone, as run_baseline() does. `shared` has the options of the specimen and of the volume.
+void write_linear_volume(const measurement::Measurement& series, const Options& shared,
+                         const std::filesystem::path& path);
+
 }  // namespace tomofield::baseline

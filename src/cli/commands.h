@@ -14,6 +14,7 @@ namespace tomofield::cli {
 /// The metrics list `origins`, the settings that come from a project (project_arguments.h). They
 /// may change until the command runs.
 void add_baseline_command(CLI::App& program, const std::vector<option_table::Setting>& origins);
+void add_batch_command(CLI::App& program);
 void add_compare_command(CLI::App& program);
 void add_evaluate_command(CLI::App& program);
 void add_export_command(CLI::App& program);
@@ -22,5 +23,6 @@ void add_info_command(CLI::App& program);
 void add_reconstruct_command(CLI::App& program, const distributed::Communicator& processes,
                              const std::vector<option_table::Setting>& origins);
 void add_simulate_command(CLI::App& program);
+void add_view_command(CLI::App& program);
 
 }  // namespace tomofield::cli

@@ -14,6 +14,7 @@
 #include "cli/config_file.h"
 #include "cli/console.h"
 #include "cli/exit_status.h"
+#include "cli/given_options.h"
 #include "cli/help_formatter.h"
 #include "cli/number_checks.h"
 #include "cli/stop_signal.h"
@@ -39,18 +40,15 @@ struct Arguments {
 std::vector<std::string> series_words(const CLI::App& command,
                                       const std::vector<std::string>& own_options) {
   std::vector<std::string> words;
-  for (const CLI::Option* option : command.get_options()) {
-    if (option->count() == 0 || std::ranges::count(own_options, option->get_name()) > 0) continue;
-    const bool is_flag = option->get_items_expected_max() == 0;
-    if (!option->get_positional() || !option->get_lnames().empty())
-      words.push_back(option->get_name());
-    if (is_flag) continue;
-    const std::string value = fmt::format("{}", fmt::join(option->results(), ","));
+  for (const option_table::GivenOption& given : given_options(command, own_options)) {
     // A separate value that begins with a minus would count as an option.
-    if (!words.empty() && words.back() == option->get_name() && value.rfind('-', 0) == 0)
-      words.back() += "=" + value;
-    else
-      words.push_back(value);
+    const bool is_one_word = given.flag.empty() || !given.value || given.value->starts_with('-');
+    if (is_one_word) {
+      words.push_back(given.word());
+    } else {
+      words.push_back(given.flag);
+      words.push_back(*given.value);
+    }
   }
   return words;
 }

@@ -16,6 +16,7 @@
 #include "cli/table_options.h"
 #include "io/output_files.h"
 #include "io/output_lock.h"
+#include "io/output_set.h"
 #include "output/model_file.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
@@ -41,8 +42,10 @@ struct ExportArguments {
 // Checks that the volume can be written, and locks it.
 std::vector<io::OutputLock> claim_output(const ExportArguments& arguments) {
   return io::claim_outputs({arguments.output}, [&] {
-    io::check_output_files({arguments.output}, {arguments.model}, arguments.overwrite,
-                           "give another name, or --overwrite to replace it");
+    constexpr const char* kAdvice = "give another name, or --overwrite to replace it";
+    io::check_output_files({arguments.output}, {arguments.model}, arguments.overwrite, kAdvice);
+    if (arguments.choices.options.zarr)
+      output::check_zarr(arguments.output, arguments.overwrite, kAdvice);
   });
 }
 
@@ -77,7 +80,9 @@ void run_export(ExportArguments& arguments) {
     box.field_from_box = field::rotation_from_euler(angles[0], angles[1], angles[2]);
   output::VolumeOptions volume = output::volume_options(arguments.choices.options);
   volume.box = box;
+  io::OutputSet results;
   output::write_volume(model, volume, arguments.output);
+  results.commit();
   print("{}: {} × {} × {} voxels (x, y, z) of {:.6g} Å about {:.6g}, {:.6g}, {:.6g} px\n",
         arguments.output.string(), box.size[0], box.size[1], box.size[2],
         box.voxel_px * model.pixel_size_A, box.centre_px[0], box.centre_px[1], box.centre_px[2]);

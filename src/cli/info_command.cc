@@ -19,6 +19,7 @@
 #include "io/mrc_format.h"
 #include "io/positioned_file.h"
 #include "io/tiff_stack.h"
+#include "io/view_table.h"
 #include "output/model_file.h"
 #include "output/shared_options.h"
 #include "tilt_series/open_views.h"
@@ -35,7 +36,8 @@ enum class FileKind { kMrc, kHdf5, kOtherImages };
 /// Returns the kind of a file by its first bytes. The images that an .mdoc names, and those of a
 /// folder, are no file.
 FileKind kind_of(const std::filesystem::path& path) {
-  if (path.extension() == ".mdoc" || std::filesystem::is_directory(path))
+  std::error_code absent;
+  if (path.extension() == ".mdoc" || std::filesystem::is_directory(path, absent))
     return FileKind::kOtherImages;
   if (io::is_tiff(path)) return FileKind::kOtherImages;
   constexpr std::string_view kHdf5Signature = "\x89HDF\r\n\x1a\n";
@@ -193,6 +195,7 @@ void print_model(const std::filesystem::path& path) {
 }
 
 void print_info(const tilt_series::TiltSeriesOptions& options) {
+  if (io::is_view_table(options.stack)) return print_series(options);
   switch (kind_of(options.stack)) {
     case FileKind::kHdf5:
       return print_model(options.stack);

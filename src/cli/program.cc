@@ -38,8 +38,10 @@ void add_commands(CLI::App& program, const distributed::Communicator& processes,
   add_reconstruct_command(program, processes, origins);
   add_baseline_command(program, origins);
   add_export_command(program);
+  add_view_command(program);
   add_evaluate_command(program);
   add_compare_command(program);
+  add_batch_command(program);
   add_simulate_command(program);
   add_info_command(program);
 }
@@ -94,7 +96,7 @@ bool prints_its_result(const CLI::App& program) {
   const CLI::App& command = called_command(program);
   const CLI::Option* dry_run = command.get_option_no_throw("--dry-run");
   return &command == &program || command.get_name() == "info" || command.get_name() == "evaluate" ||
-         (dry_run != nullptr && dry_run->count() > 0);
+         command.get_name() == "view" || (dry_run != nullptr && dry_run->count() > 0);
 }
 
 // Says so if something that was printed is lost. That is a failure if it was the command's result.

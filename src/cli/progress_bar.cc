@@ -1,4 +1,5 @@
 #include "cli/progress_bar.h"
+#include "base/time_text.h"
 #include "cli/console.h"
 
 #include <fmt/format.h>
@@ -58,13 +59,6 @@ struct Display {
 
 }  // namespace
 
-std::string format_duration(double seconds) {
-  const long s = std::lround(std::max(0.0, seconds));
-  if (s >= 3600) return fmt::format("{} h {:02} min", s / 3600, s % 3600 / 60);
-  if (s >= 60) return fmt::format("{} min {:02} s", s / 60, s % 60);
-  return fmt::format("{} s", s);
-}
-
 base::ProgressSink make_progress_bar(const std::string& title) {
   const bool terminal = isatty(STDERR_FILENO) == 1;
   auto display = std::make_shared<Display>();
@@ -74,7 +68,7 @@ base::ProgressSink make_progress_bar(const std::string& title) {
     if (!finished && report.seconds_elapsed - display->last_shown < pause) return;
     display->last_shown = report.seconds_elapsed;
     const std::string state = fmt::format("{:3.0f} %  {}  {} left", 100 * report.fraction_done,
-                                          report.detail, format_duration(report.seconds_left));
+                                          report.detail, base::time_text(report.seconds_left));
     if (terminal) {
       say("\r\033[K{}", terminal_line(title, report.fraction_done, state));
       if (finished) say("\n");

@@ -8,7 +8,4 @@ namespace tomofield::cli {
 /// and a plain line every few seconds otherwise. `title` begins every line.
 base::ProgressSink make_progress_bar(const std::string& title);
 
-/// Returns a duration as "2 h 05 min", "3 min 20 s" or "12 s".
-std::string format_duration(double seconds);
-
 }  // namespace tomofield::cli

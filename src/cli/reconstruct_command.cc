@@ -6,6 +6,7 @@
 #include "cli/commands.h"
 #include "cli/common_options.h"
 #include "cli/help_formatter.h"
+#include "cli/plan_file.h"
 #include "cli/run_reconstruction.h"
 #include "cli/table_options.h"
 #include "cli/trace_option.h"
@@ -20,7 +21,7 @@ using option_table::Group;
 struct Arguments {
   option_table::Choices choices;
   bool dry_run = false;
-  std::optional<std::filesystem::path> trace;
+  std::optional<std::filesystem::path> trace, plan;
 };
 
 void run(const Arguments& arguments, const distributed::Communicator& processes,
@@ -30,11 +31,17 @@ void run(const Arguments& arguments, const distributed::Communicator& processes,
   options.origins = origins;
   std::vector<io::OutputLock> locks;
   processes.run_collectively([&] {
-    locks = claim_run(options, arguments.dry_run || !processes.is_root());
+    locks = claim_run(options, arguments.dry_run || arguments.plan || !processes.is_root());
+    check_plan_file(arguments.plan, options);
     const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
     check_trace_file(arguments.trace, {paths.volume, paths.model, paths.json}, options.files,
                      options.resolved.overwrite);
   });
+  if (arguments.plan) {
+    options.input.look_at_views = false;
+    return write_plan(*arguments.plan, tilt_series::TiltSeries(options.input, processes), options,
+                      processes);
+  }
   options.input.keep_views = !arguments.dry_run;
   run_traced(arguments.dry_run ? std::nullopt : arguments.trace, processes, [&] {
     const tilt_series::TiltSeries series(options.input, processes);
@@ -51,10 +58,11 @@ void add_reconstruct_command(CLI::App& program, const distributed::Communicator&
   auto arguments = std::make_shared<Arguments>();
   add_input_options(command, arguments->choices);
   add_groups(command, arguments->choices,
-             {Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume});
+             {Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume, Group::kHalves});
   add_run_options(command, arguments->choices, arguments->dry_run);
   add_common_options(command);
   add_trace_option(command, arguments->trace);
+  add_plan_option(command, arguments->plan);
   add_help_all(command);
   command.footer(
       "Example: tomofield reconstruct series.mrc --tlt series.tlt --xf series.xf --bin 4 \\\n"

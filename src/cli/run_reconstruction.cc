@@ -17,9 +17,15 @@
 #include "cli/exit_status.h"
 #include "cli/fit_options.h"
 #include "cli/pictures.h"
+#include "cli/plan_file.h"
 #include "cli/progress_bar.h"
 #include "cli/stop_signal.h"
 #include "cli/table_options.h"
+#include "io/atomic_file.h"
+#include "io/output_set.h"
+#include "output/volume.h"
+#include "reconstruct/exchange_files.h"
+#include "reconstruct/run_report.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
 
@@ -73,12 +79,50 @@ void print_plan(const reconstruction::ReconstructOptions& options,
         base::thread_count(), processes, static_cast<double>(plan.memory_bytes) / (1 << 30),
         num_processes == 1 ? "" : " each");
   print("epochs: {}\n", epochs_text(plan.stages));
+  if (plan.num_fits == 2)
+    print(
+        "halves: two such fits, one after the other, which share the scales of views of a short "
+        "fit before them\n");
   flush_output();  // the plan comes before other output, in a file too
 }
 
-void print_files(const reconstruction::OutputPaths& paths) {
-  print("tomogram  {}\nmodel     {}\nmetrics   {}\n", paths.volume.string(), paths.model.string(),
-        paths.json.string());
+void print_files_of_halves(const reconstruction::OutputPaths& paths, bool with_linear_volumes) {
+  print("tomogram  {} (mean of both halves)\nmetrics   {}\nreport    {}\n", paths.volume.string(),
+        paths.json.string(), paths.report.string());
+  for (const reconstruction::OutputPaths::OfHalf& half : paths.halves) {
+    print("half      {}, model {}\n", half.volume.string(), half.model.string());
+    if (with_linear_volumes) print("linear    {}\n", half.linear_volume.string());
+  }
+  print("maps      {} {}\nFSC       {}\n", paths.local_resolution.string(),
+        paths.uncertainty.string(), paths.fsc_picture.string());
+}
+
+void print_files(const reconstruction::ReconstructOptions& options,
+                 const reconstruction::OutputPaths& paths) {
+  if (options.makes_halves())
+    return print_files_of_halves(paths, options.resolved.denoising_halves);
+  print("tomogram  {}\nmodel     {}\nmetrics   {}\nreport    {}\n", paths.volume.string(),
+        paths.model.string(), paths.json.string(), paths.report.string());
+}
+
+// Writes the report of a run beside its other results, which have temporary names yet.
+void write_report(const reconstruction::Results& results,
+                  const reconstruction::ReconstructOptions& options,
+                  const std::filesystem::path& volume, const std::filesystem::path& mask_picture) {
+  const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
+  const io::OutputSet& written = *io::OutputSet::active();
+  reconstruction::ReportSource source{.record = results.metrics,
+                                      .files = options.files,
+                                      .requested = options.requested,
+                                      .volume = volume,
+                                      .mask_picture = written.location_of(mask_picture),
+                                      .tree_picture = {},
+                                      .held_out_picture = {}};
+  if (options.field.tree == TreeKind::kAdaptive)
+    source.tree_picture = written.location_of(paths.tree_picture);
+  if (options.fit.hold_out > 0 && !options.makes_halves())
+    source.held_out_picture = written.location_of(paths.held_out_picture);
+  io::write_text_file(paths.report, reconstruction::run_report(source));
 }
 
 ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
@@ -95,7 +139,8 @@ void add_run_options(CLI::App& command, option_table::Choices& choices, bool& dr
   add_groups(command, choices, {option_table::Group::kRun});
   command.get_option("--resume")->excludes("--overwrite");
   command
-      .add_flag("--dry-run", dry_run, "Check everything and print the plan and the memory it needs")
+      .add_flag("--dry-run", dry_run,
+                "Check everything, and print the plan with its memory, time and disk")
       ->group(std::string(title_of(option_table::Group::kRun)));
 }
 
@@ -111,22 +156,30 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
                         const reconstruction::ReconstructOptions& options, bool dry_run,
                         const distributed::Communicator& processes) {
   processes.run_collectively([&] {
-    print_plan(options, reconstruction::plan_run(series, options, processes), processes.size());
+    const reconstruction::RunPlan plan = plan_run(series, options, processes);
+    require_memory(plan, processes);
+    require_few_vertices(plan);
+    print_plan(options, plan, processes.size());
+    if (dry_run && processes.is_root())
+      print_estimate(estimate_run(series, options, plan), processes.size());
   });
   if (dry_run) return;
   const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
   const bool is_job = processes.size() > 1;
   stop_on_signals(is_job);
-  if (is_job) processes.set_waiting_callback(tell_if_stuck(paths.model, processes));
+  if (is_job) processes.set_waiting_callback(tell_if_stuck(options.first_model(paths), processes));
   std::vector<std::filesystem::path> pictures;
   reconstruction::ReconstructHooks hooks{
       .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};
   hooks.write_more = [&](const reconstruction::Results& results,
                          const std::filesystem::path& volume) {
     pictures = write_pictures(volume, series, results.bead_masking, paths.picture_prefix);
-    if (options.field.tree != TreeKind::kAdaptive) return;
-    const base::TraceSpan span("draw tree");
-    report::write_tree_picture(results.model, paths.tree_picture);
+    reconstruction::write_exchange_files(series, options, volume);
+    if (options.field.tree == TreeKind::kAdaptive) {
+      const base::TraceSpan span("draw tree");
+      report::write_tree_picture(*results.model, paths.tree_picture);
+    }
+    write_report(results, options, volume, pictures.back());
   };
   if (processes.is_root()) {
     hooks.progress = make_progress_bar("reconstruct");
@@ -137,13 +190,16 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
     case reconstruction::Outcome::kFinished:
       break;
     case reconstruction::Outcome::kStopped:
-      throw stopped("the checkpoint is", paths.model, options);
+      throw stopped("the checkpoint is", run.checkpoint, options);
     case reconstruction::Outcome::kStoppedTuning:
       if (options.resolved.tune) throw stopped("the finished trials are in", paths.trials, options);
       throw ExitStatus{stop_status(), "stopped before the first checkpoint"};
   }
   if (!processes.is_root()) return;
-  print_files(paths);
+  print_files(options, paths);
+  for (const auto& file : reconstruction::exchange_files(options))
+    print("          {}\n", file.string());
+  if (options.volume.zarr) print("OME-Zarr  {}\n", output::zarr_path(paths.volume).string());
   print_pictures(pictures);
   if (options.field.tree == TreeKind::kAdaptive)
     print("tree      {}\n", paths.tree_picture.string());

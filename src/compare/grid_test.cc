@@ -40,7 +40,7 @@ class TruthOf : public ::testing::Test {
  protected:
   bool fits(const std::array<std::int64_t, 3>& size, double voxel_A, bool is_a_part = false) const {
     const auto path = directory_ / "truth.mrc";
-    io::MrcSpec spec{.nx = size[0], .ny = size[1], .nz = size[2], .label = ""};
+    io::MrcSpec spec{.nx = size[0], .ny = size[1], .nz = size[2], .labels = {}};
     spec.voxel_size_A.fill(voxel_A);
     io::MrcWriter(path, spec).close();
     return message_of<Error>([&] {

@@ -9,7 +9,6 @@
 #include "base/log.h"
 #include "base/plausible.h"
 #include "base/utf8.h"
-#include "compare/child_process.h"
 #include "compare/grid.h"
 #include "io/json.h"
 #include "io/json_numbers.h"
@@ -86,7 +85,7 @@ bool can_resume(const Row& row) {
 }
 
 // Returns the costs of earlier sessions that count towards the costs of a run.
-Costs costs_until_now(const Row& row) {
+base::Costs costs_until_now(const Row& row) {
   if (!can_resume(row)) return {};
   if (row.state.progress != Progress::kStopped) {
     base::log_warning(fmt::format(
@@ -103,28 +102,23 @@ bool run(const fs::path& program, const RunHooks& hooks, Row& row) {
   const std::vector<std::string> command = full_command(program, row, row.volume);
   // The fit is finished; only the volume is written again.
   const bool is_paid = can_resume(row) && row.state.progress == Progress::kFinished;
-  const auto keep = [&](Progress progress, const Costs& costs) {
+  const auto keep = [&](Progress progress, const base::Costs& costs) {
     if (is_paid) return;
     row.state = {progress, costs};
     write_row(file_of(row, ".row.json"), row.origin, row.state);
   };
-  const Costs before = is_paid ? row.state.costs : costs_until_now(row);
+  const base::Costs before = is_paid ? row.state.costs : costs_until_now(row);
   keep(Progress::kRunning, before);
-  const ChildResult result = run_child(command, log, hooks.stop_requested);
+  const base::ChildResult result = base::run_child(command, log, hooks.stop_requested);
   const bool has_ended = result.exit_status == 0;
-  keep(has_ended ? Progress::kFinished : Progress::kStopped,
-       before + Costs{result.core_seconds, result.wall_seconds, result.peak_bytes});
+  keep(has_ended ? Progress::kFinished : Progress::kStopped, before + result.costs);
   if (has_ended || hooks.must_stop()) return has_ended;
   throw Error(fmt::format("{} failed with status {}: {} (all that it said is in '{}')",
-                          row.run.name, result.exit_status, reason_of_failure(log), log.string()));
+                          row.run.name, result.exit_status, base::reason_of_failure(log),
+                          log.string()));
 }
 
 }  // namespace
-
-Costs operator+(const Costs& one, const Costs& other) {
-  return {one.core_seconds + other.core_seconds, one.wall_seconds + other.wall_seconds,
-          std::max(one.peak_bytes, other.peak_bytes)};
-}
 
 std::vector<std::string> utf8_texts(const std::vector<std::string>& words) {
   std::vector<std::string> texts;
@@ -202,8 +196,9 @@ std::vector<std::string> full_command(const fs::path& program, const Row& row,
 
 std::vector<fs::path> files_of(const Row& row) {
   std::vector<fs::path> files;
-  for (const char* suffix : {".row.json", ".log", ".mrc", ".h5", ".json", "_tune.json", "_xy.png",
-                             "_xz.png", "_yz.png", "_mask.png", "_tree.png", "_held_out.png"})
+  for (const char* suffix :
+       {".row.json", ".log", ".mrc", ".h5", ".json", "_tune.json", "_xy.png", "_xz.png", "_yz.png",
+        "_mask.png", "_tree.png", "_held_out.png", "_choice.png", "_report.html"})
     files.push_back(file_of(row, suffix));
   return files;
 }

@@ -8,16 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "base/child_process.h"
 #include "compare/methods.h"
 
 namespace tomofield::compare {
-
-/// The costs of a run, in all of its sessions.
-struct Costs {
-  double core_seconds = 0, wall_seconds = 0;
-  std::int64_t peak_bytes = 0;  ///< peak of the largest session
-};
-Costs operator+(const Costs& one, const Costs& other);
 
 /// The progress of a run. A run that is marked as running when nobody runs it was killed; its costs
 /// since its last start are not known.
@@ -29,7 +23,7 @@ NLOHMANN_JSON_SERIALIZE_ENUM(Progress, {{Progress::kNone, nullptr},
 
 struct RowState {
   Progress progress = Progress::kNone;
-  Costs costs;
+  base::Costs costs;  ///< of all sessions
 };
 
 /// Returns words as UTF-8, which JSON needs (base/utf8.h).

@@ -62,12 +62,5 @@ TEST_F(RowFile, ThatIsDamagedIsNamed) {
   }
 }
 
-TEST(Costs, OfSessionsAddUpButForMemory) {
-  const Costs sum = Costs{1, 2, 300} + Costs{10, 20, 200};
-  EXPECT_EQ(sum.core_seconds, 11);
-  EXPECT_EQ(sum.wall_seconds, 22);
-  EXPECT_EQ(sum.peak_bytes, 300);
-}
-
 }  // namespace
 }  // namespace tomofield::compare

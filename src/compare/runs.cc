@@ -7,11 +7,11 @@
 #include <iterator>
 #include <optional>
 #include <string>
-#include <system_error>
 
-#include "compare/child_process.h"
+#include "base/child_process.h"
 #include "compare/grid.h"
 #include "io/output_files.h"
+#include "io/scratch_folder.h"
 #include "io/text_lines.h"
 #include "tomofield/error.h"
 
@@ -83,29 +83,6 @@ Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
   return run;
 }
 
-// A directory in the folder of the comparison, which is locked. Its destructor removes it with all
-// its contents.
-class ScratchFolder {
- public:
-  explicit ScratchFolder(const fs::path& folder) : path_(folder / ".tomofield-rehearsal") {
-    std::error_code error;
-    fs::remove_all(path_, error);  // of a comparison that was killed
-    if (fs::create_directory(path_, error)) return;
-    throw Error(fmt::format("the folder '{}' cannot be written ({}): give another with -o",
-                            folder.string(), error.message()));
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
 // Returns the grid of the row's future volume, or nothing if it was asked to stop.
 std::optional<Grid> grid_to_be(const CompareOptions& options, const RunHooks& hooks, const Row& row,
                                const fs::path& scratch) {
@@ -113,10 +90,10 @@ std::optional<Grid> grid_to_be(const CompareOptions& options, const RunHooks& ho
   const fs::path log = scratch / "log";
   auto command = full_command(options.program, row, row.volume);
   command.emplace_back("--dry-run");
-  const ChildResult result = run_child(command, log, hooks.stop_requested);
+  const base::ChildResult result = base::run_child(command, log, hooks.stop_requested);
   if (hooks.must_stop()) return std::nullopt;
   if (result.exit_status != 0)
-    throw Error(fmt::format("{}: {}", row.run.name, reason_of_failure(log)));
+    throw Error(fmt::format("{}: {}", row.run.name, base::reason_of_failure(log)));
   return planned_grid(io::read_text_file(log));
 }
 
@@ -136,7 +113,7 @@ PlannedRuns plan_runs(const CompareOptions& options, const tilt_series::TiltSeri
 }
 
 bool rehearse(const CompareOptions& options, const RunHooks& hooks, const std::vector<Row>& rows) {
-  const ScratchFolder scratch(options.folder);
+  const io::ScratchFolder scratch(options.folder, ".tomofield-rehearsal");
   std::optional<NamedGrid> main;
   for (const Row& row : rows) {
     const std::optional<Grid> grid = grid_to_be(options, hooks, row, scratch.path());

@@ -51,18 +51,6 @@ void transform_axis(std::int64_t n, std::int64_t stride, std::vector<std::comple
   });
 }
 
-// The sums over the Fourier voxels of a shell.
-struct ShellSums {
-  double product = 0.0, first = 0.0, second = 0.0;
-  std::int64_t voxels = 0;
-  void operator+=(const ShellSums& other) {
-    product += other.product;
-    first += other.first;
-    second += other.second;
-    voxels += other.voxels;
-  }
-};
-
 // The sums [shell] over frequencies that the tilts cover and over those that they do not.
 struct WedgeSums {
   std::vector<ShellSums> measured, missing;
@@ -94,7 +82,8 @@ void check_weights(const base::Volume& weights) {
 }
 
 // The input of the transform: values[i] = scale · weight[i] (volume[i] − mean). Its mean square is
-// 1, so that both volumes fit one complex transform in single precision.
+// 1, so that both volumes fit one complex transform in single precision. A constant volume has
+// scale 0.
 struct Normalised {
   const base::Volume& volume;
   const base::Volume& weights;
@@ -120,10 +109,11 @@ struct Normalised {
     if (!std::isfinite(squares))
       throw Error("a volume has NaN or infinite voxels: no shell correlation means anything");
     // Rounding leaves about 10⁻³² of the square of a constant volume.
-    if (!(squares > 1e-20 * mean * mean))
-      throw Error("a volume is constant under the mask: it correlates with nothing");
+    if (!(squares > 1e-20 * mean * mean)) return;
     scale = std::sqrt(static_cast<double>(v.data.size()) / squares);
   }
+
+  bool is_constant() const { return scale == 0.0; }
 
   float operator()(std::size_t i) const {
     return static_cast<float>(scale * static_cast<double>(weights.data[i]) *
@@ -171,7 +161,7 @@ WedgeSums section_sums(const base::Shape3& shape, const std::vector<std::complex
       if (shell < 1 || shell > static_cast<long>(shells)) continue;
       const std::complex<double> f(there[kx]), g(std::conj(opposite[(shape.nx - kx) % shape.nx]));
       const std::complex<double> a = 0.5 * (f + g), b = std::complex(0.0, -0.5) * (f - g);
-      auto& set = tilts.covers(x, z) ? sums.measured : sums.missing;
+      auto& set = tilts.covers(x, y, z) ? sums.measured : sums.missing;
       set[static_cast<std::size_t>(shell - 1)] +=
           {a.real() * b.real() + a.imag() * b.imag(), std::norm(a), std::norm(b), 1};
     }
@@ -276,28 +266,60 @@ base::Volume edge_window(const base::Shape3& shape) {
   return weights;
 }
 
-Fsc fourier_shell_correlation(const base::Volume& first, const base::Volume& second,
-                              const base::Volume& weights, const std::optional<TiltRange>& tilts) {
+void FscSums::add(const base::Volume& first, const base::Volume& second,
+                  const base::Volume& weights, const std::optional<TiltRange>& tilts) {
   const base::Shape3& shape = first.shape;
   TOMOFIELD_CHECK(second.shape == shape && weights.shape == shape, "all of one shape");
   const std::int64_t longest = longest_axis(shape);
   if (longest < 4) throw Error("shell correlation needs an axis of 4 voxels or more");
   check_weights(weights);
-  const auto joint = joint_transform(Normalised(first, weights), Normalised(second, weights));
+  const Normalised a(first, weights), b(second, weights);
+  if (a.is_constant() || b.is_constant()) return;
   const TiltRange all_tilts{-90.0, 90.0};
-  WedgeSums sums = shell_sums(shape, joint, tilts.value_or(all_tilts));
+  const WedgeSums sums = shell_sums(shape, joint_transform(a, b), tilts.value_or(all_tilts));
+  if (measured_.empty()) {
+    unit_of_first_ = a.scale;
+    unit_of_second_ = b.scale;
+    length_A_ = static_cast<double>(longest) * second.voxel_size_A;
+    has_tilts_ = tilts.has_value();
+    measured_.resize(sums.measured.size());
+    missing_.resize(sums.missing.size());
+  }
+  TOMOFIELD_CHECK(sums.measured.size() == measured_.size(), "all pairs of one shape");
+  // Each pair has scales of its own, which are undone here.
+  const double ratio_a = unit_of_first_ / a.scale, ratio_b = unit_of_second_ / b.scale;
+  const auto in_common_units = [&](const ShellSums& s) {
+    return ShellSums{s.product * ratio_a * ratio_b, s.first * ratio_a * ratio_a,
+                     s.second * ratio_b * ratio_b, s.voxels};
+  };
+  for (std::size_t s = 0; s < measured_.size(); ++s) {
+    measured_[s] += in_common_units(sums.measured[s]);
+    missing_[s] += in_common_units(sums.missing[s]);
+  }
+}
+
+Fsc FscSums::correlation() const {
+  if (measured_.empty())
+    throw Error("a volume is constant under the mask: it correlates with nothing");
   Fsc fsc;
-  if (tilts) {
-    fsc.measured = curve_of(sums.measured);
-    fsc.missing = curve_of(sums.missing);
+  if (has_tilts_) {
+    fsc.measured = curve_of(measured_);
+    fsc.missing = curve_of(missing_);
   }
-  for (std::size_t s = 0; s < sums.measured.size(); ++s) {
-    sums.measured[s] += sums.missing[s];
-    fsc.frequency_per_A.push_back(static_cast<double>(s + 1) /
-                                  (static_cast<double>(longest) * second.voxel_size_A));
+  std::vector<ShellSums> all = measured_;
+  for (std::size_t s = 0; s < all.size(); ++s) {
+    all[s] += missing_[s];
+    fsc.frequency_per_A.push_back(static_cast<double>(s + 1) / length_A_);
   }
-  fsc.all = curve_of(sums.measured);
+  fsc.all = curve_of(all);
   return fsc;
+}
+
+Fsc fourier_shell_correlation(const base::Volume& first, const base::Volume& second,
+                              const base::Volume& weights, const std::optional<TiltRange>& tilts) {
+  FscSums sums;
+  sums.add(first, second, weights, tilts);
+  return sums.correlation();
 }
 
 std::optional<double> crossing_A(std::span<const double> frequency_per_A, const FscCurve& curve,

@@ -11,6 +11,7 @@
 
 #include "base/volume.h"
 #include "evaluate/box.h"
+#include "tomofield/options.h"
 
 namespace tomofield::evaluate {
 
@@ -28,9 +29,14 @@ inline std::int64_t signed_frequency(std::int64_t index, std::int64_t n) {
 /// The tilts that a single-axis series about Y covers, in degrees.
 struct TiltRange {
   double low_deg = 0.0, high_deg = 0.0;
+  VolumeAxes axes = VolumeAxes::kXyz;  ///< of the volumes that are compared
   /// Returns true if a view of the series measured the frequency (kx, ky, kz), for any ky. The view
   /// at θ shows x = X cos θ + Z sin θ, and so the frequencies along (cos θ, sin θ).
   bool covers(double kx, double kz) const;
+  /// Does the same for a frequency along the axes of the file. In xzy, rows count down along Z.
+  bool covers(double kx, double ky, double kz) const {
+    return axes == VolumeAxes::kXyz ? covers(kx, kz) : covers(kx, -ky);
+  }
 };
 
 /// The Fourier shell correlation over one set of Fourier voxels. Entry s − 1 belongs to shell s;
@@ -51,6 +57,35 @@ struct Fsc {
 /// outer eighth of every axis at either end. Without it, the faces of the box, where the volume
 /// breaks off, would be a detail that both volumes share.
 base::Volume edge_window(const base::Shape3& shape);
+
+/// The sums over the Fourier voxels of a shell.
+struct ShellSums {
+  double product = 0.0, first = 0.0, second = 0.0;
+  std::int64_t voxels = 0;
+  void operator+=(const ShellSums& other) {
+    product += other.product;
+    first += other.first;
+    second += other.second;
+    voxels += other.voxels;
+  }
+};
+
+/// Adds up the shells of several pairs of boxes of one shape, as of the blocks of large volumes.
+class FscSums {
+ public:
+  /// Adds a pair of boxes, as fourier_shell_correlation() compares them. A pair of which one box is
+  /// constant under the weights counts for nothing. Throws Error as that function does otherwise.
+  void add(const base::Volume& first, const base::Volume& second, const base::Volume& weights,
+           const std::optional<TiltRange>& tilts);
+  /// Returns the correlation over all pairs. Throws Error if none counts.
+  Fsc correlation() const;
+
+ private:
+  double unit_of_first_ = 0.0, unit_of_second_ = 0.0;  // scales of the first pair
+  double length_A_ = 0.0;                              // of the longest axis
+  bool has_tilts_ = false;
+  std::vector<ShellSums> measured_, missing_;  // [shell]
+};
 
 /// Computes the Fourier shell correlation (Harauz and van Heel, Optik 73, 1986)
 ///   FSC(s) = Σ Re(A conj B) / √(Σ |A|² Σ |B|²)

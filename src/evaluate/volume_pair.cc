@@ -39,7 +39,7 @@ bool is_ours(const io::MrcReader& volume) {
   });
 }
 
-// Returns the offset by the ORIGINs, in IMOD's sign, if they make one volume a part of the other.
+// Returns the offset by the ORIGINs if they make one volume a part of the other.
 // Otherwise they say nothing: many programs write other things there, and most nothing.
 std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcReader& b) {
   const VolumeSizes size_a = whole_box(a).end, size_b = whole_box(b).end;
@@ -48,7 +48,7 @@ std::optional<Offset> offset_by_origin(const io::MrcReader& a, const io::MrcRead
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double voxel_A = b.header().voxel_size_A[axis];
     const double voxels =
-        (b.header().origin_A[axis] - a.header().origin_A[axis]) / (voxel_A > 0 ? voxel_A : 1.0);
+        (a.header().origin_A[axis] - b.header().origin_A[axis]) / (voxel_A > 0 ? voxel_A : 1.0);
     if (!(std::abs(voxels) < 1e6) || std::abs(voxels - std::round(voxels)) > 0.01) return {};
     offset[axis] = std::llround(voxels);
     lies_in_b = lies_in_b && offset[axis] >= 0 && offset[axis] + size_a[axis] <= size_b[axis];

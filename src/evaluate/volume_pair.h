@@ -36,7 +36,7 @@ struct VolumePair {
 /// Reads an MRC volume and the one that it is compared with. Only the voxels of the box are in
 /// memory.
 ///
-/// The ORIGINs (IMOD's sign) place the volumes where they make one a part of the other. ORIGINs
+/// The ORIGINs place the volumes where they make one a part of the other. ORIGINs
 /// that are equal count only if tomofield wrote both. Other volumes of different sizes are laid
 /// centre on centre: (n − common) / 2 voxels are cut off before and the rest behind. Their common
 /// box is read, with a warning to base/log.h. Different voxel sizes cause a warning too. `box`, in

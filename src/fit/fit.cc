@@ -25,14 +25,6 @@ constexpr double kBiasRate = 0.02;
 // Random streams from here on give the order of an epoch's subsets.
 constexpr std::uint64_t kOrderStream = 1000;
 
-// Returns the views that are not held out.
-std::vector<int> views_but(int num_views, const std::vector<int>& held_out) {
-  std::vector<int> views;
-  for (int v = 0; v < num_views; ++v)
-    if (std::ranges::find(held_out, v) == held_out.end()) views.push_back(v);
-  return views;
-}
-
 FitOptions with_at_most_one_subset_a_view(FitOptions options, int num_views) {
   if (options.engine == Engine::kSlab) options.subsets = std::min(options.subsets, num_views);
   return options;
@@ -90,7 +82,7 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
       optimizer_(*field_, AdamOptions{}),
       may_change_tree_(field_options.tree != TreeKind::kUniform),
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())),
-      fitted_views_(views_but(measurement.geometry.num_views(), measurement.held_out)),
+      fitted_views_(measurement.fitted_views()),
       steps_per_epoch_(steps_per_epoch_of(measurement, options_)) {
   if (options_.coarse_epochs > 0 && stages_.front().bin == 1 && options_.engine == Engine::kSlab)
     base::log_info(
@@ -172,6 +164,14 @@ void Fit::follow_tree() {
       .options = options_,
       .processes = processes_});
   halo_.emplace(*field_, share_of_stage(), stage().bin, processes());
+}
+
+void Fit::keep_views(std::vector<measurement::ViewModel> models) {
+  kept_views_ = std::move(models);
+  for (std::size_t v = 0; v < progress_.views.size(); ++v) {
+    progress_.views[v].scale = kept_views_[v].scale;
+    progress_.views[v].offset = kept_views_[v].offset / stage().bin;
+  }
 }
 
 std::vector<int> Fit::kept_leaves(const field::Quadtree& tree) const {
@@ -305,18 +305,32 @@ void Fit::score_held_out() {
   progress_.held_out_error.push_back(error.total);
 }
 
-void Fit::end_epoch() {
-  const std::vector<double> noise_weights = binned_->noise_weights();
-  double squares = 0.0, rays = 0.0;
-  for (std::size_t v = 0; v < progress_.views.size(); ++v) {
-    squares += noise_weights[v] * progress_.epoch_sums[v].squared_residual(progress_.views[v]);
-    rays += progress_.epoch_sums[v].n;
+// Fits the models of the views to the sums of an epoch, or takes over what keep_views() gave.
+void Fit::fit_views(const std::vector<double>& noise_weights) {
+  const bool knows_noise = options_.fit_noise && residuals_are_noise();
+  if (!kept_views_.empty()) {
+    if (knows_noise) progress_.views = kept_views_;
+    return;
   }
-  progress_.data_loss.push_back(squares / rays);
-  if (options_.fit_noise && residuals_are_noise())
+  if (knows_noise)
     measurement::fit_noise(noise_weights, fitted_views_, progress_.epoch_sums, progress_.views);
   if (options_.fit_view_scale)
     measurement::fit_nuisances(measurement::NuisancePrior{}, progress_.epoch_sums, progress_.views);
+}
+
+void Fit::end_epoch() {
+  const std::vector<double> noise_weights = binned_->noise_weights();
+  double squares = 0.0, rays = 0.0;
+  progress_.view_residual.assign(progress_.views.size(), 0.0);
+  for (std::size_t v = 0; v < progress_.views.size(); ++v) {
+    const measurement::ViewSums& sums = progress_.epoch_sums[v];
+    const double of_view = noise_weights[v] * sums.squared_residual(progress_.views[v]);
+    if (sums.n > 0) progress_.view_residual[v] = std::max(of_view, 0.0) / sums.n;
+    squares += of_view;
+    rays += sums.n;
+  }
+  progress_.data_loss.push_back(squares / rays);
+  fit_views(noise_weights);
   progress_.epoch_sums.assign(progress_.views.size(), {});
   limit_spikes();
   if (!measurement_.held_out.empty()) score_held_out();

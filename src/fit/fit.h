@@ -32,6 +32,9 @@ struct Progress {
   std::vector<measurement::ViewModel> views;      ///< models of each view
   std::vector<measurement::ViewSums> epoch_sums;  ///< sums of each view in the current epoch
   std::vector<double> data_loss;  ///< of each epoch: mean squared residual over the noise variance
+  /// The same of each view in the last whole epoch; 0 for a view without rays that count, such as a
+  /// held-out one. Empty before the end of the first epoch.
+  std::vector<double> view_residual;
   TreeProgress tree;
   std::vector<double> held_out_error;  ///< of each epoch: the same of the held-out views, if any
 };
@@ -55,6 +58,12 @@ class Fit {
   Fit(const measurement::Measurement& measurement, const FieldOptions& field_options,
       const FitOptions& options,
       const distributed::Communicator& processes = distributed::Communicator::alone());
+
+  /// Keeps the views at these models, which another fit found in pixels of full resolution, instead
+  /// of fitting any. Scales and offsets hold from now on. Weights and largest residuals hold from
+  /// the second half of the fit on, as those that a fit finds itself. Call it before the first
+  /// step, and before go_on_from().
+  void keep_views(std::vector<measurement::ViewModel> models);
 
   /// Is called after every step; returning false stops the fit.
   using AfterStep = std::function<bool(const Fit&)>;
@@ -119,6 +128,7 @@ class Fit {
   void take_step();
   bool is_traced_in_detail() const;
   void end_epoch();
+  void fit_views(const std::vector<double>& noise_weights);
   bool residuals_are_noise() const;
   void limit_spikes();
   void score_held_out();
@@ -144,6 +154,7 @@ class Fit {
   TreeUpdates tree_updates_;
   Progress progress_;
   std::vector<int> fitted_views_;
+  std::vector<measurement::ViewModel> kept_views_;  // empty: the fit finds its own
   int steps_per_epoch_;
 
   // These belong to one stage or one tree and are made anew for the next. The objective refers to

@@ -74,6 +74,10 @@ std::string Fit::fault_of(const Progress& progress, const field::Field& field) c
   if (progress.data_loss.size() != epochs_done)
     return fmt::format("it has the losses of {} of {} epochs", progress.data_loss.size(),
                        epochs_done);
+  const auto is_residual = [](double r) { return std::isfinite(r) && r >= 0; };
+  if (progress.view_residual.size() != (epochs_done > 0 ? num_views : 0) ||
+      !std::ranges::all_of(progress.view_residual, is_residual))
+    return fmt::format("it has no usable residuals of {} views", num_views);
   const std::size_t num_scores = measurement_.held_out.empty() ? 0 : epochs_done;
   if (progress.held_out_error.size() != num_scores)
     return fmt::format("it has the held-out errors of {} of {} epochs",

@@ -8,6 +8,7 @@
 
 #include "io/mdoc_images.h"
 #include "io/tiff_stack.h"
+#include "io/view_images.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -55,9 +56,6 @@ constexpr OtherFile kOtherFiles[] = {
     {".aln", "AreTomo's alignment", "give the raw stack, and this file with --aln"},
     {".com", "a command file of IMOD",
      "`tomofield reconstruct` reads eTomo's tilt.com and what it names"},
-    {".star", "a STAR file", "`tomofield reconstruct` reads those of a project alone"},
-    {".tomostar", "a tilt series of Warp", "`tomofield reconstruct` reads it in its project"},
-    {".xml", "metadata of Warp", "`tomofield reconstruct` reads it in its project"},
     {".toml", "a configuration file", "give the stack, and this file with --config"},
 };
 
@@ -75,6 +73,7 @@ void refuse_other_file(const std::filesystem::path& path, std::string_view exten
 std::shared_ptr<const ImageStack> open_image_stack(const std::filesystem::path& path) {
   const std::string extension = path.extension().string();
   if (extension == ".mdoc") return open_mdoc_images(path, path.parent_path());
+  if (is_view_table(path)) return open_view_images(path);
   refuse_other_file(path, extension);
   if (is_tiff(path)) return open_tiff_stack(path);
   return std::make_shared<FileStack>(path);

@@ -26,9 +26,9 @@ class ImageStack {
   virtual void read_section(std::int64_t section, std::span<float> out) const = 0;
 };
 
-/// Opens an MRC or TIFF file, or the images that an .mdoc file names (mdoc_images.h). Throws Error
-/// as MrcReader and open_tiff_stack() do, and for other files of a tilt series with how to give
-/// them.
+/// Opens an MRC or TIFF file, or the images that an .mdoc file (mdoc_images.h) or a table of RELION
+/// or Warp (view_images.h) names. Throws Error as MrcReader and open_tiff_stack() do, and for other
+/// files of a tilt series with how to give them.
 std::shared_ptr<const ImageStack> open_image_stack(const std::filesystem::path& path);
 
 /// An image among those of a file.

@@ -29,7 +29,7 @@ struct MrcHeader {
   std::int64_t nz = 0;
   MrcMode mode = MrcMode::kFloat32;
   std::array<double, 3> voxel_size_A{1.0, 1.0, 1.0};
-  std::array<double, 3> origin_A{0.0, 0.0, 0.0};
+  std::array<double, 3> origin_A{0.0, 0.0, 0.0};  ///< of a part in the whole, as MRC2014 has it
   double min = 0.0, max = 0.0, mean = 0.0, rms = 0.0;
   bool is_volume = false;           ///< ISPG 1; 0 is a stack of images
   bool is_byte_swapped = false;     ///< written on a machine of the other byte order
@@ -72,9 +72,9 @@ struct MrcSpec {
   std::int64_t nz = 0;
   MrcMode mode = MrcMode::kFloat32;
   std::array<double, 3> voxel_size_A{1.0, 1.0, 1.0};
-  std::array<double, 3> origin_A{0.0, 0.0, 0.0};
+  std::array<double, 3> origin_A{0.0, 0.0, 0.0};  ///< of a part in the whole
   bool is_volume = true;
-  std::string label;  ///< a note on how the file was made; at most 80 characters are kept
+  std::vector<std::string> labels;  ///< how it was made: at most 10, of 80 characters each
 };
 
 /// Writes an MRC file piece by piece into a temporary file beside `path`. Only close() replaces

@@ -51,6 +51,7 @@ constexpr std::size_t kLabelBytes = 80;
 constexpr int kMaxLabels = 10;
 constexpr std::int32_t kImodStampValue = 1146047817;
 constexpr std::int32_t kImodSignedBytes = 1;
+constexpr std::int32_t kImodOriginInverted = 4;  // ORIGIN has the sign of MRC2014
 
 /// Reads numbers of either byte order from the header.
 class Fields {
@@ -156,6 +157,15 @@ SeriLayout decode_seri_layout(const Fields& fields, const MrcHeader& header) {
   return {is_seri && (flags & 1) && fits ? bytes : 0};
 }
 
+/// Tells whether ORIGIN has IMOD's sign, the opposite of MRC2014's. Versions of this program that
+/// did not write IMOD's stamp wrote it so.
+bool has_imod_origin(const Fields& fields, const MrcHeader& header) {
+  if (fields.int32(kImodStamp) == kImodStampValue)
+    return (fields.int32(kImodFlags) & kImodOriginInverted) == 0;
+  return std::ranges::any_of(
+      header.labels, [](const std::string& label) { return label.starts_with("tomofield "); });
+}
+
 template <typename T>
 void put(MrcHeaderBytes& bytes, std::size_t offset, std::type_identity_t<T> value) {
   std::memcpy(bytes.data() + offset, &value, sizeof value);
@@ -218,6 +228,9 @@ MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name
     header.labels.push_back(
         fields.text(kLabels + kLabelBytes * static_cast<std::size_t>(i), kLabelBytes));
   }
+  if (has_imod_origin(fields, header)) {
+    for (double& origin_A : header.origin_A) origin_A = origin_A == 0.0 ? 0.0 : -origin_A;
+  }
   *seri = decode_seri_layout(fields, header);
   return header;
 }
@@ -271,10 +284,9 @@ MrcHeaderBytes encode_mrc_header(const MrcHeader& header) {
   put<float>(bytes, kRms, static_cast<float>(header.rms));
   put<std::int32_t>(bytes, kSpaceGroup, header.is_volume ? 1 : 0);
   put<std::int32_t>(bytes, kVersion, 20141);
-  if (header.mode == MrcMode::kInt8) {  // without the stamp, IMOD reads the bytes as unsigned
-    put<std::int32_t>(bytes, kImodStamp, kImodStampValue);
-    put<std::int32_t>(bytes, kImodFlags, kImodSignedBytes);
-  }
+  put<std::int32_t>(bytes, kImodStamp, kImodStampValue);
+  const std::int32_t signed_bytes = header.mode == MrcMode::kInt8 ? kImodSignedBytes : 0;
+  put<std::int32_t>(bytes, kImodFlags, kImodOriginInverted | signed_bytes);
   std::memcpy(bytes.data() + kMap, "MAP ", 4);
   bytes[kMachineStamp] = bytes[kMachineStamp + 1] = std::byte{0x44};
   const std::size_t num_labels = std::min<std::size_t>(header.labels.size(), kMaxLabels);

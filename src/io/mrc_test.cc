@@ -98,6 +98,21 @@ for mode, dtype in {0: 'i1', 1: 'i2', 2: 'f4', 6: 'u2', 12: 'f2'}.items():
   }
 }
 
+// IMOD's stamp with and without the bit that says that ORIGIN has the sign of MRC2014.
+TEST(Mrc, TurnsTheOriginOfImodAround) {
+  const ScratchDirectory scratch;
+  MrcSpec spec = spec_of(5, 4, 3, MrcMode::kFloat32);
+  spec.origin_A = {50, 40, 0};
+  MrcWriter(scratch / "a.mrc", spec).close();
+  EXPECT_EQ(MrcReader(scratch / "a.mrc").header().origin_A, spec.origin_A);
+  std::string bytes = testing::read_whole_file(scratch / "a.mrc");
+  bytes[156] = 0;
+  const auto imods = MrcReader(scratch.write("imod.mrc", bytes)).header().origin_A;
+  EXPECT_EQ(imods, (std::array<double, 3>{-50, -40, 0}));
+  bytes[152] = 0;
+  EXPECT_EQ(MrcReader(scratch.write("none.mrc", bytes)).header().origin_A, spec.origin_A);
+}
+
 TEST(Mrc, OtherProgramsReadWhatIsWritten) {
   if (!python_has("mrcfile")) GTEST_SKIP() << "python3-mrcfile is not installed";
   const ScratchDirectory scratch;
@@ -107,7 +122,7 @@ TEST(Mrc, OtherProgramsReadWhatIsWritten) {
     spec.voxel_size_A = {1.7, 1.7, 3.3};
     spec.origin_A = {-5, 6, 7};
     spec.is_volume = mode != MrcMode::kInt16;
-    spec.label = std::string(100, 'L');  // 80 characters are kept
+    spec.labels = {std::string(100, 'L')};  // 80 characters are kept
     MrcWriter writer(scratch / ("mode_" + std::to_string(static_cast<int>(mode)) + ".mrc"), spec);
     std::vector<float> section(20);
     for (const std::int64_t z : {2, 0, 1}) {  // in any order
@@ -134,6 +149,8 @@ for mode in (0, 1, 2, 6, 12):
         assert abs(h.dmean - want.mean()) < 1e-5 and abs(h.rms - want.std()) < 1e-4
         assert np.allclose([m.voxel_size.x, m.voxel_size.z], [1.7, 3.3], rtol=1e-7)
         assert (h.origin.x, h.origin.y, h.origin.z) == (-5, 6, 7)
+        stamp, flags = np.frombuffer(open(name, 'rb').read()[152:160], '<i4')
+        assert stamp == 1146047817 and flags == (5 if mode == 0 else 4)  # bytes are signed
         assert h.ispg == (0 if mode == 1 else 1) and h.nversion == 20141
         assert m.get_labels() == ['L' * 80]
 )"),

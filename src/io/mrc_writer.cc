@@ -52,7 +52,7 @@ MrcHeader header_of(const MrcSpec& spec, const std::string& name) {
   header.voxel_size_A = spec.voxel_size_A;
   header.origin_A = spec.origin_A;
   header.is_volume = spec.is_volume;
-  if (!spec.label.empty()) header.labels.push_back(spec.label);
+  header.labels = spec.labels;
   return header;
 }
 

@@ -45,16 +45,17 @@ void flush_folder(const fs::path& folder) {
 
 }  // namespace
 
-// A file that got its name, or that was removed, and the file that had the name before.
+// A file or a folder that got its name, or a file that was removed, and what had the name before.
 struct OutputSet::Change {
   fs::path target;
   fs::path old;  // empty: there was none
   bool is_removal = false;
+  bool is_folder = false;
 
   // Keeps the file that is there under another name: as a second name where the file system has
   // that, so that the first is never missing.
   static Change begin(const fs::path& target, bool is_removal) {
-    Change change{target, {}, is_removal};
+    Change change{target, {}, is_removal, false};
     std::error_code absent;
     const fs::file_status status = fs::symlink_status(target, absent);
     if (!fs::exists(status)) return change;
@@ -66,8 +67,30 @@ struct OutputSet::Change {
     return change;
   }
 
-  // Gives back the old file. Returns false if that is not possible.
+  // Keeps the folder that is there under another name.
+  static Change begin_folder(const fs::path& target) {
+    Change change{target, {}, false, true};
+    std::error_code absent;
+    if (!fs::exists(fs::symlink_status(target, absent))) return change;
+    change.old = unused_temporary_name(target);
+    if (!rename_file(target, change.old)) throw_cannot_replace(target);
+    return change;
+  }
+
+  // Removes what was replaced.
+  void forget_old() const {
+    std::error_code ignored;
+    if (is_folder && !old.empty()) fs::remove_all(old, ignored);
+    if (!is_folder && !old.empty()) ::unlink(old.c_str());
+  }
+
+  // Gives back the old file or folder. Returns false if that is not possible.
   bool undo() const {
+    if (is_folder) {
+      std::error_code failed;
+      fs::remove_all(target, failed);
+      return !failed && (old.empty() || rename_file(old, target));
+    }
     if (old.empty()) return is_removal || ::unlink(target.c_str()) == 0 || errno == ENOENT;
     std::error_code absent;
     if (fs::equivalent(old, target, absent)) return ::unlink(old.c_str()) == 0;
@@ -92,6 +115,11 @@ void OutputSet::add(AtomicFile file) {
   files_.push_back(std::move(file));
 }
 
+void OutputSet::add(AtomicFolder folder) {
+  const std::lock_guard guard(mutex_);
+  folders_.push_back(std::move(folder));
+}
+
 void OutputSet::remove_old(const fs::path& path) {
   const std::lock_guard guard(mutex_);
   to_remove_.push_back(path);
@@ -109,6 +137,10 @@ void OutputSet::make_changes(std::vector<Change>& changes) const {
   for (const AtomicFile& file : files_) {
     changes.push_back(Change::begin(file.target_, false));
     if (!rename_file(file.temporary_path_, file.target_)) throw_cannot_replace(file.path_);
+  }
+  for (const AtomicFolder& folder : folders_) {
+    changes.push_back(Change::begin_folder(folder.path_));
+    if (!rename_file(folder.temporary_path_, folder.path_)) throw_cannot_replace(folder.path_);
   }
 }
 
@@ -131,10 +163,11 @@ void OutputSet::commit() {
   std::set<fs::path> folders;
   for (const Change& change : changes) folders.insert(folder_of(change.target));
   for (const fs::path& folder : folders) flush_folder(folder);
-  for (const Change& change : changes)
-    if (!change.old.empty()) ::unlink(change.old.c_str());
+  for (const Change& change : changes) change.forget_old();
   for (AtomicFile& file : files_) file.temporary_path_.clear();
+  for (AtomicFolder& folder : folders_) folder.temporary_path_.clear();
   files_.clear();
+  folders_.clear();
   to_remove_.clear();
 }
 
@@ -147,6 +180,7 @@ bool OutputSet::commit_only(const fs::path& path) {
       if (file.path() == path) kept.push_back(std::move(file));
     is_in_set = !kept.empty();
     files_.swap(kept);
+    folders_.clear();
     to_remove_.clear();
   }
   if (is_in_set) commit();

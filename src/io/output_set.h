@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "io/atomic_file.h"
+#include "io/atomic_folder.h"
 
 namespace tomofield::io {
 
@@ -33,6 +34,8 @@ class OutputSet {
 
   /// Adds a file that is flushed.
   void add(AtomicFile file);
+  /// Adds a folder of results.
+  void add(AtomicFolder folder);
   /// Lets commit() remove a file that would contradict the new ones, if it exists.
   void remove_old(const std::filesystem::path& path);
   /// Returns where the contents of a result are until commit(): in its temporary file. For other
@@ -53,6 +56,7 @@ class OutputSet {
   bool is_active_ = false;
   mutable std::mutex mutex_;  // guards the members below
   std::vector<AtomicFile> files_;
+  std::vector<AtomicFolder> folders_;
   std::vector<std::filesystem::path> to_remove_;
 };
 

@@ -41,4 +41,17 @@ void write_png_rgb(const std::filesystem::path& path, std::int64_t width, std::i
   write_png(path, width, height, PNG_FORMAT_RGB, pixels);
 }
 
+RgbImage read_png(const std::filesystem::path& path) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  RgbImage picture;
+  if (png_image_begin_read_from_file(&image, path.c_str()) != 0) {
+    image.format = PNG_FORMAT_RGB;
+    picture = {image.width, image.height, std::vector<std::uint8_t>(PNG_IMAGE_SIZE(image))};
+    if (png_image_finish_read(&image, nullptr, picture.pixels.data(), 0, nullptr) != 0)
+      return picture;
+  }
+  throw Error(fmt::format("cannot read the picture '{}': {}", path.string(), image.message));
+}
+
 }  // namespace tomofield::io

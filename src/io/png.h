@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <vector>
 
 namespace tomofield::io {
 
@@ -14,5 +15,14 @@ void write_png_grey(const std::filesystem::path& path, std::int64_t width, std::
 /// Writes an 8-bit RGB image, pixels[(row × width + column) × 3 + channel], in the same way.
 void write_png_rgb(const std::filesystem::path& path, std::int64_t width, std::int64_t height,
                    std::span<const std::uint8_t> pixels);
+
+/// An 8-bit RGB image, pixels[(row × width + column) × 3 + channel], with the first row on top.
+struct RgbImage {
+  std::int64_t width = 0, height = 0;
+  std::vector<std::uint8_t> pixels;
+};
+
+/// Reads a picture that this program wrote. Throws Error if it cannot be read.
+RgbImage read_png(const std::filesystem::path& path);
 
 }  // namespace tomofield::io

@@ -24,9 +24,11 @@ namespace {
 }  // namespace
 
 PositionedFile::PositionedFile(const std::filesystem::path& path, Access access) : path_(path) {
-  const int flags = access == Access::kRead ? O_RDONLY : O_RDWR;
+  const int flags = access == Access::kRead        ? O_RDONLY
+                    : access == Access::kReadWrite ? O_RDWR
+                                                   : O_RDWR | O_CREAT | O_EXCL;
   // O_NONBLOCK prevents waiting for a pipe, which is refused below.
-  descriptor_ = ::open(path.c_str(), flags | O_CLOEXEC | O_NONBLOCK);
+  descriptor_ = ::open(path.c_str(), flags | O_CLOEXEC | O_NONBLOCK, 0666);
   if (descriptor_ < 0) throw_system_error("open", path);
   struct stat status {};
   const bool is_regular = ::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode);

@@ -10,7 +10,7 @@ namespace tomofield::io {
 /// throw Error and name the file.
 class PositionedFile {
  public:
-  enum class Access { kRead, kReadWrite };
+  enum class Access { kRead, kReadWrite, kNew };  ///< kNew makes the file, which must not exist
 
   PositionedFile(const std::filesystem::path& path, Access access);
   ~PositionedFile();

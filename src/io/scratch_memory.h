@@ -24,6 +24,9 @@ class ScratchMemory {
   ScratchMemory(ScratchMemory&& other) noexcept;
   ScratchMemory& operator=(ScratchMemory&&) = delete;
 
+  /// Returns the size of the file of so many bytes: 0 if they are kept in memory.
+  static std::size_t bytes_in_file(std::size_t bytes) { return bytes > kInMemoryBytes ? bytes : 0; }
+
   std::byte* data() const { return data_; }
   std::size_t size() const { return size_; }
 

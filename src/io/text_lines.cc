@@ -17,6 +17,13 @@ constexpr std::string_view kWhiteSpace = " \t\r\n\v\f";
 constexpr std::int64_t kLargestTextFile = std::int64_t{16} << 20;
 constexpr int kMostLines = 1 << 20;
 
+[[noreturn]] void throw_no_text(const std::filesystem::path& path, std::int64_t bytes) {
+  throw Error(fmt::format(
+      "'{}' is no text file of a tilt series ({} bytes): give one of at most {} MiB, without "
+      "zero bytes",
+      path.string(), bytes, kLargestTextFile >> 20));
+}
+
 template <typename T>
 std::optional<T> parse_whole(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);  // from_chars does not accept a plus sign
@@ -28,20 +35,18 @@ std::optional<T> parse_whole(std::string_view word) {
 
 }  // namespace
 
-std::string read_text_file(const std::filesystem::path& path) {
+std::string read_small_file(const std::filesystem::path& path) {
   const PositionedFile file(path, PositionedFile::Access::kRead);
   const std::int64_t bytes = file.size();
-  std::string text;
-  if (bytes <= kLargestTextFile) {
-    text.resize(static_cast<std::size_t>(bytes));
-    file.read_at(0, text.data(), text.size());
-  }
-  if (bytes > kLargestTextFile || text.find('\0') != std::string::npos) {
-    throw Error(fmt::format(
-        "'{}' is no text file of a tilt series ({} bytes): give one of at most {} MiB, without "
-        "zero bytes",
-        path.string(), bytes, kLargestTextFile >> 20));
-  }
+  if (bytes > kLargestTextFile) throw_no_text(path, bytes);
+  std::string text(static_cast<std::size_t>(bytes), '\0');
+  file.read_at(0, text.data(), text.size());
+  return text;
+}
+
+std::string read_text_file(const std::filesystem::path& path) {
+  std::string text = read_small_file(path);
+  if (text.find('\0') != std::string::npos) throw_no_text(path, std::ssize(text));
   return text;
 }
 

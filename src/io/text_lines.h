@@ -11,8 +11,11 @@
 
 namespace tomofield::io {
 
-/// Returns the bytes of a small text file. Throws Error if it cannot be read, is no regular file (a
-/// pipe would never end), has zero bytes, or is larger than the text files of any series.
+/// Returns the bytes of a small file. Throws Error if it cannot be read, is no regular file (a pipe
+/// would never end), or is larger than the text files of any series.
+std::string read_small_file(const std::filesystem::path& path);
+
+/// Does the same for a text file, and refuses one with zero bytes.
 std::string read_text_file(const std::filesystem::path& path);
 
 /// One line of a text file, without white space at its ends; `number` counts from 1.

@@ -21,6 +21,7 @@ void subtract_background(double part, Measurement& measurement) {
   own_rays(measurement).subtract(static_cast<float>(subtracted));
   measurement.mean_density -= density_of(subtracted, measurement);
   measurement.background -= subtracted;
+  measurement.subtracted_background += subtracted;
 }
 
 Measurement without_background(double part, const Measurement& measurement) {

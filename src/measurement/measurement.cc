@@ -24,6 +24,14 @@ std::vector<double> Measurement::noise_weights() const {
   return weights;
 }
 
+std::vector<int> Measurement::fitted_views() const {
+  std::vector<int> views;
+  for (int view = 0; view < geometry.num_views(); ++view)
+    if (!std::ranges::binary_search(held_out, view) && !std::ranges::binary_search(left_out, view))
+      views.push_back(view);
+  return views;
+}
+
 SlabViews::Shape Measurement::rays_shape() const {
   const auto num_views = static_cast<std::size_t>(geometry.num_views());
   if (ray_geometry) {

@@ -33,6 +33,8 @@ struct Measurement {
   std::optional<geometry::RayGeometry> ray_geometry = std::nullopt;
   /// Views that carry no loss: they only tell how well the others predict them. Ascending.
   std::vector<int> held_out = {};
+  /// Views that carry no loss and tell nothing, because another fit has them. Ascending.
+  std::vector<int> left_out = {};
 
   // The members below say where the measurement comes from.
   double unit = 1.0;  ///< data units a density unit
@@ -43,6 +45,7 @@ struct Measurement {
   /// The brightness of the emptiest places of a bright series, in density units times pixels, which
   /// the rays still contain (background.h); 0 if it is small beside the specimen's.
   double background = 0.0;
+  double subtracted_background = 0.0;  ///< the part of it that the rays do not contain any more
   tilt_series::MaskMetrics masks = {};
   std::vector<double> masked_part = {};  ///< [view]: the part of the rays that carries no loss
   /// [view]: discs of beads whose rays count until hide_beads() or keep_beads() is called
@@ -55,7 +58,9 @@ struct Measurement {
   double contrast() const { return kContrastPerThickness * geometry.thickness; }
   /// Returns 1 / σ² of each view.
   std::vector<double> noise_weights() const;
-  int num_fitted_views() const { return geometry.num_views() - static_cast<int>(held_out.size()); }
+  /// Returns the views that are neither held out nor left out, ascending.
+  std::vector<int> fitted_views() const;
+  int num_fitted_views() const { return static_cast<int>(fitted_views().size()); }
   /// Returns the views' size and which of their rows are fitted: those of the region of interest,
   /// or all rows of views as recorded.
   SlabViews::Shape rays_shape() const;

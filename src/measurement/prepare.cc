@@ -13,8 +13,7 @@
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/trace.h"
-#include "kernels/lanes.h"
-#include "measurement/row_share.h"
+#include "measurement/read_rays.h"
 #include "tilt_series/view_owner.h"
 #include "tilt_series/views_at_once.h"
 #include "tomofield/error.h"
@@ -123,36 +122,6 @@ ViewBrightness view_brightness(std::span<const float> image, std::span<const std
   return {mean, std::sqrt(std::max(variance - noise * noise, 1e-4 * variance))};
 }
 
-// Returns the views that this process owns, of those from `views.begin` on.
-std::vector<std::size_t> own_views(base::Range views, const distributed::Communicator& processes) {
-  std::vector<std::size_t> own;
-  for (int view = views.begin; view < views.end; ++view)
-    if (tilt_series::is_own_view(static_cast<std::size_t>(view), processes))
-      own.push_back(static_cast<std::size_t>(view));
-  return own;
-}
-
-// Gives some views to all processes: their owners read, forget and broadcast them.
-void take_views(const tilt_series::TiltSeries& series, base::Range views,
-                const distributed::Communicator& processes, std::span<ViewBuffer> buffers) {
-  const std::vector<std::size_t> own = own_views(views, processes);
-  const std::size_t at_once = tilt_series::views_at_once(series.decoding_memory(), processes);
-  processes.run_collectively([&] {
-    tilt_series::for_views("read views", own, at_once, [&](std::size_t view) {
-      ViewBuffer& buffer = buffers[view - static_cast<std::size_t>(views.begin)];
-      series.read_view(view, buffer.image, buffer.valid);
-      series.forget_view(view);
-    });
-  });
-  for (int i = 0; i < views.size(); ++i) {
-    ViewBuffer& buffer = buffers[static_cast<std::size_t>(i)];
-    const int owner =
-        tilt_series::owner_of_view(static_cast<std::size_t>(views.begin + i), processes);
-    processes.broadcast(std::as_writable_bytes(std::span(buffer.image)), owner);
-    processes.broadcast(std::as_writable_bytes(std::span(buffer.valid)), owner);
-  }
-}
-
 // Measures the brightness of every view; each process measures the views that it owns.
 std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& series,
                                                 const SlabViews::Shape& shape,
@@ -170,7 +139,8 @@ std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& s
         view_brightness(std::span(image).subspan(first, count),
                         std::span(valid).subspan(first, count), series.noise_sigma()[view]);
   };
-  const std::vector<std::size_t> own = own_views({0, static_cast<int>(shape.num_views)}, processes);
+  const std::vector<std::size_t> own =
+      tilt_series::own_views({0, static_cast<int>(shape.num_views)}, processes);
   const std::size_t at_once = tilt_series::views_at_once(series.decoding_memory(), processes);
   processes.run_collectively(
       [&] { tilt_series::for_views("measure brightness", own, at_once, measure); });
@@ -296,18 +266,13 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
   set_unit(brightness_of_views(series, shape, processes), series.background(), prepared);
   for (const double sigma : series.noise_sigma())
     prepared.noise_sigma.push_back(sigma / prepared.unit);
-  const RowShare share = row_share(shape.num_rows, band_rows, processes);
-  const SlabViews::Holding slabs{slabs_of_bands(share.bands, band_rows, shape.num_rows),
-                                 static_cast<int>(share.rows_for_next / kernels::kLanes)};
-  {
-    const base::TraceSpan span("fill slabs");
-    prepared.rays = std::make_shared<SlabViews>(
-        shape, slabs, prepared.unit,
-        [&](base::Range views, std::span<ViewBuffer> buffers) {
-          take_views(series, views, processes, buffers);
-        },
-        scratch_dir);
-  }
+  prepared.rays = read_rays(
+      series, {shape, prepared.unit, band_rows, scratch_dir},
+      [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
+        series.read_view(view, image, valid);
+        series.forget_view(view);
+      },
+      processes);
   prepared.masks = series.mask_metrics();
   prepared.undecided_beads = undecided_discs(series, shape);
   prepared.masked_part = prepared.rays->masked_parts(processes);

@@ -4,6 +4,7 @@
 #include <bit>
 #include <utility>
 
+#include "base/check.h"
 #include "base/parallel.h"
 #include "base/xxhash64.h"
 #include "kernels/lanes.h"
@@ -270,6 +271,21 @@ void SlabViews::hide(std::span<const std::vector<tilt_series::MaskDisc>> discs) 
     }
   });
   memory_.release(0, memory_.size());
+}
+
+void SlabViews::hide_where_hidden(const SlabViews& other) {
+  const Slabs held = holding_.all();
+  TOMOFIELD_CHECK(other.num_lines() == num_lines(), "the same shape and slabs");
+  base::parallel_for("hide rays", held.size(), [&](std::int64_t i) {
+    const int slab = held.begin + static_cast<int>(i);
+    for (std::size_t at = line(slab, 0); at < line(slab + 1, 0); ++at) {
+      mask_[at] = static_cast<std::uint16_t>(mask_[at] & other.mask_[at]);
+      for (std::size_t lane = 0; lane < kRows; ++lane)
+        if ((mask_[at] >> lane & 1) == 0) rays_[at * kRows + lane] = 0.0f;
+    }
+    release(slab);
+    other.release(slab);
+  });
 }
 
 void SlabViews::subtract(float value) {

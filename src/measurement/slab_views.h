@@ -52,6 +52,8 @@ class SlabViews {
   /// Returns the memory of the buffers into which views are read.
   static std::size_t filling_memory(const Shape& shape);
   static Slabs all_slabs(const Shape& shape);
+  /// Returns the bytes of the rays and their masks.
+  static std::size_t bytes(const Shape& shape);
 
   /// Reads every view and divides its intensities by `unit`. Throws Error if the scratch file
   /// cannot be made.
@@ -109,6 +111,8 @@ class SlabViews {
   /// Masks the rays of the pixels whose centres lie in the discs of their view, in all slabs that
   /// this process holds. `discs` are [view], in pixels, with y from the first row.
   void hide(std::span<const std::vector<tilt_series::MaskDisc>> discs);
+  /// Masks the rays that do not count in `other`, which has the same shape and slabs.
+  void hide_where_hidden(const SlabViews& other);
   /// Subtracts a value from all rays that count, in all slabs that this process holds.
   void subtract(float value);
   /// Returns a hash of rays and masks of all slabs (XXH64 of the XXH64 of each slab), which tells
@@ -121,7 +125,6 @@ class SlabViews {
   // Makes slabs of zeros.
   SlabViews(const Shape& shape, const Holding& holding, const std::filesystem::path& scratch_dir,
             std::size_t in_memory_bytes);
-  static std::size_t bytes(const Shape& shape);
   void fill(double unit, const ReadViews& read_views);
   void set_rows(int slab, int view, const ViewBuffer& from, float per_unit);
   void set_means(int slab, int view, const SlabViews& fine, int bin);

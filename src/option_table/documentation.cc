@@ -31,7 +31,9 @@ options that people use, `--help-all` shows all of them. The other commands (`ba
 - Unbinned pixels are those of the aligned view before `--bin`; binned pixels are those after it.
 - Only the command line has `--threads N` (default: the processors that this process may use, or
   `OMP_NUM_THREADS`; the result is the same for any number), `--dry-run` (checks everything and prints
-  the plan), `--trace FILE.json` (writes what the run did and when) and `--config`.
+  the plan, with the [memory, time and disk](batch.md#what---dry-run-estimates) that it needs),
+  `--plan FILE.json` (writes them for programs, without reading the views), `--trace FILE.json` (writes
+  what the run did and when) and `--config`.
 )";
 
 // Escapes what Markdown would take for the end of a cell.

@@ -250,6 +250,22 @@ constexpr Row kRows[] = {
      .help = "Order of the axes in the file: xyz, or xzy as IMOD's tilt writes it (same hand)"},
     {.key = "volume.invert", .flag = "--invert", MEMBER(Options, invert),
      .group = Group::kVolume, .help = "Write the volume with the contrast of the input inverted"},
+    {.key = "running.zarr", .flag = "--zarr", MEMBER(Options, zarr), .group = Group::kVolume,
+     .help = "Also write the volume as OME-Zarr 0.4 with a 2x pyramid, in a folder NAME.zarr"},
+
+    // Halves
+    {.key = "input.even", .flag = "--even", MEMBER(SeriesFiles, even), .group = Group::kHalves,
+     .help = "MRC stack of the even frames alone; STACK is the sum or the mean of all frames. With "
+             "--odd, the program fits both separately and writes two volumes and their mean"},
+    {.key = "input.odd", .flag = "--odd", MEMBER(SeriesFiles, odd), .group = Group::kHalves,
+     .help = "MRC stack of the odd frames alone"},
+    {.key = "fit.split_tilts", .flag = "--split-tilts", MEMBER(Options, split_tilts),
+     .group = Group::kHalves,
+     .help = "Do the same with the even and the odd tilts of STACK, in the order of the angles"},
+    {.key = "volume.denoising_halves", .flag = "--denoising-halves",
+     MEMBER(Options, denoising_halves), .group = Group::kHalves,
+     .help = "Also write both halves by weighted back-projection. These may train cryoCARE, IsoNet "
+             "or DeepDeWedge; fitted halves must not"},
 
     // Running
     {.key = "running.output", .flag = "-o,--output", MEMBER(Options, output),
@@ -263,6 +279,9 @@ constexpr Row kRows[] = {
     {.key = "running.checkpoint_minutes", .flag = "--checkpoint-minutes",
      MEMBER(Options, checkpoint_minutes), .group = Group::kRun, .unit = "minutes",
      .range = Range::at_least(0), .help = "Time between checkpoints"},
+    {.key = "running.alignment_json", .flag = "--alignment-json", MEMBER(Options, alignment_json),
+     .group = Group::kRun,
+     .help = "Also write the alignment as the CryoET Data Portal has it, in NAME_alignment.json"},
 };
 // clang-format on
 #undef MEMBER
@@ -335,6 +354,8 @@ std::string_view title_of(Group group) {
       return "Fit";
     case Group::kVolume:
       return "Volume";
+    case Group::kHalves:
+      return "Halves";
     case Group::kRun:
       return "Running";
   }

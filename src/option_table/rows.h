@@ -40,7 +40,18 @@ struct Range {
 };
 
 /// Orders the options in the help and in docs/options.md.
-enum class Group { kSeries, kAlignment, kImages, kMasks, kSpecimen, kField, kFit, kVolume, kRun };
+enum class Group {
+  kSeries,
+  kAlignment,
+  kImages,
+  kMasks,
+  kSpecimen,
+  kField,
+  kFit,
+  kVolume,
+  kHalves,
+  kRun
+};
 std::string_view title_of(Group group);
 
 /// Points to the value of an option. An std::optional without a value is chosen automatically.

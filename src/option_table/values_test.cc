@@ -18,7 +18,7 @@ namespace {
 
 // The addresses of all members. A member that is added does not compile here until it is named.
 std::vector<const void*> members_of(const Choices& choices) {
-  const auto& [stack, tlt, xf, xtilt, aln, mdoc, mask, fiducials] = choices.files;
+  const auto& [stack, tlt, xf, xtilt, aln, mdoc, mask, fiducials, even, odd] = choices.files;
   const auto& [tilt_offset, x_axis_tilt, exclude, ignore, bin, angpix, pixel_size, contrast,
                take_log, log_base, black_level, bead_diameter, fixed_pattern, thickness, roi, hand,
                axis_x, axis_z, shift_z, with_margin, field, leaf_size, tree, leaf_budget,
@@ -26,8 +26,8 @@ std::vector<const void*> members_of(const Choices& choices) {
                coarse_epochs, coarse_bin, subsets, engine, ray_samples, rays_per_step,
                learning_rate, density_variation, factor_variation, penalty, boundary, fourier,
                fourier_ring, keep_spikes, fit_noise, fit_view_scale, hold_out, tune, patience, seed,
-               voxel_type, axes, invert, output, overwrite, resume, checkpoint_minutes] =
-      choices.options;
+               split_tilts, denoising_halves, voxel_type, axes, invert, zarr, output, overwrite,
+               resume, checkpoint_minutes, alignment_json] = choices.options;
   return {&stack,
           &tlt,
           &xf,
@@ -36,6 +36,8 @@ std::vector<const void*> members_of(const Choices& choices) {
           &mdoc,
           &mask,
           &fiducials,
+          &even,
+          &odd,
           &tilt_offset,
           &x_axis_tilt,
           &exclude,
@@ -86,13 +88,17 @@ std::vector<const void*> members_of(const Choices& choices) {
           &tune,
           &patience,
           &seed,
+          &split_tilts,
+          &denoising_halves,
           &voxel_type,
           &axes,
           &invert,
+          &zarr,
           &output,
           &overwrite,
           &resume,
-          &checkpoint_minutes};
+          &checkpoint_minutes,
+          &alignment_json};
 }
 
 const void* address_of(const Row& row, const Choices& choices) {

@@ -26,6 +26,12 @@ nlohmann::json tree_json(const fit::TreeProgress& tree) {
   return updates;
 }
 
+// Returns the residual of a view in the last epoch, or null for a view that was not fitted.
+nlohmann::json residual_json(const fit::Progress& progress, std::size_t view) {
+  if (progress.view_residual.empty() || progress.view_residual[view] == 0.0) return nullptr;
+  return progress.view_residual[view];
+}
+
 nlohmann::json stages_json(const std::vector<fit::Stage>& stages) {
   nlohmann::json list = nlohmann::json::array();
   for (const fit::Stage& s : stages)
@@ -72,6 +78,7 @@ nlohmann::json metrics_json(const fit::Fit& fit, const measurement::Measurement&
                      {"scale", progress.views[v].scale},
                      {"offset", progress.views[v].offset * series.unit},
                      {"noise_sigma", series.noise_sigma[v] * series.unit},
+                     {"residual", residual_json(progress, v)},
                      {"weight", progress.views[v].weight * std::pow(series.noise_sigma[v], 2)}});
   }
   return {{"parameters", fit.field().num_parameters()},

@@ -31,6 +31,7 @@ tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Op
   series.fiducials = files.fiducials;
   series.tilt_offset_deg = options.tilt_offset_deg;
   series.x_axis_tilt_deg = options.x_axis_tilt_deg;
+  if (files.even && files.odd) series.halves = {*files.even, *files.odd};
   series.exclude = options.exclude;
   series.ignore = options.ignore;
   series.bin = options.bin;
@@ -74,7 +75,8 @@ VolumeOptions volume_options(const Options& options) {
   return {.box = {},
           .mode = mrc_mode(options.voxel_type),
           .axes = options.axes,
-          .invert = options.invert};
+          .invert = options.invert,
+          .zarr = options.zarr};
 }
 
 }  // namespace tomofield::output

@@ -14,8 +14,11 @@
 #include "base/log.h"
 #include "base/trace.h"
 #include "distributed/gathered_arrays.h"
+#include "io/atomic_folder.h"
+#include "io/ome_zarr.h"
+#include "io/output_set.h"
+#include "output/volume_labels.h"
 #include "tomofield/error.h"
-#include "tomofield/version.h"
 
 namespace tomofield::output {
 namespace {
@@ -91,7 +94,7 @@ void warn_of_margin(const ModelInfo& info, const Bounds& box, double tolerance) 
   }
 }
 
-// Returns the corner of the box from the view's corner in Å, in IMOD's sign.
+// Returns the corner of the box from the view's corner in Å (docs/geometry.md).
 std::array<double, 3> origin_A(const ModelInfo& info, const OrientedBox& box, VolumeAxes axes) {
   if (!box.is_aligned()) return {0.0, 0.0, 0.0};
   const auto [nx, ny, nz] = box.size;
@@ -101,7 +104,7 @@ std::array<double, 3> origin_A(const ModelInfo& info, const OrientedBox& box, Vo
     const double top = box.position({0.0, 0.0, static_cast<double>(nz)})[2];
     corner = {corner[0], info.geometry.thickness - top, corner[1]};
   }
-  for (double& value : corner) value = value == 0.0 ? 0.0 : -value * info.pixel_size_A;
+  for (double& value : corner) value *= info.pixel_size_A;
   return corner;
 }
 
@@ -169,6 +172,25 @@ void rotate_about_x(const ModelInfo& model, OrientedBox& box) {
 
 }  // namespace
 
+std::filesystem::path zarr_path(const std::filesystem::path& volume) {
+  std::filesystem::path path = volume;
+  return path.replace_extension(".zarr");
+}
+
+void write_zarr(const std::filesystem::path& volume) {
+  const base::TraceSpan span("write OME-Zarr");
+  const io::OutputSet* const results = io::OutputSet::active();
+  io::write_ome_zarr(results != nullptr ? results->location_of(volume) : volume, zarr_path(volume),
+                     volume.stem().string());
+}
+
+void check_zarr(const std::filesystem::path& volume, bool may_replace, const std::string& advice) {
+  const std::filesystem::path zarr = zarr_path(volume);
+  io::require_replaceable_folder(zarr, io::kZarrMarker);
+  if (!may_replace && std::filesystem::exists(zarr))
+    throw Error(fmt::format("'{}' exists: {}", zarr.string(), advice));
+}
+
 OrientedBox region_box(const ModelInfo& model, double voxel_px) {
   const auto& roi = model.roi;
   OrientedBox box = field::box_between(
@@ -177,6 +199,12 @@ OrientedBox region_box(const ModelInfo& model, double voxel_px) {
       voxel_px);
   if (model.x_tilt_deg != 0.0) rotate_about_x(model, box);
   return box;
+}
+
+float largest_density(const Model& model) {
+  const OrientedBox box = region_box(model, 1.0);
+  return largest_density([&](const field::BoxSink& sink) { sample_box(*model.field, box, sink); },
+                         distributed::Communicator::alone());
 }
 
 void write_volume(const Model& model, const VolumeOptions& options,
@@ -217,21 +245,27 @@ void write_voxels(const VoxelSource& source, const OrientedBox& box, const Model
   spec.mode = options.mode;
   spec.voxel_size_A.fill(box.voxel_px * info.pixel_size_A);
   spec.origin_A = origin_A(info, box, options.axes);
-  spec.label = fmt::format("tomofield {}: {}", library_version(), made_by);
+  spec.labels = volume_labels(info, made_by);
 
   double scale = options.invert ? -info.output_scale() : info.output_scale();
   if (options.mode == io::MrcMode::kInt16) {
     { const io::MrcWriter probe(path, spec, processes); }  // refuses before the pass, not after it
     constexpr double kLargestStored = 32000.0;
     const double largest =
-        std::abs(scale) * static_cast<double>(largest_density(source, processes));
+        std::abs(scale) * static_cast<double>(options.largest_density
+                                                  ? *options.largest_density
+                                                  : largest_density(source, processes));
     const double factor = largest > 0 ? kLargestStored / largest : 1.0;
-    spec.label += fmt::format(", stored = {:.6g} x value", factor);
+    spec.labels.front() += fmt::format(", stored = {:.6g} x value", factor);
     scale *= factor;
   }
   io::MrcWriter file(path, spec, processes);
   processes.run_collectively([&] { source(PartWriter(file, box, options.axes, scale)); });
   file.close();
+  if (!options.zarr) return;
+  processes.run_collectively([&] {
+    if (processes.is_root()) write_zarr(path);
+  });
 }
 
 }  // namespace tomofield::output

@@ -21,17 +21,34 @@ struct VolumeOptions {
   io::MrcMode mode = io::MrcMode::kFloat32;  ///< kFloat32, kFloat16, or kInt16, which is scaled
   VolumeAxes axes = VolumeAxes::kXyz;
   bool invert = false;  ///< write the opposite of the input's contrast
+  bool zarr = false;    ///< write a copy as OME-Zarr beside the volume (zarr_path())
+  /// For kInt16: the density that becomes 32000, so that several volumes have one factor. Default:
+  /// the largest one of the volume.
+  std::optional<float> largest_density = {};
 };
+
+/// Returns the folder of a volume's copy as OME-Zarr: NAME.zarr beside NAME.mrc.
+std::filesystem::path zarr_path(const std::filesystem::path& volume);
+
+/// Checks before any work that this copy can be written. Throws Error, with `advice`, if the folder
+/// exists, unless `may_replace`, and if something else is there.
+void check_zarr(const std::filesystem::path& volume, bool may_replace, const std::string& advice);
+
+/// Writes this copy of a volume, which may wait in an io::OutputSet.
+void write_zarr(const std::filesystem::path& volume);
+
+/// Returns the largest absolute density in the region of interest of a model.
+float largest_density(const Model& model);
 
 /// Returns the region of interest and the whole thickness, in whole voxels of `voxel_px` pixels.
 field::OrientedBox region_box(const ModelInfo& model, double voxel_px);
 
 /// Writes a box of a model as an MRC volume, in the input's units and contrast (dark input: dense
-/// is low, an empty region is 0). The header has the exact voxel size and IMOD's origin: minus the
-/// box's corner in the view, in Å (0 for a rotated box). kInt16 takes a second pass over the box
-/// for the largest value, which becomes 32000; the label in the header names the factor. The write
-/// is atomic and replaces an old file. Throws Error before any work if `path` cannot be written or
-/// if the box lies outside of the model.
+/// is low, an empty region is 0). The header has the exact voxel size and, as
+/// ORIGIN, the box's corner in the view, in Å (0 for a rotated box). kInt16 takes a second pass
+/// over the box for the largest value, which becomes 32000; the label in the header names the
+/// factor. The write is atomic and replaces an old file. Throws Error before any work if `path`
+/// cannot be written or if the box lies outside of the model.
 void write_volume(const Model& model, const VolumeOptions& options,
                   const std::filesystem::path& path);
 

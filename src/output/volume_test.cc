@@ -47,9 +47,9 @@ TEST(WriteVolume, WritesTheRegionOfInterestInTheInputsUnits) {
   EXPECT_EQ(out.header.nz, 21);  // 21.5 is rounded to whole voxels
   EXPECT_TRUE(out.header.is_volume);
   for (const double size_A : out.header.voxel_size_A) EXPECT_NEAR(size_A, 3.3725, 1e-6);
-  EXPECT_NEAR(out.header.origin_A[0], -10 * 3.3725, 1e-4);
-  EXPECT_NEAR(out.header.origin_A[1], -4 * 3.3725, 1e-4);
-  EXPECT_NEAR(out.header.origin_A[2], -0.25 * 3.3725, 1e-4);
+  EXPECT_NEAR(out.header.origin_A[0], 10 * 3.3725, 1e-4);
+  EXPECT_NEAR(out.header.origin_A[1], 4 * 3.3725, 1e-4);
+  EXPECT_NEAR(out.header.origin_A[2], 0.25 * 3.3725, 1e-4);
   EXPECT_NEAR(out.at(7, 40, 3), 40.0 * model.field->density(17.5, 44.5, 3.75), 2e-4);
 }
 
@@ -91,7 +91,7 @@ TEST(WriteVolume, AxesXzyTurnBackByImodsRotation) {
   // The origin turns with the axes: rows count down from the upper face.
   EXPECT_EQ(xzy.header.origin_A[0], xyz.header.origin_A[0]);
   EXPECT_EQ(xzy.header.origin_A[2], xyz.header.origin_A[1]);
-  EXPECT_NEAR(xzy.header.origin_A[1], -(21.5 - 17.0) * 3.3725, 1e-4);
+  EXPECT_NEAR(xzy.header.origin_A[1], (21.5 - 17.0) * 3.3725, 1e-4);
 }
 
 TEST(WriteVolume, ScalesIntegersAndSaysSo) {

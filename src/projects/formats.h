@@ -13,6 +13,13 @@ void read_imod_project(Project& project);
 /// Reads AreTomo's .aln. The stack lies beside it.
 void read_aretomo_project(Project& project);
 
+/// Reads RELION 5's tomograms.star, or the STAR file of one tilt series. The latter becomes the
+/// stack: it lists the images (io/view_table.h).
+void read_relion_project(Project& project);
+
+/// Reads a .tomostar or an XML file of Warp, which becomes the stack.
+void read_warp_project(Project& project);
+
 /// Reads SerialEM's .mdoc. The stack lies beside it, or the images of the views, a file each.
 void read_mdoc_project(Project& project);
 

@@ -117,7 +117,8 @@ std::string_view what_hinders_raw(CommandEntries* newst) {
 
 /// Warns if the aligned stack has corrections that the raw one does not have.
 void warn_of_corrections(Project& project, const fs::path& aligned) {
-  for (std::string label : io::open_image_stack(aligned)->header().labels) {
+  const auto stack = io::open_image_stack(aligned);
+  for (std::string label : stack->header().labels) {
     std::ranges::transform(label, label.begin(),
                            [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     for (const std::string_view program : kCorrections) {

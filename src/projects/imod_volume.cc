@@ -94,9 +94,22 @@ void set_center(Project& project, CommandEntries& tilt, const ImodImages& images
                     "told: add it, or go on with --ignore SUBSETSTART",
                     tilt.file().string()));
   }
-  double axis = images.imod_width / 2;
-  if (full && start && full->at(0) > 0) axis = full->at(0) / 2 - start->at(0);
-  axis += images.width / 2 + images.imod_offset_x - images.imod_width / 2 + axis_offset;
+  const double left = images.width / 2 + images.imod_offset_x - images.imod_width / 2;
+  const double bottom = images.height / 2 + images.imod_offset_y - images.imod_height / 2;
+  double axis = left + images.imod_width / 2, middle = bottom + images.imod_height / 2;
+  if (full && full->at(0) > 0 && (start || !project.ignores("SUBSETSTART"))) {
+    axis = left + full->at(0) / 2 - (start ? start->at(0) : 0.0);
+    middle = bottom + full->at(1) / 2 - (start ? start->at(1) : 0.0);
+  }
+  axis += axis_offset;
+  if (std::fabs(middle - images.height / 2) > images.bin &&
+      tilt.number("XAXISTILT").value_or(0) != 0) {
+    project.warn(
+        fmt::format("'{}': FULLIMAGE and SUBSETSTART turn the volume about X {:g} unbinned "
+                    "pixels beside the middle of the views, where this program turns it: "
+                    "the specimen is shifted a little along Z",
+                    tilt.file().string(), middle - images.height / 2));
+  }
   // Both entries are rounded to binned pixels.
   const bool is_central = axis_offset == 0 && std::fabs(axis - images.width / 2) <= images.bin;
   if (is_central) return;

@@ -189,7 +189,10 @@ TEST(ImodProject, TheTiltAxisIsWhereTheSubsetHasIt) {
             "none");
   // The entries of tilt.com put the axis elsewhere.
   EXPECT_EQ(center("SizeToOutputInXandY 20,20\n", "FULLIMAGE 60 40\nSUBSETSTART 4 0\n"), "36");
+  EXPECT_EQ(center("SizeToOutputInXandY 20,20\n", "FULLIMAGE 60 40\n"), "40");  // from 0 on
   EXPECT_EQ(center("", "OFFSET 0 -7\n"), "23");
+  imod.write_tilt("IMAGEBINNED 2\nFULLIMAGE 60 40\nSUBSETSTART 0 6\nXAXISTILT 2\n");
+  expect_parts(imod.warnings(), {"SUBSETSTART", "-6 unbinned"});
   imod.write_tilt("IMAGEBINNED 2\nSUBSETSTART 4 0\n");
   expect_parts(imod.refusal(), {"SUBSETSTART", "FULLIMAGE"});
 }

@@ -177,6 +177,7 @@ fit::Progress progress_from(const output::TrainingState& state, const std::strin
   progress.views = unflatten_views(entry(state.doubles, "views", path));
   progress.epoch_sums = unflatten_sums(entry(state.doubles, "epoch_sums", path));
   progress.data_loss = entry(state.doubles, "data_loss", path);
+  progress.view_residual = entry(state.doubles, "view_residual", path);
   progress.held_out_error = entry(state.doubles, "held_out_error", path);
   auto tree = unflatten_tree(entry(state.integers, "tree_updates", path),
                              entry(state.doubles, "tree_errors", path));
@@ -257,6 +258,7 @@ std::string fingerprint_of(const ReconstructOptions& options,
   json["bin_factor"] = series.bin_factor;
   json["unit"] = series.unit;
   json["noise_sigma"] = series.noise_sigma;
+  if (!series.left_out.empty()) json["left_out"] = series.left_out;
   json["rays"] = fmt::format("{:016x}", series.rays->checksum(processes));
   return json.dump();
 }
@@ -270,6 +272,7 @@ output::TrainingState progress_state(const fit::Fit& fit, const FitOrigin& origi
   state.doubles["views"] = flatten(progress.views);
   state.doubles["epoch_sums"] = flatten(progress.epoch_sums);
   state.doubles["data_loss"] = progress.data_loss;
+  state.doubles["view_residual"] = progress.view_residual;
   store(progress.tree, state);
   state.doubles["held_out_error"] = progress.held_out_error;
   return state;

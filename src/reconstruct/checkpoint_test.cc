@@ -180,6 +180,8 @@ TEST_F(Checkpoint, AStateThatTheSeriesAndTheOptionsCannotHaveIsRefused) {
       [&](State& s) { s.doubles["epoch_sums"][1] = nan; },
       [&](State& s) { s.doubles["epoch_sums"][6] = nan; },  // the limited squares of the first view
       [](State& s) { s.doubles["data_loss"].clear(); },
+      [](State& s) { s.doubles["view_residual"].resize(1); },
+      [](State& s) { s.doubles["view_residual"].assign(s.doubles["view_residual"].size(), -1); },
       [](State& s) { s.doubles["held_out_error"] = {1}; },
       [](State& s) { s.integers["tree_updates"] = {}; },
       [](State& s) {

@@ -47,7 +47,7 @@ report::Curve curve_of(Penalty penalty, const TunedFit& tuned) {
 
 }  // namespace
 
-void write_choice_plot(const TunedFit& tuned, const std::filesystem::path& path) {
+ChoicePlot choice_plot(const TunedFit& tuned) {
   std::vector<report::Curve> curves;
   for (const Penalty penalty : {Penalty::kSmooth, Penalty::kConcave}) {
     curves.push_back(curve_of(penalty, tuned));
@@ -74,7 +74,12 @@ void write_choice_plot(const TunedFit& tuned, const std::filesystem::path& path)
     if (x > axes.x_range.first && x < axes.x_range.second)
       axes.x_ticks.push_back({x, fmt::format("{}", weight)});
   }
-  report::write_curve_plot(axes, curves, path);
+  return {std::move(axes), std::move(curves)};
+}
+
+void write_choice_plot(const TunedFit& tuned, const std::filesystem::path& path) {
+  const ChoicePlot plot = choice_plot(tuned);
+  report::write_curve_plot(plot.axes, plot.curves, path);
 }
 
 }  // namespace tomofield::reconstruction

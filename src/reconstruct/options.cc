@@ -10,6 +10,7 @@
 #include "io/output_files.h"
 #include "option_table/values.h"
 #include "output/shared_options.h"
+#include "reconstruct/exchange_files.h"
 #include "reconstruct/tuning.h"
 
 namespace tomofield::reconstruction {
@@ -86,6 +87,15 @@ void choose_variation(Options& options) {
     options.density_variation = objective::usual_variation(*options.penalty);
 }
 
+void add_half_files(const OutputPaths& paths, bool with_linear_volumes,
+                    std::vector<std::filesystem::path>& files) {
+  files.insert(files.end(), {paths.fsc_picture, paths.local_resolution, paths.uncertainty});
+  for (const OutputPaths::OfHalf& half : paths.halves) {
+    files.insert(files.end(), {half.volume, half.model});
+    if (with_linear_volumes) files.push_back(half.linear_volume);
+  }
+}
+
 }  // namespace
 
 Options resolve(const Options& requested) {
@@ -102,6 +112,7 @@ Options resolve(const Options& requested) {
 ReconstructOptions run_options(const SeriesFiles& files, const Options& requested) {
   ReconstructOptions run;
   run.files = files;
+  run.requested = requested;
   run.resolved = resolve(requested);
   const bool is_bright = run.resolved.contrast == Contrast::kBright;
   run.open = {.variation = !run.resolved.penalty,
@@ -124,11 +135,26 @@ ReconstructOptions run_options(const SeriesFiles& files, const Options& requeste
 OutputPaths output_paths(const std::filesystem::path& volume) {
   std::filesystem::path stem = volume;
   stem.replace_extension();
-  const auto with = [&](const char* extension) {
+  const auto with = [&](const std::string& extension) {
     return std::filesystem::path(stem.string() + extension);
   };
-  return {volume, with(".h5"),           with(".json"),       with("_tree.png"),
-          stem,   with("_held_out.png"), with("_choice.png"), with("_tune.json")};
+  const auto of_half = [&](const std::string& name) {
+    return OutputPaths::OfHalf{with("_" + name + "_Vol.mrc"), with("_" + name + ".h5"),
+                               with("_wbp_" + name + "_Vol.mrc")};
+  };
+  return {.volume = volume,
+          .model = with(".h5"),
+          .json = with(".json"),
+          .report = with("_report.html"),
+          .tree_picture = with("_tree.png"),
+          .picture_prefix = stem,
+          .held_out_picture = with("_held_out.png"),
+          .choice_picture = with("_choice.png"),
+          .trials = with("_tune.json"),
+          .halves = {of_half("EVN"), of_half("ODD")},
+          .fsc_picture = with("_fsc.png"),
+          .local_resolution = with("_local_resolution.mrc"),
+          .uncertainty = with("_uncertainty.mrc")};
 }
 
 int ReconstructOptions::num_trials(int num_fitted_views, const OpenSettings& to_choose) const {
@@ -165,6 +191,29 @@ std::vector<std::string> ReconstructOptions::faults() const {
             "--tune chooses the number of epochs: leave --early-stop out");
   refuse_if(resolved.resume && resolved.output.empty(),
             "--resume continues from the files of an interrupted run: give their output");
+  for (const char* sentence : faults_of_halves()) all.emplace_back(sentence);
+  return all;
+}
+
+// Returns a sentence for each option that does not go with halves, or needs them.
+std::vector<const char*> ReconstructOptions::faults_of_halves() const {
+  std::vector<const char*> all;
+  const auto refuse_if = [&](bool is_fault, const char* sentence) {
+    if (is_fault) all.push_back(sentence);
+  };
+  refuse_if(files.even.has_value() != files.odd.has_value(),
+            "--even and --odd are the two halves of the frames: give both");
+  refuse_if(files.even && files.odd && resolved.split_tilts,
+            "--even and --odd divide the frames, --split-tilts the tilts: choose one of them");
+  refuse_if(resolved.denoising_halves && !makes_halves(),
+            "--denoising-halves needs halves: give --even and --odd, or --split-tilts");
+  if (!makes_halves()) return all;
+  refuse_if(fit.engine == Engine::kRay, "halves need --engine slab");
+  refuse_if(field.tree == TreeKind::kAdaptive,
+            "halves need --tree uniform, because adaptive trees of two fits would differ");
+  refuse_if(fit.patience > 0,
+            "halves need fits of the same length: leave --early-stop out, or choose --epochs");
+  refuse_if(resolved.output.empty(), "halves are written as files: name the tomogram");
   return all;
 }
 
@@ -176,6 +225,7 @@ std::vector<std::string> ReconstructOptions::faults_of_job() const {
   };
   if (field.tree == TreeKind::kAdaptive) refuse("--tree adaptive");
   if (fit.engine == Engine::kRay) refuse("--engine ray");
+  if (resolved.denoising_halves) refuse("--denoising-halves");
   return all;
 }
 
@@ -186,24 +236,32 @@ void check_options(const ReconstructOptions& options) {
   const OutputPaths paths = output_paths(resolved.output);
   // Without a checkpoint there is nothing to resume. The other files are from another run.
   const bool resumes =
-      resolved.resume && (std::filesystem::exists(paths.model) ||
+      resolved.resume && (std::filesystem::exists(options.first_model(paths)) ||
                           (resolved.tune && std::filesystem::exists(paths.trials)));
-  std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json};
+  std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json, paths.report};
   if (options.field.tree == TreeKind::kAdaptive) results.push_back(paths.tree_picture);
   if (resolved.tune) results.push_back(paths.trials);
-  if (options.fit.hold_out > 0) results.push_back(paths.held_out_picture);
+  if (options.fit.hold_out > 0 && !options.makes_halves())
+    results.push_back(paths.held_out_picture);
+  if (options.makes_halves()) add_half_files(paths, resolved.denoising_halves, results);
   if (resolved.tune || options.open.any()) results.push_back(paths.choice_picture);
-  io::check_result_files(
-      std::move(results), paths.picture_prefix, options.files, resolved.overwrite || resumes,
+  for (const auto& file : exchange_files(options)) results.push_back(file);
+  const bool may_replace = resolved.overwrite || resumes;
+  const char* const advice =
       resolved.resume ? "there is no checkpoint to resume, so give --overwrite to start over and "
                         "replace it, or another name with -o"
                       : "give --overwrite to replace it, --resume to continue the run that made "
-                        "it, or another name with -o");
+                        "it, or another name with -o";
+  io::check_result_files(std::move(results), paths.picture_prefix, options.files, may_replace,
+                         advice);
+  if (resolved.zarr) output::check_zarr(paths.volume, may_replace, advice);
 }
 
 std::vector<io::OutputLock> claim_outputs(const ReconstructOptions& options) {
   const OutputPaths paths = output_paths(options.resolved.output);
   std::vector<std::filesystem::path> files{paths.volume, paths.model, paths.json};
+  if (options.makes_halves())
+    for (const OutputPaths::OfHalf& half : paths.halves) files.push_back(half.model);
   if (options.resolved.output.empty()) files.clear();
   return io::claim_outputs(files, [&] { check_options(options); });
 }

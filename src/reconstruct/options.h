@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -22,10 +23,31 @@ namespace tomofield::reconstruction {
 /// them.
 Options resolve(const Options& requested);
 
+/// Names the files of a reconstruction after its volume.
+struct OutputPaths {
+  std::filesystem::path volume, model, json;
+  std::filesystem::path report;            ///< a page to look at (HTML)
+  std::filesystem::path tree_picture;      ///< for adaptive trees
+  std::filesystem::path picture_prefix;    ///< of the slices
+  std::filesystem::path held_out_picture;  ///< if views are held out
+  std::filesystem::path choice_picture;    ///< of the trials, if there are any
+  std::filesystem::path trials;            ///< trials of --tune (JSON)
+  /// Files of one of two halves.
+  struct OfHalf {
+    std::filesystem::path volume, model;
+    std::filesystem::path linear_volume;  ///< with --denoising-halves
+  };
+  std::array<OfHalf, 2> halves;                                      ///< [tilt_series::Half]
+  std::filesystem::path fsc_picture, local_resolution, uncertainty;  ///< of the halves
+};
+/// Returns the paths of the files beside `volume`.
+OutputPaths output_paths(const std::filesystem::path& volume);
+
 /// Holds everything that a reconstruction is made from. run_options() makes it.
 struct ReconstructOptions {
   SeriesFiles files;
-  Options resolved;  ///< the options that are used
+  Options requested;  ///< as they were given
+  Options resolved;   ///< the options that are used
   /// What is left to trials. `resolved` has the settings that they start from.
   OpenSettings open;
   // The same options in the types of the layers below, with the constants of the method.
@@ -37,6 +59,13 @@ struct ReconstructOptions {
   /// Settings that the files of a project made, for the metrics; they are among the options.
   std::vector<option_table::Setting> origins;
 
+  /// Says whether the run makes two fits, of one half of the data each.
+  bool makes_halves() const { return (files.even && files.odd) || resolved.split_tilts; }
+  /// Returns the model that the run writes first. Its checkpoint has the chosen settings.
+  const std::filesystem::path& first_model(const OutputPaths& paths) const {
+    return makes_halves() ? paths.halves.front().model : paths.model;
+  }
+
   /// Returns the expected number of trials before the fit, which choose the settings `to_choose`; 0
   /// means that nothing is to be chosen. A series of few views cannot spare any of them for trials,
   /// and trials cannot predict the rays of raw views.
@@ -45,23 +74,14 @@ struct ReconstructOptions {
   std::vector<std::string> faults() const;
   /// Returns a sentence for each option that a job of several processes cannot have.
   std::vector<std::string> faults_of_job() const;
+
+ private:
+  std::vector<const char*> faults_of_halves() const;
 };
 
 /// Resolves the options and hands them to the layers below. Where trials choose an option, it gets
 /// the value that the trials start from. A fit keeps that value if no trials are made.
 ReconstructOptions run_options(const SeriesFiles& files, const Options& requested);
-
-/// Names the files of a reconstruction after its volume.
-struct OutputPaths {
-  std::filesystem::path volume, model, json;
-  std::filesystem::path tree_picture;      ///< for adaptive trees
-  std::filesystem::path picture_prefix;    ///< of the slices
-  std::filesystem::path held_out_picture;  ///< if views are held out
-  std::filesystem::path choice_picture;    ///< of the trials, if there are any
-  std::filesystem::path trials;            ///< trials of --tune (JSON)
-};
-/// Returns the paths of the files beside `volume`.
-OutputPaths output_paths(const std::filesystem::path& volume);
 
 /// Throws Error for faulty options. Throws Error also if a result would replace an input, or an
 /// existing file without --overwrite or --resume, or cannot be written at its path. Reads no file.

@@ -7,6 +7,9 @@
 #include "base/check.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "baseline/run_baseline.h"
+#include "evaluate/block_fsc.h"
+#include "evaluate/local_resolution.h"
 #include "field/vm/factorise.h"
 #include "fit/domain.h"
 #include "fit/fit.h"
@@ -152,7 +155,9 @@ std::size_t estimate_memory(const tilt_series::TiltSeries& series,
   const int bands_in_use =
       static_cast<int>(std::min<std::int64_t>(base::thread_count(), num_bands));
   const int slabs_in_use = kSlabsOfBand * bands_in_use;
-  const std::size_t rays = SlabViews::resident_memory(own_shape, slabs_in_use);
+  // The rays of all frames stay beside those of a half.
+  const std::size_t ray_sets = options.files.even ? 2 : 1;
+  const std::size_t rays = ray_sets * SlabViews::resident_memory(own_shape, slabs_in_use);
   std::size_t coarse_rays = 0;  // of the last coarse stage, which has the most
   for (const fit::Stage& s : run.stages) {
     if (s.bin == 1) continue;
@@ -177,20 +182,48 @@ std::size_t estimate_memory(const tilt_series::TiltSeries& series,
                   rays + coarse_rays + std::max({fitting + tracing, factorising, decoding}));
 }
 
+// Returns the bytes that writing the results of halves takes: the rays, and a model that is
+// sampled, or what compares the volumes or makes linear ones.
+std::size_t memory_of_halves(const tilt_series::TiltSeries& series,
+                             const measurement::Measurement& plan, const fit::Domain& domain,
+                             const ReconstructOptions& options) {
+  const auto model = static_cast<std::size_t>(parameter_bytes(
+      domain, options.field, options.field.kind, distributed::Communicator::alone()));
+  const base::Shape3 shape{plan.roi.width(), plan.roi.height(),
+                           static_cast<std::int64_t>(plan.geometry.thickness)};
+  const std::size_t linear = options.resolved.denoising_halves
+                                 ? baseline::plan_baseline(series, {options.files, options.resolved,
+                                                                    baseline::WbpOptions{}})
+                                       .memory_bytes
+                                 : 0;
+  const std::size_t sampling =
+      model + static_cast<std::size_t>(base::thread_count()) * thread_memory(plan, domain);
+  return kProgram + measurement::SlabViews::resident_memory(plan.rays_shape(), 0) +
+         std::max({sampling, evaluate::block_fsc_memory(shape),
+                   evaluate::local_resolution_memory(shape), linear});
+}
+
+// Refuses tilts that cannot be divided: each half needs views over the whole range.
+void require_views_for_halves(const measurement::Measurement& plan,
+                              const ReconstructOptions& options) {
+  constexpr int kFewest = 8;
+  const int num_views = num_fitted_views(plan, options.fit);
+  if (!options.resolved.split_tilts || num_views >= kFewest) return;
+  throw Error(
+      fmt::format("--split-tilts needs {} views or more, and there are {}", kFewest, num_views));
+}
+
 void require_views_for_trials(const measurement::Measurement& plan,
                               const fit::FitOptions& options) {
   const std::vector<double>& tilt_deg = plan.geometry.tilt_deg;
   selection::trial_views(tilt_deg, measurement::held_out_views(tilt_deg, options.hold_out));
 }
 
-void require_few_vertices(const fit::Domain& domain) {
-  for (const field::LeafShape& shape : domain.shapes) {
-    if (std::max(shape.nx, shape.nz) <= field::LeafShape::kMaxVertices) continue;
-    throw Error(fmt::format(
-        "{} vertices along an axis of a leaf are more than {}: use a larger --vertex-spacing or "
-        "--bin, or a smaller --thickness",
-        std::max(shape.nx, shape.nz), field::LeafShape::kMaxVertices));
-  }
+// Returns the largest number of vertices along an axis of a leaf.
+int most_vertices(const fit::Domain& domain) {
+  int most = 0;
+  for (const field::LeafShape& shape : domain.shapes) most = std::max({most, shape.nx, shape.nz});
+  return most;
 }
 
 }  // namespace
@@ -218,14 +251,31 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
       num_fitted_views(plan, options.fit),
       {.variation = options.open.variation, .view_scale = options.open.view_scale});
   if (run.num_trials > 0) require_views_for_trials(plan, options.fit);
-  run.num_steps = (last.first_epoch + last.epochs) * steps_an_epoch(plan, options.fit);
+  run.steps_an_epoch = steps_an_epoch(plan, options.fit);
+  run.num_steps = (last.first_epoch + last.epochs) * run.steps_an_epoch;
   run.memory_bytes = estimate_memory(series, plan, domain, run, options, processes);
-  base::require_memory(run.memory_bytes * static_cast<std::size_t>(processes.size_on_machine()),
+  run.most_vertices = most_vertices(domain);
+  if (options.makes_halves()) {
+    require_views_for_halves(plan, options);
+    run.num_fits = 2;
+    run.memory_bytes = std::max(run.memory_bytes, memory_of_halves(series, plan, domain, options));
+  }
+  return run;
+}
+
+void require_memory(const RunPlan& plan, const distributed::Communicator& processes) {
+  base::require_memory(plan.memory_bytes * static_cast<std::size_t>(processes.size_on_machine()),
                        "this reconstruction",
                        "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, or "
                        "fewer --threads");
-  require_few_vertices(domain);
-  return run;
+}
+
+void require_few_vertices(const RunPlan& plan) {
+  if (plan.most_vertices <= field::LeafShape::kMaxVertices) return;
+  throw Error(fmt::format(
+      "{} vertices along an axis of a leaf are more than {}: use a larger --vertex-spacing or "
+      "--bin, or a smaller --thickness",
+      plan.most_vertices, field::LeafShape::kMaxVertices));
 }
 
 }  // namespace tomofield::reconstruction

@@ -115,9 +115,10 @@ TEST_F(Plan, MoreParametersNeedMoreMemory) {
 }
 
 TEST_F(Plan, RefusesWhatTheMachineCannotHold) {
-  options_.specimen.thickness = 1e6;
-  options_.field.vertex_spacing = 0.01;
-  const std::string message = testing::message_of<Error>([&] { plan(); });
+  RunPlan run = plan();
+  EXPECT_NO_THROW(require_memory(run));
+  run.memory_bytes = std::size_t{1} << 50;
+  const std::string message = testing::message_of<Error>([&] { require_memory(run); });
   EXPECT_NE(message.find("GiB"), std::string::npos) << message;
   EXPECT_NE(message.find("--bin"), std::string::npos) << message;
 }

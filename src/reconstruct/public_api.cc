@@ -13,6 +13,7 @@
 #include "io/json.h"
 #include "output/model_file.h"
 #include "output/volume.h"
+#include "reconstruct/exchange_files.h"
 #include "reconstruct/options.h"
 #include "reconstruct/reconstruct.h"
 #include "tomofield/error.h"
@@ -200,16 +201,22 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
   const reconstruction::ReconstructOptions internal = internal_options(series, options);
   const auto locks = reconstruction::claim_outputs(internal);
   const tilt_series::TiltSeries views(internal.input);
-  reconstruction::plan_run(views, internal);
+  const reconstruction::RunPlan plan = reconstruction::plan_run(views, internal);
+  require_memory(plan);
+  require_few_vertices(plan);
   Listener listener(progress);
-  reconstruction::RunResult run = reconstruction::reconstruct(views, internal, listener.hooks());
+  reconstruction::ReconstructHooks hooks = listener.hooks();
+  hooks.write_more = [&](const reconstruction::Results&, const std::filesystem::path& volume) {
+    reconstruction::write_exchange_files(views, internal, volume);
+  };
+  reconstruction::RunResult run = reconstruction::reconstruct(views, internal, hooks);
   if (!run.results) return {};
   Reconstruction made{.is_finished = true,
                       .tomogram = {},
                       .model = {},
                       .metrics = io::json_text(run.results->metrics)};
-  if (options.output.empty()) made.tomogram = sample_tomogram(run.results->model, options.invert);
-  made.model = ModelAccess::make(std::move(run.results->model));
+  if (options.output.empty()) made.tomogram = sample_tomogram(*run.results->model, options.invert);
+  if (run.results->model) made.model = ModelAccess::make(std::move(*run.results->model));
   return made;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -36,14 +37,15 @@ enum class Outcome {
 /// Holds the results of a run.
 struct RunResult {
   Outcome outcome = Outcome::kFinished;
-  std::optional<Results> results;  ///< of a finished run
+  std::optional<Results> results = {};    ///< of a finished run
+  std::filesystem::path checkpoint = {};  ///< of a run that was stopped during the fit
 };
 
 /// Does the main job: prepares the views, chooses settings by trials if the options ask for it,
 /// fits a field and samples it. Writes the volume (MRC), the model (HDF5, which is also the
 /// checkpoint during the run), and the metrics with the resolved options (JSON). If Options::output
-/// is empty, it writes no file. Throws Error for bad input. The caller has called claim_outputs()
-/// and plan_run() before.
+/// is empty, it writes no file. With halves it makes two fits (halves.h). Throws Error for bad
+/// input. The caller has called claim_outputs() and plan_run() before.
 ///
 /// If several processes call it, they share the work. The results have the same bits as those of
 /// one process. The root writes the files.
@@ -60,17 +62,26 @@ struct RunPlan {
   Rectangle roi;
   double thickness = 0;
   int num_leaves = 0;              ///< at the start
+  int most_vertices = 0;           ///< along an axis of a leaf
   std::size_t num_parameters = 0;  ///< max. during the last stage
   int num_trials = 0;              ///< expected number of short fits that choose settings
   std::vector<fit::Stage> stages;
-  std::int64_t num_steps = 0;    ///< of all stages
+  int steps_an_epoch = 0;
+  std::int64_t num_steps = 0;    ///< of all stages of a fit
+  int num_fits = 1;              ///< 2 for halves, one after the other
   std::size_t memory_bytes = 0;  ///< estimated peak of each process
 };
 
 /// Plans a run. It writes nothing and allocates neither views nor parameters. Throws Error for
-/// options that do not fit the series or the number of processes, and if the machine has less
-/// memory than the run needs.
+/// options that do not fit the series or the number of processes.
 RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
                  const distributed::Communicator& processes = distributed::Communicator::alone());
+
+/// Throws Error if this machine has less memory than a run needs.
+void require_memory(const RunPlan& plan, const distributed::Communicator& processes =
+                                             distributed::Communicator::alone());
+
+/// Throws Error if a leaf would have more vertices along an axis than one can have.
+void require_few_vertices(const RunPlan& plan);
 
 }  // namespace tomofield::reconstruction

@@ -98,9 +98,9 @@ void write_results(Results& results, const ReconstructOptions& options,
   const distributed::Communicator& processes = share.processes;
   Writers writers;
   if (processes.size() == 1)
-    writers.push_back([&] { output::save_model(paths.model, results.model, &state); });
+    writers.push_back([&] { output::save_model(paths.model, *results.model, &state); });
   writers.push_back(
-      [&] { output::write_volume(results.model, options.volume, paths.volume, share); });
+      [&] { output::write_volume(*results.model, options.volume, paths.volume, share); });
   if (held_out_view) {
     writers.push_back([&] {
       processes.run_collectively([&] {
@@ -158,26 +158,35 @@ output::ModelInfo model_info(const measurement::Measurement& series,
   return info;
 }
 
+Findings examine(const fit::Fit& fit, const measurement::Measurement& series,
+                 const ReconstructOptions& options, const RunRecord& record) {
+  Findings found;
+  found.metrics = output::metrics_json(fit, series, record.fit_seconds);
+  if (options.fit.hold_out > 0) {
+    const base::TraceSpan span("score held-out views");
+    found.held_out = fit.held_out_error();
+  }
+  found.metrics["held_out"] = held_out_json(fit, series, options, found.held_out);
+  found.metrics["processes"] = output::processes_json(fit, record.fit_seconds);
+  found.verdict =
+      judge({fit, series, options, record, volume_share(fit, series).rows}, found.held_out);
+  found.metrics.update(
+      evaluate::artefacts_json(found.verdict.artefacts.speckle, found.verdict.artefacts.faces));
+  found.metrics["verdict"] = verdict_json(found.verdict);
+  const std::optional<TunedFit>& tuned = record.origin.tuned;
+  found.metrics["tuning"] = tuned ? tuning_json(*tuned) : nlohmann::json(nullptr);
+  return found;
+}
+
 Results finish(fit::Fit& fit, const measurement::Measurement& series,
                const ReconstructOptions& options, const RunRecord& record,
                const WriteMore& write_more) {
   const FitOrigin& origin = record.origin;
   const bool writes_files = !options.resolved.output.empty();
-  nlohmann::json metrics = output::metrics_json(fit, series, record.fit_seconds);
-  std::optional<measurement::ViewErrors> errors;
+  Findings found = examine(fit, series, options, record);
   std::optional<measurement::PredictedView> view;
-  if (options.fit.hold_out > 0) {
-    const base::TraceSpan span("score held-out views");
-    errors = fit.held_out_error();
-    if (writes_files) view = central_view(fit, series, *errors);
-  }
-  metrics["held_out"] = held_out_json(fit, series, options, errors);
-  metrics["processes"] = output::processes_json(fit, record.fit_seconds);
+  if (found.held_out && writes_files) view = central_view(fit, series, *found.held_out);
   const output::VolumeShare share = volume_share(fit, series);
-  Verdict verdict = judge({fit, series, options, record, share.rows}, errors);
-  metrics.update(evaluate::artefacts_json(verdict.artefacts.speckle, verdict.artefacts.faces));
-  metrics["verdict"] = verdict_json(verdict);
-  metrics["tuning"] = origin.tuned ? tuning_json(*origin.tuned) : nlohmann::json(nullptr);
   const output::ModelInfo info = model_info(series, options);
   const OutputPaths paths = output_paths(options.resolved.output);
   const distributed::Communicator& processes = share.processes;
@@ -185,12 +194,12 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   std::optional<io::OutputSet> outputs;
   if (writes_files) outputs.emplace();
   if (writes_files && processes.size() > 1) save_fit(paths.model, fit, info, state);
-  Results results{.model = {info, fit.take_field()},
+  Results results{.model = output::Model{info, fit.take_field()},
                   .metrics = {{"tomofield", TOMOFIELD_VERSION},
                               {"options", options_json(options)},
                               {"origins", option_table::to_json(options.origins)},
-                              {"metrics", std::move(metrics)}},
-                  .verdict = std::move(verdict),
+                              {"metrics", std::move(found.metrics)}},
+                  .verdict = std::move(found.verdict),
                   .bead_masking = series.masks.bead_masking};
   if (!writes_files) return results;
   try {
@@ -203,7 +212,7 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   } catch (...) {
     std::function<void()> save_again;  // several processes have saved theirs together
     if (processes.size() == 1)
-      save_again = [&] { output::save_model(paths.model, results.model, &state); };
+      save_again = [&] { output::save_model(paths.model, *results.model, &state); };
     keep_model(paths.model, *outputs, save_again);
   }
   return results;

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "fit/fit.h"
 #include "measurement/prepare.h"
@@ -17,9 +18,22 @@ namespace tomofield::reconstruction {
 output::ModelInfo model_info(const measurement::Measurement& series,
                              const ReconstructOptions& options);
 
-/// Holds the results of a finished fit.
+/// Says what a finished fit tells of itself.
+struct Findings {
+  nlohmann::json metrics;
+  Verdict verdict;
+  std::optional<measurement::ViewErrors> held_out;
+};
+
+/// Measures what a finished fit tells. Every process calls it.
+Findings examine(const fit::Fit& fit, const measurement::Measurement& series,
+                 const ReconstructOptions& options, const RunRecord& record);
+
+/// Holds the results of a run.
 struct Results {
-  output::Model model;     ///< each process has the parameters of its own leaves
+  /// The model; each process has the parameters of its own leaves. Halves have none: theirs are in
+  /// files.
+  std::optional<output::Model> model;
   nlohmann::json metrics;  ///< the content of the JSON file beside the volume
   Verdict verdict;
   tilt_series::BeadMasking bead_masking = tilt_series::BeadMasking::kNone;

@@ -73,6 +73,16 @@ int expected_trials(const SearchSpace& space) {
   return selection::kUsualWeights + 2 + (space.penalty ? 1 : 0) + (space.rank ? 2 : 0);
 }
 
+TrialShape trial_of_tune(const fit::FieldOptions& field, const fit::FitOptions& fit) {
+  return {selection::kTrialRows, field, fit};
+}
+
+TrialShape short_trial(const fit::FieldOptions& field, const fit::FitOptions& fit) {
+  fit::FieldOptions plain = field;
+  plain.kind = FieldKind::kGrid;
+  return {kShortRows, plain, short_trial_options(plain, field, fit)};
+}
+
 OpenSettings open_settings(OpenSettings wanted, const measurement::Measurement& measurement) {
   wanted.background = wanted.background && measurement.background != 0.0;
   wanted.beads = wanted.beads && !measurement.undecided_beads.empty();
@@ -106,7 +116,8 @@ std::optional<TunedFit> tune(const measurement::Measurement& measurement,
                              const OpenSettings& open, selection::TrialFile& file,
                              const TuneHooks& hooks, const distributed::Communicator& processes) {
   const SearchSpace space{.penalty = open.variation, .rank = field.kind == FieldKind::kVm};
-  TrialFits fits(measurement, selection::kTrialRows, field, fit,
+  const TrialShape shape = trial_of_tune(field, fit);
+  TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
                  open.view_scale || fit.fit_view_scale, hooks, expected_trials(space), processes);
   // A run without total variation still needs a weight to search from.
   const double first =
@@ -131,13 +142,11 @@ std::optional<TunedFit> choose_by_short_trials(const measurement::Measurement& m
                                                const fit::FitOptions& fit, const OpenSettings& open,
                                                const TuneHooks& hooks,
                                                const distributed::Communicator& processes) {
-  fit::FieldOptions plain = field;
-  plain.kind = FieldKind::kGrid;
-  const fit::FitOptions shorter = short_trial_options(plain, field, fit);
-  TrialFits fits(measurement, kShortRows, plain, shorter, open.view_scale || fit.fit_view_scale,
-                 hooks, usual_trials(open), processes);
+  const TrialShape shape = short_trial(field, fit);
+  TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
+                 open.view_scale || fit.fit_view_scale, hooks, usual_trials(open), processes);
   const TrialSettings start = with_safe_corrections(
-      {fit.penalty, fit.density_variation, field.rank, shorter.epochs, fit.fit_view_scale}, open);
+      {fit.penalty, fit.density_variation, field.rank, shape.fit.epochs, fit.fit_view_scale}, open);
   std::optional<TunedFit> tuned = searched(fits, nullptr, [&](FitTrials& trials) {
     return choose_corrections(open.variation ? choose_variation(start, trials) : start, open,
                               trials);

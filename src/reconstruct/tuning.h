@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 
@@ -37,6 +38,17 @@ struct TuneHooks {
   base::ProgressSink progress;
   std::function<bool()> stop_requested;  ///< is asked after every step
 };
+
+/// Says what one trial of a search is: a fit of at most so many rows with these options.
+struct TrialShape {
+  std::int64_t rows = 0;
+  fit::FieldOptions field;
+  fit::FitOptions fit;
+};
+/// Returns the trials that tune() makes of a run.
+TrialShape trial_of_tune(const fit::FieldOptions& field, const fit::FitOptions& fit);
+/// Returns the trials that choose_by_short_trials() makes of a run.
+TrialShape short_trial(const fit::FieldOptions& field, const fit::FitOptions& fit);
 
 /// Returns what trials can choose of `wanted`: there must be a background or undecided beads.
 OpenSettings open_settings(OpenSettings wanted, const measurement::Measurement& measurement);

@@ -69,6 +69,7 @@ SectionProfile section_profile(const std::vector<double>& deviation) {
 nlohmann::json verdict_json(const Verdict& verdict) {
   nlohmann::json json =
       evaluate::artefacts_json(verdict.artefacts.speckle, verdict.artefacts.faces);
+  json["line"] = verdict_line(verdict);
   json["residual"] = verdict.residual;
   json["held_out"] = verdict.held_out ? held_out_json(*verdict.held_out) : nlohmann::json(nullptr);
   json["sections"] = sections_json(verdict.sections);

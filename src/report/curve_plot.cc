@@ -204,6 +204,19 @@ std::vector<double> round_ticks(double low, double high) {
   return ticks;
 }
 
+std::vector<Tick> log_ticks(double low, double high) {
+  const bool has_many = high / low > 2e3;
+  std::vector<Tick> ticks;
+  for (double decade = std::pow(10, std::floor(std::log10(low))); decade <= high; decade *= 10) {
+    for (const double factor : {1.0, 2.0, 5.0}) {
+      const double at = factor * decade;
+      if (at < low || at > high || (has_many && factor > 1)) continue;
+      ticks.push_back({std::log10(at), fmt::format("{:g}", at)});
+    }
+  }
+  return ticks;
+}
+
 std::string curve_plot_svg(const PlotAxes& axes, const std::vector<Curve>& curves) {
   return drawn_on<SvgSurface>(axes, curves).element();
 }

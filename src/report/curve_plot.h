@@ -39,6 +39,10 @@ std::string curve_plot_svg(const PlotAxes& axes, const std::vector<Curve>& curve
 void write_curve_plot(const PlotAxes& axes, const std::vector<Curve>& curves,
                       const std::filesystem::path& path);
 
+/// Returns ticks for an axis of decimal logarithms: 1, 2 and 5 times each power of ten in a range
+/// of values above 0, or the powers of ten alone if the range has many.
+std::vector<Tick> log_ticks(double low, double high);
+
 /// Returns about five round numbers (1, 2 or 5 times a power of ten apart) within a range.
 std::vector<double> round_ticks(double low, double high);
 

@@ -26,6 +26,20 @@ TEST(RoundTicks, AreOneTwoOrFiveTimesAPowerOfTenApart) {
   EXPECT_FALSE(std::signbit(round_ticks(0, 1).front()));
 }
 
+TEST(LogTicks, AreOneTwoAndFiveTimesPowersOfTen) {
+  const auto labels = [](double low, double high) {
+    std::string all;
+    for (const Tick& tick : log_ticks(low, high)) {
+      EXPECT_NEAR(std::pow(10, tick.at), std::stod(tick.label), 1e-9 * high);
+      all += tick.label + " ";
+    }
+    return all;
+  };
+  EXPECT_EQ(labels(0.9, 30), "1 2 5 10 20 ");
+  EXPECT_EQ(labels(0.04, 0.6), "0.05 0.1 0.2 0.5 ");
+  EXPECT_EQ(labels(0.5, 2e4), "1 10 100 1000 10000 ");
+}
+
 TEST(CurvePlot, DrawsEveryCurveAndItsName) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::string svg = curve_plot_svg(

@@ -23,7 +23,7 @@ class SlicePictures : public ::testing::Test {
   ~SlicePictures() override { fs::remove_all(directory_); }
 
   void write(std::int64_t nx, std::int64_t ny, std::int64_t nz, const std::vector<float>& voxels) {
-    io::MrcWriter writer(mrc_, {.nx = nx, .ny = ny, .nz = nz, .label = {}});
+    io::MrcWriter writer(mrc_, {.nx = nx, .ny = ny, .nz = nz, .labels = {}});
     const auto section = static_cast<std::size_t>(nx * ny);
     for (std::int64_t z = 0; z < nz; ++z)
       writer.write_section(

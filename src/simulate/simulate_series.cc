@@ -61,7 +61,7 @@ io::MrcSpec mrc_spec(std::int64_t nx, std::int64_t ny, std::int64_t nz, bool is_
           .nz = nz,
           .voxel_size_A = {size, size, size},
           .is_volume = is_volume,
-          .label = fmt::format("tomofield simulate: {}, seed {}", what, options.cell.seed)};
+          .labels = {fmt::format("tomofield simulate: {}, seed {}", what, options.cell.seed)}};
 }
 
 SimulationSummary::Truth write_truth(const fs::path& path, const Phantom& phantom,

@@ -61,15 +61,43 @@ std::size_t ViewDecoder::memory() const {
 }
 
 DecodedView ViewDecoder::decode(std::size_t view, Frames frames, PatternSearch* search) const {
+  PixelCensus census;
+  MaskedImage image = read_and_mask(view, census);
+  if (search) search->add(view, image);
+  DecodedView decoded = decode_masked(std::move(image), view, frames);
+  decoded.census = census;
+  return decoded;
+}
+
+DecodedView ViewDecoder::decode_half(Half half, const HalfStacks& halves, std::size_t view,
+                                     Frames frames) const {
+  MaskedImage image = read_masked(view);
+  halves.read_section(half, plan_.views[view].view.section, image.values);
+  for (std::size_t i = 0; i < image.values.size(); ++i)
+    if (image.valid[i] == kNoMeasurement) image.values[i] = 0.0f;
+  return decode_masked(std::move(image), view, frames);
+}
+
+MaskedImage ViewDecoder::read_masked(std::size_t view) const {
+  PixelCensus census;
+  return read_and_mask(view, census);
+}
+
+// Reads the section of a view and masks what is no measurement.
+MaskedImage ViewDecoder::read_and_mask(std::size_t view, PixelCensus& census) const {
   const std::int64_t section = plan_.views[view].view.section;
   MaskedImage image(stack_.header().nx, stack_.header().ny);
   stack_.read_section(section, image.values);
-  DecodedView decoded;
-  decoded.census = mask_not_finite(&image);
+  census = mask_not_finite(&image);
   if (!plan_.is_raw) mask_fill(contrast_, &image);
   if (mask_) apply_mask(*mask_, section, &image);
-  decoded.census.num_bad = mask_bad_pixels(&image);
-  if (search) search->add(view, image);
+  census.num_bad = mask_bad_pixels(&image);
+  return image;
+}
+
+// Removes the fixed pattern, aligns and bins.
+DecodedView ViewDecoder::decode_masked(MaskedImage image, std::size_t view, Frames frames) const {
+  DecodedView decoded;
   pattern_.remove_from(view, &image);
   if (frames.recorded) decoded.recorded = frames.aligned ? binned(image) : binned(std::move(image));
   if (frames.aligned) decoded.aligned = binned(aligned(std::move(image), view));

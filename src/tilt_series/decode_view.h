@@ -9,6 +9,7 @@
 #include "io/mrc.h"
 #include "tilt_series/fixed_pattern/fixed_pattern.h"
 #include "tilt_series/fixed_pattern/pattern_search.h"
+#include "tilt_series/half_stacks.h"
 #include "tilt_series/image.h"
 #include "tilt_series/series_plan.h"
 #include "tomofield/options.h"
@@ -56,6 +57,14 @@ class ViewDecoder {
   /// cannot be read.
   DecodedView decode(std::size_t view, Frames frames, PatternSearch* search = nullptr) const;
 
+  /// Reads the section of a view and masks what is no measurement, as decode() does, and no more.
+  MaskedImage read_masked(std::size_t view) const;
+
+  /// Does the same as decode() with the values of one half of the frames. Masks and fixed pattern
+  /// are those of all frames.
+  DecodedView decode_half(Half half, const HalfStacks& halves, std::size_t view,
+                          Frames frames) const;
+
   /// Returns about the bytes that decode() and what is done with its result take.
   std::size_t memory() const;
 
@@ -66,6 +75,8 @@ class ViewDecoder {
   std::int64_t aligned_height() const;
 
  private:
+  MaskedImage read_and_mask(std::size_t view, PixelCensus& census) const;
+  DecodedView decode_masked(MaskedImage image, std::size_t view, Frames frames) const;
   MaskedImage aligned(MaskedImage recorded, std::size_t view) const;
   MaskedImage binned(MaskedImage image) const;
 

@@ -10,8 +10,10 @@
 #include "base/log.h"
 #include "base/plausible.h"
 #include "io/alignment_files.h"
+#include "io/view_table.h"
 #include "option_table/name_list.h"
 #include "tilt_series/binning.h"
+#include "tilt_series/section_table.h"
 #include "tilt_series/tilt_angles.h"
 #include "tomofield/error.h"
 
@@ -55,44 +57,25 @@ InPlaneAlignment alignment_of_imod(const std::filesystem::path& path, const io::
   return alignment;
 }
 
-AreTomoSections read_aretomo(const std::filesystem::path& path, const io::ImageStack& stack) {
-  AreTomoSections aretomo{io::read_aretomo_alignment(path), {}};
-  const io::MrcHeader& header = stack.header();
-  const auto& raw_size = aretomo.alignment.raw_size;
-  if (raw_size && ((*raw_size)[0] != header.nx || (*raw_size)[1] != header.ny)) {
-    throw Error(fmt::format(
-        "'{}' aligns images of {} × {} pixels but '{}' has {} × {}; give the "
-        "stack that AreTomo aligned, unbinned",
-        path.string(), (*raw_size)[0], (*raw_size)[1], stack.name(), header.nx, header.ny));
-  }
-  const auto sections =
-      io::assign_aretomo_sections(aretomo.alignment, path, header.nz, stack.name());
-  aretomo.row_of_section.resize(static_cast<std::size_t>(header.nz));
-  for (std::size_t row = 0; row < sections.size(); ++row) {
-    aretomo.row_of_section[static_cast<std::size_t>(sections[row])] = row;
-  }
-  if (aretomo.alignment.num_local_rows > 0) {
-    base::log_warning(
-        fmt::format("'{}' has local alignment, which is not applied: views are aligned as a whole",
-                    path.string()));
-  }
-  return aretomo;
-}
-
-InPlaneAlignment alignment_of_aretomo(const AreTomoSections& aretomo) {
+InPlaneAlignment alignment_of_table(const SectionTable& table) {
   InPlaneAlignment alignment;
-  for (const auto& row_index : aretomo.row_of_section) {
+  for (const auto& section : table.of_section) {
     alignment.of_section.emplace_back();
-    if (!row_index) continue;
-    const io::AreTomoRow& row = aretomo.alignment.rows[*row_index];
-    const double rotation_rad = row.rotation_deg * std::numbers::pi / 180.0;
-    const double cosine = std::cos(rotation_rad), sine = std::sin(rotation_rad);
-    alignment.of_section.back() =
-        RawFromAligned{cosine, -sine, sine, cosine, row.shift_x_px, row.shift_y_px};
-    alignment.sum_cos += cosine;
-    alignment.sum_sin += sine;
+    if (!section) continue;
+    alignment.of_section.back() = section->raw_from_aligned;
+    const double rotation_rad = section->rotation_deg * std::numbers::pi / 180.0;
+    alignment.sum_cos += std::cos(rotation_rad);
+    alignment.sum_sin += std::sin(rotation_rad);
   }
   return alignment;
+}
+
+/// Returns what --aln says of the sections, or else the table of views that is given as the stack.
+std::optional<SectionTable> find_section_table(const TiltSeriesOptions& options,
+                                               const io::ImageStack& stack, double pixel_size_A) {
+  if (options.aln) return sections_of_aretomo(*options.aln, stack);
+  if (options.images || !io::is_view_table(options.stack)) return std::nullopt;
+  return sections_of_views(io::read_view_table(options.stack), stack, pixel_size_A);
 }
 
 /// Returns the size of an unbinned pixel in Å: --pixel-size, else the header's, else the mdoc's.
@@ -132,14 +115,19 @@ double find_bin_factor(const TiltSeriesOptions& options, const SeriesPlan& plan)
   return std::max(factor, 1.0);
 }
 
-std::vector<io::NumberLine> read_x_tilts(const TiltSeriesOptions& options,
-                                         const io::ImageStack& stack) {
-  if (!options.xtilt) {
-    return std::vector<io::NumberLine>(static_cast<std::size_t>(stack.header().nz));
+/// Returns the x-axis tilt of each section: from --xtilt, else from the table, else 0.
+std::vector<double> find_x_tilts(const TiltSeriesOptions& options, const io::ImageStack& stack,
+                                 const std::optional<SectionTable>& table) {
+  std::vector<double> x_tilts_deg(static_cast<std::size_t>(stack.header().nz), 0.0);
+  if (options.xtilt) {
+    const auto numbers = io::read_number_column(*options.xtilt, "an x-axis tilt in degrees");
+    require_count(numbers.size(), *options.xtilt, "x-axis tilts", stack);
+    for (std::size_t i = 0; i < numbers.size(); ++i) x_tilts_deg[i] = numbers[i].value;
+  } else if (table) {
+    for (std::size_t i = 0; i < x_tilts_deg.size(); ++i)
+      if (table->of_section[i]) x_tilts_deg[i] = table->of_section[i]->x_tilt_deg;
   }
-  auto x_tilts = io::read_number_column(*options.xtilt, "an x-axis tilt in degrees");
-  require_count(x_tilts.size(), *options.xtilt, "x-axis tilts", stack);
-  return x_tilts;
+  return x_tilts_deg;
 }
 
 /// Throws Error for a raw stack without an alignment, as the tilt axis of the .mdoc shows it.
@@ -187,9 +175,10 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
   require_compatible(options);
   const io::MrcHeader& header = stack.header();
   const auto mdoc = options.mdoc ? std::optional(io::read_mdoc(*options.mdoc)) : std::nullopt;
-  const auto aretomo =
-      options.aln ? std::optional(read_aretomo(*options.aln, stack)) : std::nullopt;
-  TiltAngles angles = find_tilt_angles(options, stack, aretomo, mdoc);
+  SeriesPlan plan;
+  plan.pixel_size_A = find_pixel_size(options, stack, mdoc);
+  const auto table = find_section_table(options, stack, plan.pixel_size_A);
+  TiltAngles angles = find_tilt_angles(options, stack, table, mdoc);
   for (auto& angle : angles.of_section)
     if (angle) angle->value += options.tilt_offset_deg;
   if (mdoc && std::ssize(mdoc->sections) != header.nz) {
@@ -197,21 +186,21 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
                                   options.mdoc->string(), mdoc->sections.size(), stack.name(),
                                   header.nz));
   }
-  const std::vector<io::NumberLine> x_tilts = read_x_tilts(options, stack);
+  const std::vector<double> x_tilts_deg = find_x_tilts(options, stack, table);
   const auto excluded = io::parse_section_list(options.exclude, header.nz);
 
   std::optional<InPlaneAlignment> alignment;
-  if (options.xf) alignment = alignment_of_imod(*options.xf, stack);
-  if (aretomo) alignment = alignment_of_aretomo(*aretomo);
+  if (options.xf)
+    alignment = alignment_of_imod(*options.xf, stack);
+  else if (table)
+    alignment = alignment_of_table(*table);
   if (mdoc && !alignment) require_vertical_axis(options, *mdoc, stack);
 
-  SeriesPlan plan;
   plan.angle_source = angles.source;
   plan.is_raw = alignment.has_value();
   const auto size = aligned_size(alignment.value_or(InPlaneAlignment{}), header);
   plan.aligned_width = size[0];
   plan.aligned_height = size[1];
-  plan.pixel_size_A = find_pixel_size(options, stack, mdoc);
   plan.bin_factor = find_bin_factor(options, plan);
   for (std::int64_t section = 0; section < header.nz; ++section) {
     const auto at = static_cast<std::size_t>(section);
@@ -219,7 +208,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
     if (is_dark || std::binary_search(excluded.begin(), excluded.end(), section)) continue;
     PlannedView planned;
     planned.view = {section, require_usable_tilt(angles, section),
-                    x_tilts[at].value - options.x_axis_tilt_deg};
+                    x_tilts_deg[at] - options.x_axis_tilt_deg};
     if (alignment) planned.raw_from_aligned = *alignment->of_section[at];
     plan.views.push_back(planned);
   }

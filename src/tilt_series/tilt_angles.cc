@@ -31,13 +31,11 @@ TiltAngles angles_of_mdoc(const io::Mdoc& mdoc, const std::filesystem::path& pat
   return angles;
 }
 
-TiltAngles angles_of_aretomo(const AreTomoSections& aretomo, const std::filesystem::path& path) {
-  TiltAngles angles{path.string(), {}};
-  for (const auto& row : aretomo.row_of_section) {
+TiltAngles angles_of_table(const SectionTable& table) {
+  TiltAngles angles{table.source, {}};
+  for (const auto& section : table.of_section) {
     angles.of_section.emplace_back();
-    if (!row) continue;
-    const io::AreTomoRow& found = aretomo.alignment.rows[*row];
-    angles.of_section.back() = {found.tilt_deg, found.line};
+    if (section) angles.of_section.back() = {section->tilt_deg, section->line};
   }
   return angles;
 }
@@ -54,14 +52,14 @@ void require_count(std::size_t found, const std::filesystem::path& file, const c
 }
 
 TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::ImageStack& stack,
-                            const std::optional<AreTomoSections>& aretomo,
+                            const std::optional<SectionTable>& table,
                             const std::optional<io::Mdoc>& mdoc) {
   if (options.tlt) {
     const auto numbers = io::read_number_column(*options.tlt, "a tilt angle in degrees");
     require_count(numbers.size(), *options.tlt, "angles", stack);
     return {options.tlt->string(), {numbers.begin(), numbers.end()}};
   }
-  if (aretomo) return angles_of_aretomo(*aretomo, *options.aln);
+  if (table) return angles_of_table(*table);
   if (mdoc) return angles_of_mdoc(*mdoc, *options.mdoc, stack);
   const auto& extended = stack.header().extended_tilt_deg;
   if (extended.empty()) {

@@ -8,15 +8,10 @@
 
 #include "io/alignment_files.h"
 #include "io/image_stack.h"
+#include "tilt_series/section_table.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::tilt_series {
-
-/// An AreTomo alignment, with the section of the stack of each of its rows.
-struct AreTomoSections {
-  io::AreTomoAlignment alignment;
-  std::vector<std::optional<std::size_t>> row_of_section;  ///< none: a dark frame
-};
 
 /// The tilt angles of the sections of a stack.
 struct TiltAngles {
@@ -24,11 +19,11 @@ struct TiltAngles {
   std::vector<std::optional<io::NumberLine>> of_section;
 };
 
-/// Returns the tilt angles from the first of: .tlt or .rawtlt, AreTomo's .aln, the
-/// .mdoc, the stack's extended header (an explicit file always wins). Throws
+/// Returns the tilt angles from the first of: .tlt or .rawtlt, the table that aligns the sections,
+/// the .mdoc, the stack's extended header (an explicit file always wins). Throws
 /// Error if there is none, or if their number is not the stack's.
 TiltAngles find_tilt_angles(const TiltSeriesOptions& options, const io::ImageStack& stack,
-                            const std::optional<AreTomoSections>& aretomo,
+                            const std::optional<SectionTable>& table,
                             const std::optional<io::Mdoc>& mdoc);
 
 /// Throws Error with both numbers and both files unless they are equal.

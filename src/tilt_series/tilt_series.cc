@@ -18,6 +18,7 @@
 #include "tilt_series/decode_view.h"
 #include "tilt_series/fixed_pattern/fixed_pattern.h"
 #include "tilt_series/fixed_pattern/pattern_search.h"
+#include "tilt_series/half_stacks.h"
 #include "tilt_series/intensity.h"
 #include "tilt_series/masks/series_masks.h"
 #include "tilt_series/noise.h"
@@ -55,6 +56,7 @@ struct TiltSeries::Impl {
   std::int64_t num_bad_pixels = 0;
   FixedPatternMetrics fixed_pattern;
   BeadMasks beads;  // without discs until they have been found
+  std::optional<HalfStacks> halves;
 
   // Decoded views of this process, as stored intensities without discs of beads.
   std::unique_ptr<ViewStore> measured;  // in the frame that the options ask for
@@ -71,11 +73,13 @@ struct TiltSeries::Impl {
     for (const PlannedView& planned : plan.views) views.push_back(planned.view);
     beads.discs.resize(views.size());
     beads.undecided.resize(views.size());
+    if (options.halves) halves.emplace(*options.halves, *stack);
   }
 
   /// Decodes every view, checks and measures it.
   void look_over(const distributed::Communicator& processes) {
     decode_views(processes);
+    if (halves) match_halves(processes);
     if (options.take_log) measure_logarithms(processes);
     find_beads(processes);
     measure_noise_beside_beads(processes);
@@ -193,6 +197,24 @@ struct TiltSeries::Impl {
       base::log_info("fixed pattern removed: " + describe_pattern(fixed_pattern));
   }
 
+  /// Finds how the sections of the halves compare with those of all frames.
+  void match_halves(const distributed::Communicator& processes) {
+    const base::TraceSpan span("match halves");
+    std::vector<HalfMoments> moments(views.size());
+    for_own_views("match halves", processes, [&](std::size_t view) {
+      moments[view] = halves->measure(views[view].section, decoder.read_masked(view));
+    });
+    processes.allreduce_sum(std::span(moments), &HalfMoments::n, &HalfMoments::all,
+                            &HalfMoments::even, &HalfMoments::odd, &HalfMoments::all_squares,
+                            &HalfMoments::sum_squares, &HalfMoments::products,
+                            &HalfMoments::num_not_finite);
+    processes.run_collectively([&] {
+      std::vector<std::int64_t> sections;
+      for (const View& view : views) sections.push_back(view.section);
+      halves->match(sections, moments, *stack);
+    });
+  }
+
   // -------------------------------------------------------------- measuring
 
   void measure_logarithms(const distributed::Communicator& processes) {
@@ -279,14 +301,23 @@ struct TiltSeries::Impl {
 
   /// Returns a view as line integrals, without what masked beads and fiducials hide.
   MaskedImage line_integrals(std::size_t view) const {
-    MaskedImage image;
-    if (measured && measured->holds(view)) {
-      image = measured->read(view);
-    } else {
-      DecodedView decoded =
-          decoder.decode(view, {.recorded = !options.resample, .aligned = options.resample});
-      image = std::move(options.resample ? decoded.aligned : decoded.recorded);
-    }
+    if (measured && measured->holds(view)) return line_integrals(measured->read(view), view);
+    return line_integrals(decoder.decode(view, wanted_frame()), view);
+  }
+
+  MaskedImage line_integrals_of_half(Half half, std::size_t view) const {
+    return line_integrals(decoder.decode_half(half, *halves, view, wanted_frame()), view);
+  }
+
+  Frames wanted_frame() const {
+    return {.recorded = !options.resample, .aligned = options.resample};
+  }
+
+  MaskedImage line_integrals(DecodedView decoded, std::size_t view) const {
+    return line_integrals(std::move(options.resample ? decoded.aligned : decoded.recorded), view);
+  }
+
+  MaskedImage line_integrals(MaskedImage image, std::size_t view) const {
     mask_discs(beads.discs[view], &image);
     mark_undecided(beads.undecided[view], &image);
     intensity.convert(&image);
@@ -302,7 +333,7 @@ std::string describe_beads(const MaskMetrics& masks) {
 TiltSeries::TiltSeries(const TiltSeriesOptions& options,
                        const distributed::Communicator& processes) {
   processes.run_collectively([&] { impl_ = std::make_unique<Impl>(options); });
-  impl_->look_over(processes);
+  if (options.look_at_views) impl_->look_over(processes);
 }
 TiltSeries::~TiltSeries() = default;
 TiltSeries::TiltSeries(TiltSeries&&) noexcept = default;
@@ -334,8 +365,16 @@ void TiltSeries::read_view(std::size_t view, std::span<float> image,
       image.size() == static_cast<std::size_t>(width() * height()) && valid.size() == image.size(),
       "image and mask must have width × height elements");
   const MaskedImage integrals = impl_->line_integrals(view);
-  std::copy(integrals.values.begin(), integrals.values.end(), image.begin());
-  std::copy(integrals.valid.begin(), integrals.valid.end(), valid.begin());
+  std::ranges::copy(integrals.values, image.begin());
+  std::ranges::copy(integrals.valid, valid.begin());
+}
+
+void TiltSeries::read_half(Half half, std::size_t view, std::span<float> image,
+                           std::span<std::uint8_t> valid) const {
+  TOMOFIELD_CHECK(impl_->halves.has_value(), "the options name no halves");
+  const MaskedImage integrals = impl_->line_integrals_of_half(half, view);
+  std::ranges::copy(integrals.values, image.begin());
+  std::ranges::copy(integrals.valid, valid.begin());
 }
 
 void TiltSeries::forget_view(std::size_t view) const {

@@ -13,6 +13,7 @@
 #include "geometry/raw_from_aligned.h"
 #include "io/image_stack.h"
 #include "tilt_series/fixed_pattern/fixed_pattern.h"
+#include "tilt_series/half.h"
 #include "tilt_series/masks/mask_disc.h"
 #include "tomofield/options.h"
 
@@ -41,6 +42,9 @@ struct TiltSeriesOptions {
   bool resample = true;   ///< false: views stay as they were recorded, with their alignment beside
   /// False: decoded views are given up as soon as they have been checked and measured.
   bool keep_views = true;
+  /// False: no view is looked at, so that only what follows from headers and small files is known.
+  /// There are no noise, no beads and no empty beam, and broken views are not found.
+  bool look_at_views = true;
   /// Takes decoded views that do not fit in memory; empty: the system's folder for such files.
   std::filesystem::path scratch_dir = {};
 
@@ -52,6 +56,7 @@ struct TiltSeriesOptions {
   std::optional<double> bead_diameter_nm;
   /// Finds and removes what stays at one place of the detector in all views.
   bool remove_fixed_pattern = true;
+  std::optional<HalfPaths> halves = {};  ///< stacks of the even and the odd frames
 };
 
 /// Says what is done with the pixels of beads that were found.
@@ -119,6 +124,11 @@ class TiltSeries {
   /// Pixels that are not measurements are 0. A view that is not in this process's store is
   /// decoded anew. Thread-safe.
   void read_view(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) const;
+
+  /// Does the same with one half of the frames, in the units of all of them (half_stacks.h) and
+  /// with the masks of all of them. It decodes the view. The options must name the halves.
+  void read_half(Half half, std::size_t view, std::span<float> image,
+                 std::span<std::uint8_t> valid) const;
 
   /// Gives up the stored pixels of a view that will not be read soon, to make room.
   void forget_view(std::size_t view) const;

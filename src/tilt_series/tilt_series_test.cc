@@ -302,10 +302,14 @@ TEST(TiltSeries, ViewsMayLieInOneFileEach) {
 TEST(TiltSeries, OtherFilesOfASeriesAreNamed) {
   const ScratchDirectory scratch;
   TiltSeriesOptions options = small_series(scratch);
-  for (const std::string name : {"a.tlt", "b.rawtlt", "c.xf", "d.xtilt", "e.aln", "f.com", "g.star",
-                                 "h.tomostar", "i.xml", "j.toml"}) {
+  for (const std::string name :
+       {"a.tlt", "b.rawtlt", "c.xf", "d.xtilt", "e.aln", "f.com", "g.toml"}) {
     options.stack = scratch.write(name, "1 2 3\n");
     expect_parts(refusal(options), {name, "not a stack"});
+  }
+  for (const std::string name : {"h.star", "i.tomostar", "j.xml"}) {  // may list images
+    options.stack = scratch.write(name, "1 2 3\n");
+    expect_parts(refusal(options), {name});
   }
 }
 
@@ -344,6 +348,22 @@ TEST(TiltSeries, ConstantViewIsNamed) {
   write_stack(options.stack, 16, 12, 3,
               [](auto x, auto y, auto z) { return z == 2 ? 7.0f : some_value(x, y, z); });
   expect_parts(refusal(options), {"section 3", "constant", "a.st"});
+}
+
+TEST(TiltSeries, OfHeadersAloneKnowsItsGeometry) {
+  const ScratchDirectory scratch;
+  TiltSeriesOptions options = small_series(scratch);
+  write_stack(options.stack, 16, 12, 3, [](auto, auto, auto) { return 7.0f; });
+  options.look_at_views = false;  // the views are constant, which is not seen
+  const TiltSeries series(options);
+  EXPECT_EQ(series.views().size(), 3u);
+  EXPECT_EQ(series.width(), 16);
+  std::vector<float> image(16 * 12);
+  std::vector<std::uint8_t> valid(16 * 12);
+  series.read_view(1, image, valid);
+  EXPECT_EQ(valid[100], 1);
+  write_stack(options.stack, 16, 12, 4, [](auto, auto, auto) { return 7.0f; });
+  EXPECT_THROW(TiltSeries{options}, Error) << "of four sections and three angles";
 }
 
 // Transmission images I0 exp(−integral): a bright field with a dark disc.

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
+#include "base/range.h"
 #include "distributed/communicator.h"
 
 namespace tomofield::tilt_series {
@@ -12,6 +14,15 @@ inline int owner_of_view(std::size_t view, const distributed::Communicator& proc
 }
 inline bool is_own_view(std::size_t view, const distributed::Communicator& processes) {
   return owner_of_view(view, processes) == processes.rank();
+}
+/// Returns the views that this process owns, of a range of them.
+inline std::vector<std::size_t> own_views(base::Range views,
+                                          const distributed::Communicator& processes) {
+  std::vector<std::size_t> own;
+  for (int view = views.begin; view < views.end; ++view)
+    if (is_own_view(static_cast<std::size_t>(view), processes))
+      own.push_back(static_cast<std::size_t>(view));
+  return own;
 }
 /// Returns how many views the process with the most of them owns.
 inline std::size_t max_own_views(std::size_t num_views,

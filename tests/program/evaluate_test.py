@@ -144,11 +144,11 @@ def test_origins_say_where_a_part_lies():
     whole = save("whole.mrc", truth, label="tomofield 1")
     expected = evaluate(save("all.mrc", reconstruction), whole, "--box", "7,5,3,20,15,13")[0]
     part = reconstruction[3:13, 5:15, 7:20]
-    found, _ = evaluate(save("part.mrc", part, origin=(-70, -50, -30)), whole)
+    found, _ = evaluate(save("part.mrc", part, origin=(70, 50, 30)), whole)
     assert found["box_first"] == [7, 5, 3] and found["box_last"] == [20, 15, 13], found
     assert found["psnr_raw_dB"] == expected["psnr_raw_dB"]
     # The whole is compared with the part.
-    found, _ = evaluate(whole, save("part.mrc", part, origin=(-70, -50, -30)))
+    found, _ = evaluate(whole, save("part.mrc", part, origin=(70, 50, 30)))
     assert found["box_first"] == [0, 0, 0] and found["box_last"] == [13, 10, 10], found
     # Volumes that tomofield wrote share a corner. Others share the centre, with a warning.
     corner = reconstruction[:, :40, :]

@@ -80,7 +80,7 @@ def test_by_default_it_is_the_volume_of_reconstruct():
 def test_a_part_knows_where_it_lies(whole, box):
     values, voxel_size, origin = export(*box)
     check_close(values, whole[PART], whole)
-    np.testing.assert_allclose(origin, np.array([X0 + 3, Y0 + 8, 5]) * -PIXEL_A, atol=1e-4)
+    np.testing.assert_allclose(origin, np.array([X0 + 3, Y0 + 8, 5]) * PIXEL_A, atol=1e-4)
     np.testing.assert_allclose(voxel_size.tolist(), PIXEL_A, rtol=1e-7)
 
 
@@ -100,7 +100,7 @@ def test_binned_voxels_are_means(whole):
     # The odd last column and row stay out, half a pixel on either side.
     values, _, origin = export("--voxel-size", 2 * PIXEL_A)
     assert values.shape == (15, 18, 20)
-    np.testing.assert_allclose(origin, np.array([X0 + 0.5, Y0 + 0.5, 0]) * -PIXEL_A, atol=1e-4)
+    np.testing.assert_allclose(origin, np.array([X0 + 0.5, Y0 + 0.5, 0]) * PIXEL_A, atol=1e-4)
 
 
 def test_axes_rotation_and_sign(whole):

@@ -133,11 +133,13 @@ class Sweep:
                 str(fault), name, ended)
 
     def is_whole(self, name, data):
-        """Says whether a result is one of the new run; its JSON has times, which differ."""
-        return json.loads(data) is not None if name.endswith(".json") else data == self.new[name]
+        """Says whether a result is one of the new run; its JSON and its report have times."""
+        if name.endswith(".json"):
+            return json.loads(data) is not None
+        return data.endswith(b"</html>\n") if name.endswith(".html") else data == self.new[name]
 
     def is_right(self, files):
-        return all(files[name] == self.new[name] for name in self.new if name[-5:] != ".json")
+        return all(self.is_whole(name, files[name]) for name in self.new)
 
     def check_next_run(self, fault):
         """Checks that the next run, which resumes if there is a checkpoint, has the right bits."""

@@ -173,8 +173,9 @@ class Results:
         self.model_path, self.json_path = stem + ".h5", stem + ".json"
         self.pictures = {plane: f"{stem}_{plane}.png" for plane in ("xy", "xz", "yz")}
         self.mask_picture = stem + "_mask.png"
+        self.report_path = stem + "_report.html"
         self.all_paths = [output, self.model_path, self.json_path, self.mask_picture,
-                          *self.pictures.values()]
+                          self.report_path, *self.pictures.values()]
 
     @property
     def volume(self):

@@ -91,7 +91,7 @@ def metrics(results):
         found = json.load(file)["metrics"]
     for key in ("seconds", "processes", "threads", "threads_why"):  # of the run, not of the result
         found.pop(key)
-    for key in ("seconds", "peak_GiB"):
+    for key in ("seconds", "peak_GiB", "line"):
         found["verdict"].pop(key)
     if found["tuning"]:
         for trial in found["tuning"]["trials"]:
@@ -122,6 +122,27 @@ def test_results_have_the_bytes_of_one_process(command):
             assert result.stdout.count("tomogram  ") == 1, result.stdout
             assert set(map(os.path.basename, glob.glob(os.path.dirname(shared.volume_path) + "/*"))) \
                 == set(map(os.path.basename, glob.glob(os.path.dirname(alone.volume_path) + "/*")))
+
+
+def test_halves_have_the_bytes_of_one_process(command, series):
+    views = harness.read_volume(series[0]) / 2
+    random = np.random.default_rng(6)
+    halves = {}
+    for half in ("even", "odd"):
+        halves[half] = os.path.join(os.path.dirname(series[0]), half + ".mrc")
+        harness.write_stack(halves[half],
+                            (views + random.normal(0, 0.02, views.shape)).astype(np.float32))
+    options = ["--even", halves["even"], "--odd", halves["odd"], "--view-scale", "on"]
+    volumes = []
+    for processes in (1, 2):
+        results = fresh_results(f"halves{processes}")
+        succeed(processes, *command(results, *options))
+        stem = results.volume_path[:-len(".mrc")]
+        volumes.append([harness.read_bytes(stem + end) for end in (
+            ".mrc", "_EVN_Vol.mrc", "_ODD_Vol.mrc", "_ODD.h5", "_uncertainty.mrc")])
+    assert volumes[0] == volumes[1]
+    refused = mpirun(2, *command(fresh_results("linear"), *options, "--denoising-halves"))
+    assert refused.returncode != 0 and "cannot share --denoising-halves yet" in refused.stderr
 
 
 # Each process sees some of the views, and the pattern is what all of them have in common.

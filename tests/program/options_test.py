@@ -17,7 +17,7 @@ COMMON = {"stack", "--tlt", "--xf", "--aln", "--bin", "--contrast", "--thickness
 def flags_of_keys():
     """Returns the flag of every key in docs/options.md."""
     rows = {key: flags.split(",")[-1] for flags, key in ROW.findall(PAGE.read_text("utf-8"))}
-    assert len(rows) == 65, len(rows)
+    assert len(rows) == 71, len(rows)
     return rows
 
 
@@ -42,7 +42,7 @@ def test_help_fits_on_a_screen():
 def test_help_all_has_every_option_of_the_page():
     text = harness.succeed("reconstruct", "--help-all").stdout
     page = set(flags_of_keys().values())
-    assert options_in(text) == page | COMMON | {"--trace", "--series"}, options_in(text) ^ (page | COMMON)
+    assert options_in(text) == page | COMMON | {"--trace", "--series", "--plan"}, options_in(text) ^ (page | COMMON)
     assert max(map(len, text.splitlines())) <= 100
 
 

@@ -49,7 +49,7 @@ def test_volume_is_an_mrc_file_that_others_read(plain):
         values = data.astype(np.float64)
         np.testing.assert_allclose(header.dmean, values.mean(), rtol=1e-6)
         np.testing.assert_allclose(header.rms, values.std(), rtol=1e-5)
-        assert header.nlabl == 1 and header.label[0].startswith(b"tomofield"), header.label[0]
+        assert header.label[0].startswith(b"tomofield"), header.label[0]
 
 
 def test_specimen_is_found(series):
@@ -71,7 +71,8 @@ def test_json_has_metrics_and_every_option(plain, series):
     assert options["specimen"]["thickness"] == THICKNESS and options["specimen"]["hand"] == 1
     assert options["field"]["kind"] == "vm" and options["field"]["with_margin"] is False
     assert options["fit"]["epochs"] == 8 and options["fit"]["seed"] == 1
-    assert options["volume"] == {"mode": 2, "axes": "xyz", "invert": False}
+    assert options["volume"] == {"mode": 2, "axes": "xyz", "invert": False,
+                                 "denoising_halves": False}
     assert metrics["steps"] == 8 * 7 and metrics["size_px"] == [WIDTH, HEIGHT, THICKNESS]
     assert abs(metrics["pixel_size_A"] - PIXEL_SIZE) < 1e-5
     residuals = metrics["mean_squared_residual_per_noise_variance"]
@@ -169,9 +170,14 @@ def test_region_of_interest_has_its_size(series):
     results = series.reconstruct("roi", "--roi", "5,3,40,30")
     with mrcfile.open(results.volume_path) as file:
         assert file.data.shape == (THICKNESS, 27, 35)
-        # With IMOD's sign the corner of a subvolume has a negative origin.
+        # MRC2014: where the part begins. IMOD has the other sign, and bit 2 of its flags says so.
         np.testing.assert_allclose(file.header.origin.tolist(),
-                                   (-5 * PIXEL_SIZE, -3 * PIXEL_SIZE, 0), rtol=1e-6)
+                                   (5 * PIXEL_SIZE, 3 * PIXEL_SIZE, 0), rtol=1e-6)
+        stamp, flags = np.frombuffer(read_bytes(results.volume_path)[152:160], "<i4")
+        assert stamp == 1146047817 and flags & 4
+        labels = [label.decode().strip() for label in file.header.label[:file.header.nlabl]]
+        assert labels[0].startswith("tomofield ") and "density field" in labels[0]
+        assert labels[1:] == ["series: series.mrc", "angles: series.tlt"]
     assert json.load(open(results.json_path))["options"]["specimen"]["roi"] == [5, 3, 40, 30]
 
 

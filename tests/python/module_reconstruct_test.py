@@ -84,6 +84,22 @@ def test_ctrl_c_stops_it_and_leaves_a_checkpoint(series, quick, tmp_path):
     assert (tmp_path / "t.h5").exists() and not (tmp_path / "t.mrc").exists()
 
 
+def test_halves_are_files(series, quick, tmp_path):
+    with pytest.raises(tomofield.Error, match="halves are written as files"):
+        tomofield.reconstruct(series.views, series.tilt_deg, **quick, split_tilts=True)
+    made = tomofield.reconstruct(series.views, series.tilt_deg, **quick, split_tilts=True,
+                                 output=tmp_path / "t.mrc")
+    assert made.is_finished and made.model is None and made.tomogram is None
+    assert made.metrics["halves"]["of"] == "tilts"
+    even = tomofield.Model(tmp_path / "t_EVN.h5")
+    assert even.sample(even.region()).shape == series.tomogram.shape
+    stack = series.folder / "s.mrc"
+    again = tomofield.reconstruct(stack, tlt=series.folder / "s.tlt", even=stack, odd=stack,
+                                  **quick, output=tmp_path / "f.mrc")
+    assert again.metrics["halves"]["of"] == "frames"
+    assert (tmp_path / "f_EVN_Vol.mrc").read_bytes() == (tmp_path / "f_ODD_Vol.mrc").read_bytes()
+
+
 def test_messages_go_to_the_logger(series, quick, caplog):
     views = series.views.copy()
     views[2, 5, 7] = np.nan

@@ -422,6 +422,58 @@ TEST_P(CoarseToFine, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(run(1), run(3));
 }
 
+TEST_P(CoarseToFine, KeepsTheViewsAtTheModelsOfAnotherFit) {
+  const auto first = make_fit();
+  first->run([](const Fit&) { return true; });
+  const auto second = make_fit();
+  std::vector<measurement::ViewModel> models = first->progress().views;
+  models[3] = {1.25, -0.5, 70.0, 0.4};
+  second->keep_views(models);
+  second->run([&](const Fit& fit) {
+    EXPECT_EQ(fit.progress().views[3].scale, 1.25);
+    return true;
+  });
+  for (std::size_t v = 0; v < models.size(); ++v) {
+    EXPECT_EQ(second->progress().views[v].scale, models[v].scale);
+    EXPECT_EQ(second->progress().views[v].offset, models[v].offset);
+    EXPECT_EQ(second->progress().views[v].weight, models[v].weight);
+    EXPECT_EQ(second->progress().views[v].largest_residual, models[v].largest_residual);
+  }
+}
+
+TEST(Fit, ViewsThatAreLeftOutTellNothing) {
+  const Bead bead({15.3, 20.6, 9.2});
+  const auto geometry = geometry::centred_geometry(33, 37, 20, tilts(-60, 60, 12));
+  const BeadSeries series(geometry, bead, 3);
+  // Another series with the same views but those that are left out.
+  const BeadSeries other(geometry, Bead({20.1, 14.2, 11.0}), 3);
+  const std::vector<int> views{1, 3, 5, 7, 9};
+  const auto fitted = [&](measurement::Measurement measured) {
+    measured.left_out = views;
+    FitOptions options;
+    options.epochs = 3;
+    options.subsets = 4;
+    Fit fit(measured, field_options(FieldKind::kGrid), options);
+    fit.run([](const Fit&) { return true; });
+    return std::pair(std::vector(fit.field().parameters().begin(), fit.field().parameters().end()),
+                     fit.progress().epoch_sums[3].n);
+  };
+  measurement::Measurement mixed = series.measurement();
+  const auto& from = *series.measurement().rays;
+  const auto& left_out = *other.measurement().rays;
+  mixed.rays = std::make_shared<measurement::SlabViews>(
+      from.shape(), 1.0,
+      [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
+        const auto& source = view % 2 == 1 ? left_out : from;
+        for (std::size_t i = 0; i < image.size(); ++i)
+          image[i] = source.ray(static_cast<int>(view), static_cast<std::int64_t>(i) % 33,
+                                static_cast<std::int64_t>(i) / 33);
+        std::ranges::fill(valid, std::uint8_t{1});
+      },
+      "/tmp");
+  EXPECT_EQ(fitted(series.measurement()), fitted(mixed));
+}
+
 TEST(Fit, StopsWhenToldAndGoesOnToTheSameBits) {
   geometry::TiltGeometry g = geometry::centred_geometry(16, 20, 8, tilts(-48, 48, 8));
   const BeadSeries series(g, Bead({8, 10, 4}), 4);

@@ -1,4 +1,4 @@
-#include "compare/child_process.h"
+#include "base/child_process.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -15,11 +16,11 @@
 #include <fstream>
 #include <string_view>
 #include <thread>
+#include <utility>
 
-#include "base/stopwatch.h"
 #include "tomofield/error.h"
 
-namespace tomofield::compare {
+namespace tomofield::base {
 namespace {
 
 double seconds(const timeval& t) {
@@ -29,7 +30,7 @@ double seconds(const timeval& t) {
 // Becomes the program, in the new process. Returns errno if that is not possible. The parent may
 // have other threads, so that only system calls are allowed here.
 int become(char* const* arguments, const char* log, pid_t parent) {
-  // If compare is killed, its child is asked to stop. It may have been killed just before.
+  // If the parent is killed, its child is asked to stop. It may have been killed just before.
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (getppid() != parent) _exit(1);
   const int output = open(log, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
@@ -69,29 +70,60 @@ pid_t start(const std::vector<std::string>& command, const std::filesystem::path
 
 }  // namespace
 
-ChildResult run_child(const std::vector<std::string>& command, const std::filesystem::path& log,
-                      const std::function<bool()>& stop_requested) {
-  constexpr auto kPause = std::chrono::milliseconds(20);
-  const base::Stopwatch running;
-  const pid_t child = start(command, log);
-  bool told = false;
+Costs operator+(const Costs& one, const Costs& other) {
+  return {one.core_seconds + other.core_seconds, one.wall_seconds + other.wall_seconds,
+          std::max(one.peak_bytes, other.peak_bytes)};
+}
+
+ChildProcess::ChildProcess(const std::vector<std::string>& command,
+                           const std::filesystem::path& log)
+    : program_(command[0]), child_(start(command, log)) {}
+
+ChildProcess::ChildProcess(ChildProcess&& other) noexcept
+    : program_(std::move(other.program_)),
+      child_(std::exchange(other.child_, -1)),
+      is_told_(other.is_told_),
+      running_(other.running_) {}
+
+ChildProcess::~ChildProcess() {
+  if (child_ < 0) return;
+  ask_to_stop();
+  while (waitpid(child_, nullptr, 0) < 0 && errno == EINTR) {
+  }
+}
+
+std::optional<ChildResult> ChildProcess::poll() {
   int status = 0;
   rusage usage{};
-  for (;;) {
-    const pid_t ended = wait4(child, &status, WNOHANG, &usage);
-    if (ended == child) break;
-    if (ended < 0 && errno != EINTR)
-      throw Error(fmt::format("'{}' was lost: {}", command[0], std::strerror(errno)));
-    if (!told && stop_requested && stop_requested()) {
-      kill(child, SIGTERM);
-      told = true;
-    }
-    std::this_thread::sleep_for(kPause);
+  const pid_t ended = wait4(child_, &status, WNOHANG, &usage);
+  if (ended == 0 || (ended < 0 && errno == EINTR)) return std::nullopt;
+  if (ended < 0) {
+    child_ = -1;
+    throw Error(fmt::format("'{}' was lost: {}", program_, std::strerror(errno)));
   }
-  return {.exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status),
-          .core_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime),
-          .wall_seconds = running.seconds(),
-          .peak_bytes = std::int64_t{usage.ru_maxrss} * 1024};
+  child_ = -1;
+  return ChildResult{
+      .exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status),
+      .costs = {.core_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime),
+                .wall_seconds = running_.seconds(),
+                .peak_bytes = std::int64_t{usage.ru_maxrss} * 1024}};
+}
+
+void ChildProcess::ask_to_stop() {
+  if (!is_told_ && child_ > 0) kill(child_, SIGTERM);
+  is_told_ = true;
+}
+
+void pause_between_polls() { std::this_thread::sleep_for(std::chrono::milliseconds(20)); }
+
+ChildResult run_child(const std::vector<std::string>& command, const std::filesystem::path& log,
+                      const std::function<bool()>& stop_requested) {
+  ChildProcess child(command, log);
+  for (;;) {
+    if (const auto result = child.poll()) return *result;
+    if (stop_requested && stop_requested()) child.ask_to_stop();
+    pause_between_polls();
+  }
 }
 
 std::string reason_of_failure(const std::filesystem::path& log) {
@@ -105,4 +137,4 @@ std::string reason_of_failure(const std::filesystem::path& log) {
   return sentence.empty() ? last : sentence;
 }
 
-}  // namespace tomofield::compare
+}  // namespace tomofield::base

@@ -1,4 +1,4 @@
-#include "compare/child_process.h"
+#include "base/child_process.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 
-namespace tomofield::compare {
+namespace tomofield::base {
 namespace {
 
 class ChildProcess : public ::testing::Test {
@@ -37,10 +37,10 @@ TEST_F(ChildProcess, TellsItsStatusAndKeepsWhatItSaid) {
 
 TEST_F(ChildProcess, MeasuresWhatItTook) {
   const ChildResult busy = run("i=0; while [ $i -lt 100000 ]; do i=$((i+1)); done");
-  EXPECT_GT(busy.core_seconds, 0.01);
-  EXPECT_GE(busy.wall_seconds, 0.5 * busy.core_seconds);
-  EXPECT_GT(busy.peak_bytes, 100'000);
-  EXPECT_LT(busy.peak_bytes, std::int64_t{1} << 30);
+  EXPECT_GT(busy.costs.core_seconds, 0.01);
+  EXPECT_GE(busy.costs.wall_seconds, 0.5 * busy.costs.core_seconds);
+  EXPECT_GT(busy.costs.peak_bytes, 100'000);
+  EXPECT_LT(busy.costs.peak_bytes, std::int64_t{1} << 30);
 }
 
 TEST_F(ChildProcess, IsStoppedOnRequest) {
@@ -92,5 +92,12 @@ TEST_F(ChildProcess, ThatDoesNotExistIsAnError) {
   EXPECT_THROW(run_child({"/nowhere/program"}, log_, {}), Error);
 }
 
+TEST(Costs, OfSessionsAddUpButForMemory) {
+  const Costs sum = Costs{1, 2, 300} + Costs{10, 20, 200};
+  EXPECT_EQ(sum.core_seconds, 11);
+  EXPECT_EQ(sum.wall_seconds, 22);
+  EXPECT_EQ(sum.peak_bytes, 300);
+}
+
 }  // namespace
-}  // namespace tomofield::compare
+}  // namespace tomofield::base

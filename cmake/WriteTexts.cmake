@@ -1,0 +1,10 @@
+# cmake -DHEADER=… "-DTEXTS=kName=FILE;…" -P: writes a header with a constant for each text file.
+cmake_minimum_required(VERSION 3.25)
+set(header "#pragma once\n\n#include <string_view>\n\n")
+foreach(text IN LISTS TEXTS)
+  string(REGEX MATCH "^([^=]+)=(.+)$" match "${text}")
+  set(name ${CMAKE_MATCH_1})
+  file(READ "${CMAKE_MATCH_2}" content)
+  string(APPEND header "inline constexpr std::string_view ${name} = R\"TEXT(${content})TEXT\";\n")
+endforeach()
+file(WRITE ${HEADER} "${header}")

@@ -1,0 +1,8 @@
+#include "fuzz_input.h"
+#include "io/view_table.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const tomofield::fuzz::InputFile file(data, size);
+  tomofield::fuzz::refuse_or([&] { tomofield::io::read_warp_xml(file.path()); });
+  return 0;
+}

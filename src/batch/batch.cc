@@ -1,0 +1,81 @@
+#include "batch/batch.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+
+#include "base/memory.h"
+#include "batch/faults.h"
+#include "batch/series_list.h"
+#include "batch/slurm.h"
+#include "batch/state.h"
+#include "batch/summary.h"
+#include "io/output_files.h"
+
+namespace tomofield::batch {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kGibibyte = 1 << 30;
+
+}  // namespace
+
+void settle_outputs(std::vector<Series>& all, const PlanOptions& options) {
+  std::vector<fs::path> inputs, outputs;
+  for (Series& series : all) {
+    series.output = output_of(series, options.folder);
+    outputs.push_back(series.output);
+    if (fs::is_regular_file(series.input)) inputs.push_back(series.input);
+  }
+  require_own_names(all);
+  io::require_no_input_is_replaced(outputs, inputs);
+  if (options.skips_existing || options.overwrites) return;
+  Faults faults;
+  for (const Series& series : all) {
+    if (fs::exists(series.output))
+      faults.add(
+          fmt::format("{}: '{}' exists: --skip-existing leaves it as it is, --overwrite "
+                      "replaces it",
+                      series.source, series.output.string()));
+  }
+  faults.require_none();
+}
+
+void require_room(const std::vector<Job>& jobs, const Room& room) {
+  Faults faults;
+  for (const Job& job : jobs) {
+    const std::int64_t needed = job.needs.memory_bytes_of_one_thread;
+    if (job.is_skipped || needed <= room.memory_bytes) continue;
+    faults.add(
+        fmt::format("{} needs about {:.1f} GiB of memory, and {:.1f} GiB are there: use a "
+                    "larger --bin, a smaller --roi or --thickness, or a larger machine "
+                    "(--slurm)",
+                    job.name, static_cast<double>(needed) / kGibibyte,
+                    static_cast<double>(room.memory_bytes) / kGibibyte));
+  }
+  faults.require_none();
+}
+
+void begin_batch(const fs::path& folder, const JobList& list) {
+  fs::create_directories(log_folder(folder));
+  write_jobs(list_of(folder), list);
+  for (const Job& job : list.jobs) {
+    State state = read_state(folder, job);
+    state.progress = job.is_skipped ? Progress::kSkipped : Progress::kWaiting;
+    state.reason.clear();
+    write_state(folder, job, state);
+  }
+  write_summary(folder, list.jobs);
+}
+
+std::int64_t memory_for_jobs() {
+  constexpr std::int64_t kUnknown = std::numeric_limits<std::int64_t>::max();
+  const auto found = base::find_available_memory();
+  const std::int64_t free = found ? static_cast<std::int64_t>(found->bytes) : kUnknown;
+  return std::min(free, slurm_grant().memory_bytes.value_or(kUnknown));
+}
+
+}  // namespace tomofield::batch

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "batch/job.h"
+#include "batch/packing.h"
+#include "batch/planning.h"
+#include "batch/series.h"
+
+namespace tomofield::batch {
+
+/// Names the outputs of all series, and checks all that can be checked without running anything:
+/// that no two series share a name or an output, that no output is an input, and, unless existing
+/// results are skipped or replaced, that there are none. Throws Error with all mistakes.
+void settle_outputs(std::vector<Series>& all, const PlanOptions& options);
+
+/// Throws Error with every job that needs more memory than there is, also on one thread.
+void require_room(const std::vector<Job>& jobs, const Room& room);
+
+/// Makes the folder of logs, the list of jobs, their first states and the first summary.
+void begin_batch(const std::filesystem::path& folder, const JobList& list);
+
+/// Returns the memory that all jobs may use together: what the machine has free, or what Slurm
+/// grants if that is less.
+std::int64_t memory_for_jobs();
+
+}  // namespace tomofield::batch

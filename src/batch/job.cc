@@ -1,0 +1,130 @@
+#include "batch/job.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "base/plausible.h"
+#include "base/utf8.h"
+#include "io/json.h"
+#include "io/json_numbers.h"
+#include "reconstruct/options.h"
+#include "tomofield/error.h"
+
+namespace tomofield::batch {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kMostBytes = std::int64_t{1} << 60;
+constexpr double kMostSamples = 1e30;
+constexpr std::int64_t kMostThreads = 1 << 20;
+
+// Returns what `read` makes of a JSON file. Mistakes in the file are errors that name it.
+template <typename Read>
+auto read_json(const fs::path& file, const char* what, Read&& read) {
+  const auto fail = [&](const char* why) {
+    return Error(fmt::format("'{}' is not {}: {}", file.string(), what, why));
+  };
+  try {
+    return read(io::read_json(file));
+  } catch (const json::exception& fault) {
+    throw fail(fault.what());
+  } catch (const Error& fault) {
+    throw fail(fault.what());
+  }
+}
+
+std::int64_t bytes_at(const json& object, const char* key) {
+  return io::integer_at(object, key, 0, kMostBytes);
+}
+
+std::optional<double> core_seconds_at(const json& object) {
+  if (object.at("core_seconds").is_null()) return std::nullopt;
+  return io::number_at(object, "core_seconds", 0, base::kLargestNumber);
+}
+
+std::string checked_text(const std::string& text) {
+  if (base::utf8_text(text) == text) return text;
+  throw Error(
+      fmt::format("'{}' is not UTF-8, and the list of a batch cannot hold it: give the file "
+                  "another name",
+                  text));
+}
+
+json job_json(const Job& job) {
+  json words = json::array();
+  for (const std::string& word : job.command) words.push_back(checked_text(word));
+  const Needs& needs = job.needs;
+  return {{"name", checked_text(job.name)},
+          {"output", checked_text(job.output.string())},
+          {"command", words},
+          {"skipped", job.is_skipped},
+          {"memory_bytes_of_one_thread", needs.memory_bytes_of_one_thread},
+          {"memory_bytes_a_thread", needs.memory_bytes_a_thread},
+          {"core_seconds", needs.core_seconds ? json(*needs.core_seconds) : json(nullptr)},
+          {"sample_steps", needs.sample_steps},
+          {"result_bytes", needs.result_bytes},
+          {"disk_bytes", needs.disk_bytes}};
+}
+
+Job job_from(const json& object) {
+  return {.name = object.at("name").get<std::string>(),
+          .output = object.at("output").get<std::string>(),
+          .command = object.at("command").get<std::vector<std::string>>(),
+          .needs = {.memory_bytes_of_one_thread = bytes_at(object, "memory_bytes_of_one_thread"),
+                    .memory_bytes_a_thread = bytes_at(object, "memory_bytes_a_thread"),
+                    .core_seconds = core_seconds_at(object),
+                    .sample_steps = io::number_at(object, "sample_steps", 0, kMostSamples),
+                    .result_bytes = bytes_at(object, "result_bytes"),
+                    .disk_bytes = bytes_at(object, "disk_bytes")},
+          .is_skipped = object.at("skipped").get<bool>()};
+}
+
+}  // namespace
+
+Needs read_needs(const fs::path& file) {
+  return read_json(file, "the plan of a run", [](const json& plan) {
+    Needs needs;
+    const std::int64_t threads = io::integer_at(plan, "threads", 1, kMostThreads);
+    const std::int64_t most = bytes_at(plan, "memory_bytes");
+    needs.memory_bytes_of_one_thread = bytes_at(plan, "memory_bytes_of_one_thread");
+    if (threads > 1)
+      needs.memory_bytes_a_thread =
+          std::max(most - needs.memory_bytes_of_one_thread, std::int64_t{0}) / (threads - 1);
+    needs.core_seconds = core_seconds_at(plan);
+    needs.sample_steps = io::number_at(plan, "sample_steps", 0, kMostSamples);
+    needs.result_bytes = bytes_at(plan, "result_bytes");
+    needs.disk_bytes = bytes_at(plan, "disk_bytes");
+    return needs;
+  });
+}
+
+void write_jobs(const fs::path& file, const JobList& list) {
+  json jobs = json::array();
+  for (const Job& job : list.jobs) jobs.push_back(job_json(job));
+  io::write_json(
+      file, {{"tomofield", TOMOFIELD_VERSION}, {"overwrites", list.overwrites}, {"jobs", jobs}});
+}
+
+JobList read_jobs(const fs::path& file) {
+  return read_json(file, "the list of a batch", [](const json& document) {
+    JobList list;
+    list.overwrites = document.at("overwrites").get<bool>();
+    for (const json& job : document.at("jobs")) list.jobs.push_back(job_from(job));
+    return list;
+  });
+}
+
+bool has_results(const fs::path& output) {
+  const reconstruction::OutputPaths paths = reconstruction::output_paths(output);
+  return fs::exists(paths.volume) && fs::exists(paths.json);
+}
+
+bool can_resume(const fs::path& output) {
+  const reconstruction::OutputPaths paths = reconstruction::output_paths(output);
+  return fs::exists(paths.model) || fs::exists(paths.trials);
+}
+
+}  // namespace tomofield::batch

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tomofield::batch {
+
+/// Says what a job needs, as `tomofield reconstruct --plan` estimates it.
+struct Needs {
+  std::int64_t memory_bytes_of_one_thread = 0;
+  std::int64_t memory_bytes_a_thread = 0;  ///< of every further thread
+  std::optional<double> core_seconds;      ///< processor time, if it can be estimated
+  double sample_steps = 0;                 ///< the size of the job, the same on every machine
+  std::int64_t result_bytes = 0;           ///< of the files that stay
+  std::int64_t disk_bytes = 0;             ///< at most, while it runs
+
+  std::int64_t memory_bytes(int threads) const {
+    return memory_bytes_of_one_thread + (threads - 1) * memory_bytes_a_thread;
+  }
+};
+
+/// The reconstruction of one series.
+struct Job {
+  std::string name;
+  std::filesystem::path output;      ///< the tomogram
+  std::vector<std::string> command;  ///< words after `tomofield`, with the output's name
+  Needs needs;
+  bool is_skipped = false;  ///< its results were there before
+};
+
+/// All jobs of a batch, in the order of its series.
+struct JobList {
+  std::vector<Job> jobs;
+  bool overwrites = false;  ///< replace what other runs have left
+};
+
+/// Reads the JSON of --plan. Throws Error for anything else.
+Needs read_needs(const std::filesystem::path& file);
+
+/// Writes the list of a batch, from which the tasks of a job array read their jobs. Throws Error if
+/// it cannot be written, and for words that are no UTF-8.
+void write_jobs(const std::filesystem::path& file, const JobList& list);
+/// Reads what write_jobs() has written. Throws Error for anything else.
+JobList read_jobs(const std::filesystem::path& file);
+
+/// Returns whether the results of a job are there: the tomogram and its metrics.
+bool has_results(const std::filesystem::path& output);
+/// Returns whether a run can continue: there is a checkpoint, or trials of --tune.
+bool can_resume(const std::filesystem::path& output);
+
+}  // namespace tomofield::batch

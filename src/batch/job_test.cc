@@ -1,0 +1,91 @@
+#include "batch/job.h"
+
+#include <gtest/gtest.h>
+
+#include "batch/state.h"
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+
+namespace tomofield::batch {
+namespace {
+
+using testing::ScratchDirectory;
+
+TEST(Jobs, AreReadAsTheyAreWritten) {
+  const ScratchDirectory directory;
+  JobList list{
+      .jobs = {{.name = "a",
+                .output = "out/ä b.mrc",
+                .command = {"reconstruct", "a.mrc", "--center=-3,4"},
+                .needs = {.memory_bytes_of_one_thread = 1000,
+                          .memory_bytes_a_thread = 10,
+                          .core_seconds = 2.5,
+                          .sample_steps = 1e9,
+                          .result_bytes = 20,
+                          .disk_bytes = 30}},
+               {.name = "b", .output = "b.mrc", .command = {}, .needs = {}, .is_skipped = true}},
+      .overwrites = true};
+  write_jobs(directory / "batch.json", list);
+  const JobList read = read_jobs(directory / "batch.json");
+  EXPECT_TRUE(read.overwrites);
+  ASSERT_EQ(read.jobs.size(), 2u);
+  EXPECT_EQ(read.jobs[0].output, list.jobs[0].output);
+  EXPECT_EQ(read.jobs[0].command, list.jobs[0].command);
+  EXPECT_EQ(read.jobs[0].needs.memory_bytes(4), 1030);
+  EXPECT_EQ(read.jobs[0].needs.core_seconds, 2.5);
+  EXPECT_EQ(read.jobs[0].needs.sample_steps, 1e9);
+  EXPECT_FALSE(read.jobs[0].is_skipped);
+  EXPECT_TRUE(read.jobs[1].is_skipped);
+  EXPECT_FALSE(read.jobs[1].needs.core_seconds.has_value());
+  list.jobs[0].command.emplace_back("\xff");
+  EXPECT_THROW(write_jobs(directory / "batch.json", list), Error);
+}
+
+TEST(Jobs, OfADamagedListAreRefused) {
+  const ScratchDirectory directory;
+  for (const char* text : {"", "[]", "{}", R"({"overwrites": 1, "jobs": []})",
+                           R"({"overwrites": true, "jobs": [{"name": "a"}]})"}) {
+    const auto file = directory.write("batch.json", text);
+    EXPECT_NE(testing::message_of<Error>([&] { read_jobs(file); }).find("batch.json"),
+              std::string::npos)
+        << text;
+  }
+}
+
+TEST(Needs, ComeFromThePlanOfARun) {
+  const ScratchDirectory directory;
+  const auto read = [&](const std::string& threads, const std::string& seconds) {
+    return read_needs(directory.write(
+        "plan.json", R"({"threads": )" + threads + R"(, "memory_bytes": 1300,
+                         "memory_bytes_of_one_thread": 1000, "core_seconds": )" +
+                         seconds + R"(, "sample_steps": 5, "result_bytes": 7, "disk_bytes": 9})"));
+  };
+  EXPECT_EQ(read("4", "1.5").memory_bytes(2), 1100);
+  EXPECT_EQ(read("1", "1.5").memory_bytes(2), 1000);
+  EXPECT_FALSE(read("4", "null").core_seconds.has_value());
+  EXPECT_EQ(read("4", "2").disk_bytes, 9);
+  EXPECT_THROW(read("0", "1"), Error);
+  EXPECT_THROW(read("4", "-1"), Error);
+  EXPECT_THROW(read("4", "\"x\""), Error);
+}
+
+TEST(State, OfAJobIsKeptAndDamageIsForgotten) {
+  const ScratchDirectory directory;
+  Job job;
+  job.name = "a";
+  EXPECT_EQ(read_state(directory.path(), job).progress, Progress::kWaiting);
+  std::filesystem::create_directory(log_folder(directory.path()));
+  write_state(directory.path(), job,
+              {.progress = Progress::kFailed,
+               .reason = "\xffno",
+               .costs = {.core_seconds = 1, .wall_seconds = 2, .peak_bytes = 3}});
+  const State state = read_state(directory.path(), job);
+  EXPECT_EQ(state.progress, Progress::kFailed);
+  EXPECT_NE(state.reason.find("no"), std::string::npos);
+  EXPECT_EQ(state.costs.peak_bytes, 3);
+  directory.write("logs/a.state.json", "{");
+  EXPECT_EQ(read_state(directory.path(), job).progress, Progress::kWaiting);
+}
+
+}  // namespace
+}  // namespace tomofield::batch

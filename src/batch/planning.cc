@@ -1,0 +1,90 @@
+#include "batch/planning.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/child_process.h"
+#include "batch/faults.h"
+#include "io/scratch_folder.h"
+
+namespace tomofield::batch {
+namespace {
+
+namespace fs = std::filesystem;
+using option_table::GivenOption;
+
+void replace_all(const std::string& mark, const std::string& text, std::string& value) {
+  for (std::size_t at = value.find(mark); at != std::string::npos;
+       at = value.find(mark, at + text.size()))
+    value.replace(at, mark.size(), text);
+}
+
+// Returns a common option with the names of a series in place of {name} and {folder}.
+GivenOption option_for(const Series& series, GivenOption option) {
+  if (!option.value) return option;
+  const fs::path folder = series.input.parent_path();
+  replace_all("{name}", series.input.stem().string(), *option.value);
+  replace_all("{folder}", folder.empty() ? "." : folder.string(), *option.value);
+  return option;
+}
+
+// Returns the words that check a job and write what it needs to `plan`.
+std::vector<std::string> plan_command(const PlanOptions& options, const Job& job,
+                                      const fs::path& plan) {
+  std::vector<std::string> words{options.program.string()};
+  words.insert(words.end(), job.command.begin(), job.command.end());
+  words.push_back(fmt::format("--threads={}", options.threads));
+  words.push_back("--plan=" + plan.string());
+  if (options.skips_existing && can_resume(job.output))
+    words.emplace_back("--resume");
+  else if (options.overwrites)
+    words.emplace_back("--overwrite");
+  return words;
+}
+
+}  // namespace
+
+fs::path output_of(const Series& series, const fs::path& folder) {
+  return series.output.empty() ? folder / (series.name + ".mrc") : series.output;
+}
+
+std::vector<std::string> command_of(const Series& series, const std::vector<GivenOption>& common) {
+  std::vector<std::string> words{"reconstruct", series.input.string()};
+  for (const GivenOption& option : common) {
+    if (std::ranges::find(series.options, option.flag, &GivenOption::flag) == series.options.end())
+      words.push_back(option_for(series, option).word());
+  }
+  for (const GivenOption& option : series.options) words.push_back(option.word());
+  words.push_back("--output=" + series.output.string());
+  return words;
+}
+
+JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
+  const io::ScratchFolder scratch(options.folder, ".tomofield-plan");
+  const fs::path plan = scratch.path() / "plan.json", log = scratch.path() / "log";
+  Faults faults;
+  JobList list{.jobs = {}, .overwrites = options.overwrites};
+  for (const Series& series : all) {
+    Job job{.name = series.name,
+            .output = series.output,
+            .command = command_of(series, options.common),
+            .needs = {},
+            .is_skipped = options.skips_existing && has_results(series.output)};
+    if (!job.is_skipped) {
+      fs::remove(plan);
+      const base::ChildResult result =
+          base::run_child(plan_command(options, job, plan), log, options.stop_requested);
+      if (options.stop_requested && options.stop_requested()) return list;
+      if (result.exit_status != 0)
+        faults.add(fmt::format("{}: {}", series.source, base::reason_of_failure(log)));
+      else
+        job.needs = read_needs(plan);
+    }
+    list.jobs.push_back(std::move(job));
+  }
+  faults.require_none();
+  return list;
+}
+
+}  // namespace tomofield::batch

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+#include "batch/job.h"
+#include "batch/series.h"
+#include "option_table/given_option.h"
+
+namespace tomofield::batch {
+
+/// Says how series become jobs.
+struct PlanOptions {
+  std::filesystem::path program;  ///< tomofield itself
+  std::filesystem::path folder;   ///< of the batch; it exists
+  /// Options of all series, which an option of a series replaces. {name} in a value stands for the
+  /// name of a series' file without its ending, {folder} for its folder.
+  std::vector<option_table::GivenOption> common;
+  int threads = 1;              ///< that a job may get at most
+  bool skips_existing = false;  ///< leave finished series as they are, and continue others
+  bool overwrites = false;
+  std::function<bool()> stop_requested;
+};
+
+/// Returns where the tomogram of a series goes.
+std::filesystem::path output_of(const Series& series, const std::filesystem::path& folder);
+
+/// Returns the words after `tomofield` that reconstruct a series.
+std::vector<std::string> command_of(const Series& series,
+                                    const std::vector<option_table::GivenOption>& common);
+
+/// Makes a job of every series, and runs each with --plan to check it and to find what it needs.
+/// Those that are skipped are not checked. The outputs of the series are there. Throws Error with
+/// the mistakes of all series. Returns fewer jobs if it was asked to stop.
+JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options);
+
+}  // namespace tomofield::batch

@@ -1,0 +1,124 @@
+#include "batch/run_jobs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <csignal>
+#include <memory>
+
+#include "batch/summary.h"
+#include "tomofield/error.h"
+
+namespace tomofield::batch {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Returns whether the session that begins continues an earlier one. A checkpoint that a batch with
+// --overwrite finds counts only if a session of that batch has left it.
+bool continues(const RunOptions& options, const Job& job, const State& before) {
+  const bool has_run =
+      before.progress == Progress::kStopped || before.progress == Progress::kRunning;
+  return can_resume(job.output) && (has_run || !options.overwrites);
+}
+
+std::vector<std::string> command_of(const RunOptions& options, const Job& job, int threads,
+                                    bool resumes) {
+  std::vector<std::string> words{options.program.string()};
+  words.insert(words.end(), job.command.begin(), job.command.end());
+  words.push_back(fmt::format("--threads={}", threads));
+  if (resumes)
+    words.emplace_back("--resume");
+  else if (options.overwrites)
+    words.emplace_back("--overwrite");
+  return words;
+}
+
+std::string why_it_failed(int status, const fs::path& log) {
+  constexpr int kKilled = 128 + SIGKILL;
+  if (status == kKilled) return "it was killed, as the system does when memory runs out";
+  const std::string reason = base::reason_of_failure(log);
+  if (status > 128)
+    return fmt::format("signal {} ended it; it said last: {}", status - 128, reason);
+  return reason.empty() ? fmt::format("it failed with status {}", status) : reason;
+}
+
+bool was_stopped(int status) {
+  return status == 128 + SIGTERM || status == 128 + SIGINT;  // with a checkpoint
+}
+
+}  // namespace
+
+RunningJob::Session RunningJob::begin(const RunOptions& options, const Job& job) {
+  const State before = read_state(options.folder, job);
+  Session session{.resumes = continues(options, job, before), .state = {}};
+  if (session.resumes) session.state.costs = before.costs;
+  session.state.progress = Progress::kRunning;
+  write_state(options.folder, job, session.state);
+  return session;
+}
+
+RunningJob::RunningJob(const RunOptions& options, const Job& job, int threads)
+    : options_(&options),
+      job_(&job),
+      threads_(threads),
+      session_(begin(options, job)),
+      child_(command_of(options, job, threads, session_.resumes), log_of(options.folder, job)) {}
+
+bool RunningJob::has_ended() {
+  const auto result = child_.poll();
+  if (!result) return false;
+  State& state = session_.state;
+  state.costs = state.costs + result->costs;
+  if (result->exit_status == 0) {
+    state.progress = Progress::kDone;
+  } else if (was_stopped(result->exit_status)) {
+    state.progress = Progress::kStopped;
+    state.reason = base::reason_of_failure(log_of(options_->folder, *job_));
+  } else {
+    state.progress = Progress::kFailed;
+    state.reason = why_it_failed(result->exit_status, log_of(options_->folder, *job_));
+  }
+  write_state(options_->folder, *job_, state);
+  return true;
+}
+
+bool run_jobs(const RunOptions& options, const std::vector<Job>& jobs, const Room& room) {
+  std::vector<std::size_t> waiting = largest_first(jobs);
+  std::vector<std::unique_ptr<RunningJob>> running;
+  Room free = room;
+  const auto take = [&](const Job& job, int threads, int sign) {
+    free.threads -= sign * threads;
+    free.memory_bytes -= sign * job.needs.memory_bytes(threads);
+    free.jobs -= sign;
+  };
+  bool is_stopped = false;
+  while (!running.empty() || (!waiting.empty() && !is_stopped)) {
+    is_stopped = is_stopped || (options.stop_requested && options.stop_requested());
+    const auto starts =
+        is_stopped ? std::vector<Start>{} : choose_starts(jobs, waiting, free, running.empty());
+    for (const Start& start : starts) {
+      const Job& job = jobs[start.job];
+      options.job_starts(job, start.threads);
+      running.push_back(std::make_unique<RunningJob>(options, job, start.threads));
+      std::erase(waiting, start.job);
+      take(job, start.threads, 1);
+    }
+    if (!starts.empty()) write_summary(options.folder, jobs);
+    if (is_stopped)
+      for (const auto& job : running) job->ask_to_stop();
+    const auto has_ended = [&](const std::unique_ptr<RunningJob>& job) {
+      if (!job->has_ended()) return false;
+      take(job->job(), job->threads(), -1);
+      options.job_ends(job->job(), job->state());
+      return true;
+    };
+    if (std::erase_if(running, has_ended) > 0)
+      write_summary(options.folder, jobs);
+    else
+      base::pause_between_polls();
+  }
+  return waiting.empty() && !is_stopped;
+}
+
+}  // namespace tomofield::batch

@@ -1,0 +1,229 @@
+#include "batch/series_list.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <glob.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+
+#include "base/utf8.h"
+#include "batch/csv.h"
+#include "batch/faults.h"
+#include "io/relion_star.h"
+#include "io/text_lines.h"
+#include "tomofield/error.h"
+
+namespace tomofield::batch {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Column {
+  std::string name;
+  ColumnKind kind = ColumnKind::kWithValue;  // of an option
+  bool is(std::string_view wanted) const { return name == wanted; }
+  bool is_input() const { return is("stack") || is("path"); }
+  bool is_option() const { return !is_input() && !is("name") && !is("output"); }
+};
+
+std::string place(const fs::path& path, int line) {
+  return fmt::format("line {} of '{}'", line, path.string());
+}
+
+std::string fault_of(const Column& column) {
+  switch (column.kind) {
+    case ColumnKind::kUnknown:
+      return fmt::format("'{}' is no option of `tomofield reconstruct`, which --help-all lists",
+                         column.name);
+    case ColumnKind::kNotHere:
+      return fmt::format("'{}' is set by the batch and cannot be a column", column.name);
+    case ColumnKind::kFlag:
+    case ColumnKind::kWithValue:
+      break;
+  }
+  return {};
+}
+
+// Returns the columns that the first record names.
+std::vector<Column> read_head(const fs::path& path, const CsvRecord& head,
+                              const KindOfColumn& kind_of) {
+  Faults faults;
+  std::vector<Column> columns;
+  const auto fail = [&](const std::string& what) {
+    faults.add(fmt::format("{}: {}", place(path, head.line), what));
+  };
+  for (const std::string& name : head.fields) {
+    Column column{.name = name};
+    if (name.empty()) {
+      fail("a column has no name");
+    } else if (std::ranges::count(head.fields, name) > 1 &&
+               std::ranges::find(columns, name, &Column::name) == columns.end()) {
+      fail(fmt::format("there are two columns '{}'", name));
+    } else if (column.is_option()) {
+      column.kind = kind_of("--" + name);
+      if (const std::string fault = fault_of(column); !fault.empty()) fail(fault);
+    }
+    columns.push_back(column);
+  }
+  if (std::ranges::count_if(columns, &Column::is_input) != 1)
+    fail("one column must be named 'stack' (or 'path'), for the files of the series");
+  faults.require_none();
+  return columns;
+}
+
+// Returns whether a flag is given, or nothing if the cell cannot be read.
+std::optional<bool> read_flag(const std::string& cell) {
+  if (cell == "true" || cell == "yes" || cell == "1") return true;
+  if (cell == "false" || cell == "no" || cell == "0") return false;
+  return std::nullopt;
+}
+
+// Adds the option of a cell that is not empty. Returns what is wrong, or an empty text.
+std::string add_option(const Column& column, const std::string& cell, Series& series) {
+  const std::string flag = "--" + column.name;
+  if (column.kind == ColumnKind::kWithValue) {
+    series.options.push_back({flag, cell});
+    return {};
+  }
+  const auto is_given = read_flag(cell);
+  if (!is_given)
+    return fmt::format("{} takes no value: the cell must be true, false or empty, not '{}'", flag,
+                       io::quote(cell));
+  if (*is_given) series.options.push_back({flag, std::nullopt});
+  return {};
+}
+
+// Reads one series and adds its mistakes to `faults`.
+Series read_row(const fs::path& path, const CsvRecord& record, const std::vector<Column>& columns,
+                Faults& faults) {
+  Series series{
+      .name = {}, .source = place(path, record.line), .input = {}, .output = {}, .options = {}};
+  const auto fail = [&](const std::string& what) { faults.add(series.source + ": " + what); };
+  if (record.fields.size() > columns.size())
+    fail(fmt::format("it has {} fields, and there are {} columns", record.fields.size(),
+                     columns.size()));
+  const std::size_t count = std::min(record.fields.size(), columns.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string& cell = record.fields[i];
+    const Column& column = columns[i];
+    if (cell.empty()) continue;
+    if (column.is_input()) {
+      series.input = cell;
+    } else if (column.is("name")) {
+      series.name = cell;
+    } else if (column.is("output")) {
+      series.output = cell;
+    } else if (const std::string fault = add_option(column, cell, series); !fault.empty()) {
+      fail(fault);
+    }
+  }
+  if (series.input.empty())
+    fail("the series has no stack");
+  else if (std::error_code absent; !fs::exists(series.input, absent))
+    fail(fmt::format("'{}' does not exist", series.input.string()));
+  if (series.name.empty()) series.name = series_name(series.input);
+  return series;
+}
+
+// Puts the names of folders before names that several series have.
+void tell_apart(std::vector<Series>& all) {
+  std::map<std::string, int> counts;
+  for (const Series& series : all) ++counts[series.name];
+  for (Series& series : all) {
+    const std::string folder = fs::absolute(series.input).parent_path().filename().string();
+    if (counts[series.name] > 1) series.name = folder + "_" + series.name;
+  }
+}
+
+}  // namespace
+
+std::string series_name(const fs::path& input) {
+  const fs::path path = input.has_filename() ? input : input.parent_path();  // a slash at the end
+  std::error_code absent;
+  return fs::is_directory(path, absent) ? path.filename().string() : path.stem().string();
+}
+
+std::vector<Series> read_table(const fs::path& path, const KindOfColumn& kind_of) {
+  std::vector<CsvRecord> records;
+  try {
+    records = parse_csv(io::read_text_file(path), path.extension() == ".tsv" ? '\t' : ',');
+  } catch (const Error& error) {
+    throw Error(fmt::format("the table '{}' cannot be read: {}", path.string(), error.what()));
+  }
+  if (records.size() < 2)
+    throw Error(
+        fmt::format("the table '{}' has no series: it needs a line that names its columns, "
+                    "and a line for every series",
+                    path.string()));
+  const std::vector<Column> columns = read_head(path, records.front(), kind_of);
+  std::vector<Series> all;
+  Faults faults;
+  for (auto record = records.begin() + 1; record != records.end(); ++record)
+    all.push_back(read_row(path, *record, columns, faults));
+  faults.require_none();
+  return all;
+}
+
+std::vector<Series> expand_pattern(const std::string& pattern) {
+  glob_t found{};
+  const int status = glob(pattern.c_str(), GLOB_TILDE, nullptr, &found);
+  std::vector<Series> all;
+  for (std::size_t i = 0; status == 0 && i < found.gl_pathc; ++i) {
+    const fs::path path = found.gl_pathv[i];
+    all.push_back({.name = series_name(path),
+                   .source = fmt::format("'{}'", path.string()),
+                   .input = path,
+                   .output = {},
+                   .options = {}});
+  }
+  globfree(&found);
+  if (all.empty())
+    throw Error(
+        fmt::format("no file has a name like '{}': give a table, or a pattern in quotes, as "
+                    "in 'data/*.mrc'",
+                    pattern));
+  tell_apart(all);
+  return all;
+}
+
+std::vector<Series> read_star(const fs::path& path) {
+  if (!io::lists_tomograms(path)) return expand_pattern(path.string());
+  std::vector<Series> all;
+  for (const io::RelionTomogram& tomogram : io::read_relion_tomograms(path).tomograms)
+    all.push_back({.name = tomogram.name,
+                   .source = fmt::format("'{}' of '{}'", tomogram.name, path.string()),
+                   .input = path,
+                   .output = {},
+                   .options = {{"--series", tomogram.name}}});
+  return all;
+}
+
+void require_own_names(const std::vector<Series>& all) {
+  Faults faults;
+  std::map<std::string, const Series*> names;
+  std::map<fs::path, const Series*> outputs;
+  for (const Series& series : all) {
+    const bool is_file_name = !series.name.empty() && series.name.front() != '.' &&
+                              series.name.find('/') == std::string::npos &&
+                              base::printable(series.name) == series.name;
+    if (!is_file_name)
+      faults.add(
+          fmt::format("{}: '{}' cannot be the name of a file; give the table a column "
+                      "'name'",
+                      series.source, series.name));
+    const auto [named, is_new_name] = names.emplace(series.name, &series);
+    if (!is_new_name)
+      faults.add(fmt::format("{} and {} have the same name '{}': give the table a column 'name'",
+                             named->second->source, series.source, series.name));
+    const auto [same, is_new] =
+        outputs.emplace(fs::absolute(series.output).lexically_normal(), &series);
+    if (!is_new && is_new_name)
+      faults.add(fmt::format("{} and {} have the same output '{}'", same->second->source,
+                             series.source, series.output.string()));
+  }
+  faults.require_none();
+}
+
+}  // namespace tomofield::batch

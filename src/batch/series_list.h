@@ -1,0 +1,47 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "batch/series.h"
+
+namespace tomofield::batch {
+
+/// Says what a table may do with an option of `reconstruct`.
+enum class ColumnKind {
+  kUnknown,   ///< there is no such option
+  kNotHere,   ///< the batch itself sets it
+  kFlag,      ///< an option without a value
+  kWithValue  ///< an option with a value
+};
+/// Tells about an option by its flag, as in "--thickness".
+using KindOfColumn = std::function<ColumnKind(const std::string& flag)>;
+
+/// Reads a table: comma-separated values, or values separated by tabs if its name ends with .tsv.
+/// Its first line names the columns. `stack` (or `path`) is the series, `name` and `output` may be
+/// there, and any other column is an option of `reconstruct` without its dashes. An empty cell
+/// means the default. Cells of flags are true, false or empty. Throws Error with every mistake,
+/// each with its line.
+std::vector<Series> read_table(const std::filesystem::path& path, const KindOfColumn& kind_of);
+
+/// Returns the files and folders that a pattern of the shell names, in their order. A file gives
+/// its series the name of the file without its ending. Those with the same name get that of their
+/// folder before it. Throws Error if there are none.
+std::vector<Series> expand_pattern(const std::string& pattern);
+
+/// Returns the tomograms of RELION 5's tomograms.star, or of its list of tilt series, each as one
+/// series of that file. A STAR file of anything else is one series. Throws Error if it is no STAR
+/// file.
+std::vector<Series> read_star(const std::filesystem::path& path);
+
+/// Returns the name of a series without one of its own: that of its file without the ending, or of
+/// its folder.
+std::string series_name(const std::filesystem::path& input);
+
+/// Throws Error with every series whose name cannot be that of a file, and with every name and
+/// output that two series share. The outputs are there.
+void require_own_names(const std::vector<Series>& all);
+
+}  // namespace tomofield::batch

@@ -1,0 +1,125 @@
+#include "batch/slurm.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "base/child_process.h"
+#include "batch/packing.h"
+#include "batch/state.h"
+#include "io/text_lines.h"
+#include "tomofield/error.h"
+
+namespace tomofield::batch {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kMebibyte = std::int64_t{1} << 20;
+constexpr double kMoreMemory = 1.2;  // estimates are within 10 %
+constexpr double kMoreTime = 3;      // nodes differ, and others use them too
+constexpr double kLeastMinutes = 15;
+
+// Returns a positive whole number of the environment.
+std::optional<std::int64_t> number_in_environment(const char* name) {
+  const char* text = std::getenv(name);
+  const auto number = text == nullptr ? std::nullopt : io::parse_integer(text);
+  return number && *number > 0 ? number : std::nullopt;
+}
+
+// Returns a text as one word of the shell.
+std::string shell_word(const std::string& text) {
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
+  return word + "'";
+}
+
+// Returns the tasks of an array, counted from 1, as Slurm reads them: "1,3,4".
+std::string array_of(const std::vector<Job>& jobs) {
+  std::vector<std::size_t> numbers;
+  for (const std::size_t job : largest_first(jobs)) numbers.push_back(job + 1);
+  std::ranges::sort(numbers);
+  return fmt::format("{}", fmt::join(numbers, ","));
+}
+
+std::int64_t memory_MiB(const std::vector<Job>& jobs, int threads) {
+  std::int64_t most = 0;
+  for (const Job& job : jobs) most = std::max(most, job.needs.memory_bytes(threads));
+  return static_cast<std::int64_t>(kMoreMemory * static_cast<double>(most)) / kMebibyte + 256;
+}
+
+double minutes(const std::vector<Job>& jobs, int threads) {
+  double most = 0;
+  for (const Job& job : jobs)
+    most = std::max(most, job.needs.core_seconds.value_or(0) / threads / 60);
+  return std::ceil(kLeastMinutes + kMoreTime * most);
+}
+
+// Returns a name in an option of sbatch, which knows no quotes and reads % as a pattern.
+std::string name_for_sbatch(const fs::path& path) {
+  const std::string name = path.string();
+  if (name.find_first_of(" \t\"'\\%#") == std::string::npos) return name;
+  throw Error(
+      fmt::format("'{}' cannot be named in a script for sbatch: give -o a folder without "
+                  "spaces, quotes, '%' and '#' in its path",
+                  name));
+}
+
+}  // namespace
+
+SlurmGrant slurm_grant() {
+  if (std::getenv("SLURM_JOB_ID") == nullptr) return {};
+  SlurmGrant grant;
+  if (const auto cpus = number_in_environment("SLURM_CPUS_PER_TASK"))
+    grant.threads = static_cast<int>(*cpus);
+  if (const auto of_node = number_in_environment("SLURM_MEM_PER_NODE"))
+    grant.memory_bytes = *of_node * kMebibyte;
+  else if (const auto of_cpu = number_in_environment("SLURM_MEM_PER_CPU"))
+    grant.memory_bytes = *of_cpu * kMebibyte * grant.threads.value_or(1);
+  return grant;
+}
+
+fs::path script_of(const fs::path& folder) { return folder / "batch.sbatch"; }
+fs::path list_of(const fs::path& folder) { return folder / "batch.json"; }
+
+std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jobs) {
+  const fs::path logs = fs::absolute(log_folder(options.folder));
+  std::string script = "#!/bin/sh\n";
+  // Of two options sbatch takes the last.
+  const auto add = [&](const std::string& option) { script += "#SBATCH " + option + "\n"; };
+  add("--job-name=tomofield");
+  add(fmt::format("--cpus-per-task={}", options.threads));
+  add(fmt::format("--mem={}M", memory_MiB(jobs, options.threads)));
+  add(fmt::format("--time={:.0f}", minutes(jobs, options.threads)));
+  for (const std::string& line : options.more) add(line);
+  add("--array=" + array_of(jobs));
+  add("--ntasks=1");
+  add("--chdir=" + name_for_sbatch(fs::current_path()));
+  add("--output=" + name_for_sbatch(logs) + "/slurm-%A_%a.out");
+  add(fmt::format("--signal=B:USR1@{}", kWarningSeconds));
+  script += fmt::format("exec {} batch {} --output {} --task \"$SLURM_ARRAY_TASK_ID\"\n",
+                        shell_word(options.program.string()),
+                        shell_word(fs::absolute(list_of(options.folder)).string()),
+                        shell_word(fs::absolute(options.folder).string()));
+  return script;
+}
+
+std::string submit(const fs::path& folder, std::optional<int> job) {
+  std::vector<std::string> command{"/usr/bin/env", "sbatch", "--parsable"};
+  if (job) command.push_back(fmt::format("--array={}", *job));
+  command.push_back(fs::absolute(script_of(folder)).string());
+  const fs::path answer = log_folder(folder) / fmt::format("sbatch-{}.out", job.value_or(0));
+  const base::ChildResult result = base::run_child(command, answer, {});
+  const std::string said(io::trim(io::read_text_file(answer)));
+  if (result.exit_status == 127)
+    throw Error("sbatch is not there: --slurm needs a machine from which jobs are submitted");
+  if (result.exit_status != 0)
+    throw Error(fmt::format("sbatch refused '{}': {}", script_of(folder).string(), said));
+  const std::string_view last = std::string_view(said).substr(said.rfind('\n') + 1);
+  return std::string(last.substr(0, last.find(';')));  // NUMBER or NUMBER;CLUSTER
+}
+
+}  // namespace tomofield::batch

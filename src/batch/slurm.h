@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "batch/job.h"
+
+namespace tomofield::batch {
+
+/// What Slurm grants to the job in which this process runs.
+struct SlurmGrant {
+  std::optional<int> threads;                ///< SLURM_CPUS_PER_TASK
+  std::optional<std::int64_t> memory_bytes;  ///< SLURM_MEM_PER_NODE, or _PER_CPU times the threads
+};
+/// Reads the environment. A process outside of Slurm gets no grant.
+SlurmGrant slurm_grant();
+
+/// Seconds before the time limit at which a task is told to save its checkpoint (SIGUSR1).
+inline constexpr int kWarningSeconds = 120;
+
+/// Says how the tasks of a job array run.
+struct SlurmOptions {
+  std::filesystem::path program;  ///< tomofield itself
+  std::filesystem::path folder;   ///< of the batch, with the list of its jobs
+  int threads = 1;                ///< CPUs of a task
+  std::vector<std::string> more;  ///< lines of options for sbatch; they go before the usual ones
+};
+
+/// Returns the batch script of a job array with a task for every job that is not skipped. All tasks
+/// get the memory of the largest job, and three times the estimated time of the longest.
+std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jobs);
+
+/// Returns the file of the script, and the list of jobs that its tasks read.
+std::filesystem::path script_of(const std::filesystem::path& folder);
+std::filesystem::path list_of(const std::filesystem::path& folder);
+
+/// Submits the script with sbatch: all of its tasks, or that of one job, counted from 1. Returns
+/// the number of the Slurm job. Throws Error with what sbatch says if that fails.
+std::string submit(const std::filesystem::path& folder, std::optional<int> job = std::nullopt);
+
+}  // namespace tomofield::batch

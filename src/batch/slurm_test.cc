@@ -1,0 +1,69 @@
+#include "batch/slurm.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+
+namespace tomofield::batch {
+namespace {
+
+Job job(double core_seconds, std::int64_t MiB) {
+  Job made;
+  made.needs.memory_bytes_of_one_thread = MiB << 20;
+  made.needs.core_seconds = core_seconds;
+  return made;
+}
+
+TEST(SlurmScript, HasATaskForEveryJobAndRoomForTheLargest) {
+  std::vector<Job> jobs{job(60, 1000), job(4 * 3600, 500), job(1e6, 9000)};
+  jobs[2].is_skipped = true;
+  jobs[2].needs = {};
+  const std::string script = slurm_script(
+      {.program = "/opt/it's/tomofield", .folder = "/data/out", .threads = 4, .more = {"--mem=1G"}},
+      jobs);
+  EXPECT_NE(script.find("#SBATCH --array=1,2\n"), std::string::npos) << script;
+  EXPECT_NE(script.find("#SBATCH --cpus-per-task=4\n"), std::string::npos) << script;
+  EXPECT_NE(script.find("#SBATCH --mem=1456M\n"), std::string::npos) << script;
+  EXPECT_NE(script.find("#SBATCH --time=195\n"), std::string::npos) << script;
+  EXPECT_LT(script.find("--mem=1456M"), script.find("--mem=1G"));  // sbatch takes the last
+  EXPECT_NE(script.find("exec '/opt/it'\\''s/tomofield' batch '/data/out/batch.json'"),
+            std::string::npos)
+      << script;
+}
+
+TEST(SlurmScript, NeedsAFolderThatSbatchCanRead) {
+  EXPECT_THROW(
+      slurm_script({.program = "p", .folder = "/data/my results", .more = {}}, {job(1, 1)}), Error);
+}
+
+// Sets variables of the environment for one test.
+class SlurmGrantTest : public ::testing::Test {
+ protected:
+  SlurmGrantTest() { clear(); }
+  ~SlurmGrantTest() override { clear(); }
+  static void clear() {
+    for (const char* name :
+         {"SLURM_JOB_ID", "SLURM_CPUS_PER_TASK", "SLURM_MEM_PER_NODE", "SLURM_MEM_PER_CPU"})
+      ::unsetenv(name);
+  }
+};
+
+TEST_F(SlurmGrantTest, IsThatOfTheJob) {
+  ::setenv("SLURM_CPUS_PER_TASK", "6", 1);
+  EXPECT_FALSE(slurm_grant().threads.has_value()) << "there is no job";
+  ::setenv("SLURM_JOB_ID", "7", 1);
+  EXPECT_EQ(slurm_grant().threads, 6);
+  EXPECT_FALSE(slurm_grant().memory_bytes.has_value());
+  ::setenv("SLURM_MEM_PER_CPU", "100", 1);
+  EXPECT_EQ(slurm_grant().memory_bytes, std::int64_t{600} << 20);
+  ::setenv("SLURM_MEM_PER_NODE", "2000", 1);
+  EXPECT_EQ(slurm_grant().memory_bytes, std::int64_t{2000} << 20);
+  ::setenv("SLURM_CPUS_PER_TASK", "many", 1);
+  EXPECT_FALSE(slurm_grant().threads.has_value());
+}
+
+}  // namespace
+}  // namespace tomofield::batch

@@ -1,0 +1,50 @@
+#include "batch/state.h"
+
+#include <cstdint>
+
+#include "base/plausible.h"
+#include "io/json.h"
+#include "io/json_numbers.h"
+#include "tomofield/error.h"
+
+namespace tomofield::batch {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+std::string name_of(Progress progress) { return json(progress).get<std::string>(); }
+
+fs::path log_folder(const fs::path& folder) { return folder / "logs"; }
+
+fs::path log_of(const fs::path& folder, const Job& job) {
+  return log_folder(folder) / (job.name + ".log");
+}
+
+fs::path state_file_of(const fs::path& folder, const Job& job) {
+  return log_folder(folder) / (job.name + ".state.json");
+}
+
+State read_state(const fs::path& folder, const Job& job) {
+  try {
+    const json state = io::read_json(state_file_of(folder, job));
+    return {.progress = state.at("progress").get<Progress>(),
+            .reason = state.at("reason").get<std::string>(),
+            .costs = {.core_seconds = io::number_at(state, "core_seconds", 0, base::kLargestNumber),
+                      .wall_seconds = io::number_at(state, "wall_seconds", 0, base::kLargestNumber),
+                      .peak_bytes = io::integer_at(state, "peak_bytes", 0, INT64_MAX)}};
+  } catch (const json::exception&) {
+    return {};
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+void write_state(const fs::path& folder, const Job& job, const State& state) {
+  io::write_json(state_file_of(folder, job), {{"progress", state.progress},
+                                              {"reason", state.reason},
+                                              {"core_seconds", state.costs.core_seconds},
+                                              {"wall_seconds", state.costs.wall_seconds},
+                                              {"peak_bytes", state.costs.peak_bytes}});
+}
+
+}  // namespace tomofield::batch

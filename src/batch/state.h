@@ -1,0 +1,43 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "base/child_process.h"
+#include "batch/job.h"
+
+namespace tomofield::batch {
+
+/// The progress of a job.
+enum class Progress { kWaiting, kRunning, kDone, kFailed, kStopped, kSkipped };
+NLOHMANN_JSON_SERIALIZE_ENUM(Progress, {{Progress::kWaiting, "waiting"},
+                                        {Progress::kRunning, "running"},
+                                        {Progress::kDone, "done"},
+                                        {Progress::kFailed, "failed"},
+                                        {Progress::kStopped, "stopped"},
+                                        {Progress::kSkipped, "skipped"}})
+/// Returns "waiting", "running", …
+std::string name_of(Progress progress);
+
+/// The progress of a job, with its costs in all sessions.
+struct State {
+  Progress progress = Progress::kWaiting;
+  std::string reason;  ///< why it failed or was stopped
+  base::Costs costs;
+};
+
+/// Returns the folder of logs and states, FOLDER/logs.
+std::filesystem::path log_folder(const std::filesystem::path& folder);
+/// Returns the file of all that a job says, and the file of its state.
+std::filesystem::path log_of(const std::filesystem::path& folder, const Job& job);
+std::filesystem::path state_file_of(const std::filesystem::path& folder, const Job& job);
+
+/// Reads the state of a job. Returns one that waits if there is none, or none that can be read:
+/// it only informs.
+State read_state(const std::filesystem::path& folder, const Job& job);
+/// Writes the state of a job. Each job has a file of its own, so that tasks on several machines do
+/// not wait for each other.
+void write_state(const std::filesystem::path& folder, const Job& job, const State& state);
+
+}  // namespace tomofield::batch

@@ -1,0 +1,208 @@
+#include "batch/summary.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+#include <chrono>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "base/log.h"
+#include "base/time_text.h"
+#include "batch/csv.h"
+#include "batch/state.h"
+#include "io/atomic_file.h"
+#include "io/json_numbers.h"
+#include "io/output_lock.h"
+#include "io/output_set.h"
+#include "reconstruct/options.h"
+#include "report/html.h"
+#include "tomofield/error.h"
+
+namespace tomofield::batch {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+constexpr double kGibibyte = 1 << 30;
+
+// What the summary says of one series.
+struct Line {
+  const Job* job;
+  State state;
+  std::optional<double> held_out_error;
+  std::string verdict;  // its line
+  std::vector<std::string> warnings;
+};
+
+// Reads what the metrics of a finished run say. Metrics of another version may say less.
+void read_metrics(const fs::path& file, Line& line) {
+  try {
+    const json metrics = io::read_json(file).at("metrics");
+    const json& verdict = metrics.at("verdict");
+    line.verdict = verdict.value("line", "");
+    for (const json& warning : verdict.at("warnings"))
+      line.warnings.push_back(warning.at("message").get<std::string>());
+    if (const json& held_out = metrics.at("held_out"); held_out.is_object())
+      line.held_out_error = held_out.at("error").get<double>();
+  } catch (const json::exception&) {
+  } catch (const Error&) {
+  }
+}
+
+std::vector<Line> read_lines(const fs::path& folder, const std::vector<Job>& jobs) {
+  std::vector<Line> lines;
+  for (const Job& job : jobs) {
+    lines.push_back({&job, read_state(folder, job), {}, {}, {}});
+    const Progress progress = lines.back().state.progress;
+    if (progress == Progress::kDone || progress == Progress::kSkipped)
+      read_metrics(reconstruction::output_paths(job.output).json, lines.back());
+  }
+  return lines;
+}
+
+std::string number(double value, int digits) { return fmt::format("{:.{}f}", value, digits); }
+
+std::string optional_number(const std::optional<double>& value, int digits) {
+  return value ? number(*value, digits) : std::string();
+}
+
+std::string csv_text(const std::vector<Line>& lines) {
+  std::string text =
+      "name,state,reason,output,wall_seconds,core_seconds,expected_core_seconds,peak_GiB,"
+      "expected_GiB,held_out_error,verdict,warnings\n";
+  for (const Line& line : lines) {
+    const base::Costs& costs = line.state.costs;
+    const Needs& needs = line.job->needs;
+    const std::array fields{
+        line.job->name,
+        name_of(line.state.progress),
+        line.state.reason,
+        line.job->output.string(),
+        number(costs.wall_seconds, 1),
+        number(costs.core_seconds, 1),
+        optional_number(needs.core_seconds, 1),
+        number(static_cast<double>(costs.peak_bytes) / kGibibyte, 3),
+        number(static_cast<double>(needs.memory_bytes_of_one_thread) / kGibibyte, 3),
+        optional_number(line.held_out_error, 5),
+        line.verdict,
+        fmt::format("{}", fmt::join(line.warnings, " ")),
+    };
+    std::vector<std::string> quoted;
+    for (const std::string& field : fields) quoted.push_back(csv_field(field));
+    text += fmt::format("{}\n", fmt::join(quoted, ","));
+  }
+  return text;
+}
+
+// Returns the links to the files of a series that are there.
+std::vector<report::HtmlLink> links_of(const fs::path& folder, const Job& job) {
+  const reconstruction::OutputPaths paths = reconstruction::output_paths(job.output);
+  std::vector<report::HtmlLink> links;
+  const auto add = [&](const char* text, const fs::path& file) {
+    if (fs::exists(file)) links.push_back({text, fs::absolute(file).lexically_proximate(folder)});
+  };
+  add("report", job.output.parent_path() / (job.output.stem().string() + "_report.html"));
+  add("tomogram", paths.volume);
+  add("metrics", paths.json);
+  add("log", log_of(folder, job));
+  return links;
+}
+
+// Returns the words about a series: its verdict and warnings, or why it has none.
+std::string words_of(const Line& line) {
+  std::vector<std::string> words;
+  for (const std::string& text : {line.state.reason, line.verdict})
+    if (!text.empty()) words.push_back(text);
+  for (const std::string& warning : line.warnings) words.push_back("Warning: " + warning);
+  return fmt::format("{}", fmt::join(words, "\n"));
+}
+
+std::string mark_of(const Line& line) {
+  if (line.state.progress == Progress::kFailed) return "bad";
+  return line.warnings.empty() ? "" : "warned";
+}
+
+std::vector<report::HtmlCell> page_row(const fs::path& folder, const Line& line) {
+  const base::Costs& costs = line.state.costs;
+  const fs::path picture =
+      reconstruction::output_paths(line.job->output).picture_prefix.string() + "_xy.png";
+  report::HtmlCell shown{.text = {}, .mark = "picture"};
+  if (fs::exists(picture)) shown.picture = fs::absolute(picture).lexically_proximate(folder);
+  const bool has_run = costs.wall_seconds > 0;
+  return {{.text = line.job->name, .mark = {}},
+          shown,
+          {.text = name_of(line.state.progress), .mark = mark_of(line)},
+          {.text = words_of(line), .mark = "words"},
+          {.text = has_run ? base::time_text(costs.wall_seconds) : "", .mark = {}},
+          {.text = has_run ? base::time_text(costs.core_seconds) : "", .mark = {}},
+          {.text = has_run ? number(static_cast<double>(costs.peak_bytes) / kGibibyte, 2) : "",
+           .mark = {}},
+          {.text = optional_number(line.held_out_error, 3), .mark = {}},
+          {.text = {}, .mark = {}, .links = links_of(folder, *line.job)}};
+}
+
+// Returns how many series have each state: "3 done, 1 failed".
+std::string counts_text(const std::vector<Line>& lines) {
+  std::map<Progress, int> counts;
+  for (const Line& line : lines) ++counts[line.state.progress];
+  std::vector<std::string> parts;
+  for (const auto& [progress, count] : counts)
+    parts.push_back(fmt::format("{} {}", count, name_of(progress)));
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+std::string page_text(const fs::path& folder, const std::vector<Line>& lines) {
+  report::HtmlPage page("Batch: " + folder.filename().string());
+  page.add_paragraph(
+      fmt::format("tomofield {}; {} series: {}. Times and memory are those of all "
+                  "sessions of a series.",
+                  TOMOFIELD_VERSION, lines.size(), counts_text(lines)));
+  std::vector<std::vector<report::HtmlCell>> rows(1);
+  for (const char* title : {"series", "", "state", "verdict", "time", "processor time",
+                            "memory, GiB", "held-out error", "files"})
+    rows.front().push_back({.text = title, .mark = title == std::string("verdict") ? "words" : ""});
+  for (const Line& line : lines) rows.push_back(page_row(folder, line));
+  page.add_table(rows);
+  return page.document();
+}
+
+// Locks a file that other processes lock for a moment only.
+io::OutputLock wait_for_lock(const fs::path& file) {
+  constexpr int kTries = 200;
+  constexpr auto kPause = std::chrono::milliseconds(50);
+  for (int i = 1; i < kTries; ++i) {
+    try {
+      return io::OutputLock(file);
+    } catch (const Error&) {
+      std::this_thread::sleep_for(kPause);
+    }
+  }
+  return io::OutputLock(file);
+}
+
+}  // namespace
+
+fs::path summary_table(const fs::path& folder) { return folder / "summary.csv"; }
+fs::path summary_page(const fs::path& folder) { return folder / "index.html"; }
+
+void write_summary(const fs::path& folder, const std::vector<Job>& jobs) {
+  try {
+    const io::OutputLock lock = wait_for_lock(summary_table(folder));  // before states are read
+    const std::vector<Line> lines = read_lines(folder, jobs);
+    io::OutputSet files;
+    io::write_text_file(summary_table(folder), csv_text(lines));
+    io::write_text_file(summary_page(folder), page_text(fs::absolute(folder), lines));
+    files.commit();
+  } catch (const Error& error) {
+    base::log_warning(fmt::format("the summary is old: {}", error.what()));
+  }
+}
+
+}  // namespace tomofield::batch

@@ -1,0 +1,85 @@
+#include "batch/task.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <optional>
+
+#include "base/log.h"
+#include "batch/slurm.h"
+#include "batch/summary.h"
+#include "reconstruct/options.h"
+#include "tomofield/error.h"
+
+namespace tomofield::batch {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kGibibyte = 1 << 30;
+
+// Returns why a job does not get enough memory, or an empty text.
+std::string memory_fault(const Job& job, int threads) {
+  const auto granted = slurm_grant().memory_bytes;
+  const std::int64_t needed = job.needs.memory_bytes(threads);
+  if (!granted || needed <= *granted) return {};
+  return fmt::format(
+      "it needs about {:.1f} GiB of memory on {} threads, and Slurm grants {:.1f} GiB "
+      "(SLURM_MEM_PER_NODE): give more with --sbatch '--mem=…'",
+      static_cast<double>(needed) / kGibibyte, threads, static_cast<double>(*granted) / kGibibyte);
+}
+
+// Returns when a checkpoint or the trials were last written, or nothing if there are none.
+std::optional<fs::file_time_type> last_progress(const Job& job) {
+  const reconstruction::OutputPaths paths = reconstruction::output_paths(job.output);
+  std::optional<fs::file_time_type> last;
+  for (const fs::path& file : {paths.model, paths.trials}) {
+    std::error_code error;
+    const fs::file_time_type written = fs::last_write_time(file, error);
+    if (!error) last = std::max(last.value_or(written), written);
+  }
+  return last;
+}
+
+State run_to_the_end(const RunOptions& options, const JobList& list, const Job& job, int threads,
+                     const std::function<bool()>& time_is_up) {
+  RunningJob running(options, job, threads);
+  write_summary(options.folder, list.jobs);
+  while (!running.has_ended()) {
+    if (time_is_up() || options.stop_requested()) running.ask_to_stop();
+    base::pause_between_polls();
+  }
+  return running.state();
+}
+
+}  // namespace
+
+TaskResult run_task(const RunOptions& options, const JobList& list, int number, int threads,
+                    const std::function<bool()>& time_is_up) {
+  if (number < 1 || number > std::ssize(list.jobs))
+    throw Error(
+        fmt::format("there is no task {}: the batch has {} series", number, list.jobs.size()));
+  const Job& job = list.jobs[static_cast<std::size_t>(number - 1)];
+  const auto before = last_progress(job);
+  TaskResult result;
+  if (std::string fault = memory_fault(job, threads); !fault.empty())
+    result.state = {.progress = Progress::kFailed, .reason = std::move(fault), .costs = {}};
+  else
+    result.state = run_to_the_end(options, list, job, threads, time_is_up);
+  if (result.state.progress == Progress::kStopped && time_is_up()) {
+    if (last_progress(job) == before) {
+      result.state.progress = Progress::kFailed;
+      result.state.reason =
+          "its time limit came before the first checkpoint: give more with --sbatch '--time=…'";
+    } else {
+      result.continued_by = submit(options.folder, number);
+      result.state.reason =
+          fmt::format("its time limit came; Slurm job {} goes on", result.continued_by);
+    }
+  }
+  write_state(options.folder, job, result.state);
+  write_summary(options.folder, list.jobs);
+  return result;
+}
+
+}  // namespace tomofield::batch

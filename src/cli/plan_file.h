@@ -1,0 +1,30 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <optional>
+
+#include "distributed/communicator.h"
+#include "reconstruct/options.h"
+#include "reconstruct/run_estimate.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::cli {
+
+/// Registers --plan.
+void add_plan_option(CLI::App& command, std::optional<std::filesystem::path>& file);
+
+/// Checks that the file of --plan, if there is one, can be written.
+void check_plan_file(const std::optional<std::filesystem::path>& file,
+                     const reconstruction::ReconstructOptions& options);
+
+/// Writes what a run needs as JSON, whether this machine has it or not, for programs that start
+/// runs elsewhere or later (batch).
+void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries& series,
+                const reconstruction::ReconstructOptions& options,
+                const distributed::Communicator& processes);
+
+/// Prints the time and the disk that a run takes. `num_processes` share the time.
+void print_estimate(const reconstruction::RunEstimate& estimate, int num_processes);
+
+}  // namespace tomofield::cli

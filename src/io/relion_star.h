@@ -1,0 +1,36 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/star_file.h"
+
+namespace tomofield::io {
+
+/// One tomogram of RELION 5's tomograms.star. (io/view_table.h has its views.)
+struct RelionTomogram {
+  std::string name;
+  std::string tilt_series_star;  ///< as it is written, from RELION's project folder
+  std::optional<double> pixel_size_A;
+  std::optional<double> hand;  ///< of the defocus across a tilted view, not of the geometry
+  std::optional<std::array<std::int64_t, 3>> size_px;  ///< unbinned
+};
+
+/// A tomograms.star, or a STAR file of tilt series that has the same table without volumes.
+struct RelionTomograms {
+  StarTable table;  ///< with all columns
+  std::vector<RelionTomogram> tomograms;
+};
+
+/// Tells whether a STAR file lists tomograms; one of a single tilt series lists views. Throws Error
+/// if it is no STAR file.
+bool lists_tomograms(const std::filesystem::path& path);
+
+/// Reads a tomograms.star. Throws Error with the row for what is missing or cannot be.
+RelionTomograms read_relion_tomograms(const std::filesystem::path& path);
+
+}  // namespace tomofield::io

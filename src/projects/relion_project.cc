@@ -1,0 +1,73 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "io/relion_star.h"
+#include "io/view_images.h"
+#include "io/view_table.h"
+#include "projects/formats.h"
+#include "tomofield/error.h"
+
+namespace tomofield::projects {
+
+namespace fs = std::filesystem;
+namespace {
+
+std::string names_of(const std::vector<io::RelionTomogram>& tomograms) {
+  constexpr std::size_t kMostNames = 8;
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < std::min(tomograms.size(), kMostNames); ++i)
+    names.push_back(tomograms[i].name);
+  if (tomograms.size() > kMostNames) names.emplace_back("…");
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+/// Returns the tomogram of --series, or the only one.
+const io::RelionTomogram& choose_tomogram(const std::vector<io::RelionTomogram>& tomograms,
+                                          const Request& request) {
+  if (request.series.empty() && tomograms.size() == 1) return tomograms.front();
+  const auto found = std::ranges::find(tomograms, request.series, &io::RelionTomogram::name);
+  if (found != tomograms.end()) return *found;
+  throw Error(request.series.empty()
+                  ? fmt::format("'{}' has {} tomograms, {}: name one with --series",
+                                request.path.string(), tomograms.size(), names_of(tomograms))
+                  : fmt::format("'{}' has no tomogram '{}' (--series); it has {}",
+                                request.path.string(), request.series, names_of(tomograms)));
+}
+
+/// Sets what a table of one tilt series says.
+void set_views(Project& project, const fs::path& views, const fs::path& named_by,
+               std::string_view entry) {
+  const io::ViewTable table = io::read_view_table(views);
+  for (const io::ImageInFile& image : io::find_view_images(table)) project.add_file(image.file);
+  project.set("stack", views.string(), named_by, entry);
+  const bool has_defocus = std::ranges::any_of(
+      table.views, [](const io::ListedView& view) { return view.defocus.has_value(); });
+  if (has_defocus) {
+    project.warn(
+        fmt::format("'{}' has a defocus for each view, which is not corrected for: the "
+                    "views are used as they are",
+                    views.string()));
+  }
+}
+
+}  // namespace
+
+void read_relion_project(Project& project) {
+  const fs::path star = project.request().path;
+  if (!io::lists_tomograms(star)) return set_views(project, star, star, "rlnMicrographName");
+  const auto tomograms = io::read_relion_tomograms(star).tomograms;
+  const io::RelionTomogram& tomogram = choose_tomogram(tomograms, project.request());
+  const fs::path views = io::find_listed_file(tomogram.tilt_series_star, star);
+  project.add_file(views);
+  set_views(project, views, star, "rlnTomoTiltSeriesStarFile");
+  if (tomogram.pixel_size_A) {
+    project.set("--pixel-size", fmt::format("{}", *tomogram.pixel_size_A), star,
+                "rlnTomoTiltSeriesPixelSize");
+  }
+  if (tomogram.size_px) {
+    project.set("--thickness", fmt::format("{}", (*tomogram.size_px)[2]), star, "rlnTomoSizeZ");
+  }
+}
+
+}  // namespace tomofield::projects

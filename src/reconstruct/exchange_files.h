@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "reconstruct/options.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::reconstruction {
+
+/// Returns the small files that a run writes for other programs beside its volume: a STAR file for
+/// RELION, the alignment for the CryoET Data Portal.
+std::vector<std::filesystem::path> exchange_files(const ReconstructOptions& options);
+
+/// Writes them. The volume's contents are in the file `volume` (Results, WriteMore).
+void write_exchange_files(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
+                          const std::filesystem::path& volume);
+
+}  // namespace tomofield::reconstruction

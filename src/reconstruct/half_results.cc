@@ -1,0 +1,249 @@
+#include "reconstruct/half_results.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "base/log.h"
+#include "base/utf8.h"
+#include "baseline/run_baseline.h"
+#include "evaluate/block_fsc.h"
+#include "evaluate/local_resolution.h"
+#include "evaluate/mean_and_uncertainty.h"
+#include "io/json.h"
+#include "io/output_set.h"
+#include "option_table/setting.h"
+#include "output/volume.h"
+#include "reconstruct/choice_plot.h"
+#include "reconstruct/half_measurement.h"
+#include "report/pictures.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+using nlohmann::json;
+using tilt_series::Half;
+
+// What the volumes of both halves tell of each other.
+struct Agreement {
+  evaluate::Fsc fsc;
+  std::optional<evaluate::Fsc> linear_fsc;  // of the linear halves, if they are written
+  evaluate::LocalResolution local;
+};
+
+const OutputPaths::OfHalf& paths_of(const Run& run, Half half) {
+  return run.paths.halves[static_cast<std::size_t>(half)];
+}
+
+// Returns the tilts that a volume of this run was measured from.
+evaluate::TiltRange tilt_range(const Run& run) {
+  const std::vector<double>& tilt_deg = run.measurement.geometry.tilt_deg;
+  const auto [low, high] = std::ranges::minmax(tilt_deg);
+  const VolumeAxes axes = run.options.volume.axes;
+  return run.measurement.geometry.hand == 1 ? evaluate::TiltRange{low, high, axes}
+                                            : evaluate::TiltRange{-high, -low, axes};
+}
+
+// Samples one model after the other. Scaled integers have one factor in both, so that they and
+// their mean compare.
+void write_volumes(const Run& run) {
+  output::VolumeOptions options = run.options.volume;
+  options.zarr = false;  // of the mean alone
+  if (options.mode == io::MrcMode::kInt16) {
+    float largest = 0.0f;
+    for (const Half half : tilt_series::kBothHalves)
+      largest =
+          std::max(largest, output::largest_density(output::load_model(paths_of(run, half).model)));
+    options.largest_density = largest;
+  }
+  for (const Half half : tilt_series::kBothHalves)
+    output::write_volume(output::load_model(paths_of(run, half).model), options,
+                         paths_of(run, half).volume);
+}
+
+void write_linear_volumes(const tilt_series::TiltSeries& series, const Run& run) {
+  for (const Half half : tilt_series::kBothHalves)
+    baseline::write_linear_volume(half_measurement(series, half, run), run.options.resolved,
+                                  paths_of(run, half).linear_volume);
+}
+
+// Writes the volumes and the maps, and measures how they agree.
+Agreement write_maps(const tilt_series::TiltSeries& series, const Run& run,
+                     const io::OutputSet& outputs) {
+  write_volumes(run);
+  const std::filesystem::path even = outputs.location_of(paths_of(run, Half::kEven).volume);
+  const std::filesystem::path odd = outputs.location_of(paths_of(run, Half::kOdd).volume);
+  const evaluate::TiltRange tilts = tilt_range(run);
+  evaluate::write_mean(even, odd, run.options.volume.mode, run.paths.volume);
+  if (run.options.volume.zarr) output::write_zarr(run.paths.volume);
+  evaluate::write_uncertainty(even, odd, run.paths.uncertainty);
+  Agreement found{.fsc = evaluate::correlate_blocks(even, odd, tilts),
+                  .linear_fsc = {},
+                  .local = evaluate::local_resolution(even, odd, tilts)};
+  evaluate::write_local_resolution(found.local, even, run.paths.local_resolution);
+  if (run.options.resolved.denoising_halves) {
+    write_linear_volumes(series, run);
+    found.linear_fsc = evaluate::correlate_blocks(
+        outputs.location_of(paths_of(run, Half::kEven).linear_volume),
+        outputs.location_of(paths_of(run, Half::kOdd).linear_volume), tilts);
+  }
+  return found;
+}
+
+void write_fsc_plot(const Agreement& found, const std::filesystem::path& path) {
+  const auto curve = [](const char* name, const evaluate::Fsc& fsc, const evaluate::FscCurve& of) {
+    return report::fsc_curve(name, fsc.frequency_per_A, of.correlation);
+  };
+  const evaluate::Fsc& fsc = found.fsc;
+  std::vector<report::Curve> curves{curve("fitted halves", fsc, fsc.all),
+                                    curve("fitted halves, measured", fsc, *fsc.measured),
+                                    curve("fitted halves, missing wedge", fsc, *fsc.missing)};
+  if (found.linear_fsc)
+    curves.push_back(
+        curve("linear halves, measured", *found.linear_fsc, *found.linear_fsc->measured));
+  report::write_curve_plot(report::fsc_axes(fsc.frequency_per_A.back()), curves, path);
+}
+
+// Returns the members that both objects have with the same value.
+json common_part(const json& a, const json& b) {
+  json common = json::object();
+  for (const auto& [key, value] : a.items())
+    if (b.contains(key) && b.at(key) == value) common[key] = value;
+  return common;
+}
+
+// Returns what both fits share of each view. They have residuals of their own.
+json common_views(const json& a, const json& b) {
+  json common = json::array();
+  for (std::size_t view = 0; view < a.size(); ++view)
+    common.push_back(common_part(a.at(view), b.at(view)));
+  return common;
+}
+
+// Joins two verdicts: mean residuals, and the warnings of both.
+Verdict verdict_on_both(const Verdict& even, const Verdict& odd) {
+  Verdict both = even;
+  both.residual = (even.residual + odd.residual) / 2;
+  both.seconds = std::max(even.seconds, odd.seconds);
+  both.peak_GiB = std::max(even.peak_GiB, odd.peak_GiB);
+  for (const Warning& warning : odd.warnings)
+    if (std::ranges::find(both.warnings, warning.code, &Warning::code) == both.warnings.end())
+      both.warnings.push_back(warning);
+  return both;
+}
+
+json metrics_of_both(const FinishedHalves& halves, const Verdict& verdict) {
+  const json &even = halves.front().metrics, &odd = halves.back().metrics;
+  json metrics = common_part(even, odd);
+  metrics["views"] = common_views(even.at("views"), odd.at("views"));
+  metrics["verdict"] = verdict_json(verdict);
+  return metrics;
+}
+
+json halves_json(const Run& run, const FinishedHalves& halves, const Agreement& found) {
+  const auto text = [](const std::filesystem::path& path) {
+    return base::utf8_text(path.string());
+  };
+  const auto fsc_json = [&](const evaluate::Fsc& fsc, const std::filesystem::path& even,
+                            const std::filesystem::path& odd) {
+    return evaluate::fsc_json(
+        fsc, {.first = even, .second = odd, .mask = {}, .box = {}, .tilts = tilt_range(run)});
+  };
+  const OutputPaths::OfHalf &even = paths_of(run, Half::kEven), &odd = paths_of(run, Half::kOdd);
+  const double voxel_A = run.measurement.pixel_size_A;
+  json all = {{"of", run.options.resolved.split_tilts ? "tilts" : "frames"},
+              {"fsc", fsc_json(found.fsc, even.volume, odd.volume)},
+              {"local_resolution",
+               {{"file", text(run.paths.local_resolution)},
+                {"window_px", evaluate::kResolutionWindow},
+                {"threshold", evaluate::kLocalThreshold},
+                {"median_A", voxel_A * found.local.percentile_px(50)},
+                {"finest_tenth_A", voxel_A * found.local.percentile_px(10)},
+                {"coarsest_tenth_A", voxel_A * found.local.percentile_px(90)}}},
+              {"uncertainty",
+               {{"file", text(run.paths.uncertainty)}, {"box_px", evaluate::kUncertaintyBox}}}};
+  for (const Half half : tilt_series::kBothHalves)
+    all[name_of(half)] = {{"volume", text(paths_of(run, half).volume)},
+                          {"model", text(paths_of(run, half).model)},
+                          {"metrics", halves[static_cast<std::size_t>(half)].metrics}};
+  if (found.linear_fsc)
+    all["linear"] = {{"even", text(even.linear_volume)},
+                     {"odd", text(odd.linear_volume)},
+                     {"fsc", fsc_json(*found.linear_fsc, even.linear_volume, odd.linear_volume)}};
+  return all;
+}
+
+std::string crossing_text(const evaluate::Fsc& fsc, double threshold) {
+  const auto at = evaluate::crossing_A(fsc.frequency_per_A, fsc.all, threshold);
+  return at ? fmt::format("at {:.4g} Å", *at) : "nowhere";
+}
+
+// Says what the halves are for and what they are not.
+void log_halves(const Run& run, const evaluate::Fsc& fsc) {
+  base::log_info(fmt::format(
+      "the FSC of the halves falls below 0.5 {} and below 0.143 {}; it is too optimistic, because "
+      "the errors of two regularised fits are alike",
+      crossing_text(fsc, 0.5), crossing_text(fsc, 0.143)));
+  const OutputPaths::OfHalf &even = paths_of(run, Half::kEven), &odd = paths_of(run, Half::kOdd);
+  base::log_warning(fmt::format(
+      "'{}' and '{}' are regularised: do not train cryoCARE, IsoNet or DeepDeWedge with them; {}",
+      even.volume.string(), odd.volume.string(),
+      run.options.resolved.denoising_halves
+          ? fmt::format("take '{}' and '{}'", even.linear_volume.string(),
+                        odd.linear_volume.string())
+          : "--denoising-halves writes linear halves for that"));
+}
+
+// Throws the exception that is being handled, and says that the fits are not lost.
+[[noreturn]] void say_that_models_are_kept(const Run& run) {
+  const std::string advice = fmt::format(
+      "; the finished fits are kept in '{}' and '{}': the same command with --resume writes the "
+      "results",
+      paths_of(run, Half::kEven).model.string(), paths_of(run, Half::kOdd).model.string());
+  try {
+    throw;
+  } catch (const Error& error) {
+    throw Error(error.what() + advice);
+  }
+}
+
+void write_all(const tilt_series::TiltSeries& series, const Run& run, const FinishedHalves& halves,
+               const std::optional<TunedFit>& tuned, Results& results) {
+  io::OutputSet outputs;
+  const Agreement found = write_maps(series, run, outputs);
+  write_fsc_plot(found, run.paths.fsc_picture);
+  if (tuned) write_choice_plot(*tuned, run.paths.choice_picture);
+  results.metrics["halves"] = halves_json(run, halves, found);
+  io::write_json(run.paths.json, results.metrics);
+  if (run.hooks.write_more) run.hooks.write_more(results, outputs.location_of(run.paths.volume));
+  outputs.remove_old(run.paths.model);  // of a run without halves
+  outputs.commit();
+  log_halves(run, found.fsc);
+}
+
+}  // namespace
+
+Results write_half_results(const tilt_series::TiltSeries& series, const Run& run,
+                           const FinishedHalves& halves, const std::optional<TunedFit>& tuned) {
+  Results results{.model = {},
+                  .metrics = {{"tomofield", TOMOFIELD_VERSION},
+                              {"options", options_json(run.options)},
+                              {"origins", option_table::to_json(run.options.origins)}},
+                  .verdict = verdict_on_both(halves.front().verdict, halves.back().verdict),
+                  .bead_masking = run.measurement.masks.bead_masking};
+  results.metrics["metrics"] = metrics_of_both(halves, results.verdict);
+  run.processes.run_collectively([&] {
+    if (!run.processes.is_root()) return;
+    try {
+      write_all(series, run, halves, tuned, results);
+    } catch (const Error&) {
+      say_that_models_are_kept(run);
+    }
+  });
+  return results;
+}
+
+}  // namespace tomofield::reconstruction

@@ -1,0 +1,100 @@
+#include "reconstruct/relion_output.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/log.h"
+#include "io/atomic_file.h"
+#include "io/mrc.h"
+#include "io/output_set.h"
+#include "io/relion_star.h"
+#include "io/view_images.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruction {
+
+namespace fs = std::filesystem;
+namespace {
+
+// The entry of a tomograms.star by which the stack was found (projects/relion_project.cc).
+constexpr const char* kEntry = "rlnTomoTiltSeriesStarFile";
+
+const option_table::Setting* find_origin(const ReconstructOptions& options) {
+  const auto found = std::ranges::find(options.origins, kEntry, &option_table::Setting::entry);
+  return found == options.origins.end() ? nullptr : &*found;
+}
+
+// Returns the row of the tilt series that was reconstructed.
+std::size_t find_row(const io::RelionTomograms& all, const fs::path& star, const fs::path& stack) {
+  for (std::size_t row = 0; row < all.tomograms.size(); ++row)
+    if (io::find_listed_file(all.tomograms[row].tilt_series_star, star) == stack) return row;
+  throw Error(fmt::format("'{}' names '{}' no longer: it has changed since the run began",
+                          star.string(), stack.string()));
+}
+
+// Says why RELION could not use the volume, or nothing if it can.
+const char* obstacle(const Options& options) {
+  if (options.axes != VolumeAxes::kXyz) return "its axes are not in the order xyz";
+  if (options.roi) return "it is a part of the specimen (--roi)";
+  if (options.axis_x || options.axis_z || options.shift_z != 0)
+    return "its middle is not the point about which the series is aligned";
+  if (options.hand != 1) return "it is mirrored in Z (--hand -1)";
+  return nullptr;
+}
+
+// Sets the columns of half maps if the run wrote them.
+void set_halves(const fs::path& volume, io::StarTable& table) {
+  const io::OutputSet* const results = io::OutputSet::active();
+  int number = 0;
+  for (const char* ending : {"_EVN_Vol.mrc", "_ODD_Vol.mrc"}) {
+    ++number;
+    fs::path half = volume;
+    half.replace_extension();
+    half += ending;
+    if (results == nullptr || results->location_of(half) == half) continue;
+    table.set(0, fmt::format("rlnTomoReconstructedTomogramHalf{}", number), half.string());
+  }
+}
+
+}  // namespace
+
+std::optional<fs::path> relion_output(const ReconstructOptions& options) {
+  if (find_origin(options) == nullptr || obstacle(options.resolved) != nullptr) return std::nullopt;
+  fs::path star = options.resolved.output;
+  return star.replace_extension(".star");
+}
+
+void write_relion_output(const ReconstructOptions& options, const fs::path& volume) {
+  const option_table::Setting* const origin = find_origin(options);
+  if (origin == nullptr) return;
+  const fs::path path = options.resolved.output;
+  if (const char* const why = obstacle(options.resolved)) {
+    base::log_warning(
+        fmt::format("no STAR file is written for RELION beside '{}': {}", path.string(), why));
+    return;
+  }
+  const io::RelionTomograms all = io::read_relion_tomograms(origin->file);
+  const std::size_t row = find_row(all, origin->file, origin->value);
+  const io::MrcHeader header = io::MrcReader(volume).header();
+  const double voxel_A = header.voxel_size_A[0];
+  const double binning = voxel_A / all.tomograms[row].pixel_size_A.value_or(voxel_A);
+  io::StarTable table = all.table.only(row);
+  table.set(0, "rlnTomoTomogramBinning", fmt::format("{:.6f}", binning));
+  const auto unbinned = [&](std::int64_t voxels) {
+    return std::to_string(std::llround(static_cast<double>(voxels) * binning));
+  };
+  table.set(0, "rlnTomoSizeX", unbinned(header.nx));
+  table.set(0, "rlnTomoSizeY", unbinned(header.ny));
+  table.set(0, "rlnTomoSizeZ", unbinned(header.nz));
+  table.set(0, "rlnTomoReconstructedTomogram", path.string());
+  set_halves(path, table);
+  // Programs know the denoised tomogram by either name; RELION 5 by the second.
+  table.set(0, "rlnTomoDenoisedTomogram", path.string());
+  table.set(0, "rlnTomoReconstructedTomogramDenoised", path.string());
+  io::write_text_file(*relion_output(options), io::star_file_text(table));
+}
+
+}  // namespace tomofield::reconstruction

@@ -1,0 +1,122 @@
+#include "reconstruct/run_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "base/stopwatch.h"
+#include "fit/stages.h"
+#include "io/scratch_memory.h"
+#include "measurement/prepare.h"
+#include "measurement/slab_views.h"
+#include "reconstruct/step_times.h"
+#include "reconstruct/tuning.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+// Fitted to whole runs (docs/batch.md): what reading a series takes, in times of decoding its views
+// once, with the searches for beads and fixed patterns; and what a voxel takes at the end, when the
+// volume is written and judged.
+constexpr double kReadingsOfAView = 1.3;
+constexpr double kSecondsAVoxel = 1e-7;
+constexpr double kStart = 0.1;  // seconds: the program, and plots
+
+constexpr int kLargestLeaf = 256;  // larger ones do not fit in the volume that is measured
+
+constexpr std::size_t kSmallFiles = std::size_t{2} << 20;  // metrics and pictures
+
+// Counts steps and samples, in each kind of field.
+struct Work {
+  double steps_of_vertices = 0, samples_of_vertices = 0;
+  double steps_of_factors = 0, samples_of_factors = 0;
+
+  // Adds a fit of at most so many rows, `times` times.
+  void add_fit(const measurement::Measurement& plan, const fit::FieldOptions& field,
+               const fit::FitOptions& fit, int steps_an_epoch, double max_rows, int times) {
+    for (const fit::Stage& stage : fit::make_stages(field, fit)) {
+      const bool is_grid = stage.field_kind == FieldKind::kGrid;
+      const double steps = static_cast<double>(times) * stage.epochs * steps_an_epoch;
+      (is_grid ? steps_of_vertices : steps_of_factors) += steps;
+      (is_grid ? samples_of_vertices : samples_of_factors) +=
+          steps * samples_of(stage, plan, field, max_rows);
+    }
+  }
+  double samples() const { return samples_of_vertices + samples_of_factors; }
+  double seconds(const StepTimes& times) const {
+    return times.vertices.fixed_seconds * steps_of_vertices +
+           times.vertices.seconds_a_sample * samples_of_vertices +
+           times.factors.fixed_seconds * steps_of_factors +
+           times.factors.seconds_a_sample * samples_of_factors;
+  }
+};
+
+// Returns the work of the fit and of the trials that choose its settings.
+Work work_of(const measurement::Measurement& plan, const ReconstructOptions& options,
+             const RunPlan& run) {
+  constexpr double kAllRows = std::numeric_limits<double>::infinity();
+  Work work;
+  work.add_fit(plan, options.field, options.fit, run.steps_an_epoch, kAllRows, run.num_fits);
+  if (run.num_trials == 0) return work;
+  const TrialShape trial = options.resolved.tune ? trial_of_tune(options.field, options.fit)
+                                                 : short_trial(options.field, options.fit);
+  work.add_fit(plan, trial.field, trial.fit, run.steps_an_epoch, static_cast<double>(trial.rows),
+               run.num_trials);
+  return work;
+}
+
+// Decodes a view in the middle of the series and returns its processor time.
+double seconds_of_a_view(const tilt_series::TiltSeries& series) {
+  const auto pixels = static_cast<std::size_t>(series.width() * series.height());
+  std::vector<float> image(pixels);
+  std::vector<std::uint8_t> valid(pixels);
+  const base::ProcessorStopwatch decoding;
+  series.read_view(series.views().size() / 2, image, valid);
+  return decoding.seconds();
+}
+
+double num_voxels(const RunPlan& run) {
+  return static_cast<double>(run.roi.width()) * static_cast<double>(run.roi.height()) *
+         std::round(run.thickness);
+}
+
+// Returns the bytes of the scratch files of the decoded views and of the rays.
+std::size_t scratch_bytes(const tilt_series::TiltSeries& series,
+                          const measurement::Measurement& plan) {
+  const std::size_t views = static_cast<std::size_t>(series.width() * series.height()) *
+                            series.views().size() * sizeof(float);
+  return io::ScratchMemory::bytes_in_file(views) +
+         io::ScratchMemory::bytes_in_file(measurement::SlabViews::bytes(plan.rays_shape()));
+}
+
+}  // namespace
+
+RunEstimate estimate_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
+                         const RunPlan& run) {
+  const measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
+  RunEstimate estimate;
+  const auto num_fits = static_cast<std::size_t>(run.num_fits);
+  const std::size_t parameters = sizeof(float) * run.num_parameters * num_fits;
+  const auto volume = static_cast<std::size_t>(
+      num_voxels(run) * (options.volume.mode == io::MrcMode::kFloat32 ? 4 : 2));
+  // Halves are two volumes; their mean, the uncertainty and the local resolution are three more.
+  const std::size_t num_volumes = run.num_fits == 1 ? 1 : 5;
+  estimate.result_bytes = num_volumes * volume + parameters + kSmallFiles;
+  // A checkpoint has the parameters and two moments, and is there twice while it is replaced.
+  estimate.disk_bytes = scratch_bytes(series, plan) +
+                        std::max(6 * parameters, estimate.result_bytes + 3 * parameters);
+  if (plan.ray_geometry) return estimate;
+  const Work work = work_of(plan, options, run);
+  estimate.sample_steps = work.samples();
+  if (options.field.leaf_size > kLargestLeaf) return estimate;
+  const StepTimes times = measure_steps(plan, options.field, options.fit);
+  estimate.core_seconds =
+      kStart + work.seconds(times) + kSecondsAVoxel * num_voxels(run) +
+      kReadingsOfAView * seconds_of_a_view(series) * static_cast<double>(series.views().size());
+  return estimate;
+}
+
+}  // namespace tomofield::reconstruction

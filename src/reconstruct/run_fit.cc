@@ -1,0 +1,105 @@
+#include "reconstruct/run_fit.h"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <string>
+
+#include "base/log.h"
+#include "base/stopwatch.h"
+#include "base/trace.h"
+#include "reconstruct/results.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+std::unique_ptr<fit::Fit> begin_fit(const Run& run, const FitJob& job) {
+  const base::TraceSpan span("begin fit");
+  auto fit = std::make_unique<fit::Fit>(job.measurement, run.options.field, run.options.fit,
+                                        run.processes);
+  if (!job.kept_views.empty()) fit->keep_views(job.kept_views);
+  return fit;
+}
+
+// Continues from the checkpoint, if there is one yet.
+void resume(const FitJob& job, fit::Fit& fit) {
+  const base::TraceSpan span("read checkpoint");
+  const std::filesystem::path& path = job.model;
+  if (!std::filesystem::exists(path)) {
+    base::log_info(fmt::format("no checkpoint {} yet: starting from the beginning", path.string()));
+    return;
+  }
+  read_checkpoint([&] { restore_fit(path, job.origin.fingerprint, fit); });
+  base::log_info(fmt::format("resuming {} at step {} of {}", path.string(), fit.progress().step,
+                             fit.num_steps()));
+}
+
+base::ProgressReport progress_report(const fit::Fit& fit, std::int64_t first_step,
+                                     const base::Stopwatch& running) {
+  base::ProgressReport report;
+  const std::int64_t step = fit.progress().step;
+  const double done = fit.work(step), all = fit.work(fit.num_steps());
+  report.fraction_done = done / all;
+  report.seconds_elapsed = running.seconds();
+  report.seconds_left = (all - done) / (done - fit.work(first_step)) * report.seconds_elapsed;
+  const double rate = static_cast<double>(step - first_step) / report.seconds_elapsed;
+  const auto& loss = fit.progress().data_loss;
+  const std::int64_t epoch = (step - 1) / fit.steps_per_epoch() + 1;
+  const auto& held_out = fit.progress().held_out_error;
+  report.detail =
+      fmt::format("epoch {}/{}  loss {}{}  {:.1f} steps/s", epoch, fit.num_epochs(),
+                  loss.empty() ? "-" : fmt::format("{:.4f}", loss.back()),
+                  held_out.empty() ? "" : fmt::format("  held out {:.4f}", held_out.back()), rate);
+  return report;
+}
+
+// Takes the steps and saves checkpoints when they are due, if the run writes files. Returns false
+// if it was stopped; there is a checkpoint then.
+bool run_with_checkpoints(const Run& run, const FitJob& job, fit::Fit& fit) {
+  const base::TraceSpan span("fit");
+  const double seconds_between = 60 * run.options.resolved.checkpoint_minutes;
+  const base::Stopwatch running;
+  base::Stopwatch since_checkpoint;
+  const std::int64_t first_step = fit.progress().step;
+  bool stopped = false;
+  fit.run([&](const fit::Fit&) {
+    if (job.progress) job.progress(progress_report(fit, first_step, running));
+    const ReconstructHooks& hooks = run.hooks;
+    const bool stop = hooks.stop_requested && hooks.stop_requested() && !fit.is_done();
+    const bool is_due = run.processes.is_root() && since_checkpoint.seconds() > seconds_between;
+    // Any process can stop all of them. The root decides when it is time for a checkpoint.
+    const double wanted = run.processes.allreduce_max(stop ? 2.0 : is_due ? 1.0 : 0.0);
+    stopped = wanted == 2.0;
+    if (wanted > 0.0 && run.writes_files()) {
+      save_checkpoint(job.model, fit, model_info(job.measurement, run.options), job.origin);
+      since_checkpoint.restart();
+    }
+    return !stopped;
+  });
+  return !stopped;
+}
+
+}  // namespace
+
+void read_checkpoint(const std::function<void()>& read) {
+  try {
+    read();
+  } catch (const Error& error) {
+    throw Error(fmt::format(
+        "cannot resume: {}; to start over, give --overwrite instead of --resume", error.what()));
+  }
+}
+
+FitRun run_fit(const Run& run, const FitJob& job) {
+  FitRun made{.fit = begin_fit(run, job)};
+  if (job.resumes) run.processes.run_collectively([&] { resume(job, *made.fit); });
+  const std::int64_t first_step = made.fit->progress().step;
+  const base::Stopwatch running;
+  made.was_stopped = !run_with_checkpoints(run, job, *made.fit);
+  made.seconds = running.seconds();
+  made.took_steps = made.fit->progress().step > first_step;
+  return made;
+}
+
+}  // namespace tomofield::reconstruction

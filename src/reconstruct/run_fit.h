@@ -1,0 +1,43 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "base/progress.h"
+#include "fit/fit.h"
+#include "measurement/measurement.h"
+#include "measurement/view_residuals.h"
+#include "reconstruct/checkpoint.h"
+#include "reconstruct/run.h"
+
+namespace tomofield::reconstruction {
+
+/// Says what is fitted and where the checkpoint is.
+struct FitJob {
+  const measurement::Measurement& measurement;  ///< must outlive the fit
+  const std::filesystem::path& model;           ///< the checkpoint
+  const FitOrigin& origin;
+  bool resumes = false;  ///< from the checkpoint, if there is one
+  const base::ProgressSink& progress;
+  /// Models that the views keep (fit::Fit::keep_views()). Empty: the fit finds its own.
+  std::vector<measurement::ViewModel> kept_views = {};
+};
+
+/// Holds a fit after its steps.
+struct FitRun {
+  std::unique_ptr<fit::Fit> fit;
+  double seconds = 0.0;      ///< of its steps in this run
+  bool was_stopped = false;  ///< there is a checkpoint then, if the run writes files
+  bool took_steps = false;
+};
+
+/// Makes a fit, continues it from its checkpoint, and takes its steps. Saves checkpoints when they
+/// are due, if the run writes files. Every process calls it.
+FitRun run_fit(const Run& run, const FitJob& job);
+
+/// Calls a function that reads the checkpoint. If it throws, adds what the user can do.
+void read_checkpoint(const std::function<void()>& read);
+
+}  // namespace tomofield::reconstruction

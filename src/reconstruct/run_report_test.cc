@@ -1,0 +1,102 @@
+#include "reconstruct/run_report.h"
+
+#include <gtest/gtest.h>
+
+#include "io/mrc.h"
+#include "io/png.h"
+#include "reconstruct/options.h"
+#include "scratch_directory.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+using nlohmann::json;
+
+// Returns the metrics of a fit of two views, as output::metrics_json() and others write them.
+json metrics_of_fit(double residual) {
+  const auto view = [&](double tilt_deg) {
+    return json{{"tilt_deg", tilt_deg}, {"scale", 1.0},  {"offset", 0.0},
+                {"noise_sigma", 2.0},   {"weight", 1.0}, {"residual", residual}};
+  };
+  return {{"views", {view(10), view(20)}},
+          {"mean_squared_residual_per_noise_variance", {9.0, residual}},
+          {"held_out", nullptr},
+          {"tuning", nullptr},
+          {"mask",
+           {{"beads", 0},
+            {"bead_masking", "none"},
+            {"bad_pixels", 0},
+            {"masked_part", 0.0},
+            {"views", json::array()}}},
+          {"stages", json::array({{{"epochs", 2}, {"bin", 1}, {"field", "grid"}}})},
+          {"threads", 2},
+          {"threads_why", "2 threads"},
+          {"steps", 4},
+          {"parameters", 100},
+          {"seconds", 1.5},
+          {"leaves", 1},
+          {"verdict",
+           {{"residual", residual},
+            {"held_out", nullptr},
+            {"views", nullptr},
+            {"seconds", 7000},
+            {"peak_GiB", 1.5},
+            {"warnings", json::array({{{"code", "thin"}, {"message", "it seems <thin>"}}})}}}};
+}
+
+class RunReport : public ::testing::Test {
+ protected:
+  RunReport() {
+    io::MrcWriter writer(
+        directory_ / "volume.mrc",
+        {.nx = 4, .ny = 3, .nz = 2, .voxel_size_A = {8.0, 8.0, 8.0}, .labels = {}});
+    for (int z = 0; z < 2; ++z)
+      writer.write_section(z, std::vector<float>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11});
+    writer.close();
+    io::write_png_grey(directory_ / "mask.png", 2, 2, std::vector<std::uint8_t>{0, 1, 2, 3});
+    files_.stack = "series.mrc";
+    requested_.thickness = 2;
+    record_ = {{"options", options_json(run_options(files_, requested_))},
+               {"metrics", metrics_of_fit(1.25)}};
+  }
+
+  std::string page() const {
+    return run_report({.record = record_,
+                       .files = files_,
+                       .requested = requested_,
+                       .volume = directory_ / "volume.mrc",
+                       .mask_picture = directory_ / "mask.png",
+                       .tree_picture = {},
+                       .held_out_picture = {}});
+  }
+  bool page_has(const std::string& text) const { return page().find(text) != std::string::npos; }
+
+  const testing::ScratchDirectory directory_;
+  SeriesFiles files_;
+  Options requested_;
+  json record_;
+};
+
+TEST_F(RunReport, ShowsWarningsAndNumbers) {
+  EXPECT_TRUE(page_has("One warning"));
+  EXPECT_TRUE(page_has("It seems &lt;thin&gt;."));
+  EXPECT_TRUE(page_has("<b>4 × 3 × 2</b>"));
+  EXPECT_TRUE(page_has("Tilts from 10.0° to 20.0°."));
+  EXPECT_TRUE(page_has("1.9 h, 1.5 GiB"));
+  EXPECT_TRUE(page_has("CTF and dose"));
+  EXPECT_FALSE(page_has("even half"));
+}
+
+TEST_F(RunReport, ShowsBothHalvesAndTheirCorrelation) {
+  record_["halves"] = {
+      {"fsc", {{"frequency_per_A", {0.01, 0.02}}, {"all", {{"correlation", {1.0, nullptr}}}}}},
+      {"even", {{"metrics", metrics_of_fit(1.2)}}},
+      {"odd", {{"metrics", metrics_of_fit(1.3)}}}};
+  record_["metrics"] = {{"verdict", record_["metrics"]["verdict"]}};  // what both have in common
+  EXPECT_TRUE(page_has("fitted views, even"));
+  EXPECT_TRUE(page_has("in each of two halves"));
+  EXPECT_TRUE(page_has("<h2>Halves</h2>"));
+}
+
+}  // namespace
+}  // namespace tomofield::reconstruction

@@ -1,0 +1,64 @@
+#include "report/embedded_volume.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "base/random.h"
+#include "io/mrc.h"
+#include "scratch_directory.h"
+
+namespace tomofield::report {
+namespace {
+
+void write_volume(const std::filesystem::path& path, std::int64_t side,
+                  const std::function<float(std::int64_t)>& voxel) {
+  io::MrcWriter writer(path, {.nx = side, .ny = side, .nz = side, .labels = {}});
+  std::vector<float> section(static_cast<std::size_t>(side * side));
+  for (std::int64_t z = 0; z < side; ++z) {
+    for (std::size_t i = 0; i < section.size(); ++i)
+      section[i] = voxel(z * side * side + static_cast<std::int64_t>(i));
+    writer.write_section(z, section);
+  }
+  writer.close();
+}
+
+TEST(EmbeddedVolume, HasLimitsBeyondTheContrast) {
+  const testing::ScratchDirectory directory;
+  write_volume(directory / "v.mrc", 10, [](std::int64_t i) { return static_cast<float>(i); });
+  std::vector<float> sample;
+  for (int i = 0; i <= 1000; ++i) sample.push_back(static_cast<float>(i));
+  const EmbeddedVolume volume = embed_volume(directory / "v.mrc", sample);
+  EXPECT_EQ(volume.contrast, (std::pair{5.0, 995.0}));
+  EXPECT_EQ(volume.limits, (std::pair{5.0 - 247.5, 995.0 + 247.5}));
+  EXPECT_EQ(volume.size, (std::array<std::int64_t, 3>{10, 10, 10}));
+  EXPECT_EQ(volume.tile, (std::array<std::int64_t, 2>{16, 16}));  // whole blocks of JPEG
+  EXPECT_EQ(volume.sheets.size(), 1u);
+  EXPECT_EQ(volume_json(volume)["sheets"].size(), 1u);
+}
+
+TEST(EmbeddedVolume, OfOneValueHasAContrastAllTheSame) {
+  const testing::ScratchDirectory directory;
+  write_volume(directory / "v.mrc", 4, [](std::int64_t) { return 7.0f; });
+  for (const std::vector<float>& sample : {std::vector<float>{}, std::vector<float>{7, 7, 7}}) {
+    const EmbeddedVolume volume = embed_volume(directory / "v.mrc", sample);
+    EXPECT_LT(volume.contrast.first, volume.contrast.second);
+    EXPECT_LT(volume.limits.first, volume.limits.second);
+  }
+}
+
+TEST(EmbeddedVolume, OfNoiseIsNotLargerThanAllowed) {
+  const testing::ScratchDirectory directory;
+  constexpr std::int64_t kSide = 224;
+  base::Random random(1);
+  write_volume(directory / "v.mrc", kSide,
+               [&](std::int64_t) { return static_cast<float>(random.uniform()); });
+  const EmbeddedVolume volume = embed_volume(directory / "v.mrc", {0.0f, 0.5f, 1.0f});
+  std::size_t bytes = 0;
+  for (const std::string& sheet : volume.sheets) bytes += sheet.size();
+  EXPECT_LE(bytes, kMostSheetBytes);
+  EXPECT_GT(bytes, kMostSheetBytes / 4);
+}
+
+}  // namespace
+}  // namespace tomofield::report

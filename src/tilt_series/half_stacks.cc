@@ -1,0 +1,148 @@
+#include "tilt_series/half_stacks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/check.h"
+#include "base/log.h"
+#include "tomofield/error.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+// Noise of the camera may differ a little from sum to sum; sections of another series do not
+// correlate at all.
+constexpr double kLeastCorrelation = 0.5, kGoodCorrelation = 0.9;
+
+// Counts lie well above zero.
+constexpr double kLeastMean = 0.5;  // in standard deviations
+constexpr double kLargestMismatch = 0.05;
+
+struct Slope {
+  double slope = 0.0, correlation = 0.0;
+};
+
+// Returns the slope of all frames over the sum of the halves, over all sections.
+Slope slope_of(std::span<const HalfMoments> moments) {
+  HalfMoments total;
+  for (const HalfMoments& m : moments) {
+    total.all_squares += m.all_squares;
+    total.sum_squares += m.sum_squares;
+    total.products += m.products;
+  }
+  if (!(total.all_squares > 0 && total.sum_squares > 0)) return {};
+  return {total.products / total.sum_squares,
+          total.products / std::sqrt(total.all_squares * total.sum_squares)};
+}
+
+bool are_counts(std::span<const HalfMoments> moments, double slope) {
+  return std::ranges::all_of(moments, [&](const HalfMoments& m) {
+    const double sum = m.even + m.odd;
+    const double deviation = std::sqrt(m.sum_squares / m.n);
+    return m.even > 0 && m.odd > 0 && m.all > 0 && sum > kLeastMean * deviation &&
+           std::abs(slope * sum - m.all) < kLargestMismatch * m.all;
+  });
+}
+
+void require_finite(const HalfMoments& moments, std::int64_t section, const std::string& halves,
+                    const std::string& all) {
+  if (moments.num_not_finite == 0) return;
+  throw Error(
+      fmt::format("section {} of {} has {} pixels that are NaN or infinite in one of them and "
+                  "measured in '{}': "
+                  "write the halves with the same masks as the stack of all frames",
+                  section + 1, halves, moments.num_not_finite, all));
+}
+
+// Refuses a sum of halves that does not look like all frames, and warns of one that roughly does.
+void require_alike(double correlation, const std::string& halves, const std::string& all) {
+  if (!(correlation >= kLeastCorrelation)) {
+    throw Error(fmt::format(
+        "{} are no halves of '{}': their sum correlates with it by {:.2f} only; give the even and "
+        "the odd frames of the same series, aligned in the same way",
+        halves, all, correlation));
+  }
+  if (correlation < kGoodCorrelation)
+    base::log_warning(
+        fmt::format("the sum of {} correlates with '{}' by {:.2f} only: is it made "
+                    "from other frames, or weighted or filtered otherwise?",
+                    halves, all, correlation));
+}
+
+void require_same_size(const io::ImageStack& half, const io::ImageStack& all) {
+  const io::MrcHeader &a = half.header(), &b = all.header();
+  if (a.nx == b.nx && a.ny == b.ny && a.nz == b.nz) return;
+  throw Error(fmt::format(
+      "'{}' has {} sections of {} × {} pixels and '{}' {} of {} × {}: give halves with the same "
+      "sections as the stack of all frames",
+      half.name(), a.nz, a.nx, a.ny, all.name(), b.nz, b.nx, b.ny));
+}
+
+}  // namespace
+
+HalfStacks::HalfStacks(const HalfPaths& paths, const io::ImageStack& all)
+    : stacks_{io::open_image_stack(paths.even), io::open_image_stack(paths.odd)} {
+  for (const auto& half : stacks_) require_same_size(*half, all);
+}
+
+HalfMoments HalfStacks::measure(std::int64_t section, const MaskedImage& all) const {
+  std::vector<float> even(all.values.size()), odd(all.values.size());
+  stack(Half::kEven).read_section(section, even);
+  stack(Half::kOdd).read_section(section, odd);
+  HalfMoments m;
+  const auto for_pixels = [&](const auto& body) {
+    for (std::size_t i = 0; i < even.size(); ++i)
+      if (all.valid[i] != kNoMeasurement && std::isfinite(even[i]) && std::isfinite(odd[i]))
+        body(static_cast<double>(all.values[i]), static_cast<double>(even[i]),
+             static_cast<double>(odd[i]));
+  };
+  for_pixels([&](double a, double e, double o) {
+    m.n += 1;
+    m.all += a;
+    m.even += e;
+    m.odd += o;
+  });
+  const auto num_measured =
+      std::ranges::count_if(all.valid, [](std::uint8_t state) { return state != kNoMeasurement; });
+  m.num_not_finite = static_cast<double>(num_measured) - m.n;
+  if (m.n > 0) m.all /= m.n, m.even /= m.n, m.odd /= m.n;
+  for_pixels([&](double a, double e, double o) {
+    const double sum = e + o - m.even - m.odd;
+    m.all_squares += (a - m.all) * (a - m.all);
+    m.sum_squares += sum * sum;
+    m.products += (a - m.all) * sum;
+  });
+  return m;
+}
+
+void HalfStacks::match(std::span<const std::int64_t> sections, std::span<const HalfMoments> moments,
+                       const io::ImageStack& all) {
+  const std::string names =
+      fmt::format("'{}' and '{}'", stack(Half::kEven).name(), stack(Half::kOdd).name());
+  for (std::size_t i = 0; i < sections.size(); ++i)
+    require_finite(moments[i], sections[i], names, all.name());
+  const Slope found = slope_of(moments);
+  require_alike(found.correlation, names, all.name());
+  const bool is_ratio = are_counts(moments, found.slope);
+  const double gain = 2 * found.slope;
+  for (std::size_t i = 0; i < sections.size(); ++i) {
+    const HalfMoments& m = moments[i];
+    const auto match_to = [&](double mean) {
+      return is_ratio ? Match{m.all / mean, 0.0} : Match{gain, m.all - gain * mean};
+    };
+    matches_[sections[i]] = {match_to(m.even), match_to(m.odd)};
+  }
+}
+
+void HalfStacks::read_section(Half half, std::int64_t section, std::span<float> out) const {
+  const auto found = matches_.find(section);
+  TOMOFIELD_CHECK(found != matches_.end(), "the section has been matched");
+  stack(half).read_section(section, out);
+  const auto& [gain, offset] = found->second[static_cast<std::size_t>(half)];
+  for (float& value : out) value = static_cast<float>(gain * static_cast<double>(value) + offset);
+}
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,92 @@
+#include "tilt_series/section_table.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "base/log.h"
+#include "io/alignment_files.h"
+#include "tilt_series/tilt_angles.h"
+#include "tomofield/error.h"
+
+namespace tomofield::tilt_series {
+namespace {
+
+using geometry::RawFromAligned;
+
+double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
+
+void require_raw_size(const io::AreTomoAlignment& alignment, const std::filesystem::path& path,
+                      const io::ImageStack& stack) {
+  const io::MrcHeader& header = stack.header();
+  const auto& raw_size = alignment.raw_size;
+  if (!raw_size || ((*raw_size)[0] == header.nx && (*raw_size)[1] == header.ny)) return;
+  throw Error(fmt::format(
+      "'{}' aligns images of {} × {} pixels but '{}' has {} × {}; give the "
+      "stack that AreTomo aligned, unbinned",
+      path.string(), (*raw_size)[0], (*raw_size)[1], stack.name(), header.nx, header.ny));
+}
+
+AlignedSection section_of(const io::AreTomoRow& row) {
+  const double cosine = std::cos(radians(row.rotation_deg));
+  const double sine = std::sin(radians(row.rotation_deg));
+  return {row.tilt_deg, 0.0, row.rotation_deg,
+          RawFromAligned{cosine, -sine, sine, cosine, row.shift_x_px, row.shift_y_px}, row.line};
+}
+
+/// Converts one view. The other program counts from its centres: with d and e from this program's
+/// centres to those of the image and of the specimen, its p = R P + shift becomes
+/// p = R P + (shift + d − R e), where R = Rz(rotation) Ry(tilt) Rx(x tilt). The specimen has an
+/// even number of pixels, which makes e (1/2, 1/2, 1/2).
+AlignedSection section_of(const io::ListedView& view, io::CentreRule centre,
+                          const io::MrcHeader& images, double pixel_size_A) {
+  const double cosine = std::cos(radians(view.rotation_deg));
+  const double sine = std::sin(radians(view.rotation_deg));
+  const double tilt = radians(view.tilt_deg), x_tilt = radians(view.x_tilt_deg);
+  const double e = io::distance_from_middle_px(centre, 2);
+  const double turned_y = e * std::cos(x_tilt) - e * std::sin(x_tilt);
+  const double turned_z = e * std::sin(x_tilt) + e * std::cos(x_tilt);
+  const double turned_x = e * std::cos(tilt) + turned_z * std::sin(tilt);
+  RawFromAligned map{cosine, -sine, sine, cosine, 0.0, 0.0};
+  map.shift_x_px = view.shift_x_A / pixel_size_A + io::distance_from_middle_px(centre, images.nx) -
+                   (cosine * turned_x - sine * turned_y);
+  map.shift_y_px = view.shift_y_A / pixel_size_A + io::distance_from_middle_px(centre, images.ny) -
+                   (sine * turned_x + cosine * turned_y);
+  return {view.tilt_deg, view.x_tilt_deg, view.rotation_deg, map, 0};
+}
+
+}  // namespace
+
+SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::ImageStack& stack) {
+  const io::AreTomoAlignment alignment = io::read_aretomo_alignment(path);
+  require_raw_size(alignment, path, stack);
+  const auto sections =
+      io::assign_aretomo_sections(alignment, path, stack.header().nz, stack.name());
+  SectionTable table{path.string(), {}};
+  table.of_section.resize(static_cast<std::size_t>(stack.header().nz));
+  for (std::size_t row = 0; row < sections.size(); ++row)
+    table.of_section[static_cast<std::size_t>(sections[row])] = section_of(alignment.rows[row]);
+  if (alignment.num_local_rows > 0) {
+    base::log_warning(
+        fmt::format("'{}' has local alignment, which is not applied: views are aligned as a whole",
+                    path.string()));
+  }
+  return table;
+}
+
+SectionTable sections_of_views(const io::ViewTable& table, const io::ImageStack& stack,
+                               double pixel_size_A) {
+  require_count(table.views.size(), table.file, "views", stack);
+  SectionTable sections{table.file.string(), {}};
+  for (const io::ListedView& view : table.views) {
+    sections.of_section.emplace_back();
+    if (view.is_used)
+      sections.of_section.back() = section_of(view, table.centre, stack.header(), pixel_size_A);
+  }
+  for (const std::string& what : table.not_applied)
+    base::log_warning(fmt::format("'{}': {}", table.file.string(), what));
+  return sections;
+}
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/raw_from_aligned.h"
+#include "io/image_stack.h"
+#include "io/view_table.h"
+
+namespace tomofield::tilt_series {
+
+/// The alignment of one section of a stack.
+struct AlignedSection {
+  double tilt_deg = 0.0;
+  double x_tilt_deg = 0.0;
+  double rotation_deg = 0.0;  ///< of the tilt axis, counter-clockwise from +Y
+  geometry::RawFromAligned raw_from_aligned;
+  int line = 0;  ///< of the file that says so; 0: not known
+};
+
+/// What a file that has angles and alignment together says of each section: AreTomo's .aln, or a
+/// table of views of RELION or Warp.
+struct SectionTable {
+  std::string source;                                     ///< the name of the file
+  std::vector<std::optional<AlignedSection>> of_section;  ///< none: left out by that program
+};
+
+/// Reads AreTomo's .aln. Throws Error if it is not of this stack.
+SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::ImageStack& stack);
+
+/// Converts a table of views to unbinned pixels and to this program's centres (docs/geometry.md).
+/// `stack` has the images that the table lists.
+SectionTable sections_of_views(const io::ViewTable& table, const io::ImageStack& stack,
+                               double pixel_size_A);
+
+}  // namespace tomofield::tilt_series

@@ -1,0 +1,111 @@
+// A model as a volume that planes can be taken from.
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "field/sampling/sample_box.h"
+#include "output/model_file.h"
+#include "output/volume.h"
+#include "view/viewed_volume.h"
+
+namespace tomofield::view {
+namespace {
+
+// Returns the axis that a direction runs along, or −1.
+int axis_of(const Point& direction) {
+  for (int axis = 0; axis < 3; ++axis) {
+    Point unit{};
+    unit[static_cast<std::size_t>(axis)] = 1;
+    if (direction == unit) return axis;
+  }
+  return -1;
+}
+
+class ViewedModel : public ViewedVolume {
+ public:
+  explicit ViewedModel(const std::filesystem::path& path)
+      : model_(output::load_model(path)), region_(output::region_box(model_, 1.0)) {
+    title_ = path.filename().string();
+    note_ = "model: every zoom is evaluated from the fitted field";
+    size_ = region_.size;
+    voxel_size_A_ = model_.pixel_size_A;
+    choose_contrast(coarse_values());
+  }
+
+ private:
+  std::vector<float> sample_voxels(const Plane& plane) const override {
+    const int across = axis_of(plane.right), up = axis_of(plane.up);
+    std::vector<float> values = region_.is_aligned() && across >= 0 && up >= 0
+                                    ? aligned_values(plane, across, up)
+                                    : point_values(plane);
+    const auto scale = static_cast<float>(model_.output_scale());
+    for (float& value : values) value = scale * value + 0.0f;  // no −0
+    return values;
+  }
+
+  // Samples a box of one voxel's thickness, the fast way.
+  std::vector<float> aligned_values(const Plane& plane, int across, int up) const {
+    field::OrientedBox box{
+        .centre_px = region_.position(plane.centre), .size = {1, 1, 1}, .voxel_px = plane.step};
+    box.size[static_cast<std::size_t>(across)] = plane.width;
+    box.size[static_cast<std::size_t>(up)] = plane.height;
+    std::vector<float> values = field::sample_box(*model_.field, box);
+    return across < up ? values : transposed(values, plane);
+  }
+
+  // Turns [column, row] into [row, column].
+  static std::vector<float> transposed(const std::vector<float>& values, const Plane& plane) {
+    std::vector<float> turned;
+    turned.reserve(values.size());
+    for (std::int64_t row = 0; row < plane.height; ++row)
+      for (std::int64_t column = 0; column < plane.width; ++column)
+        turned.push_back(values[static_cast<std::size_t>(column * plane.height + row)]);
+    return turned;
+  }
+
+  // Evaluates the field at the middle of every pixel, or at four points of one that is larger than
+  // a pixel of the fit.
+  std::vector<float> point_values(const Plane& plane) const {
+    const int points = plane.step > 1 ? 2 : 1;
+    std::vector<float> values(static_cast<std::size_t>(plane.width * plane.height));
+    base::parallel_for("view plane", plane.height, [&](std::int64_t row) {
+      for (std::int64_t column = 0; column < plane.width; ++column) {
+        double sum = 0;
+        for (int point = 0; point < points * points; ++point) {
+          const field::Point at = region_.position(
+              plane.position(static_cast<double>(column) + (point % points + 0.5) / points,
+                             static_cast<double>(row) + (point / points + 0.5) / points));
+          sum += static_cast<double>(model_.field->density(at[0], at[1], at[2]));
+        }
+        values[static_cast<std::size_t>(row * plane.width + column)] =
+            static_cast<float>(sum / (points * points));
+      }
+    });
+    return values;
+  }
+
+  // Returns the region in at most 64 voxels a side, in the units of the file.
+  std::vector<float> coarse_values() const {
+    constexpr double kSide = 64;
+    const auto longest = static_cast<double>(*std::ranges::max_element(region_.size));
+    field::OrientedBox box = region_;
+    box.voxel_px = std::max(1.0, longest / kSide);
+    for (std::int64_t& size : box.size)
+      size = std::max<std::int64_t>(1, std::lround(static_cast<double>(size) / box.voxel_px));
+    std::vector<float> values = field::sample_box(*model_.field, box);
+    for (float& value : values) value *= static_cast<float>(model_.output_scale());
+    return values;
+  }
+
+  output::Model model_;
+  field::OrientedBox region_;
+};
+
+}  // namespace
+
+std::unique_ptr<ViewedVolume> open_model(const std::filesystem::path& path) {
+  return std::make_unique<ViewedModel>(path);
+}
+
+}  // namespace tomofield::view

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "view/plane.h"
+
+namespace tomofield::view {
+
+/// A volume that planes can be taken from.
+class ViewedVolume {
+ public:
+  virtual ~ViewedVolume() = default;
+  ViewedVolume(const ViewedVolume&) = delete;
+  ViewedVolume& operator=(const ViewedVolume&) = delete;
+
+  /// Returns the values of the pixels of a plane, [row, column] with row 0 at the bottom; NaN
+  /// outside of the volume.
+  std::vector<float> sample(const Plane& plane) const;
+
+  const std::string& title() const { return title_; }
+  /// Returns the number of voxels.
+  const std::array<std::int64_t, 3>& size() const { return size_; }
+  /// Returns the side of a voxel, or 0 if the file does not say.
+  double voxel_size_A() const { return voxel_size_A_; }
+  /// Returns the values that are black and white at first: the 0.5 and 99.5 percentiles.
+  const std::pair<double, double>& contrast() const { return contrast_; }
+  /// Says what the viewer should know, such as that the volume is reduced; may be empty.
+  const std::string& note() const { return note_; }
+
+ protected:
+  ViewedVolume() = default;
+  /// Returns the values of a plane, with any value outside of the volume.
+  virtual std::vector<float> sample_voxels(const Plane& plane) const = 0;
+  /// Chooses the contrast by finite values from all over the volume.
+  void choose_contrast(const std::vector<float>& sample);
+
+  std::string title_, note_;
+  std::array<std::int64_t, 3> size_{};
+  double voxel_size_A_ = 0;
+  std::pair<double, double> contrast_{0, 1};
+};
+
+/// Opens a model (.h5) of reconstruct, whose region of interest is shown. A plane is evaluated from
+/// the field: pixels that are larger than those of the fit are means.
+std::unique_ptr<ViewedVolume> open_model(const std::filesystem::path& path);
+
+/// Opens an MRC volume and reads it into memory. If it would take more than half of the memory that
+/// is free, it is reduced to that.
+std::unique_ptr<ViewedVolume> open_mrc(const std::filesystem::path& path);
+
+/// Opens a file by its contents: a model if it is HDF5, else an MRC volume.
+std::unique_ptr<ViewedVolume> open_volume(const std::filesystem::path& path);
+
+}  // namespace tomofield::view

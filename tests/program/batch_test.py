@@ -1,0 +1,261 @@
+"""Tests batch: the list of series, what runs, how it goes on, and the summary that it writes."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+
+import harness
+import star_projects
+
+SIZE = 32
+QUICK = ["--thickness", 16, "--contrast", "bright", "--no-margin", "--leaf-size", 16, "--epochs", 2,
+         "--coarse-epochs", 0, "--tv-penalty", "concave", "--view-scale", "off"]
+
+
+@pytest.fixture(scope="module", name="data")
+def make_data():
+    """Returns a folder with two small series, a.mrc and b.mrc, and c.mrc, whose third view is
+    constant, which only a run finds. The angles lie beside them."""
+    folder = harness.fresh_directory("data")
+    views = harness.Series("source").views[:, 2:2 + SIZE, 8:8 + SIZE].astype(np.float32)
+    for name in "abc":
+        if name == "c":
+            views[2] = 5
+        harness.write_stack(os.path.join(folder, name + ".mrc"), views)
+        np.savetxt(os.path.join(folder, name + ".tlt"), harness.TILTS, fmt="%.1f")
+    return folder
+
+
+def pattern(data):
+    return [os.path.join(data, "?.mrc"), "--tlt", "{folder}/{name}.tlt"]
+
+
+def summary(folder):
+    """Returns the lines of summary.csv by the names of their series."""
+    with open(os.path.join(folder, "summary.csv"), encoding="utf-8", newline="") as file:
+        return {line["name"]: line for line in csv.DictReader(file)}
+
+
+def page(folder):
+    with open(os.path.join(folder, "index.html"), encoding="utf-8") as file:
+        return file.read()
+
+
+def write_table(path, rows):
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows(rows)
+    return path
+
+
+def options_of(volume):
+    with open(volume[:-len(".mrc")] + ".json", encoding="utf-8") as file:
+        return json.load(file)["options"]
+
+
+@pytest.fixture(scope="module", name="first")
+def run_first(data):
+    """Returns the folder and the result of a batch of all three series."""
+    folder = harness.fresh_directory("first")
+    result = harness.tomofield("batch", *pattern(data), *QUICK, "-o", folder)
+    return folder, result
+
+
+def test_a_series_that_fails_does_not_stop_the_others(data, first):
+    folder, result = first
+    assert result.returncode == 1, result.stderr
+    assert "1 of 3 series failed: c" in result.stderr
+    lines = summary(folder)
+    assert [lines[name]["state"] for name in "abc"] == ["done", "done", "failed"]
+    assert "section 3" in lines["c"]["reason"], lines["c"]
+    for name in "ab":
+        line = lines[name]
+        volume = os.path.join(folder, name + ".mrc")
+        assert line["output"] == volume
+        assert harness.read_volume(volume).shape == (16, SIZE, SIZE)
+        assert float(line["core_seconds"]) > 0 and float(line["wall_seconds"]) > 0
+        assert 0.01 < float(line["peak_GiB"]) < 2
+        assert line["verdict"].startswith("verdict: residual")
+        assert "harness" not in line["warnings"]
+    by_hand = os.path.join(harness.fresh_directory("by_hand"), "a.mrc")
+    harness.succeed("reconstruct", os.path.join(data, "a.mrc"), "--tlt",
+                    os.path.join(data, "a.tlt"), *QUICK, "-o", by_hand)
+    assert np.array_equal(harness.read_volume(by_hand),
+                          harness.read_volume(os.path.join(folder, "a.mrc")))
+
+
+def test_the_page_shows_all_series_and_opens(first):
+    folder, _ = first
+    text = page(folder)
+    for link in ("./a_xy.png", "./a.mrc", "./b.json", "./logs/c.log"):
+        assert f'"{link}"' in text, link
+        assert os.path.exists(os.path.join(folder, link))
+    assert "./c_xy.png" not in text
+    assert "1 failed" in text and "section 3" in text
+    shown = subprocess.run(
+        ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
+         "--virtual-time-budget=2000", "file://" + os.path.join(folder, "index.html")],
+        capture_output=True, text=True, timeout=60)
+    assert shown.stdout.count("<tr>") == 4, shown.stderr
+
+
+def test_finished_series_are_skipped_and_others_are_tried_again(data, first):
+    folder, _ = first
+    before = harness.read_bytes(os.path.join(folder, "a.mrc"))
+    written = os.stat(os.path.join(folder, "a.mrc")).st_mtime_ns
+    refused = harness.tomofield("batch", *pattern(data), *QUICK, "-o", folder)
+    assert refused.returncode == 2 and "--skip-existing" in refused.stderr
+    again = harness.tomofield("batch", *pattern(data), *QUICK, "--exclude", "3", "-o", folder,
+                              "--skip-existing")
+    assert again.returncode == 0, again.stderr
+    assert [summary(folder)[name]["state"] for name in "abc"] == ["skipped", "skipped", "done"]
+    assert os.stat(os.path.join(folder, "a.mrc")).st_mtime_ns == written
+    assert harness.read_bytes(os.path.join(folder, "a.mrc")) == before
+    assert options_of(os.path.join(folder, "c.mrc"))["input"]["exclude"] == "3"
+
+
+def test_a_table_gives_each_series_its_own_options(data):
+    folder = harness.fresh_directory("table")
+    other = os.path.join(folder, "other", "two.mrc")
+    os.makedirs(os.path.dirname(other))
+    table = write_table(os.path.join(folder, "list.csv"), [
+        ["stack", "tlt", "name", "thickness", "exclude", "invert", "output"],
+        [os.path.join(data, "a.mrc"), os.path.join(data, "a.tlt"), "one, first", "", "1,2", "", ""],
+        [os.path.join(data, "b.mrc"), os.path.join(data, "b.tlt"), "two", 12, "", "true", other]])
+    results = os.path.join(folder, "results")
+    harness.succeed("batch", table, *QUICK, "-o", results)
+    one = os.path.join(results, "one, first.mrc")
+    assert harness.read_volume(one).shape[0] == 16 and harness.read_volume(other).shape[0] == 12
+    assert options_of(one)["input"]["exclude"] == "1,2"
+    assert options_of(other)["volume"]["invert"] and not options_of(one)["volume"]["invert"]
+    assert set(summary(results)) == {"one, first", "two"}
+    assert '"./one%2C%20first.mrc"' in page(results) and '"./../other/two.mrc"' in page(results)
+
+
+def test_all_tomograms_of_relion_are_reconstructed():
+    folder = harness.fresh_directory("relion")
+    star = star_projects.write_relion(folder, harness.Series("source"))
+    results = os.path.join(folder, "results")
+    assert QUICK[0] == "--thickness"  # which the files of RELION have
+    harness.succeed("batch", star, *QUICK[2:], "-o", results)
+    assert [line["state"] for line in summary(results).values()] == ["done", "done"]
+    one, two = (harness.read_volume(os.path.join(results, name + ".mrc"))
+                for name in ("TS_01", "TS_02"))
+    assert one.shape[0] == harness.THICKNESS
+    assert np.array_equal(one, two)  # the same images, in single files and in a stack
+    views = os.path.join(folder, "Tomograms/job009/tilt_series/TS_01.star")
+    plan = harness.succeed("batch", views, *QUICK, "--dry-run", "-o", results + "2").stdout
+    assert plan.startswith("TS_01:") and "1 of 1 series" in plan
+
+
+def test_all_mistakes_are_found_before_anything_starts(data):
+    folder = harness.fresh_directory("mistakes")
+    results = os.path.join(folder, "results")
+
+    def refusal(*rows, **keywords):
+        table = write_table(os.path.join(folder, "list.csv"), rows)
+        result = harness.tomofield("batch", table, *QUICK, "-o", results, **keywords)
+        assert result.returncode == 2, result.stderr
+        assert not os.path.exists(results)
+        return result.stderr
+
+    a, tlt = os.path.join(data, "a.mrc"), os.path.join(data, "a.tlt")
+    said = refusal(["stack", "tlt", "bin"], [a, tlt, "0"], ["nowhere.mrc", tlt, ""])
+    assert "line 3" in said and "nowhere.mrc" in said
+    said = refusal(["stack", "tlt", "bin"], [a, tlt, "0"], [a[:-5] + "b.mrc", "no.tlt", ""])
+    assert "line 2" in said and "--bin" in said and "line 3" in said and "no.tlt" in said
+    too_long = 300 * "x" + ".mrc"  # for any file system
+    assert "line 2" in refusal(["stack", "tlt"], [too_long, tlt])
+    assert "'thicknes'" in refusal(["stack", "thicknes"], [a, 12])
+    assert "'overwrite'" in refusal(["stack", "overwrite"], [a, "true"])
+    assert "same name 'a'" in refusal(["stack", "tlt"], [a, tlt], [a, tlt])
+    nothing = harness.tomofield("batch", a, "--tlt", tlt, "-o", results)
+    assert nothing.returncode == 2 and "--thickness" in nothing.stderr
+    assert "'maybe'" in refusal(["stack", "invert"], [a, "maybe"])
+    assert "'stack'" in refusal(["name"], ["x"])
+    small_job = {**os.environ, "SLURM_JOB_ID": "1", "SLURM_MEM_PER_NODE": "8"}  # MiB
+    assert "a needs about" in refusal(["stack", "tlt"], [a, tlt], env=small_job)
+    nothing = harness.tomofield("batch", os.path.join(folder, "*.st"), "-o", results)
+    assert nothing.returncode == 2 and "*.st" in nothing.stderr
+
+
+def test_dry_run_tells_what_is_needed_and_makes_nothing(data):
+    results = os.path.join(harness.fresh_directory("dry"), "results")
+    said = harness.succeed("batch", *pattern(data), *QUICK, "--dry-run", "-o", results).stdout
+    assert said.count("of processor time") == 3 and "3 of 3 series" in said
+    assert not os.path.exists(results)
+
+
+def test_a_plan_for_programs_has_what_a_run_needs(data):
+    folder = harness.fresh_directory("plan")
+    plan, volume = os.path.join(folder, "plan.json"), os.path.join(folder, "a.mrc")
+    command = ["reconstruct", os.path.join(data, "a.mrc"), "--tlt", os.path.join(data, "a.tlt"),
+               *QUICK, "-o", volume]
+    harness.succeed(*command, "--plan", plan)
+    with open(plan, encoding="utf-8") as file:
+        needs = json.load(file)
+    assert os.listdir(folder) == ["plan.json"]
+    assert 0 < needs["memory_bytes_of_one_thread"] <= needs["memory_bytes"] < 1 << 30
+    assert needs["core_seconds"] > 0
+    assert needs["result_bytes"] > 4 * 16 * SIZE * SIZE + 4 * needs["parameters"]
+    assert needs["disk_bytes"] > needs["result_bytes"]
+    refused = harness.tomofield(*command, "--plan", plan)
+    assert refused.returncode == 2 and "--plan" in refused.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_batch_that_is_stopped_goes_on(data, number):
+    """Ctrl-C stops all series in order. If the batch is killed, the system stops its series."""
+    folder = harness.fresh_directory("stopped")
+    long = [*harness.merge(QUICK, ["--epochs", 4000]), "--checkpoint-minutes", 0]
+    run = harness.start("batch", *pattern(data), *long, "--at-once", 1, "--threads", 1, "-o",
+                        folder)
+    model = os.path.join(folder, "a.h5")
+    while not os.path.exists(model) and run.poll() is None:
+        time.sleep(0.02)
+    run.send_signal(number)
+    _, errors = run.communicate(timeout=60)
+    assert run.returncode == (-signal.SIGKILL if number == signal.SIGKILL else 130), errors
+    if number == signal.SIGINT:
+        assert "--skip-existing" in errors
+        assert summary(folder)["a"]["state"] == "stopped"
+        assert summary(folder)["b"]["state"] == "waiting"
+    lock = os.path.join(folder, ".a.h5.tomofield-lock")
+    for _ in range(500):  # the series saves its checkpoint
+        if not os.path.exists(lock):
+            break
+        time.sleep(0.02)
+    assert not os.path.exists(os.path.join(folder, "a.mrc"))
+    again = harness.start("batch", os.path.join(data, "a.mrc"), *pattern(data)[1:], *long,
+                          "--skip-existing", "-o", folder)
+    log = os.path.join(folder, "logs", "a.log")
+    while again.poll() is None and "resum" not in harness.read_bytes(log).decode():
+        time.sleep(0.02)
+    again.send_signal(signal.SIGTERM)
+    again.communicate(timeout=60)
+    assert "resum" in harness.read_bytes(log).decode()
+
+
+def test_a_series_that_is_killed_ends_alone(data):
+    folder = harness.fresh_directory("killed")
+    rows = [[os.path.join(data, name + ".mrc"), os.path.join(data, name + ".tlt"), epochs]
+            for name, epochs in (("b", 2), ("a", 4000))]
+    table = write_table(os.path.join(folder, "list.csv"), [["stack", "tlt", "epochs"], *rows])
+    run = harness.start("batch", table, *QUICK, "--at-once", 1, "-o", folder)
+    log = os.path.join(folder, "logs", "a.log")
+    while run.poll() is None and not (os.path.exists(log)
+                                      and b"reconstruct " in harness.read_bytes(log)):
+        time.sleep(0.02)  # the larger series goes first
+    with open(f"/proc/{run.pid}/task/{run.pid}/children", encoding="ascii") as file:
+        child, = map(int, file.read().split())
+    os.kill(child, signal.SIGKILL)
+    _, errors = run.communicate(timeout=60)
+    assert run.returncode == 1 and "1 of 2 series failed: a" in errors, errors
+    lines = summary(folder)
+    assert lines["a"]["state"] == "failed" and "killed" in lines["a"]["reason"]
+    assert lines["b"]["state"] == "done"

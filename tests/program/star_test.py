@@ -1,0 +1,162 @@
+"""Series of RELION and Warp: what they mean, what is refused, and what is written back."""
+
+import json
+import os
+
+import gemmi
+import harness
+import numpy as np
+import pytest
+import star_projects
+from harness import HEIGHT, PIXEL_SIZE, THICKNESS, TILTS, WIDTH
+from star_projects import SHIFTS_PX
+
+
+class RelionProject:
+    """A project folder of RELION 5, and runs on it."""
+
+    def __init__(self, series):
+        self.folder = harness.fresh_directory("relion")
+        self.star = star_projects.write_relion(self.folder, series)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def run(self, *options, run=harness.succeed, cwd=None):
+        output = self.path("out.mrc")
+        result = run("reconstruct", self.star, "-o", output, "--overwrite",
+                     *harness.merge(QUICK, options), cwd=cwd or self.folder)
+        return result, output
+
+
+QUICK = [word for word in harness.QUICK if word not in ("--thickness", THICKNESS)]
+
+
+def agreement(volume, truth):
+    return np.corrcoef(volume.ravel(), truth.ravel())[0, 1]
+
+
+@pytest.fixture(scope="module")
+def series():
+    return harness.Series("series")
+
+
+@pytest.fixture(scope="module")
+def plain(series):
+    return series.reconstruct("plain")
+
+
+@pytest.fixture(scope="module")
+def relion(series):
+    return RelionProject(series)
+
+
+@pytest.fixture(scope="module")
+def finished(relion):
+    return relion.run("--series", "TS_01")
+
+
+def test_a_project_of_relion_is_reconstructed(series, plain, finished):
+    result, output = finished
+    for setting in ("rlnTomoTiltSeriesStarFile", "--pixel-size 13.37", "rlnTomoSizeZ"):
+        assert setting in result.stdout, result.stdout
+    assert "defocus" in result.stderr
+    volume = harness.read_volume(output)
+    assert volume.shape == (THICKNESS, HEIGHT, WIDTH)
+    # The fill at the edges of shifted views and their interpolation cost a little.
+    assert agreement(volume, series.truth) > agreement(plain.volume, series.truth) - 0.02
+    assert agreement(volume, plain.volume) > 0.97
+
+
+def star_rows(path):
+    """Returns the rows of a STAR file with one table, read by gemmi."""
+    (block,) = gemmi.cif.read(path)
+    (item,) = block
+    names = [tag[1:] for tag in item.loop.tags]
+    cells = [gemmi.cif.as_string(value) for value in item.loop.values]
+    return [dict(zip(names, cells[i:i + len(names)])) for i in range(0, len(cells), len(names))]
+
+
+def test_the_result_goes_back_to_relion(relion, finished):
+    _, output = finished
+    (row,) = star_rows(output[:-4] + ".star")
+    before = star_rows(relion.star)[0]
+    sizes = {"rlnTomoSizeX": WIDTH, "rlnTomoSizeY": HEIGHT, "rlnTomoSizeZ": THICKNESS}
+    assert {name: value for name, value in row.items() if name in before} == {
+        **before, **{name: str(size) for name, size in sizes.items()}}
+    assert float(row["rlnTomoTomogramBinning"]) == 1
+    for name in ("rlnTomoReconstructedTomogram", "rlnTomoDenoisedTomogram",
+                 "rlnTomoReconstructedTomogramDenoised"):
+        assert row[name] == output
+    assert "rlnTomoReconstructedTomogramHalf1" not in row
+
+
+def test_sizes_for_relion_are_unbinned(relion, finished):
+    result, output = relion.run("--series", "TS_01", "--bin", 2, "--alignment-json")
+    (row,) = star_rows(output[:-4] + ".star")
+    assert float(row["rlnTomoTomogramBinning"]) == 2
+    assert [row["rlnTomoSize" + axis] for axis in "XYZ"] == [
+        str(size) for size in (WIDTH, HEIGHT, THICKNESS)]
+    with open(output[:-4] + "_alignment.json", encoding="utf-8") as file:
+        alignment = json.load(file)
+    check_portal_alignment(alignment)
+    # A part of the specimen has no row in RELION's terms.
+    result, output = relion.run("--series", "TS_01", "--roi", "5,3,40,30")
+    assert "no STAR file" in result.stderr, result.stderr
+
+
+def check_portal_alignment(alignment):
+    """Checks the JSON against the definition of the portal: offsets in unbinned pixels, after the
+    rotation, about the middle of the views."""
+    sections = alignment["per_section_alignment_parameters"]
+    assert [section["z_index"] for section in sections] == list(range(len(TILTS)))
+    np.testing.assert_allclose([section["tilt_angle"] for section in sections], TILTS)
+    offsets = [(section["x_offset"], section["y_offset"]) for section in sections]
+    np.testing.assert_allclose(offsets, SHIFTS_PX, atol=1e-9)
+    for section in sections:
+        np.testing.assert_allclose(section["in_plane_rotation"], np.eye(2), atol=1e-12)
+        assert section["volume_x_rotation"] == 0
+    size = np.array([WIDTH, HEIGHT, THICKNESS]) * PIXEL_SIZE
+    np.testing.assert_allclose([alignment["volume_dimension"][a] for a in "xyz"], size, rtol=1e-6)
+    np.testing.assert_allclose([alignment["volume_offset"][a] for a in "xyz"], 0, atol=1e-3)
+
+
+def test_a_star_file_that_would_be_replaced_is_refused(relion):
+    output = relion.star[:-5] + ".mrc"
+    result = harness.tomofield("reconstruct", relion.star, "--series", "TS_01", "-o", output,
+                               "--overwrite", *QUICK, cwd=relion.folder)
+    assert result.returncode == 2 and "would replace the input" in result.stderr, result.stderr
+    assert not os.path.exists(output)
+
+
+def test_names_are_looked_for_from_the_project(relion, finished):
+    _, output = relion.run("--series", "TS_02", cwd=harness.SCRATCH)
+    np.testing.assert_array_equal(harness.read_volume(output).shape,
+                                  (THICKNESS, HEIGHT, WIDTH))
+
+
+def test_one_of_several_tomograms_is_asked_for(relion):
+    for options, words in (([], ["TS_01, TS_02", "--series"]), (["--series", "TS_3"], ["TS_3"])):
+        result, _ = relion.run(*options, run=harness.tomofield)
+        assert result.returncode == 2 and all(word in result.stderr for word in words), result.stderr
+
+
+def test_a_missing_image_is_named(relion):
+    star_projects.write_relion_views(relion.folder, "TS_02", ["gone/a.mrc"] * len(TILTS))
+    result, _ = relion.run("--series", "TS_02", run=harness.tomofield)
+    assert result.returncode == 2 and "gone/a.mrc" in result.stderr, result.stderr
+    info = harness.tomofield("info", relion.path("Tomograms/job009/tilt_series/TS_01.star"))
+    assert info.returncode == 0 and "48 × 36" in info.stdout + info.stderr, info
+
+
+def test_series_of_warp(series, plain):
+    folder = harness.fresh_directory("warp")
+    tomostar, xml = star_projects.write_warp(folder, series)
+    volumes = []
+    for source, options in ((tomostar, ["--thickness", THICKNESS]), (xml, [])):
+        output = os.path.join(folder, "out.mrc")
+        harness.succeed("reconstruct", source, "-o", output, "--overwrite", *QUICK, *options,
+                        cwd=folder)
+        volumes.append(harness.read_volume(output))
+    np.testing.assert_array_equal(*volumes)
+    assert agreement(volumes[0], plain.volume) > 0.97
