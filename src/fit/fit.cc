@@ -186,6 +186,11 @@ void Fit::go_on_from(Progress progress, std::unique_ptr<field::Field> field) {
   follow_tree();
 }
 
+void Fit::reread_measurement() {
+  enter_stage();
+  follow_tree();
+}
+
 double Fit::variation_gain() const { return objective::variation_gain(options_, measurement_); }
 
 std::int64_t Fit::num_epochs() const { return stages_.back().first_epoch + stages_.back().epochs; }

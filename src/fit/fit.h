@@ -77,6 +77,10 @@ class Fit {
   /// fault. The optimiser starts anew; the caller can restore its state.
   void go_on_from(Progress progress, std::unique_ptr<field::Field> field);
 
+  /// Takes over rays and tilt angles of the measurement that the caller has replaced between two
+  /// steps. Field, optimiser and models of the views stay.
+  void reread_measurement();
+
   const Progress& progress() const { return progress_; }
   /// Says whether every step is done, or the held-out error has not improved for
   /// FitOptions::patience epochs.
@@ -86,6 +90,8 @@ class Fit {
   std::int64_t num_epochs() const;
   std::int64_t num_steps() const { return num_epochs() * steps_per_epoch(); }
   const std::vector<Stage>& stages() const { return stages_; }
+  /// Returns the stage of the next step.
+  const Stage& stage() const { return stage_at(progress_.step); }
   /// Returns the estimated work of the first `steps` steps, in steps of the last stage
   /// (Stage::step_cost).
   double work(std::int64_t steps) const;
@@ -134,7 +140,6 @@ class Fit {
   void score_held_out();
   std::vector<int> views_of_step(std::int64_t step) const;
   double learning_rate(std::int64_t step) const;
-  const Stage& stage() const { return stage_at(progress_.step); }
   const Stage& stage_at(std::int64_t step) const;
   measurement::RowShare share_of_stage() const;
   void enter_stage();

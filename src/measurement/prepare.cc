@@ -14,6 +14,7 @@
 #include "base/parallel.h"
 #include "base/trace.h"
 #include "measurement/read_rays.h"
+#include "tilt_series/align_image.h"
 #include "tilt_series/view_owner.h"
 #include "tilt_series/views_at_once.h"
 #include "tomofield/error.h"
@@ -124,6 +125,7 @@ ViewBrightness view_brightness(std::span<const float> image, std::span<const std
 
 // Measures the brightness of every view; each process measures the views that it owns.
 std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& series,
+                                                const ReadView& read_view,
                                                 const SlabViews::Shape& shape,
                                                 const distributed::Communicator& processes) {
   const base::TraceSpan span("measure brightness");
@@ -134,7 +136,7 @@ std::vector<ViewBrightness> brightness_of_views(const tilt_series::TiltSeries& s
   const auto measure = [&](std::size_t view) {
     std::vector<float> image(pixels);
     std::vector<std::uint8_t> valid(pixels);
-    series.read_view(view, image, valid);
+    read_view(view, image, valid);
     views[view] =
         view_brightness(std::span(image).subspan(first, count),
                         std::span(valid).subspan(first, count), series.noise_sigma()[view]);
@@ -172,6 +174,11 @@ void set_unit(const std::vector<ViewBrightness>& views, double background, Measu
     prepared.background = background / prepared.unit;
 }
 
+void set_noise(const tilt_series::TiltSeries& series, Measurement& prepared) {
+  for (const double sigma : series.noise_sigma())
+    prepared.noise_sigma.push_back(sigma / prepared.unit);
+}
+
 // Returns the discs of undecided beads of each view, with y from the first row that is fitted; none
 // if there are no such beads.
 std::vector<std::vector<tilt_series::MaskDisc>> undecided_discs(
@@ -181,6 +188,31 @@ std::vector<std::vector<tilt_series::MaskDisc>> undecided_discs(
   for (auto& of_view : discs)
     for (tilt_series::MaskDisc& disc : of_view) disc.y_px -= static_cast<double>(shape.first_row);
   return discs;
+}
+
+// Returns a function that reads views as recorded and resamples them to aligned ones.
+ReadView aligning(const tilt_series::TiltSeries& recorded,
+                  std::span<const geometry::ViewCorrection> corrections) {
+  return [&recorded, corrections](std::size_t view, std::span<float> image,
+                                  std::span<std::uint8_t> valid) {
+    tilt_series::MaskedImage raw(recorded.width(), recorded.height());
+    recorded.read_view(view, raw.values, raw.valid);
+    const geometry::RawFromAligned transform = geometry::corrected(
+        recorded.raw_from_aligned(view), corrections[view].binned(recorded.bin_factor()));
+    const tilt_series::MaskedImage aligned = tilt_series::align_image(
+        raw, transform, recorded.aligned_width(), recorded.aligned_height());
+    std::ranges::copy(aligned.values, image.begin());
+    std::ranges::copy(aligned.valid, valid.begin());
+  };
+}
+
+// Returns the tilt angles of the views with their corrections.
+std::vector<double> corrected_tilts(const tilt_series::TiltSeries& recorded,
+                                    std::span<const geometry::ViewCorrection> corrections) {
+  std::vector<double> tilts;
+  for (std::size_t view = 0; view < corrections.size(); ++view)
+    tilts.push_back(recorded.views()[view].tilt_deg + corrections[view].tilt_deg);
+  return tilts;
 }
 
 void log_masks(const Measurement& prepared) {
@@ -263,9 +295,12 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
                                 const distributed::Communicator& processes) {
   Measurement prepared = plan_measurement(series, specimen);
   const SlabViews::Shape shape = prepared.rays_shape();
-  set_unit(brightness_of_views(series, shape, processes), series.background(), prepared);
-  for (const double sigma : series.noise_sigma())
-    prepared.noise_sigma.push_back(sigma / prepared.unit);
+  const ReadView read_view = [&](std::size_t view, std::span<float> image,
+                                 std::span<std::uint8_t> valid) {
+    series.read_view(view, image, valid);
+  };
+  set_unit(brightness_of_views(series, read_view, shape, processes), series.background(), prepared);
+  set_noise(series, prepared);
   prepared.rays = read_rays(
       series, {shape, prepared.unit, band_rows, scratch_dir},
       [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
@@ -278,6 +313,34 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
   prepared.masked_part = prepared.rays->masked_parts(processes);
   log_masks(prepared);
   return prepared;
+}
+
+Measurement prepare_realigned(const tilt_series::TiltSeries& recorded,
+                              std::span<const geometry::ViewCorrection> corrections,
+                              const SpecimenOptions& specimen,
+                              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
+                              const distributed::Communicator& processes) {
+  Measurement prepared = plan_measurement(recorded, specimen);
+  prepared.x_tilt_deg = common_x_tilt(recorded.views(), prepared.geometry.thickness);
+  prepared.ray_geometry.reset();
+  const ReadView read_view = aligning(recorded, corrections);
+  const SlabViews::Shape shape = prepared.rays_shape();
+  set_unit(brightness_of_views(recorded, read_view, shape, processes), recorded.background(),
+           prepared);
+  set_noise(recorded, prepared);
+  realign(recorded, corrections, scratch_dir, band_rows, processes, prepared);
+  return prepared;
+}
+
+void realign(const tilt_series::TiltSeries& recorded,
+             std::span<const geometry::ViewCorrection> corrections,
+             const std::filesystem::path& scratch_dir, std::int64_t band_rows,
+             const distributed::Communicator& processes, Measurement& measurement) {
+  measurement.rays.reset();  // its successor needs the memory
+  measurement.rays =
+      read_rays(recorded, {measurement.rays_shape(), measurement.unit, band_rows, scratch_dir},
+                aligning(recorded, corrections), processes);
+  measurement.geometry.tilt_deg = corrected_tilts(recorded, corrections);
 }
 
 }  // namespace tomofield::measurement

@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "distributed/communicator.h"
 #include "geometry/tilt_geometry.h"
+#include "geometry/view_correction.h"
 #include "measurement/measurement.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
@@ -52,5 +54,19 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
                                 const SpecimenOptions& specimen,
                                 const std::filesystem::path& scratch_dir, std::int64_t band_rows,
                                 const distributed::Communicator& processes);
+
+/// Prepares a series that is not resampled as if its views were aligned, each with a correction of
+/// its alignment. The stored pixels of the views stay.
+Measurement prepare_realigned(const tilt_series::TiltSeries& recorded,
+                              std::span<const geometry::ViewCorrection> corrections,
+                              const SpecimenOptions& specimen,
+                              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
+                              const distributed::Communicator& processes);
+
+/// Reads the rays of such a measurement anew with other corrections. The density unit stays.
+void realign(const tilt_series::TiltSeries& recorded,
+             std::span<const geometry::ViewCorrection> corrections,
+             const std::filesystem::path& scratch_dir, std::int64_t band_rows,
+             const distributed::Communicator& processes, Measurement& measurement);
 
 }  // namespace tomofield::measurement

@@ -1,0 +1,236 @@
+#include "align/joint_alignment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "align/gauge.h"
+#include "align/slow_modes.h"
+#include "base/log.h"
+#include "base/parallel.h"
+#include "base/stopwatch.h"
+#include "base/trace.h"
+#include "fit/fit.h"
+
+namespace tomofield::align {
+namespace {
+
+using geometry::ViewCorrection;
+
+// Predicted views take at most this memory together.
+constexpr std::size_t kPredictionBytes = std::size_t{1} << 30;
+
+// A registration to a field that was fitted to the view itself finds a part of the displacement.
+constexpr double kRelaxation = 1.3;
+// A shift changes by at most so many pixels of the stage at once.
+constexpr double kLongestStep = 2.0;
+// The first epochs of a fit show too little of the specimen.
+constexpr std::int64_t kEpochsBefore = 2;
+// Rotations and magnifications are looked for in pixels at most this many times as wide.
+constexpr int kFreedomBin = 2;
+constexpr double kSure = 3.0;  // standard errors by which a freedom must pay
+
+constexpr int kCoarseEpochs = 80, kFineEpochs = 4;
+// A stiff field explains less of wrong shifts.
+constexpr double kStiffness = 2.0;
+
+fit::FieldOptions field_of(fit::FieldOptions field) {
+  field.kind = FieldKind::kGrid;
+  field.tree = TreeKind::kUniform;
+  field.vertex_spacing = std::max(field.vertex_spacing, 1.0);
+  field.leaf_size = fit::usual_leaf_size(field);
+  field.depth = fit::usual_depth(field);
+  return field;
+}
+
+fit::FitOptions schedule(std::uint64_t seed) {
+  fit::FitOptions options;
+  options.seed = seed;
+  options.penalty = Penalty::kSmooth;
+  options.density_variation = kStiffness * objective::usual_variation(options.penalty);
+  options.learning_rate = 0.035;
+  options.coarse_epochs = kCoarseEpochs;
+  options.epochs = kFineEpochs;
+  options.fit_noise = false;
+  return options;
+}
+
+// A fit and the corrections of the views that it is made with.
+class AligningFit {
+ public:
+  AligningFit(const JointProblem& problem, std::vector<ViewCorrection> start,
+              const distributed::Communicator& processes)
+      : problem_(problem),
+        processes_(processes),
+        field_(field_of(problem.field)),
+        measurement_(measurement::prepare_realigned(problem.recorded, start, problem.specimen,
+                                                    problem.scratch_dir, fit::band_rows(field_),
+                                                    processes)),
+        fit_(measurement_, field_, schedule(problem.seed), processes) {
+    found_.agreement.resize(start.size());
+    found_.corrections = std::move(start);
+  }
+
+  JointAlignment run() {
+    const base::Stopwatch running;
+    while (!fit_.is_done()) {
+      const fit::Stage stage = fit_.stage();
+      take_epoch();
+      if (problem_.progress) problem_.progress(report(running.seconds()));
+      const std::int64_t epochs = fit_.progress().step / fit_.steps_per_epoch();
+      const bool is_last = epochs == stage.first_epoch + stage.epochs;
+      if (epochs > kEpochsBefore && (!is_last || fit_.is_done())) update(stage);
+    }
+    return std::move(found_);
+  }
+
+ private:
+  void take_epoch() {
+    fit_.run([](const fit::Fit& fit) { return fit.progress().step % fit.steps_per_epoch() != 0; });
+  }
+
+  base::ProgressReport report(double seconds) const {
+    const double part = fit_.work(fit_.progress().step) / fit_.work(fit_.num_steps());
+    return {.fraction_done = part,
+            .seconds_elapsed = seconds,
+            .seconds_left = (1 - part) / part * seconds,
+            .detail = found_.steps_px.empty()
+                          ? ""
+                          : fmt::format("last step {:.3f} px", found_.steps_px.back())};
+  }
+
+  // Registers every view and goes on with the corrected ones.
+  void update(const fit::Stage& stage) {
+    const base::TraceSpan span("register views");
+    std::vector<ViewCorrection> steps = limited(register_views(stage), stage);
+    std::vector<ViewCorrection> next = found_.corrections;
+    for (std::size_t v = 0; v < next.size(); ++v) next[v] = next[v].then(steps[v]);
+    remove_gauge(measurement_.geometry, next);
+    found_.steps_px.push_back(rms_change(found_.corrections, next));
+    found_.corrections = std::move(next);
+    measurement::realign(problem_.recorded, found_.corrections, problem_.scratch_dir,
+                         fit::band_rows(field_), processes_, measurement_);
+    fit_.reread_measurement();
+  }
+
+  static double rms_change(const std::vector<ViewCorrection>& from,
+                           const std::vector<ViewCorrection>& to) {
+    double squares = 0.0;
+    for (std::size_t v = 0; v < from.size(); ++v)
+      squares += std::pow(to[v].shift_x_px - from[v].shift_x_px, 2) +
+                 std::pow(to[v].shift_y_px - from[v].shift_y_px, 2);
+    return std::sqrt(squares / 2 / static_cast<double>(from.size()));
+  }
+
+  // Returns the steps that are taken for what the registrations found.
+  std::vector<ViewCorrection> limited(std::vector<ViewCorrection> steps,
+                                      const fit::Stage& stage) const {
+    std::vector<std::size_t> by_tilt(steps.size());
+    std::iota(by_tilt.begin(), by_tilt.end(), std::size_t{0});
+    std::ranges::stable_sort(
+        by_tilt, {}, [&](std::size_t view) { return measurement_.geometry.tilt_deg[view]; });
+    std::vector<double> shifts;
+    for (const std::size_t view : by_tilt) shifts.push_back(steps[view].shift_x_px);
+    amplify_slow_modes(shifts);
+    for (std::size_t i = 0; i < by_tilt.size(); ++i) steps[by_tilt[i]].shift_x_px = shifts[i];
+    const double most = kLongestStep * stage.bin * measurement_.bin_factor;
+    for (ViewCorrection& step : steps) {
+      for (double* shift : {&step.shift_x_px, &step.shift_y_px})
+        *shift = std::clamp(kRelaxation * *shift, -most, most);
+      step.rotation_rad *= kRelaxation;
+      step.log_magnification *= kRelaxation;
+    }
+    return steps;
+  }
+
+  // Predicts all views, some at a time, and returns what the registration to the predictions finds.
+  std::vector<ViewCorrection> register_views(const fit::Stage& stage) {
+    std::vector<std::optional<Registration>> registrations(found_.corrections.size());
+    const auto num_views = static_cast<int>(registrations.size());
+    const int at_once = views_at_once(stage);
+    for (int first = 0; first < num_views; first += at_once) {
+      std::vector<int> views(static_cast<std::size_t>(std::min(at_once, num_views - first)));
+      std::iota(views.begin(), views.end(), first);
+      const auto predicted = fit_.predict(views, std::vector<measurement::ViewModel>(views.size()));
+      base::parallel_for("register views", std::ssize(views), [&](std::int64_t i) {
+        const auto at = static_cast<std::size_t>(i);
+        registrations[static_cast<std::size_t>(views[at])].emplace(pair_of(predicted[at], stage),
+                                                                   RegistrationOptions{});
+      });
+    }
+    if (stage.bin <= kFreedomBin) open_freedoms(registrations);
+    std::vector<ViewCorrection> steps;
+    for (std::size_t v = 0; v < registrations.size(); ++v) {
+      const Registration& registration = *registrations[v];
+      steps.push_back(registration.solve(found_.freedoms));
+      found_.agreement[v] = {registration.correlation(), registration.shift_error(found_.freedoms)};
+    }
+    return steps;
+  }
+
+  int views_at_once(const fit::Stage& stage) const {
+    const auto pixels =
+        static_cast<std::size_t>(measurement_.geometry.width * measurement_.rays_shape().num_rows) /
+        static_cast<std::size_t>(stage.bin * stage.bin);
+    return static_cast<int>(
+        std::clamp<std::size_t>(kPredictionBytes / (8 * pixels + 1), 1, found_.corrections.size()));
+  }
+
+  // Opens each freedom that predicts pixels better which did not decide about it.
+  void open_freedoms(const std::vector<std::optional<Registration>>& registrations) {
+    for (bool Freedoms::*freedom : {&Freedoms::rotation, &Freedoms::magnification}) {
+      Freedoms with = found_.freedoms;
+      with.*freedom = true;
+      if (with == found_.freedoms) continue;
+      if (pays(registrations, found_.freedoms, with)) found_.freedoms = with;
+    }
+  }
+
+  // Says whether the error of the views falls by more than three standard errors. One is too few,
+  // because the question comes up at every update.
+  static bool pays(const std::vector<std::optional<Registration>>& registrations,
+                   const Freedoms& without, const Freedoms& with) {
+    double n = 0, sum = 0, squares = 0;
+    for (const auto& registration : registrations) {
+      const double before = registration->predicted_error(without);
+      if (before <= 0.0) continue;
+      const double gain = 1.0 - registration->predicted_error(with) / before;
+      n += 1, sum += gain, squares += gain * gain;
+    }
+    const double mean = sum / std::max(n, 1.0);
+    const double variance = squares / std::max(n, 1.0) - mean * mean;
+    return n > 1 && mean > kSure * std::sqrt(std::max(variance, 0.0) / (n - 1));
+  }
+
+  ImagePair pair_of(const measurement::PredictedView& view, const fit::Stage& stage) const {
+    const double bin = stage.bin;
+    const auto first_row = static_cast<double>(measurement_.rays_shape().first_row);
+    return {.width = view.width,
+            .height = view.height,
+            .pixel = bin * measurement_.bin_factor,
+            .centre_x = static_cast<double>(measurement_.geometry.width) / 2 / bin,
+            .centre_y = (static_cast<double>(measurement_.geometry.height) / 2 - first_row) / bin,
+            .measured = view.measured,
+            .predicted = view.predicted};
+  }
+
+  const JointProblem& problem_;
+  const distributed::Communicator& processes_;
+  fit::FieldOptions field_;
+  measurement::Measurement measurement_;
+  fit::Fit fit_;
+  JointAlignment found_;
+};
+
+}  // namespace
+
+JointAlignment align_jointly(const JointProblem& problem, std::vector<ViewCorrection> start,
+                             const distributed::Communicator& processes) {
+  return AligningFit(problem, std::move(start), processes).run();
+}
+
+}  // namespace tomofield::align

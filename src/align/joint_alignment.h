@@ -1,0 +1,54 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "align/registration.h"
+#include "base/progress.h"
+#include "distributed/communicator.h"
+#include "fit/options.h"
+#include "geometry/view_correction.h"
+#include "measurement/prepare.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::align {
+
+/// Describes how well a view agrees with the projection of the field that it was registered to
+/// last.
+struct ViewAgreement {
+  double correlation = 0.0;  ///< of both images, without trends
+  /// Standard error of the shift in x and y, in pixels before binning.
+  std::array<double, 2> error_px{};
+};
+
+/// Holds what a joint alignment finds.
+struct JointAlignment {
+  std::vector<geometry::ViewCorrection> corrections;  ///< [view]
+  std::vector<ViewAgreement> agreement;               ///< [view]
+  Freedoms freedoms;  ///< those that made the prediction of pixels better
+  /// Root mean square of the change of the shifts in each update, in pixels before binning.
+  std::vector<double> steps_px;
+};
+
+/// Describes the specimen and the field of a joint alignment.
+struct JointProblem {
+  const tilt_series::TiltSeries& recorded;  ///< views that are not resampled, and keep their pixels
+  const measurement::SpecimenOptions& specimen;
+  fit::FieldOptions field;  ///< its kind is replaced by plain vertices
+  std::uint64_t seed = 1;
+  const std::filesystem::path& scratch_dir;
+  const base::ProgressSink& progress;
+};
+
+/// Aligns the views of a series with the projections of a field while the field is being fitted to
+/// them, from coarse to fine. After each epoch the field predicts all views. Each view is
+/// registered to its prediction (registration.h) and resampled anew from the recorded one. The part
+/// that the views cannot tell is removed (gauge.h), and the fit goes on. `start` are the
+/// corrections to begin with. Every process calls it and gets the same.
+JointAlignment align_jointly(const JointProblem& problem,
+                             std::vector<geometry::ViewCorrection> start,
+                             const distributed::Communicator& processes);
+
+}  // namespace tomofield::align
