@@ -28,6 +28,7 @@ struct SimulateArguments {
   std::optional<double> gain_spread;
   std::optional<std::int64_t> num_beads;
   double gold_diameter_A = 100.0;
+  double magnification_percent = 0.0;
   bool without_truth = false;
   bool overwrite = false;
 };
@@ -88,7 +89,7 @@ std::string how_to_reconstruct(const std::filesystem::path& directory,
       "reconstruct it with: tomofield reconstruct {} --tlt {}{} --thickness {} --contrast {}{} -o "
       "{}",
       file("tilt_series.mrc"), file("tilt_series.tlt"),
-      options.shift_spread_px > 0 ? " --xf " + file("tilt_series.xf") : "",
+      options.misalignment.is_none() ? "" : " --xf " + file("tilt_series.xf"),
       options.cell.thickness_px, options.contrast == Contrast::kDark ? "dark" : "bright", more,
       file("tomogram.mrc"));
 }
@@ -101,6 +102,7 @@ void run_simulate(SimulateArguments& arguments) {
   options.contrast = resolve_contrast(arguments);
   options.noise = arguments.noise.value_or(options.noise);
   options.write_truth = !arguments.without_truth;
+  options.misalignment.magnification_spread = arguments.magnification_percent / 100.0;
   options.cell.bead_diameter_px = arguments.gold_diameter_A / options.voxel_size_A;
   const auto summary = simulate::simulate_series(arguments.directory, options, arguments.overwrite);
   std::string line = fmt::format("{} ellipsoids", summary.num_ellipsoids);
@@ -114,6 +116,32 @@ void run_simulate(SimulateArguments& arguments) {
                         options.reference_has_beads ? "" : " without gold", summary.truth->max,
                         summary.truth->mean);
   print("{}\n{}\n", line, how_to_reconstruct(arguments.directory, options));
+}
+
+void add_misalignment_options(CLI::App& command, SimulateArguments& arguments) {
+  simulate::Misalignment& misalignment = arguments.options.misalignment;
+  command
+      .add_option("--misalign", misalignment.shift_spread_px,
+                  "Standard deviation in pixels of each view's random shift in x and in y; an .xf "
+                  "file undoes it and the next three options")
+      ->capture_default_str();
+  command
+      .add_option("--misalign-rotation", misalignment.rotation_spread_deg,
+                  "Standard deviation in degrees of each view's random rotation in the plane")
+      ->capture_default_str();
+  command
+      .add_option("--misalign-magnification", arguments.magnification_percent,
+                  "Standard deviation in percent of each view's random magnification")
+      ->capture_default_str();
+  command
+      .add_option("--misalign-axis", misalignment.axis_deg,
+                  "Rotation in degrees, counter-clockwise, of the tilt axis in all views")
+      ->capture_default_str();
+  command
+      .add_option("--misalign-local", misalignment.local_px,
+                  "Rms displacement in pixels by a smooth random warp of each view, which changes "
+                  "slowly from view to view")
+      ->capture_default_str();
 }
 
 }  // namespace
@@ -164,11 +192,7 @@ void add_simulate_command(CLI::App& program) {
       "--gain", arguments->gain_spread,
       "Standard deviation of the logarithm of each view's random scale (default: 0; "
       "with --yardstick c 0.03)");
-  command
-      ->add_option(
-          "--shifts", options.shift_spread_px,
-          "Standard deviation of each view's random shift in pixels; an .xf file undoes it")
-      ->capture_default_str();
+  add_misalignment_options(*command, *arguments);
   command->add_option(
       "--gold", arguments->num_beads,
       "Number of gold beads in the field of view (default: 0; with --yardstick c 12 "

@@ -30,10 +30,10 @@ double quadrature(const Phantom& phantom, const ViewFrame& view, std::int64_t co
                   std::int64_t row) {
   constexpr int kSteps = 4000;
   const double tilt = view.tilt_deg * std::numbers::pi / 180.0;
-  const double u =
-      static_cast<double>(column) + 0.5 - static_cast<double>(view.width) / 2.0 - view.shift_x_px;
-  const double y =
-      static_cast<double>(row) + 0.5 - static_cast<double>(view.height) / 2.0 - view.shift_y_px;
+  const double u = static_cast<double>(column) + 0.5 - static_cast<double>(view.width) / 2.0 -
+                   view.raw_from_aligned.shift_x_px;
+  const double y = static_cast<double>(row) + 0.5 - static_cast<double>(view.height) / 2.0 -
+                   view.raw_from_aligned.shift_y_px;
   const double length = static_cast<double>(phantom.shape.nz) / std::cos(tilt);
   const double start = -length / 2.0 - u * std::tan(tilt);
   double sum = 0.0;
@@ -48,8 +48,10 @@ double quadrature(const Phantom& phantom, const ViewFrame& view, std::int64_t co
 TEST(Blob, LineIntegralsMatchQuadrature) {
   const Phantom phantom = blobs_in_a_slab();
   for (const double tilt_deg : {0.0, -33.3, 60.0}) {
-    const ViewFrame view{
-        .width = 40, .height = 36, .tilt_deg = tilt_deg, .shift_x_px = 1.3, .shift_y_px = -0.4};
+    const ViewFrame view{.width = 40,
+                         .height = 36,
+                         .tilt_deg = tilt_deg,
+                         .raw_from_aligned = {.shift_x_px = 1.3, .shift_y_px = -0.4}};
     std::vector<float> image(40 * 36);
     project_view(phantom, view, image);
     for (std::int64_t row = 0; row < 36; row += 5) {
@@ -64,7 +66,8 @@ TEST(Blob, LineIntegralsMatchQuadrature) {
 
 TEST(Blob, BandsOfRowsGiveTheSameBits) {
   const Phantom phantom = blobs_in_a_slab();
-  const ViewFrame view{.width = 40, .height = 36, .tilt_deg = 21.0, .shift_y_px = 0.1};
+  const ViewFrame view{
+      .width = 40, .height = 36, .tilt_deg = 21.0, .raw_from_aligned = {.shift_y_px = 0.1}};
   std::vector<float> whole(40 * 36), bands(40 * 36);
   project_rows(phantom, view, 0, 36, whole);
   for (std::int64_t row = 0; row < 36; row += 7) {

@@ -22,10 +22,10 @@ CellOptions small_cell(bool is_extended) {
 double quadrature(const Phantom& phantom, const ViewFrame& view, std::int64_t column,
                   std::int64_t row, double step) {
   const double tilt = view.tilt_deg * std::numbers::pi / 180.0;
-  const double u =
-      static_cast<double>(column) + 0.5 - static_cast<double>(view.width) / 2.0 - view.shift_x_px;
-  const double y =
-      static_cast<double>(row) + 0.5 - static_cast<double>(view.height) / 2.0 - view.shift_y_px;
+  const double u = static_cast<double>(column) + 0.5 - static_cast<double>(view.width) / 2.0 -
+                   view.raw_from_aligned.shift_x_px;
+  const double y = static_cast<double>(row) + 0.5 - static_cast<double>(view.height) / 2.0 -
+                   view.raw_from_aligned.shift_y_px;
   double sum = 0.0;
   const double reach = 75.0;
   for (double t = -reach + step / 2.0; t < reach; t += step) {
@@ -43,8 +43,10 @@ TEST(ProjectPhantom, LineIntegralsMatchQuadrature) {
     const Phantom phantom = make_cell_phantom(options);
     ASSERT_GT(phantom.bodies.size(), 20u);
     for (const double tilt_deg : {0.0, -33.3, 45.0, 60.0}) {
-      const ViewFrame view{
-          .width = 48, .height = 48, .tilt_deg = tilt_deg, .shift_x_px = 2.3, .shift_y_px = -1.4};
+      const ViewFrame view{.width = 48,
+                           .height = 48,
+                           .tilt_deg = tilt_deg,
+                           .raw_from_aligned = {.shift_x_px = 2.3, .shift_y_px = -1.4}};
       std::vector<float> image(48 * 48);
       project_view(phantom, view, image);
       for (std::int64_t row = 1; row < 48; row += 9) {

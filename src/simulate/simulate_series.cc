@@ -6,11 +6,13 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "base/percentile.h"
+#include "geometry/imod_transform.h"
 #include "io/atomic_file.h"
 #include "io/json.h"
 #include "io/mrc.h"
@@ -97,8 +99,8 @@ ViewFrame frame_of(const SimulatedView& view, const Phantom& phantom) {
   return {.width = phantom.shape.nx,
           .height = phantom.shape.ny,
           .tilt_deg = view.tilt_deg,
-          .shift_x_px = view.shift_x_px,
-          .shift_y_px = view.shift_y_px};
+          .raw_from_aligned = view.raw_from_aligned,
+          .warp = view.warp};
 }
 
 // Returns the standard deviation of the noise in data units (SimulationOptions::noise).
@@ -148,13 +150,14 @@ void write_angles(const fs::path& path, const std::vector<SimulatedView>& views)
   io::write_text_file(path, text);
 }
 
-// Writes the transforms that align the series: each moves the image back by the shift of the
-// specimen. Both images have the same size, hence the same centre.
+// Writes the transforms that undo the misalignment except for local motion. Adding 0 drops the sign
+// of −0.
 void write_transforms(const fs::path& path, const std::vector<SimulatedView>& views) {
   std::string text;
   for (const SimulatedView& view : views) {
-    text += fmt::format("{:12.7f}{:12.7f}{:12.7f}{:12.7f}{:12.3f}{:12.3f}\n", 1.0, 0.0, 0.0, 1.0,
-                        -view.shift_x_px, -view.shift_y_px);
+    const io::ImodTransform t = geometry::invert(view.raw_from_aligned);
+    text += fmt::format("{:12.7f}{:12.7f}{:12.7f}{:12.7f}{:12.3f}{:12.3f}\n", t.a11, t.a12 + 0.0,
+                        t.a21 + 0.0, t.a22, t.shift_x_px, t.shift_y_px);
   }
   io::write_text_file(path, text);
 }
@@ -172,10 +175,17 @@ Json options_json(const SimulationOptions& options) {
       {"voxel_size_A", options.voxel_size_A},
       {"contrast", options.contrast == Contrast::kDark ? "dark" : "bright"},
       {"gain_spread", options.gain_spread},
-      {"shift_spread_px", options.shift_spread_px},
+      {"shift_spread_px", options.misalignment.shift_spread_px},
       {"gold_beads", cell.num_beads},
       {"gold_diameter_px", cell.bead_diameter_px},
       {"gold_density", cell.bead_density}};
+  const Misalignment& misalignment = options.misalignment;
+  if (misalignment.turns_or_scales()) {
+    json["rotation_spread_deg"] = misalignment.rotation_spread_deg;
+    json["magnification_spread"] = misalignment.magnification_spread;
+    json["axis_deg"] = misalignment.axis_deg;
+  }
+  if (misalignment.local_px > 0.0) json["local_px"] = misalignment.local_px;
   if (cell.content == Content::kTextured) json["content"] = "textured";
   if (!options.reference_has_beads) json["reference_has_gold"] = false;
   if (options.dose) {
@@ -208,6 +218,27 @@ Json blobs_json(const std::vector<Blob>& blobs) {
   return rows;
 }
 
+// Returns the record of a view. Rotation and magnification appear if the series has any.
+Json view_json(const SimulatedView& view, const Misalignment& misalignment) {
+  const geometry::RawFromAligned& map = view.raw_from_aligned;
+  Json json{{"tilt_deg", view.tilt_deg},
+            {"shift_px", {map.shift_x_px, map.shift_y_px}},
+            {"gain", view.gain}};
+  if (misalignment.turns_or_scales()) {
+    json["rotation_deg"] =
+        std::atan2(map.m21 - map.m12, map.m11 + map.m22) * 180.0 / std::numbers::pi;
+    json["magnification"] = std::sqrt(map.m11 * map.m22 - map.m12 * map.m21);
+  }
+  if (view.warp) {
+    json["local_px"] = Json::array();
+    for (std::size_t node = 0; node < view.warp->nodes.size(); ++node) {
+      if (node % ViewWarp::kNodes == 0) json["local_px"].push_back(Json::array());
+      json["local_px"].back().push_back(view.warp->nodes[node]);
+    }
+  }
+  return json;
+}
+
 // Returns the record beside the series: the options, the views, and every body, with doubles that
 // read back exactly. Positions and lengths are voxels relative to the volume's centre, (X, Y, Z).
 nlohmann::json phantom_json(const SimulationOptions& options, const Phantom& phantom,
@@ -223,11 +254,8 @@ nlohmann::json phantom_json(const SimulationOptions& options, const Phantom& pha
         {"min", summary.truth->min}, {"max", summary.truth->max}, {"mean", summary.truth->mean}};
   }
   json["views"] = Json::array();
-  for (const SimulatedView& view : views) {
-    json["views"].push_back({{"tilt_deg", view.tilt_deg},
-                             {"shift_px", {view.shift_x_px, view.shift_y_px}},
-                             {"gain", view.gain}});
-  }
+  for (const SimulatedView& view : views)
+    json["views"].push_back(view_json(view, options.misalignment));
   json["ellipsoids"] = Json::array();
   json["gold_beads"] = Json::array();
   const std::size_t num_ellipsoids =
@@ -276,10 +304,10 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
     results.remove_old(files.truth);
   write_views(files, phantom, views, options, summary.sigma);
   write_angles(files.angles, views);
-  if (options.shift_spread_px > 0.0)
-    write_transforms(files.transforms, views);
-  else
+  if (options.misalignment.is_none())
     results.remove_old(files.transforms);
+  else
+    write_transforms(files.transforms, views);
   io::write_json(files.record, phantom_json(options, phantom, views, summary));
   results.commit();
   return summary;

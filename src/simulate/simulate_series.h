@@ -29,7 +29,7 @@ struct SimulationSummary {
 ///   truth.mrc        thickness × size × size, the density, high = dense; with or without gold
 ///                    beads (SimulationOptions::reference_has_beads)
 ///   tilt_series.tlt  the true angles
-///   tilt_series.xf   only with shifts: transforms that align the series
+///   tilt_series.xf   only with misalignment: transforms that undo all of it but local motion
 ///   phantom.json     options, views and every ellipsoid, blob and bead
 ///
 /// With bright contrast, the views are line integrals in voxels. It keeps one view, or a few

@@ -12,7 +12,6 @@ namespace tomofield::simulate {
 namespace {
 
 constexpr std::uint64_t kGainStream = 3;
-constexpr std::uint64_t kShiftStream = 4;
 constexpr double kMaxTilt_deg = 80.0;
 constexpr std::int64_t kMaxSize_px = 32768;
 constexpr std::int64_t kMaxViews = 10000;
@@ -80,8 +79,18 @@ std::vector<std::string> SimulationOptions::validate() const {
           "above 0 electrons per pixel and view, and at most 1e9");
   require(is_positive(absorption_per_A), "the absorption", absorption_per_A, "above 0 per Å");
   require(is_spread(gain_spread, 2.0), "the gain's spread", gain_spread, "0 to 2");
-  require(is_spread(shift_spread_px, static_cast<double>(cell.size_px) / 4.0), "the shifts' spread",
-          shift_spread_px, "0 to a quarter of the size");
+  const auto size = static_cast<double>(cell.size_px);
+  const Misalignment& m = misalignment;
+  require(is_spread(m.shift_spread_px, size / 4.0), "the shifts' spread", m.shift_spread_px,
+          "0 to a quarter of the size");
+  require(is_spread(m.rotation_spread_deg, 20.0), "the rotations' spread", m.rotation_spread_deg,
+          "0 to 20 degrees");
+  require(is_spread(m.magnification_spread, 0.2), "the magnifications' spread",
+          100.0 * m.magnification_spread, "0 to 20 percent");
+  require(std::abs(m.axis_deg) <= 180.0, "the rotation of the tilt axis", m.axis_deg,
+          "-180 to 180 degrees");
+  require(is_spread(m.local_px, size / 20.0), "the local motion", m.local_px,
+          "0 to a twentieth of the size");
   require(cell.num_beads >= 0 && cell.num_beads <= 100000, "the number of gold beads",
           static_cast<double>(cell.num_beads), "0 to 100000");
   if (cell.num_beads > 0) {
@@ -98,16 +107,18 @@ std::vector<std::string> SimulationOptions::validate() const {
 
 std::vector<SimulatedView> plan_views(const SimulationOptions& options) {
   base::Random gains(options.cell.seed, kGainStream);
-  base::Random shifts(options.cell.seed, kShiftStream);
-  const auto draw_shift = [&] {
-    return std::round(options.shift_spread_px * shifts.normal() * 1000.0) / 1000.0;
-  };
   std::vector<SimulatedView> views(static_cast<std::size_t>(count_views(options.tilts)));
+  const std::uint64_t seed = options.cell.seed;
+  const auto maps = draw_maps(options.misalignment, seed, views.size());
+  std::vector<ViewWarp> warps;
+  if (options.misalignment.local_px > 0.0)
+    warps = draw_warps(options.misalignment.local_px, static_cast<double>(options.cell.size_px),
+                       seed, views.size());
   for (std::size_t i = 0; i < views.size(); ++i) {
     views[i].tilt_deg = options.tilts.first_deg + options.tilts.step_deg * static_cast<double>(i);
     views[i].gain = std::exp(options.gain_spread * gains.normal());
-    views[i].shift_x_px = draw_shift();
-    views[i].shift_y_px = draw_shift();
+    views[i].raw_from_aligned = maps[i];
+    if (!warps.empty()) views[i].warp = warps[i];
   }
   return views;
 }

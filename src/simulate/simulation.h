@@ -8,7 +8,10 @@
 #include <vector>
 
 #include "base/enum_names.h"
+#include "geometry/raw_from_aligned.h"
+#include "simulate/misalignment.h"
 #include "simulate/phantom.h"
+#include "simulate/view_warp.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::simulate {
@@ -46,8 +49,8 @@ struct SimulationOptions {
   /// True if the gold beads belong to what is measured: truth.mrc shows them, and the range that
   /// `noise` refers to includes them.
   bool reference_has_beads = true;
-  double gain_spread = 0.0;      ///< standard deviation of the logarithm of each view's scale
-  double shift_spread_px = 0.0;  ///< standard deviation of each view's shift, in x and in y
+  double gain_spread = 0.0;  ///< standard deviation of the logarithm of each view's scale
+  Misalignment misalignment;
   Contrast contrast = Contrast::kBright;
   bool write_truth = true;
 
@@ -61,15 +64,15 @@ struct SimulationOptions {
 /// them. It leaves noise, seed and all else as they are.
 void apply_yardstick(Yardstick yardstick, SimulationOptions& options);
 
-/// Holds the tilt, the shift and the gain of a simulated view.
+/// Holds the tilt, the alignment and the gain of a simulated view.
 struct SimulatedView {
   double tilt_deg = 0.0;
-  double shift_x_px = 0.0;  ///< of the specimen in the image; thousandths, as .xf has them
-  double shift_y_px = 0.0;
+  geometry::RawFromAligned raw_from_aligned{};
+  std::optional<ViewWarp> warp{};  ///< local motion
   double gain = 1.0;
 };
 
-/// Returns the views of a series: the tilts, and the random shifts and gains of the seed.
+/// Returns the views of a series: the tilts, and the random misalignment and gains of the seed.
 std::vector<SimulatedView> plan_views(const SimulationOptions& options);
 
 /// Converts line integrals into the intensities that a detector stores. Dark contrast without

@@ -9,6 +9,7 @@
 
 #include "base/log.h"
 #include "base/plausible.h"
+#include "geometry/imod_transform.h"
 #include "io/alignment_files.h"
 #include "io/view_table.h"
 #include "option_table/name_list.h"
@@ -29,24 +30,12 @@ struct InPlaneAlignment {
   bool swaps_sizes() const { return std::fabs(sum_sin) > std::fabs(sum_cos); }
 };
 
-RawFromAligned invert(const io::ImodTransform& t) {
-  const double determinant = t.a11 * t.a22 - t.a12 * t.a21;
-  RawFromAligned inverse;
-  inverse.m11 = t.a22 / determinant;
-  inverse.m12 = -t.a12 / determinant;
-  inverse.m21 = -t.a21 / determinant;
-  inverse.m22 = t.a11 / determinant;
-  inverse.shift_x_px = -(inverse.m11 * t.shift_x_px + inverse.m12 * t.shift_y_px);
-  inverse.shift_y_px = -(inverse.m21 * t.shift_x_px + inverse.m22 * t.shift_y_px);
-  return inverse;
-}
-
 InPlaneAlignment alignment_of_imod(const std::filesystem::path& path, const io::ImageStack& stack) {
   const auto transforms = io::read_imod_transforms(path);
   require_count(transforms.size(), path, "transforms", stack);
   InPlaneAlignment alignment;
   for (const io::ImodTransform& t : transforms) {
-    alignment.of_section.emplace_back(invert(t));
+    alignment.of_section.emplace_back(geometry::invert(t));
     // A pure rotation is R(−ROT): cos on the diagonal, +sin ROT above it.
     const double cosine = t.a11 + t.a22, sine = t.a12 - t.a21;
     const double length = std::hypot(cosine, sine);

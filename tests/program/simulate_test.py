@@ -8,6 +8,7 @@ import re
 
 import mrcfile
 import numpy as np
+import scipy.interpolate
 import scipy.ndimage
 
 import cell_reference
@@ -147,7 +148,8 @@ FILES = ["tilt_series.mrc", "clean.mrc", "truth.mrc", "tilt_series.tlt", "phanto
 
 
 def test_same_seed_same_bytes_whatever_the_threads():
-    options = [*SMALL, "--gold", 5, "--gain", 0.1, "--shifts", 2, "--dose", 50, "--gold-diameter", 40]
+    options = [*SMALL, "--gold", 5, "--gain", 0.1, "--misalign", 2, "--misalign-local", 1,
+               "--dose", 50, "--gold-diameter", 40]
     one = simulate("one", *options, threads=1)
     two = simulate("two", *options, threads=2)
     other = simulate("other", *options, "--seed", 8)
@@ -184,24 +186,83 @@ def test_dose_gives_poisson_counts_of_the_attenuated_beam():
         assert abs(deviates.var() - 1) < 5 * spread, deviates.var()
 
 
+# At this size the membranes are sampled well enough to interpolate.
+SMOOTH = ["--size", 128, "--thickness", 90, "--tilts=-60:60:10", "--extended", "--no-truth"]
+INSIDE = (slice(20, -20), slice(20, -20))
+
+
 def test_transforms_undo_the_shifts():
-    # At this size the membranes are sampled well enough to interpolate.
-    options = ["--size", 128, "--thickness", 90, "--tilts=-60:60:10", "--extended"]
-    plain = simulate("plain", *options)
-    shifted = simulate("shifted", *options, "--shifts", 3)
+    plain = simulate("plain", *SMOOTH)
+    shifted = simulate("shifted", *SMOOTH, "--misalign", 3)
     assert not os.path.exists(plain.path("tilt_series.xf"))
     transforms = np.loadtxt(shifted.path("tilt_series.xf"))
     assert transforms.shape == (13, 6) and (transforms[:, :4] == [1, 0, 0, 1]).all()
     assert abs(transforms[:, 4:]).max() > 2
     expected, moved = plain.read("clean.mrc"), shifted.read("clean.mrc")
-    inside = (slice(12, -12), slice(12, -12))
     for view, (dx, dy) in enumerate(transforms[:, 4:]):
         # raw -> aligned: X' = X + DX, so the aligned image is the raw one moved by (DX, DY)
         aligned = scipy.ndimage.shift(moved[view], (dy, dx), order=3)
-        here = np.corrcoef(aligned[inside].ravel(), expected[view][inside].ravel())[0, 1]
+        here = np.corrcoef(aligned[INSIDE].ravel(), expected[view][INSIDE].ravel())[0, 1]
         assert here > 0.99, (view, here)
         record = shifted.views[view]["shift_px"]
         np.testing.assert_allclose([-dx, -dy], record, atol=1e-9)
+
+
+def error_of(image, expected):
+    """Returns the rms error inside of the image, divided by the contrast that is expected there."""
+    return (image - expected)[INSIDE].std() / expected[INSIDE].std()
+
+
+def test_transforms_undo_rotations_and_magnifications():
+    plain = simulate("plain", *SMOOTH)
+    turned = simulate("turned", *SMOOTH, "--misalign", 2, "--misalign-rotation", 1.5,
+                      "--misalign-magnification", 1, "--misalign-axis", -4)
+    transforms = np.loadtxt(turned.path("tilt_series.xf"))
+    expected, recorded = plain.read("clean.mrc"), turned.read("clean.mrc")
+    rotations = []
+    for view, line in enumerate(transforms):
+        record = turned.views[view]
+        angle, scale = np.deg2rad(record["rotation_deg"]), record["magnification"]
+        rotations.append(record["rotation_deg"])
+        matrix = scale * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        # The record maps aligned to raw, the file raw to aligned: q = A p + (DX, DY).
+        inverse = line[:4].reshape(2, 2)
+        np.testing.assert_allclose(inverse @ matrix, np.eye(2), atol=2e-7)
+        np.testing.assert_allclose(-np.linalg.inv(inverse) @ line[4:], record["shift_px"], atol=1e-9)
+        # scipy maps indices (y, x) of the output to those of the input. The centre is 63.5.
+        back = np.linalg.inv(inverse)[::-1, ::-1]
+        offset = np.array(record["shift_px"])[::-1] + 63.5 - back @ [63.5, 63.5]
+        aligned = scipy.ndimage.affine_transform(recorded[view], back, offset, order=3)
+        assert error_of(aligned, expected[view]) < 0.1, (view, error_of(aligned, expected[view]))
+        assert error_of(recorded[view], expected[view]) > 0.2
+    assert abs(np.mean(rotations) + 4) < 1.5 and 0.5 < np.std(rotations) < 3
+
+
+def node_weights(place):
+    """Returns the weights of five nodes along a side of 128 pixels at places from its middle."""
+    nodes = np.linspace(-64, 64, 5)
+    slopes = np.gradient(np.eye(5), nodes, axis=0)  # central inside, to one side at the edges
+    return scipy.interpolate.CubicHermiteSpline(nodes, np.eye(5), slopes)(np.clip(place, -64, 64))
+
+
+def test_local_motion_is_what_the_record_says():
+    plain = simulate("plain", *SMOOTH)
+    warped = simulate("warped", *SMOOTH, "--misalign", 1, "--misalign-rotation", 1, "--misalign-local", 2)
+    transforms = np.loadtxt(warped.path("tilt_series.xf"))
+    expected, recorded = plain.read("clean.mrc"), warped.read("clean.mrc")
+    y, x = np.meshgrid(*[np.arange(128) - 63.5] * 2, indexing="ij")
+    squares = []
+    for view, (a11, a12, a21, a22, dx, dy) in enumerate(transforms):
+        qx, qy = a11 * x + a12 * y + dx, a21 * x + a22 * y + dy
+        local = np.einsum("yxr,yxc,rcd->dyx", node_weights(qy), node_weights(qx),
+                          warped.views[view]["local_px"])
+        squares.append((local**2).sum(0).mean())
+        with_local = scipy.ndimage.map_coordinates(
+            expected[view], [qy + local[1] + 63.5, qx + local[0] + 63.5], order=3)
+        without = scipy.ndimage.map_coordinates(expected[view], [qy + 63.5, qx + 63.5], order=3)
+        assert error_of(recorded[view], with_local) < 0.1, (view, error_of(recorded[view], with_local))
+        assert error_of(recorded[view], without) > 0.2, (view, error_of(recorded[view], without))
+    assert abs(np.sqrt(np.mean(squares)) - 2) < 0.1
 
 
 def test_gold_beads_are_where_the_record_says():
@@ -219,7 +280,7 @@ def test_gold_beads_are_where_the_record_says():
 
 
 def test_existing_files_are_kept_unless_asked():
-    series = simulate("kept", *SMALL, "--shifts", 1)
+    series = simulate("kept", *SMALL, "--misalign", 1)
     before = open(series.path("tilt_series.mrc"), "rb").read()
     result = run("simulate", series.directory, *SMALL)
     assert result.returncode == 2 and "exists" in result.stderr and "--overwrite" in result.stderr
@@ -247,6 +308,11 @@ def test_bad_options_are_named_and_nothing_is_written():
         (["--dose", "5", "--noise", "0.1"], "--noise"),
         (["--dose", "5", "--contrast", "bright"], "contrast"),
         (["--voxel-size", "0"], "voxel size"),
+        (["--misalign", "-1"], "shifts' spread"),
+        (["--misalign-rotation", "90"], "0 to 20 degrees"),
+        (["--misalign-magnification", "nan"], "0 to 20 percent"),
+        (["--misalign-axis", "200"], "tilt axis"),
+        (["--misalign-local", "50"], "local motion"),
         (["--gold", "5", "--gold-diameter", "1e6"], "diameter"),
         (["--yardstick", "d"], "yardstick"),
         (["--yardstick", "a", "--extended"], "--extended"),

@@ -30,7 +30,7 @@ def make_cell():
 @pytest.fixture(scope="module", name="slab")
 def make_slab():
     """An extended specimen, dark and with much noise, whose views are shifted."""
-    return simulate("slab", "--yardstick", "b", "--noise", 0.2, "--contrast", "dark", "--shifts", 2,
+    return simulate("slab", "--yardstick", "b", "--noise", 0.2, "--contrast", "dark", "--misalign", 2,
                     "--seed", 5)
 
 

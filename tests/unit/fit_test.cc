@@ -80,11 +80,11 @@ class BeadSeries {
     const std::vector<Ellipsoid> bodies = {
         simulate::make_sphere(relative(bead_.large), Bead::kLarge, 1.0),
         simulate::make_sphere(relative(bead_.small), Bead::kSmall, 1.0)};
-    const auto exact =
-        project_ellipsoids(bodies, {.width = g.width,
-                                    .height = g.height,
-                                    .tilt_deg = g.hand * g.tilt_deg[view],
-                                    .shift_x_px = g.axis_x - static_cast<double>(g.width) / 2});
+    const auto exact = project_ellipsoids(
+        bodies, {.width = g.width,
+                 .height = g.height,
+                 .tilt_deg = g.hand * g.tilt_deg[view],
+                 .raw_from_aligned = {.shift_x_px = g.axis_x - static_cast<double>(g.width) / 2}});
     base::Random random(noise_seed_, view);
     for (std::size_t i = 0; i < image.size(); ++i)
       image[i] = static_cast<float>(exact[i] + kSigma * random.normal());

@@ -327,7 +327,8 @@ std::vector<double> exact_projection(const Scene& scene, int view) {
         .width = g.width,
         .height = kLanes,
         .tilt_deg = g.hand * g.tilt_deg[static_cast<std::size_t>(view)],
-        .shift_x_px = g.axis_x - static_cast<double>(g.width) / 2 + (sub + 0.5) / kSub - 0.5};
+        .raw_from_aligned = {.shift_x_px = g.axis_x - static_cast<double>(g.width) / 2 +
+                                           (sub + 0.5) / kSub - 0.5}};
     const auto image = project_ellipsoids(scene.bodies, frame);
     for (std::int64_t u = 0; u < g.width; ++u) {
       for (int l = 0; l < kLanes; ++l) {

@@ -1,0 +1,174 @@
+#!/usr/bin/python3
+"""Scores an alignment against the truth of a series of `tomofield simulate --misalign`.
+
+usage: alignment_score.py FOLDER ESTIMATE.xf [--tlt ESTIMATE.tlt] [--local ESTIMATE.json]
+
+FOLDER is what simulate wrote. Prints one line of JSON:
+
+  x_px, y_px        rms error of the views' shifts at the image's centre
+  rotation_deg      rms error of the views' rotations; it contains axis_error_deg
+  magnification     rms error of the logarithms of the views' magnifications
+  axis_error_deg    mean error of the rotations: the error of the tilt axis
+  tilt_offset_deg   mean error of the tilt angles (0 without --tlt)
+  tilt_deg          rms error of the tilt angles after removal of the offset
+  local_px          rms error of the local motion after removal of each view's affine part
+  local_less_specimen_warp_px
+                    the same after removal of what a fixed warp of the specimen explains
+
+The last two appear if the truth or the estimate has local motion. ESTIMATE.json has it as phantom.json
+has: views, each with local_px (docs/export-simulate.md). Errors go from the true to the estimated
+aligned view. Removed is what only moves, turns or scales the specimen: shifts in x that are a
+combination of cos(tilt) and sin(tilt), the mean shift in y, the mean logarithm of the magnifications,
+and the tilt offset."""
+
+import argparse
+import json
+import os
+import sys
+
+import numpy as np
+
+PLACES = 16  # along each side of a view, at which alignments are compared
+
+
+class Alignment:
+    """Holds the transforms q = A p + shift, the tilts, and the local motion of each view."""
+
+    def __init__(self, transforms, tilts_deg, local=None):
+        transforms = np.atleast_2d(transforms)
+        self.matrices = transforms[:, :4].reshape(-1, 2, 2)
+        self.shifts = transforms[:, 4:]
+        self.tilts_deg = np.atleast_1d(tilts_deg)
+        self.local = local  # None or [view][row][column] = (x, y) in pixels
+
+    def displace(self, view, places, size):
+        """Returns where the motion of a view puts places [n, 2] of the aligned view."""
+        if self.local is None:
+            return places
+        nodes = np.asarray(self.local[view])
+        across = node_weights(places[:, 0] / size, nodes.shape[1])
+        along = node_weights(places[:, 1] / size, nodes.shape[0])
+        return places + np.einsum("nr,nc,rcd->nd", along, across, nodes)
+
+
+def node_weights(position, count):
+    """Returns the weights [n, count] of the nodes of a side at positions from -1/2 to 1/2.
+
+    Between nodes it is a cubic Hermite spline with central differences for slopes, at the ends
+    one-sided ones."""
+    at = np.clip((position + 0.5) * (count - 1), 0, count - 1)
+    cell = np.minimum(at.astype(int), count - 2)
+    f = (at - cell)[:, None]
+    values, slopes = np.eye(count), np.gradient(np.eye(count), axis=0)
+    return ((1 + 2 * f) * (1 - f)**2 * values[cell] + f**2 * (3 - 2 * f) * values[cell + 1] +
+            f * (1 - f)**2 * slopes[cell] + f**2 * (f - 1) * slopes[cell + 1])
+
+
+def grid(size):
+    """Returns places [n, 2] that cover a view evenly, relative to its centre."""
+    line = ((np.arange(PLACES) + 0.5) / PLACES - 0.5) * size
+    x, y = np.meshgrid(line, line)
+    return np.stack([x.ravel(), y.ravel()], axis=1)
+
+
+def errors(truth, estimate, size):
+    """Returns the error [view, n, 2] of the estimated place of what truly is at places of a view."""
+    places, found = grid(size), []
+    for view, (true, matrix) in enumerate(zip(truth.matrices, estimate.matrices)):
+        recorded = np.linalg.solve(true, (places - truth.shifts[view]).T).T
+        estimated = recorded @ matrix.T + estimate.shifts[view]
+        found.append(estimate.displace(view, estimated, size) - truth.displace(view, places, size))
+    return np.array(found)
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def residual(values, basis):
+    """Returns values [n, …] less their least-squares fit by the columns of basis [n, k]."""
+    return values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+
+
+def specimen_warp_residual(local, tilts_deg, size):
+    """Returns errors [view, n, 2] less those of a warp of the specimen that all views share.
+
+    The warp has 5 x 5 nodes over the specimen's plane. The point X, Y in it is seen at
+    x = X cos(tilt), y = Y, and its displacement is seen like a point of the specimen."""
+    places = grid(size)
+    affine = np.column_stack([np.ones(len(places)), places])
+    tilts = np.radians(tilts_deg)
+    weights = [residual((node_weights(places[:, 1] / size, 5)[:, :, None] *
+                         node_weights(places[:, 0] / np.cos(tilt) / size, 5)[:, None, :]
+                         ).reshape(len(places), 25), affine) for tilt in tilts]
+    across = np.concatenate([np.hstack([w * np.cos(tilt), w * np.sin(tilt)])
+                             for w, tilt in zip(weights, tilts)])
+    flat = local.reshape(-1, 2)
+    return np.stack([residual(flat[:, 0], across), residual(flat[:, 1], np.concatenate(weights))],
+                    axis=1).reshape(local.shape)
+
+
+def score(truth, estimate, size):
+    """Returns the figures of the module's text for views of size x size pixels."""
+    places = grid(size)
+    affine = np.column_stack([np.ones(len(places)), places])
+    found = errors(truth, estimate, size)
+    fits = np.array([np.linalg.lstsq(affine, error, rcond=None)[0] for error in found])
+    shifts = fits[:, 0]
+    maps = np.eye(2) + fits[:, 1:].swapaxes(1, 2)
+    rotations = np.degrees(np.arctan2(maps[:, 1, 0] - maps[:, 0, 1], maps[:, 0, 0] + maps[:, 1, 1]))
+    scales = np.log(np.linalg.det(maps)) / 2
+    tilts = np.radians(truth.tilts_deg)
+    tilt_errors = estimate.tilts_deg - truth.tilts_deg
+    figures = {
+        "x_px": rms(residual(shifts[:, 0], np.column_stack([np.cos(tilts), np.sin(tilts)]))),
+        "y_px": rms(shifts[:, 1] - shifts[:, 1].mean()),
+        "rotation_deg": rms(rotations),
+        "magnification": rms(scales - scales.mean()),
+        "axis_error_deg": float(rotations.mean()),
+        "tilt_offset_deg": float(tilt_errors.mean()),
+        "tilt_deg": rms(tilt_errors - tilt_errors.mean()),
+    }
+    if truth.local is not None or estimate.local is not None:
+        local = np.array([error - affine @ fit for error, fit in zip(found, fits)])
+        warp_free = specimen_warp_residual(local, truth.tilts_deg, size)
+        figures["local_px"] = rms(np.linalg.norm(local, axis=2))
+        figures["local_less_specimen_warp_px"] = rms(np.linalg.norm(warp_free, axis=2))
+    return figures
+
+
+def read_local(path):
+    """Returns the local motion of a JSON file's views, or None if they have none."""
+    with open(path, encoding="utf-8") as file:
+        views = json.load(file)["views"]
+    return [view["local_px"] for view in views] if "local_px" in views[0] else None
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder")
+    parser.add_argument("xf")
+    parser.add_argument("--tlt")
+    parser.add_argument("--local")
+    arguments = parser.parse_args()
+    record, xf, tlt = (os.path.join(arguments.folder, name)
+                       for name in ("phantom.json", "tilt_series.xf", "tilt_series.tlt"))
+    with open(record, encoding="utf-8") as file:
+        size = json.load(file)["options"]["size_px"]
+    tilts = np.loadtxt(tlt, ndmin=1)
+    aligned = np.tile([1.0, 0.0, 0.0, 1.0, 0.0, 0.0], (len(tilts), 1))  # simulate wrote no .xf
+    true = np.loadtxt(xf, ndmin=2) if os.path.exists(xf) else aligned
+    truth = Alignment(true, tilts, read_local(record))
+    estimate = Alignment(np.loadtxt(arguments.xf, ndmin=2),
+                         np.loadtxt(arguments.tlt, ndmin=1) if arguments.tlt else tilts,
+                         read_local(arguments.local) if arguments.local else None)
+    counts = [len(estimate.matrices), len(estimate.tilts_deg), len(estimate.local or tilts)]
+    if set(counts) != {len(tilts)}:
+        sys.exit(f"{arguments.xf}: the series has {len(tilts)} views, but the estimate has "
+                 f"{counts[0]} transforms, {counts[1]} tilts and {counts[2]} views with motion")
+    print(json.dumps(score(truth, estimate, size)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <array>
+
+namespace tomofield::simulate {
+
+/// Describes local motion in a view by a smooth field of displacements d. After the view's
+/// RawFromAligned is undone, the pixel at q shows what belongs at q + d(q), in pixels relative to
+/// the image's centre.
+///
+/// The field goes through nodes that divide the view into 4 × 4 equal cells; the outer ones lie on
+/// the view's edges. Between nodes it is the product of cubic Hermite splines in x and y whose
+/// slope at a node is half the difference of its neighbours, and at an edge the difference to the
+/// only neighbour. Outside the view, d is that of the nearest point on the edge.
+struct ViewWarp {
+  static constexpr int kNodes = 5;  ///< along each side
+  using Vector = std::array<double, 2>;
+
+  double width_px = 0.0;
+  double height_px = 0.0;
+  /// Displacements (x, y) in pixels, rows of equal y one after the other, from the smallest y and
+  /// x on.
+  std::array<Vector, kNodes * kNodes> nodes{};
+
+  /// Returns the place of a node relative to the view's centre.
+  Vector node_place(int row, int column) const {
+    return {(static_cast<double>(column) / (kNodes - 1) - 0.5) * width_px,
+            (static_cast<double>(row) / (kNodes - 1) - 0.5) * height_px};
+  }
+  /// Returns d at a place relative to the view's centre.
+  Vector displacement(double x, double y) const;
+  /// Returns a length that neither component of any displacement exceeds.
+  double largest_component() const;
+};
+
+}  // namespace tomofield::simulate
