@@ -12,6 +12,7 @@
 #include "batch/slurm.h"
 #include "batch/state.h"
 #include "batch/summary.h"
+#include "io/is_file.h"
 #include "io/output_files.h"
 
 namespace tomofield::batch {
@@ -28,7 +29,7 @@ void settle_outputs(std::vector<Series>& all, const PlanOptions& options) {
   for (Series& series : all) {
     series.output = output_of(series, options.folder);
     outputs.push_back(series.output);
-    if (fs::is_regular_file(series.input)) inputs.push_back(series.input);
+    if (io::is_file(series.input)) inputs.push_back(series.input);
   }
   require_own_names(all);
   io::require_no_input_is_replaced(outputs, inputs);

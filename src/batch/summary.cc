@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 
 constexpr double kGibibyte = 1 << 30;
 
-// What the summary says of one series.
+// Holds what the summary says of one series.
 struct Line {
   const Job* job;
   State state;

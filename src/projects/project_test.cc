@@ -7,6 +7,7 @@
 #include <map>
 #include <string>
 
+#include "expect_parts.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -14,20 +15,15 @@
 namespace tomofield::projects {
 namespace {
 
+using testing::expect_parts;
 using testing::message_of;
 using testing::ScratchDirectory;
 using testing::some_value;
 using testing::write_stack;
 using Values = std::map<std::string, std::string>;
 
-void expect_parts(const std::string& message, const std::vector<std::string>& parts) {
-  for (const auto& part : parts) {
-    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;
-  }
-}
-
-/// An eTomo folder of a raw stack of 40 × 60 pixels whose tilt axis lies along X: aligned views
-/// have 60 × 40 pixels.
+// An eTomo folder of a raw stack of 40 × 60 pixels whose tilt axis lies along X: aligned views
+// have 60 × 40 pixels.
 class ImodFolder {
  public:
   ImodFolder() {
@@ -37,7 +33,7 @@ class ImodFolder {
     folder.write("TS.xf", transforms);
   }
 
-  /// Writes tilt.com, as eTomo lays it out, with more entries.
+  // Writes tilt.com, as eTomo lays it out, with more entries.
   void write_tilt(const std::string& entries) const {
     folder.write("tilt.com",
                  "$setenv IMOD_OUTPUT_FORMAT MRC\n$tilt -StandardInput\nInputProjections "
@@ -53,14 +49,14 @@ class ImodFolder {
   Project read(const std::vector<std::string>& ignored = {}) const {
     return *read_project({.path = folder.path(), .ignored = ignored});
   }
-  /// Returns the values of the settings by their options.
+  // Returns the values of the settings by their options.
   Values values(const std::vector<std::string>& ignored = {}) const {
     Values found;
     const Project project = read(ignored);
     for (const auto& setting : project.settings()) found[setting.option] = setting.value;
     return found;
   }
-  /// Returns the warnings, a line each.
+  // Returns the warnings, a line each.
   std::string warnings(const std::vector<std::string>& ignored = {}) const {
     return fmt::format("{}", fmt::join(read(ignored).warnings(), "\n"));
   }
