@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "io/alignment_files.h"
+#include "io/is_file.h"
 #include "io/text_lines.h"
 #include "projects/command_entries.h"
 #include "projects/formats.h"
@@ -120,8 +121,13 @@ void set_angles(Project& project, CommandEntries& tilt) {
       break;
     }
   }
-  if (const auto xtilt = tilt.path("XTILTFILE"))
+  if (const auto xtilt = tilt.path("XTILTFILE")) {
+    if (!io::is_file(*xtilt)) {
+      tilt.refuse("XTILTFILE",
+                  fmt::format("names the x-axis tilts '{}', which are not there", xtilt->string()));
+    }
     project.set("--xtilt", xtilt->string(), tilt.file(), "XTILTFILE");
+  }
   const auto x_axis_tilt = tilt.number("XAXISTILT");
   if (x_axis_tilt.value_or(0) != 0)
     project.set("--x-axis-tilt", fmt::format("{}", *x_axis_tilt), tilt.file(), "XAXISTILT");
