@@ -27,6 +27,7 @@ fs::path make_folder() {
   for (const char* name : {"TS.st", "TS_ali.mrc"}) io::MrcWriter(folder / name, spec).close();
   std::ofstream transforms(folder / "TS.xf");
   for (int i = 0; i < 5; ++i) transforms << "1 0 0 1 0.5 0\n";
+  std::ofstream(folder / "TS.xtilt") << "0\n0\n0\n0\n0\n";
   return folder;
 }
 

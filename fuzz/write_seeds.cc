@@ -71,6 +71,13 @@ const std::string kConfig =
     "thickness = 24\ntv = 1.5\nfield = \"grid\"\nroi = [0, 0, 16, 16]\nno-margin = true\n"
     "center = \"12,10\"\nmode = 12\nseed = 7\n";
 
+// Describes a file of text for the fuzz target of one reader.
+struct Seed {
+  const char* reader;
+  const char* name;
+  std::string text;
+};
+
 void write(const fs::path& path, const std::string& contents) {
   fs::create_directories(path.parent_path());
   std::ofstream(path, std::ios::binary) << contents;
@@ -167,13 +174,13 @@ void write_models(const fs::path& folder) {
   for (const FieldKind kind : {FieldKind::kVm, FieldKind::kGrid})
     output::save_model(folder / "model" / (kind == FieldKind::kVm ? "vm" : "grid"),
                        testing::uneven_model(kind));
-  const fuzz::SmallFit series;
+  const testing::SmallFit series;
   for (const int steps : {1, 7, 12}) {
     const auto fit = series.make();
     fit->run([&](const fit::Fit& f) { return f.progress().step != steps; });
     const fs::path path = folder / "checkpoint" / std::to_string(steps);
     reconstruction::save_checkpoint(path, *fit, series.info(),
-                                    {.fingerprint = fuzz::SmallFit::kFingerprint, .tuned = {}});
+                                    {.fingerprint = testing::SmallFit::kFingerprint, .tuned = {}});
     fs::copy_file(path, folder / "model" / ("checkpoint" + std::to_string(steps)),
                   fs::copy_options::overwrite_existing);
   }
@@ -188,19 +195,22 @@ int main(int argc, char** argv) {
   }
   base::set_thread_count(1);
   const fs::path folder = argv[1];
-  write(folder / "angles" / "tlt", kAngles);
-  write(folder / "transforms" / "xf", kTransforms);
-  write(folder / "aretomo" / "aln", kAreTomo);
-  write(folder / "mdoc" / "mdoc", kMdoc);
-  write(folder / "star" / "views", kRelionViews);
-  write(folder / "star" / "tomograms", kRelionTomograms);
-  write(folder / "star" / "tomostar", kTomostar);
-  write(folder / "warp_xml" / "series", kWarpXml);
-  write(folder / "fiducials" / "text", kFiducials);
-  write(folder / "config" / "toml", kConfig);
-  write(folder / "table" / "csv", kTable);
-  write(folder / "command_file" / "tilt", kTiltCom);
-  write(folder / "command_file" / "both", kTiltCom + '\1' + kNewstCom);
+  const Seed seeds[] = {
+      {"angles", "tlt", kAngles},
+      {"transforms", "xf", kTransforms},
+      {"aretomo", "aln", kAreTomo},
+      {"mdoc", "mdoc", kMdoc},
+      {"star", "views", kRelionViews},
+      {"star", "tomograms", kRelionTomograms},
+      {"star", "tomostar", kTomostar},
+      {"warp_xml", "series", kWarpXml},
+      {"fiducials", "text", kFiducials},
+      {"config", "toml", kConfig},
+      {"table", "csv", kTable},
+      {"command_file", "tilt", kTiltCom},
+      {"command_file", "both", kTiltCom + '\1' + kNewstCom},
+  };
+  for (const Seed& seed : seeds) write(folder / seed.reader / seed.name, seed.text);
   write_tiffs(folder / "tiff");
   write_trials(folder / "trials");
   for (const io::MrcMode mode : {io::MrcMode::kInt8, io::MrcMode::kInt16, io::MrcMode::kUint16,

@@ -8,11 +8,14 @@
 
 #include "base/memory.h"
 #include "batch/faults.h"
+#include "batch/relion_table.h"
 #include "batch/series_list.h"
 #include "batch/slurm.h"
 #include "batch/state.h"
 #include "batch/summary.h"
+#include "io/is_file.h"
 #include "io/output_files.h"
+#include "tomofield/error.h"
 
 namespace tomofield::batch {
 namespace {
@@ -21,6 +24,18 @@ namespace fs = std::filesystem;
 
 constexpr double kGibibyte = 1 << 30;
 
+bool is_star_file(const Series& series) { return series.input.extension() == ".star"; }
+
+// Throws Error if the batch would replace a tomograms.star that is not of an earlier batch.
+void require_own_relion_table(const std::vector<Series>& all, const fs::path& folder) {
+  if (std::ranges::none_of(all, is_star_file) || !io::is_file(relion_table(folder))) return;
+  if (io::is_file(list_of(folder))) return;
+  throw Error(
+      fmt::format("'{}' is not of an earlier batch, which would write a file of this name for "
+                  "RELION: give another folder with --output",
+                  relion_table(folder).string()));
+}
+
 }  // namespace
 
 void settle_outputs(std::vector<Series>& all, const PlanOptions& options) {
@@ -28,10 +43,12 @@ void settle_outputs(std::vector<Series>& all, const PlanOptions& options) {
   for (Series& series : all) {
     series.output = output_of(series, options.folder);
     outputs.push_back(series.output);
-    if (fs::is_regular_file(series.input)) inputs.push_back(series.input);
+    if (io::is_file(series.input)) inputs.push_back(series.input);
   }
   require_own_names(all);
+  if (std::ranges::any_of(all, is_star_file)) outputs.push_back(relion_table(options.folder));
   io::require_no_input_is_replaced(outputs, inputs);
+  require_own_relion_table(all, options.folder);
   if (options.skips_existing || options.overwrites) return;
   Faults faults;
   for (const Series& series : all) {

@@ -9,7 +9,7 @@
 
 namespace tomofield::batch {
 
-/// What is free for jobs.
+/// Holds the resources that are free for jobs.
 struct Room {
   int threads = 1;
   std::int64_t memory_bytes = 0;

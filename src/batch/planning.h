@@ -31,7 +31,7 @@ std::vector<std::string> command_of(const Series& series,
                                     const std::vector<option_table::GivenOption>& common);
 
 /// Makes a job of every series, and runs each with --plan to check it and to find what it needs.
-/// Those that are skipped are not checked. The outputs of the series are there. Throws Error with
+/// Does not check series that are skipped. The outputs of the series are there. Throws Error with
 /// the mistakes of all series. Returns fewer jobs if it was asked to stop.
 JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options);
 

@@ -88,7 +88,7 @@ fs::path list_of(const fs::path& folder) { return folder / "batch.json"; }
 std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jobs) {
   const fs::path logs = fs::absolute(log_folder(options.folder));
   std::string script = "#!/bin/sh\n";
-  // Of two options sbatch takes the last.
+  // If an option comes twice, sbatch takes the last.
   const auto add = [&](const std::string& option) { script += "#SBATCH " + option + "\n"; };
   add("--job-name=tomofield");
   add(fmt::format("--cpus-per-task={}", options.threads));

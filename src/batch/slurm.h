@@ -10,7 +10,7 @@
 
 namespace tomofield::batch {
 
-/// What Slurm grants to the job in which this process runs.
+/// Holds the resources that Slurm grants to the job in which this process runs.
 struct SlurmGrant {
   std::optional<int> threads;                ///< SLURM_CPUS_PER_TASK
   std::optional<std::int64_t> memory_bytes;  ///< SLURM_MEM_PER_NODE, or _PER_CPU times the threads

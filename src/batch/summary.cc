@@ -15,6 +15,7 @@
 #include "base/log.h"
 #include "base/time_text.h"
 #include "batch/csv.h"
+#include "batch/relion_table.h"
 #include "batch/state.h"
 #include "io/atomic_file.h"
 #include "io/json_numbers.h"
@@ -32,7 +33,7 @@ namespace fs = std::filesystem;
 
 constexpr double kGibibyte = 1 << 30;
 
-// What the summary says of one series.
+// Holds what the summary says of one series.
 struct Line {
   const Job* job;
   State state;
@@ -56,12 +57,23 @@ void read_metrics(const fs::path& file, Line& line) {
   }
 }
 
+bool has_result(const Line& line) {
+  const Progress progress = line.state.progress;
+  return progress == Progress::kDone || progress == Progress::kSkipped;
+}
+
+std::vector<Job> finished_jobs(const std::vector<Line>& lines) {
+  std::vector<Job> finished;
+  for (const Line& line : lines)
+    if (has_result(line)) finished.push_back(*line.job);
+  return finished;
+}
+
 std::vector<Line> read_lines(const fs::path& folder, const std::vector<Job>& jobs) {
   std::vector<Line> lines;
   for (const Job& job : jobs) {
     lines.push_back({&job, read_state(folder, job), {}, {}, {}});
-    const Progress progress = lines.back().state.progress;
-    if (progress == Progress::kDone || progress == Progress::kSkipped)
+    if (has_result(lines.back()))
       read_metrics(reconstruction::output_paths(job.output).json, lines.back());
   }
   return lines;
@@ -199,6 +211,7 @@ void write_summary(const fs::path& folder, const std::vector<Job>& jobs) {
     io::OutputSet files;
     io::write_text_file(summary_table(folder), csv_text(lines));
     io::write_text_file(summary_page(folder), page_text(fs::absolute(folder), lines));
+    if (are_of_star_files(jobs)) write_relion_table(folder, finished_jobs(lines));
     files.commit();
   } catch (const Error& error) {
     base::log_warning(fmt::format("the summary is old: {}", error.what()));

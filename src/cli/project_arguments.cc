@@ -68,10 +68,12 @@ std::string word_of(const CLI::Option& option, const Setting& setting) {
 // Returns the option among the user's arguments that stands in place of a setting, or an empty
 // text.
 std::string winner_over(const Setting& setting, const CLI::App& command, const Words& given) {
-  // Of these, one is given.
+  // A user gives one option of each pair.
   constexpr std::pair<std::string_view, std::string_view> kRivals[] = {
       {"--bin", "--angpix"}, {"--angpix", "--bin"}, {"--xf", "--aln"}, {"--aln", "--xf"}};
   if (is_given(*command.get_option(setting.option), given)) return setting.option;
+  const bool is_of_intensities = setting.option == "--log" || setting.option == "--log-base";
+  if (is_of_intensities && value_of("--contrast", given) == "bright") return "--contrast bright";
   for (const auto& [option, rival] : kRivals) {
     if (option == setting.option && is_given(*command.get_option(std::string(rival)), given))
       return std::string(rival);

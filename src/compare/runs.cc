@@ -10,6 +10,7 @@
 
 #include "base/child_process.h"
 #include "compare/grid.h"
+#include "io/is_file.h"
 #include "io/output_files.h"
 #include "io/scratch_folder.h"
 #include "io/text_lines.h"
@@ -57,7 +58,7 @@ std::vector<fs::path> named_files(const std::vector<std::string>& words) {
   std::vector<fs::path> files;
   for (const std::string& word : words) {
     const fs::path value = word.starts_with('-') ? word.substr(word.find('=') + 1) : word;
-    if (fs::is_regular_file(value)) files.push_back(value);
+    if (io::is_file(value)) files.push_back(value);
   }
   return files;
 }

@@ -18,8 +18,8 @@ namespace {
                           quote(line.text), expected));
 }
 
-/// Tells whether a matrix is invertible and stretches no direction by less than 1 / kLargestStretch
-/// or more than kLargestStretch. `determinant` is positive or, with a mirror, negative.
+// Tells whether a matrix is invertible and stretches no direction by less than 1 / kLargestStretch
+// or more than kLargestStretch. `determinant` is positive or, with a mirror, negative.
 bool is_plausible_matrix(const ImodTransform& t) {
   constexpr double kLargestStretch = 100.0;
   const double determinant = std::fabs(t.a11 * t.a22 - t.a12 * t.a21);

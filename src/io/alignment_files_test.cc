@@ -2,21 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include "expect_parts.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
 namespace {
 
+using testing::expect_parts;
 using testing::message_of;
 using testing::ScratchDirectory;
 using Sections = std::vector<std::int64_t>;
-
-void expect_parts(const std::string& message, const std::vector<std::string>& parts) {
-  for (const auto& part : parts) {
-    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;
-  }
-}
 
 TEST(NumberColumn, ReadsAnglesWithTheirLines) {
   const ScratchDirectory scratch;
@@ -254,7 +250,7 @@ TEST(AreTomoSections, EveryWayOfCounting) {
   EXPECT_EQ(assign({0, 1, 2}, {1}, 3), (Sections{0, 1, 2}));
 }
 
-/// Assigns rows of these tilts, numbered from `first`, beside dark frames whose section is 0.
+// Assigns rows of these tilts, numbered from `first`, beside dark frames whose section is 0.
 Sections assign_by_tilt(const std::vector<double>& tilts, const std::vector<double>& dark,
                         std::int64_t first, double alpha_deg = 0) {
   AreTomoAlignment alignment;

@@ -16,7 +16,7 @@ namespace {
                           quote(line.text), expected));
 }
 
-/// Returns the words of a line as finite numbers, or nothing if any word is not one.
+// Returns the words of a line as finite numbers, or nothing if any word is not one.
 std::vector<double> parse_numbers(std::string_view text) {
   std::vector<double> numbers;
   for (const std::string_view word : split_words(text)) {
@@ -27,7 +27,7 @@ std::vector<double> parse_numbers(std::string_view text) {
   return numbers;
 }
 
-/// Parses "# name = numbers" and skips comments of any other form.
+// Parses "# name = numbers" and skips comments of any other form.
 void parse_header_line(const std::filesystem::path& path, const TextLine& line,
                        AreTomoAlignment* alignment) {
   const std::size_t equals = line.text.find('=');

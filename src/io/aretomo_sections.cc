@@ -14,7 +14,7 @@ namespace {
 
 using Sections = std::vector<std::int64_t>;
 
-/// Returns true if the numbers are exactly first, …, first + count − 1 in some order.
+// Returns true if the numbers are exactly first, …, first + count − 1 in some order.
 bool are_consecutive(const std::set<std::int64_t>& numbers, std::int64_t first, std::size_t count) {
   return numbers.size() == count && !numbers.empty() && *numbers.begin() == first &&
          *numbers.rbegin() == first + static_cast<std::int64_t>(count) - 1;
@@ -30,14 +30,14 @@ Sections all_but(const Sections& left_out, std::int64_t offset, std::int64_t cou
   return kept;
 }
 
-/// AreTomo3 may write 0 for the section of every dark frame, which says nothing.
+// AreTomo3 may write 0 for the section of every dark frame, which says nothing.
 bool has_unknown_dark_sections(const AreTomoAlignment& alignment) {
   return !alignment.dark_sections.empty() &&
          std::ranges::all_of(alignment.dark_sections, [](std::int64_t s) { return s == 0; }) &&
          alignment.dark_tilt_deg.size() == alignment.dark_sections.size();
 }
 
-/// Returns the rows in the order of SEC.
+// Returns the rows in the order of SEC.
 Sections rows_by_number(const AreTomoAlignment& alignment) {
   Sections order(alignment.rows.size());
   std::iota(order.begin(), order.end(), 0);
@@ -47,9 +47,9 @@ Sections rows_by_number(const AreTomoAlignment& alignment) {
   return order;
 }
 
-/// Places dark frames among rows whose tilts rise (or fall) with SEC. `offset_deg` is what AreTomo
-/// has added to the tilts of the rows and not to those of the dark frames. Returns the section of
-/// each row, or nothing if the tilts do not say where the dark frames are.
+// Places dark frames among rows whose tilts rise (or fall) with SEC. `offset_deg` is what AreTomo
+// has added to the tilts of the rows and not to those of the dark frames. Returns the section of
+// each row, or nothing if the tilts do not say where the dark frames are.
 std::optional<Sections> place_by_tilt(const AreTomoAlignment& alignment, double offset_deg) {
   const Sections order = rows_by_number(alignment);
   const auto tilt_at = [&](std::size_t rank) {
@@ -70,7 +70,7 @@ std::optional<Sections> place_by_tilt(const AreTomoAlignment& alignment, double 
   return sections;
 }
 
-/// Returns the sections of the rows in a complete stack, where only tilts tell the dark frames.
+// Returns the sections of the rows in a complete stack, where only tilts tell the dark frames.
 Sections sections_beside_unknown_dark(const AreTomoAlignment& alignment,
                                       const std::filesystem::path& aln) {
   // It is not said whether the tilts of dark frames include the offset, so both must agree.

@@ -17,7 +17,7 @@ using testing::message_of;
 using testing::read_whole_file;
 using testing::ScratchDirectory;
 
-/// Makes a folder of results with one file beside the marker.
+// Makes a folder of results with one file beside the marker.
 AtomicFolder folder_with(const fs::path& path, const std::string& text) {
   AtomicFolder folder(path, "marker");
   std::ofstream(folder.temporary_path() / "marker") << "";

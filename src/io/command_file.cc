@@ -11,7 +11,7 @@
 namespace tomofield::io {
 namespace {
 
-/// Splits a line into its first word and the rest.
+// Splits a line into its first word and the rest.
 std::pair<std::string_view, std::string_view> split_first_word(std::string_view text) {
   const auto words = split_words(text);
   if (words.empty()) return {};

@@ -242,7 +242,7 @@ class ObjectReader {
   }
 
  private:
-  // What the messages of an object say.
+  // Holds what the messages of an object say.
   struct Header {
     Hdf5Object object;
     std::map<std::string, std::uint64_t> links;

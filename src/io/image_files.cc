@@ -11,7 +11,7 @@
 namespace tomofield::io {
 namespace {
 
-/// A stack whose sections lie in several files.
+// A stack whose sections lie in several files.
 class FilesStack : public ImageStack {
  public:
   FilesStack(const std::vector<ImageInFile>& images, std::string name) : name_(std::move(name)) {
@@ -39,7 +39,7 @@ class FilesStack : public ImageStack {
     std::int64_t index;
   };
 
-  /// Takes sizes from the first file, and throws Error if an image has others or is not there.
+  // Takes sizes from the first file, and throws Error if an image has others or is not there.
   void require_fits(const ImageInFile& image, const MrcHeader& found) {
     if (sections_.empty()) {
       header_.nx = found.nx;

@@ -44,7 +44,7 @@ class MemoryStack : public ImageStack {
   MrcHeader header_;
 };
 
-/// A kind of file that belongs to a tilt series and is no stack.
+// A kind of file that belongs to a tilt series and is no stack.
 struct OtherFile {
   std::string_view extension, what, how_to_give;
 };
@@ -59,7 +59,7 @@ constexpr OtherFile kOtherFiles[] = {
     {".toml", "a configuration file", "give the stack, and this file with --config"},
 };
 
-/// Throws Error for a file whose name says that it is no stack.
+// Throws Error for a file whose name says that it is no stack.
 void refuse_other_file(const std::filesystem::path& path, std::string_view extension) {
   for (const OtherFile& other : kOtherFiles) {
     if (extension != other.extension) continue;

@@ -18,7 +18,7 @@ struct KeyValue {
   std::string_view key, value;
 };
 
-/// Splits "key = value". Returns an empty key for lines of another form.
+// Splits "key = value". Returns an empty key for lines of another form.
 KeyValue split_key_value(std::string_view text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string_view::npos) return {};
@@ -33,13 +33,13 @@ double require_number(const std::filesystem::path& path, const TextLine& line,
                           path.string(), line.number, quote(line.text), largest, largest));
 }
 
-/// Returns what a path, of Windows or of Unix, names in its folder.
+// Returns what a path, of Windows or of Unix, names in its folder.
 std::string without_folders(std::string_view path) {
   return std::string(path.substr(path.find_last_of("/\\") + 1));
 }
 
-/// Returns the angle of "[T = Tilt axis angle = 85.9, binning = 1 …]", and nothing for other
-/// titles.
+// Returns the angle of "[T = Tilt axis angle = 85.9, binning = 1 …]", and nothing for other
+// titles.
 std::optional<double> axis_of_title(const std::filesystem::path& path, const TextLine& line) {
   constexpr std::string_view kKey = "ilt axis angle";
   const std::string_view text = line.text;
@@ -52,8 +52,8 @@ std::optional<double> axis_of_title(const std::filesystem::path& path, const Tex
                         base::kLargestAngle_deg);
 }
 
-/// Returns n of "[ZValue = n]", and nothing for other heads such as "[T = …]" and
-/// "[MontSection = …]".
+// Returns n of "[ZValue = n]", and nothing for other heads such as "[T = …]" and
+// "[MontSection = …]".
 std::optional<std::int64_t> parse_section_head(const std::filesystem::path& path,
                                                const TextLine& line) {
   const std::string_view inside = std::string_view(line.text).substr(1, line.text.find(']') - 1);
@@ -78,14 +78,14 @@ void sort_and_require_unique(const std::filesystem::path& path, Mdoc* mdoc) {
   }
 }
 
-/// Returns the number of a month's name, or 0.
+// Returns the number of a month's name, or 0.
 std::int64_t month_named(std::string_view name) {
   constexpr std::string_view kMonths = "JanFebMarAprMayJunJulAugSepOctNovDec";
   const std::size_t at = name.size() == 3 ? kMonths.find(name) : std::string_view::npos;
   return at == std::string_view::npos || at % 3 != 0 ? 0 : static_cast<std::int64_t>(at / 3 + 1);
 }
 
-/// Splits "12:30:05" or "2021-03-12" into three parts; they are empty if there are not three.
+// Splits "12:30:05" or "2021-03-12" into three parts; they are empty if there are not three.
 std::array<std::string_view, 3> three_parts(std::string_view text, char separator) {
   const std::size_t first = text.find(separator);
   const std::size_t second =
@@ -95,8 +95,8 @@ std::array<std::string_view, 3> three_parts(std::string_view text, char separato
           text.substr(second + 1)};
 }
 
-/// Reads "12-Mar-21  15:31:02", "12-Mar-2021 15:31:02" or "2021-03-12 15:31:02". Returns nothing
-/// for another form.
+// Reads "12-Mar-21  15:31:02", "12-Mar-2021 15:31:02" or "2021-03-12 15:31:02". Returns nothing
+// for another form.
 std::optional<std::int64_t> parse_time(std::string_view text) {
   const auto words = split_words(text);
   if (words.size() != 2) return std::nullopt;
@@ -122,7 +122,7 @@ std::optional<std::int64_t> parse_time(std::string_view text) {
   return midnight.count() + seconds;
 }
 
-/// Sets what an entry of a section says.
+// Sets what an entry of a section says.
 void read_section_entry(const std::filesystem::path& path, const TextLine& line,
                         const KeyValue& entry, MdocSection* section) {
   if (entry.key == "TiltAngle") {
@@ -137,7 +137,7 @@ void read_section_entry(const std::filesystem::path& path, const TextLine& line,
   }
 }
 
-/// Returns the order of sections by a key, if all have it and no two are equal.
+// Returns the order of sections by a key, if all have it and no two are equal.
 template <typename Key>
 std::optional<std::vector<std::size_t>> order_by(const std::vector<MdocSection>& sections,
                                                  std::optional<Key> MdocSection::*key) {

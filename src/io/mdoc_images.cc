@@ -24,7 +24,7 @@ bool is_image(const fs::path& path) {
   return std::ranges::find(kExtensions, path.extension().string()) != kExtensions.end();
 }
 
-/// Returns the images in a folder, sorted by name.
+// Returns the images in a folder, sorted by name.
 std::vector<fs::path> images_in(const fs::path& folder) {
   std::vector<fs::path> images;
   std::error_code failure;
@@ -37,8 +37,8 @@ std::vector<fs::path> images_in(const fs::path& folder) {
   return images;
 }
 
-/// Finds the image of a movie: the one with its name, else the only one whose name goes on after
-/// it. "TS_1" does not go on as "TS_12".
+// Finds the image of a movie: the one with its name, else the only one whose name goes on after
+// it. "TS_1" does not go on as "TS_12".
 fs::path find_image(const std::string& movie, const std::vector<fs::path>& images,
                     const std::string& section) {
   const std::string stem = fs::path(movie).stem().string();

@@ -53,7 +53,7 @@ constexpr std::int32_t kImodStampValue = 1146047817;
 constexpr std::int32_t kImodSignedBytes = 1;
 constexpr std::int32_t kImodOriginInverted = 4;  // ORIGIN has the sign of MRC2014
 
-/// Reads numbers of either byte order from the header.
+// Reads numbers of either byte order from the header.
 class Fields {
  public:
   Fields(const MrcHeaderBytes& bytes, bool swapped) : bytes_(bytes), swapped_(swapped) {}
@@ -127,8 +127,8 @@ void require_axis_order(const Fields& fields, const std::string& name) {
       name, axes[0], axes[1], axes[2]));
 }
 
-/// Returns cell length over number of samples, never rounded; 0 if the header has none, or one that
-/// cannot be.
+// Returns cell length over number of samples, never rounded; 0 if the header has none, or one that
+// cannot be.
 double decode_voxel_size(const Fields& fields, std::size_t axis) {
   const double cell_A = fields.float32(kCell + 4 * axis);
   const auto samples = static_cast<double>(fields.int32(kSampling + 4 * axis));
@@ -136,7 +136,7 @@ double decode_voxel_size(const Fields& fields, std::size_t axis) {
   return base::is_plausible_pixel_size(size_A) ? size_A : 0.0;
 }
 
-/// Returns the bytes a section that SerialEM's flags announce (IMOD's description of the header).
+// Returns the bytes a section that SerialEM's flags announce (IMOD's description of the header).
 int bytes_of_section_flags(int flags) {
   int bytes = 0;
   constexpr std::array<int, 6> kBytesOfFlag{2, 6, 4, 2, 2, 4};
@@ -157,8 +157,8 @@ SeriLayout decode_seri_layout(const Fields& fields, const MrcHeader& header) {
   return {is_seri && (flags & 1) && fits ? bytes : 0};
 }
 
-/// Tells whether ORIGIN has IMOD's sign, the opposite of MRC2014's. Versions of this program that
-/// did not write IMOD's stamp wrote it so.
+// Tells whether ORIGIN has IMOD's sign, the opposite of MRC2014's. Versions of this program that
+// did not write IMOD's stamp wrote it so.
 bool has_imod_origin(const Fields& fields, const MrcHeader& header) {
   if (fields.int32(kImodStamp) == kImodStampValue)
     return (fields.int32(kImodFlags) & kImodOriginInverted) == 0;

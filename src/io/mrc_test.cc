@@ -43,8 +43,8 @@ std::vector<float> read_all(const std::filesystem::path& path) {
   return values;
 }
 
-/// Returns value i of the files that both Python and this test make. Every mode of MRC can hold it;
-/// the unsigned mode holds its magnitude.
+// Returns value i of the files that both Python and this test make. Every mode of MRC can hold it;
+// the unsigned mode holds its magnitude.
 float pattern(std::size_t i, bool is_unsigned) {
   const auto value = static_cast<float>((i * 37) % 41) - 20.0f;
   return is_unsigned ? std::fabs(value) : value;
@@ -317,7 +317,7 @@ TEST(Mrc, TruncationTellsBothLengths) {
   EXPECT_THROW(MrcReader(scratch.path()), Error);
 }
 
-/// Writes a file with the given extended header and changed words in the fixed one.
+// Writes a file with the given extended header and changed words in the fixed one.
 void write_with_extended_header(const std::filesystem::path& path, const std::string& extended,
                                 const char* type, std::int16_t section_bytes, std::int16_t flags) {
   MrcWriter(path, spec_of(2, 1, 3, MrcMode::kInt16)).close();

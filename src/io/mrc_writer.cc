@@ -19,9 +19,9 @@
 namespace tomofield::io {
 namespace {
 
-/// The mean and the sum of squared deviations of one row. They are kept for every row (a thousandth
-/// of the file) and combined in the file's order at the end. The header is therefore the same
-/// whichever thread wrote which row and when.
+// The mean and the sum of squared deviations of one row. They are kept for every row (a thousandth
+// of the file) and combined in the file's order at the end. The header is therefore the same
+// whichever thread wrote which row and when.
 struct RowMoments {
   double mean = 0.0;
   double squares = 0.0;

@@ -16,8 +16,8 @@ namespace {
 
 using Size = std::array<std::int64_t, 3>;  // x, y, z
 
-/// Calls write(chunk z, chunk y, buffer) for all chunks of an array that lie beside each other in
-/// x.
+// Calls write(chunk z, chunk y, buffer) for all chunks of an array that lie beside each other in
+// x.
 template <typename Write>
 void for_chunks(const ZarrArray& array, const Write& write) {
   std::vector<float> values;
@@ -43,7 +43,7 @@ void copy_volume(const MrcReader& volume, const ZarrArray& array) {
   });
 }
 
-/// Adds pairs of rows of one section of the finer array to the rows of a coarser one.
+// Adds pairs of rows of one section of the finer array to the rows of a coarser one.
 void add_halved(std::span<const float> fine, std::int64_t fine_width, std::int64_t fine_rows,
                 std::int64_t width, std::span<float> sums) {
   for (std::int64_t y = 0; y < fine_rows; ++y) {
@@ -53,7 +53,7 @@ void add_halved(std::span<const float> fine, std::int64_t fine_width, std::int64
   }
 }
 
-/// Divides sums by the number of voxels that they are of, which is smaller at odd ends.
+// Divides sums by the number of voxels that they are of, which is smaller at odd ends.
 void divide_by_counts(const Size& fine, std::int64_t section, std::int64_t first_row,
                       std::int64_t width, std::span<float> sums) {
   const auto pair = [](std::int64_t index, std::int64_t size) {
@@ -88,8 +88,8 @@ void average_pairs(const ZarrArray& finer, const ZarrArray& array) {
   });
 }
 
-/// Describes one array: the side of its voxels, and the middle of its first voxel as that of array
-/// "0" has it, which is at the ORIGIN.
+// Describes one array: the side of its voxels, and the middle of its first voxel as that of array
+// "0" has it, which is at the ORIGIN.
 nlohmann::json dataset(int level, const MrcHeader& volume) {
   const double factor = static_cast<double>(std::int64_t{1} << level);
   nlohmann::json scale = nlohmann::json::array(), translation = nlohmann::json::array();

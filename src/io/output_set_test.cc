@@ -19,86 +19,83 @@ using testing::message_of;
 using testing::read_whole_file;
 using testing::ScratchDirectory;
 
-TEST(OutputSet, GivesAllFilesTheirNamesTogether) {
-  const ScratchDirectory scratch;
-  const auto old = scratch.write("old.txt", "old");
+// Keeps a result of an earlier run in a folder of its own.
+class OutputSetTest : public ::testing::Test {
+ protected:
+  ScratchDirectory scratch_;
+  fs::path old_ = scratch_.write("old.txt", "old");
+};
+
+TEST_F(OutputSetTest, GivesAllFilesTheirNamesTogether) {
   OutputSet results;
-  write_text_file(old, "new");
-  write_text_file(scratch / "fresh.txt", "fresh");
-  EXPECT_EQ(read_whole_file(old), "old");
-  EXPECT_FALSE(fs::exists(scratch / "fresh.txt"));
-  EXPECT_EQ(read_whole_file(results.location_of(scratch / "fresh.txt")), "fresh");
-  EXPECT_EQ(results.location_of(scratch / "none.txt"), scratch / "none.txt");
+  write_text_file(old_, "new");
+  write_text_file(scratch_ / "fresh.txt", "fresh");
+  EXPECT_EQ(read_whole_file(old_), "old");
+  EXPECT_FALSE(fs::exists(scratch_ / "fresh.txt"));
+  EXPECT_EQ(read_whole_file(results.location_of(scratch_ / "fresh.txt")), "fresh");
+  EXPECT_EQ(results.location_of(scratch_ / "none.txt"), scratch_ / "none.txt");
   results.commit();
-  EXPECT_EQ(read_whole_file(old), "new");
-  EXPECT_EQ(read_whole_file(scratch / "fresh.txt"), "fresh");
-  EXPECT_EQ(scratch.num_files(), 2u);
+  EXPECT_EQ(read_whole_file(old_), "new");
+  EXPECT_EQ(read_whole_file(scratch_ / "fresh.txt"), "fresh");
+  EXPECT_EQ(scratch_.num_files(), 2u);
 }
 
-TEST(OutputSet, LeavesNothingBehindWithoutCommit) {
-  const ScratchDirectory scratch;
-  const auto old = scratch.write("old.txt", "old");
+TEST_F(OutputSetTest, LeavesNothingBehindWithoutCommit) {
   {
     OutputSet results;
-    write_text_file(old, "new");
-    write_text_file(scratch / "fresh.txt", "fresh");
-    results.remove_old(old);
+    write_text_file(old_, "new");
+    write_text_file(scratch_ / "fresh.txt", "fresh");
+    results.remove_old(old_);
   }
-  EXPECT_EQ(read_whole_file(old), "old");
-  EXPECT_EQ(scratch.num_files(), 1u);
-  write_text_file(scratch / "later.txt", "alone again");
-  EXPECT_TRUE(fs::exists(scratch / "later.txt"));
+  EXPECT_EQ(read_whole_file(old_), "old");
+  EXPECT_EQ(scratch_.num_files(), 1u);
+  write_text_file(scratch_ / "later.txt", "alone again");
+  EXPECT_TRUE(fs::exists(scratch_ / "later.txt"));
 }
 
-TEST(OutputSet, GivesBackWhatItReplacedIfAFileCannotGetItsName) {
-  const ScratchDirectory scratch;
-  const auto old = scratch.write("old.txt", "old");
-  const auto removed = scratch.write("removed.txt", "removed");
+TEST_F(OutputSetTest, GivesBackWhatItReplacedIfAFileCannotGetItsName) {
+  const auto removed = scratch_.write("removed.txt", "removed");
   struct stat before {};
-  ASSERT_EQ(::stat(old.c_str(), &before), 0);
+  ASSERT_EQ(::stat(old_.c_str(), &before), 0);
   {
     OutputSet results;
-    write_text_file(old, "new");
-    write_text_file(scratch / "fresh.txt", "fresh");
-    write_text_file(scratch / "blocked.txt", "blocked");
+    write_text_file(old_, "new");
+    write_text_file(scratch_ / "fresh.txt", "fresh");
+    write_text_file(scratch_ / "blocked.txt", "blocked");
     results.remove_old(removed);
-    fs::create_directory(scratch / "blocked.txt");
+    fs::create_directory(scratch_ / "blocked.txt");
     const std::string message = message_of<Error>([&] { results.commit(); });
     EXPECT_NE(message.find("blocked.txt"), std::string::npos) << message;
   }
-  EXPECT_EQ(read_whole_file(old), "old");
+  EXPECT_EQ(read_whole_file(old_), "old");
   EXPECT_EQ(read_whole_file(removed), "removed");
   struct stat after {};
-  ASSERT_EQ(::stat(old.c_str(), &after), 0);
+  ASSERT_EQ(::stat(old_.c_str(), &after), 0);
   EXPECT_EQ(before.st_ino, after.st_ino) << "it is the same file";
-  EXPECT_EQ(scratch.num_files(), 3u) << "the folder counts";
+  EXPECT_EQ(scratch_.num_files(), 3u) << "the folder counts";
 }
 
-TEST(OutputSet, RemovesOldFilesWithItsCommit) {
-  const ScratchDirectory scratch;
-  const auto stale = scratch.write("stale.txt", "of an earlier run");
+TEST_F(OutputSetTest, RemovesOldFilesWithItsCommit) {
   OutputSet results;
-  results.remove_old(stale);
-  results.remove_old(scratch / "absent.txt");
-  write_text_file(scratch / "fresh.txt", "fresh");
-  EXPECT_TRUE(fs::exists(stale));
+  results.remove_old(old_);
+  results.remove_old(scratch_ / "absent.txt");
+  write_text_file(scratch_ / "fresh.txt", "fresh");
+  EXPECT_TRUE(fs::exists(old_));
   results.commit();
-  EXPECT_FALSE(fs::exists(stale));
-  EXPECT_EQ(scratch.num_files(), 1u);
+  EXPECT_FALSE(fs::exists(old_));
+  EXPECT_EQ(scratch_.num_files(), 1u);
 }
 
-TEST(OutputSet, KeepsOneFileOfMany) {
-  const ScratchDirectory scratch;
-  const auto old = scratch.write("old.txt", "old");
+TEST_F(OutputSetTest, KeepsOneFileOfMany) {
   OutputSet results;
-  write_text_file(old, "new");
-  write_text_file(scratch / "kept.txt", "kept");
-  EXPECT_FALSE(results.commit_only(scratch / "none.txt"));
-  write_text_file(scratch / "kept.txt", "kept");
-  EXPECT_TRUE(results.commit_only(scratch / "kept.txt"));
-  EXPECT_EQ(read_whole_file(old), "old");
-  EXPECT_EQ(read_whole_file(scratch / "kept.txt"), "kept");
-  EXPECT_EQ(scratch.num_files(), 2u);
+  write_text_file(old_, "new");
+  write_text_file(scratch_ / "kept.txt", "kept");
+  EXPECT_FALSE(results.commit_only(scratch_ / "none.txt"));
+  write_text_file(scratch_ / "kept.txt", "kept");
+  EXPECT_TRUE(results.commit_only(scratch_ / "kept.txt"));
+  EXPECT_EQ(read_whole_file(old_), "old");
+  EXPECT_EQ(read_whole_file(scratch_ / "kept.txt"), "kept");
+  EXPECT_EQ(scratch_.num_files(), 2u);
 }
 
 // Calls `body` as another user than root, in a process of its own. Returns its exit status.

@@ -2,19 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include "expect_parts.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
 namespace {
 
+using testing::expect_parts;
 using testing::message_of;
 using testing::ScratchDirectory;
-
-void expect_parts(const std::string& message, const std::vector<std::string>& parts) {
-  for (const auto& part : parts)
-    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;
-}
 
 TEST(StarFile, ReadsTablesWithAndWithoutLoops) {
   const ScratchDirectory scratch;

@@ -36,7 +36,7 @@ int keep_first_message(TIFF*, void* user_data, const char*, const char* format, 
 
 int drop_message(TIFF*, void*, const char*, const char*, va_list) { return 1; }
 
-/// What the values of a page are.
+// Describes the size of a page and the type of its values.
 struct PageFormat {
   std::uint32_t width = 0, height = 0;
   std::uint16_t bits = 1, samples = 1, kind = SAMPLEFORMAT_UINT;
@@ -46,7 +46,7 @@ struct PageFormat {
   double bytes() const { return static_cast<double>(width) * height * bits / 8; }
 };
 
-/// An open TIFF file. libtiff keeps the page that it is at, so each thread opens its own.
+// An open TIFF file. libtiff keeps the page that it is at, so each thread opens its own.
 class TiffFile {
  public:
   explicit TiffFile(const std::filesystem::path& path) : path_(path) {
@@ -73,10 +73,10 @@ class TiffFile {
                             message_.empty() ? "" : fmt::format(" ({})", message_)));
   }
 
-  /// Returns the most bytes that a page of this file can have.
+  // Returns the most bytes that a page of this file can have.
   double most_bytes() const { return kLargestCompression * static_cast<double>(file_bytes_); }
 
-  /// Returns the format of the page that the file is at. Throws Error for one that is not read.
+  // Returns the format of the page that the file is at. Throws Error for one that is not read.
   PageFormat format(std::size_t page) const {
     PageFormat format;
     TIFFGetField(handle_, TIFFTAG_IMAGEWIDTH, &format.width);
@@ -89,7 +89,7 @@ class TiffFile {
     return format;
   }
 
-  /// Returns the size of a pixel in Å by the resolution tags, or 0.
+  // Returns the size of a pixel in Å by the resolution tags, or 0.
   double pixel_size_A() const {
     float per_unit = 0;
     std::uint16_t unit = RESUNIT_NONE;
@@ -135,7 +135,7 @@ void convert(const std::byte* raw, std::size_t count, float* out) {
   }
 }
 
-/// Converts values of a page to floats.
+// Converts values of a page to floats.
 void decode(const PageFormat& format, const std::byte* raw, std::size_t count, float* out) {
   const bool is_signed = format.kind == SAMPLEFORMAT_INT;
   if (format.kind == SAMPLEFORMAT_IEEEFP) return convert<float>(raw, count, out);
@@ -152,7 +152,7 @@ void decode(const PageFormat& format, const std::byte* raw, std::size_t count, f
   }
 }
 
-/// Reads the page that a file is at, its top row last.
+// Reads the page that a file is at, its top row last.
 class PageReader {
  public:
   PageReader(const TiffFile& file, const PageFormat& format, std::span<float> out)

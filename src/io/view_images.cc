@@ -5,6 +5,7 @@
 #include <optional>
 #include <system_error>
 
+#include "io/is_file.h"
 #include "io/text_lines.h"
 #include "tomofield/error.h"
 
@@ -12,11 +13,6 @@ namespace tomofield::io {
 
 namespace fs = std::filesystem;
 namespace {
-
-bool is_file(const fs::path& path) {
-  std::error_code absent;
-  return fs::is_regular_file(path, absent);
-}
 
 std::optional<fs::path> look_for(const fs::path& name, const fs::path& list) {
   if (is_file(name)) return name;
@@ -31,7 +27,7 @@ std::optional<fs::path> look_for(const fs::path& name, const fs::path& list) {
   return std::nullopt;
 }
 
-/// Returns the name of the image that a row means.
+// Returns the name of the image that a row means.
 std::string image_of(const ViewTable& table, std::size_t row, Frames frames) {
   const ListedView& view = table.views[row];
   if (frames == Frames::kAll) return view.image;
@@ -41,8 +37,8 @@ std::string image_of(const ViewTable& table, std::size_t row, Frames frames) {
                           table.file.string(), row + 1, frames == Frames::kEven ? "even" : "odd"));
 }
 
-/// Returns the aligned average of a movie of Warp: DIR/average/NAME.mrc, or that of half of the
-/// frames, DIR/average/even/NAME.mrc.
+// Returns the aligned average of a movie of Warp: DIR/average/NAME.mrc, or that of half of the
+// frames, DIR/average/even/NAME.mrc.
 fs::path average_of(const fs::path& movie, Frames frames) {
   fs::path folder = movie.parent_path() / "average";
   if (frames == Frames::kEven) folder /= "even";

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "expect_parts.h"
 #include "io/mrc.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
@@ -10,11 +11,12 @@
 namespace tomofield::io {
 namespace {
 
+using testing::expect_parts;
 using testing::message_of;
 using testing::ScratchDirectory;
 using testing::write_stack;
 
-/// Writes a stack whose pixels are 100 times the section plus `base`.
+// Writes a stack whose pixels are 100 times the section plus `base`.
 std::filesystem::path stack(const std::filesystem::path& path, std::int64_t num_sections,
                             float base, std::int64_t width = 4) {
   std::filesystem::create_directories(path.parent_path());
@@ -22,11 +24,6 @@ std::filesystem::path stack(const std::filesystem::path& path, std::int64_t num_
                      [=](std::int64_t, std::int64_t, std::int64_t section) {
                        return base + 100.0f * static_cast<float>(section);
                      });
-}
-
-void expect_parts(const std::string& message, const std::vector<std::string>& parts) {
-  for (const auto& part : parts)
-    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;
 }
 
 TEST(ViewImages, HaveTheNamesOfRelion) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "expect_parts.h"
 #include "io/relion_star.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -9,13 +10,9 @@
 namespace tomofield::io {
 namespace {
 
+using testing::expect_parts;
 using testing::message_of;
 using testing::ScratchDirectory;
-
-void expect_parts(const std::string& message, const std::vector<std::string>& parts) {
-  for (const auto& part : parts)
-    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;
-}
 
 std::string refusal_of_views(const std::filesystem::path& path) {
   return message_of<Error>([&] { read_view_table(path); });

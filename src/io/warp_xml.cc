@@ -10,7 +10,7 @@
 namespace tomofield::io {
 namespace {
 
-/// Warp's XML file of a tilt series. Elements hold one value a line, one line a view.
+// Warp's XML file of a tilt series. Elements hold one value a line, one line a view.
 class WarpXml {
  public:
   explicit WarpXml(const std::filesystem::path& path) : path_(path) {
@@ -29,7 +29,7 @@ class WarpXml {
     }
   }
 
-  /// Returns the lines of an element, or none if there is no such element.
+  // Returns the lines of an element, or none if there is no such element.
   std::vector<std::string> lines(const char* element) const {
     std::vector<std::string> found;
     const std::string_view text = root_.child(element).text().get();
@@ -42,7 +42,7 @@ class WarpXml {
     return found;
   }
 
-  /// Returns one number a view: zeros if there is no such element.
+  // Returns one number a view: zeros if there is no such element.
   std::vector<double> numbers(const char* element, std::size_t num_views, double largest) const {
     const std::vector<std::string> text = lines(element);
     if (text.empty()) return std::vector<double>(num_views, 0.0);
@@ -58,13 +58,13 @@ class WarpXml {
                             count, num_views));
   }
 
-  /// Returns an attribute of the series, or 0.
+  // Returns an attribute of the series, or 0.
   double attribute(const char* name) const {
     const char* const text = root_.attribute(name).value();
     return *text == '\0' ? 0.0 : parse(name, text, base::kLargestAngle_deg);
   }
 
-  /// Returns the last of "x, y, z", the size of the volume, which older versions do not write.
+  // Returns the last of "x, y, z", the size of the volume, which older versions do not write.
   std::optional<double> thickness_A() const {
     const std::string_view sizes = root_.attribute("VolumeDimensionsAngstrom").value();
     const std::size_t comma = sizes.rfind(',');
@@ -74,8 +74,8 @@ class WarpXml {
     return size_A > 0 ? std::optional(size_A) : std::nullopt;
   }
 
-  /// Returns a shift of each view from a grid of movements. Nothing if the grid varies within a
-  /// view or has some other number of views.
+  // Returns a shift of each view from a grid of movements. Nothing if the grid varies within a
+  // view or has some other number of views.
   std::optional<std::vector<double>> shifts_of_grid(const char* name, std::size_t num_views) const {
     const pugi::xml_node grid = root_.child(name);
     if (is_zero_grid(grid)) return std::vector<double>(num_views, 0.0);
@@ -119,7 +119,7 @@ class WarpXml {
 
 bool parse_flag(const std::string& text) { return text != "False" && text != "false"; }
 
-/// Subtracts the shifts that Warp refined beside the offsets of the axis, as Warp does.
+// Subtracts the shifts that Warp refined beside the offsets of the axis, as Warp does.
 void apply_movements(const WarpXml& xml, ViewTable& table) {
   const auto shifts_x = xml.shifts_of_grid("GridMovementX", table.views.size());
   const auto shifts_y = xml.shifts_of_grid("GridMovementY", table.views.size());

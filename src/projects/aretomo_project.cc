@@ -12,8 +12,8 @@ namespace tomofield::projects {
 namespace fs = std::filesystem;
 namespace {
 
-/// Returns the stack beside an .aln file: AreTomo3 writes it under the same name, and AreTomo2
-/// names the .aln file after it.
+// Returns the stack beside an .aln file: AreTomo3 writes it under the same name, and AreTomo2
+// names the .aln file after it.
 fs::path find_stack(const fs::path& aln) {
   constexpr std::array kExtensions{".mrc", ".st", ".mrcs", ".tif", ".tiff"};
   for (const char* extension : kExtensions) {

@@ -6,16 +6,17 @@
 #include <array>
 #include <cctype>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "io/image_stack.h"
+#include "io/is_file.h"
 #include "tilt_series/series_plan.h"
 #include "tomofield/error.h"
 
 namespace tomofield::projects {
 
 namespace fs = std::filesystem;
+using io::is_file;
 namespace {
 
 // With these entries of newst.com the aligned stack is more than the transforms of the raw one.
@@ -40,20 +41,15 @@ constexpr std::array<std::string_view, 4> kOfRawStack{"InputFile", "TransformFil
 // Programs that change the aligned stack after newstack, as its labels say.
 constexpr std::array<std::string_view, 3> kCorrections{"ctfphaseflip", "mtffilter", "ccderaser"};
 
-bool is_file(const fs::path& path) {
-  std::error_code absent;
-  return fs::is_regular_file(path, absent);
-}
-
-/// A file that an entry names.
+// A file that an entry names.
 struct NamedFile {
   fs::path path;
   fs::path named_in;
   std::string entry;
 };
 
-/// Returns the file where the entry says that it is, or beside the command file or above it, where
-/// it lies if the folder was moved. Nothing if it is in none of these places.
+// Returns the file where the entry says that it is, or beside the command file or above it, where
+// it lies if the folder was moved. Nothing if it is in none of these places.
 std::optional<NamedFile> find_file(CommandEntries& entries, std::string_view name) {
   const auto path = entries.path(name);
   if (!path) return std::nullopt;
@@ -65,7 +61,7 @@ std::optional<NamedFile> find_file(CommandEntries& entries, std::string_view nam
   return std::nullopt;
 }
 
-/// A raw stack and its transforms.
+// A raw stack and its transforms.
 struct RawFiles {
   NamedFile stack, xf;
 };
@@ -77,8 +73,8 @@ std::optional<RawFiles> raw_files_of(CommandEntries& newst) {
   return RawFiles{*stack, *xf};
 }
 
-/// Tells whether the raw stack has pieces of montages, which blend.com aligns: blenda.com for
-/// tilta.com.
+// Tells whether the raw stack has pieces of montages, which blend.com aligns: blenda.com for
+// tilta.com.
 bool is_montage(const fs::path& tilt) {
   std::string name = tilt.filename().string();
   constexpr std::string_view kTilt = "tilt";
@@ -86,8 +82,8 @@ bool is_montage(const fs::path& tilt) {
   return is_file(tilt.parent_path() / name) && name != tilt.filename().string();
 }
 
-/// Finds the raw files by eTomo's names: NAME.st or NAME.mrc, and NAME.xf, for NAME_ali.mrc or
-/// NAME.ali.
+// Finds the raw files by eTomo's names: NAME.st or NAME.mrc, and NAME.xf, for NAME_ali.mrc or
+// NAME.ali.
 std::optional<RawFiles> usual_raw_files(Project& project, CommandEntries& tilt) {
   const auto aligned = tilt.path("InputProjections");
   if (!aligned || project.ignores("TransformFile") || is_montage(tilt.file())) return std::nullopt;
@@ -107,7 +103,7 @@ std::optional<RawFiles> usual_raw_files(Project& project, CommandEntries& tilt) 
   return std::nullopt;
 }
 
-/// Returns the first entry of newst.com that the raw stack cannot do without, or an empty text.
+// Returns the first entry of newst.com that the raw stack cannot do without, or an empty text.
 std::string_view what_hinders_raw(CommandEntries* newst) {
   if (newst == nullptr) return {};
   const auto it =
@@ -115,7 +111,7 @@ std::string_view what_hinders_raw(CommandEntries* newst) {
   return it == kBeyondTransforms.end() ? std::string_view() : *it;
 }
 
-/// Warns if the aligned stack has corrections that the raw one does not have.
+// Warns if the aligned stack has corrections that the raw one does not have.
 void warn_of_corrections(Project& project, const fs::path& aligned) {
   const auto stack = io::open_image_stack(aligned);
   for (std::string label : stack->header().labels) {
@@ -131,7 +127,7 @@ void warn_of_corrections(Project& project, const fs::path& aligned) {
   }
 }
 
-/// Returns the binning of the aligned stack. Throws Error if the two command files differ.
+// Returns the binning of the aligned stack. Throws Error if the two command files differ.
 double find_bin(Project& project, CommandEntries& tilt, CommandEntries* newst, bool is_raw) {
   const auto of_tilt = tilt.number("IMAGEBINNED");
   const auto of_newst = newst == nullptr ? std::nullopt : newst->number("BinByFactor");
@@ -151,7 +147,7 @@ double find_bin(Project& project, CommandEntries& tilt, CommandEntries* newst, b
   return bin;
 }
 
-/// Fills in how the aligned stack that newst.com makes lies over the views.
+// Fills in how the aligned stack that newst.com makes lies over the views.
 void place_aligned_stack(CommandEntries& newst, ImodImages& images) {
   if (const auto size = newst.numbers("SizeToOutputInXandY", 2, 2)) {
     images.imod_width = size->at(0) * images.bin;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "io/alignment_files.h"
+#include "io/is_file.h"
 #include "io/text_lines.h"
 #include "projects/command_entries.h"
 #include "projects/formats.h"
@@ -61,7 +62,7 @@ constexpr std::array<std::string_view, 37> kHarmless{"OutputFile",
                                                      "VertBoundaryFile",
                                                      "BoundaryInfoFile"};
 
-/// An entry without which the reconstruction is another one.
+// An entry without which the reconstruction is another one.
 struct Refusal {
   std::string_view entry, why;
 };
@@ -77,7 +78,7 @@ constexpr Refusal kRefusals[] = {
     {"TOTALSLICES", "belongs to one part of a volume: give the command file of the whole"},
 };
 
-/// Returns newst.com for tilt.com, newsta.com for tilta.com, or nothing if it is not there.
+// Returns newst.com for tilt.com, newsta.com for tilta.com, or nothing if it is not there.
 std::optional<fs::path> find_newst(const fs::path& tilt) {
   const std::string name = tilt.filename().string();
   constexpr std::string_view kTilt = "tilt";
@@ -120,21 +121,26 @@ void set_angles(Project& project, CommandEntries& tilt) {
       break;
     }
   }
-  if (const auto xtilt = tilt.path("XTILTFILE"))
+  if (const auto xtilt = tilt.path("XTILTFILE")) {
+    if (!io::is_file(*xtilt)) {
+      tilt.refuse("XTILTFILE",
+                  fmt::format("names the x-axis tilts '{}', which are not there", xtilt->string()));
+    }
     project.set("--xtilt", xtilt->string(), tilt.file(), "XTILTFILE");
+  }
   const auto x_axis_tilt = tilt.number("XAXISTILT");
   if (x_axis_tilt.value_or(0) != 0)
     project.set("--x-axis-tilt", fmt::format("{}", *x_axis_tilt), tilt.file(), "XAXISTILT");
 }
 
-/// Joins lists of sections that are separated by commas or white space.
+// Joins lists of sections that are separated by commas or white space.
 std::string joined_lists(const std::vector<std::string>& lists) {
   std::string all = fmt::format("{}", fmt::join(lists, ","));
   std::ranges::replace(all, ',', ' ');
   return fmt::format("{}", fmt::join(io::split_words(all), ","));
 }
 
-/// Returns the sections that are not in the list, as a list.
+// Returns the sections that are not in the list, as a list.
 std::string all_but(const std::string& included, std::int64_t num_sections) {
   const auto kept = io::parse_section_list(included, num_sections);
   std::vector<std::int64_t> others;

@@ -17,19 +17,19 @@ namespace {
 // stack, the tilt axis is at FULLIMAGE/2 − SUBSETSTART + (second OFFSET) of it, and column i of the
 // volume at zero tilt is i + W/2 − WIDTH/2 − SHIFT.
 
-/// One side of a rectangle that the volume covers.
+// One side of a rectangle that the volume covers.
 struct Side {
   double low = 0, high = 0;
 };
 
-/// Joins the names of entries that a setting follows from.
+// Joins the names of entries that a setting follows from.
 std::string join(const std::vector<std::string>& names) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
 std::string text_of(double value) { return fmt::format("{}", value); }
 
-/// Returns the part of a side that is in the view. Throws Error if there is none.
+// Returns the part of a side that is in the view. Throws Error if there is none.
 Side clipped(const Side& side, double size, const std::string& entries, Project& project,
              const CommandEntries& tilt, double bin) {
   const Side inside{std::max(side.low, 0.0), std::min(side.high, size)};

@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <system_error>
 
 #include "io/alignment_files.h"
+#include "io/is_file.h"
 #include "io/mdoc_images.h"
 #include "projects/formats.h"
 #include "tomofield/error.h"
@@ -14,15 +14,11 @@
 namespace tomofield::projects {
 
 namespace fs = std::filesystem;
+using io::is_file;
 namespace {
 
-bool is_file(const fs::path& path) {
-  std::error_code absent;
-  return fs::is_regular_file(path, absent);
-}
-
-/// Returns the stack beside an .mdoc file: "TS.st" for "TS.st.mdoc" and for "TS.mdoc", or what the
-/// entry ImageFile names.
+// Returns the stack beside an .mdoc file: "TS.st" for "TS.st.mdoc" and for "TS.mdoc", or what the
+// entry ImageFile names.
 std::optional<fs::path> find_stack(const fs::path& mdoc, const std::string& image_file) {
   fs::path stem = mdoc;
   stem.replace_extension();

@@ -23,8 +23,8 @@ struct MainFile {
   fs::path path;
 };
 
-/// Returns the main files of a folder, sorted by name; with `metadata`, those of formats that are
-/// metadata, else those of the others.
+// Returns the main files of a folder, sorted by name; with `metadata`, those of formats that are
+// metadata, else those of the others.
 std::vector<MainFile> main_files(const fs::path& folder, bool metadata) {
   std::vector<MainFile> found;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
@@ -46,8 +46,8 @@ std::string names_of_formats() {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-/// Returns the one main file of a folder, or none if the folder may be one of images. Throws Error
-/// if there is none, or more than one.
+// Returns the one main file of a folder, or none if the folder may be one of images. Throws Error
+// if there is none, or more than one.
 MainFile find_main_file(const fs::path& folder, bool may_have_images) {
   std::vector<MainFile> found = main_files(folder, false);
   if (found.empty() && may_have_images) return {};
@@ -66,7 +66,7 @@ MainFile find_main_file(const fs::path& folder, bool may_have_images) {
                           folder.string(), found.size(), fmt::join(names, ", ")));
 }
 
-/// Returns the format of a file by the end of its name, or null.
+// Returns the format of a file by the end of its name, or null.
 const Format* format_of(const fs::path& path) {
   const std::string extension = path.extension().string();
   const auto formats = all_formats();

@@ -11,7 +11,7 @@
 
 namespace tomofield::projects {
 
-/// What the user asks for: a file or folder of another program, and how it is read.
+/// Names a file or folder of another program, and says how the user wants it to be read.
 struct Request {
   std::filesystem::path path = {};
   std::vector<std::string> ignored = {};  ///< names of entries that are not applied (--ignore)
@@ -19,7 +19,7 @@ struct Request {
   bool has_mdoc = false;  ///< the user gave --mdoc, so a folder may be that of its images
 };
 
-/// What the files of another program say, as settings of this one.
+/// Holds what the files of another program say, as settings of this one.
 class Project {
  public:
   explicit Project(const Request& request) : request_(request) {}

@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <fstream>
 #include <map>
 #include <string>
 
+#include "expect_parts.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -14,20 +17,15 @@
 namespace tomofield::projects {
 namespace {
 
+using testing::expect_parts;
 using testing::message_of;
 using testing::ScratchDirectory;
 using testing::some_value;
 using testing::write_stack;
 using Values = std::map<std::string, std::string>;
 
-void expect_parts(const std::string& message, const std::vector<std::string>& parts) {
-  for (const auto& part : parts) {
-    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' in: " << message;
-  }
-}
-
-/// An eTomo folder of a raw stack of 40 × 60 pixels whose tilt axis lies along X: aligned views
-/// have 60 × 40 pixels.
+// An eTomo folder of a raw stack of 40 × 60 pixels whose tilt axis lies along X: aligned views
+// have 60 × 40 pixels.
 class ImodFolder {
  public:
   ImodFolder() {
@@ -35,9 +33,10 @@ class ImodFolder {
     std::string transforms;
     for (int i = 0; i < 5; ++i) transforms += "-0.17 -0.98 0.98 -0.17 3 4\n";
     folder.write("TS.xf", transforms);
+    folder.write("TS.xtilt", "0\n0\n0\n0\n0\n");
   }
 
-  /// Writes tilt.com, as eTomo lays it out, with more entries.
+  // Writes tilt.com, as eTomo lays it out, with more entries.
   void write_tilt(const std::string& entries) const {
     folder.write("tilt.com",
                  "$setenv IMOD_OUTPUT_FORMAT MRC\n$tilt -StandardInput\nInputProjections "
@@ -53,14 +52,14 @@ class ImodFolder {
   Project read(const std::vector<std::string>& ignored = {}) const {
     return *read_project({.path = folder.path(), .ignored = ignored});
   }
-  /// Returns the values of the settings by their options.
+  // Returns the values of the settings by their options.
   Values values(const std::vector<std::string>& ignored = {}) const {
     Values found;
     const Project project = read(ignored);
     for (const auto& setting : project.settings()) found[setting.option] = setting.value;
     return found;
   }
-  /// Returns the warnings, a line each.
+  // Returns the warnings, a line each.
   std::string warnings(const std::vector<std::string>& ignored = {}) const {
     return fmt::format("{}", fmt::join(read(ignored).warnings(), "\n"));
   }
@@ -262,6 +261,81 @@ TEST(ImodProject, OtherCommandFiles) {
   expect_parts(refuse("$newstack -StandardInput\nInputFile a\n"), {"tilt.com", "$tilt"});
   expect_parts(refuse("$tilt a.ali a.rec\nTHICKNESS 4\n"), {"line 1", "-StandardInput"});
   EXPECT_NE(refuse("$tilt -StandardInput\n$tilt -StandardInput\n"), "");
+}
+
+// Writes a stack of bytes that are all 0, as a file with a hole.
+void write_empty_stack(const std::filesystem::path& path, std::int32_t nx, std::int32_t ny,
+                       std::int32_t nz) {
+  write_stack(path, 1, 1, 1, some_value);
+  const std::int32_t start[] = {nx, ny, nz, 0};  // mode 0
+  std::fstream(path, std::ios::binary | std::ios::in | std::ios::out)
+      .write(reinterpret_cast<const char*>(start), sizeof(start));
+  constexpr std::int64_t kHeaderBytes = 1024;
+  const std::int64_t pixels = std::int64_t{nx} * ny * nz;
+  std::filesystem::resize_file(path, static_cast<std::uintmax_t>(kHeaderBytes + pixels));
+}
+
+// Writes the files of a public series: the entries of tilt.com and newst.com are those of
+// tests/data/convert/imod_1 in the repository uermel/cryoet-alignment, whose transforms turn the
+// views by 100° and whose 59 angles are 2° apart. The images are not public.
+void write_public_pair(const ScratchDirectory& folder) {
+  const std::string name = "mka2018-10-01-1";
+  folder.write("newst.com",
+               "$setenv IMOD_OUTPUT_FORMAT MRC\n$newstack -StandardInput\nAntialiasFilter\t-1\n"
+               "InputFile\t" +
+                   name + ".mrc\nOutputFile\t" + name + "_ali.mrc\nTransformFile\t" + name +
+                   ".xf\nTaperAtFill\t1,1\nAdjustOrigin\nSizeToOutputInXandY\t928,958\n"
+                   "OffsetsInXandY\t0.0,0.0\n#DistortionField\t.idf\nImagesAreBinned\t1.0\n"
+                   "BinByFactor\t4\n#GradientFile\t" +
+                   name + ".maggrad\n$if (-e ./savework) ./savework\n");
+  folder.write("tilt.com",
+               "$setenv IMOD_OUTPUT_FORMAT MRC\n$tilt -StandardInput\nInputProjections " + name +
+                   "_ali.mrc\nOutputFile " + name + "_full_rec.mrc\nIMAGEBINNED 4\nTILTFILE " +
+                   name + ".tlt\nXTILTFILE " + name +
+                   ".xtilt\nTHICKNESS 2000\n"
+                   "RADIAL 0.35 0.035\nFalloffIsTrueSigma 1\nXAXISTILT 0.0\nLOG 0.0\n"
+                   "SCALE 0.0 330.0\nPERPENDICULAR\nMODE 1\nFULLIMAGE 3708 3832\nSUBSETSTART -2 0\n"
+                   "AdjustOrigin\nOFFSET 0.0\nSHIFT 0.0 0.0\nActionIfGPUFails 1,2\n"
+                   "$if (-e ./savework) ./savework\n");
+  std::string angles, transforms;
+  for (int view = 0; view < 59; ++view) {
+    angles += fmt::format("{:.2f}\n", -52.24 + 2 * view);
+    transforms += view % 2 == 0 ? "-0.1813379 -0.9834202 0.9834202 -0.1813379 -58.170 69.816\n"
+                                : "-0.1653824 -0.9862289 0.9862289 -0.1653824 213.511 -120.539\n";
+  }
+  folder.write(name + ".tlt", angles);
+  folder.write(name + ".xf", transforms);
+}
+
+TEST(ImodProject, PublicSeriesOfEtomo) {
+  const ScratchDirectory folder;
+  write_public_pair(folder);
+  // The views are wider than high before they are turned: tilt.com has 3708 × 3832 pixels.
+  write_empty_stack(folder / "mka2018-10-01-1.mrc", 3832, 3708, 59);
+  const auto read = [&](const std::vector<std::string>& ignored) {
+    return read_project({.path = folder.path(), .ignored = ignored});
+  };
+  expect_parts(message_of<Error>([&] { read({}); }),
+               {"tilt.com', line 7", "XTILTFILE", "mka2018-10-01-1.xtilt", "--ignore XTILTFILE"});
+  std::string x_tilts;
+  for (int view = 0; view < 59; ++view) x_tilts += "0.41\n";
+  folder.write("mka2018-10-01-1.xtilt", x_tilts);
+  const Project project = *read({});
+  Values values;
+  for (const auto& setting : project.settings()) values[setting.option] = setting.value;
+  const auto in = [&](const char* end) {
+    return (folder / (std::string("mka2018-10-01-1") + end)).string();
+  };
+  // The aligned stack is 4 unbinned pixels wider than the views, 2 on each side, as SUBSETSTART
+  // says: the volume ends with the views, and the tilt axis stays in their middle.
+  EXPECT_EQ(values, (Values{{"stack", in(".mrc")},
+                            {"--xf", in(".xf")},
+                            {"--tlt", in(".tlt")},
+                            {"--xtilt", in(".xtilt")},
+                            {"--bin", "4"},
+                            {"--thickness", "2000"},
+                            {"--log", "true"}}));
+  EXPECT_EQ(project.warnings(), std::vector<std::string>{});
 }
 
 TEST(ProjectFolder, HasOneProject) {

@@ -22,7 +22,7 @@ std::string names_of(const std::vector<io::RelionTomogram>& tomograms) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-/// Returns the tomogram of --series, or the only one.
+// Returns the tomogram of --series, or the only one.
 const io::RelionTomogram& choose_tomogram(const std::vector<io::RelionTomogram>& tomograms,
                                           const Request& request) {
   if (request.series.empty() && tomograms.size() == 1) return tomograms.front();
@@ -35,7 +35,7 @@ const io::RelionTomogram& choose_tomogram(const std::vector<io::RelionTomogram>&
                                 request.path.string(), request.series, names_of(tomograms)));
 }
 
-/// Sets what a table of one tilt series says.
+// Sets what a table of one tilt series says.
 void set_views(Project& project, const fs::path& views, const fs::path& named_by,
                std::string_view entry) {
   const io::ViewTable table = io::read_view_table(views);

@@ -11,36 +11,26 @@
 #include <vector>
 
 #include "scratch_directory.h"
-#include "sphere_series.h"
+#include "small_fit.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
 namespace {
 
 using testing::message_of;
-using testing::SphereSeries;
 
-constexpr const char* kFingerprint = R"({"fit":{"seed":1},"rays":12})";
+constexpr const char* kFingerprint = testing::SmallFit::kFingerprint;
 
 // Makes fits of a small series and keeps them in a file.
 class Checkpoint : public ::testing::Test {
  protected:
-  Checkpoint() {
-    info_.geometry = series_.geometry;
-    info_.roi = measurement_.roi;
-    field_.leaf_size = 16;
-    field_.rank = 2;
-    field_.with_margin = false;
-    fit_.epochs = 3;
-    fit_.subsets = 4;
-  }
-
-  std::unique_ptr<fit::Fit> make_fit() const {
-    return std::make_unique<fit::Fit>(measurement_, field_, fit_);
-  }
+  std::unique_ptr<fit::Fit> make_fit() const { return series_.make(); }
   // Returns a fit that was stopped after some steps.
   std::unique_ptr<fit::Fit> stopped_fit(std::int64_t steps) const {
-    auto fit = make_fit();
+    return stopped_fit(steps, series_.field());
+  }
+  std::unique_ptr<fit::Fit> stopped_fit(std::int64_t steps, const fit::FieldOptions& field) const {
+    auto fit = series_.make(field);
     fit->run([&](const fit::Fit& f) { return f.progress().step != steps; });
     EXPECT_EQ(fit->progress().step, steps);
     return fit;
@@ -55,15 +45,7 @@ class Checkpoint : public ::testing::Test {
             .predicted_views = {4, 12}};
   }
 
-  SphereSeries series_;
-  measurement::Measurement measurement_{.geometry = series_.geometry,
-                                        .roi = {0, 0, SphereSeries::kWidth, SphereSeries::kRows},
-                                        .rays = series_.rays,
-                                        .noise_sigma = series_.noise_sigma,
-                                        .mean_density = 0.1};
-  fit::FieldOptions field_;
-  fit::FitOptions fit_;
-  output::ModelInfo info_;
+  testing::SmallFit series_;
   testing::ScratchDirectory scratch_;
   std::filesystem::path file_ = scratch_ / "fit.h5";
 };
@@ -74,7 +56,7 @@ TEST_F(Checkpoint, RestoresTheSameBitsAndGoesOnToTheSameBits) {
   // In the first epoch, between two, in the second, and after the noise of the views was fitted.
   for (const std::int64_t steps : {1, 4, 7, 10}) {
     const auto stopped = stopped_fit(steps);
-    save_checkpoint(file_, *stopped, info_, {.fingerprint = kFingerprint, .tuned = {}});
+    save_checkpoint(file_, *stopped, series_.info(), {.fingerprint = kFingerprint, .tuned = {}});
     const auto restored = make_fit();
     restore_fit(file_, kFingerprint, *restored);
     EXPECT_EQ(restored->progress().step, steps);
@@ -89,7 +71,7 @@ TEST_F(Checkpoint, RestoresTheSameBitsAndGoesOnToTheSameBits) {
 TEST_F(Checkpoint, AFinishedModelNeedsNoOptimiserState) {
   const auto whole = make_fit();
   whole->run([](const fit::Fit&) { return true; });
-  save_fit(file_, *whole, info_, progress_state(*whole, {kFingerprint, {}}));
+  save_fit(file_, *whole, series_.info(), progress_state(*whole, {kFingerprint, {}}));
   const auto restored = make_fit();
   restore_fit(file_, kFingerprint, *restored);
   EXPECT_TRUE(restored->is_done());
@@ -98,7 +80,7 @@ TEST_F(Checkpoint, AFinishedModelNeedsNoOptimiserState) {
 
 TEST_F(Checkpoint, AModelBetweenTwoStepsIsNone) {
   const auto stopped = stopped_fit(5);
-  save_fit(file_, *stopped, info_, progress_state(*stopped, {kFingerprint, {}}));
+  save_fit(file_, *stopped, series_.info(), progress_state(*stopped, {kFingerprint, {}}));
   const auto restored = make_fit();
   const std::string message =
       message_of<Error>([&] { restore_fit(file_, kFingerprint, *restored); });
@@ -107,7 +89,7 @@ TEST_F(Checkpoint, AModelBetweenTwoStepsIsNone) {
 
 TEST_F(Checkpoint, AnotherFingerprintIsRefusedAndWhatDiffersIsNamed) {
   const auto stopped = stopped_fit(2);
-  save_checkpoint(file_, *stopped, info_, {.fingerprint = kFingerprint, .tuned = {}});
+  save_checkpoint(file_, *stopped, series_.info(), {.fingerprint = kFingerprint, .tuned = {}});
   const auto complaint = [&](const std::string& fingerprint) {
     const auto fit = make_fit();
     const auto before = parameters(*fit);
@@ -126,9 +108,9 @@ TEST_F(Checkpoint, AnotherFingerprintIsRefusedAndWhatDiffersIsNamed) {
 
 TEST_F(Checkpoint, KeepsWhatTheOptionsWereChosenBy) {
   const auto stopped = stopped_fit(2);
-  save_checkpoint(file_, *stopped, info_, {.fingerprint = kFingerprint, .tuned = {}});
+  save_checkpoint(file_, *stopped, series_.info(), {.fingerprint = kFingerprint, .tuned = {}});
   EXPECT_FALSE(stored_choice(file_).has_value());
-  save_checkpoint(file_, *stopped, info_, {.fingerprint = kFingerprint, .tuned = tuned()});
+  save_checkpoint(file_, *stopped, series_.info(), {.fingerprint = kFingerprint, .tuned = tuned()});
   const auto stored = stored_choice(file_);
   ASSERT_TRUE(stored.has_value());
   EXPECT_EQ(stored->settings, tuned().settings);
@@ -142,8 +124,8 @@ TEST_F(Checkpoint, TheSameFitGivesTheSameBytesWheneverItIsMade) {
   selection::Tuned slower = tuned();
   slower.trials[0].seconds = 99;
   const auto stopped = stopped_fit(2);
-  save_checkpoint(file_, *stopped, info_, {kFingerprint, tuned()});
-  save_checkpoint(scratch_ / "again.h5", *stopped, info_, {kFingerprint, slower});
+  save_checkpoint(file_, *stopped, series_.info(), {kFingerprint, tuned()});
+  save_checkpoint(scratch_ / "again.h5", *stopped, series_.info(), {kFingerprint, slower});
   EXPECT_EQ(testing::read_whole_file(file_), testing::read_whole_file(scratch_ / "again.h5"));
 }
 
@@ -208,9 +190,10 @@ TEST_F(Checkpoint, AStateThatTheSeriesAndTheOptionsCannotHaveIsRefused) {
       [](State& s) { s.floats["adam_m"][1] = std::nanf(""); },
       [](State& s) { s.floats.erase("adam_v"); },
   };
-  EXPECT_EQ(refusal_after(*stopped, *make_fit(), info_, file_, [](State&) {}), "");
+  EXPECT_EQ(refusal_after(*stopped, *make_fit(), series_.info(), file_, [](State&) {}), "");
   for (std::size_t i = 0; i < changes.size(); ++i) {
-    const std::string said = refusal_after(*stopped, *make_fit(), info_, file_, changes[i]);
+    const std::string said =
+        refusal_after(*stopped, *make_fit(), series_.info(), file_, changes[i]);
     EXPECT_NE(said.find(file_.string()), std::string::npos) << "change " << i << ": " << said;
   }
 }
@@ -218,44 +201,38 @@ TEST_F(Checkpoint, AStateThatTheSeriesAndTheOptionsCannotHaveIsRefused) {
 TEST_F(Checkpoint, AFieldOfOtherLeavesIsRefused) {
   const auto stopped = stopped_fit(7);
   const auto refusal = [&](const fit::Fit& other) {
-    save_checkpoint(file_, other, info_, {.fingerprint = kFingerprint, .tuned = {}});
+    save_checkpoint(file_, other, series_.info(), {.fingerprint = kFingerprint, .tuned = {}});
     const auto restored = make_fit();
     return message_of<Error>([&] { restore_fit(file_, kFingerprint, *restored); });
   };
   EXPECT_EQ(refusal(*stopped), "");
-  field_.leaf_size = 32;
-  const auto larger = stopped_fit(7);
-  field_.leaf_size = 16;
-  EXPECT_NE(refusal(*larger).find("root cells"), std::string::npos);
-  field_.rank = 3;
-  const auto richer = stopped_fit(7);
-  field_.rank = 2;
-  EXPECT_NE(refusal(*richer).find("ranks"), std::string::npos);
-  field_.kind = FieldKind::kGrid;
-  const auto other_kind = stopped_fit(7);
-  field_.kind = FieldKind::kVm;
-  EXPECT_NE(refusal(*other_kind).find("field"), std::string::npos);
+  fit::FieldOptions large = series_.field(), rich = series_.field(), grid = series_.field();
+  large.leaf_size = 32;
+  rich.rank = 3;
+  grid.kind = FieldKind::kGrid;
+  EXPECT_NE(refusal(*stopped_fit(7, large)).find("root cells"), std::string::npos);
+  EXPECT_NE(refusal(*stopped_fit(7, rich)).find("ranks"), std::string::npos);
+  EXPECT_NE(refusal(*stopped_fit(7, grid)).find("field"), std::string::npos);
   // A leaf that has been split.
   const field::Field& whole = stopped->field();
-  field_.leaf_size = 32;
-  const auto of_large = stopped_fit(7);
+  const auto of_large = stopped_fit(7, large);
   field::Quadtree split = of_large->field().tree();
   split.split(0);
   std::vector<field::LeafShape> shapes(static_cast<std::size_t>(split.num_leaves()),
                                        of_large->field().shape(0));
   output::Model model;
-  static_cast<output::ModelInfo&>(model) = info_;
+  static_cast<output::ModelInfo&>(model) = series_.info();
   model.field = field::make_field(whole.kind(), split, whole.thickness(), std::move(shapes));
   const output::TrainingState state = progress_state(*of_large, {kFingerprint, {}});
   output::save_model(file_, model, &state);
-  const auto restored = make_fit();
+  const auto restored = series_.make(large);
   const std::string said = message_of<Error>([&] { restore_fit(file_, kFingerprint, *restored); });
   EXPECT_NE(said.find("leaves"), std::string::npos) << said;
 }
 
 TEST_F(Checkpoint, ATornFileIsRefused) {
   const auto stopped = stopped_fit(2);
-  save_checkpoint(file_, *stopped, info_, {.fingerprint = kFingerprint, .tuned = {}});
+  save_checkpoint(file_, *stopped, series_.info(), {.fingerprint = kFingerprint, .tuned = {}});
   std::filesystem::resize_file(file_, std::filesystem::file_size(file_) / 2);
   const auto fit = make_fit();
   const std::string message = message_of<Error>([&] { restore_fit(file_, kFingerprint, *fit); });

@@ -27,7 +27,7 @@ namespace {
 using nlohmann::json;
 using tilt_series::Half;
 
-// What the volumes of both halves tell of each other.
+// Holds the resolution that a comparison of the volumes of both halves gives.
 struct Agreement {
   evaluate::Fsc fsc;
   std::optional<evaluate::Fsc> linear_fsc;  // of the linear halves, if they are written

@@ -10,7 +10,7 @@
 
 namespace tomofield::reconstruction {
 
-/// What the fits of both halves tell, [tilt_series::Half].
+/// Holds the findings of the fits of both halves, [tilt_series::Half].
 using FinishedHalves = std::array<Findings, 2>;
 
 /// Writes the results of two finished fits, whose models are in their files: the volumes of both

@@ -48,7 +48,7 @@ struct ReconstructOptions {
   SeriesFiles files;
   Options requested;  ///< as they were given
   Options resolved;   ///< the options that are used
-  /// What is left to trials. `resolved` has the settings that they start from.
+  /// Names the settings that trials choose. The trials start from those in `resolved`.
   OpenSettings open;
   // The same options in the types of the layers below, with the constants of the method.
   tilt_series::TiltSeriesOptions input;

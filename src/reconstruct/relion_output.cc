@@ -8,6 +8,7 @@
 
 #include "base/log.h"
 #include "io/atomic_file.h"
+#include "io/is_file.h"
 #include "io/mrc.h"
 #include "io/output_set.h"
 #include "io/relion_star.h"
@@ -21,6 +22,9 @@ namespace {
 
 // The entry of a tomograms.star by which the stack was found (projects/relion_project.cc).
 constexpr const char* kEntry = "rlnTomoTiltSeriesStarFile";
+constexpr const char* kTomogram = "rlnTomoReconstructedTomogram";
+
+fs::path star_beside(fs::path volume) { return volume.replace_extension(".star"); }
 
 const option_table::Setting* find_origin(const ReconstructOptions& options) {
   const auto found = std::ranges::find(options.origins, kEntry, &option_table::Setting::entry);
@@ -45,6 +49,11 @@ const char* obstacle(const Options& options) {
   return nullptr;
 }
 
+// Removes a file when the results get their names.
+void remove_with_commit(const fs::path& file) {
+  if (io::OutputSet* const results = io::OutputSet::active()) results->remove_old(file);
+}
+
 // Sets the columns of half maps if the run wrote them.
 void set_halves(const fs::path& volume, io::StarTable& table) {
   const io::OutputSet* const results = io::OutputSet::active();
@@ -63,14 +72,28 @@ void set_halves(const fs::path& volume, io::StarTable& table) {
 
 std::optional<fs::path> relion_output(const ReconstructOptions& options) {
   if (find_origin(options) == nullptr || obstacle(options.resolved) != nullptr) return std::nullopt;
-  fs::path star = options.resolved.output;
-  return star.replace_extension(".star");
+  return star_beside(options.resolved.output);
+}
+
+std::optional<io::StarTable> read_relion_output(const fs::path& volume) {
+  const fs::path star = star_beside(volume);
+  if (!io::is_file(star)) return std::nullopt;
+  try {
+    for (const io::StarTable& table : io::read_star_file(star)) {
+      const auto named = table.num_rows() == 1 ? table.find(0, kTomogram) : std::nullopt;
+      if (named && fs::path(*named).filename() == volume.filename()) return table;
+    }
+  } catch (const Error&) {
+    // The file is of something else.
+  }
+  return std::nullopt;
 }
 
 void write_relion_output(const ReconstructOptions& options, const fs::path& volume) {
   const option_table::Setting* const origin = find_origin(options);
-  if (origin == nullptr) return;
   const fs::path path = options.resolved.output;
+  if (!relion_output(options) && read_relion_output(path)) remove_with_commit(star_beside(path));
+  if (origin == nullptr) return;
   if (const char* const why = obstacle(options.resolved)) {
     base::log_warning(
         fmt::format("no STAR file is written for RELION beside '{}': {}", path.string(), why));
@@ -89,7 +112,7 @@ void write_relion_output(const ReconstructOptions& options, const fs::path& volu
   table.set(0, "rlnTomoSizeX", unbinned(header.nx));
   table.set(0, "rlnTomoSizeY", unbinned(header.ny));
   table.set(0, "rlnTomoSizeZ", unbinned(header.nz));
-  table.set(0, "rlnTomoReconstructedTomogram", path.string());
+  table.set(0, kTomogram, path.string());
   set_halves(path, table);
   // Programs know the denoised tomogram by either name; RELION 5 by the second.
   table.set(0, "rlnTomoDenoisedTomogram", path.string());

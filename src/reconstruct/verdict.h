@@ -12,14 +12,15 @@
 
 namespace tomofield::reconstruction {
 
-/// How well a field predicts views that it was not fitted to, in units of their noise variance.
+/// Tells how well a field predicts views that it was not fitted to, in units of their noise
+/// variance.
 struct HeldOutSummary {
   double median = 0.0, worst = 0.0;
   double worst_tilt_deg = 0.0;
   bool is_of_trials = false;  ///< of the trials that chose the settings, not of the fit itself
 };
 
-/// How the density varies within the sections of the volume.
+/// Tells how the density varies within the sections of the volume.
 struct SectionProfile {
   /// Standard deviation in the outermost twentieth of the sections, at the face where it is
   /// smaller, over the median of the middle half.

@@ -9,7 +9,7 @@
 
 namespace tomofield::reconstruction {
 
-/// How the brightness of the views follows the length of their rays in the volume.
+/// Tells how the brightness of the views follows the length of their rays in the volume.
 struct PathEffect {
   double correlation = 0.0;
   /// Line through the means of all columns: its rise from the shortest to the longest ray, over the
@@ -17,7 +17,8 @@ struct PathEffect {
   double rise = 0.0;
 };
 
-/// How some views of a series agree with the field that was fitted to them, and with each other.
+/// Tells how some views of a series agree with the field that was fitted to them, and with each
+/// other.
 struct ViewAgreement {
   std::vector<int> views;           ///< those that were looked at, in order of tilt
   std::vector<double> correlation;  ///< [i]: of measured and predicted view

@@ -27,8 +27,8 @@ struct HtmlCell {
   std::vector<HtmlLink> links = {};
 };
 
-/// What the cells of a table hold besides its first column: numbers, aligned to the right, or
-/// words.
+/// Says whether the cells beside the first column of a table hold numbers, which are aligned to the
+/// right, or words.
 enum class TableOf { kNumbers, kWords };
 
 /// A picture with a line below it.
@@ -71,7 +71,7 @@ class HtmlPage {
                   bool is_warning);
   /// Adds three linked planes of a volume to scroll through. A page has at most one volume.
   void add_volume(const EmbeddedVolume& volume);
-  /// What is added between these two is folded under a line that the reader opens.
+  /// Fold what is added between these two calls under a line that the reader opens.
   void begin_folded(std::string_view summary);
   void end_folded();
   /// Returns the whole document.

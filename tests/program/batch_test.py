@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import pathlib
 import signal
 import subprocess
 import time
@@ -148,9 +149,48 @@ def test_all_tomograms_of_relion_are_reconstructed():
                 for name in ("TS_01", "TS_02"))
     assert one.shape[0] == harness.THICKNESS
     assert np.array_equal(one, two)  # the same images, in single files and in a stack
+    rows = star_projects.read_rows(os.path.join(results, "tomograms.star"))
+    for row, before in zip(rows, star_projects.read_rows(star), strict=True):
+        assert row == {**row, **before}  # sizes are the same, since nothing is binned
+        assert row["rlnTomoReconstructedTomogram"] == os.path.join(results,
+                                                                   before["rlnTomoName"] + ".mrc")
     views = os.path.join(folder, "Tomograms/job009/tilt_series/TS_01.star")
     plan = harness.succeed("batch", views, *QUICK, "--dry-run", "-o", results + "2").stdout
     assert plan.startswith("TS_01:") and "1 of 1 series" in plan
+
+
+def test_a_table_for_relion_has_the_series_with_results():
+    folder = harness.fresh_directory("relion_parts")
+    star = star_projects.write_relion(folder, harness.Series("source"))
+    results = os.path.join(folder, "results")
+    joined = os.path.join(results, "tomograms.star")
+    os.makedirs(results)
+    pathlib.Path(joined).write_text("of somebody else", encoding="utf-8")
+    refused = harness.tomofield("batch", star, *QUICK[2:], "-o", results)
+    assert refused.returncode == 2 and "not of an earlier batch" in refused.stderr, refused.stderr
+    os.remove(joined)
+
+    def names(*options):
+        """Runs the batch and returns the tomograms in its table."""
+        harness.tomofield("batch", star, *QUICK[2:], "-o", results, *options)
+        if not os.path.exists(joined):
+            return []
+        return [row["rlnTomoName"] for row in star_projects.read_rows(joined)]
+
+    def break_images():
+        broken = np.full((len(harness.TILTS), harness.HEIGHT, harness.WIDTH), np.nan, np.float32)
+        harness.write_stack(os.path.join(folder, "stacks/TS_02.mrcs"), broken)
+
+    images = harness.read_bytes(os.path.join(folder, "stacks/TS_02.mrcs"))
+    break_images()
+    assert names() == ["TS_01"]
+    pathlib.Path(folder, "stacks/TS_02.mrcs").write_bytes(images)
+    assert names("--skip-existing") == ["TS_01", "TS_02"]  # the first keeps its row
+    states = [line["state"] for line in summary(results).values()]
+    assert states == ["skipped", "done"]
+    break_images()
+    assert names("--overwrite") == ["TS_01"]  # the row of an earlier result has gone
+    assert names("--overwrite", "--roi", "8,8,40,28") == []  # RELION has no place for a part
 
 
 def test_all_mistakes_are_found_before_anything_starts(data):

@@ -2,7 +2,6 @@
 the plan, and --resume in and after them."""
 
 import json
-import os
 
 import h5py
 import pytest
@@ -29,10 +28,6 @@ def make_command(series):
     return command
 
 
-def fresh_results(name):
-    return harness.Results(os.path.join(harness.fresh_directory(name), "out.mrc"))
-
-
 @pytest.fixture(scope="module", name="psnr")
 def make_psnr(series):
     def psnr(results):
@@ -44,13 +39,13 @@ def make_psnr(series):
 @pytest.fixture(scope="module")
 def whole(command):
     """Returns the results of an undisturbed run."""
-    results = fresh_results("whole")
+    results = harness.fresh_results("whole")
     harness.succeed(*command(results))
     return results
 
 
 def test_plan_and_metrics_count_both_stages(command, whole):
-    plan = harness.succeed(*command(fresh_results("plan"), "--dry-run")).stdout
+    plan = harness.succeed(*command(harness.fresh_results("plan"), "--dry-run")).stdout
     assert f"{(COARSE + FINE) * SUBSETS} steps" in plan, plan
     assert f"epochs: {COARSE} of pixels 2 x 2, {FINE} at full resolution\n" in plan, plan
     with open(whole.json_path) as file:
@@ -62,23 +57,23 @@ def test_plan_and_metrics_count_both_stages(command, whole):
 
 
 def test_the_coarse_stage_helps(command, psnr, whole):
-    alone = fresh_results("alone")
+    alone = harness.fresh_results("alone")
     harness.succeed(*command(alone, "--coarse-epochs", 0))
     print(f"PSNR {psnr(whole):.2f} dB, {psnr(alone):.2f} dB without")
     assert psnr(whole) > psnr(alone)
 
 
 def test_leaves_too_small_have_no_coarse_stage(command):
-    result = harness.succeed(*command(fresh_results("small"), "--leaf-size", 16))
+    result = harness.succeed(*command(harness.fresh_results("small"), "--leaf-size", 16))
     assert "no coarse stage" in result.stderr and "--leaf-size" in result.stderr, result.stderr
-    result = harness.succeed(*command(fresh_results("off"), "--coarse-epochs", 0))
+    result = harness.succeed(*command(harness.fresh_results("off"), "--coarse-epochs", 0))
     assert "no coarse stage" not in result.stderr, result.stderr
 
 
 def test_faulty_options_are_refused(command):
     for option, value in (("--coarse-epochs", -1), ("--vertex-epochs", -1), ("--coarse-bin", 1),
                           ("--coarse-bin", 65)):
-        result = harness.tomofield(*command(fresh_results("faulty"), option, value))
+        result = harness.tomofield(*command(harness.fresh_results("faulty"), option, value))
         assert result.returncode == 2 and option in result.stderr, result
 
 
@@ -102,7 +97,7 @@ def make_stages_when_stopped(command):
 
 
 def test_runs_stopped_in_either_stage_end_alike(stages_when_stopped, whole):
-    results = fresh_results("resumed")
+    results = harness.fresh_results("resumed")
     stages = stages_when_stopped(results)
     assert ("vm", 17) in stages, f"no run was caught in the coarse stage: {stages}"
     assert results.same_as(whole)
@@ -114,7 +109,7 @@ VERTICES_FIRST = ["--rank", 20, "--vertex-epochs", 8, "--coarse-epochs", 10, "--
 @pytest.fixture(scope="module")
 def with_vertices(command):
     """Returns the results of an undisturbed run that begins with plain vertices."""
-    results = fresh_results("vertices")
+    results = harness.fresh_results("vertices")
     harness.succeed(*command(results, *VERTICES_FIRST))
     return results
 
@@ -129,7 +124,7 @@ def residuals(results):
 
 
 def test_factors_begin_as_plain_vertices(command, psnr, with_vertices):
-    plan = harness.succeed(*command(fresh_results("plan"), *VERTICES_FIRST, "--dry-run")).stdout
+    plan = harness.succeed(*command(harness.fresh_results("plan"), *VERTICES_FIRST, "--dry-run")).stdout
     assert "epochs: 10 of pixels 2 x 2 with plain vertices, 8 at full resolution with plain " \
         "vertices, 6 at full resolution\n" in plan, plan
     assert [(stage["field"], stage["bin"], stage["epochs"])
@@ -137,7 +132,7 @@ def test_factors_begin_as_plain_vertices(command, psnr, with_vertices):
         == [("grid", 2, 10), ("grid", 1, 8), ("vm", 1, 6)]
     with h5py.File(with_vertices.model_path) as model:
         assert model["field"].attrs["kind"] == b"vm"
-    of_factors = fresh_results("factors")
+    of_factors = harness.fresh_results("factors")
     harness.succeed(*command(of_factors, "--rank", 20, "--vertex-epochs", 0, "--coarse-epochs", 10,
                              "--epochs", 14))
     print(f"PSNR {psnr(with_vertices):.2f} dB, {psnr(of_factors):.2f} dB of factors alone")
@@ -152,14 +147,14 @@ def test_factors_go_on_where_vertices_were(with_vertices):
 
 
 def test_held_out_views_are_predicted_in_every_stage(command):
-    results = fresh_results("held")
+    results = harness.fresh_results("held")
     harness.succeed(*command(results, *VERTICES_FIRST, "--hold-out", 4))
     curve = metrics(results)["held_out"]["error_by_epoch"]
     assert len(curve) == 24 and curve[-1] == min(curve), curve
 
 
 def test_an_early_stop_is_one_of_factors(command):
-    results = fresh_results("early")
+    results = harness.fresh_results("early")
     stopping = ["--hold-out", 4, "--tv", 0, "--epochs", 90, "--early-stop", 2]
     harness.succeed(*command(results, *harness.merge(VERTICES_FIRST, stopping)))
     curve = metrics(results)["held_out"]["error_by_epoch"]
@@ -170,7 +165,7 @@ def test_an_early_stop_is_one_of_factors(command):
 
 def test_trials_of_the_penalty_are_the_same_whatever_factors_begin_with(command):
     def trials(name, *options):
-        results = fresh_results(name)
+        results = harness.fresh_results(name)
         harness.succeed(*command(results, "--rank", 20, "--tv-penalty", "auto", *options))
         return [(trial["tv_penalty"], trial["held_out_error"])
                 for trial in metrics(results)["tuning"]["trials"]]
@@ -183,7 +178,7 @@ def test_trials_of_the_penalty_are_the_same_whatever_factors_begin_with(command)
 def test_the_usual_factors_begin_as_vertices(series):
     def epochs(*options):
         plan = harness.succeed("reconstruct", *series.input, "-o",
-                               fresh_results("plan").volume_path, "--thickness", harness.THICKNESS,
+                               harness.fresh_results("plan").volume_path, "--thickness", harness.THICKNESS,
                                "--contrast", "bright", "--field", "vm", "--dry-run", *options).stdout
         return next(line for line in plan.splitlines() if line.startswith("epochs: "))
 
@@ -198,14 +193,14 @@ def test_the_usual_factors_begin_as_vertices(series):
 
 
 def test_vertices_have_no_variation_of_factors(command, with_vertices):
-    results = fresh_results("factor_variation")
+    results = harness.fresh_results("factor_variation")
     harness.succeed(*command(results, *VERTICES_FIRST, "--tv-factors", 5))
     assert residuals(results)[:18] == residuals(with_vertices)[:18]
     assert residuals(results)[18:] != residuals(with_vertices)[18:]
 
 
 def test_runs_stopped_before_there_are_factors_end_alike(stages_when_stopped, with_vertices):
-    results = fresh_results("vertices_resumed")
+    results = harness.fresh_results("vertices_resumed")
     stages = stages_when_stopped(results, *VERTICES_FIRST)
     assert stages & {("grid", 17), ("grid", 33)}, f"no run was caught with vertices: {stages}"
     assert results.same_as(with_vertices)
@@ -214,7 +209,7 @@ def test_runs_stopped_before_there_are_factors_end_alike(stages_when_stopped, wi
 def test_leaves_of_a_grid_are_fitted_at_a_quarter_of_the_width_first(series, stages_when_stopped):
     grid = ["--field", "grid", "--coarse-epochs", 2 * COARSE]
     options = [word for word in harness.merge(OPTIONS, grid) if word not in ("--leaf-size", 32)]
-    undisturbed = fresh_results("grid")
+    undisturbed = harness.fresh_results("grid")
     harness.succeed("reconstruct", *series.input, "-o", undisturbed.volume_path, *options)
     with open(undisturbed.json_path) as file:
         document = json.load(file)
@@ -222,7 +217,7 @@ def test_leaves_of_a_grid_are_fitted_at_a_quarter_of_the_width_first(series, sta
     assert document["options"]["field"]["depth"] == 0
     assert [(stage["bin"], stage["epochs"]) for stage in document["metrics"]["stages"]] \
         == [(4, COARSE), (2, COARSE), (1, FINE)]
-    results = fresh_results("grid_resumed")
+    results = harness.fresh_results("grid_resumed")
     stages = stages_when_stopped(results, *grid, "--leaf-size", 64)
     assert stages & {("grid", 17), ("grid", 33)}, f"no run was caught in a coarse stage: {stages}"
     assert results.same_as(undisturbed)

@@ -31,7 +31,7 @@ def run(command, redirection):
 @pytest.mark.parametrize("redirection", ["2>/dev/full", "2>&-", ">/dev/full", ">&-", "<&- >&- 2>&-",
                                          ">/dev/full 2>&1"])
 def test_a_run_goes_on_without_its_messages(redirection, series, undisturbed):
-    results = harness.Results(os.path.join(harness.fresh_directory("silent"), "out.mrc"))
+    results = harness.fresh_results("silent")
     ended = run(["reconstruct", *series.input, *QUICK, "-o", results.volume_path], redirection)
     assert ended.returncode == 0, ended
     assert results.same_as(undisturbed)
@@ -41,7 +41,7 @@ def test_a_run_goes_on_without_its_messages(redirection, series, undisturbed):
 
 
 def test_a_run_goes_on_when_nobody_reads_its_messages(series, undisturbed):
-    results = harness.Results(os.path.join(harness.fresh_directory("pipe"), "out.mrc"))
+    results = harness.fresh_results("pipe")
     reader, writer = os.pipe()
     os.close(reader)
     ended = subprocess.run([PROGRAM, "reconstruct", *series.input, *map(str, QUICK), "-o",

@@ -54,7 +54,7 @@ class Sweep:
         self.harness, self.scratch, self.library = harness, str(scratch), library
         harness.SCRATCH = self.scratch
         self.series = harness.Series("series")
-        self.results = harness.Results(os.path.join(harness.fresh_directory("out"), "out.mrc"))
+        self.results = harness.fresh_results("out")
         self.old = self.finished(["--epochs", 1])
         self.new = self.finished([])
 

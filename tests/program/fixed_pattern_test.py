@@ -1,10 +1,6 @@
 """Tests that a pattern that stays at one place of the detector is found and removed."""
 
-import json
-import os
-
 import numpy as np
-import pytest
 
 import harness
 
@@ -16,39 +12,17 @@ QUICK = ["--thickness", 24, "--contrast", "bright", "--leaf-size", 16, "--field"
 
 def clean_views():
     """Returns views [tilt, y, x] of soft bodies in a slab that extends beyond the views."""
-    random = np.random.default_rng(1)
-    bodies = random.uniform([-130, -10, -10, 3], [130, HEIGHT + 10, 10, 7], size=(250, 4))
-    y, x = np.mgrid[0:HEIGHT, 0:WIDTH] + 0.5
-    views = []
-    for tilt in np.radians(TILTS):
-        view = random.normal(size=x.shape)
-        for body_x, body_y, body_z, radius in bodies:
-            at = WIDTH / 2 + body_x * np.cos(tilt) + body_z * np.sin(tilt)
-            view += 3 * np.exp(-((x - at) ** 2 + (y - body_y) ** 2) / (2 * radius**2))
-        views.append(100 + view)
-    return np.array(views)
+    return 100 + harness.views_of_bodies(TILTS, WIDTH, HEIGHT, [-130, -10, -10, 3],
+                                         [130, HEIGHT + 10, 10, 7], 250)
 
 
-@pytest.fixture(scope="module", name="volume_of")
-def make_volume_of():
-    directory = harness.fresh_directory("fixed_pattern")
-    tlt = os.path.join(directory, "a.tlt")
-    np.savetxt(tlt, TILTS, fmt="%.1f")
-
-    def volume_of(name, views, *options):
-        """Reconstructs and returns the results, what was removed, and the program's words."""
-        stack = os.path.join(directory, name + ".st")
-        harness.write_stack(stack, views.astype(np.float32))
-        output = os.path.join(harness.fresh_directory(name), "out.mrc")
-        run = harness.succeed("reconstruct", stack, "--tlt", tlt, "-o", output, *QUICK, *options)
-        results = harness.Results(output)
-        pattern = json.load(open(results.json_path))["metrics"]["mask"]["fixed_pattern"]
-        return results, pattern, run.stdout + run.stderr
-
-    return volume_of
+def volume_of(name, views, *options):
+    """Reconstructs and returns the results, what was removed, and the program's words."""
+    run, results, metrics = harness.reconstruct_views(name, views, TILTS, *QUICK, *options)
+    return results, metrics["mask"]["fixed_pattern"], run.stdout + run.stderr
 
 
-def test_columns_are_removed_and_reported(volume_of):
+def test_columns_are_removed_and_reported():
     views = clean_views()
     pattern = np.random.default_rng(2).normal(size=WIDTH)
     clean, nothing, _ = volume_of("clean", views)
@@ -62,7 +36,7 @@ def test_columns_are_removed_and_reported(volume_of):
     assert error["removed"] < 0.5 * error["left"], error
 
 
-def test_nothing_changes_without_a_pattern(volume_of):
+def test_nothing_changes_without_a_pattern():
     views = clean_views()
     looked_for, _, _ = volume_of("looked_for", views)
     not_looked_for, _, _ = volume_of("not_looked_for", views, "--no-fixed-pattern")

@@ -3,6 +3,7 @@ which program runs and where the tests write."""
 
 import copy
 import glob
+import json
 import os
 import shutil
 import signal
@@ -191,6 +192,39 @@ class Results:
         return set(glob.glob(os.path.join(glob.escape(os.path.dirname(self.volume_path)), "*"))
                    + glob.glob(os.path.join(glob.escape(os.path.dirname(self.volume_path)), ".*"))
                    ) - set(self.all_paths)
+
+
+def fresh_results(name):
+    """Names the results of a run in an empty directory of this name."""
+    return Results(os.path.join(fresh_directory(name), "out.mrc"))
+
+
+def views_of_bodies(tilts, width, height, low, high, number):
+    """Returns views [tilt, y, x] of soft bodies with noise of standard deviation 1. The centres x, y
+    and z of the bodies and their radii lie between `low` and `high`."""
+    random = np.random.default_rng(1)
+    bodies = random.uniform(low, high, size=(number, 4))
+    y, x = np.mgrid[0:height, 0:width] + 0.5
+    views = []
+    for tilt in np.radians(tilts):
+        view = random.normal(size=x.shape)
+        for body_x, body_y, body_z, radius in bodies:
+            at = width / 2 + body_x * np.cos(tilt) + body_z * np.sin(tilt)
+            view += 3 * np.exp(-((x - at) ** 2 + (y - body_y) ** 2) / (2 * radius**2))
+        views.append(view)
+    return np.array(views)
+
+
+def reconstruct_views(name, views, tilts, *options):
+    """Reconstructs bare views in a directory of this name. Returns the program's run, the results,
+    and their metrics."""
+    results = fresh_results(name)
+    stack, tlt = (results.volume_path.replace("out.mrc", end) for end in ("views.st", "views.tlt"))
+    write_stack(stack, views.astype(np.float32))
+    np.savetxt(tlt, tilts, fmt="%.1f")
+    run = succeed("reconstruct", stack, "--tlt", tlt, "-o", results.volume_path, *options)
+    with open(results.json_path) as file:
+        return run, results, json.load(file)["metrics"]
 
 
 def psnr(volume, truth):

@@ -64,10 +64,6 @@ def make_command(series):
     return command
 
 
-def fresh_results(name):
-    return harness.Results(os.path.join(harness.fresh_directory(name), "out.mrc"))
-
-
 def start(processes, *arguments):
     return subprocess.Popen(["mpirun", "-np", str(processes), harness.PROGRAM,
                              *map(str, arguments)],
@@ -112,10 +108,10 @@ def test_results_have_the_bytes_of_one_process(command):
                         (3,))}
     for name, (options, numbers) in cases.items():
         fit = [word for word in FIT if word != "--no-margin"] if name == "margin" else FIT
-        alone = fresh_results(name)
+        alone = harness.fresh_results(name)
         harness.succeed(*command(alone, *options, fit=fit))
         for processes in numbers:
-            shared = fresh_results(f"{name}{processes}")
+            shared = harness.fresh_results(f"{name}{processes}")
             result = succeed(processes, *command(shared, *options, fit=fit))
             assert shared.same_as(alone), (name, processes)
             assert metrics(shared) == metrics(alone), (name, processes)
@@ -135,13 +131,13 @@ def test_halves_have_the_bytes_of_one_process(command, series):
     options = ["--even", halves["even"], "--odd", halves["odd"], "--view-scale", "on"]
     volumes = []
     for processes in (1, 2):
-        results = fresh_results(f"halves{processes}")
+        results = harness.fresh_results(f"halves{processes}")
         succeed(processes, *command(results, *options))
         stem = results.volume_path[:-len(".mrc")]
         volumes.append([harness.read_bytes(stem + end) for end in (
             ".mrc", "_EVN_Vol.mrc", "_ODD_Vol.mrc", "_ODD.h5", "_uncertainty.mrc")])
     assert volumes[0] == volumes[1]
-    refused = mpirun(2, *command(fresh_results("linear"), *options, "--denoising-halves"))
+    refused = mpirun(2, *command(harness.fresh_results("linear"), *options, "--denoising-halves"))
     assert refused.returncode != 0 and "cannot share --denoising-halves yet" in refused.stderr
 
 
@@ -154,7 +150,7 @@ def test_a_fixed_pattern_has_the_bytes_of_one_process(command):
     stack, tlt = os.path.join(directory, "a.mrc"), os.path.join(directory, "a.tlt")
     harness.write_stack(stack, views.astype(np.float32))
     np.savetxt(tlt, harness.TILTS, fmt="%.1f")
-    alone, shared = fresh_results("pattern_alone"), fresh_results("pattern_shared")
+    alone, shared = harness.fresh_results("pattern_alone"), harness.fresh_results("pattern_shared")
     harness.succeed(*command(alone, input=[stack, "--tlt", tlt]))
     succeed(2, *command(shared, input=[stack, "--tlt", tlt]))
     pattern = metrics(alone)["mask"]["fixed_pattern"]
@@ -172,7 +168,7 @@ def test_a_divided_band_has_the_bytes_of_one_process(command):
                          "--coarse-epochs", 2, "--hold-out", 5],
              "smooth": ["--field", "vm", "--leaf-size", 32, "--tv-penalty", "smooth"]}
     for name, options in cases.items():
-        alone, shared = fresh_results(f"tall_{name}"), fresh_results(f"tall_{name}2")
+        alone, shared = harness.fresh_results(f"tall_{name}"), harness.fresh_results(f"tall_{name}2")
         harness.succeed(*command(alone, *options, input=tall, fit=with_margin))
         succeed(2, *command(shared, *options, input=tall, fit=with_margin))
         assert shared.same_as(alone), name
@@ -191,34 +187,34 @@ def test_processes_find_the_beads_together(command):
     gold = [stack, "--tlt", os.path.join(cell, "tilt_series.tlt")]
     options = ["--contrast", "dark", "--epochs", 2]
     for extra in ([], ["--log"]):
-        alone = fresh_results("beads")
+        alone = harness.fresh_results("beads")
         harness.succeed(*command(alone, *options, *extra, input=gold))
         assert metrics(alone)["mask"]["beads"] >= 5, metrics(alone)["mask"]
-        shared = fresh_results("beads3")
+        shared = harness.fresh_results("beads3")
         succeed(3, *command(shared, *options, *extra, input=gold))
         assert shared.same_as(alone), extra
         assert metrics(shared) == metrics(alone), extra
 
 
 def test_the_first_process_writes_its_trace(command):
-    results = fresh_results("traced")
+    results = harness.fresh_results("traced")
     folder = harness.fresh_directory("trace")
     trace = os.path.join(folder, "trace.json")
     said = succeed(2, *command(results, "--trace", trace)).stdout
     assert said.count("trace     ") == 1 and os.listdir(folder) == ["trace.json"], said
     with open(trace, encoding="utf-8") as file:
         assert json.load(file)["traceEvents"]
-    refused = mpirun(2, *command(fresh_results("refused"), "--trace", trace))
+    refused = mpirun(2, *command(harness.fresh_results("refused"), "--trace", trace))
     assert refused.returncode == 2 and "give another name with --trace" in refused.stderr, refused
 
 
 def test_processes_share_the_threads_of_their_machine(command, monkeypatch):
     monkeypatch.delenv("OMP_NUM_THREADS")
-    alone = harness.succeed(*command(fresh_results("alone"))).stderr
+    alone = harness.succeed(*command(harness.fresh_results("alone"))).stderr
     if "one for each of the machine's processors" not in alone:
         pytest.skip("this process may not use the whole machine")
     monkeypatch.setenv("OMPI_MCA_hwloc_base_binding_policy", "none")
-    results = fresh_results("threads")
+    results = harness.fresh_results("threads")
     said = succeed(2, *command(results)).stderr
     assert said.count("the share of each of 2 processes on this machine") == 1, said
     with open(results.json_path, encoding="utf-8") as file:
@@ -226,7 +222,7 @@ def test_processes_share_the_threads_of_their_machine(command, monkeypatch):
 
 
 def test_each_process_has_its_part(command):
-    results = fresh_results("parts")
+    results = harness.fresh_results("parts")
     succeed(3, *command(results))
     with open(results.json_path) as file:
         processes = json.load(file)["metrics"]["processes"]
@@ -240,7 +236,7 @@ def test_each_process_has_its_part(command):
 def test_a_turned_volume_is_the_same(command, series):
     xtilt = os.path.join(os.path.dirname(series[0]), "x.xtilt")
     np.savetxt(xtilt, np.full(len(harness.TILTS), 4.0), fmt="%.1f")
-    alone, shared = fresh_results("turned"), fresh_results("turned2")
+    alone, shared = harness.fresh_results("turned"), harness.fresh_results("turned2")
     harness.succeed(*command(alone, "--xtilt", xtilt, "--epochs", 1))
     succeed(2, *command(shared, "--xtilt", xtilt, "--epochs", 1))
     assert shared.same_as(alone)
@@ -259,7 +255,7 @@ def step_of(results):
 
 
 def test_checkpoints_go_on_with_any_number_of_processes(command):
-    undisturbed, results = fresh_results("undisturbed"), fresh_results("resumed")
+    undisturbed, results = harness.fresh_results("undisturbed"), harness.fresh_results("resumed")
     long = ["--epochs", 400]  # to be stopped in, three times
     harness.succeed(*command(undisturbed, *long))
     steps = []
@@ -284,7 +280,7 @@ def processes_of(run):
 
 
 def test_a_process_that_dies_ends_the_job_and_leaves_a_checkpoint(command):
-    undisturbed, results = fresh_results("alive"), fresh_results("killed")
+    undisturbed, results = harness.fresh_results("alive"), harness.fresh_results("killed")
     long = ["--epochs", 12, "--checkpoint-minutes", 0]
     harness.succeed(*command(undisturbed, *long))
     run = start(2, *command(results, *long))
@@ -308,7 +304,7 @@ def refuse(words, processes, *arguments):
 
 
 def test_faults_are_told_once(command, series):
-    results = fresh_results("faults")
+    results = harness.fresh_results("faults")
     refuse(["nowhere.mrc", "No such file"], 3, *command(results, input=["nowhere.mrc", *series[1:]]))
     refuse(["--no-such-option"], 2, *command(results, "--no-such-option", 3))
     refuse(["--epochs"], 2, *command(results, "--epochs", -2))
@@ -323,7 +319,7 @@ def test_faults_are_told_once(command, series):
 
 
 def test_a_fault_of_one_process_is_told_by_the_first(command, series):
-    results = fresh_results("fault_of_one")
+    results = harness.fresh_results("fault_of_one")
     other = command(results, input=["not_here.mrc", *series[1:]])
     refuse(["not_here.mrc", "No such file"], 2, *command(results), ":", "-np", 1,
            harness.PROGRAM, *other)

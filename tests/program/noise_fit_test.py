@@ -1,10 +1,6 @@
 """Tests that views and pixels that no volume explains count less."""
 
-import json
-import os
-
 import numpy as np
-import pytest
 
 import harness
 
@@ -13,38 +9,15 @@ QUICK = ["--thickness", 32, "--contrast", "bright", "--leaf-size", 16, "--epochs
          "--coarse-epochs", 10, "--tv-penalty", "smooth", "--tv", 5, "--no-margin", "--bead-diameter", 0]
 
 
-def clean_views(width=96, height=48):
-    """Returns views [tilt, y, x] of soft bodies that none of them cuts off across the axis, with noise 1."""
-    random = np.random.default_rng(1)
-    bodies = random.uniform([-30, -10, -6, 2], [30, height + 10, 6, 4], size=(80, 4))
-    y, x = np.mgrid[0:height, 0:width] + 0.5
-    views = []
-    for tilt in np.radians(TILTS):
-        view = random.normal(size=x.shape)
-        for body_x, body_y, body_z, radius in bodies:
-            at = width / 2 + body_x * np.cos(tilt) + body_z * np.sin(tilt)
-            view += 3 * np.exp(-((x - at) ** 2 + (y - body_y) ** 2) / (2 * radius**2))
-        views.append(view)
-    return np.array(views)
+def clean_views():
+    """Returns views [tilt, y, x] of soft bodies that none of them cuts off across the axis."""
+    return harness.views_of_bodies(TILTS, 96, 48, [-30, -10, -6, 2], [30, 58, 6, 4], 80)
 
 
-@pytest.fixture(scope="module", name="fitted")
-def make_fitted():
-    directory = harness.fresh_directory("noise_fit")
-    tlt = os.path.join(directory, "a.tlt")
-    np.savetxt(tlt, TILTS, fmt="%.1f")
-
-    def fitted(name, views, *options):
-        """Returns the volume of some views and the weight of each view."""
-        stack = os.path.join(directory, name + ".st")
-        harness.write_stack(stack, views.astype(np.float32))
-        output = os.path.join(harness.fresh_directory(name), "out.mrc")
-        harness.succeed("reconstruct", stack, "--tlt", tlt, "-o", output, *QUICK, *options)
-        results = harness.Results(output)
-        metrics = json.load(open(results.json_path))["metrics"]
-        return results.volume, np.array([view["weight"] for view in metrics["views"]])
-
-    return fitted
+def fitted(name, views, *options):
+    """Returns the volume of some views and the weight of each view."""
+    _, results, metrics = harness.reconstruct_views(name, views, TILTS, *QUICK, *options)
+    return results.volume, np.array([view["weight"] for view in metrics["views"]])
 
 
 def relative_error(volume, reference):
@@ -53,7 +26,7 @@ def relative_error(volume, reference):
     return np.std(slope * volume + offset - reference) / np.std(reference)
 
 
-def test_hot_pixels_that_come_and_go_do_less_harm(fitted):
+def test_hot_pixels_that_come_and_go_do_less_harm():
     views = clean_views()
     hit = np.random.default_rng(2).random(views.shape) < 0.003
     clean, _ = fitted("clean", views)
@@ -64,7 +37,7 @@ def test_hot_pixels_that_come_and_go_do_less_harm(fitted):
     np.testing.assert_allclose(weights, 1, rtol=1e-6)
 
 
-def test_a_view_that_no_volume_explains_counts_less(fitted):
+def test_a_view_that_no_volume_explains_counts_less():
     views = clean_views()
     clean, weights = fitted("as_it_is", views)
     assert weights.min() > 0.6 and abs(weights.mean() - 1) < 0.02, weights

@@ -199,7 +199,7 @@ def test_a_finished_fit_is_kept_when_its_results_cannot_be_written(series):
     whole = series.reconstruct("whole", *coarse)
     room = os.path.getsize(whole.model_path)
     assert room < os.path.getsize(whole.volume_path)
-    results = harness.Results(os.path.join(harness.fresh_directory("kept"), "out.mrc"))
+    results = harness.fresh_results("kept")
     command = ["reconstruct", *series.input, *harness.merge(QUICK, coarse), "-o",
                results.volume_path]
     ended = harness.tomofield(*command, **with_room_for(room))

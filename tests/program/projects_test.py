@@ -37,6 +37,20 @@ def series():
     return harness.Series("series")
 
 
+def write_command_files(folder, name, extension, entries, newst):
+    """Writes tilt.com and newst.com as eTomo lays them out, with more entries."""
+    write(folder, "newst.com", "$setenv IMOD_OUTPUT_FORMAT MRC", "$newstack -StandardInput",
+          "AntialiasFilter\t-1", f"InputFile\t{name}.{extension}", f"OutputFile\t{name}_ali.mrc",
+          f"TransformFile\t{name}.xf", "TaperAtFill\t1,1", "AdjustOrigin",
+          "OffsetsInXandY\t0.0,0.0", "#DistortionField\t.idf", "ImagesAreBinned\t1.0",
+          f"#GradientFile\t{name}.maggrad", *newst, "$if (-e ./savework) ./savework")
+    write(folder, "tilt.com", "$setenv IMOD_OUTPUT_FORMAT MRC", "$tilt -StandardInput",
+          f"InputProjections {name}_ali.mrc", f"OutputFile {name}_full_rec.mrc",
+          f"TILTFILE {name}.tlt", "RADIAL 0.35 0.035", "FalloffIsTrueSigma 1", "SCALE 0.0 330.0",
+          "PERPENDICULAR", "MODE 1", "AdjustOrigin", "ActionIfGPUFails 1,2", *entries,
+          "$if (-e ./savework) ./savework")
+
+
 def write_etomo(folder, series, *entries, newst=()):
     """Makes a folder in the layout of eTomo, with more entries in its command files."""
     os.makedirs(folder, exist_ok=True)
@@ -44,15 +58,7 @@ def write_etomo(folder, series, *entries, newst=()):
     np.savetxt(os.path.join(folder, "TS_01.tlt"), TILTS, fmt="%.2f")
     write(folder, "TS_01.xf", *SHIFTS)
     write(folder, "TS_01.xtilt", *["0.0"] * NUM_VIEWS)
-    write(folder, "newst.com", "$setenv IMOD_OUTPUT_FORMAT MRC", "$newstack -StandardInput",
-          "AntialiasFilter\t-1", "InputFile\tTS_01.st", "OutputFile\tTS_01_ali.mrc",
-          "TransformFile\tTS_01.xf", "TaperAtFill\t1,1", "AdjustOrigin", "OffsetsInXandY\t0.0,0.0",
-          "#DistortionField\t.idf", "ImagesAreBinned\t1.0", *newst,
-          "$if (-e ./savework) ./savework")
-    write(folder, "tilt.com", "$setenv IMOD_OUTPUT_FORMAT MRC", "$tilt -StandardInput",
-          "InputProjections TS_01_ali.mrc", "OutputFile TS_01_full_rec.mrc", "TILTFILE TS_01.tlt",
-          "RADIAL 0.35 0.035", "FalloffIsTrueSigma 1", "SCALE 0.0 330.0", "PERPENDICULAR", "MODE 1",
-          "AdjustOrigin", "ActionIfGPUFails 1,2", *entries, "$if (-e ./savework) ./savework")
+    write_command_files(folder, "TS_01", "st", entries, newst)
     return folder
 
 
@@ -207,6 +213,76 @@ def test_the_volume_lies_over_that_of_imod():
         found = [np.average(np.arange(9) - 4, weights=weight.sum(tuple({0, 1, 2} - {axis})))
                  for axis in range(3)]
         assert np.abs(found).max() < 0.35, (x, y, row, found)
+
+
+def rotated_views(transforms, aligned_at, raw_shape):
+    """Returns raw intensities whose beads lie at `aligned_at` [view, bead, (u, v)], from the middle
+    of the views, after the transforms [view, (A11, A12, A21, A22, DX, DY)]."""
+    height, width = raw_shape
+    y, x = np.mgrid[:height, :width] + 0.5
+    random = np.random.default_rng(1)
+    views = []
+    for transform, beads in zip(transforms, aligned_at):
+        at = (beads - transform[4:]) @ np.linalg.inv(transform[:4].reshape(2, 2)).T
+        density = sum(0.6 * np.exp(-((x - width / 2 - u) ** 2 + (y - height / 2 - v) ** 2)
+                                   / (2 * 5.0 ** 2)) for u, v in at)
+        views.append(800 * np.exp(-density) + random.normal(0, 5, x.shape))
+    return np.array(views, np.float32)
+
+
+def write_public_series(folder, beads):
+    """Makes the folder of a public series of eTomo (tests/data/convert/imod_1 in the repository
+    uermel/cryoet-alignment) at a sixteenth of its lengths. Its entries, angles and rotations are those
+    of the public files, whose images are not public. Beads lie at voxels [bead, (x, y, row)] of the
+    .rec, in unbinned pixels. Returns the size of the aligned stack and the thickness."""
+    name, shape = os.path.join(folder, "mka2018-10-01-1"), (232, 240, 125)
+    tilts = -52.24 + 2 * np.arange(59)
+    part = np.linspace(0, 1, 59)[:, None]
+    matrix = (1 - part) * [-0.1813379, -0.9834202] + part * [-0.1653824, -0.9862289]
+    matrix /= np.linalg.norm(matrix, axis=1, keepdims=True)
+    transforms = np.hstack([matrix, matrix[:, ::-1] * [-1, 1],
+                            ((1 - part) * [-58.17, 69.816] + part * [213.511, -120.539]) / 16])
+    at = np.array([[imod_projection(*bead, tilt, 0.41, shape, 0, 0) for bead in beads]
+                   for tilt in tilts])
+    views = rotated_views(transforms, at + 0.5 - np.array(shape[:2]) / 2, (230, 240))
+    harness.write_stack(name + ".mrc", views)
+    np.savetxt(name + ".tlt", tilts, fmt="%.2f")
+    np.savetxt(name + ".xf", transforms, fmt="%.7f")
+    np.savetxt(name + ".xtilt", np.full(59, 0.41), fmt="%.2f")
+    write_command_files(folder, os.path.basename(name), "mrc",
+                        ["IMAGEBINNED 4", "XTILTFILE mka2018-10-01-1.xtilt", "THICKNESS 125",
+                         "XAXISTILT 0.0", "LOG 0.0", "FULLIMAGE 230 240", "SUBSETSTART -1 0",
+                         "OFFSET 0.0", "SHIFT 0.0 0.0"],
+                        ["SizeToOutputInXandY\t58,60", "BinByFactor\t4"])
+    return shape
+
+
+def test_a_public_series_of_etomo_is_reconstructed():
+    """Its tilt axis lies almost along x, so that width and height of the views change places, its
+    intensities have their logarithm taken, and its aligned stack is a little wider than its views."""
+    folder = fresh_directory("public")
+    beads = [(70, 60, 40), (150, 175, 70), (110, 120, 90)]
+    width, height, thickness = write_public_series(folder, beads)
+    results, printed = reconstruct("of_public", folder, "--bead-diameter", 0, "--tv-penalty",
+                                   "smooth", "--epochs", 10, "--no-fixed-pattern")
+    for setting in ("--bin 4", "--thickness 125", "--log true", "--xtilt", "--xf", "--tlt"):
+        assert setting in printed.stdout, printed.stdout
+    for setting in ("--roi", "--center", "--shift-z", "--tilt-offset", "--x-axis-tilt"):
+        assert setting not in printed.stdout, printed.stdout
+    volume = -results.volume  # specimens are dark, as in the views
+    assert volume.shape == (31, 60, 57)  # whole voxels of a volume of 125 × 240 × 230 pixels
+    for x, y, row in beads:
+        expected = np.array([thickness / 2 - row - 0.5, y + 0.5 - height / 2, x + 0.5 - width / 2]) / 4
+        near = np.round(expected + np.array(volume.shape) / 2 - 0.5).astype(int)
+        around = volume[tuple(slice(n - 4, n + 5) for n in near)]
+        weight = (around - np.median(volume)).clip(0.3 * (around.max() - np.median(volume)))
+        weight -= weight.min()
+        found = np.array([np.average(np.arange(-4, 5), weights=weight.sum(tuple({0, 1, 2} - {axis})))
+                          for axis in range(3)]) + near + 0.5 - np.array(volume.shape) / 2
+        assert np.abs(found - expected).max() < 0.35, (expected, found)
+    # The data are said to be bright: they have no logarithm.
+    again = harness.succeed("info", folder, "--contrast", "bright").stdout
+    assert "(not used: --contrast bright is given)" in again
 
 
 # ----------------------------------------------------------------------------------- AreTomo

@@ -82,7 +82,7 @@ class RawSeries:
         return [*self.input, "--aln", self.path("raw.aln")]
 
     def command(self, name, alignment, *options):
-        self.results = harness.Results(os.path.join(harness.fresh_directory(name), "out.mrc"))
+        self.results = harness.fresh_results(name)
         defaults = ["--contrast", "bright", "--thickness", THICKNESS, "--field", "grid",
                     "--leaf-size", 16, "--epochs", 12, "--learning-rate", 0.05,
                     "--engine", "ray", "--threads", 1]

@@ -34,14 +34,10 @@ def make_command(series):
     return command
 
 
-def fresh_results(name):
-    return harness.Results(os.path.join(harness.fresh_directory(name), "out.mrc"))
-
-
 @pytest.fixture(scope="module")
 def undisturbed(command):
     """Returns the results of an undisturbed run, and in `duration` the seconds that it took."""
-    results = fresh_results("undisturbed")
+    results = harness.fresh_results("undisturbed")
     began = time.monotonic()
     harness.succeed(*command(results, *EVERY_STEP))
     results.duration = time.monotonic() - began
@@ -91,7 +87,7 @@ def test_killed_at_random_moments(interrupted, undisturbed):
         return lambda: time.monotonic() > moment
 
     for _ in range(5):  # a run may be much quicker than the one that was timed
-        results = fresh_results("random")
+        results = harness.fresh_results("random")
         if kills := interrupted(results, kill_when, most=6):
             break
     assert kills > 0
@@ -101,7 +97,7 @@ def test_killed_at_random_moments(interrupted, undisturbed):
 
 def test_killed_in_the_middle_of_writing(interrupted, undisturbed):
     for written in ("out.h5", "out.mrc", "out.json", "out_xz.png"):
-        results = fresh_results("writing")
+        results = harness.fresh_results("writing")
         pattern = os.path.join(os.path.dirname(results.volume_path), f".{written}.tmp-*")
         seen = set()
 
@@ -132,7 +128,7 @@ def make_stopped_run(command):
         """Returns results that are only a checkpoint, the run that a signal stopped, and what it
         said. No checkpoint falls due before the signal."""
         for _ in range(10):
-            results = fresh_results(name)
+            results = harness.fresh_results(name)
             run, errors = harness.stop_after_first_step(command(results, *options), number)
             if run.returncode != 0:  # else it was too quick for us
                 return results, run, errors
@@ -226,12 +222,12 @@ def test_foreign_checkpoints_are_refused(command, refuse, series, stopped_run, u
 
 
 def test_resume_without_a_checkpoint_starts_from_the_beginning(command, undisturbed):
-    results = fresh_results("beginning")
+    results = harness.fresh_results("beginning")
     result = harness.succeed(*command(results, "--resume"))
     assert "from the beginning" in result.stderr, result.stderr
     assert results.same_as(undisturbed)
     # A file that somebody else put there is no result of a run to resume.
-    results = fresh_results("others")
+    results = harness.fresh_results("others")
     with open(results.volume_path, "w") as file:
         file.write("another volume")
     result = harness.tomofield(*command(results, "--resume"))
@@ -240,7 +236,7 @@ def test_resume_without_a_checkpoint_starts_from_the_beginning(command, undistur
 
 
 def test_resume_of_a_finished_run_writes_the_same_results(command, undisturbed):
-    results = fresh_results("finished")
+    results = harness.fresh_results("finished")
     harness.succeed(*command(results))
     os.remove(results.volume_path)
     os.remove(results.pictures["yz"])

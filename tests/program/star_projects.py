@@ -2,6 +2,7 @@
 
 import os
 
+import gemmi
 import mrcfile
 import numpy as np
 
@@ -28,6 +29,15 @@ def write_star(path, name, columns, rows):
         for row in rows:
             file.write(" ".join(map(str, row)) + " \n")
         file.write(" \n")
+
+
+def read_rows(path):
+    """Returns the rows of a STAR file with one table, read by gemmi."""
+    (block,) = gemmi.cif.read(path)
+    (item,) = block
+    names = [tag[1:] for tag in item.loop.tags]
+    cells = [gemmi.cif.as_string(value) for value in item.loop.values]
+    return [dict(zip(names, cells[i:i + len(names)])) for i in range(0, len(cells), len(names))]
 
 
 def recorded(views):

@@ -3,7 +3,6 @@
 import json
 import os
 
-import gemmi
 import harness
 import numpy as np
 import pytest
@@ -68,19 +67,10 @@ def test_a_project_of_relion_is_reconstructed(series, plain, finished):
     assert agreement(volume, plain.volume) > 0.97
 
 
-def star_rows(path):
-    """Returns the rows of a STAR file with one table, read by gemmi."""
-    (block,) = gemmi.cif.read(path)
-    (item,) = block
-    names = [tag[1:] for tag in item.loop.tags]
-    cells = [gemmi.cif.as_string(value) for value in item.loop.values]
-    return [dict(zip(names, cells[i:i + len(names)])) for i in range(0, len(cells), len(names))]
-
-
 def test_the_result_goes_back_to_relion(relion, finished):
     _, output = finished
-    (row,) = star_rows(output[:-4] + ".star")
-    before = star_rows(relion.star)[0]
+    (row,) = star_projects.read_rows(output[:-4] + ".star")
+    before = star_projects.read_rows(relion.star)[0]
     sizes = {"rlnTomoSizeX": WIDTH, "rlnTomoSizeY": HEIGHT, "rlnTomoSizeZ": THICKNESS}
     assert {name: value for name, value in row.items() if name in before} == {
         **before, **{name: str(size) for name, size in sizes.items()}}
@@ -93,7 +83,7 @@ def test_the_result_goes_back_to_relion(relion, finished):
 
 def test_sizes_for_relion_are_unbinned(relion, finished):
     result, output = relion.run("--series", "TS_01", "--bin", 2, "--alignment-json")
-    (row,) = star_rows(output[:-4] + ".star")
+    (row,) = star_projects.read_rows(output[:-4] + ".star")
     assert float(row["rlnTomoTomogramBinning"]) == 2
     assert [row["rlnTomoSize" + axis] for axis in "XYZ"] == [
         str(size) for size in (WIDTH, HEIGHT, THICKNESS)]

@@ -60,8 +60,8 @@ function roundLength(longest) {
   return decade * (longest >= 5 * decade ? 5 : longest >= 2 * decade ? 2 : 1);
 }
 
-// What is seen, which all volumes of a page share: the point in which the planes meet, the centre of
-// the panels, and the zoom.
+// Holds what is seen, which all volumes of a page share: the point in which the planes meet, the
+// centre of the panels, and the zoom.
 class View {
   constructor(size) {
     this.size = size;

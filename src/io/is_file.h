@@ -1,0 +1,14 @@
+#pragma once
+
+#include <filesystem>
+#include <system_error>
+
+namespace tomofield::io {
+
+/// Tells whether a regular file lies at a path. A path that cannot be looked at has none.
+inline bool is_file(const std::filesystem::path& path) {
+  std::error_code failed;
+  return std::filesystem::is_regular_file(path, failed);
+}
+
+}  // namespace tomofield::io
