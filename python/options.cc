@@ -141,6 +141,7 @@ void add_field_and_fit(Class& options) {
       .def_readwrite("tune", &Options::tune)
       .def_readwrite("patience", &Options::patience)
       .def_readwrite("seed", &Options::seed);
+  add_choice(options, "align", &Options::align);
   add_choice(options, "field", &Options::field);
   add_choice(options, "tree", &Options::tree);
   add_choice(options, "activation", &Options::activation);

@@ -9,6 +9,8 @@ namespace tomofield {
 
 /// Says whether dense matter is dark (transmission images) or bright (phantoms, HAADF) in views.
 enum class Contrast { kDark, kBright };
+/// The views stay where the files align them, or they are aligned further with the field itself.
+enum class Alignment { kOff, kRefine };
 /// Vector–matrix factors in every leaf, or plain trilinear vertices.
 enum class FieldKind { kVm, kGrid };
 /// All leaves alike, or finer leaves where the density varies more.
@@ -111,6 +113,9 @@ struct Options {
   bool tune = false;                   ///< choose penalty, weight, rank and epochs by trials
   int patience = 0;                    ///< epochs without a better held-out error; 0: never stop
   std::uint64_t seed = 1;
+
+  // Alignment (docs/alignment.md)
+  Alignment align = Alignment::kOff;
 
   // Halves (docs/halves.md)
   bool split_tilts = false;       ///< fit the even and the odd tilts separately

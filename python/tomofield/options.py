@@ -71,6 +71,9 @@ class Options(TypedDict, total=False):
     patience: int
     seed: int
 
+    # Alignment
+    align: Literal["off", "refine"]
+
     # Halves
     split_tilts: bool
     denoising_halves: bool

@@ -8,7 +8,9 @@
 #include <optional>
 #include <utility>
 
+#include "align/aligning_fit.h"
 #include "align/gauge.h"
+#include "align/registration.h"
 #include "align/slow_modes.h"
 #include "base/log.h"
 #include "base/parallel.h"
@@ -35,29 +37,6 @@ constexpr int kFreedomBin = 2;
 constexpr double kSure = 3.0;  // standard errors by which a freedom must pay
 
 constexpr int kCoarseEpochs = 80, kFineEpochs = 4;
-// A stiff field explains less of wrong shifts.
-constexpr double kStiffness = 2.0;
-
-fit::FieldOptions field_of(fit::FieldOptions field) {
-  field.kind = FieldKind::kGrid;
-  field.tree = TreeKind::kUniform;
-  field.vertex_spacing = std::max(field.vertex_spacing, 1.0);
-  field.leaf_size = fit::usual_leaf_size(field);
-  field.depth = fit::usual_depth(field);
-  return field;
-}
-
-fit::FitOptions schedule(std::uint64_t seed) {
-  fit::FitOptions options;
-  options.seed = seed;
-  options.penalty = Penalty::kSmooth;
-  options.density_variation = kStiffness * objective::usual_variation(options.penalty);
-  options.learning_rate = 0.035;
-  options.coarse_epochs = kCoarseEpochs;
-  options.epochs = kFineEpochs;
-  options.fit_noise = false;
-  return options;
-}
 
 // A fit and the corrections of the views that it is made with.
 class AligningFit {
@@ -66,23 +45,25 @@ class AligningFit {
               const distributed::Communicator& processes)
       : problem_(problem),
         processes_(processes),
-        field_(field_of(problem.field)),
+        field_(aligning_field(problem.field)),
         measurement_(measurement::prepare_realigned(problem.recorded, start, problem.specimen,
                                                     problem.scratch_dir, fit::band_rows(field_),
                                                     processes)),
-        fit_(measurement_, field_, schedule(problem.seed), processes) {
+        fit_(measurement_, field_, aligning_fit(kCoarseEpochs, kFineEpochs, problem.seed),
+             processes) {
     found_.agreement.resize(start.size());
     found_.corrections = std::move(start);
   }
 
   JointAlignment run() {
     const base::Stopwatch running;
-    while (!fit_.is_done()) {
+    while (!fit_.is_done() && !found_.was_stopped) {
       const fit::Stage stage = fit_.stage();
       take_epoch();
       if (problem_.progress) problem_.progress(report(running.seconds()));
       const std::int64_t epochs = fit_.progress().step / fit_.steps_per_epoch();
       const bool is_last = epochs == stage.first_epoch + stage.epochs;
+      found_.was_stopped = is_to_stop();
       if (epochs > kEpochsBefore && (!is_last || fit_.is_done())) update(stage);
     }
     return std::move(found_);
@@ -91,6 +72,12 @@ class AligningFit {
  private:
   void take_epoch() {
     fit_.run([](const fit::Fit& fit) { return fit.progress().step % fit.steps_per_epoch() != 0; });
+  }
+
+  // Any process can stop all of them.
+  bool is_to_stop() const {
+    const bool asked = problem_.stop_requested && problem_.stop_requested();
+    return processes_.allreduce_max(asked ? 1.0 : 0.0) > 0.0;
   }
 
   base::ProgressReport report(double seconds) const {
@@ -158,8 +145,8 @@ class AligningFit {
       const auto predicted = fit_.predict(views, std::vector<measurement::ViewModel>(views.size()));
       base::parallel_for("register views", std::ssize(views), [&](std::int64_t i) {
         const auto at = static_cast<std::size_t>(i);
-        registrations[static_cast<std::size_t>(views[at])].emplace(pair_of(predicted[at], stage),
-                                                                   RegistrationOptions{});
+        registrations[static_cast<std::size_t>(views[at])].emplace(
+            image_pair(predicted[at], measurement_, stage), RegistrationOptions{});
       });
     }
     if (stage.bin <= kFreedomBin) open_freedoms(registrations);
@@ -204,18 +191,6 @@ class AligningFit {
     const double mean = sum / std::max(n, 1.0);
     const double variance = squares / std::max(n, 1.0) - mean * mean;
     return n > 1 && mean > kSure * std::sqrt(std::max(variance, 0.0) / (n - 1));
-  }
-
-  ImagePair pair_of(const measurement::PredictedView& view, const fit::Stage& stage) const {
-    const double bin = stage.bin;
-    const auto first_row = static_cast<double>(measurement_.rays_shape().first_row);
-    return {.width = view.width,
-            .height = view.height,
-            .pixel = bin * measurement_.bin_factor,
-            .centre_x = static_cast<double>(measurement_.geometry.width) / 2 / bin,
-            .centre_y = (static_cast<double>(measurement_.geometry.height) / 2 - first_row) / bin,
-            .measured = view.measured,
-            .predicted = view.predicted};
   }
 
   const JointProblem& problem_;

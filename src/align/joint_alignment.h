@@ -3,9 +3,10 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <vector>
 
-#include "align/registration.h"
+#include "align/freedoms.h"
 #include "base/progress.h"
 #include "distributed/communicator.h"
 #include "fit/options.h"
@@ -28,6 +29,7 @@ struct JointAlignment {
   std::vector<geometry::ViewCorrection> corrections;  ///< [view]
   std::vector<ViewAgreement> agreement;               ///< [view]
   Freedoms freedoms;  ///< those that made the prediction of pixels better
+  bool was_stopped = false;
   /// Root mean square of the change of the shifts in each update, in pixels before binning.
   std::vector<double> steps_px;
 };
@@ -39,7 +41,8 @@ struct JointProblem {
   fit::FieldOptions field;  ///< its kind is replaced by plain vertices
   std::uint64_t seed = 1;
   const std::filesystem::path& scratch_dir;
-  const base::ProgressSink& progress;
+  base::ProgressSink progress;
+  std::function<bool()> stop_requested;  ///< is asked after each epoch; empty: never stop
 };
 
 /// Aligns the views of a series with the projections of a field while the field is being fitted to

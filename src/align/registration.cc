@@ -263,18 +263,24 @@ double Registration::predicted_error(const Freedoms& freedoms) const {
   return squares / static_cast<double>(num_pixels());
 }
 
-double Registration::correlation() const {
-  if (num_pixels() == 0) return 0.0;
+// Returns the sum of the products of two columns of which quadratic trends are subtracted.
+double Registration::without_trends(int a, int b) const {
   const Sums sums = all();
   const Eigen::Matrix<double, 6, 6> trends = sums.block<6, 6>(kTrend, kTrend);
-  const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factors(trends);
-  const auto product = [&](int a, int b) {
-    const Eigen::Matrix<double, 6, 1> of_a = sums.block<6, 1>(kTrend, a);
-    const Eigen::Matrix<double, 6, 1> of_b = sums.block<6, 1>(kTrend, b);
-    return sums(a, b) - of_a.dot(factors.solve(of_b));
-  };
-  const double variances = product(kScale, kScale) * product(kMeasured, kMeasured);
-  return variances > 0.0 ? product(kScale, kMeasured) / std::sqrt(variances) : 0.0;
+  const Eigen::Matrix<double, 6, 1> of_a = sums.block<6, 1>(kTrend, a);
+  const Eigen::Matrix<double, 6, 1> of_b = sums.block<6, 1>(kTrend, b);
+  return sums(a, b) - of_a.dot(trends.ldlt().solve(of_b));
+}
+
+double Registration::measured_variance() const {
+  return without_trends(kMeasured, kMeasured) /
+         static_cast<double>(std::max<std::int64_t>(num_pixels(), 1));
+}
+
+double Registration::correlation() const {
+  if (num_pixels() == 0) return 0.0;
+  const double variances = without_trends(kScale, kScale) * without_trends(kMeasured, kMeasured);
+  return variances > 0.0 ? without_trends(kScale, kMeasured) / std::sqrt(variances) : 0.0;
 }
 
 }  // namespace tomofield::align

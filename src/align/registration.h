@@ -7,18 +7,10 @@
 
 #include <Eigen/Core>
 
+#include "align/freedoms.h"
 #include "geometry/view_correction.h"
 
 namespace tomofield::align {
-
-/// Names what a registration may change beside the shift.
-struct Freedoms {
-  bool rotation = false;
-  bool magnification = false;
-  bool tilt = false;
-
-  bool operator==(const Freedoms&) const = default;
-};
 
 /// Holds a view and its prediction, both [y, x] in pixels of a stage.
 struct ImagePair {
@@ -63,6 +55,8 @@ class Registration {
   /// Returns the mean squared residual of each set, as the solution of the other set leaves it,
   /// averaged over both sets, in the square of the images' unit.
   double predicted_error(const Freedoms& freedoms) const;
+  /// Returns the variance of the measured pixels without trends.
+  double measured_variance() const;
   /// Returns the correlation of the view with its prediction where they are, without trends.
   double correlation() const;
   /// Returns the number of pixels that count.
@@ -87,6 +81,7 @@ class Registration {
   Solution solve_on(const Sums& sums, const Freedoms& freedoms) const;
   static double scale_of(const Solution& solution);
   double squared_residual(const Sums& sums, const Solution& solution) const;
+  double without_trends(int a, int b) const;
   double residual_variance(const Freedoms& freedoms) const;
   Sums all() const { return sums_[0] + sums_[1]; }
 

@@ -21,6 +21,11 @@ struct EnumNames<Contrast> {
                                      std::pair{Contrast::kBright, "bright"}};
 };
 template <>
+struct EnumNames<Alignment> {
+  static constexpr std::array kNames{std::pair{Alignment::kOff, "off"},
+                                     std::pair{Alignment::kRefine, "refine"}};
+};
+template <>
 struct EnumNames<FieldKind> {
   static constexpr std::array kNames{std::pair{FieldKind::kVm, "vm"},
                                      std::pair{FieldKind::kGrid, "grid"}};

@@ -44,7 +44,7 @@ void run(const Arguments& arguments, const distributed::Communicator& processes,
   }
   options.input.keep_views = !arguments.dry_run;
   run_traced(arguments.dry_run ? std::nullopt : arguments.trace, processes, [&] {
-    const tilt_series::TiltSeries series(options.input, processes);
+    const tilt_series::TiltSeries series = open_series(options, arguments.dry_run, processes);
     run_reconstruction(series, options, arguments.dry_run, processes);
   });
 }

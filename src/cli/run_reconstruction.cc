@@ -24,6 +24,7 @@
 #include "io/atomic_file.h"
 #include "io/output_set.h"
 #include "output/volume.h"
+#include "reconstruct/aligned_series.h"
 #include "reconstruct/exchange_files.h"
 #include "reconstruct/run_report.h"
 #include "report/pictures.h"
@@ -150,6 +151,18 @@ std::vector<io::OutputLock> claim_run(const reconstruction::ReconstructOptions& 
   if (!check_alone) return reconstruction::claim_outputs(options);
   reconstruction::check_options(options);
   return {};
+}
+
+tilt_series::TiltSeries open_series(reconstruction::ReconstructOptions& options, bool dry_run,
+                                    const distributed::Communicator& processes) {
+  if (dry_run) options.resolved.align = Alignment::kOff;
+  if (options.resolved.align != Alignment::kOff) stop_on_signals(processes.size() > 1);
+  reconstruction::ReconstructHooks hooks{
+      .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};
+  if (processes.is_root()) hooks.tune_progress = make_progress_bar("align");
+  if (!reconstruction::align_series(options, hooks, processes))
+    throw ExitStatus{stop_status(), "stopped during the alignment"};
+  return tilt_series::TiltSeries(options.input, processes);
 }
 
 void run_reconstruction(const tilt_series::TiltSeries& series,

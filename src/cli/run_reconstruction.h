@@ -17,6 +17,12 @@ void add_run_options(CLI::App& command, option_table::Choices& choices, bool& dr
 std::vector<io::OutputLock> claim_run(const reconstruction::ReconstructOptions& options,
                                       bool check_alone);
 
+/// Opens the series of a run. Aligns it first with a progress bar, if the options ask for it and
+/// the run is not dry, and puts what it found into the options. Throws an ExitStatus if a signal
+/// stops it.
+tilt_series::TiltSeries open_series(reconstruction::ReconstructOptions& options, bool dry_run,
+                                    const distributed::Communicator& processes);
+
 /// Prints the plan of a reconstruction, runs it with a progress bar, and writes its pictures. With
 /// `dry_run` it prints the plan alone. The caller has called claim_run() before. If a signal stops
 /// it, it throws an ExitStatus that says how to continue. Every process that shares the run calls

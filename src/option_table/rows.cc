@@ -156,6 +156,9 @@ constexpr Row kRows[] = {
      .help = "softplus keeps densities above zero; identity lets them have either sign"},
 
     // Fit
+    {.key = "fit.align", .flag = "--align", MEMBER(Options, align), .group = Group::kFit,
+     .help = "refine: first align each view with the projections of a field that is fitted to all "
+             "of them, from the alignment that the files give", .is_common = true},
     {.key = "fit.epochs", .flag = "--epochs", MEMBER(Options, epochs), .group = Group::kFit,
      .range = Range::between(1, kMaxCount),
      .automatic = "10; 30 for factors that do not begin with vertices; 5 for vertices 2 or more "

@@ -60,10 +60,10 @@ using Member = std::variant<
     bool Options::*, int Options::*, std::int64_t Options::*, std::uint64_t Options::*,
     double Options::*, std::string Options::*, std::filesystem::path Options::*,
     std::optional<bool> Options::*, std::optional<int> Options::*, std::optional<double> Options::*,
-    std::optional<Rectangle> Options::*, Contrast Options::*, std::optional<FieldKind> Options::*,
-    TreeKind Options::*, std::optional<Activation> Options::*, Engine Options::*,
-    std::optional<Penalty> Options::*, RingReference Options::*, VoxelType Options::*,
-    VolumeAxes Options::*>;
+    std::optional<Rectangle> Options::*, Contrast Options::*, Alignment Options::*,
+    std::optional<FieldKind> Options::*, TreeKind Options::*, std::optional<Activation> Options::*,
+    Engine Options::*, std::optional<Penalty> Options::*, RingReference Options::*,
+    VoxelType Options::*, VolumeAxes Options::*>;
 
 /// Describes one option: the command line, the configuration file, the checks, the JSON, the
 /// fingerprint of a checkpoint and docs/options.md all read this row.

@@ -26,8 +26,8 @@ std::vector<const void*> members_of(const Choices& choices) {
                coarse_epochs, coarse_bin, subsets, engine, ray_samples, rays_per_step,
                learning_rate, density_variation, factor_variation, penalty, boundary, fourier,
                fourier_ring, keep_spikes, fit_noise, fit_view_scale, hold_out, tune, patience, seed,
-               split_tilts, denoising_halves, voxel_type, axes, invert, zarr, output, overwrite,
-               resume, checkpoint_minutes, alignment_json] = choices.options;
+               align, split_tilts, denoising_halves, voxel_type, axes, invert, zarr, output,
+               overwrite, resume, checkpoint_minutes, alignment_json] = choices.options;
   return {&stack,
           &tlt,
           &xf,
@@ -88,6 +88,7 @@ std::vector<const void*> members_of(const Choices& choices) {
           &tune,
           &patience,
           &seed,
+          &align,
           &split_tilts,
           &denoising_halves,
           &voxel_type,

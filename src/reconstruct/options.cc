@@ -151,6 +151,7 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
           .held_out_picture = with("_held_out.png"),
           .choice_picture = with("_choice.png"),
           .trials = with("_tune.json"),
+          .alignment = with("_align.json"),
           .halves = {of_half("EVN"), of_half("ODD")},
           .fsc_picture = with("_fsc.png"),
           .local_resolution = with("_local_resolution.mrc"),
@@ -191,6 +192,8 @@ std::vector<std::string> ReconstructOptions::faults() const {
             "--tune chooses the number of epochs: leave --early-stop out");
   refuse_if(resolved.resume && resolved.output.empty(),
             "--resume continues from the files of an interrupted run: give their output");
+  refuse_if(resolved.align != Alignment::kOff && is_ray,
+            "--align refine aligns views in their plane: it needs --engine slab");
   for (const char* sentence : faults_of_halves()) all.emplace_back(sentence);
   return all;
 }
@@ -236,11 +239,14 @@ void check_options(const ReconstructOptions& options) {
   const OutputPaths paths = output_paths(resolved.output);
   // Without a checkpoint there is nothing to resume. The other files are from another run.
   const bool resumes =
-      resolved.resume && (std::filesystem::exists(options.first_model(paths)) ||
-                          (resolved.tune && std::filesystem::exists(paths.trials)));
+      resolved.resume &&
+      (std::filesystem::exists(options.first_model(paths)) ||
+       (resolved.tune && std::filesystem::exists(paths.trials)) ||
+       (resolved.align != Alignment::kOff && std::filesystem::exists(paths.alignment)));
   std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json, paths.report};
   if (options.field.tree == TreeKind::kAdaptive) results.push_back(paths.tree_picture);
   if (resolved.tune) results.push_back(paths.trials);
+  if (resolved.align != Alignment::kOff) results.push_back(paths.alignment);
   if (options.fit.hold_out > 0 && !options.makes_halves())
     results.push_back(paths.held_out_picture);
   if (options.makes_halves()) add_half_files(paths, resolved.denoising_halves, results);

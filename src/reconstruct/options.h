@@ -32,6 +32,7 @@ struct OutputPaths {
   std::filesystem::path held_out_picture;  ///< if views are held out
   std::filesystem::path choice_picture;    ///< of the trials, if there are any
   std::filesystem::path trials;            ///< trials of --tune (JSON)
+  std::filesystem::path alignment;         ///< of --align, from which a run resumes (JSON)
   /// Files of one of two halves.
   struct OfHalf {
     std::filesystem::path volume, model;
@@ -58,6 +59,8 @@ struct ReconstructOptions {
   output::VolumeOptions volume;
   /// Settings that the files of a project made, for the metrics; they are among the options.
   std::vector<option_table::Setting> origins;
+  /// What the alignment before the fit found (aligned_series.h), for the metrics.
+  nlohmann::json alignment = {};
 
   /// Says whether the run makes two fits, of one half of the data each.
   bool makes_halves() const { return (files.even && files.odd) || resolved.split_tilts; }

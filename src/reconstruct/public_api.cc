@@ -13,6 +13,7 @@
 #include "io/json.h"
 #include "output/model_file.h"
 #include "output/volume.h"
+#include "reconstruct/aligned_series.h"
 #include "reconstruct/exchange_files.h"
 #include "reconstruct/options.h"
 #include "reconstruct/reconstruct.h"
@@ -198,14 +199,15 @@ TiltSeries TiltSeries::from_images(ViewImages images) {
 Reconstruction reconstruct(const TiltSeries& series, const Options& options,
                            const ProgressCallback& progress) {
   const OneAtATime turn;
-  const reconstruction::ReconstructOptions internal = internal_options(series, options);
+  reconstruction::ReconstructOptions internal = internal_options(series, options);
   const auto locks = reconstruction::claim_outputs(internal);
+  Listener listener(progress);
+  reconstruction::ReconstructHooks hooks = listener.hooks();
+  if (!reconstruction::align_series(internal, hooks, distributed::Communicator::alone())) return {};
   const tilt_series::TiltSeries views(internal.input);
   const reconstruction::RunPlan plan = reconstruction::plan_run(views, internal);
   require_memory(plan);
   require_few_vertices(plan);
-  Listener listener(progress);
-  reconstruction::ReconstructHooks hooks = listener.hooks();
   hooks.write_more = [&](const reconstruction::Results&, const std::filesystem::path& volume) {
     reconstruction::write_exchange_files(views, internal, volume);
   };

@@ -174,6 +174,7 @@ Findings examine(const fit::Fit& fit, const measurement::Measurement& series,
       evaluate::artefacts_json(found.verdict.artefacts.speckle, found.verdict.artefacts.faces));
   found.metrics["verdict"] = verdict_json(found.verdict);
   const std::optional<TunedFit>& tuned = record.origin.tuned;
+  found.metrics["alignment"] = options.alignment;
   found.metrics["tuning"] = tuned ? tuning_json(*tuned) : nlohmann::json(nullptr);
   return found;
 }

@@ -153,6 +153,11 @@ std::array<std::int64_t, 2> aligned_size(const InPlaneAlignment& alignment,
   return {header.nx, header.ny};
 }
 
+void correct(const geometry::ViewCorrection& correction, PlannedView& planned) {
+  planned.raw_from_aligned = geometry::corrected(planned.raw_from_aligned, correction);
+  planned.view.tilt_deg += correction.tilt_deg;
+}
+
 }  // namespace
 
 std::array<std::int64_t, 2> aligned_size(const std::filesystem::path& xf,
@@ -194,11 +199,14 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
   for (std::int64_t section = 0; section < header.nz; ++section) {
     const auto at = static_cast<std::size_t>(section);
     const bool is_dark = alignment && !alignment->of_section[at];
-    if (is_dark || std::binary_search(excluded.begin(), excluded.end(), section)) continue;
+    if (is_dark || std::ranges::binary_search(excluded, section) ||
+        std::ranges::binary_search(options.left_out, section))
+      continue;
     PlannedView planned;
     planned.view = {section, require_usable_tilt(angles, section),
                     x_tilts_deg[at] - options.x_axis_tilt_deg};
     if (alignment) planned.raw_from_aligned = *alignment->of_section[at];
+    if (!options.corrections.empty()) correct(options.corrections[at], planned);
     plan.views.push_back(planned);
   }
   if (plan.views.empty()) {

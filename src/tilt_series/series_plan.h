@@ -21,7 +21,7 @@ struct PlannedView {
 /// A series as the small files and the stack's header describe it, before any pixel is read.
 struct SeriesPlan {
   std::vector<PlannedView> views;  ///< in the stack's order
-  bool is_raw = false;             ///< images are resampled; else the stack is aligned already
+  bool is_raw = false;             ///< the files align a raw stack; else it is aligned already
   std::int64_t aligned_width = 0;  ///< unbinned pixels
   std::int64_t aligned_height = 0;
   double pixel_size_A = 1.0;  ///< of an unbinned pixel

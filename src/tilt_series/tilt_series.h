@@ -11,6 +11,7 @@
 #include "base/enum_names.h"
 #include "distributed/communicator.h"
 #include "geometry/raw_from_aligned.h"
+#include "geometry/view_correction.h"
 #include "io/image_stack.h"
 #include "tilt_series/fixed_pattern/fixed_pattern.h"
 #include "tilt_series/half.h"
@@ -56,6 +57,10 @@ struct TiltSeriesOptions {
   std::optional<double> bead_diameter_nm;
   /// Finds and removes what stays at one place of the detector in all views.
   bool remove_fixed_pattern = true;
+  /// [section]: changes of the alignment that the files give. Empty: none.
+  std::vector<geometry::ViewCorrection> corrections = {};
+  /// Sections that are left out beside `exclude`, counted from 0, ascending.
+  std::vector<std::int64_t> left_out = {};
   std::optional<HalfPaths> halves = {};  ///< stacks of the even and the odd frames
 };
 

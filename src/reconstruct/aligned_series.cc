@@ -1,0 +1,176 @@
+#include "reconstruct/aligned_series.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "align/alignment.h"
+#include "base/log.h"
+#include "base/stopwatch.h"
+#include "base/trace.h"
+#include "io/json.h"
+#include "tilt_series/tilt_series.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kRadian_deg = 180.0 / std::numbers::pi;
+constexpr std::size_t kFewestViews = 12;
+
+// Returns the options that decide what the alignment finds.
+json relevant_options(const ReconstructOptions& options) {
+  const json all = options_json(options);
+  return {{"input", all["input"]}, {"specimen", all["specimen"]}, {"seed", options.fit.seed}};
+}
+
+json view_json(const tilt_series::View& view, const geometry::ViewCorrection& correction,
+               const align::ViewAgreement& agreement, bool is_unaligned) {
+  return {{"section", view.section + 1},
+          {"tilt_deg", view.tilt_deg},
+          {"shift_px", {correction.shift_x_px, correction.shift_y_px}},
+          {"rotation_deg", correction.rotation_rad * kRadian_deg},
+          {"log_magnification", correction.log_magnification},
+          {"correlation", agreement.correlation},
+          {"shift_error_px", agreement.error_px},
+          {"left_out", is_unaligned}};
+}
+
+json record_of(const tilt_series::TiltSeries& series, const align::Alignment& found,
+               const ReconstructOptions& options, double seconds) {
+  json views = json::array();
+  for (std::size_t v = 0; v < series.views().size(); ++v) {
+    views.push_back(view_json(series.views()[v], found.corrections[v], found.joint.agreement[v],
+                              std::ranges::binary_search(found.unaligned, static_cast<int>(v))));
+  }
+  return {{"made_with", relevant_options(options)},
+          {"accepted", found.is_accepted},
+          {"held_out_error", {{"before", found.error_before}, {"after", found.error_after}}},
+          {"gain", {{"mean", found.gain}, {"standard_error", found.gain_error}}},
+          {"rotation", found.joint.freedoms.rotation},
+          {"magnification", found.joint.freedoms.magnification},
+          {"steps_px", found.joint.steps_px},
+          {"seconds", seconds},
+          {"views", std::move(views)}};
+}
+
+// Reads the record of an earlier run of the same options.
+json read_record(const std::filesystem::path& path, const ReconstructOptions& options) {
+  const auto refuse = [&](const char* why) {
+    throw Error(
+        fmt::format("cannot resume: the alignment '{}' {}; to start over, give --overwrite "
+                    "instead of --resume",
+                    path.string(), why));
+  };
+  json record = json::parse(std::ifstream(path), nullptr, false);
+  if (!record.is_object() || !record.contains("made_with") || !record.contains("views"))
+    refuse("is damaged");
+  if (record["made_with"] != relevant_options(options)) refuse("was made with other options");
+  return record;
+}
+
+// Puts the corrections of a record into the options.
+void apply_record(const json& record, ReconstructOptions& options) {
+  std::int64_t num_sections = 0;
+  for (const json& view : record["views"])
+    num_sections = std::max(num_sections, view["section"].get<std::int64_t>());
+  auto& corrections = options.input.corrections;
+  corrections.assign(static_cast<std::size_t>(num_sections), {});
+  for (const json& view : record["views"]) {
+    const auto section = view["section"].get<std::int64_t>() - 1;
+    corrections[static_cast<std::size_t>(section)] = {
+        .shift_x_px = view["shift_px"][0],
+        .shift_y_px = view["shift_px"][1],
+        .rotation_rad = view["rotation_deg"].get<double>() / kRadian_deg,
+        .log_magnification = view["log_magnification"]};
+    if (view["left_out"].get<bool>()) options.input.left_out.push_back(section);
+  }
+  options.alignment = record;
+}
+
+void log_alignment(const json& record) {
+  double squares = 0.0;
+  std::vector<std::string> left_out;
+  for (const json& view : record["views"]) {
+    squares += std::pow(view["shift_px"][0].get<double>(), 2) +
+               std::pow(view["shift_px"][1].get<double>(), 2);
+    if (view["left_out"].get<bool>())
+      left_out.push_back(fmt::format("{}", view["section"].get<int>()));
+  }
+  const std::string errors = fmt::format(
+      "held-out views are predicted with an error of {:.4f} (before: {:.4f}; the difference is "
+      "known to {:.4f})",
+      record["held_out_error"]["after"].get<double>(),
+      record["held_out_error"]["before"].get<double>(),
+      record["gain"]["standard_error"].get<double>());
+  if (record["accepted"].get<bool>()) {
+    base::log_info(fmt::format("aligned: shifts of {:.2f} pixels (root mean square){}{}; {}",
+                               std::sqrt(squares / 2 / static_cast<double>(record["views"].size())),
+                               record["rotation"].get<bool>() ? ", rotations" : "",
+                               record["magnification"].get<bool>() ? ", magnifications" : "",
+                               errors));
+  } else {
+    base::log_info("the alignment stays as it was, since a new one is no better: " + errors);
+  }
+  if (!left_out.empty())
+    base::log_warning(fmt::format("left out, since they do not resemble the specimen: sections {}",
+                                  fmt::join(left_out, ", ")));
+}
+
+// Aligns the series. Returns nothing if a stop was requested.
+std::optional<json> make_record(const ReconstructOptions& options, const ReconstructHooks& hooks,
+                                const distributed::Communicator& processes) {
+  const base::TraceSpan span("align series");
+  const base::Stopwatch running;
+  tilt_series::TiltSeriesOptions recorded = options.input;
+  recorded.resample = false;
+  recorded.halves.reset();
+  const tilt_series::TiltSeries series(recorded, processes);
+  if (series.views().size() < kFewestViews)
+    throw Error(
+        fmt::format("--align needs at least {} views, since it judges the alignment by "
+                    "views that it holds out; '{}' has {}",
+                    kFewestViews, recorded.stack.string(), series.views().size()));
+  const align::Alignment found = align::refine_alignment({.recorded = series,
+                                                          .specimen = options.specimen,
+                                                          .field = options.field,
+                                                          .seed = options.fit.seed,
+                                                          .scratch_dir = recorded.scratch_dir,
+                                                          .progress = hooks.tune_progress,
+                                                          .stop_requested = hooks.stop_requested},
+                                                         processes);
+  if (found.joint.was_stopped) return std::nullopt;
+  return record_of(series, found, options, running.seconds());
+}
+
+}  // namespace
+
+bool align_series(ReconstructOptions& options, const ReconstructHooks& hooks,
+                  const distributed::Communicator& processes) {
+  if (options.resolved.align == Alignment::kOff) return true;
+  const std::filesystem::path path = output_paths(options.resolved.output).alignment;
+  std::optional<json> record;
+  if (options.resolved.resume && std::filesystem::exists(path)) {
+    processes.run_collectively([&] { record = read_record(path, options); });
+  } else {
+    record = make_record(options, hooks, processes);
+    if (!record) return false;
+    processes.run_collectively([&] {
+      if (processes.is_root() && !options.resolved.output.empty()) io::write_json(path, *record);
+    });
+  }
+  apply_record(*record, options);
+  log_alignment(*record);
+  return true;
+}
+
+}  // namespace tomofield::reconstruction
