@@ -27,6 +27,7 @@ set(TOMOFIELD_io_LIBRARIES HDF5::HDF5 PNG::PNG PkgConfig::TURBOJPEG TIFF::TIFF p
 set(TOMOFIELD_kernels_LIBRARIES hwy::hwy)
 set(TOMOFIELD_field_LIBRARIES $<BUILD_INTERFACE:Eigen3::Eigen>)
 set(TOMOFIELD_objective_LIBRARIES kissfft::kissfft-float)
+set(TOMOFIELD_align_LIBRARIES kissfft::kissfft-float $<BUILD_INTERFACE:Eigen3::Eigen>)
 set(TOMOFIELD_evaluate_LIBRARIES kissfft::kissfft-float)
 set(TOMOFIELD_baseline_LIBRARIES kissfft::kissfft-float)
 set(TOMOFIELD_view_LIBRARIES PkgConfig::HTTPLIB)
