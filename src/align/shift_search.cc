@@ -64,8 +64,8 @@ ShiftPeak find_shift(const ImageTransform& transform, const Reference& reference
     const std::size_t i = at(x, y);
     if (!(overlap[i].real() > kLeastOverlap * all_weight)) return 0.0;
     if (!(counts[i].real() > 0.1 * kLeastOverlap * all_squares)) return 0.0;
-    const double energy =
-        static_cast<double>(counts[i].real()) * std::max(0.0, static_cast<double>(squares[i].real()));
+    const double energy = static_cast<double>(counts[i].real()) *
+                          std::max(0.0, static_cast<double>(squares[i].real()));
     return energy > 0.0 ? product[i].real() / std::sqrt(energy) : 0.0;
   };
 
@@ -89,12 +89,11 @@ ShiftPeak find_shift(const ImageTransform& transform, const Reference& reference
   const double spread = std::sqrt(std::max(0.0, sum_squares / places - mean * mean));
   peak.prominence = spread > 0.0 ? (peak.correlation - mean) / spread : 0.0;
   peak.at_centre = coefficient(0, 0);
-  peak.moved_px = {static_cast<double>(peak_x) + parabola_peak(coefficient(peak_x - 1, peak_y),
-                                                               peak.correlation,
-                                                               coefficient(peak_x + 1, peak_y)),
-                   static_cast<double>(peak_y) + parabola_peak(coefficient(peak_x, peak_y - 1),
-                                                               peak.correlation,
-                                                               coefficient(peak_x, peak_y + 1))};
+  peak.moved_px = {
+      static_cast<double>(peak_x) + parabola_peak(coefficient(peak_x - 1, peak_y), peak.correlation,
+                                                  coefficient(peak_x + 1, peak_y)),
+      static_cast<double>(peak_y) + parabola_peak(coefficient(peak_x, peak_y - 1), peak.correlation,
+                                                  coefficient(peak_x, peak_y + 1))};
   return peak;
 }
 

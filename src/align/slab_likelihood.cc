@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <numbers>
 
 #include <Eigen/Eigenvalues>
 
@@ -43,37 +41,39 @@ SlabLikelihood::SlabLikelihood(const SlabModel& model)
       num_shells_ = std::max(num_shells_, static_cast<std::size_t>(shell) + 1);
 }
 
-void SlabLikelihood::normalise(Spectra& spectra) const {
-  const auto divide_by_shells = [&] {
-    std::vector<double> power(num_shells_), count(num_shells_);
-    for (std::size_t c = 0; c < columns_.size(); ++c)
-      for (std::size_t k = 0; k < model_->columns()[c].ky.size(); ++k) {
-        const auto shell = static_cast<std::size_t>(model_->columns()[c].shell[k]);
-        power[shell] += spectra[c].col(index(k)).squaredNorm();
-        count[shell] += columns_[c].num_views;
-      }
-    for (std::size_t c = 0; c < columns_.size(); ++c)
-      for (std::size_t k = 0; k < model_->columns()[c].ky.size(); ++k) {
-        const auto shell = static_cast<std::size_t>(model_->columns()[c].shell[k]);
-        if (power[shell] > 0.0)
-          spectra[c].col(index(k)) *= std::sqrt(count[shell] / power[shell]);
-      }
-  };
-  const auto divide_by_views = [&] {
-    Eigen::VectorXd power = Eigen::VectorXd::Zero(index(model_->num_views())), count = power;
-    for (std::size_t c = 0; c < columns_.size(); ++c) {
-      power += spectra[c].rowwise().squaredNorm();
-      for (std::size_t v = 0; v < model_->num_views(); ++v)
-        if (model_->has_signal(v, model_->columns()[c].fx))
-          count[index(v)] += static_cast<double>(spectra[c].cols());
+void SlabLikelihood::divide_by_shells(Spectra& spectra) const {
+  std::vector<double> power(num_shells_), count(num_shells_);
+  for (std::size_t c = 0; c < columns_.size(); ++c)
+    for (std::size_t k = 0; k < model_->columns()[c].shell.size(); ++k) {
+      const auto shell = static_cast<std::size_t>(model_->columns()[c].shell[k]);
+      power[shell] += spectra[c].col(index(k)).squaredNorm();
+      count[shell] += columns_[c].num_views;
     }
-    for (Eigen::Index v = 0; v < power.size(); ++v)
-      if (power[v] > 0.0)
-        for (Eigen::MatrixXcd& column : spectra) column.row(v) *= std::sqrt(count[v] / power[v]);
-  };
-  divide_by_shells();
-  divide_by_views();
-  divide_by_shells();
+  for (std::size_t c = 0; c < columns_.size(); ++c)
+    for (std::size_t k = 0; k < model_->columns()[c].shell.size(); ++k) {
+      const auto shell = static_cast<std::size_t>(model_->columns()[c].shell[k]);
+      if (power[shell] > 0.0) spectra[c].col(index(k)) *= std::sqrt(count[shell] / power[shell]);
+    }
+}
+
+void SlabLikelihood::divide_by_views(Spectra& spectra) const {
+  Eigen::VectorXd power = Eigen::VectorXd::Zero(index(model_->num_views())), count = power;
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    power += spectra[c].rowwise().squaredNorm();
+    for (std::size_t v = 0; v < model_->num_views(); ++v)
+      if (model_->has_signal(v, model_->columns()[c].fx))
+        count[index(v)] += static_cast<double>(spectra[c].cols());
+  }
+  for (Eigen::Index v = 0; v < power.size(); ++v)
+    if (power[v] > 0.0)
+      for (Eigen::MatrixXcd& column : spectra) column.row(v) *= std::sqrt(count[v] / power[v]);
+}
+
+// Views would look stronger or weaker than they are if shells were not of equal power first.
+void SlabLikelihood::normalise(Spectra& spectra) const {
+  divide_by_shells(spectra);
+  divide_by_views(spectra);
+  divide_by_shells(spectra);
 }
 
 double SlabLikelihood::cost_of(const Column& column, double coherence, double power,
@@ -85,14 +85,15 @@ double SlabLikelihood::cost_of(const Column& column, double coherence, double po
          (power - removed_share(column.eigenvalues, coherence).dot(mode_power)) / noise;
 }
 
-std::vector<double> SlabLikelihood::estimate_coherence(const Spectra& spectra) const {
+double SlabLikelihood::cost(Spectra spectra) const {
+  normalise(spectra);
   std::vector<Eigen::MatrixXd> parts(columns_.size());  // [shell, step]
-  base::parallel_for("coherence", std::ssize(columns_), [&](std::int64_t index_of_column) {
-    const auto c = static_cast<std::size_t>(index_of_column);
+  base::parallel_for("slab likelihood", std::ssize(columns_), [&](std::int64_t task) {
+    const auto c = static_cast<std::size_t>(task);
     parts[c] = Eigen::MatrixXd::Zero(index(num_shells_), kCoherenceSteps);
     const Eigen::MatrixXd mode_power =
         (columns_[c].basis.transpose() * spectra[c]).array().abs2().matrix();
-    for (std::size_t k = 0; k < model_->columns()[c].ky.size(); ++k)
+    for (std::size_t k = 0; k < model_->columns()[c].shell.size(); ++k)
       for (int step = 0; step < kCoherenceSteps; ++step)
         parts[c](model_->columns()[c].shell[k], step) +=
             cost_of(columns_[c], coherence_of_step(step), spectra[c].col(index(k)).squaredNorm(),
@@ -100,83 +101,7 @@ std::vector<double> SlabLikelihood::estimate_coherence(const Spectra& spectra) c
   });
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(index(num_shells_), kCoherenceSteps);
   for (const Eigen::MatrixXd& part : parts) sums += part;
-  std::vector<double> coherence;
-  for (Eigen::Index shell = 0; shell < sums.rows(); ++shell) {
-    Eigen::Index best = 0;
-    sums.row(shell).minCoeff(&best);
-    coherence.push_back(coherence_of_step(static_cast<int>(best)));
-  }
-  return coherence;
-}
-
-double SlabLikelihood::cost(const Spectra& spectra, const std::vector<double>& coherence) const {
-  std::vector<double> parts(columns_.size());
-  base::parallel_for("likelihood", std::ssize(columns_), [&](std::int64_t index_of_column) {
-    const auto c = static_cast<std::size_t>(index_of_column);
-    const Eigen::MatrixXd mode_power =
-        (columns_[c].basis.transpose() * spectra[c]).array().abs2().matrix();
-    for (std::size_t k = 0; k < model_->columns()[c].ky.size(); ++k)
-      parts[c] += cost_of(columns_[c], coherence[static_cast<std::size_t>(model_->columns()[c].shell[k])],
-                          spectra[c].col(index(k)).squaredNorm(), mode_power.col(index(k)));
-  });
-  double sum = 0.0;
-  for (const double part : parts) sum += part;
-  return sum;
-}
-
-PositionDerivatives SlabLikelihood::derivatives(const Spectra& spectra,
-                                                const std::vector<double>& coherence) const {
-  const Eigen::Index n = index(model_->num_views());
-  std::vector<PositionDerivatives> parts(columns_.size());
-  base::parallel_for("derivatives", std::ssize(columns_), [&](std::int64_t index_of_column) {
-    const auto c = static_cast<std::size_t>(index_of_column);
-    const FrequencyColumn& frequencies = model_->columns()[c];
-    std::map<int, std::vector<std::size_t>> rows_of_shell;
-    for (std::size_t k = 0; k < frequencies.ky.size(); ++k)
-      rows_of_shell[frequencies.shell[k]].push_back(k);
-    Eigen::VectorXd gradient_x = Eigen::VectorXd::Zero(n), gradient_y = gradient_x;
-    Eigen::MatrixXd xx = Eigen::MatrixXd::Zero(n, n), xy = xx, yy = xx;
-    for (const auto& [shell, rows] : rows_of_shell) {
-      const double share = coherence[static_cast<std::size_t>(shell)];
-      if (share == 0.0) continue;
-      const Eigen::VectorXd removed = removed_share(columns_[c].eigenvalues, share);
-      // The rest of K⁻¹ is a multiple of the identity, which does not see positions.
-      const Eigen::MatrixXd inverse = -1.0 / (1.0 - share) * columns_[c].basis *
-                                      removed.asDiagonal() * columns_[c].basis.transpose();
-      for (const std::size_t k : rows) {
-        const Eigen::VectorXcd z = spectra[c].col(index(k));
-        const Eigen::VectorXd re = z.real(), im = z.imag();
-        const Eigen::VectorXd kre = inverse * re, kim = inverse * im;
-        const Eigen::VectorXd slope = (re.array() * kim.array() - im.array() * kre.array()).matrix();
-        const double wx = 2.0 * std::numbers::pi * frequencies.fx;
-        const double wy = 2.0 * std::numbers::pi * frequencies.fy[k];
-        gradient_x += 2.0 * wx * slope;
-        gradient_y += 2.0 * wy * slope;
-        const Eigen::MatrixXd pair =
-            2.0 * inverse.cwiseProduct(re * re.transpose() + im * im.transpose());
-        xx += wx * wx * pair;
-        xy += wx * wy * pair;
-        yy += wy * wy * pair;
-      }
-    }
-    PositionDerivatives& part = parts[c];
-    part.gradient.resize(2 * n);
-    part.gradient << gradient_x, gradient_y;
-    part.hessian.resize(2 * n, 2 * n);
-    // A translation of all views changes nothing, so the rows of each block add up to 0.
-    for (Eigen::MatrixXd* block : {&xx, &xy, &yy}) {
-      block->diagonal().setZero();
-      const Eigen::VectorXd sums = block->rowwise().sum();
-      block->diagonal() = -sums;
-    }
-    part.hessian << xx, xy, xy, yy;
-  });
-  PositionDerivatives sum = std::move(parts.front());
-  for (std::size_t c = 1; c < parts.size(); ++c) {
-    sum.gradient += parts[c].gradient;
-    sum.hessian += parts[c].hessian;
-  }
-  return sum;
+  return sums.rowwise().minCoeff().sum();
 }
 
 }  // namespace tomofield::align

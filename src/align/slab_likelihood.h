@@ -8,34 +8,18 @@
 
 namespace tomofield::align {
 
-/// Holds how a sum over frequencies changes with the positions of the views, x0, x1, … y0, y1, …
-struct PositionDerivatives {
-  Eigen::VectorXd gradient;
-  Eigen::MatrixXd hessian;
-};
-
 /// Computes how unlikely the views of a slab are at their present positions. At each frequency the
 /// views' transforms are Gaussian with the covariance K = c C + (1 − c) I, where C is the
 /// correlation of the slab model and c the share of the signal in the power of the shell:
 ///
 ///   −log likelihood = Σ_k log det K + z^H K⁻¹ z.
-///
-/// Moving view i by u_i multiplies its transform by exp(2πi k·u_i). All views count together, so
-/// errors do not accumulate from neighbour to neighbour as they do in pairwise correlation.
 class SlabLikelihood {
  public:
   explicit SlabLikelihood(const SlabModel& model);
 
-  /// Divides the transforms by the amplitude of each view and by the power of each shell.
-  void normalise(Spectra& spectra) const;
-  /// Returns the most likely share of the signal in each shell of normalised transforms.
-  std::vector<double> estimate_coherence(const Spectra& spectra) const;
-  /// Returns minus the logarithm of the likelihood.
-  double cost(const Spectra& spectra, const std::vector<double>& coherence) const;
-  /// Returns the exact first and second derivatives of cost() with respect to the positions, in
-  /// pixels of the stretched views.
-  PositionDerivatives derivatives(const Spectra& spectra,
-                                  const std::vector<double>& coherence) const;
+  /// Returns minus the logarithm of the likelihood. The transforms are first divided by the
+  /// amplitude of each view and by the power of each shell, and c is the most likely share.
+  double cost(Spectra spectra) const;
 
  private:
   // The eigenvectors of the correlation at one column, without those of tiny eigenvalues.
@@ -44,6 +28,9 @@ class SlabLikelihood {
     Eigen::VectorXd eigenvalues;
     double num_views = 0.0;  // that have a signal here
   };
+  void normalise(Spectra& spectra) const;
+  void divide_by_shells(Spectra& spectra) const;
+  void divide_by_views(Spectra& spectra) const;
   double cost_of(const Column& column, double coherence, double power,
                  const Eigen::VectorXd& mode_power) const;
 

@@ -12,18 +12,17 @@ constexpr double kReach = 0.45;  // cycles per pixel of the image that survive t
 
 }  // namespace
 
-std::vector<FrequencyColumn> frequencies_below(double limit, std::int64_t width,
+std::vector<FrequencyColumn> frequencies_below(double limit, double least_fx, std::int64_t width,
                                                std::int64_t height) {
   const auto shells_per_cycle = static_cast<double>(std::min(width, height));
   std::vector<FrequencyColumn> columns;
-  for (std::int64_t kx = 0; 2 * kx <= width; ++kx) {
-    FrequencyColumn column{.kx = kx, .fx = cycles_per_pixel(kx, width)};
+  for (std::int64_t kx = 1; 2 * kx <= width; ++kx) {
+    FrequencyColumn column{.kx = kx, .fx = cycles_per_pixel(kx, width), .ky = {}, .shell = {}};
+    if (column.fx < least_fx) continue;
     for (std::int64_t ky = 0; ky < height; ++ky) {
-      const double fy = cycles_per_pixel(ky, height);
-      const double length = std::hypot(column.fx, fy);
-      if (length > limit || (kx == 0 && fy <= 0.0)) continue;
+      const double length = std::hypot(column.fx, cycles_per_pixel(ky, height));
+      if (length > limit) continue;
       column.ky.push_back(ky);
-      column.fy.push_back(fy);
       column.shell.push_back(static_cast<int>(std::lround(length * shells_per_cycle)));
     }
     if (!column.ky.empty()) columns.push_back(std::move(column));
@@ -48,12 +47,9 @@ Eigen::MatrixXd SlabModel::correlation(double fx) const {
   for (std::size_t i = 0; i < num_views(); ++i)
     for (std::size_t j = 0; j < num_views(); ++j) {
       if (!has_signal(i, fx) || !has_signal(j, fx)) continue;
-      const double slope = sigma_px_ * (slope_[i] - slope_[j]);
-      const double phase = 2.0 * kPi * fx * slope;
-      static const double ws = getenv("WS") ? atof(getenv("WS")) : 0.4;
-      const double common = 1.0 + slope * slope / (64.0 * 64.0 * ws * ws);
+      const double phase = 2.0 * kPi * sigma_px_ * fx * (slope_[i] - slope_[j]);
       result(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-          std::exp(-0.5 * phase * phase / common) / std::sqrt(common);
+          std::exp(-0.5 * phase * phase);
     }
   return result;
 }

@@ -16,12 +16,12 @@ struct FrequencyColumn {
   std::int64_t kx = 0;
   double fx = 0.0;               ///< cycles a pixel
   std::vector<std::int64_t> ky;  ///< index into the transform
-  std::vector<double> fy;
-  std::vector<int> shell;  ///< of the frequency's length
+  std::vector<int> shell;        ///< of the frequency's length
 };
 
-/// Lists the frequencies of half a plane up to `limit` cycles a pixel, without the mean.
-std::vector<FrequencyColumn> frequencies_below(double limit, std::int64_t width,
+/// Lists the frequencies of half a plane up to `limit` cycles a pixel, whose part across the tilt
+/// axis is `least_fx` at least and not 0.
+std::vector<FrequencyColumn> frequencies_below(double limit, double least_fx, std::int64_t width,
                                                std::int64_t height);
 
 /// Holds the transforms of stretched views: for each column a matrix [view, ky].

@@ -22,7 +22,8 @@ std::vector<double> half_gaussian(double sigma_px) {
   return weights;
 }
 
-// Convolves `count` lines of `length` values. Neighbours on a line are `step` apart, lines `stride`.
+// Convolves `count` lines of `length` values. Neighbours on a line are `step` apart, lines
+// `stride`.
 void blur_lines(std::vector<double>& values, std::int64_t count, std::int64_t stride,
                 std::int64_t length, std::int64_t step, const std::vector<double>& kernel) {
   const std::int64_t radius = std::ssize(kernel) - 1;
@@ -32,18 +33,22 @@ void blur_lines(std::vector<double>& values, std::int64_t count, std::int64_t st
     for (std::int64_t i = 0; i < length; ++i) line[static_cast<std::size_t>(i)] = first[i * step];
     for (std::int64_t i = 0; i < length; ++i) {
       double sum = 0.0;
-      for (auto j = std::max<std::int64_t>(0, i - radius); j <= std::min(length - 1, i + radius); ++j)
-        sum += kernel[static_cast<std::size_t>(std::abs(i - j))] * line[static_cast<std::size_t>(j)];
+      for (auto j = std::max<std::int64_t>(0, i - radius); j <= std::min(length - 1, i + radius);
+           ++j)
+        sum +=
+            kernel[static_cast<std::size_t>(std::abs(i - j))] * line[static_cast<std::size_t>(j)];
       first[i * step] = sum;
     }
   }
 }
 
-void blur(std::vector<double>& values, const MaskedImage& image, const std::vector<double>& kernel) {
+void blur(std::vector<double>& values, const MaskedImage& image,
+          const std::vector<double>& kernel) {
   blur_lines(values, image.height, image.width, image.width, 1, kernel);
   blur_lines(values, image.width, 1, image.height, image.width, kernel);
 }
 
+// Holds the cosine and the sine of an angle in degrees.
 struct Rotation {
   double cosine, sine;
   explicit Rotation(double deg)
@@ -51,12 +56,13 @@ struct Rotation {
         sine(std::sin(deg * std::numbers::pi / 180.0)) {}
 };
 
-// Maps a pixel of the stretched view to its place in the image: R(axis) diag(cos θ, 1) q + shift.
-geometry::RawFromAligned raw_from_stretched(const ViewPose& pose) {
+// Maps a pixel of the stretched view to its place in the image: R(axis) diag(cos θ / cos(seen_at),
+// 1) q + shift.
+geometry::RawFromAligned raw_from_stretched(const ViewPose& pose, double seen_at_deg) {
   const Rotation axis(pose.axis_deg);
-  const double compress = Rotation(pose.tilt_deg).cosine;
-  return {axis.cosine * compress, -axis.sine,        axis.sine * compress,
-          axis.cosine,            pose.shift_px[0], pose.shift_px[1]};
+  const double compress = Rotation(pose.tilt_deg).cosine / Rotation(seen_at_deg).cosine;
+  return {axis.cosine * compress, -axis.sine,      axis.sine * compress, axis.cosine,
+          pose.shift_px[0],       pose.shift_px[1]};
 }
 
 }  // namespace
@@ -78,13 +84,13 @@ MaskedImage without_trend(const MaskedImage& image, double sigma_px) {
   return out;
 }
 
-MaskedImage stretched_view(const MaskedImage& image, const ViewPose& pose, std::int64_t width,
-                           std::int64_t height) {
-  return tilt_series::align_image(image, raw_from_stretched(pose), width, height);
+MaskedImage stretched_view(const MaskedImage& image, const ViewPose& pose, double seen_at_deg,
+                           std::int64_t width, std::int64_t height) {
+  return tilt_series::align_image(image, raw_from_stretched(pose, seen_at_deg), width, height);
 }
 
 std::array<double, 2> image_shift(const ViewPose& pose, const std::array<double, 2>& moved_px) {
-  const geometry::RawFromAligned map = raw_from_stretched(pose);
+  const geometry::RawFromAligned map = raw_from_stretched(pose, pose.tilt_deg);
   return {map.m11 * moved_px[0] + map.m12 * moved_px[1],
           map.m21 * moved_px[0] + map.m22 * moved_px[1]};
 }

@@ -19,13 +19,14 @@ struct ViewPose {
 /// are no measurements count nowhere and stay 0.
 tilt_series::MaskedImage without_trend(const tilt_series::MaskedImage& image, double sigma_px);
 
-/// Returns a view of width × height pixels as the specimen's plane Z = 0 sees it: the tilt axis is
-/// +Y through the centre, and the image is stretched by 1 / cos θ in X. So all views show a thin
-/// specimen alike, and matter at height Z moves by Z tan θ.
+/// Returns a view of width × height pixels, corrected and stretched in X by cos(seen_at) / cos θ.
+/// The tilt axis is then +Y through the centre, and a thin specimen looks as it does in a view at
+/// the angle `seen_at_deg`.
 tilt_series::MaskedImage stretched_view(const tilt_series::MaskedImage& image, const ViewPose& pose,
-                                        std::int64_t width, std::int64_t height);
+                                        double seen_at_deg, std::int64_t width,
+                                        std::int64_t height);
 
-/// Returns the shift of the image, in its own pixels, that moves the stretched view by `moved_px`:
+/// Returns the shift of the image, in its own pixels, that moves the corrected view by `moved_px`:
 /// what was found at q + moved_px is then found at q.
 std::array<double, 2> image_shift(const ViewPose& pose, const std::array<double, 2>& moved_px);
 
