@@ -1,0 +1,303 @@
+#include "align/correlation_start.h"
+
+#include <kiss_fft.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <numeric>
+
+#include <Eigen/Cholesky>
+
+#include "align/image_transform.h"
+#include "align/shift_search.h"
+#include "align/slab_likelihood.h"
+#include "align/slab_model.h"
+#include "align/stretched_view.h"
+#include "base/check.h"
+#include "base/parallel.h"
+
+namespace tomofield::align {
+namespace {
+
+using Image = ImageTransform::Image;
+using tilt_series::MaskedImage;
+
+constexpr double kTrend = 0.08;     // σ of the local mean that is removed, a share of the width
+constexpr double kTaper = 0.15;     // of the size, at each edge
+constexpr double kNoise = 0.3;      // power of the noise over that of the signal, in predictions
+constexpr std::size_t kOthers = 8;  // views that predict another one
+// The low pass of IMOD's tiltxcorr, cycles a pixel.
+constexpr double kCutoff = 0.25, kFalloff = 0.05;
+// The frequencies that tell the axis, cycles a pixel. Slow changes across the axis depend most on
+// what enters and leaves the images at high tilt.
+constexpr double kAxisCutoff = 0.35, kAxisLeast = 0.03;
+
+std::int64_t fast_even_size(std::int64_t size) {
+  return 2 * kiss_fft_next_fast_size(static_cast<int>((size + 1) / 2));
+}
+
+// Returns a window of a line: 1 in the middle, with the rise of a cosine at both ends.
+std::vector<float> taper(std::int64_t size) {
+  std::vector<float> window;
+  const double rise = kTaper * static_cast<double>(size);
+  for (std::int64_t i = 0; i < size; ++i) {
+    const double inside = static_cast<double>(std::min(i, size - 1 - i)) + 0.5;
+    const double share = std::min(1.0, inside / rise);
+    window.push_back(static_cast<float>(0.5 - 0.5 * std::cos(std::numbers::pi * share)));
+  }
+  return window;
+}
+
+// Multiplies a transform by the low pass and by the root of the frequency, which makes the
+// frequencies of a specimen's views count more evenly.
+void filter(const ImageTransform& transform, Image& image) {
+  for (std::int64_t y = 0; y < transform.height(); ++y)
+    for (std::int64_t x = 0; x < transform.width(); ++x) {
+      const double f = std::hypot(cycles_per_pixel(x, transform.width()),
+                                  cycles_per_pixel(y, transform.height()));
+      const double beyond = std::max(0.0, f - kCutoff) / kFalloff;
+      image[static_cast<std::size_t>(y * transform.width() + x)] *=
+          static_cast<float>(std::exp(-0.5 * beyond * beyond) * std::sqrt(f));
+    }
+}
+
+// Returns how far right of the middle of three values at −1, 0, 1 their parabola is lowest.
+double lowest_place(double left, double middle, double right) {
+  const double bend = left - 2.0 * middle + right;
+  return bend > 0.0 ? std::clamp(0.5 * (left - right) / bend, -1.0, 1.0) : 0.0;
+}
+
+// Holds the views with their present poses, and improves the poses.
+class PoseSearch {
+ public:
+  PoseSearch(std::span<const CoarseView> views, const CorrelationOptions& options)
+      : options_(options),
+        width_(fast_even_size(views.front().image.width)),
+        height_(fast_even_size(views.front().image.height)),
+        transform_(width_, height_),
+        wide_transform_(2 * width_, 2 * height_),
+        taper_x_(taper(width_)),
+        taper_y_(taper(height_)),
+        images_(views.size()),
+        poses_(views.size()),
+        confidence_(views.size()) {
+    base::parallel_for("remove trends", std::ssize(views), [&](std::int64_t i) {
+      const CoarseView& view = views[static_cast<std::size_t>(i)];
+      images_[static_cast<std::size_t>(i)] =
+          without_trend(view.image, kTrend * static_cast<double>(view.image.width));
+      poses_[static_cast<std::size_t>(i)].tilt_deg = view.tilt_deg;
+    });
+  }
+
+  // Finds the shift of each view from views of lower tilt.
+  void go_outwards() {
+    std::vector<std::size_t> order(poses_.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return std::abs(poses_[a].tilt_deg) < std::abs(poses_[b].tilt_deg);
+    });
+    for (std::size_t i = 1; i < order.size(); ++i) {
+      const auto others = nearest(order[i], std::span(order).first(i));
+      poses_[order[i]].shift_px = poses_[others.front()].shift_px;
+      move(order[i], find(order[i], others));
+    }
+    first_ = order.front();
+  }
+
+  // Finds the shift of each view anew, from its neighbours on both sides.
+  void compare_with_neighbours() {
+    std::vector<std::size_t> all(poses_.size());
+    std::iota(all.begin(), all.end(), 0);
+    std::vector<ShiftPeak> peaks(poses_.size());
+    base::parallel_for("compare with neighbours", std::ssize(poses_), [&](std::int64_t i) {
+      const auto view = static_cast<std::size_t>(i);
+      peaks[view] = find(view, nearest(view, all));
+    });
+    for (const std::size_t view : all) move(view, peaks[view]);
+  }
+
+  // Finds the direction of the axis at which the views are most likely, with the present shifts.
+  void find_axis() {
+    std::vector<double> tilts;
+    for (const ViewPose& pose : poses_) tilts.push_back(pose.tilt_deg);
+    const SlabModel model(frequencies_below(kAxisCutoff, kAxisLeast, width_, height_), tilts,
+                          options_.thickness_px);
+    const SlabLikelihood likelihood(model);
+    const auto cost_at = [&](double axis_deg) {
+      for (ViewPose& pose : poses_) pose.axis_deg = axis_deg;
+      return likelihood.cost(spectra(model));
+    };
+    // Steps of about a degree, so that the search cannot end in a side minimum; then of half a one.
+    const int steps = static_cast<int>(std::ceil(options_.axis_range_deg));
+    const double step = options_.axis_range_deg / steps;
+    double best = 0.0, lowest = cost_at(0.0);
+    for (int i = -steps; i <= steps; ++i) {
+      const double cost = cost_at(i * step);
+      if (cost >= lowest) continue;
+      lowest = cost;
+      best = i * step;
+    }
+    for (const double half_width : {step, 0.5 * step})
+      best += half_width *
+              lowest_place(cost_at(best - half_width), cost_at(best), cost_at(best + half_width));
+    for (ViewPose& pose : poses_)
+      pose.axis_deg = std::clamp(best, -options_.axis_range_deg, options_.axis_range_deg);
+  }
+
+  CorrelationStart result() const {
+    CorrelationStart start{poses_.front().axis_deg, {}, confidence_};
+    const std::array<double, 2> origin = poses_[first_].shift_px;
+    for (const ViewPose& pose : poses_) {
+      // The specimen moves so that it stays at the centre of the first view.
+      const double cosine = std::cos(pose.tilt_deg * std::numbers::pi / 180.0) /
+                            std::cos(poses_[first_].tilt_deg * std::numbers::pi / 180.0);
+      const ViewPose back{.axis_deg = -pose.axis_deg};
+      const std::array<double, 2> corrected = image_shift(back, origin);
+      const std::array<double, 2> moved = image_shift(pose, {corrected[0] * cosine, corrected[1]});
+      start.shift_px.push_back({pose.shift_px[0] - moved[0], pose.shift_px[1] - moved[1]});
+    }
+    return start;
+  }
+
+ private:
+  std::vector<std::size_t> nearest(std::size_t view, std::span<const std::size_t> among) const {
+    std::vector<std::size_t> others(among.begin(), among.end());
+    std::erase(others, view);
+    const auto distance = [&](std::size_t other) {
+      return std::abs(poses_[other].tilt_deg - poses_[view].tilt_deg);
+    };
+    std::stable_sort(others.begin(), others.end(),
+                     [&](std::size_t a, std::size_t b) { return distance(a) < distance(b); });
+    others.resize(std::min(others.size(), kOthers));
+    return others;
+  }
+
+  float window(std::int64_t x, std::int64_t y) const {
+    return taper_x_[static_cast<std::size_t>(x)] * taper_y_[static_cast<std::size_t>(y)];
+  }
+
+  // Returns the transform of a view under the window, stretched as a view at another tilt.
+  Image spectrum(std::size_t view, double seen_at_deg) const {
+    const MaskedImage image =
+        stretched_view(images_[view], poses_[view], seen_at_deg, width_, height_);
+    Image values(image.values.size());
+    for (std::int64_t y = 0; y < height_; ++y)
+      for (std::int64_t x = 0; x < width_; ++x)
+        values[image.index(x, y)] = window(x, y) * image.values[image.index(x, y)];
+    transform_.forward(values);
+    return values;
+  }
+
+  // Returns the transform of a view as others predict it: at each frequency the mean of a Gaussian
+  // process, C_vo (C_oo + noise)⁻¹ times the transforms of the others.
+  Image predicted_spectrum(std::size_t view, const std::vector<std::size_t>& others) const {
+    const double seen_at = poses_[view].tilt_deg;
+    const double cosine = std::cos(seen_at * std::numbers::pi / 180.0);
+    std::vector<double> tilts{seen_at};
+    std::vector<Image> seen;
+    for (const std::size_t other : others) {
+      tilts.push_back(poses_[other].tilt_deg);
+      seen.push_back(spectrum(other, seen_at));
+    }
+    const SlabModel model({}, tilts, options_.thickness_px);
+    const auto n = static_cast<Eigen::Index>(others.size());
+    Image sum(static_cast<std::size_t>(width_ * height_));
+    for (std::int64_t x = 0; x < width_; ++x) {
+      const Eigen::MatrixXd alike =
+          model.correlation(std::abs(cycles_per_pixel(x, width_)) * cosine);
+      const Eigen::MatrixXd covariance =
+          alike.bottomRightCorner(n, n) + kNoise * Eigen::MatrixXd::Identity(n, n);
+      const Eigen::VectorXd weights = covariance.ldlt().solve(alike.col(0).tail(n));
+      for (std::size_t o = 0; o < seen.size(); ++o)
+        for (std::int64_t y = 0; y < height_; ++y) {
+          const auto at = static_cast<std::size_t>(y * width_ + x);
+          sum[at] += static_cast<float>(weights[static_cast<Eigen::Index>(o)]) * seen[o][at];
+        }
+    }
+    return sum;
+  }
+
+  // Puts the prediction into the middle of an image of twice the size, so that shifts wrap nowhere.
+  Reference predict(std::size_t view, const std::vector<std::size_t>& others) const {
+    Image values = predicted_spectrum(view, others);
+    filter(transform_, values);
+    transform_.inverse(values);
+    Reference reference{Image(4 * values.size()), Image(4 * values.size())};
+    for (std::int64_t y = 0; y < height_; ++y)
+      for (std::int64_t x = 0; x < width_; ++x) {
+        const auto at = static_cast<std::size_t>((y + height_ / 2) * 2 * width_ + x + width_ / 2);
+        reference.values[at] = values[static_cast<std::size_t>(y * width_ + x)].real();
+        reference.weights[at] = window(x, y);
+      }
+    return reference;
+  }
+
+  ShiftPeak find(std::size_t view, const std::vector<std::size_t>& others) const {
+    MaskedImage image =
+        stretched_view(images_[view], poses_[view], poses_[view].tilt_deg, 2 * width_, 2 * height_);
+    Image values(image.values.begin(), image.values.end());
+    wide_transform_.forward(values);
+    filter(wide_transform_, values);
+    wide_transform_.inverse(values);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      image.values[i] = image.valid[i] ? values[i].real() : 0.0f;
+    return find_shift(wide_transform_, predict(view, others), image,
+                      {options_.largest_shift * static_cast<double>(images_[view].width),
+                       options_.largest_shift * static_cast<double>(images_[view].height)});
+  }
+
+  void move(std::size_t view, const ShiftPeak& peak) {
+    const std::array<double, 2> shift = image_shift(poses_[view], peak.moved_px);
+    poses_[view].shift_px[0] += shift[0];
+    poses_[view].shift_px[1] += shift[1];
+    confidence_[view] = peak.prominence;
+  }
+
+  Spectra spectra(const SlabModel& model) const {
+    std::vector<Image> seen(poses_.size());
+    base::parallel_for("spectra", std::ssize(poses_), [&](std::int64_t view) {
+      seen[static_cast<std::size_t>(view)] = spectrum(static_cast<std::size_t>(view), 0.0);
+    });
+    Spectra result;
+    for (const FrequencyColumn& column : model.columns()) {
+      Eigen::MatrixXcd matrix = Eigen::MatrixXcd::Zero(std::ssize(seen), std::ssize(column.ky));
+      for (std::size_t v = 0; v < seen.size(); ++v)
+        for (std::size_t k = 0; k < column.ky.size() && model.has_signal(v, column.fx); ++k)
+          matrix(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(k)) =
+              seen[v][static_cast<std::size_t>(column.ky[k] * width_ + column.kx)];
+      result.push_back(std::move(matrix));
+    }
+    return result;
+  }
+
+  CorrelationOptions options_;
+  std::int64_t width_, height_;
+  ImageTransform transform_, wide_transform_;
+  std::vector<float> taper_x_, taper_y_;
+  std::vector<MaskedImage> images_;  // without trends
+  std::vector<ViewPose> poses_;
+  std::vector<double> confidence_;
+  std::size_t first_ = 0;  // the view nearest to zero tilt
+};
+
+}  // namespace
+
+CorrelationStart correlate_views(std::span<const CoarseView> views,
+                                 const CorrelationOptions& options) {
+  TOMOFIELD_CHECK(views.size() >= 2, "views to correlate");
+  PoseSearch search(views, options);
+  search.go_outwards();
+  search.compare_with_neighbours();
+  if (options.axis_range_deg > 0.0) {
+    search.find_axis();
+    search.compare_with_neighbours();
+    search.find_axis();  // with shifts that no longer follow the wrong axis
+    search.compare_with_neighbours();
+  }
+  return search.result();
+}
+
+}  // namespace tomofield::align

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <complex>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+struct kiss_fft_state;
+
+namespace tomofield::align {
+
+/// Transforms images [y, x] of one size by Fourier and back. Thread-safe.
+class ImageTransform {
+ public:
+  using Image = std::vector<std::complex<float>>;
+
+  ImageTransform(std::int64_t width, std::int64_t height);
+
+  /// Replaces an image by Σ image exp(−2πi (kx x / width + ky y / height)), [ky, kx].
+  void forward(Image& image) const;
+  /// Undoes forward(), with its factor 1 / (width height).
+  void inverse(Image& image) const;
+
+  std::int64_t width() const { return width_; }
+  std::int64_t height() const { return height_; }
+
+ private:
+  using Plan = std::unique_ptr<kiss_fft_state, void (*)(kiss_fft_state*)>;
+  void transform(Image& image, const Plan& rows, const Plan& columns) const;
+
+  std::int64_t width_, height_;
+  Plan forward_rows_, forward_columns_, inverse_rows_, inverse_columns_;
+};
+
+/// Returns the frequency of index `k` of a transform of length `size`, in cycles a pixel, −½ to ½.
+inline double cycles_per_pixel(std::int64_t k, std::int64_t size) {
+  const std::int64_t signed_k = 2 * k > size ? k - size : k;
+  return static_cast<double>(signed_k) / static_cast<double>(size);
+}
+
+}  // namespace tomofield::align
