@@ -33,7 +33,7 @@ constexpr double kLongestStep = 2.0;
 // The first epochs of a fit show too little of the specimen.
 constexpr std::int64_t kEpochsBefore = 2;
 // Rotations and magnifications are looked for in pixels at most this many times as wide.
-constexpr int kFreedomBin = 2;
+constexpr int kFreedomBin = 4;
 constexpr double kSure = 3.0;  // standard errors by which a freedom must pay
 
 constexpr int kCoarseEpochs = 80, kFineEpochs = 4;

@@ -140,14 +140,16 @@ std::optional<json> make_record(const ReconstructOptions& options, const Reconst
         fmt::format("--align needs at least {} views, since it judges the alignment by "
                     "views that it holds out; '{}' has {}",
                     kFewestViews, recorded.stack.string(), series.views().size()));
-  const align::Alignment found = align::refine_alignment({.recorded = series,
-                                                          .specimen = options.specimen,
-                                                          .field = options.field,
-                                                          .seed = options.fit.seed,
-                                                          .scratch_dir = recorded.scratch_dir,
-                                                          .progress = hooks.tune_progress,
-                                                          .stop_requested = hooks.stop_requested},
-                                                         processes);
+  const align::JointProblem problem{.recorded = series,
+                                    .specimen = options.specimen,
+                                    .field = options.field,
+                                    .seed = options.fit.seed,
+                                    .scratch_dir = recorded.scratch_dir,
+                                    .progress = hooks.tune_progress,
+                                    .stop_requested = hooks.stop_requested};
+  std::vector<geometry::ViewCorrection> start(series.views().size());
+  if (options.resolved.align == Alignment::kFull) start = align::correlated_start(problem);
+  const align::Alignment found = align::refine_alignment(problem, std::move(start), processes);
   if (found.joint.was_stopped) return std::nullopt;
   return record_of(series, found, options, running.seconds());
 }
