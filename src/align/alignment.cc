@@ -61,8 +61,9 @@ std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& probl
   std::vector<CoarseView> views(series.views().size());
   base::parallel_for("reduce views", std::ssize(views), [&](std::int64_t i) {
     const auto view = static_cast<std::size_t>(i);
-    views[view] = {tilt_series::reduce_image(measurement::read_aligned(series, view, {}), reduction),
-                   series.views()[view].tilt_deg};
+    views[view] = {
+        tilt_series::reduce_image(measurement::read_aligned(series, view, {}), reduction),
+        series.views()[view].tilt_deg};
   });
   const double pixel = reduction * series.bin_factor();
   const CorrelationStart found = correlate_views(
@@ -74,8 +75,7 @@ std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& probl
   return corrections;
 }
 
-Alignment refine_alignment(const JointProblem& problem,
-                           std::vector<geometry::ViewCorrection> start,
+Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::ViewCorrection> start,
                            const distributed::Communicator& processes) {
   const std::vector<geometry::ViewCorrection> none(problem.recorded.views().size());
   Alignment alignment;

@@ -12,7 +12,8 @@ namespace tomofield::align {
 struct Alignment {
   std::vector<geometry::ViewCorrection> corrections;  ///< [view]; none if it was not accepted
   JointAlignment joint;
-  /// Mean error of held-out views (trial.h) with the alignment that the files give and with the new one.
+  /// Mean error of held-out views (trial.h) with the alignment that the files give and with the new
+  /// one.
   double error_before = 0.0, error_after = 0.0;
   /// Mean of their differences over the views, and its standard error.
   double gain = 0.0, gain_error = 0.0;
@@ -27,8 +28,7 @@ std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& probl
 /// Aligns a series further, from `start`. The new alignment is accepted if a field that is
 /// fitted with it predicts held-out views better, by more than the standard error over the views.
 /// Every process calls it and gets the same.
-Alignment refine_alignment(const JointProblem& problem,
-                           std::vector<geometry::ViewCorrection> start,
+Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::ViewCorrection> start,
                            const distributed::Communicator& processes);
 
 }  // namespace tomofield::align

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "align/alignment.h"
+#include "align/axis_search.h"
 #include "base/log.h"
 #include "base/stopwatch.h"
 #include "base/trace.h"
@@ -148,7 +149,8 @@ std::optional<json> make_record(const ReconstructOptions& options, const Reconst
                                     .progress = hooks.tune_progress,
                                     .stop_requested = hooks.stop_requested};
   std::vector<geometry::ViewCorrection> start(series.views().size());
-  if (options.resolved.align == Alignment::kFull) start = align::correlated_start(problem);
+  if (options.resolved.align == Alignment::kFull)
+    start = align::with_best_axis(problem, align::correlated_start(problem), processes);
   const align::Alignment found = align::refine_alignment(problem, std::move(start), processes);
   if (found.joint.was_stopped) return std::nullopt;
   return record_of(series, found, options, running.seconds());
