@@ -24,7 +24,7 @@ constexpr std::int64_t kSize = 48;
 class ShiftedSeries {
  public:
   ShiftedSeries() {
-    for (double tilt = -60; tilt <= 60; tilt += 3) tilt_deg_.push_back(tilt);
+    for (double tilt = -60; tilt <= 60; tilt += 6) tilt_deg_.push_back(tilt);
     base::Random random(4);
     for (std::size_t view = 0; view < tilt_deg_.size(); ++view) {
       right_.push_back({.shift_x_px = random.normal(), .shift_y_px = random.normal()});

@@ -55,5 +55,38 @@ TEST(AmplifySlowModes, TakesFewViews) {
   EXPECT_NEAR(one[0], 6.0, 1e-12);
 }
 
+TEST(SlowModeAmplifier, AddsHalfAsMuchOnceAStepTurnsBack) {
+  SlowModeAmplifier amplifier;
+  const auto factor = [&](double size) {
+    std::vector<double> step = cosine(30, 0);
+    for (double& value : step) value *= size;
+    amplifier.amplify(step);
+    return step[4] / size;
+  };
+  EXPECT_NEAR(factor(1.0), 3.0, 1e-9);
+  EXPECT_NEAR(factor(0.5), 3.0, 1e-9);
+  EXPECT_NEAR(factor(-0.1), 3.0, 1e-9) << "it turns too little to tell";
+  EXPECT_NEAR(factor(0.2), 2.0, 1e-9);
+  EXPECT_NEAR(factor(0.3), 2.0, 1e-9);
+  EXPECT_NEAR(factor(-0.3), 1.5, 1e-9);
+}
+
+// Returns the error that is left after some updates if a registration shows `shown` of it.
+double error_left(double shown) {
+  SlowModeAmplifier amplifier;
+  double error = 1.0;
+  for (int update = 0; update < 20; ++update) {
+    std::vector<double> step = cosine(30, 0);
+    for (double& value : step) value *= -1.3 * shown * error;
+    amplifier.amplify(step);
+    error += step[0];
+  }
+  return std::abs(error);
+}
+
+TEST(SlowModeAmplifier, UpdatesConvergeWhateverPartOfTheErrorIsShown) {
+  for (const double shown : {0.2, 0.5, 0.8, 1.0}) EXPECT_LT(error_left(shown), 0.01) << shown;
+}
+
 }  // namespace
 }  // namespace tomofield::align
