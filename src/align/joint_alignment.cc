@@ -128,15 +128,14 @@ class AligningFit {
   }
 
   // Returns the steps that are taken for what the registrations found.
-  std::vector<ViewCorrection> limited(std::vector<ViewCorrection> steps,
-                                      const fit::Stage& stage) const {
+  std::vector<ViewCorrection> limited(std::vector<ViewCorrection> steps, const fit::Stage& stage) {
     std::vector<std::size_t> by_tilt(steps.size());
     std::iota(by_tilt.begin(), by_tilt.end(), std::size_t{0});
     std::ranges::stable_sort(
         by_tilt, {}, [&](std::size_t view) { return measurement_.geometry.tilt_deg[view]; });
     std::vector<double> shifts;
     for (const std::size_t view : by_tilt) shifts.push_back(steps[view].shift_x_px);
-    amplify_slow_modes(shifts);
+    slow_modes_.amplify(shifts);
     for (std::size_t i = 0; i < by_tilt.size(); ++i) steps[by_tilt[i]].shift_x_px = shifts[i];
     double mean_rotation = 0.0;
     for (const ViewCorrection& step : steps)
@@ -215,6 +214,7 @@ class AligningFit {
   fit::FieldOptions field_;
   measurement::Measurement measurement_;
   fit::Fit fit_;
+  SlowModeAmplifier slow_modes_;
   JointAlignment found_;
 };
 
