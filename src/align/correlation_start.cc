@@ -13,7 +13,6 @@
 
 #include "align/image_transform.h"
 #include "align/shift_search.h"
-#include "align/slab_likelihood.h"
 #include "align/slab_model.h"
 #include "align/stretched_view.h"
 #include "base/check.h"
@@ -31,9 +30,6 @@ constexpr double kNoise = 0.3;      // power of the noise over that of the signa
 constexpr std::size_t kOthers = 8;  // views that predict another one
 // The low pass of IMOD's tiltxcorr, cycles a pixel.
 constexpr double kCutoff = 0.25, kFalloff = 0.05;
-// The frequencies that tell the axis, cycles a pixel. Slow changes across the axis depend most on
-// what enters and leaves the images at high tilt.
-constexpr double kAxisCutoff = 0.35, kAxisLeast = 0.03;
 
 std::int64_t fast_even_size(std::int64_t size) {
   return 2 * kiss_fft_next_fast_size(static_cast<int>((size + 1) / 2));
@@ -64,13 +60,7 @@ void filter(const ImageTransform& transform, Image& image) {
     }
 }
 
-// Returns how far right of the middle of three values at −1, 0, 1 their parabola is lowest.
-double lowest_place(double left, double middle, double right) {
-  const double bend = left - 2.0 * middle + right;
-  return bend > 0.0 ? std::clamp(0.5 * (left - right) / bend, -1.0, 1.0) : 0.0;
-}
-
-// Holds the views with their present poses, and improves the poses.
+// Holds the views with their present poses, and improves their shifts.
 class PoseSearch {
  public:
   PoseSearch(std::span<const CoarseView> views, const CorrelationOptions& options)
@@ -119,45 +109,15 @@ class PoseSearch {
     for (const std::size_t view : all) move(view, peaks[view]);
   }
 
-  // Finds the direction of the axis at which the views are most likely, with the present shifts.
-  void find_axis() {
-    std::vector<double> tilts;
-    for (const ViewPose& pose : poses_) tilts.push_back(pose.tilt_deg);
-    const SlabModel model(frequencies_below(kAxisCutoff, kAxisLeast, width_, height_), tilts,
-                          options_.thickness_px);
-    const SlabLikelihood likelihood(model);
-    const auto cost_at = [&](double axis_deg) {
-      for (ViewPose& pose : poses_) pose.axis_deg = axis_deg;
-      return likelihood.cost(spectra(model));
-    };
-    // Steps of about a degree, so that the search cannot end in a side minimum; then of half a one.
-    const int steps = static_cast<int>(std::ceil(options_.axis_range_deg));
-    const double step = options_.axis_range_deg / steps;
-    double best = 0.0, lowest = cost_at(0.0);
-    for (int i = -steps; i <= steps; ++i) {
-      const double cost = cost_at(i * step);
-      if (cost >= lowest) continue;
-      lowest = cost;
-      best = i * step;
-    }
-    for (const double half_width : {step, 0.5 * step})
-      best += half_width *
-              lowest_place(cost_at(best - half_width), cost_at(best), cost_at(best + half_width));
-    for (ViewPose& pose : poses_)
-      pose.axis_deg = std::clamp(best, -options_.axis_range_deg, options_.axis_range_deg);
-  }
-
   CorrelationStart result() const {
-    CorrelationStart start{poses_.front().axis_deg, {}, confidence_};
+    CorrelationStart start{{}, confidence_};
     const std::array<double, 2> origin = poses_[first_].shift_px;
     for (const ViewPose& pose : poses_) {
       // The specimen moves so that it stays at the centre of the first view.
       const double cosine = std::cos(pose.tilt_deg * std::numbers::pi / 180.0) /
                             std::cos(poses_[first_].tilt_deg * std::numbers::pi / 180.0);
-      const ViewPose back{.axis_deg = -pose.axis_deg};
-      const std::array<double, 2> corrected = image_shift(back, origin);
-      const std::array<double, 2> moved = image_shift(pose, {corrected[0] * cosine, corrected[1]});
-      start.shift_px.push_back({pose.shift_px[0] - moved[0], pose.shift_px[1] - moved[1]});
+      start.shift_px.push_back(
+          {pose.shift_px[0] - origin[0] * cosine, pose.shift_px[1] - origin[1]});
     }
     return start;
   }
@@ -202,7 +162,7 @@ class PoseSearch {
       tilts.push_back(poses_[other].tilt_deg);
       seen.push_back(spectrum(other, seen_at));
     }
-    const SlabModel model({}, tilts, options_.thickness_px);
+    const SlabModel model(tilts, options_.thickness_px);
     const auto n = static_cast<Eigen::Index>(others.size());
     Image sum(static_cast<std::size_t>(width_ * height_));
     for (std::int64_t x = 0; x < width_; ++x) {
@@ -250,27 +210,9 @@ class PoseSearch {
   }
 
   void move(std::size_t view, const ShiftPeak& peak) {
-    const std::array<double, 2> shift = image_shift(poses_[view], peak.moved_px);
-    poses_[view].shift_px[0] += shift[0];
-    poses_[view].shift_px[1] += shift[1];
+    poses_[view].shift_px[0] += peak.moved_px[0];
+    poses_[view].shift_px[1] += peak.moved_px[1];
     confidence_[view] = peak.prominence;
-  }
-
-  Spectra spectra(const SlabModel& model) const {
-    std::vector<Image> seen(poses_.size());
-    base::parallel_for("spectra", std::ssize(poses_), [&](std::int64_t view) {
-      seen[static_cast<std::size_t>(view)] = spectrum(static_cast<std::size_t>(view), 0.0);
-    });
-    Spectra result;
-    for (const FrequencyColumn& column : model.columns()) {
-      Eigen::MatrixXcd matrix = Eigen::MatrixXcd::Zero(std::ssize(seen), std::ssize(column.ky));
-      for (std::size_t v = 0; v < seen.size(); ++v)
-        for (std::size_t k = 0; k < column.ky.size() && model.has_signal(v, column.fx); ++k)
-          matrix(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(k)) =
-              seen[v][static_cast<std::size_t>(column.ky[k] * width_ + column.kx)];
-      result.push_back(std::move(matrix));
-    }
-    return result;
   }
 
   CorrelationOptions options_;
@@ -291,12 +233,6 @@ CorrelationStart correlate_views(std::span<const CoarseView> views,
   PoseSearch search(views, options);
   search.go_outwards();
   search.compare_with_neighbours();
-  if (options.axis_range_deg > 0.0) {
-    search.find_axis();
-    search.compare_with_neighbours();
-    search.find_axis();  // with shifts that no longer follow the wrong axis
-    search.compare_with_neighbours();
-  }
   return search.result();
 }
 

@@ -18,28 +18,24 @@ struct CoarseView {
 struct CorrelationOptions {
   double thickness_px = 0.0;    ///< of the specimen, roughly
   double largest_shift = 0.25;  ///< from one view to the next, as a share of the image's size
-  double axis_range_deg = 6.0;  ///< the axis is looked for within ± this; 0: it is +Y
 };
 
 /// Holds what a correlation finds. A position q of a corrected view, relative to its centre, lies
-/// in the given image at R(axis) q + shift, with R(φ) = [[cos φ, −sin φ], [sin φ, cos φ]]. The
-/// view nearest to zero tilt has no shift.
+/// in the given image at q + shift. The view nearest to zero tilt has no shift.
 struct CorrelationStart {
-  double axis_deg = 0.0;                        ///< of all views, counter-clockwise from +Y
   std::vector<std::array<double, 2>> shift_px;  ///< of each view
   /// Height of each view's correlation peak above the mean, in standard deviations of the whole
   /// correlation image. Low values name views that cannot be aligned.
   std::vector<double> confidence;
 };
 
-/// Finds shifts of a few pixels' accuracy and the direction of the tilt axis without any start.
+/// Finds shifts of a few pixels' accuracy without any start.
 ///
 /// The search goes outwards from the view nearest to zero tilt. Each view is correlated with what
 /// its nearest aligned views predict of it, and then once more with its neighbours on both sides.
 /// The prediction is the best linear one for a slab of the given thickness (slab_model.h): a
 /// cosine-stretched mean in which a view counts at the frequencies that it shares with the wanted
-/// one. The direction of the axis is the one at which the views of a slab are most likely
-/// (slab_likelihood.h).
+/// one.
 ///
 /// All images have one size; the tilt axis is roughly +Y through their centres. The sizes, the
 /// angles and the options must have been checked.

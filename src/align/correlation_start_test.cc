@@ -34,18 +34,16 @@ std::vector<Blob> random_slab() {
 
 double radians(double deg) { return deg * std::numbers::pi / 180.0; }
 
-// Returns the exact projection of Gaussian blobs, with some noise. The corrected position q is at
-// R(axis) q + shift.
-CoarseView make_view(double tilt_deg, double axis_deg, const Shift& shift, std::uint64_t seed) {
+// Returns the exact projection of Gaussian blobs, with some noise, shifted.
+CoarseView make_view(double tilt_deg, const Shift& shift, std::uint64_t seed) {
   static const std::vector<Blob> blobs = random_slab();
   CoarseView view{tilt_series::MaskedImage(kSize, kSize), tilt_deg};
-  const double c = std::cos(radians(axis_deg)), s = std::sin(radians(axis_deg));
   base::Random random(9, seed);
   for (float& value : view.image.values) value = static_cast<float>(0.1 * random.normal());
   for (const Blob& blob : blobs) {
     const double qx = blob.x * std::cos(radians(tilt_deg)) + blob.z * std::sin(radians(tilt_deg));
-    const double px = c * qx - s * blob.y + shift[0] + 0.5 * kSize - 0.5;
-    const double py = s * qx + c * blob.y + shift[1] + 0.5 * kSize - 0.5;
+    const double px = qx + shift[0] + 0.5 * kSize - 0.5;
+    const double py = blob.y + shift[1] + 0.5 * kSize - 0.5;
     for (std::int64_t y = 0; y < kSize; ++y)
       for (std::int64_t x = 0; x < kSize; ++x) {
         const double d = std::hypot(static_cast<double>(x) - px, static_cast<double>(y) - py);
@@ -61,15 +59,14 @@ struct Series {
   std::vector<Shift> shifts;
 };
 
-Series make_series(double axis_deg, int jumping_view = -1) {
+Series make_series(int jumping_view = -1) {
   Series series;
   base::Random random(3);
   for (int i = 0; i < 31; ++i) {
     Shift shift{random.uniform(-4, 4), random.uniform(-4, 4)};
     if (i == jumping_view) shift[0] += 0.2 * kSize;
     series.shifts.push_back(shift);
-    series.views.push_back(
-        make_view(-60.0 + 4.0 * i, axis_deg, shift, static_cast<std::uint64_t>(i)));
+    series.views.push_back(make_view(-60.0 + 4.0 * i, shift, static_cast<std::uint64_t>(i)));
   }
   return series;
 }
@@ -97,57 +94,48 @@ double largest_error(const Series& series, const std::vector<Shift>& found) {
   return largest;
 }
 
-const CorrelationOptions kKnownAxis{.thickness_px = kThickness, .axis_range_deg = 0.0};
+const CorrelationOptions kOptions{.thickness_px = kThickness};
 
 TEST(CorrelationStart, FindsKnownShifts) {
-  const Series series = make_series(0.0);
-  const CorrelationStart start = correlate_views(series.views, kKnownAxis);
+  const Series series = make_series();
+  const CorrelationStart start = correlate_views(series.views, kOptions);
   EXPECT_LT(largest_error(series, start.shift_px), 0.5);
-  EXPECT_EQ(start.axis_deg, 0.0);
   EXPECT_NEAR(start.shift_px[15][0], 0.0, 1e-9);  // of the view at zero tilt
 }
 
 TEST(CorrelationStart, FindsAViewThatJumped) {
-  const Series series = make_series(0.0, 18);
-  EXPECT_LT(largest_error(series, correlate_views(series.views, kKnownAxis).shift_px), 0.5);
+  const Series series = make_series(18);
+  EXPECT_LT(largest_error(series, correlate_views(series.views, kOptions).shift_px), 0.5);
 }
 
 TEST(CorrelationStart, MaskedPixelsDoNotPull) {
-  Series series = make_series(0.0);
+  Series series = make_series();
   for (CoarseView& view : series.views)
     for (std::int64_t y = 20; y < 32; ++y)
       for (std::int64_t x = 8; x < 20; ++x) {
         view.image.values[view.image.index(x, y)] = 1000.0f;
         view.image.valid[view.image.index(x, y)] = 0;
       }
-  EXPECT_LT(largest_error(series, correlate_views(series.views, kKnownAxis).shift_px), 0.5);
-}
-
-TEST(CorrelationStart, FindsTheAxis) {
-  const Series series = make_series(3.0);
-  const CorrelationStart start = correlate_views(series.views, {.thickness_px = kThickness});
-  EXPECT_NEAR(start.axis_deg, 3.0, 0.5);
-  EXPECT_LT(largest_error(series, start.shift_px), 0.6);
+  EXPECT_LT(largest_error(series, correlate_views(series.views, kOptions).shift_px), 0.5);
 }
 
 TEST(CorrelationStart, AViewOfNoiseHasTheLeastConfidence) {
-  Series series = make_series(0.0);
+  Series series = make_series();
   base::Random random(1);
   for (float& value : series.views[22].image.values) value = static_cast<float>(random.normal());
-  const CorrelationStart start = correlate_views(series.views, kKnownAxis);
+  const CorrelationStart start = correlate_views(series.views, kOptions);
   EXPECT_EQ(
       std::min_element(start.confidence.begin(), start.confidence.end()) - start.confidence.begin(),
       22);
 }
 
 TEST(CorrelationStartThreads, SameBitsForAnyNumber) {
-  const Series series = make_series(1.0);
+  const Series series = make_series();
   base::set_thread_count(1);
-  const CorrelationStart one = correlate_views(series.views, {.thickness_px = kThickness});
+  const CorrelationStart one = correlate_views(series.views, kOptions);
   base::set_thread_count(2);
-  const CorrelationStart two = correlate_views(series.views, {.thickness_px = kThickness});
+  const CorrelationStart two = correlate_views(series.views, kOptions);
   base::set_thread_count(0);
-  EXPECT_EQ(one.axis_deg, two.axis_deg);
   EXPECT_EQ(one.shift_px, two.shift_px);
   EXPECT_EQ(one.confidence, two.confidence);
 }

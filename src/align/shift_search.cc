@@ -88,7 +88,6 @@ ShiftPeak find_shift(const ImageTransform& transform, const Reference& reference
   const double mean = sum / places;
   const double spread = std::sqrt(std::max(0.0, sum_squares / places - mean * mean));
   peak.prominence = spread > 0.0 ? (peak.correlation - mean) / spread : 0.0;
-  peak.at_centre = coefficient(0, 0);
   peak.moved_px = {
       static_cast<double>(peak_x) + parabola_peak(coefficient(peak_x - 1, peak_y), peak.correlation,
                                                   coefficient(peak_x + 1, peak_y)),

@@ -12,7 +12,6 @@ namespace tomofield::align {
 struct ShiftPeak {
   std::array<double, 2> moved_px{};  ///< the reference at q is found in the image at q + moved_px
   double correlation = 0.0;          ///< at the peak, −1 to 1
-  double at_centre = 0.0;            ///< correlation without a shift
   double prominence = 0.0;  ///< (peak − mean) / standard deviation of the whole correlation
 };
 

@@ -48,22 +48,7 @@ void blur(std::vector<double>& values, const MaskedImage& image,
   blur_lines(values, image.width, 1, image.height, image.width, kernel);
 }
 
-// Holds the cosine and the sine of an angle in degrees.
-struct Rotation {
-  double cosine, sine;
-  explicit Rotation(double deg)
-      : cosine(std::cos(deg * std::numbers::pi / 180.0)),
-        sine(std::sin(deg * std::numbers::pi / 180.0)) {}
-};
-
-// Maps a pixel of the stretched view to its place in the image: R(axis) diag(cos θ / cos(seen_at),
-// 1) q + shift.
-geometry::RawFromAligned raw_from_stretched(const ViewPose& pose, double seen_at_deg) {
-  const Rotation axis(pose.axis_deg);
-  const double compress = Rotation(pose.tilt_deg).cosine / Rotation(seen_at_deg).cosine;
-  return {axis.cosine * compress, -axis.sine,      axis.sine * compress, axis.cosine,
-          pose.shift_px[0],       pose.shift_px[1]};
-}
+double cosine_of(double deg) { return std::cos(deg * std::numbers::pi / 180.0); }
 
 }  // namespace
 
@@ -86,13 +71,10 @@ MaskedImage without_trend(const MaskedImage& image, double sigma_px) {
 
 MaskedImage stretched_view(const MaskedImage& image, const ViewPose& pose, double seen_at_deg,
                            std::int64_t width, std::int64_t height) {
-  return tilt_series::align_image(image, raw_from_stretched(pose, seen_at_deg), width, height);
-}
-
-std::array<double, 2> image_shift(const ViewPose& pose, const std::array<double, 2>& moved_px) {
-  const geometry::RawFromAligned map = raw_from_stretched(pose, pose.tilt_deg);
-  return {map.m11 * moved_px[0] + map.m12 * moved_px[1],
-          map.m21 * moved_px[0] + map.m22 * moved_px[1]};
+  const double compress = cosine_of(pose.tilt_deg) / cosine_of(seen_at_deg);
+  const geometry::RawFromAligned raw_from_stretched{
+      compress, 0.0, 0.0, 1.0, pose.shift_px[0], pose.shift_px[1]};
+  return tilt_series::align_image(image, raw_from_stretched, width, height);
 }
 
 }  // namespace tomofield::align

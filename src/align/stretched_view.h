@@ -7,10 +7,9 @@
 
 namespace tomofield::align {
 
-/// Says how a view is seen: the direction of its tilt axis in the image, its tilt angle, and where
-/// the centre of the corrected view lies in the image, relative to the centre of the image.
+/// Says how a view is seen: its tilt angle, and where the centre of the corrected view lies in the
+/// image, relative to the centre of the image.
 struct ViewPose {
-  double axis_deg = 0.0;
   double tilt_deg = 0.0;
   std::array<double, 2> shift_px{};
 };
@@ -25,9 +24,5 @@ tilt_series::MaskedImage without_trend(const tilt_series::MaskedImage& image, do
 tilt_series::MaskedImage stretched_view(const tilt_series::MaskedImage& image, const ViewPose& pose,
                                         double seen_at_deg, std::int64_t width,
                                         std::int64_t height);
-
-/// Returns the shift of the image, in its own pixels, that moves the corrected view by `moved_px`:
-/// what was found at q + moved_px is then found at q.
-std::array<double, 2> image_shift(const ViewPose& pose, const std::array<double, 2>& moved_px);
 
 }  // namespace tomofield::align
