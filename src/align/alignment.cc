@@ -66,8 +66,8 @@ std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& probl
         series.views()[view].tilt_deg};
   });
   const double pixel = reduction * series.bin_factor();
-  const CorrelationStart found = correlate_views(
-      views, {.thickness_px = problem.specimen.thickness / pixel, .axis_range_deg = 0});
+  const CorrelationStart found =
+      correlate_views(views, {.thickness_px = problem.specimen.thickness / pixel});
   std::vector<geometry::ViewCorrection> corrections;
   for (const auto& [x, y] : found.shift_px)
     corrections.push_back({.shift_x_px = x * pixel, .shift_y_px = y * pixel});

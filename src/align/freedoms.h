@@ -2,8 +2,9 @@
 
 namespace tomofield::align {
 
-/// Names what a registration may change beside the shift.
+/// Names what a registration may change.
 struct Freedoms {
+  bool shift = true;
   bool rotation = false;
   bool magnification = false;
   bool tilt = false;

@@ -44,7 +44,8 @@ class ShiftedSeries {
                           .specimen = specimen_,
                           .field = {},
                           .scratch_dir = scratch_.path(),
-                          .progress = {}},
+                          .progress = {},
+                          .stop_requested = {}},
                          std::move(start), distributed::Communicator::alone());
   }
 

@@ -171,7 +171,7 @@ double Registration::ridge(int column) const {
 
 Registration::Solution Registration::solve_on(const Sums& sums, const Freedoms& freedoms) const {
   Solution solution;
-  solution.columns = {kX, kY};
+  if (freedoms.shift) solution.columns = {kX, kY};
   if (freedoms.rotation) solution.columns.push_back(kRotation);
   if (freedoms.magnification) solution.columns.push_back(kMagnification);
   if (freedoms.tilt && knows_tilt_) solution.columns.push_back(kTilt);

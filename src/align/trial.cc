@@ -33,7 +33,7 @@ std::vector<double> errors_of_held_out_views(const JointProblem& problem,
   base::parallel_for("score held-out views", std::ssize(errors), [&](std::int64_t i) {
     const auto at = static_cast<std::size_t>(i);
     const Registration registration(image_pair(predicted[at], measurement, fit.stage()), {});
-    errors[at] = registration.predicted_error({}) / registration.measured_variance();
+    errors[at] = registration.predicted_error({.shift = false}) / registration.measured_variance();
   });
   return errors;
 }

@@ -11,8 +11,8 @@ namespace tomofield::align {
 
 /// Fits a field to the views of an alignment without every eighth one in order of tilt, and returns
 /// how badly it predicts those: the mean squared difference of each, over the variance of the
-/// measured pixels, after the best shift, scale and trend of the view itself, which no other view
-/// tells. The shift comes from other pixels than the error. Every process calls it.
+/// measured pixels. Scale and trend are the best for the view itself, since no other view tells
+/// them; they come from other pixels than the error. Every process calls it.
 std::vector<double> errors_of_held_out_views(const JointProblem& problem,
                                              std::span<const geometry::ViewCorrection> corrections,
                                              const distributed::Communicator& processes);

@@ -24,8 +24,8 @@ report::AlignmentCurves curves_of(const nlohmann::json& record) {
     curves.shift_x_px.push_back(view["shift_px"][0]);
     curves.shift_y_px.push_back(view["shift_px"][1]);
     curves.rotation_deg.push_back(view["rotation_deg"]);
-    curves.magnification_percent.push_back(
-        100 * std::expm1(view["log_magnification"].get<double>()));
+    curves.magnification_percent.push_back(100 *
+                                           std::expm1(view["log_magnification"].get<double>()));
     curves.correlation.push_back(view["correlation"]);
     curves.error_x_px.push_back(view["shift_error_px"][0]);
     curves.error_y_px.push_back(view["shift_error_px"][1]);

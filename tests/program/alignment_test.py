@@ -1,0 +1,106 @@
+"""Tests --align and the command align, from misaligned views to the files of the alignment."""
+
+import json
+import os
+import sys
+
+import numpy as np
+import pytest
+
+import harness
+
+sys.path.insert(0, os.path.abspath(os.path.join(os.path.dirname(__file__), "../../bench")))
+
+import alignment_score  # pylint: disable=wrong-import-position
+
+SIZE = 64
+THICKNESS = 38
+# A short fit, with nothing left to trials.
+FIT = ["--epochs", 2, "--coarse-epochs", 4, "--tv-penalty", "smooth", "--view-scale", "off",
+       "--black-level", 0, "--bead-diameter", 0]
+
+
+def simulate(name, *options):
+    """Returns the folder of a series of a cell that ends in the field of view."""
+    folder = os.path.join(harness.fresh_directory(name), "cell")
+    harness.succeed("simulate", folder, "--size", SIZE, "--yardstick", "a", "--noise", 0.05,
+                    "--seed", 21, "--no-truth", *options)
+    return folder
+
+
+def series_of(folder):
+    """Returns the arguments that name a raw series."""
+    return [os.path.join(folder, "tilt_series.mrc"), "--tlt", os.path.join(folder, "tilt_series.tlt"),
+            "--thickness", THICKNESS, "--contrast", "bright", "--bead-diameter", 0, "--no-margin"]
+
+
+def errors(folder, prefix):
+    """Returns the errors of the alignment in PREFIX.xf and PREFIX.tlt."""
+    read = alignment_score.read_alignment
+    truth = read(os.path.join(folder, "tilt_series.xf"), os.path.join(folder, "tilt_series.tlt"))
+    return alignment_score.score(truth, read(prefix + ".xf", prefix + ".tlt"), SIZE)
+
+
+def record(prefix):
+    with open(prefix + ".json", encoding="utf-8") as file:
+        return json.load(file)
+
+
+@pytest.fixture(scope="module", name="shifted")
+def make_shifted():
+    return simulate("alignment_shifted", "--misalign", 1.5)
+
+
+def test_align_finds_shifts_and_writes_them_for_other_programs(shifted):
+    prefix = os.path.join(shifted, "found_align")
+    harness.succeed("align", *series_of(shifted), "-o", os.path.join(shifted, "found.mrc"))
+    found = errors(shifted, prefix)
+    assert found["x_px"] < 0.15 and found["y_px"] < 0.1, found
+    made = record(prefix)
+    assert made["accepted"] and made["held_out_error"]["after"] < made["held_out_error"]["before"]
+    for extension in (".aln", ".png"):
+        assert os.path.getsize(prefix + extension) > 0
+
+
+def test_full_finds_large_shifts_and_the_axis():
+    folder = simulate("alignment_raw", "--misalign", 5, "--misalign-axis", 2)
+    harness.succeed("align", *series_of(folder), "--align", "full", "-o",
+                    os.path.join(folder, "found.mrc"))
+    found = errors(folder, os.path.join(folder, "found_align"))
+    assert found["x_px"] < 0.3 and found["y_px"] < 0.3, found
+    assert abs(found["axis_error_deg"]) < 0.5, found
+
+
+def test_a_good_alignment_is_hardly_changed():
+    folder = simulate("alignment_good")
+    harness.succeed("align", *series_of(folder), "-o", os.path.join(folder, "found.mrc"))
+    shifts = np.array([view["shift_px"] for view in record(os.path.join(folder, "found_align"))["views"]])
+    assert np.sqrt(np.mean(shifts**2)) < 0.1
+
+
+def test_reconstruct_takes_the_alignment_and_resumes_from_it(shifted):
+    volume = os.path.join(shifted, "made.mrc")
+    command = ["reconstruct", *series_of(shifted), *FIT[:-2], "--align", "refine", "-o", volume]
+    harness.succeed(*command)
+    first = harness.read_bytes(volume)
+    with open(os.path.join(shifted, "made.json"), encoding="utf-8") as file:
+        metrics = json.load(file)["metrics"]
+    assert metrics["alignment"] == record(os.path.join(shifted, "made_align"))
+    with open(os.path.join(shifted, "made_report.html"), encoding="utf-8") as file:
+        assert "alignment before the fit" in file.read()
+    # The written .xf gives the same tomogram to the rounding of its digits.
+    again = os.path.join(shifted, "again.mrc")
+    harness.succeed("reconstruct", *series_of(shifted), *FIT[:-2], "--xf",
+                    os.path.join(shifted, "made_align.xf"), "-o", again)
+    assert harness.psnr(harness.read_volume(again), harness.read_volume(volume)) > 35
+    os.remove(os.path.join(shifted, "made.h5"))
+    resumed = harness.succeed(*command, "--resume")
+    assert "last step" not in resumed.stderr
+    assert harness.read_bytes(volume) == first
+
+
+def test_too_few_views_are_refused(shifted):
+    refused = harness.tomofield("align", *series_of(shifted), "--exclude", "1-84", "-o",
+                                os.path.join(shifted, "few.mrc"))
+    assert refused.returncode == 2 and "at least 12 views" in refused.stderr
+    assert not os.path.exists(os.path.join(shifted, "few_align.json"))
