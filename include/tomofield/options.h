@@ -9,8 +9,9 @@ namespace tomofield {
 
 /// Says whether dense matter is dark (transmission images) or bright (phantoms, HAADF) in views.
 enum class Contrast { kDark, kBright };
-/// The views stay where the files align them, or they are aligned further with the field itself.
-enum class Alignment { kOff, kRefine };
+/// The views stay where the files align them, or they are aligned further with the field itself,
+/// or they are aligned from a raw stack of which the direction of the tilt axis is known.
+enum class Alignment { kOff, kRefine, kFull };
 /// Vector–matrix factors in every leaf, or plain trilinear vertices.
 enum class FieldKind { kVm, kGrid };
 /// All leaves alike, or finer leaves where the density varies more.

@@ -72,7 +72,7 @@ class Options(TypedDict, total=False):
     seed: int
 
     # Alignment
-    align: Literal["off", "refine"]
+    align: Literal["off", "refine", "full"]
 
     # Halves
     split_tilts: bool

@@ -4,14 +4,22 @@
 #include <cmath>
 #include <numeric>
 
+#include "align/correlation_start.h"
+#include "align/gauge.h"
 #include "align/trial.h"
+#include "base/parallel.h"
 #include "base/percentile.h"
+#include "base/trace.h"
+#include "tilt_series/binning.h"
 
 namespace tomofield::align {
 namespace {
 
 // A view that resembles its projection so much less than the others is not of this specimen.
 constexpr double kUnalike = 0.2;
+
+// Views are correlated in images of at most about this width and height.
+constexpr double kCorrelatedSize = 96;
 
 double mean_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
@@ -44,11 +52,34 @@ void judge(const std::vector<double>& before, const std::vector<double>& after,
 
 }  // namespace
 
-Alignment refine_alignment(const JointProblem& problem,
+std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& problem) {
+  const base::TraceSpan span("correlate views");
+  const tilt_series::TiltSeries& series = problem.recorded;
+  const double reduction =
+      std::max(1.0, static_cast<double>(std::max(series.aligned_width(), series.aligned_height())) /
+                        kCorrelatedSize);
+  std::vector<CoarseView> views(series.views().size());
+  base::parallel_for("reduce views", std::ssize(views), [&](std::int64_t i) {
+    const auto view = static_cast<std::size_t>(i);
+    views[view] = {
+        tilt_series::reduce_image(measurement::read_aligned(series, view, {}), reduction),
+        series.views()[view].tilt_deg};
+  });
+  const double pixel = reduction * series.bin_factor();
+  const CorrelationStart found =
+      correlate_views(views, {.thickness_px = problem.specimen.thickness / pixel});
+  std::vector<geometry::ViewCorrection> corrections;
+  for (const auto& [x, y] : found.shift_px)
+    corrections.push_back({.shift_x_px = x * pixel, .shift_y_px = y * pixel});
+  remove_gauge(measurement::plan_measurement(series, problem.specimen).geometry, corrections);
+  return corrections;
+}
+
+Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::ViewCorrection> start,
                            const distributed::Communicator& processes) {
   const std::vector<geometry::ViewCorrection> none(problem.recorded.views().size());
   Alignment alignment;
-  alignment.joint = align_jointly(problem, none, processes);
+  alignment.joint = align_jointly(problem, std::move(start), processes);
   if (alignment.joint.was_stopped) return alignment;
   alignment.unaligned = unalike_views(alignment.joint.agreement);
   judge(errors_of_held_out_views(problem, none, processes),

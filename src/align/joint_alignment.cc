@@ -28,6 +28,9 @@ constexpr std::size_t kPredictionBytes = std::size_t{1} << 30;
 
 // A registration to a field that was fitted to the view itself finds a part of the displacement.
 constexpr double kRelaxation = 1.3;
+// The direction of the tilt axis, which is the mean rotation, converges slowly. So much more of its
+// steps is added.
+constexpr double kAxisAmplification = 3.0;
 // A shift changes by at most so many pixels of the stage at once.
 constexpr double kLongestStep = 2.0;
 // The first epochs of a fit show too little of the specimen.
@@ -52,16 +55,21 @@ class AligningFit {
         fit_(measurement_, field_, aligning_fit(kCoarseEpochs, kFineEpochs, problem.seed),
              processes) {
     found_.agreement.resize(start.size());
+    // A start with rotations has errors of rotations.
+    found_.freedoms.rotation = std::ranges::any_of(
+        start, [](const ViewCorrection& correction) { return correction.rotation_rad != 0.0; });
     found_.corrections = std::move(start);
   }
 
-  JointAlignment run() {
+  // Aligns in the first `num_epochs` epochs of the fit.
+  JointAlignment run(std::int64_t num_epochs) {
     const base::Stopwatch running;
-    while (!fit_.is_done() && !found_.was_stopped) {
+    while (epochs_done() < num_epochs && !found_.was_stopped) {
       const fit::Stage stage = fit_.stage();
       take_epoch();
-      if (problem_.progress) problem_.progress(report(running.seconds()));
-      const std::int64_t epochs = fit_.progress().step / fit_.steps_per_epoch();
+      if (problem_.progress && num_epochs == this->num_epochs())
+        problem_.progress(report(running.seconds()));
+      const std::int64_t epochs = epochs_done();
       const bool is_last = epochs == stage.first_epoch + stage.epochs;
       found_.was_stopped = is_to_stop();
       if (epochs > kEpochsBefore && (!is_last || fit_.is_done())) update(stage);
@@ -69,7 +77,13 @@ class AligningFit {
     return std::move(found_);
   }
 
+  std::int64_t num_epochs() const { return fit_.num_epochs(); }
+  // Returns the residual of the last epoch, in units of the noise's variance.
+  double residual() const { return fit_.progress().data_loss.back(); }
+
  private:
+  std::int64_t epochs_done() const { return fit_.progress().step / fit_.steps_per_epoch(); }
+
   void take_epoch() {
     fit_.run([](const fit::Fit& fit) { return fit.progress().step % fit.steps_per_epoch() != 0; });
   }
@@ -114,21 +128,23 @@ class AligningFit {
   }
 
   // Returns the steps that are taken for what the registrations found.
-  std::vector<ViewCorrection> limited(std::vector<ViewCorrection> steps,
-                                      const fit::Stage& stage) const {
+  std::vector<ViewCorrection> limited(std::vector<ViewCorrection> steps, const fit::Stage& stage) {
     std::vector<std::size_t> by_tilt(steps.size());
     std::iota(by_tilt.begin(), by_tilt.end(), std::size_t{0});
     std::ranges::stable_sort(
         by_tilt, {}, [&](std::size_t view) { return measurement_.geometry.tilt_deg[view]; });
     std::vector<double> shifts;
     for (const std::size_t view : by_tilt) shifts.push_back(steps[view].shift_x_px);
-    amplify_slow_modes(shifts);
+    slow_modes_.amplify(shifts);
     for (std::size_t i = 0; i < by_tilt.size(); ++i) steps[by_tilt[i]].shift_x_px = shifts[i];
+    double mean_rotation = 0.0;
+    for (const ViewCorrection& step : steps)
+      mean_rotation += step.rotation_rad / static_cast<double>(steps.size());
     const double most = kLongestStep * stage.bin * measurement_.bin_factor;
     for (ViewCorrection& step : steps) {
       for (double* shift : {&step.shift_x_px, &step.shift_y_px})
         *shift = std::clamp(kRelaxation * *shift, -most, most);
-      step.rotation_rad *= kRelaxation;
+      step.rotation_rad = kRelaxation * (step.rotation_rad + kAxisAmplification * mean_rotation);
       step.log_magnification *= kRelaxation;
     }
     return steps;
@@ -198,6 +214,7 @@ class AligningFit {
   fit::FieldOptions field_;
   measurement::Measurement measurement_;
   fit::Fit fit_;
+  SlowModeAmplifier slow_modes_;
   JointAlignment found_;
 };
 
@@ -205,7 +222,16 @@ class AligningFit {
 
 JointAlignment align_jointly(const JointProblem& problem, std::vector<ViewCorrection> start,
                              const distributed::Communicator& processes) {
-  return AligningFit(problem, std::move(start), processes).run();
+  AligningFit fit(problem, std::move(start), processes);
+  return fit.run(fit.num_epochs());
+}
+
+double coarse_residual(const JointProblem& problem, std::vector<ViewCorrection> start,
+                       const distributed::Communicator& processes) {
+  constexpr std::int64_t kEpochs = 15;
+  AligningFit fit(problem, std::move(start), processes);
+  fit.run(kEpochs);
+  return fit.residual();
 }
 
 }  // namespace tomofield::align

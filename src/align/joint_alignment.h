@@ -54,4 +54,9 @@ JointAlignment align_jointly(const JointProblem& problem,
                              std::vector<geometry::ViewCorrection> start,
                              const distributed::Communicator& processes);
 
+/// Does the same for the first epochs with coarse pixels alone, and returns what residual is left:
+/// its mean square over the noise's variance.
+double coarse_residual(const JointProblem& problem, std::vector<geometry::ViewCorrection> start,
+                       const distributed::Communicator& processes);
+
 }  // namespace tomofield::align

@@ -216,8 +216,9 @@ double Registration::scale_of(const Solution& solution) {
 
 geometry::ViewCorrection Registration::solve(const Freedoms& freedoms) const {
   geometry::ViewCorrection correction;
-  if (num_pixels() == 0) return correction;
   const Solution solution = solve_on(all(), freedoms);
+  const double num_samples = static_cast<double>(num_pixels()) / pixels_per_sample_;
+  if (num_samples < static_cast<double>(solution.columns.size())) return correction;
   const double scale = scale_of(solution);
   if (!(scale > 0.0)) return correction;
   // The view shows at q what the prediction has at q + ε(q), so the view is to be moved by −ε.

@@ -48,7 +48,8 @@ class Registration {
  public:
   Registration(const ImagePair& images, const RegistrationOptions& options);
 
-  /// Returns the correction of the view that makes it agree with the prediction.
+  /// Returns the correction of the view that makes it agree with the prediction: none if there are
+  /// fewer independent samples than unknowns.
   geometry::ViewCorrection solve(const Freedoms& freedoms) const;
   /// Returns the standard error of the shift in x and in y, in pixels of the view before binning.
   std::array<double, 2> shift_error(const Freedoms& freedoms) const;

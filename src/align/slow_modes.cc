@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <vector>
+#include <numeric>
+#include <utility>
 
 namespace tomofield::align {
 namespace {
@@ -11,6 +12,7 @@ namespace {
 constexpr double kAmplification = 2.0;  // is added to the factor of the slowest mode
 constexpr double kModes = 3.0;          // the addition falls with exp(−(mode / kModes)²)
 constexpr int kMostModes = 12;          // later ones have no addition
+constexpr double kTurned = -0.3;        // of the last step, from which on a step turns back
 
 }  // namespace
 
@@ -28,6 +30,19 @@ void amplify_slow_modes(std::span<double> values) {
     for (int i = 0; i < n; ++i) added[static_cast<std::size_t>(i)] += part * cosine(i);
   }
   for (std::size_t i = 0; i < values.size(); ++i) values[i] += added[i];
+}
+
+void SlowModeAmplifier::amplify(std::span<double> steps) {
+  std::vector<double> added(steps.begin(), steps.end());
+  amplify_slow_modes(added);
+  for (std::size_t i = 0; i < added.size(); ++i) added[i] -= steps[i];
+  if (last_added_.empty()) last_added_.resize(added.size());
+  const auto product = [](const std::vector<double>& a, const std::vector<double>& b) {
+    return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+  };
+  if (product(added, last_added_) < kTurned * product(last_added_, last_added_)) part_ /= 2;
+  for (std::size_t i = 0; i < added.size(); ++i) steps[i] += part_ * added[i];
+  last_added_ = std::move(added);
 }
 
 }  // namespace tomofield::align

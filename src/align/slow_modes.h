@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 namespace tomofield::align {
 
@@ -11,5 +12,17 @@ namespace tomofield::align {
 /// over the tilts. A registration to its projections then shows only a small part of their errors
 /// (docs/alignment.md).
 void amplify_slow_modes(std::span<double> values);
+
+/// Amplifies the slow modes of the steps of an iteration. Where the field shows the whole error,
+/// an amplified step goes too far, and the next one turns back. Then this adds half as much from
+/// there on.
+class SlowModeAmplifier {
+ public:
+  void amplify(std::span<double> steps);
+
+ private:
+  double part_ = 1.0;               // of what amplify_slow_modes() adds
+  std::vector<double> last_added_;  // the whole of it, in the last step
+};
 
 }  // namespace tomofield::align

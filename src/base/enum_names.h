@@ -23,7 +23,8 @@ struct EnumNames<Contrast> {
 template <>
 struct EnumNames<Alignment> {
   static constexpr std::array kNames{std::pair{Alignment::kOff, "off"},
-                                     std::pair{Alignment::kRefine, "refine"}};
+                                     std::pair{Alignment::kRefine, "refine"},
+                                     std::pair{Alignment::kFull, "full"}};
 };
 template <>
 struct EnumNames<FieldKind> {

@@ -13,6 +13,7 @@ namespace tomofield::cli {
 // src/cli/NAME_command.cc.
 /// The metrics list `origins`, the settings that come from a project (project_arguments.h). They
 /// may change until the command runs.
+void add_align_command(CLI::App& program, const std::vector<option_table::Setting>& origins);
 void add_baseline_command(CLI::App& program, const std::vector<option_table::Setting>& origins);
 void add_batch_command(CLI::App& program);
 void add_compare_command(CLI::App& program);

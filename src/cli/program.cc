@@ -36,6 +36,7 @@ void print_log(base::LogLevel level, std::string_view message) {
 void add_commands(CLI::App& program, const distributed::Communicator& processes,
                   const std::vector<option_table::Setting>& origins) {
   add_reconstruct_command(program, processes, origins);
+  add_align_command(program, origins);
   add_baseline_command(program, origins);
   add_export_command(program);
   add_view_command(program);

@@ -195,12 +195,7 @@ ReadView aligning(const tilt_series::TiltSeries& recorded,
                   std::span<const geometry::ViewCorrection> corrections) {
   return [&recorded, corrections](std::size_t view, std::span<float> image,
                                   std::span<std::uint8_t> valid) {
-    tilt_series::MaskedImage raw(recorded.width(), recorded.height());
-    recorded.read_view(view, raw.values, raw.valid);
-    const geometry::RawFromAligned transform = geometry::corrected(
-        recorded.raw_from_aligned(view), corrections[view].binned(recorded.bin_factor()));
-    const tilt_series::MaskedImage aligned = tilt_series::align_image(
-        raw, transform, recorded.aligned_width(), recorded.aligned_height());
+    const tilt_series::MaskedImage aligned = read_aligned(recorded, view, corrections[view]);
     std::ranges::copy(aligned.values, image.begin());
     std::ranges::copy(aligned.valid, valid.begin());
   };
@@ -313,6 +308,16 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
   prepared.masked_part = prepared.rays->masked_parts(processes);
   log_masks(prepared);
   return prepared;
+}
+
+tilt_series::MaskedImage read_aligned(const tilt_series::TiltSeries& recorded, std::size_t view,
+                                      const geometry::ViewCorrection& correction) {
+  tilt_series::MaskedImage raw(recorded.width(), recorded.height());
+  recorded.read_view(view, raw.values, raw.valid);
+  const geometry::RawFromAligned transform = geometry::corrected(
+      recorded.raw_from_aligned(view), correction.binned(recorded.bin_factor()));
+  return tilt_series::align_image(raw, transform, recorded.aligned_width(),
+                                  recorded.aligned_height());
 }
 
 Measurement prepare_realigned(const tilt_series::TiltSeries& recorded,

@@ -12,6 +12,7 @@
 #include "geometry/tilt_geometry.h"
 #include "geometry/view_correction.h"
 #include "measurement/measurement.h"
+#include "tilt_series/image.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
 
@@ -54,6 +55,10 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
                                 const SpecimenOptions& specimen,
                                 const std::filesystem::path& scratch_dir, std::int64_t band_rows,
                                 const distributed::Communicator& processes);
+
+/// Reads a view of a series that is not resampled, and aligns it with a correction.
+tilt_series::MaskedImage read_aligned(const tilt_series::TiltSeries& recorded, std::size_t view,
+                                      const geometry::ViewCorrection& correction);
 
 /// Prepares a series that is not resampled as if its views were aligned, each with a correction of
 /// its alignment. The stored pixels of the views stay.

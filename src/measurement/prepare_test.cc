@@ -2,11 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "base/random.h"
+#include "geometry/imod_transform.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -176,6 +182,116 @@ TEST(PrepareSeries, OptionsThatDoNotFitTheSeriesAreRefused) {
   EXPECT_NE(complaint(options).find("--center"), std::string::npos) << complaint(options);
   files.options().xtilt = files.scratch().write("series.xtilt", "0\n0\n0\n0\n0\n0\n9\n");
   EXPECT_NE(complaint(specimen()).find("--engine ray"), std::string::npos) << complaint(specimen());
+}
+
+using geometry::RawFromAligned;
+using geometry::ViewCorrection;
+
+// A series whose views were recorded turned, shifted and a little magnified.
+class RecordedSeries : public ::testing::Test {
+ protected:
+  RecordedSeries() {
+    files_.options().mask = testing::write_stack(
+        files_.scratch() / "block.mrc", kWidth, kHeight, kNumViews,
+        [](auto x, auto y, auto) { return x > 8 && x < 15 && y > 20 && y < 28 ? 0.0f : 1.0f; });
+    for (int view = 0; view < kNumViews; ++view) {
+      const double angle = (6.0 + 0.3 * view) * std::numbers::pi / 180, scale = 1.0 + 0.002 * view;
+      maps_.push_back({.m11 = scale * std::cos(angle),
+                       .m12 = -scale * std::sin(angle),
+                       .m21 = scale * std::sin(angle),
+                       .m22 = scale * std::cos(angle),
+                       .shift_x_px = 1.5 * view - 3.25,
+                       .shift_y_px = 2.75 - view});
+      corrections_.push_back({.shift_x_px = 0.4 * view - 1,
+                              .shift_y_px = 0.7 - 0.3 * view,
+                              .rotation_rad = 0.01 * view - 0.02,
+                              .log_magnification = 0.004 * view,
+                              .tilt_deg = 0.5 * view - 1});
+    }
+  }
+
+  // Returns the series with an .xf file, and its views resampled or as they were recorded.
+  tilt_series::TiltSeries series(std::span<const RawFromAligned> maps, bool resample) {
+    std::string lines;
+    for (const RawFromAligned& map : maps) {
+      const io::ImodTransform t = geometry::invert(map);
+      lines += fmt::format("{:.12f} {:.12f} {:.12f} {:.12f} {:.9f} {:.9f}\n", t.a11, t.a12, t.a21,
+                           t.a22, t.shift_x_px, t.shift_y_px);
+    }
+    files_.options().xf = files_.scratch().write("series.xf", lines);
+    files_.options().resample = resample;
+    return tilt_series::TiltSeries(files_.options());
+  }
+  std::vector<RawFromAligned> corrected_maps() const {
+    std::vector<RawFromAligned> maps;
+    for (std::size_t view = 0; view < maps_.size(); ++view)
+      maps.push_back(geometry::corrected(maps_[view], corrections_[view]));
+    return maps;
+  }
+  Measurement realigned(std::span<const ViewCorrection> corrections) {
+    return prepare_realigned(series(maps_, false), corrections, specimen(), scratch(), kHeight,
+                             distributed::Communicator::alone());
+  }
+  Measurement resampled(std::span<const RawFromAligned> maps) {
+    return prepare_measurement(series(maps, true), specimen(), scratch());
+  }
+  const std::filesystem::path& scratch() const { return files_.scratch().path(); }
+
+  SeriesFiles files_;
+  std::vector<RawFromAligned> maps_;
+  std::vector<ViewCorrection> corrections_;
+};
+
+// Expects the same rays but for rounding, in the units of the series.
+void expect_same_rays(const Measurement& found, const Measurement& expected) {
+  ASSERT_EQ(found.rays->shape().width, kWidth);
+  ASSERT_EQ(found.rays->shape().num_rows, kHeight);
+  std::int64_t num_valid = 0, num_different_masks = 0;
+  for (int view = 0; view < kNumViews; ++view) {
+    for (std::int64_t y = 0; y < kHeight; ++y) {
+      for (std::int64_t x = 0; x < kWidth; ++x) {
+        const bool counts = found.rays->counts(view, x, y);
+        num_different_masks += counts != expected.rays->counts(view, x, y) ? 1 : 0;
+        if (!counts || !expected.rays->counts(view, x, y)) continue;
+        ++num_valid;
+        ASSERT_NEAR(found.rays->ray(view, x, y) * found.unit,
+                    expected.rays->ray(view, x, y) * expected.unit, 1e-3)
+            << view << ", " << x << ", " << y;
+      }
+    }
+  }
+  EXPECT_GT(num_valid, 1000);
+  EXPECT_LE(num_different_masks, 3);  // the outermost pixels may round apart
+}
+
+TEST_F(RecordedSeries, HasTheRaysOfTheResampledOne) {
+  const Measurement found = realigned(std::vector<ViewCorrection>(kNumViews));
+  const Measurement expected = resampled(maps_);
+  expect_same_rays(found, expected);
+  EXPECT_FALSE(found.ray_geometry.has_value());
+  EXPECT_EQ(found.geometry.tilt_deg, expected.geometry.tilt_deg);
+  // Noise is measured before views are resampled, which smooths it.
+  EXPECT_NEAR(found.unit, expected.unit, 0.01 * expected.unit);
+  EXPECT_NEAR(found.mean_density * found.unit, expected.mean_density * expected.unit, 1e-6);
+}
+
+TEST_F(RecordedSeries, ACorrectionIsThatOfItsAlignment) {
+  const Measurement found = realigned(corrections_);
+  expect_same_rays(found, resampled(corrected_maps()));
+  for (std::size_t view = 0; view < kNumViews; ++view)
+    EXPECT_NEAR(found.geometry.tilt_deg[view],
+                20.0 * static_cast<double>(view) - 60 + corrections_[view].tilt_deg, 1e-12);
+}
+
+TEST_F(RecordedSeries, RealigningGivesTheSameRaysAsPreparingSo) {
+  Measurement found = realigned(std::vector<ViewCorrection>(kNumViews));
+  const double unit = found.unit;
+  realign(series(maps_, false), corrections_, scratch(), kHeight,
+          distributed::Communicator::alone(), found);
+  EXPECT_EQ(found.unit, unit);
+  const Measurement expected = realigned(corrections_);
+  expect_same_rays(found, expected);
+  EXPECT_EQ(found.geometry.tilt_deg, expected.geometry.tilt_deg);
 }
 
 }  // namespace

@@ -158,7 +158,8 @@ constexpr Row kRows[] = {
     // Fit
     {.key = "fit.align", .flag = "--align", MEMBER(Options, align), .group = Group::kFit,
      .help = "refine: first align each view with the projections of a field that is fitted to all "
-             "of them, from the alignment that the files give", .is_common = true},
+             "of them, from the alignment of the files; full: the same after a cross-correlation",
+     .is_common = true},
     {.key = "fit.epochs", .flag = "--epochs", MEMBER(Options, epochs), .group = Group::kFit,
      .range = Range::between(1, kMaxCount),
      .automatic = "10; 30 for factors that do not begin with vertices; 5 for vertices 2 or more "

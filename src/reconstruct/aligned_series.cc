@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "align/alignment.h"
+#include "align/axis_search.h"
 #include "base/log.h"
 #include "base/stopwatch.h"
 #include "base/trace.h"
@@ -140,14 +141,17 @@ std::optional<json> make_record(const ReconstructOptions& options, const Reconst
         fmt::format("--align needs at least {} views, since it judges the alignment by "
                     "views that it holds out; '{}' has {}",
                     kFewestViews, recorded.stack.string(), series.views().size()));
-  const align::Alignment found = align::refine_alignment({.recorded = series,
-                                                          .specimen = options.specimen,
-                                                          .field = options.field,
-                                                          .seed = options.fit.seed,
-                                                          .scratch_dir = recorded.scratch_dir,
-                                                          .progress = hooks.tune_progress,
-                                                          .stop_requested = hooks.stop_requested},
-                                                         processes);
+  const align::JointProblem problem{.recorded = series,
+                                    .specimen = options.specimen,
+                                    .field = options.field,
+                                    .seed = options.fit.seed,
+                                    .scratch_dir = recorded.scratch_dir,
+                                    .progress = hooks.tune_progress,
+                                    .stop_requested = hooks.stop_requested};
+  std::vector<geometry::ViewCorrection> start(series.views().size());
+  if (options.resolved.align == Alignment::kFull)
+    start = align::with_best_axis(problem, align::correlated_start(problem), processes);
+  const align::Alignment found = align::refine_alignment(problem, std::move(start), processes);
   if (found.joint.was_stopped) return std::nullopt;
   return record_of(series, found, options, running.seconds());
 }

@@ -47,7 +47,7 @@ report::Curve curve_of(Penalty penalty, const TunedFit& tuned) {
 
 }  // namespace
 
-ChoicePlot choice_plot(const TunedFit& tuned) {
+report::CurvePlot choice_plot(const TunedFit& tuned) {
   std::vector<report::Curve> curves;
   for (const Penalty penalty : {Penalty::kSmooth, Penalty::kConcave}) {
     curves.push_back(curve_of(penalty, tuned));
@@ -78,8 +78,7 @@ ChoicePlot choice_plot(const TunedFit& tuned) {
 }
 
 void write_choice_plot(const TunedFit& tuned, const std::filesystem::path& path) {
-  const ChoicePlot plot = choice_plot(tuned);
-  report::write_curve_plot(plot.axes, plot.curves, path);
+  report::write_curve_plots({choice_plot(tuned)}, path);
 }
 
 }  // namespace tomofield::reconstruction

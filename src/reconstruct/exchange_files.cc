@@ -2,6 +2,7 @@
 
 #include "base/trace.h"
 #include "io/json.h"
+#include "reconstruct/alignment_output.h"
 #include "reconstruct/portal_alignment.h"
 #include "reconstruct/relion_output.h"
 
@@ -12,6 +13,7 @@ std::vector<std::filesystem::path> exchange_files(const ReconstructOptions& opti
   if (const auto star = relion_output(options)) files.push_back(*star);
   if (options.resolved.alignment_json)
     files.push_back(portal_alignment_path(options.resolved.output));
+  for (const auto& file : alignment_results(options)) files.push_back(file);
   return files;
 }
 
@@ -19,6 +21,7 @@ void write_exchange_files(const tilt_series::TiltSeries& series, const Reconstru
                           const std::filesystem::path& volume) {
   const base::TraceSpan span("write files for other programs");
   write_relion_output(options, volume);
+  write_alignment_results(series, options);
   if (options.resolved.alignment_json) {
     io::write_json(portal_alignment_path(options.resolved.output),
                    portal_alignment(series, options, volume));

@@ -19,6 +19,7 @@ namespace {
 using nlohmann::json;
 using report::Curve;
 using report::PlotAxes;
+using report::range_with_room;
 
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();  // is not drawn
 constexpr const char* kTilt = "tilt, degrees";
@@ -73,20 +74,6 @@ Curve with_marks(Curve curve) {
   return curve;
 }
 
-// Returns the range of all values of curves, with some room.
-std::pair<double, double> range_of(const std::vector<Curve>& curves, double least_room) {
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (const Curve& curve : curves) {
-    for (const auto& point : curve.points) {
-      if (!std::isfinite(point.second)) continue;
-      low = std::min(low, point.second);
-      high = std::max(high, point.second);
-    }
-  }
-  const double room = std::max(0.08 * (high - low), least_room);
-  return {low - room, high + room};
-}
-
 }  // namespace
 
 std::string loss_plot(const AllFits& fits) {
@@ -97,7 +84,7 @@ std::string loss_plot(const AllFits& fits) {
     curves.push_back(epoch_curve(name_of("held-out views", fit),
                                  member(member(fit.metrics, "held_out"), "error_by_epoch")));
   }
-  const auto range = range_of(curves, 0.02);
+  const auto range = range_with_room(curves, 0.02);
   if (!std::isfinite(range.first)) return "";
   return plot({.x_title = "epoch",
                .y_title = "mean squared residual over the noise's variance",
@@ -109,7 +96,7 @@ std::string loss_plot(const AllFits& fits) {
 std::string trials_plot(const json& metrics) {
   const json& tuning = member(metrics, "tuning");
   if (!tuning.is_object()) return "";
-  const ChoicePlot choice = choice_plot(tuned_from(tuning));
+  const report::CurvePlot choice = choice_plot(tuned_from(tuning));
   return report::curve_plot_svg(choice.axes, choice.curves);
 }
 
@@ -122,7 +109,7 @@ std::string residual_plot(const AllFits& fits) {
         with_marks(tilt_curve(name_of("held-out views", fit),
                               member(member(fit.metrics, "held_out"), "views"), "error")));
   }
-  const auto [low, high] = range_of(curves, 0.05);
+  const auto [low, high] = range_with_room(curves, 0.05);
   return plot({.x_title = kTilt,
                .y_title = "mean squared residual over the noise's variance",
                .y_range = {std::min(low, 0.9), std::max(high, 1.1)}},
@@ -136,7 +123,8 @@ std::string scale_plot(const AllFits& fits) {
     curves.push_back(tilt_curve(name_of("scale", fit), views, "scale"));
     curves.push_back(tilt_curve(name_of("weight in the fit", fit), views, "weight"));
   }
-  return plot({.x_title = kTilt, .y_title = "factor", .y_range = range_of(curves, 0.02)}, curves);
+  return plot({.x_title = kTilt, .y_title = "factor", .y_range = range_with_room(curves, 0.02)},
+              curves);
 }
 
 std::string offset_plot(const AllFits& fits) {
@@ -148,7 +136,7 @@ std::string offset_plot(const AllFits& fits) {
   }
   return plot({.x_title = kTilt,
                .y_title = "line integral, units of the views",
-               .y_range = range_of(curves, 1e-9)},
+               .y_range = range_with_room(curves, 1e-9)},
               curves);
 }
 
@@ -166,7 +154,7 @@ std::string displacement_plot(const AllFits& fits) {
       curves.push_back(with_marks(std::move(curve)));
     }
   }
-  const auto [low, high] = range_of(curves, 0.05);
+  const auto [low, high] = range_with_room(curves, 0.05);
   return plot({.x_title = kTilt,
                .y_title = "pixels of the fit",
                .y_range = {std::min(low, -0.5), std::max(high, 0.5)}},
@@ -183,7 +171,7 @@ std::string masked_plot(const AllFits& fits) {
   }
   return plot({.x_title = kTilt,
                .y_title = "per cent of the view",
-               .y_range = {0, range_of(curves, 0.5).second}},
+               .y_range = {0, range_with_room(curves, 0.5).second}},
               curves);
 }
 

@@ -12,6 +12,7 @@
 #include "base/trace.h"
 #include "base/version.h"
 #include "io/mrc.h"
+#include "reconstruct/alignment_output.h"
 #include "reconstruct/report_options.h"
 #include "reconstruct/report_plots.h"
 #include "report/embedded_volume.h"
@@ -222,12 +223,30 @@ void add_plot(const char* heading, const char* text, const std::string& svg, Htm
   page.add_svg(svg, text);
 }
 
+// Adds what the alignment before the fit found, if there was one.
+void add_alignment(const json& metrics, HtmlPage& page) {
+  const auto record = metrics.find("alignment");
+  if (record == metrics.end() || !record->is_object()) return;
+  const json& error = record->at("held_out_error");
+  page.add_heading("Views: alignment before the fit");
+  page.add_paragraph(fmt::format(
+      "The views were aligned with the projections of a field that was fitted to all of them. "
+      "Views that such a field did not see are predicted with an error of {:.4f} of their "
+      "variance; with the alignment of the files it is {:.4f}. {}",
+      error.at("after").get<double>(), error.at("before").get<double>(),
+      record->at("accepted").get<bool>() ? "So the new alignment is used."
+                                         : "So the alignment of the files is kept."));
+  for (const report::CurvePlot& plot : alignment_plots(*record))
+    page.add_svg(report::curve_plot_svg(plot.axes, plot.curves), "");
+}
+
 void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
   add_plot(
       "Settings that trials chose",
       "Short fits without some views were tried before the fit. Lower is better; bars are two "
       "standard errors long. Of settings that are as good as the best, the smoothest is taken.",
       trials_plot(fits.front().metrics), page);
+  add_alignment(fits.front().metrics, page);
   add_plot("Loss",
            "The fit begins with coarse pixels, whose noise is lower; the curves jump where it goes "
            "on with finer ones. Held-out views that get worse while the fitted ones improve would "

@@ -14,9 +14,10 @@ namespace tomofield::report {
 namespace {
 
 // The drawing area of a picture of kWidth pixels. The legend is at its right.
-constexpr int kWidth = 900, kMinHeight = 360;
+constexpr int kWidth = 900;
 constexpr double kLeft = 70, kRight = 660, kTop = 30, kBelow = 55;
 constexpr double kLine = 20;            // distance of two lines of the legend
+constexpr int kGap = 20;                // between two plots
 constexpr double kNames = kRight + 48;  // x at which the names begin
 constexpr double kNameWidth = kWidth - 4 - kNames;
 
@@ -80,11 +81,18 @@ std::vector<std::string> lines_of(const std::string& name) {
   return lines;
 }
 
-// Returns the height of the picture in pixels.
-int height_for(const Legend& legend) {
+template <typename Surface>
+Legend legend_of(const std::vector<Curve>& curves) {
+  Legend legend;
+  for (const Curve& curve : curves) legend.push_back(lines_of<Surface>(curve.name));
+  return legend;
+}
+
+// Returns the height of a plot in pixels.
+int height_for(const PlotAxes& axes, const Legend& legend) {
   std::size_t lines = 0;
   for (const auto& name : legend) lines += name.size();
-  return std::max(kMinHeight, static_cast<int>(kTop + kLine * static_cast<double>(lines)));
+  return std::max(axes.height_px, static_cast<int>(kTop + kLine * static_cast<double>(lines)));
 }
 
 class Plot {
@@ -95,7 +103,7 @@ class Plot {
         curves_(curves),
         legend_(legend),
         surface_(surface),
-        height_(height_for(legend)),
+        height_(height_for(axes, legend)),
         bottom_(height_ - kBelow),
         x_(range_of(axes.x_range, curves, &Range::first)),
         y_(range_of(axes.y_range, curves, &Range::second)) {}
@@ -176,14 +184,24 @@ class Plot {
   Range x_, y_;
 };
 
-template <typename Surface>
-Surface drawn_on(const PlotAxes& axes, const std::vector<Curve>& curves) {
-  Legend legend;
-  for (const Curve& curve : curves) legend.push_back(lines_of<Surface>(curve.name));
-  Surface surface(kWidth, height_for(legend));
-  Plot(axes, curves, legend, surface).draw();
-  return surface;
-}
+// Moves what is drawn down by a number of pixels.
+class LoweredSurface : public PlotSurface {
+ public:
+  LoweredSurface(PlotSurface& surface, double by) : surface_(surface), by_(by) {}
+
+  void draw_line(const std::vector<Point>& points, double width, const Colour& colour) override {
+    std::vector<Point> lowered = points;
+    for (Point& point : lowered) point.y += by_;
+    surface_.draw_line(lowered, width, colour);
+  }
+  void draw_text(Point at, Anchor anchor, std::string_view text) override {
+    surface_.draw_text({at.x, at.y + by_}, anchor, text);
+  }
+
+ private:
+  PlotSurface& surface_;
+  double by_;
+};
 
 }  // namespace
 
@@ -217,13 +235,46 @@ std::vector<Tick> log_ticks(double low, double high) {
   return ticks;
 }
 
+std::pair<double, double> range_with_room(const std::vector<Curve>& curves, double least_room) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const Curve& curve : curves) {
+    for (const auto& point : curve.points) {
+      if (!std::isfinite(point.second)) continue;
+      low = std::min(low, point.second);
+      high = std::max(high, point.second);
+    }
+  }
+  const double room = std::max(0.08 * (high - low), least_room);
+  return {low - room, high + room};
+}
+
 std::string curve_plot_svg(const PlotAxes& axes, const std::vector<Curve>& curves) {
-  return drawn_on<SvgSurface>(axes, curves).element();
+  const Legend legend = legend_of<SvgSurface>(curves);
+  SvgSurface surface(kWidth, height_for(axes, legend));
+  Plot(axes, curves, legend, surface).draw();
+  return surface.element();
+}
+
+void write_curve_plots(const std::vector<CurvePlot>& plots, const std::filesystem::path& path) {
+  std::vector<Legend> legends;
+  int height = -kGap;
+  for (const CurvePlot& plot : plots) {
+    legends.push_back(legend_of<PngSurface>(plot.curves));
+    height += height_for(plot.axes, legends.back()) + kGap;
+  }
+  PngSurface surface(kWidth, height);
+  double top = 0;
+  for (std::size_t i = 0; i < plots.size(); ++i) {
+    LoweredSurface area(surface, top);
+    Plot(plots[i].axes, plots[i].curves, legends[i], area).draw();
+    top += height_for(plots[i].axes, legends[i]) + kGap;
+  }
+  surface.write(path);
 }
 
 void write_curve_plot(const PlotAxes& axes, const std::vector<Curve>& curves,
                       const std::filesystem::path& path) {
-  drawn_on<PngSurface>(axes, curves).write(path);
+  write_curve_plots({{axes, curves}}, path);
 }
 
 }  // namespace tomofield::report

@@ -13,13 +13,13 @@
 
 #include "base/percentile.h"
 #include "geometry/imod_transform.h"
-#include "io/atomic_file.h"
 #include "io/json.h"
 #include "io/mrc.h"
 #include "io/output_files.h"
 #include "io/output_folder.h"
 #include "io/output_lock.h"
 #include "io/output_set.h"
+#include "io/write_alignment.h"
 #include "simulate/noise.h"
 #include "simulate/phantom.h"
 #include "simulate/project_phantom.h"
@@ -145,21 +145,17 @@ void write_views(const OutputFiles& files, const Phantom& phantom,
 }
 
 void write_angles(const fs::path& path, const std::vector<SimulatedView>& views) {
-  std::string text;
-  for (const SimulatedView& view : views) text += fmt::format("{:.4f}\n", view.tilt_deg);
-  io::write_text_file(path, text);
+  std::vector<double> angles_deg;
+  for (const SimulatedView& view : views) angles_deg.push_back(view.tilt_deg);
+  io::write_number_column(path, angles_deg);
 }
 
-// Writes the transforms that undo the misalignment except for local motion. Adding 0 drops the sign
-// of −0.
+// Writes the transforms that undo the misalignment except for local motion.
 void write_transforms(const fs::path& path, const std::vector<SimulatedView>& views) {
-  std::string text;
-  for (const SimulatedView& view : views) {
-    const io::ImodTransform t = geometry::invert(view.raw_from_aligned);
-    text += fmt::format("{:12.7f}{:12.7f}{:12.7f}{:12.7f}{:12.3f}{:12.3f}\n", t.a11, t.a12 + 0.0,
-                        t.a21 + 0.0, t.a22, t.shift_x_px, t.shift_y_px);
-  }
-  io::write_text_file(path, text);
+  std::vector<io::ImodTransform> transforms;
+  for (const SimulatedView& view : views)
+    transforms.push_back(geometry::invert(view.raw_from_aligned));
+  io::write_imod_transforms(path, transforms);
 }
 
 using Json = nlohmann::json;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "base/log.h"
 #include "base/parallel.h"
 #include "base/random.h"
 #include "expect_parts.h"
@@ -14,6 +13,7 @@
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
+#include "warning_catcher.h"
 
 namespace tomofield::tilt_series {
 namespace {
@@ -25,22 +25,8 @@ using testing::refusal;
 using testing::ScratchDirectory;
 using testing::small_series;
 using testing::some_value;
+using testing::WarningCatcher;
 using testing::write_stack;
-
-// Collects warnings while it lives.
-class WarningCatcher {
- public:
-  WarningCatcher() {
-    base::set_log_sink([this](base::LogLevel level, std::string_view text) {
-      if (level == base::LogLevel::kWarning) text_ += std::string(text) + "\n";
-    });
-  }
-  ~WarningCatcher() { base::set_log_sink({}); }
-  const std::string& text() const { return text_; }
-
- private:
-  std::string text_;
-};
 
 TEST(TiltSeries, AlignedStackIsReadAsItIs) {
   const ScratchDirectory scratch;

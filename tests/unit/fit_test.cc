@@ -334,6 +334,10 @@ class CoarseToFine : public ::testing::TestWithParam<FieldKind> {
  protected:
   static constexpr int kCoarseEpochs = 4, kEpochs = 3;
   std::unique_ptr<Fit> make_fit(int coarse_epochs = kCoarseEpochs) const {
+    return make_fit(measurement_, coarse_epochs);
+  }
+  static std::unique_ptr<Fit> make_fit(const measurement::Measurement& measurement,
+                                       int coarse_epochs = kCoarseEpochs) {
     FieldOptions field = field_options(GetParam());
     field.with_margin = false;
     FitOptions options;
@@ -341,7 +345,7 @@ class CoarseToFine : public ::testing::TestWithParam<FieldKind> {
     options.epochs = kEpochs;
     options.subsets = 5;
     options.fit_view_scale = true;
-    return std::make_unique<Fit>(measurement_, field, options);
+    return std::make_unique<Fit>(measurement, field, options);
   }
   // Returns the root mean square distance between the field's density and the bead's.
   double error_of(const Fit& fit) const {
@@ -409,6 +413,49 @@ TEST_P(CoarseToFine, GoesOnFromACheckpointOfEitherStageToTheSameBits) {
     EXPECT_EQ(second->progress().data_loss, whole->progress().data_loss);
     EXPECT_EQ(second->progress().views[2].offset, whole->progress().views[2].offset);
   }
+}
+
+TEST_P(CoarseToFine, GoesOnToTheSameBitsFromAMeasurementThatIsReadAgain) {
+  const auto whole = make_fit(), reread = make_fit();
+  whole->run([](const Fit&) { return true; });
+  for (const std::int64_t pause_at : {3, 10, kCoarseEpochs * 5, 27}) {
+    reread->run([&](const Fit& fit) { return fit.progress().step != pause_at; });
+    ASSERT_EQ(reread->progress().step, pause_at);
+    reread->reread_measurement();
+  }
+  reread->run([](const Fit&) { return true; });
+  EXPECT_TRUE(std::ranges::equal(reread->field().parameters(), whole->field().parameters()));
+  EXPECT_EQ(reread->progress().data_loss, whole->progress().data_loss);
+  EXPECT_EQ(reread->progress().views[2].scale, whole->progress().views[2].scale);
+}
+
+TEST_P(CoarseToFine, TakesOverRaysAndTiltsThatWereReplaced) {
+  measurement::Measurement changing = measurement_;
+  const auto fit = make_fit(changing);
+  fit->run([](const Fit& f) { return f.progress().step != 6; });
+  const auto predicted = [&](int view) {
+    return fit->predict(std::span(&view, 1), std::vector(1, measurement::ViewModel{}))[0];
+  };
+  constexpr int kView = 4;
+  const std::vector<float> of_next = predicted(kView + 1).predicted;
+  // Every view gets the tilt of the next one, and the rays of a bead that is elsewhere.
+  const BeadSeries other(changing.geometry, Bead({24.0, 15.5, 13.0}), 3);
+  changing.rays = other.measurement().rays;
+  std::rotate(changing.geometry.tilt_deg.begin(), changing.geometry.tilt_deg.begin() + 1,
+              changing.geometry.tilt_deg.end());
+  EXPECT_NE(predicted(kView).predicted, of_next);
+  fit->reread_measurement();
+  const measurement::PredictedView after = predicted(kView);
+  EXPECT_EQ(after.predicted, of_next);
+  const auto rays = other.measurement().rays->binned(fit->stage().bin);
+  int num_rays = 0;
+  for (std::int64_t i = 0; i < std::ssize(after.measured); ++i) {
+    const std::int64_t x = i % after.width, y = i / after.width;
+    if (!rays->counts(kView, x, y)) continue;
+    ASSERT_EQ(after.measured[static_cast<std::size_t>(i)], rays->ray(kView, x, y));
+    ++num_rays;
+  }
+  EXPECT_GT(num_rays, 50);
 }
 
 TEST_P(CoarseToFine, SameBitsForAnyNumberOfThreads) {

@@ -1,0 +1,57 @@
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "cli/commands.h"
+#include "cli/common_options.h"
+#include "cli/console.h"
+#include "cli/help_formatter.h"
+#include "cli/run_reconstruction.h"
+#include "cli/table_options.h"
+#include "io/output_set.h"
+#include "reconstruct/alignment_output.h"
+#include "reconstruct/options.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::cli {
+namespace {
+
+using option_table::Group;
+
+void run(option_table::Choices& choices, const std::vector<option_table::Setting>& origins) {
+  if (choices.options.align == Alignment::kOff) choices.options.align = Alignment::kRefine;
+  reconstruction::ReconstructOptions options =
+      reconstruction::run_options(choices.files, choices.options);
+  options.origins = origins;
+  const std::vector<io::OutputLock> locks = claim_run(options, false);
+  const tilt_series::TiltSeries series =
+      open_series(options, false, distributed::Communicator::alone());
+  io::OutputSet results;
+  reconstruction::write_alignment_results(series, options);
+  results.commit();
+  print("alignment {}\n",
+        reconstruction::output_paths(options.resolved.output).alignment.string());
+  for (const auto& file : reconstruction::alignment_results(options))
+    if (std::filesystem::exists(file)) print("          {}\n", file.string());
+}
+
+}  // namespace
+
+void add_align_command(CLI::App& program, const std::vector<option_table::Setting>& origins) {
+  CLI::App& command = *program.add_subcommand(
+      "align", "Align the views of a tilt series with each other, without a reconstruction");
+  auto choices = std::make_shared<option_table::Choices>();
+  add_input_options(command, *choices);
+  add_groups(command, *choices, {Group::kSpecimen});
+  for (const char* key : {"fit.align", "fit.seed", "running.output", "running.overwrite"})
+    add_row(command, key, *choices);
+  add_common_options(command);
+  add_help_all(command);
+  command.footer(
+      "Example: tomofield align series.mrc --tlt series.tlt --align full --thickness 1200 \\\n"
+      "           -o series.mrc\nThe files are called after the output: series_align.xf, .tlt, "
+      ".aln, .json and .png");
+  command.callback([choices, &origins] { run(*choices, origins); });
+}
+
+}  // namespace tomofield::cli

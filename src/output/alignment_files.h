@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::output {
+
+/// Names the files of an alignment.
+struct AlignmentFiles {
+  std::filesystem::path xf, tlt, xtilt, aln;
+
+  std::vector<std::filesystem::path> all() const { return {xf, tlt, xtilt, aln}; }
+};
+
+/// Returns the names PREFIX.xf, PREFIX.tlt, PREFIX.xtilt and PREFIX.aln.
+AlignmentFiles alignment_files(const std::filesystem::path& prefix);
+
+/// Writes how a series is aligned, as IMOD and AreTomo have it (docs/geometry.md). `raw_size` are
+/// the width and the height of the recorded views before binning, in pixels, and the number of
+/// sections of the stack. Replaces the files. Throws Error if one cannot be written.
+///
+/// - The .tlt, the .xtilt and the .xf have a line for every section of the stack. The line of a
+///   section that is left out has the mean rotation of the views, no shift, and angles on a
+///   straight line through those of the nearest views. Shifts are in pixels before binning.
+/// - The .xtilt is written if a view has an x-axis tilt. Otherwise an old one is removed when the
+///   results are committed (io/output_set.h). It belongs to the .xf as well as to the .aln, which
+///   has no x-axis tilts.
+/// - The .aln counts sections from 1. A section that is left out is a dark frame. The format has a
+///   rotation and a shift for each view: AreTomo applies no magnification (GMAG is 1), and neither
+///   does the reader of this program. So a view has the rotation that is nearest to its matrix. If
+///   this moves a corner of a view by more than 0.1 pixels before binning, a warning says how far.
+///   There is no .aln of mirrored views, and a warning says so.
+///
+/// The angles include --tilt-offset and --x-axis-tilt, which are not to be applied again.
+void write_alignment_files(const tilt_series::TiltSeries& series,
+                           const std::array<std::int64_t, 3>& raw_size,
+                           const AlignmentFiles& files);
+
+}  // namespace tomofield::output

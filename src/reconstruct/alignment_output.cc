@@ -1,0 +1,58 @@
+#include "reconstruct/alignment_output.h"
+
+#include <cmath>
+
+#include "output/alignment_files.h"
+#include "report/alignment_plot.h"
+#include "tilt_series/open_views.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+std::filesystem::path prefix_of(const ReconstructOptions& options) {
+  return output_paths(options.resolved.output).alignment.replace_extension();
+}
+
+std::filesystem::path picture_of(const ReconstructOptions& options) {
+  return output_paths(options.resolved.output).alignment.replace_extension(".png");
+}
+
+report::AlignmentCurves curves_of(const nlohmann::json& record) {
+  report::AlignmentCurves curves;
+  for (const nlohmann::json& view : record["views"]) {
+    curves.tilt_deg.push_back(view["tilt_deg"]);
+    curves.shift_x_px.push_back(view["shift_px"][0]);
+    curves.shift_y_px.push_back(view["shift_px"][1]);
+    curves.rotation_deg.push_back(view["rotation_deg"]);
+    curves.magnification_percent.push_back(
+        100 * std::expm1(view["log_magnification"].get<double>()));
+    curves.correlation.push_back(view["correlation"]);
+    curves.error_x_px.push_back(view["shift_error_px"][0]);
+    curves.error_y_px.push_back(view["shift_error_px"][1]);
+  }
+  return curves;
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> alignment_results(const ReconstructOptions& options) {
+  if (options.resolved.align == Alignment::kOff) return {};
+  std::vector<std::filesystem::path> files = output::alignment_files(prefix_of(options)).all();
+  files.push_back(picture_of(options));
+  return files;
+}
+
+void write_alignment_results(const tilt_series::TiltSeries& series,
+                             const ReconstructOptions& options) {
+  if (options.resolved.align == Alignment::kOff) return;
+  const io::MrcHeader& header = tilt_series::open_views(options.input)->header();
+  output::write_alignment_files(series, {header.nx, header.ny, header.nz},
+                                output::alignment_files(prefix_of(options)));
+  report::write_alignment_picture(curves_of(options.alignment), picture_of(options));
+}
+
+std::vector<report::CurvePlot> alignment_plots(const nlohmann::json& record) {
+  return report::alignment_plots(curves_of(record));
+}
+
+}  // namespace tomofield::reconstruction
