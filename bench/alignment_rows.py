@@ -90,28 +90,17 @@ def reconstruct(options, row, volume, folder, *arguments, tlt=None):
 
 
 def read_estimate(prefix):
-    """Returns the Alignment that a run with --align found, and the views that it did not leave out."""
-    with open(f"{prefix}_align.json", encoding="utf-8") as file:
+    """Returns the Alignment in PREFIX.xf, .tlt and .json, and the views that were not left out."""
+    with open(f"{prefix}.json", encoding="utf-8") as file:
         views = json.load(file)["views"]
     kept = [number for number, view in enumerate(views) if not view["left_out"]]
-    local = alignment_score.read_local(f"{prefix}_align.json")
-    if os.path.exists(f"{prefix}.xf"):
-        return Alignment(np.loadtxt(f"{prefix}.xf"), np.loadtxt(f"{prefix}.tlt"), local), kept
-    return Alignment(transforms(views), [view["tilt_deg"] for view in views], local), kept
-
-
-def transforms(views):
-    """Returns lines of an .xf file: they undo q' = exp(m) R(rotation) q + shift."""
-    rotation = np.radians([view["rotation_deg"] for view in views])
-    scale = np.exp([-view["log_magnification"] for view in views])
-    c, s = scale * np.cos(rotation), scale * np.sin(rotation)
-    x, y = np.array([view["shift_px"] for view in views]).T
-    return np.stack([c, s, -s, c, -c * x - s * y, s * x - c * y], axis=1)
+    return Alignment(np.loadtxt(f"{prefix}.xf"), np.loadtxt(f"{prefix}.tlt"),
+                     alignment_score.read_local(f"{prefix}.json")), kept
 
 
 def write_in_frame(truth, estimate, kept, size, prefix):
     """Writes the estimate, moved to where the truth has the specimen, as PREFIX.xf and PREFIX.tlt.
-    Returns the arguments that leave out all views but those that were kept."""
+    Returns the arguments of tomofield that leave out the views that were not kept."""
     moved = alignment_score.in_frame_of(truth.of_views(kept), estimate.of_views(kept), size)
     lines, tilts = truth.transforms(), truth.tilts_deg.copy()
     lines[kept], tilts[kept] = moved.transforms(), moved.tilts_deg
@@ -140,9 +129,9 @@ def measure(options, row, seed, scratch):
                           "--tilt-offset", str(case.tilt_offset_deg))
 
     truth, size = alignment_score.read_truth(folder)
-    estimate, kept = read_estimate(aligned)
-    left_out = write_in_frame(truth, estimate, kept, size, moved)
-    reconstruct(options, row, f"{moved}.mrc", folder, "--xf", f"{moved}.xf", *left_out,
+    estimate, kept = read_estimate(f"{aligned}_align")
+    exclude = write_in_frame(truth, estimate, kept, size, moved)
+    reconstruct(options, row, f"{moved}.mrc", folder, "--xf", f"{moved}.xf", *exclude,
                 tlt=f"{moved}.tlt")
 
     given = Alignment(alignment_score.unaligned(len(truth.tilts_deg)),

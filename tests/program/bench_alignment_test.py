@@ -143,34 +143,20 @@ def test_the_script_scores_a_simulated_series():
     assert short.returncode == 1 and "13 views" in short.stderr and "12 transforms" in short.stderr
 
 
-def write_record(prefix, views):
-    with open(f"{prefix}_align.json", "w", encoding="utf-8") as file:
-        json.dump({"views": views}, file)
-
-
-def test_a_record_of_the_program_becomes_an_alignment():
-    prefix = os.path.join(harness.fresh_directory("record"), "tomogram")
-    views = [{"shift_px": [3.0, -2.0], "rotation_deg": 20.0, "log_magnification": 0.1,
-              "tilt_deg": -5.0, "left_out": False},
-             {"shift_px": [0.0, 0.0], "rotation_deg": 0.0, "log_magnification": 0.0,
-              "tilt_deg": 0.0, "left_out": True},
-             {"shift_px": [-1.0, 4.0], "rotation_deg": -3.0, "log_magnification": -0.02,
-              "tilt_deg": 5.0, "left_out": False}]
-    write_record(prefix, views)
+def test_views_that_were_left_out_stay_out(truth):
+    prefix = os.path.join(harness.fresh_directory("estimate"), "tomogram_align")
+    gauge = moved(truth, x=4.5 * COS, y=2.2)
+    lines = gauge.transforms()
+    lines[[3, 17]] = [1, 0, 0, 1, 500, -500]  # of views that nothing is known of
+    np.savetxt(f"{prefix}.xf", lines)
+    np.savetxt(f"{prefix}.tlt", TILTS)
+    with open(f"{prefix}.json", "w", encoding="utf-8") as file:
+        json.dump({"views": [{"left_out": view in (3, 17)} for view in range(len(TILTS))]}, file)
     estimate, kept = alignment_rows.read_estimate(prefix)
-    assert kept == [0, 2] and list(estimate.tilts_deg) == [-5, 0, 5]
-    corrected = np.array([7.0, 11.0])
-    for view, matrix, shift in zip(views, estimate.matrices, estimate.shifts):
-        turn = np.radians(view["rotation_deg"])
-        rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-        recorded = np.exp(view["log_magnification"]) * rotation @ corrected + view["shift_px"]
-        assert np.allclose(matrix @ recorded + shift, corrected)
-
-    arguments = alignment_rows.write_in_frame(estimate, estimate, kept, SIZE, prefix)
-    assert arguments == ["--exclude", "2"]
-    files, _ = alignment_rows.read_estimate(prefix)  # prefers the .xf and the .tlt
-    assert np.allclose(files.transforms(), estimate.transforms())
-    assert np.allclose(files.tilts_deg, estimate.tilts_deg)
+    exclude = alignment_rows.write_in_frame(truth, estimate, kept, SIZE, f"{prefix}_moved")
+    assert exclude == ["--exclude", "4,18"]
+    written = np.loadtxt(f"{prefix}_moved.xf")
+    assert np.allclose(written[kept], truth.transforms()[kept], atol=1e-6)
 
 
 def test_rows_are_measured_once_and_shown():
