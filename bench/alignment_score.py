@@ -41,6 +41,15 @@ class Alignment:
         self.tilts_deg = np.atleast_1d(tilts_deg)
         self.local = local  # None or [view][row][column] = (x, y) in pixels
 
+    def transforms(self):
+        """Returns the lines of an .xf file, [view, 6]."""
+        return np.hstack([self.matrices.reshape(-1, 4), self.shifts])
+
+    def of_views(self, views):
+        """Returns the alignment of some of the views."""
+        return Alignment(self.transforms()[views], self.tilts_deg[views],
+                         None if self.local is None else [self.local[view] for view in views])
+
     def displace(self, view, places, size):
         """Returns where the motion of a view puts places [n, 2] of the aligned view."""
         if self.local is None:
@@ -108,31 +117,57 @@ def specimen_warp_residual(local, tilts_deg, size):
                     axis=1).reshape(local.shape)
 
 
+def specimen_shift(shifts, tilts_deg):
+    """Returns the part of the views' shifts [view, 2] that a shift of the specimen explains."""
+    tilts = np.radians(tilts_deg)
+    x = shifts[:, 0] - residual(shifts[:, 0], np.column_stack([np.cos(tilts), np.sin(tilts)]))
+    return np.column_stack([x, np.full(len(x), shifts[:, 1].mean())])
+
+
+class Differences:
+    """Holds how an estimate differs from the truth, without removing anything: for each view the
+    shift, the rotation, the logarithm of the magnification, the tilt angle, and the rest of the
+    motion at the places of grid() [view, n, 2]."""
+
+    def __init__(self, truth, estimate, size):
+        places = grid(size)
+        affine = np.column_stack([np.ones(len(places)), places])
+        found = errors(truth, estimate, size)
+        fits = np.array([np.linalg.lstsq(affine, error, rcond=None)[0] for error in found])
+        maps = np.eye(2) + fits[:, 1:].swapaxes(1, 2)
+        self.shifts_px = fits[:, 0]
+        self.rotations_deg = np.degrees(np.arctan2(maps[:, 1, 0] - maps[:, 0, 1],
+                                                   maps[:, 0, 0] + maps[:, 1, 1]))
+        self.log_magnifications = np.log(np.linalg.det(maps)) / 2
+        self.tilts_deg = estimate.tilts_deg - truth.tilts_deg
+        self.local_px = found - affine @ fits
+
+
+def in_frame_of(truth, estimate, size):
+    """Returns the estimate with its specimen moved, scaled and tilted to where the truth has it."""
+    found = Differences(truth, estimate, size)
+    scale = np.exp(-found.log_magnifications.mean())
+    shifts = estimate.shifts - specimen_shift(found.shifts_px, truth.tilts_deg)
+    return Alignment(scale * np.hstack([estimate.matrices.reshape(-1, 4), shifts]),
+                     estimate.tilts_deg - found.tilts_deg.mean(), estimate.local)
+
+
 def score(truth, estimate, size):
     """Returns the figures of the module's text for views of size x size pixels."""
-    places = grid(size)
-    affine = np.column_stack([np.ones(len(places)), places])
-    found = errors(truth, estimate, size)
-    fits = np.array([np.linalg.lstsq(affine, error, rcond=None)[0] for error in found])
-    shifts = fits[:, 0]
-    maps = np.eye(2) + fits[:, 1:].swapaxes(1, 2)
-    rotations = np.degrees(np.arctan2(maps[:, 1, 0] - maps[:, 0, 1], maps[:, 0, 0] + maps[:, 1, 1]))
-    scales = np.log(np.linalg.det(maps)) / 2
-    tilts = np.radians(truth.tilts_deg)
-    tilt_errors = estimate.tilts_deg - truth.tilts_deg
+    found = Differences(truth, estimate, size)
+    shifts = found.shifts_px - specimen_shift(found.shifts_px, truth.tilts_deg)
     figures = {
-        "x_px": rms(residual(shifts[:, 0], np.column_stack([np.cos(tilts), np.sin(tilts)]))),
-        "y_px": rms(shifts[:, 1] - shifts[:, 1].mean()),
-        "rotation_deg": rms(rotations),
-        "magnification": rms(scales - scales.mean()),
-        "axis_error_deg": float(rotations.mean()),
-        "tilt_offset_deg": float(tilt_errors.mean()),
-        "tilt_deg": rms(tilt_errors - tilt_errors.mean()),
+        "x_px": rms(shifts[:, 0]),
+        "y_px": rms(shifts[:, 1]),
+        "rotation_deg": rms(found.rotations_deg),
+        "magnification": rms(found.log_magnifications - found.log_magnifications.mean()),
+        "axis_error_deg": float(found.rotations_deg.mean()),
+        "tilt_offset_deg": float(found.tilts_deg.mean()),
+        "tilt_deg": rms(found.tilts_deg - found.tilts_deg.mean()),
     }
     if truth.local is not None or estimate.local is not None:
-        local = np.array([error - affine @ fit for error, fit in zip(found, fits)])
-        warp_free = specimen_warp_residual(local, truth.tilts_deg, size)
-        figures["local_px"] = rms(np.linalg.norm(local, axis=2))
+        warp_free = specimen_warp_residual(found.local_px, truth.tilts_deg, size)
+        figures["local_px"] = rms(np.linalg.norm(found.local_px, axis=2))
         figures["local_less_specimen_warp_px"] = rms(np.linalg.norm(warp_free, axis=2))
     return figures
 
@@ -144,6 +179,22 @@ def read_local(path):
     return [view["local_px"] for view in views] if "local_px" in views[0] else None
 
 
+def read_truth(folder):
+    """Returns the Alignment of a series of simulate, and the width of its views in pixels."""
+    record, xf, tlt = (os.path.join(folder, name)
+                       for name in ("phantom.json", "tilt_series.xf", "tilt_series.tlt"))
+    with open(record, encoding="utf-8") as file:
+        size = json.load(file)["options"]["size_px"]
+    tilts = np.loadtxt(tlt, ndmin=1)
+    true = np.loadtxt(xf, ndmin=2) if os.path.exists(xf) else unaligned(len(tilts))
+    return Alignment(true, tilts, read_local(record)), size
+
+
+def unaligned(count):
+    """Returns lines of an .xf file that change nothing."""
+    return np.tile([1.0, 0.0, 0.0, 1.0, 0.0, 0.0], (count, 1))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -152,14 +203,8 @@ def main():
     parser.add_argument("--tlt")
     parser.add_argument("--local")
     arguments = parser.parse_args()
-    record, xf, tlt = (os.path.join(arguments.folder, name)
-                       for name in ("phantom.json", "tilt_series.xf", "tilt_series.tlt"))
-    with open(record, encoding="utf-8") as file:
-        size = json.load(file)["options"]["size_px"]
-    tilts = np.loadtxt(tlt, ndmin=1)
-    aligned = np.tile([1.0, 0.0, 0.0, 1.0, 0.0, 0.0], (len(tilts), 1))  # simulate wrote no .xf
-    true = np.loadtxt(xf, ndmin=2) if os.path.exists(xf) else aligned
-    truth = Alignment(true, tilts, read_local(record))
+    truth, size = read_truth(arguments.folder)
+    tilts = truth.tilts_deg
     estimate = Alignment(np.loadtxt(arguments.xf, ndmin=2),
                          np.loadtxt(arguments.tlt, ndmin=1) if arguments.tlt else tilts,
                          read_local(arguments.local) if arguments.local else None)

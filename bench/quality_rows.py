@@ -58,11 +58,12 @@ def simulate(options, folder, *arguments):
                        check=True, stdout=subprocess.DEVNULL)
 
 
-def series_arguments(folder, thickness):
-    """Returns the arguments that describe the series in a folder of simulate() to tomofield."""
+def series_arguments(folder, thickness, tlt=None):
+    """Returns the arguments that describe the series in a folder of simulate() to tomofield. `tlt`
+    names other tilt angles."""
     return [os.path.join(folder, "tilt_series.mrc"), "--tlt",
-            os.path.join(folder, "tilt_series.tlt"), "--thickness", str(thickness), "--contrast",
-            "bright"]
+            tlt or os.path.join(folder, "tilt_series.tlt"), "--thickness", str(thickness),
+            "--contrast", "bright"]
 
 
 Usage = collections.namedtuple("Usage", "core_seconds peak_MiB wall_seconds")

@@ -1,4 +1,4 @@
-"""Tests bench/alignment_score.py on alignments with known errors."""
+"""Tests bench/alignment_score.py on alignments with known errors, and bench/alignment."""
 
 import json
 import os
@@ -13,6 +13,7 @@ import harness
 BENCH = os.path.abspath(os.path.join(os.path.dirname(__file__), "../../bench"))
 sys.path.insert(0, BENCH)
 
+import alignment_rows  # pylint: disable=wrong-import-position
 import alignment_score  # pylint: disable=wrong-import-position
 from alignment_score import Alignment  # pylint: disable=wrong-import-position
 
@@ -51,6 +52,21 @@ def test_what_moves_the_specimen_costs_nothing(truth):
     assert abs(figures.pop("tilt_offset_deg") - 1.7) < 1e-9
     assert all(abs(value) < 1e-6 for value in figures.values()), figures
     assert "local_px" not in figures
+
+
+def test_an_estimate_is_moved_to_where_the_truth_has_the_specimen(truth):
+    gauge = moved(truth, scale=1.003, x=4.5 * COS - 7.1 * SIN, y=2.2)
+    gauge.tilts_deg = TILTS + 1.7
+    back = alignment_score.in_frame_of(truth, gauge, SIZE)
+    assert np.allclose(back.transforms(), truth.transforms(), atol=1e-9)
+    assert np.allclose(back.tilts_deg, TILTS, atol=1e-9)
+    # Whatever is no motion of the specimen stays.
+    wrong = moved(gauge, rotation_deg=0.3 * np.sin(TILTS), x=np.cos(7 * TILTS))
+    before, after = (alignment_score.score(truth, estimate, SIZE)
+                     for estimate in (wrong, alignment_score.in_frame_of(truth, wrong, SIZE)))
+    assert before["x_px"] > 0.3 and before["rotation_deg"] > 0.1
+    for name in ("x_px", "y_px", "rotation_deg", "magnification"):
+        assert abs(before[name] - after[name]) < 0.004 * before["x_px"], name
 
 
 def test_known_errors_are_returned(truth):
@@ -125,3 +141,47 @@ def test_the_script_scores_a_simulated_series():
     np.savetxt(unaligned, np.tile([1, 0, 0, 1, 0, 0], (12, 1)))
     short = subprocess.run([*script, unaligned], capture_output=True, text=True, check=False)
     assert short.returncode == 1 and "13 views" in short.stderr and "12 transforms" in short.stderr
+
+
+def test_views_that_were_left_out_stay_out(truth):
+    prefix = os.path.join(harness.fresh_directory("estimate"), "tomogram_align")
+    gauge = moved(truth, x=4.5 * COS, y=2.2)
+    lines = gauge.transforms()
+    lines[[3, 17]] = [1, 0, 0, 1, 500, -500]  # of views that nothing is known of
+    np.savetxt(f"{prefix}.xf", lines)
+    np.savetxt(f"{prefix}.tlt", TILTS)
+    with open(f"{prefix}.json", "w", encoding="utf-8") as file:
+        json.dump({"views": [{"left_out": view in (3, 17)} for view in range(len(TILTS))]}, file)
+    estimate, kept = alignment_rows.read_estimate(prefix)
+    exclude = alignment_rows.write_in_frame(truth, estimate, kept, SIZE, f"{prefix}_moved")
+    assert exclude == ["--exclude", "4,18"]
+    written = np.loadtxt(f"{prefix}_moved.xf")
+    assert np.allclose(written[kept], truth.transforms()[kept], atol=1e-6)
+
+
+def test_rows_are_measured_once_and_shown():
+    folder = harness.fresh_directory("rows")
+
+    def bench(*arguments):
+        done = subprocess.run(["/usr/bin/python3", os.path.join(BENCH, "alignment"), folder,
+                               "--program", harness.PROGRAM, "--quick", *arguments],
+                              capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return done
+
+    assert "nothing was measured yet" in bench("--table").stdout
+    chosen = ("--only", "^(A 3 px refine|B warp)")
+    done = bench(*chosen)
+    lines = done.stdout.splitlines()
+    for name in ("A 3 px refine", "B warp 2 px refine"):
+        assert any(line.startswith(f"| {name} | ") for line in lines), done.stdout
+    assert len({line.count("|") for line in lines if line.startswith("|")}) == 1, done.stdout
+    again = bench(*chosen)
+    assert again.stdout == done.stdout and again.stderr == ""
+    assert bench("--table").stdout == done.stdout
+
+    with open(os.path.join(folder, "alignment/A_3_px_refine_64_101.json"), encoding="utf-8") as file:
+        row = json.load(file)
+    for name in ("x_px", "y_px"):
+        assert row["start"][name] > 2 and row["found"][name] < 0.5, row
+    assert abs(row["found"]["loss_dB"]) < 1 and row["psnr_true_dB"] > 15, row
