@@ -28,13 +28,13 @@ constexpr std::size_t kPredictionBytes = std::size_t{1} << 30;
 
 // A registration to a field that was fitted to the view itself finds a part of the displacement.
 constexpr double kRelaxation = 1.3;
-// The direction of the tilt axis, which is the mean rotation, converges slowly. So much more of its
-// steps is added.
-constexpr double kAxisAmplification = 3.0;
 // A shift changes by at most so many pixels of the stage at once.
 constexpr double kLongestStep = 2.0;
 // The first epochs of a fit show too little of the specimen.
 constexpr std::int64_t kEpochsBefore = 2;
+// With pixels this many times as wide, an update costs as much as an epoch, so every second epoch
+// has one.
+constexpr int kSlowBin = 2;
 // Rotations and magnifications are looked for in pixels at most this many times as wide.
 constexpr int kFreedomBin = 2;
 constexpr double kSure = 3.0;  // standard errors by which a freedom must pay
@@ -72,7 +72,8 @@ class AligningFit {
       const std::int64_t epochs = epochs_done();
       const bool is_last = epochs == stage.first_epoch + stage.epochs;
       found_.was_stopped = is_to_stop();
-      if (epochs > kEpochsBefore && (!is_last || fit_.is_done())) update(stage);
+      const bool is_due = stage.bin != kSlowBin || epochs % 2 == 0;
+      if (epochs > kEpochsBefore && is_due && (!is_last || fit_.is_done())) update(stage);
     }
     return std::move(found_);
   }
@@ -137,14 +138,11 @@ class AligningFit {
     for (const std::size_t view : by_tilt) shifts.push_back(steps[view].shift_x_px);
     slow_modes_.amplify(shifts);
     for (std::size_t i = 0; i < by_tilt.size(); ++i) steps[by_tilt[i]].shift_x_px = shifts[i];
-    double mean_rotation = 0.0;
-    for (const ViewCorrection& step : steps)
-      mean_rotation += step.rotation_rad / static_cast<double>(steps.size());
     const double most = kLongestStep * stage.bin * measurement_.bin_factor;
     for (ViewCorrection& step : steps) {
       for (double* shift : {&step.shift_x_px, &step.shift_y_px})
         *shift = std::clamp(kRelaxation * *shift, -most, most);
-      step.rotation_rad = kRelaxation * (step.rotation_rad + kAxisAmplification * mean_rotation);
+      step.rotation_rad *= kRelaxation;
       step.log_magnification *= kRelaxation;
     }
     return steps;

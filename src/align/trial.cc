@@ -11,7 +11,7 @@ namespace tomofield::align {
 namespace {
 
 constexpr int kEvery = 8;
-constexpr int kCoarseEpochs = 40, kFineEpochs = 1;
+constexpr int kCoarseEpochs = 24, kFineEpochs = 1;
 
 }  // namespace
 

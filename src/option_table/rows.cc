@@ -157,8 +157,7 @@ constexpr Row kRows[] = {
 
     // Fit
     {.key = "fit.align", .flag = "--align", MEMBER(Options, align), .group = Group::kFit,
-     .help = "refine: first align each view with the projections of a field that is fitted to all "
-             "of them, from the alignment of the files; full: the same after a cross-correlation",
+     .help = "Align the views with the field before the fit",
      .is_common = true},
     {.key = "fit.epochs", .flag = "--epochs", MEMBER(Options, epochs), .group = Group::kFit,
      .range = Range::between(1, kMaxCount),
@@ -234,8 +233,7 @@ constexpr Row kRows[] = {
      .help = "Distance between samples of the margin around the region of interest"},
     {.key = "fit.hold_out", .flag = "--hold-out", MEMBER(Options, hold_out),
      .group = Group::kFit, .range = Range::zero_or_between(2, kMaxCount),
-     .help = "Leave every Nth view out of the fit and score it. 0: none",
-     .is_common = true},
+     .help = "Leave every Nth view out of the fit and score it. 0: none"},
     {.key = "tune", .flag = "--tune", MEMBER(Options, tune), .group = Group::kFit,
      .help = "Choose --tv-penalty, --tv, --rank and --epochs by short trials that predict every "
              "8th view, then fit all views",
