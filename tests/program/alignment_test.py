@@ -14,31 +14,30 @@ sys.path.insert(0, os.path.abspath(os.path.join(os.path.dirname(__file__), "../.
 import alignment_score  # pylint: disable=wrong-import-position
 
 SIZE = 64
-THICKNESS = 38
 # A short fit, with nothing left to trials.
 FIT = ["--epochs", 2, "--coarse-epochs", 4, "--tv-penalty", "smooth", "--view-scale", "off",
        "--black-level", 0, "--bead-diameter", 0]
 
 
-def simulate(name, *options):
+def simulate(name, *options, size=SIZE):
     """Returns the folder of a series of a cell that ends in the field of view."""
     folder = os.path.join(harness.fresh_directory(name), "cell")
-    harness.succeed("simulate", folder, "--size", SIZE, "--yardstick", "a", "--noise", 0.05,
+    harness.succeed("simulate", folder, "--size", size, "--yardstick", "a", "--noise", 0.05,
                     "--seed", 21, "--no-truth", *options)
     return folder
 
 
-def series_of(folder):
+def series_of(folder, size=SIZE):
     """Returns the arguments that name a raw series."""
     return [os.path.join(folder, "tilt_series.mrc"), "--tlt", os.path.join(folder, "tilt_series.tlt"),
-            "--thickness", THICKNESS, "--contrast", "bright", "--bead-diameter", 0, "--no-margin"]
+            "--thickness", size * 75 // 128, "--contrast", "bright", "--bead-diameter", 0, "--no-margin"]
 
 
-def errors(folder, prefix):
+def errors(folder, prefix, size=SIZE):
     """Returns the errors of the alignment in PREFIX.xf and PREFIX.tlt."""
-    read = alignment_score.read_alignment
-    truth = read(os.path.join(folder, "tilt_series.xf"), os.path.join(folder, "tilt_series.tlt"))
-    return alignment_score.score(truth, read(prefix + ".xf", prefix + ".tlt"), SIZE)
+    truth, estimate = (alignment_score.Alignment(np.loadtxt(stem + ".xf"), np.loadtxt(stem + ".tlt"))
+                       for stem in (os.path.join(folder, "tilt_series"), prefix))
+    return alignment_score.score(truth, estimate, size)
 
 
 def record(prefix):
@@ -63,10 +62,11 @@ def test_align_finds_shifts_and_writes_them_for_other_programs(shifted):
 
 
 def test_full_finds_large_shifts_and_the_axis():
-    folder = simulate("alignment_raw", "--misalign", 5, "--misalign-axis", 2)
-    harness.succeed("align", *series_of(folder), "--align", "full", "-o",
+    size = 128
+    folder = simulate("alignment_raw", "--misalign", 5, "--misalign-axis", 2, size=size)
+    harness.succeed("align", *series_of(folder, size), "--align", "full", "-o",
                     os.path.join(folder, "found.mrc"))
-    found = errors(folder, os.path.join(folder, "found_align"))
+    found = errors(folder, os.path.join(folder, "found_align"), size)
     assert found["x_px"] < 0.3 and found["y_px"] < 0.3, found
     assert abs(found["axis_error_deg"]) < 0.5, found
 

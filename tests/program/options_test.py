@@ -10,7 +10,7 @@ import harness
 PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs/options.md"
 ROW = re.compile(r"^\| `([^`]+)` \|.*\| `([^`]+)` \|$", re.MULTILINE)
 COMMON = {"stack", "--tlt", "--xf", "--aln", "--bin", "--contrast", "--thickness", "--roi", "--tune",
-          "--hold-out", "--output", "--overwrite", "--resume", "--dry-run", "--threads", "--config",
+          "--align", "--output", "--overwrite", "--resume", "--dry-run", "--threads", "--config",
           "--help", "--help-all"}
 
 
