@@ -45,7 +45,8 @@ std::vector<std::filesystem::path> alignment_results(const ReconstructOptions& o
 void write_alignment_results(const tilt_series::TiltSeries& series,
                              const ReconstructOptions& options) {
   if (options.resolved.align == Alignment::kOff) return;
-  const io::MrcHeader& header = tilt_series::open_views(options.input)->header();
+  const auto stack = tilt_series::open_views(options.input);
+  const io::MrcHeader& header = stack->header();
   output::write_alignment_files(series, {header.nx, header.ny, header.nz},
                                 output::alignment_files(prefix_of(options)));
   report::write_alignment_picture(curves_of(options.alignment), picture_of(options));

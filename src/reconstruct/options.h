@@ -59,7 +59,7 @@ struct ReconstructOptions {
   output::VolumeOptions volume;
   /// Settings that the files of a project made, for the metrics; they are among the options.
   std::vector<option_table::Setting> origins;
-  /// What the alignment before the fit found (aligned_series.h), for the metrics.
+  /// Record of the alignment before the fit (aligned_series.h), for the metrics; null without one.
   nlohmann::json alignment = {};
 
   /// Says whether the run makes two fits, of one half of the data each.

@@ -21,7 +21,7 @@ struct AlignedSection {
   int line = 0;  ///< of the file that says so; 0: not known
 };
 
-/// What a file that has angles and alignment together says of each section: AreTomo's .aln, or a
+/// Holds the angles and the alignment of each section that one file gives: AreTomo's .aln, or a
 /// table of views of RELION or Warp.
 struct SectionTable {
   std::string source;                                     ///< the name of the file
