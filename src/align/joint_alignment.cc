@@ -12,7 +12,6 @@
 #include "align/gauge.h"
 #include "align/registration.h"
 #include "align/slow_modes.h"
-#include "base/log.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
 #include "base/trace.h"
@@ -114,6 +113,7 @@ class AligningFit {
     remove_gauge(measurement_.geometry, next);
     found_.steps_px.push_back(rms_change(found_.corrections, next));
     found_.corrections = std::move(next);
+    if (fit_.is_done()) return;
     measurement::realign(problem_.recorded, found_.corrections, problem_.scratch_dir,
                          fit::band_rows(field_), processes_, measurement_);
     fit_.reread_measurement();
