@@ -23,11 +23,12 @@ set(TOMOFIELD_COMMON_LIBRARIES
   Threads::Threads fmt::fmt nlohmann_json::nlohmann_json)
 
 # The layer of that name alone compiles against these.
+set(TOMOFIELD_fourier_LIBRARIES kissfft::kissfft-float)
 set(TOMOFIELD_io_LIBRARIES HDF5::HDF5 PNG::PNG PkgConfig::TURBOJPEG TIFF::TIFF pugixml::pugixml)
 set(TOMOFIELD_kernels_LIBRARIES hwy::hwy)
 set(TOMOFIELD_field_LIBRARIES $<BUILD_INTERFACE:Eigen3::Eigen>)
 set(TOMOFIELD_objective_LIBRARIES kissfft::kissfft-float)
-set(TOMOFIELD_align_LIBRARIES kissfft::kissfft-float $<BUILD_INTERFACE:Eigen3::Eigen>)
+set(TOMOFIELD_align_LIBRARIES $<BUILD_INTERFACE:Eigen3::Eigen>)
 set(TOMOFIELD_evaluate_LIBRARIES kissfft::kissfft-float)
 set(TOMOFIELD_baseline_LIBRARIES kissfft::kissfft-float)
 set(TOMOFIELD_view_LIBRARIES PkgConfig::HTTPLIB)

@@ -1,7 +1,5 @@
 #include "align/correlation_start.h"
 
-#include <kiss_fft.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -11,16 +9,18 @@
 
 #include <Eigen/Cholesky>
 
-#include "align/image_transform.h"
 #include "align/shift_search.h"
 #include "align/slab_model.h"
 #include "align/stretched_view.h"
 #include "base/check.h"
 #include "base/parallel.h"
+#include "fourier/image_transform.h"
 
 namespace tomofield::align {
 namespace {
 
+using fourier::cycles_per_pixel;
+using fourier::fast_even_size;
 using Image = ImageTransform::Image;
 using tilt_series::MaskedImage;
 
@@ -30,10 +30,6 @@ constexpr double kNoise = 0.3;      // power of the noise over that of the signa
 constexpr std::size_t kOthers = 8;  // views that predict another one
 // The low pass of IMOD's tiltxcorr, cycles a pixel.
 constexpr double kCutoff = 0.25, kFalloff = 0.05;
-
-std::int64_t fast_even_size(std::int64_t size) {
-  return 2 * kiss_fft_next_fast_size(static_cast<int>((size + 1) / 2));
-}
 
 // Returns a window of a line: 1 in the middle, with the rise of a cosine at both ends.
 std::vector<float> taper(std::int64_t size) {

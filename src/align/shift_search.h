@@ -3,10 +3,12 @@
 #include <array>
 #include <cstdint>
 
-#include "align/image_transform.h"
+#include "fourier/image_transform.h"
 #include "tilt_series/image.h"
 
 namespace tomofield::align {
+
+using fourier::ImageTransform;
 
 /// Holds the highest place of a correlation.
 struct ShiftPeak {

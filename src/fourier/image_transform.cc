@@ -1,4 +1,4 @@
-#include "align/image_transform.h"
+#include "fourier/image_transform.h"
 
 #include <kiss_fft.h>
 
@@ -6,7 +6,7 @@
 
 #include "base/check.h"
 
-namespace tomofield::align {
+namespace tomofield::fourier {
 namespace {
 
 void free_plan(kiss_fft_state* plan) { std::free(plan); }
@@ -58,4 +58,8 @@ void ImageTransform::transform(Image& image, const Plan& rows, const Plan& colum
   }
 }
 
-}  // namespace tomofield::align
+std::int64_t fast_even_size(std::int64_t size) {
+  return 2 * kiss_fft_next_fast_size(static_cast<int>((size + 1) / 2));
+}
+
+}  // namespace tomofield::fourier

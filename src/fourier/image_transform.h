@@ -7,7 +7,7 @@
 
 struct kiss_fft_state;
 
-namespace tomofield::align {
+namespace tomofield::fourier {
 
 /// Transforms images [y, x] of one size by Fourier and back. Thread-safe.
 class ImageTransform {
@@ -32,10 +32,13 @@ class ImageTransform {
   Plan forward_rows_, forward_columns_, inverse_rows_, inverse_columns_;
 };
 
+/// Returns the smallest even length of at least `size` whose transform is fast.
+std::int64_t fast_even_size(std::int64_t size);
+
 /// Returns the frequency of index `k` of a transform of length `size`, in cycles a pixel, −½ to ½.
 inline double cycles_per_pixel(std::int64_t k, std::int64_t size) {
   const std::int64_t signed_k = 2 * k > size ? k - size : k;
   return static_cast<double>(signed_k) / static_cast<double>(size);
 }
 
-}  // namespace tomofield::align
+}  // namespace tomofield::fourier
