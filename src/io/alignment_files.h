@@ -44,7 +44,8 @@ struct MdocSection {
   int line = 0;              ///< line of the tilt angle, or of the section's head without one
   std::optional<double> tilt_deg;
   std::optional<double> pixel_spacing_A;
-  std::optional<double> prior_dose;    ///< PriorRecordDose: electrons / Å² before this section
+  std::optional<double> prior_dose;  ///< PriorRecordDose: electrons / Å² before this section
+  std::optional<double> dose;        ///< ExposureDose: electrons / Å² of this section; 0: unknown
   std::optional<std::int64_t> time_s;  ///< DateTime, in seconds from some day on
   std::string frame_name;              ///< SubFramePath without its folders
 };

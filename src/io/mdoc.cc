@@ -130,6 +130,8 @@ void read_section_entry(const std::filesystem::path& path, const TextLine& line,
     section->line = line.number;
   } else if (entry.key == "PriorRecordDose") {
     section->prior_dose = parse_number(entry.value);
+  } else if (entry.key == "ExposureDose") {
+    section->dose = parse_number(entry.value);
   } else if (entry.key == "DateTime") {
     section->time_s = parse_time(entry.value);
   } else if (entry.key == "SubFramePath") {

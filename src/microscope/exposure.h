@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "io/alignment_files.h"
+#include "io/view_table.h"
+
+namespace tomofield::microscope {
+
+/// Returns the exposure, in electrons per Å², after which the signal at a frequency, in cycles per
+/// Å, has fallen to exp(−½). It is Grant and Grigorieff's fit 0.245 k^−1.665 + 2.81 at 300 kV
+/// (eLife 4:e06980, 2015, equation 3), times 0.8 at 200 kV and 0.45 at 120 kV as in RELION, and
+/// between these in proportion.
+double critical_exposure(double k, double voltage_kV);
+
+/// Returns the share of the signal that is left after an exposure, in electrons per Å²:
+/// exp(−exposure / (2 critical exposure)). All of it is left at frequency 0.
+double signal_after(double exposure, double k, double voltage_kV);
+
+/// Holds what a view received, in electrons per Å².
+struct Exposure {
+  double before = 0.0;   ///< by the specimen, when the view began
+  double of_view = 0.0;  ///< by the view itself
+
+  /// Returns the exposure at the middle of the view, which stands for the whole view.
+  double at_middle() const { return before + of_view / 2; }
+};
+
+/// Returns the exposures of views that were recorded in this order of their indices, each with
+/// `of_view` electrons per Å².
+std::vector<Exposure> exposures_in_order(std::span<const std::size_t> order, double of_view);
+
+/// Returns the exposure of each section of an .mdoc: from PriorRecordDose if the sections have it
+/// and it is not 0 in all of them, else from ExposureDose and the order of acquisition
+/// (io::acquisition_order()). Returns nothing if it has neither: SerialEM writes 0 if it does not
+/// know the dose.
+std::optional<std::vector<Exposure>> exposures_of(const io::Mdoc& mdoc);
+
+/// Returns the exposure of each view of a table of RELION or Warp, or nothing if it has none, or if
+/// it is 0 in all views. The exposure of a view itself is the smallest difference between two
+/// views, because the tables do not have it.
+std::optional<std::vector<Exposure>> exposures_of(const io::ViewTable& table);
+
+}  // namespace tomofield::microscope

@@ -1,0 +1,103 @@
+#include "microscope/exposure.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "scratch_directory.h"
+
+namespace tomofield::microscope {
+namespace {
+
+using testing::ScratchDirectory;
+
+TEST(CriticalExposure, IsThatOfGrantAndGrigorieff) {
+  // 0.245 · 10^1.665 + 2.81 and 0.245 · 3^1.665 + 2.81, from a desk calculator
+  EXPECT_NEAR(critical_exposure(0.1, 300), 14.13834, 1e-4);
+  EXPECT_NEAR(critical_exposure(1.0 / 3, 300), 4.33606, 1e-4);
+  EXPECT_NEAR(critical_exposure(0.1, 200), 0.8 * 14.13834, 1e-4);
+  EXPECT_NEAR(critical_exposure(0.1, 120), 0.45 * 14.13834, 1e-4);
+  EXPECT_NEAR(critical_exposure(0.1, 250), 0.9 * 14.13834, 1e-4);
+}
+
+TEST(SignalAfter, FallsToTheRootOfEAtTheCriticalExposure) {
+  EXPECT_NEAR(signal_after(critical_exposure(0.05, 300), 0.05, 300), std::exp(-0.5), 1e-12);
+  EXPECT_EQ(signal_after(120, 0.0, 300), 1.0);
+  EXPECT_EQ(signal_after(0, 0.3, 300), 1.0);
+}
+
+TEST(Exposures, FollowTheOrder) {
+  const std::array<std::size_t, 3> order{1, 2, 0};
+  const auto exposures = exposures_in_order(order, 3.0);
+  EXPECT_EQ(exposures[1].before, 0.0);
+  EXPECT_EQ(exposures[2].before, 3.0);
+  EXPECT_EQ(exposures[0].before, 6.0);
+  EXPECT_EQ(exposures[0].at_middle(), 7.5);
+}
+
+// Returns an .mdoc of three sections that were recorded in the order 1, 2, 0.
+std::string mdoc_text(const std::array<std::string, 3>& entries) {
+  const std::array<std::string, 3> times{"12:40:00", "12:30:00", "12:35:00"};
+  std::string text = "PixelSpacing = 2\n";
+  for (std::size_t i = 0; i < 3; ++i)
+    text += "[ZValue = " + std::to_string(i) + "]\nTiltAngle = 0\nDateTime = 12-Mar-21 " +
+            times[i] + "\n" + entries[i] + "\n";
+  return text;
+}
+
+std::optional<std::vector<Exposure>> exposures_of_text(const std::array<std::string, 3>& entries) {
+  const ScratchDirectory directory;
+  return exposures_of(io::read_mdoc(directory.write("a.mdoc", mdoc_text(entries))));
+}
+
+TEST(ExposuresOfMdoc, AddUpTheDoses) {
+  const auto exposures =
+      exposures_of_text({"ExposureDose = 4", "ExposureDose = 2", "ExposureDose = 3"});
+  ASSERT_TRUE(exposures);
+  EXPECT_EQ((*exposures)[1].before, 0.0);
+  EXPECT_EQ((*exposures)[2].before, 2.0);
+  EXPECT_EQ((*exposures)[0].before, 5.0);
+  EXPECT_EQ((*exposures)[0].of_view, 4.0);
+}
+
+TEST(ExposuresOfMdoc, TakeThePriorDose) {
+  const auto exposures =
+      exposures_of_text({"PriorRecordDose = 10", "PriorRecordDose = 1", "PriorRecordDose = 4"});
+  ASSERT_TRUE(exposures);
+  EXPECT_EQ((*exposures)[0].before, 10.0);
+  EXPECT_EQ((*exposures)[1].before, 1.0);
+  EXPECT_EQ((*exposures)[1].of_view, 3.0);
+  const auto both = exposures_of_text({"PriorRecordDose = 10\nExposureDose = 2.5",
+                                       "PriorRecordDose = 0\nExposureDose = 2.5",
+                                       "PriorRecordDose = 5\nExposureDose = 2.5"});
+  ASSERT_TRUE(both);
+  EXPECT_EQ((*both)[2].before, 5.0);
+  EXPECT_EQ((*both)[2].of_view, 2.5);
+}
+
+TEST(ExposuresOfMdoc, AreUnknownIfSerialEmDoesNotKnowThem) {
+  EXPECT_FALSE(exposures_of_text({"", "", ""}));
+  EXPECT_FALSE(exposures_of_text({"ExposureDose = 0\nPriorRecordDose = 0",
+                                  "ExposureDose = 0\nPriorRecordDose = 0",
+                                  "ExposureDose = 0\nPriorRecordDose = 0"}));
+  EXPECT_FALSE(exposures_of_text({"ExposureDose = 3", "ExposureDose = 3", ""}));
+}
+
+TEST(ExposuresOfTable, AreThoseBeforeTheViews) {
+  io::ViewTable table;
+  for (const double dose : {6.0, 0.0, 3.0}) {
+    table.views.emplace_back();
+    table.views.back().dose_before = dose;
+  }
+  const auto exposures = exposures_of(table);
+  ASSERT_TRUE(exposures);
+  EXPECT_EQ((*exposures)[0].before, 6.0);
+  EXPECT_EQ((*exposures)[0].of_view, 3.0);
+  table.views.back().dose_before.reset();
+  EXPECT_FALSE(exposures_of(table));
+}
+
+}  // namespace
+}  // namespace tomofield::microscope
