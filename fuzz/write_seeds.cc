@@ -65,7 +65,17 @@ const std::string kWarpXml =
     "<AxisAngle>-4.3\n-4.3</AxisAngle><AxisOffsetX>271.8\n1</AxisOffsetX>\n"
     "<MoviePath>../2/a.tif\n../2/b.tif</MoviePath>\n"
     "<GridMovementX Width=\"1\" Height=\"1\" Depth=\"2\"><Node X=\"0\" Y=\"0\" Z=\"0\" "
-    "Value=\"1\"/><Node X=\"0\" Y=\"0\" Z=\"1\" Value=\"2\"/></GridMovementX></TiltSeries>\n";
+    "Value=\"1\"/><Node X=\"0\" Y=\"0\" Z=\"1\" Value=\"2\"/></GridMovementX>\n"
+    "<CTF><Param Name=\"Voltage\" Value=\"300\"/></CTF><GridCTF Width=\"1\" Height=\"1\">"
+    "<Node X=\"0\" Y=\"0\" Z=\"0\" Value=\"4.5\"/></GridCTF></TiltSeries>\n";
+const std::string kCtffind =
+    "# Pixel size: 1.327 Angstroms ; acceleration voltage: 300.0 keV ; spherical aberration: 2.70 "
+    "mm "
+    "; amplitude contrast: 0.07\n# Columns: #1 - micrograph number; #2 - defocus 1 [Angstroms]\n"
+    "1.000000 14477.8 13500.0 75.0 0.5 0.001 12.1\n3.000000 19371.7 18665.4 -39.9 0 0.006 inf\n";
+const std::string kDefocus2 = "1\t3\t-60.0\t-56.0\t4000.0\t2\n4\t6\t-54.0\t-50.0\t4600.0\n";
+const std::string kDefocus3 =
+    "47 0 0. 0. 0 3\n1 1 -3 -3 4100 3900 0.52 1.57 0.01\n3 3 -3 -3 4100 0 0.52 1.57 0.01\n";
 const std::string kFiducials = "1 1 5 6 0\n1 1 5.5 6 1\n1 2 12 10 2\n1 2 13 10 3\n";
 const std::string kConfig =
     "thickness = 24\ntv = 1.5\nfield = \"grid\"\nroi = [0, 0, 16, 16]\nno-margin = true\n"
@@ -204,6 +214,10 @@ int main(int argc, char** argv) {
       {"star", "tomograms", kRelionTomograms},
       {"star", "tomostar", kTomostar},
       {"warp_xml", "series", kWarpXml},
+      {"ctf", "ctffind", kCtffind},
+      {"ctf", "imod2", kDefocus2},
+      {"ctf", "imod3", kDefocus3},
+      {"ctf", "relion", kRelionViews},
       {"fiducials", "text", kFiducials},
       {"config", "toml", kConfig},
       {"table", "csv", kTable},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "io/ctf_table.h"
 #include "io/view_table.h"
 #include "tomofield/error.h"
 
@@ -11,7 +12,6 @@ namespace tomofield::io {
 namespace {
 
 constexpr double kLargestShift_A = base::kLargestPosition_px;
-constexpr double kLargestDefocus_A = 1e7;
 constexpr double kLargestDose = 1e6;
 
 const StarTable* find_table(const std::vector<StarTable>& tables, std::string_view column) {
@@ -40,6 +40,20 @@ std::optional<Defocus> defocus_of(const StarRow& row) {
   defocus.angle_deg = row.find_number("rlnDefocusAngle", base::kLargestAngle_deg).value_or(0.0);
   defocus.phase_shift_deg = row.find_number("rlnPhaseShift", base::kLargestAngle_deg).value_or(0.0);
   return defocus;
+}
+
+// Returns the number in the first row of whichever table has the column.
+std::optional<double> first_number(const std::filesystem::path& path,
+                                   const std::vector<StarTable>& tables, std::string_view column) {
+  const StarTable* const table = find_table(tables, column);
+  if (table == nullptr || table->num_rows() == 0) return std::nullopt;
+  return StarRow(path, *table, 0).find_number(column);
+}
+
+StatedOptics optics_of(const std::filesystem::path& path, const std::vector<StarTable>& tables) {
+  return {first_number(path, tables, "rlnVoltage"),
+          first_number(path, tables, "rlnSphericalAberration"),
+          first_number(path, tables, "rlnAmplitudeContrast")};
 }
 
 ListedView view_of(const StarRow& row) {
@@ -103,10 +117,25 @@ ViewTable read_relion_views(const std::filesystem::path& path) {
                     "yet: give the table that RELION's job 'Align tilt-series' wrote",
                     path.string()));
   }
-  ViewTable views{path, CentreRule::kWholePixel, false, {}, {}, {}};
+  ViewTable views{path, CentreRule::kWholePixel, false, {}, {}, {}, optics_of(path, tables)};
   for (std::size_t i = 0; i < table->num_rows(); ++i)
     views.views.push_back(view_of(StarRow(path, *table, i)));
   return views;
+}
+
+CtfTable read_relion_ctf(const std::filesystem::path& path) {
+  const std::vector<StarTable> tables = read_star_file(path);
+  const StarTable* const table = find_table(tables, "rlnDefocusU");
+  if (table == nullptr) {
+    throw Error(fmt::format(
+        "'{}' has no column _rlnDefocusU: give the table of a tilt series that RELION's "
+        "job 'CTF estimation' or a later one wrote",
+        path.string()));
+  }
+  CtfTable ctf{path, {}, optics_of(path, tables), {}};
+  for (std::size_t i = 0; i < table->num_rows(); ++i)
+    ctf.views.push_back(defocus_of(StarRow(path, *table, i)));
+  return ctf;
 }
 
 }  // namespace tomofield::io

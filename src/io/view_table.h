@@ -25,6 +25,11 @@ struct Defocus {
   double phase_shift_deg = 0.0;
 };
 
+/// What a file states of the microscope; none: it is not in the file.
+struct StatedOptics {
+  std::optional<double> voltage_kV, spherical_aberration_mm, amplitude_contrast;
+};
+
 /// One view of a tilt series: where its images lie, and how the specimen is projected to them. With
 /// positions from the centres of the specimen and of the image, the rotations right-handed, and
 /// only x and y of the result:
@@ -51,6 +56,7 @@ struct ViewTable {
   std::vector<ListedView> views;
   std::optional<double> thickness_A;     ///< of the volume that the other program makes
   std::vector<std::string> not_applied;  ///< what the file has and a rigid alignment cannot honour
+  StatedOptics optics{};
 };
 
 /// Tells by the end of its name whether a file is a table of views: .star, .tomostar, or .xml.

@@ -77,23 +77,35 @@ class WarpXml {
   // Returns a shift of each view from a grid of movements. Nothing if the grid varies within a
   // view or has some other number of views.
   std::optional<std::vector<double>> shifts_of_grid(const char* name, std::size_t num_views) const {
+    if (is_zero(name)) return std::vector<double>(num_views, 0.0);
+    return values_of_grid(name, num_views);
+  }
+
+  // Returns a value of each view from a grid. Nothing if there is no such grid, or if it varies
+  // within a view or has some other number of views.
+  std::optional<std::vector<double>> values_of_grid(const char* name, std::size_t num_views) const {
     const pugi::xml_node grid = root_.child(name);
-    if (is_zero_grid(grid)) return std::vector<double>(num_views, 0.0);
     const auto nodes = static_cast<std::size_t>(
         std::distance(grid.children("Node").begin(), grid.children("Node").end()));
     const bool is_rigid = grid.attribute("Width").as_int(1) == 1 &&
                           grid.attribute("Height").as_int(1) == 1 &&
                           (nodes == 1 || nodes == num_views);
     if (!is_rigid) return std::nullopt;
-    std::vector<double> shifts(num_views);
+    std::vector<double> values(num_views);
     for (const pugi::xml_node node : grid.children("Node")) {
       const double value = parse(name, node.attribute("Value").value(), base::kLargestPosition_px);
       if (nodes == 1) return std::vector<double>(num_views, value);
       const auto view = parse_integer(node.attribute("Z").value());
       if (!view || *view < 0 || static_cast<std::size_t>(*view) >= num_views) return std::nullopt;
-      shifts[static_cast<std::size_t>(*view)] = value;
+      values[static_cast<std::size_t>(*view)] = value;
     }
-    return shifts;
+    return values;
+  }
+
+  // Returns a parameter of the element CTF.
+  std::optional<double> ctf_parameter(const char* name) const {
+    const pugi::xml_node found = root_.child("CTF").find_child_by_attribute("Param", "Name", name);
+    return found ? std::optional(parse(name, found.attribute("Value").value(), 1e6)) : std::nullopt;
   }
 
   bool is_zero(const char* grid) const { return is_zero_grid(root_.child(grid)); }
@@ -134,6 +146,25 @@ void apply_movements(const WarpXml& xml, ViewTable& table) {
   }
 }
 
+// Sets the defocus of the views, as Warp's ts_ctf found it: the mean of both directions in µm,
+// their difference, the direction of the first, and the phase shift in units of π (CTF.cs). The
+// grid of the mean is zero before ts_ctf ran.
+void set_defocus(const WarpXml& xml, ViewTable& table) {
+  constexpr double kAngstroms_in_um = 1e4, kHalfTurn_deg = 180.0;
+  const std::size_t num_views = table.views.size();
+  const auto means_um = xml.values_of_grid("GridCTF", num_views);
+  if (!means_um || xml.is_zero("GridCTF")) return;
+  const std::vector<double> zeros(num_views);
+  const auto differences_um = xml.values_of_grid("GridCTFDefocusDelta", num_views).value_or(zeros);
+  const auto angles_deg = xml.values_of_grid("GridCTFDefocusAngle", num_views).value_or(zeros);
+  const auto phases = xml.values_of_grid("GridCTFPhase", num_views).value_or(zeros);
+  for (std::size_t i = 0; i < num_views; ++i) {
+    table.views[i].defocus = {kAngstroms_in_um * ((*means_um)[i] + differences_um[i] / 2),
+                              kAngstroms_in_um * ((*means_um)[i] - differences_um[i] / 2),
+                              angles_deg[i], kHalfTurn_deg * phases[i]};
+  }
+}
+
 }  // namespace
 
 // The geometry is that of read_warp_tomostar(). LevelAngleX turns the specimen about x before it is
@@ -168,6 +199,9 @@ ViewTable read_warp_xml(const std::filesystem::path& path) {
   }
   table.thickness_A = xml.thickness_A();
   apply_movements(xml, table);
+  set_defocus(xml, table);
+  table.optics = {xml.ctf_parameter("Voltage"), xml.ctf_parameter("Cs"),
+                  xml.ctf_parameter("Amplitude")};
   for (const char* grid : {"GridVolumeWarpX", "GridVolumeWarpY", "GridVolumeWarpZ"})
     if (!xml.is_zero(grid))
       table.not_applied.emplace_back(fmt::format("{}, a deformation of the specimen", grid));

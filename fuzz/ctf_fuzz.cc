@@ -1,0 +1,9 @@
+#include "fuzz_input.h"
+#include "io/ctf_table.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const tomofield::fuzz::InputFile file(data, size);
+  tomofield::fuzz::refuse_or([&] { tomofield::io::read_ctf(file.path()); });
+  tomofield::fuzz::refuse_or([&] { tomofield::io::read_relion_ctf(file.path()); });
+  return 0;
+}
