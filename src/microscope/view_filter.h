@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "fourier/image_transform.h"
+#include "microscope/ctf.h"
+#include "microscope/defocus_slope.h"
+#include "microscope/line_extension.h"
+
+namespace tomofield::microscope {
+
+/// Describes what turns a projection of density, in which dense is high, into a view.
+struct ViewTransfer {
+  Optics optics;
+  io::Defocus defocus;        ///< with its angle in the image that is filtered
+  DefocusSlope slope;         ///< over that image
+  double exposure = 0.0;      ///< electrons per Å² (Exposure::at_middle()); 0: no damage
+  double pixel_size_A = 1.0;  ///< of that image
+  bool is_flipped = false;    ///< the view's phases were flipped: |CTF| instead of −CTF
+};
+
+/// Applies the transfer H of a view to images [y, x], and its transpose. H is −CTF times what
+/// radiation damage leaves of the signal (signal_after()). Thread-safe; works on one thread.
+///
+/// Where the defocus changes over the image, each pixel of the projection is spread with the
+/// defocus at its own place: with hat functions w_s of the local defocus, H = Σ_s H_s w_s. Their
+/// spacing is 1 / (8 λ k²), where k is the Nyquist frequency. There it changes the phase of H_s by
+/// π / 8, so the interpolation errs by at most 2 percent.
+///
+/// The image is extended on all sides (LineExtension), so that nothing wraps around. Within
+/// reach_px() of its border the result depends on what the extension puts outside: give a wider
+/// projection, where one is known.
+class ViewFilter {
+ public:
+  ViewFilter(std::int64_t width, std::int64_t height, const ViewTransfer& transfer);
+
+  /// Returns H image.
+  std::vector<float> apply(std::span<const float> image) const;
+  /// Returns Hᵀ image: ⟨H a, b⟩ = ⟨a, Hᵀ b⟩.
+  std::vector<float> apply_transpose(std::span<const float> image) const;
+
+  /// Returns how far H moves what is in the image.
+  std::int64_t reach_px() const { return reach_px_; }
+  /// Returns the number of defoci, one for each hat function.
+  std::int64_t num_defoci() const { return num_defoci_; }
+
+ private:
+  using Image = fourier::ImageTransform::Image;
+
+  double transfer(std::int64_t x, std::int64_t y, double more_defocus_A) const;
+  double defocus_of(std::int64_t s) const { return first_defocus_A_ + defocus_step_A_ * double(s); }
+  float weight_at(std::int64_t x, std::int64_t y, std::int64_t s) const;
+  Image extended_pair(std::span<const float> image, std::int64_t s) const;
+  void add_filtered_pair(const Image& pair, std::int64_t s, Image& sum) const;
+  void add_folded_pair(const Image& pair, std::int64_t s, std::vector<float>& sum) const;
+
+  ViewTransfer view_;
+  Ctf ctf_;
+  std::int64_t reach_px_;
+  double first_defocus_A_ = 0.0, defocus_step_A_ = 0.0;  // added to that of the view
+  std::int64_t num_defoci_ = 1;
+  LineExtension across_, along_;  // x and y
+  fourier::ImageTransform transform_;
+  std::vector<float> signal_;  // what damage leaves, [ky, kx]
+};
+
+}  // namespace tomofield::microscope
