@@ -24,6 +24,7 @@ struct SimulateArguments {
   std::optional<std::int64_t> thickness_px;
   std::optional<std::string> tilts;
   std::optional<std::string> contrast;
+  std::optional<std::string> defocus;
   std::optional<double> noise;
   std::optional<double> gain_spread;
   std::optional<std::int64_t> num_beads;
@@ -49,6 +50,22 @@ simulate::TiltRange parse_tilts(const std::string& text) {
   take(tilts.last_deg, ':');
   take(tilts.step_deg, '\0');
   return tilts;
+}
+
+/// Parses "LOW:HIGH", or one number, in µm.
+simulate::Imaging::Range parse_defocus(const std::string& text) {
+  const char* const end = text.data() + text.size();
+  simulate::Imaging::Range range;
+  auto [next, fault] = std::from_chars(text.data(), end, range.low_um);
+  range.high_um = range.low_um;
+  if (fault == std::errc() && next != end && *next == ':') {
+    const auto high = std::from_chars(next + 1, end, range.high_um);
+    next = high.ptr;
+    fault = high.ec;
+  }
+  if (fault != std::errc() || next != end)
+    throw Error(fmt::format("--defocus is '{}': give low:high in µm, as 3:5, or one number", text));
+  return range;
 }
 
 /// The contrast that is meant: counts of electrons are dark by nature.
@@ -98,8 +115,11 @@ void run_simulate(SimulateArguments& arguments) {
   simulate::SimulationOptions& options = arguments.options;
   if (arguments.noise && options.dose)
     throw Error("--noise and --dose are two kinds of noise: give one of them");
+  if (options.noise_blur_px > 0.0 && options.dose)
+    throw Error("--noise-blur is for --noise: the counts of --dose are independent");
   resolve_specimen(arguments);
   options.contrast = resolve_contrast(arguments);
+  if (arguments.defocus) options.imaging.defocus = parse_defocus(*arguments.defocus);
   options.noise = arguments.noise.value_or(options.noise);
   options.write_truth = !arguments.without_truth;
   options.misalignment.magnification_spread = arguments.magnification_percent / 100.0;
@@ -141,6 +161,42 @@ void add_misalignment_options(CLI::App& command, SimulateArguments& arguments) {
       .add_option("--misalign-local", misalignment.local_px,
                   "Rms displacement in pixels by a smooth random warp of each view, which changes "
                   "slowly from view to view")
+      ->capture_default_str();
+}
+
+void add_imaging_options(CLI::App& command, SimulateArguments& arguments) {
+  simulate::Imaging& imaging = arguments.options.imaging;
+  CLI::Option* defocus = command.add_option(
+      "--defocus", arguments.defocus,
+      "Filter the views by a contrast transfer function, with an underfocus of low:high µm that is "
+      "drawn for each view (default: plain projections)");
+  command
+      .add_option("--astigmatism", imaging.astigmatism_um,
+                  "Difference between the two defoci of a view in µm; its direction is drawn")
+      ->needs(defocus)
+      ->capture_default_str();
+  command.add_option("--voltage", imaging.optics.voltage_kV, "Voltage of the microscope in kV")
+      ->capture_default_str();
+  command
+      .add_option("--cs", imaging.optics.spherical_aberration_mm,
+                  "Spherical aberration of the microscope in mm")
+      ->needs(defocus)
+      ->capture_default_str();
+  command
+      .add_option("--amplitude-contrast", imaging.optics.amplitude_contrast,
+                  "Share of the contrast that is absorption, 0 to 1")
+      ->needs(defocus)
+      ->capture_default_str();
+  command
+      .add_option(
+          "--dose-per-tilt", imaging.dose_per_tilt,
+          "Electrons per Å² and view, in dose-symmetric order: radiation damage weakens the "
+          "signal of late views (0: none)")
+      ->capture_default_str();
+  command
+      .add_option("--noise-blur", arguments.options.noise_blur_px,
+                  "Blur the noise of --noise by a Gaussian with this standard deviation in pixels, "
+                  "and keep its strength (0: white noise)")
       ->capture_default_str();
 }
 
@@ -193,6 +249,7 @@ void add_simulate_command(CLI::App& program) {
       "Standard deviation of the logarithm of each view's random scale (default: 0; "
       "with --yardstick c 0.03)");
   add_misalignment_options(*command, *arguments);
+  add_imaging_options(*command, *arguments);
   command->add_option(
       "--gold", arguments->num_beads,
       "Number of gold beads in the field of view (default: 0; with --yardstick c 12 "

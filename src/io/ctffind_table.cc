@@ -93,7 +93,7 @@ void write_ctffind(const std::filesystem::path& path, std::span<const WrittenCtf
       "# Output from tomofield simulate, in the form of CTFFind version 4\n"
       "# Number of micrographs: {}\n"
       "# Pixel size: {:.3f} Angstroms ; acceleration voltage: {:.1f} keV ; spherical aberration: "
-      "{:.2f} mm ; amplitude contrast: {:.2f}\n"
+      "{} mm ; amplitude contrast: {}\n"
       "# Columns: #1 - micrograph number; #2 - defocus 1 [Angstroms]; #3 - defocus 2; #4 - azimuth "
       "of astigmatism; #5 - additional phase shift [radians]; #6 - cross correlation; #7 - spacing "
       "(in Angstroms) up to which CTF rings were fit successfully\n",

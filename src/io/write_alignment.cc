@@ -34,6 +34,22 @@ void write_imod_transforms(const std::filesystem::path& path,
   write_text_file(path, text);
 }
 
+void write_mdoc(const std::filesystem::path& path, const Mdoc& mdoc) {
+  std::string text;
+  const auto add = [&](const char* key, const std::optional<double>& value) {
+    if (value) text += fmt::format("{} = {:.4f}\n", key, unsigned_zero(*value));
+  };
+  add("PixelSpacing", mdoc.pixel_spacing_A);
+  if (!mdoc.image_file.empty()) text += fmt::format("ImageFile = {}\n", mdoc.image_file);
+  for (const MdocSection& section : mdoc.sections) {
+    text += fmt::format("\n[ZValue = {}]\n", section.section);
+    add("TiltAngle", section.tilt_deg);
+    add("ExposureDose", section.dose);
+    add("PriorRecordDose", section.prior_dose);
+  }
+  write_text_file(path, text);
+}
+
 void write_aretomo_alignment(const std::filesystem::path& path, const AreTomoAlignment& alignment) {
   TOMOFIELD_CHECK(alignment.raw_size && !alignment.rows.empty() &&
                       alignment.dark_tilt_deg.size() == alignment.dark_sections.size(),

@@ -20,6 +20,10 @@ void write_number_column(const std::filesystem::path& path, std::span<const doub
 void write_imod_transforms(const std::filesystem::path& path,
                            std::span<const ImodTransform> transforms);
 
+/// Writes SerialEM's .mdoc with what the Mdoc has: pixel spacing, stack, and for each section the
+/// tilt angle, the dose and the dose before it, all with four decimals.
+void write_mdoc(const std::filesystem::path& path, const Mdoc& mdoc);
+
 /// Writes AreTomo's .aln file without local alignment. Rotations have five decimals,
 /// magnifications five, shifts three and tilts four. The thickness has three and is written if it
 /// is there. The columns SMEAN, SFIT, SCALE and BASE, which describe AreTomo's own images, are 1,

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "base/parallel.h"
+#include "fourier/image_transform.h"
 
 namespace tomofield::simulate {
 namespace {
@@ -71,6 +72,28 @@ void add_gaussian_noise(std::span<float> image, std::int64_t width, double sigma
   for_each_pixel(image, width, seed, first_stream, [sigma](double value, base::Random& random) {
     return value + sigma * random.normal();
   });
+}
+
+void add_blurred_noise(std::span<float> image, std::int64_t width, double sigma, double blur_px,
+                       std::uint64_t seed, std::uint64_t first_stream) {
+  const std::int64_t height = std::ssize(image) / width;
+  std::vector<float> white(image.size());
+  add_gaussian_noise(white, width, sigma, seed, first_stream);
+  const fourier::ImageTransform transform(width, height);
+  fourier::ImageTransform::Image noise(white.begin(), white.end());
+  transform.forward(noise);
+  double power = 0.0;
+  for (std::int64_t y = 0; y < height; ++y)
+    for (std::int64_t x = 0; x < width; ++x) {
+      const double f =
+          std::hypot(fourier::cycles_per_pixel(x, width), fourier::cycles_per_pixel(y, height));
+      const double share = std::exp(-0.5 * std::pow(2.0 * std::numbers::pi * blur_px * f, 2));
+      noise[static_cast<std::size_t>(y * width + x)] *= static_cast<float>(share);
+      power += share * share;
+    }
+  transform.inverse(noise);
+  const auto scale = static_cast<float>(std::sqrt(static_cast<double>(image.size()) / power));
+  for (std::size_t i = 0; i < image.size(); ++i) image[i] += scale * noise[i].real();
 }
 
 void draw_counts(std::span<float> image, std::int64_t width, std::uint64_t seed,

@@ -13,6 +13,7 @@
 
 #include "base/percentile.h"
 #include "geometry/imod_transform.h"
+#include "io/ctf_table.h"
 #include "io/json.h"
 #include "io/mrc.h"
 #include "io/output_files.h"
@@ -20,6 +21,7 @@
 #include "io/output_lock.h"
 #include "io/output_set.h"
 #include "io/write_alignment.h"
+#include "simulate/imaging.h"
 #include "simulate/noise.h"
 #include "simulate/phantom.h"
 #include "simulate/project_phantom.h"
@@ -42,16 +44,19 @@ struct OutputFiles {
         truth(directory / "truth.mrc"),
         angles(directory / "tilt_series.tlt"),
         transforms(directory / "tilt_series.xf"),
+        ctf(directory / "tilt_series_ctf.txt"),
+        defocus(directory / "tilt_series.defocus"),
+        mdoc(directory / "tilt_series.mdoc"),
         record(directory / "phantom.json") {}
-  fs::path series, clean, truth, angles, transforms, record;
+  fs::path series, clean, truth, angles, transforms, ctf, defocus, mdoc, record;
 };
 
 // Checks that the files can be written, and locks the series, which every simulation writes.
 std::vector<io::OutputLock> claim_files(const OutputFiles& files, bool overwrite) {
   return io::claim_outputs({files.series}, [&] {
-    io::check_output_files(
-        {files.series, files.clean, files.truth, files.angles, files.transforms, files.record}, {},
-        overwrite, "give another directory, or --overwrite to replace it");
+    io::check_output_files({files.series, files.clean, files.truth, files.angles, files.transforms,
+                            files.ctf, files.defocus, files.mdoc, files.record},
+                           {}, overwrite, "give another directory, or --overwrite to replace it");
   });
 }
 
@@ -115,6 +120,29 @@ double noise_sigma(const Phantom& phantom, const std::vector<SimulatedView>& vie
   return noise * (base::percentile(std::move(image), 99.5) - low);
 }
 
+// Computes what a view shows before the detector.
+void compute_view(const Phantom& phantom, const SimulatedView& view,
+                  const SimulationOptions& options, std::vector<float>& image) {
+  const ViewFrame frame = frame_of(view, phantom);
+  if (options.imaging.filters())
+    image_view(phantom, frame, options.imaging, view.defocus, view.exposure.at_middle(),
+               options.voxel_size_A, image);
+  else
+    project_view(phantom, frame, image);
+}
+
+void add_noise(std::vector<float>& image, const Phantom& phantom, const SimulationOptions& options,
+               std::optional<double> sigma, std::uint64_t first_stream) {
+  const std::int64_t width = phantom.shape.nx;
+  const std::uint64_t seed = options.cell.seed;
+  if (!sigma)
+    draw_counts(image, width, seed, first_stream);
+  else if (options.noise_blur_px > 0.0)
+    add_blurred_noise(image, width, *sigma, options.noise_blur_px, seed, first_stream);
+  else
+    add_gaussian_noise(image, width, *sigma, seed, first_stream);
+}
+
 // Writes both stacks, one view at a time.
 void write_views(const OutputFiles& files, const Phantom& phantom,
                  const std::vector<SimulatedView>& views, const SimulationOptions& options,
@@ -129,15 +157,11 @@ void write_views(const OutputFiles& files, const Phantom& phantom,
   std::vector<float> image(static_cast<std::size_t>(shape.nx * shape.ny));
   for (std::int64_t i = 0; i < num_views; ++i) {
     const SimulatedView& view = views[static_cast<std::size_t>(i)];
-    project_view(phantom, frame_of(view, phantom), image);
+    compute_view(phantom, view, options, image);
     detector.expose(image, view.gain);
     clean.write_section(i, image);
-    const auto first_stream = kNoiseStream + static_cast<std::uint64_t>(i * shape.ny);
-    if (sigma) {
-      add_gaussian_noise(image, shape.nx, *sigma, options.cell.seed, first_stream);
-    } else {
-      draw_counts(image, shape.nx, options.cell.seed, first_stream);
-    }
+    add_noise(image, phantom, options, sigma,
+              kNoiseStream + static_cast<std::uint64_t>(i * shape.ny));
     series.write_section(i, image);
   }
   clean.close();
@@ -158,7 +182,48 @@ void write_transforms(const fs::path& path, const std::vector<SimulatedView>& vi
   io::write_imod_transforms(path, transforms);
 }
 
+// Writes the contrast transfer in the forms of two programs.
+void write_ctf(const OutputFiles& files, const std::vector<SimulatedView>& views,
+               const SimulationOptions& options) {
+  std::vector<io::WrittenCtf> sections;
+  for (const SimulatedView& view : views) sections.push_back({view.tilt_deg, view.defocus.value()});
+  const microscope::Optics& optics = options.imaging.optics;
+  io::write_ctffind(files.ctf, sections,
+                    {optics.voltage_kV, optics.spherical_aberration_mm, optics.amplitude_contrast},
+                    options.voxel_size_A);
+  io::write_imod_defocus(files.defocus, sections);
+}
+
+void write_exposures(const OutputFiles& files, const std::vector<SimulatedView>& views,
+                     const SimulationOptions& options) {
+  io::Mdoc mdoc;
+  mdoc.pixel_spacing_A = options.voxel_size_A;
+  mdoc.image_file = files.series.filename().string();
+  for (const SimulatedView& view : views) {
+    io::MdocSection& section = mdoc.sections.emplace_back();
+    section.section = std::ssize(mdoc.sections) - 1;
+    section.tilt_deg = view.tilt_deg;
+    section.dose = view.exposure.of_view;
+    section.prior_dose = view.exposure.before;
+  }
+  io::write_mdoc(files.mdoc, mdoc);
+}
+
 using Json = nlohmann::json;
+
+// Adds the options of the microscope that differ from a plain projection.
+void add_imaging(const SimulationOptions& options, Json& json) {
+  const Imaging& imaging = options.imaging;
+  if (imaging.filters()) json["voltage_kV"] = imaging.optics.voltage_kV;
+  if (imaging.defocus) {
+    json["defocus_um"] = {imaging.defocus->low_um, imaging.defocus->high_um};
+    json["astigmatism_um"] = imaging.astigmatism_um;
+    json["spherical_aberration_mm"] = imaging.optics.spherical_aberration_mm;
+    json["amplitude_contrast"] = imaging.optics.amplitude_contrast;
+  }
+  if (imaging.dose_per_tilt > 0.0) json["dose_per_tilt"] = imaging.dose_per_tilt;
+  if (options.noise_blur_px > 0.0) json["noise_blur_px"] = options.noise_blur_px;
+}
 
 Json options_json(const SimulationOptions& options) {
   const CellOptions& cell = options.cell;
@@ -184,6 +249,7 @@ Json options_json(const SimulationOptions& options) {
   if (misalignment.local_px > 0.0) json["local_px"] = misalignment.local_px;
   if (cell.content == Content::kTextured) json["content"] = "textured";
   if (!options.reference_has_beads) json["reference_has_gold"] = false;
+  add_imaging(options, json);
   if (options.dose) {
     json["dose_per_px"] = *options.dose;
     json["absorption_per_A"] = options.absorption_per_A;
@@ -224,6 +290,14 @@ Json view_json(const SimulatedView& view, const Misalignment& misalignment) {
     json["rotation_deg"] =
         std::atan2(map.m21 - map.m12, map.m11 + map.m22) * 180.0 / std::numbers::pi;
     json["magnification"] = std::sqrt(map.m11 * map.m22 - map.m12 * map.m21);
+  }
+  if (view.defocus) {
+    json["defocus_A"] = {view.defocus->u_A, view.defocus->v_A};
+    json["defocus_angle_deg"] = view.defocus->angle_deg;
+  }
+  if (view.exposure.of_view > 0.0) {
+    json["exposure_before"] = view.exposure.before;
+    json["exposure"] = view.exposure.of_view;
   }
   if (view.warp) {
     json["local_px"] = Json::array();
@@ -304,6 +378,16 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
     results.remove_old(files.transforms);
   else
     write_transforms(files.transforms, views);
+  if (options.imaging.defocus) {
+    write_ctf(files, views, options);
+  } else {
+    results.remove_old(files.ctf);
+    results.remove_old(files.defocus);
+  }
+  if (options.imaging.dose_per_tilt > 0.0)
+    write_exposures(files, views, options);
+  else
+    results.remove_old(files.mdoc);
   io::write_json(files.record, phantom_json(options, phantom, views, summary));
   results.commit();
   return summary;

@@ -30,9 +30,13 @@ struct SimulationSummary {
 ///                    beads (SimulationOptions::reference_has_beads)
 ///   tilt_series.tlt  the true angles
 ///   tilt_series.xf   only with misalignment: transforms that undo all of it but local motion
+///   tilt_series_ctf.txt, tilt_series.defocus
+///                    only with a defocus: the contrast transfer, as CTFFIND and IMOD write it
+///   tilt_series.mdoc only with a dose per tilt: the exposures
 ///   phantom.json     options, views and every ellipsoid, blob and bead
 ///
-/// With bright contrast, the views are line integrals in voxels. It keeps one view, or a few
+/// With bright contrast, the views are line integrals in voxels; with a defocus or a dose per tilt,
+/// they are these integrals as the microscope filters them. It keeps one view, or a few
 /// sections of the truth, in memory. The same options give the same bytes with any number of
 /// threads. Throws Error for invalid options, for files that exist (unless `overwrite`) and if it
 /// cannot write.

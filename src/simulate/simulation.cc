@@ -91,6 +91,22 @@ std::vector<std::string> SimulationOptions::validate() const {
           "-180 to 180 degrees");
   require(is_spread(m.local_px, size / 20.0), "the local motion", m.local_px,
           "0 to a twentieth of the size");
+  const Imaging& i = imaging;
+  if (i.defocus) {
+    const auto [low, high] = *i.defocus;
+    require(is_spread(low, 50.0) && high >= low && high <= 50.0, "the defocus in µm", high,
+            "a range within 0 to 50, the smaller number first");
+  }
+  require(is_spread(i.astigmatism_um, 5.0), "the astigmatism in µm", i.astigmatism_um, "0 to 5");
+  require(i.optics.voltage_kV >= 20.0 && i.optics.voltage_kV <= 3000.0, "the voltage in kV",
+          i.optics.voltage_kV, "20 to 3000");
+  require(is_spread(i.optics.spherical_aberration_mm, 20.0), "the spherical aberration in mm",
+          i.optics.spherical_aberration_mm, "0 to 20");
+  require(is_spread(i.optics.amplitude_contrast, 1.0), "the amplitude contrast",
+          i.optics.amplitude_contrast, "0 to 1");
+  require(is_spread(i.dose_per_tilt, 1000.0), "the dose per tilt", i.dose_per_tilt,
+          "0 to 1000 electrons per Å²");
+  require(is_spread(noise_blur_px, 20.0), "the noise's blur", noise_blur_px, "0 to 20 pixels");
   require(cell.num_beads >= 0 && cell.num_beads <= 100000, "the number of gold beads",
           static_cast<double>(cell.num_beads), "0 to 100000");
   if (cell.num_beads > 0) {
@@ -119,6 +135,15 @@ std::vector<SimulatedView> plan_views(const SimulationOptions& options) {
     views[i].gain = std::exp(options.gain_spread * gains.normal());
     views[i].raw_from_aligned = maps[i];
     if (!warps.empty()) views[i].warp = warps[i];
+  }
+  const auto defoci = draw_defoci(options.imaging, seed, views.size());
+  std::vector<double> tilts_deg;
+  for (const SimulatedView& view : views) tilts_deg.push_back(view.tilt_deg);
+  const auto exposures = microscope::exposures_in_order(dose_symmetric_order(tilts_deg),
+                                                        options.imaging.dose_per_tilt);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    views[i].defocus = defoci[i];
+    views[i].exposure = exposures[i];
   }
   return views;
 }

@@ -9,6 +9,7 @@
 
 #include "base/enum_names.h"
 #include "geometry/raw_from_aligned.h"
+#include "simulate/imaging.h"
 #include "simulate/misalignment.h"
 #include "simulate/phantom.h"
 #include "simulate/view_warp.h"
@@ -40,6 +41,7 @@ struct SimulationOptions {
   /// Standard deviation of the Gaussian noise, the same in all views, divided by the range (0.5 to
   /// 99.5 percentile) of the noise-free view nearest to zero tilt, at gain 1.
   double noise = 0.05;
+  double noise_blur_px = 0.0;  ///< standard deviation of a Gaussian that blurs that noise; 0: white
   /// Electrons per pixel and view of an empty beam. If given, views are Poisson counts of mean
   /// dose · exp(−absorption · ∫ density) and have no Gaussian noise.
   std::optional<double> dose;
@@ -51,6 +53,7 @@ struct SimulationOptions {
   bool reference_has_beads = true;
   double gain_spread = 0.0;  ///< standard deviation of the logarithm of each view's scale
   Misalignment misalignment;
+  Imaging imaging;
   Contrast contrast = Contrast::kBright;
   bool write_truth = true;
 
@@ -70,6 +73,8 @@ struct SimulatedView {
   geometry::RawFromAligned raw_from_aligned{};
   std::optional<ViewWarp> warp{};  ///< local motion
   double gain = 1.0;
+  std::optional<io::Defocus> defocus{};  ///< of the recorded image, on the tilt axis
+  microscope::Exposure exposure{};
 };
 
 /// Returns the views of a series: the tilts, and the random misalignment and gains of the seed.

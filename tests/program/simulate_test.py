@@ -148,7 +148,7 @@ FILES = ["tilt_series.mrc", "clean.mrc", "truth.mrc", "tilt_series.tlt", "phanto
 
 
 def test_same_seed_same_bytes_whatever_the_threads():
-    options = [*SMALL, "--gold", 5, "--gain", 0.1, "--misalign", 2, "--misalign-local", 1,
+    options = [*SMALL, "--defocus", "2:4", "--gold", 5, "--gain", 0.1, "--misalign", 2, "--misalign-local", 1,
                "--dose", 50, "--gold-diameter", 40]
     one = simulate("one", *options, threads=1)
     two = simulate("two", *options, threads=2)
@@ -279,6 +279,90 @@ def test_gold_beads_are_where_the_record_says():
     np.testing.assert_allclose(gold.read("truth.mrc"), expected, atol=1e-5)
 
 
+def transfer(kx, ky, view, more_defocus=0.0):
+    """Returns minus the contrast transfer function as CTFFIND4 defines it, at 300 kV with a Cs of 2.7 mm
+    and an amplitude contrast of 0.07, times the signal that Grant and Grigorieff's exposure filter
+    leaves."""
+    wavelength = 12.2643 / np.sqrt(300e3 + 0.978476e-6 * 300e3**2)
+    k2, direction = kx**2 + ky**2, np.arctan2(ky, kx) - np.radians(view["defocus_angle_deg"])
+    u, v = view["defocus_A"]
+    defocus = (u + v) / 2 + (u - v) / 2 * np.cos(2 * direction) + more_defocus
+    chi = np.pi * wavelength * k2 * (defocus - wavelength**2 * k2 * 2.7e7 / 2)
+    dose = view["exposure_before"] + view["exposure"] / 2
+    with np.errstate(divide="ignore"):
+        signal = np.exp(-dose / 2 / (0.245 * np.sqrt(k2) ** -1.665 + 2.81))
+    return signal * (np.sqrt(1 - 0.07**2) * np.sin(chi) + 0.07 * np.cos(chi))
+
+
+def imaged(projection, view, pixel, has_slope=True):
+    """Filters a projection column by column, each with the defocus of its own place."""
+    pad = 40
+    wide = np.pad(projection, pad, mode="reflect")
+    kx, ky = np.meshgrid(*[np.fft.fftfreq(len(wide), pixel)] * 2)
+    spectrum = np.zeros(wide.shape, complex)
+    for x in range(len(wide)):
+        column = np.zeros_like(wide)
+        column[:, x] = wide[:, x]
+        slope = np.tan(np.radians(view["tilt_deg"])) * pixel * has_slope
+        spectrum += np.fft.fft2(column) * transfer(kx, ky, view, slope * (x + 0.5 - len(wide) / 2))
+    return np.fft.ifft2(spectrum).real[pad:-pad, pad:-pad]
+
+
+IMAGING = ["--defocus", "3:5", "--astigmatism", 0.4, "--dose-per-tilt", 20]
+
+
+def test_views_are_filtered_by_the_local_contrast_transfer_and_by_damage():
+    options = ["--size", 128, "--thickness", 60, "--extended", "--tilts=-60:60:60", "--voxel-size", 5,
+               "--no-truth"]
+    plain = simulate("plain", *options)
+    ours = simulate("imaged", *options, *IMAGING)
+    assert [view["exposure_before"] for view in ours.views] == [40, 0, 20]
+    assert ours.record["noise_sigma"] == plain.record["noise_sigma"]
+    clean = ours.read("clean.mrc")
+    for view, projection, image in zip(ours.views, plain.read("clean.mrc"), clean):
+        error = error_of(image, imaged(projection, view, 5))
+        assert error < 0.015, view
+        assert error_of(image, imaged(projection, {**view, "exposure": 0}, 5)) > 0.04, view
+        if view["tilt_deg"] != 0:
+            assert error_of(image, imaged(projection, view, 5, has_slope=False)) > 2 * error, view
+    dark = simulate("dark", *options, *IMAGING, "--contrast", "dark")
+    np.testing.assert_allclose(dark.read("clean.mrc"), dark.record["empty_beam"] - clean, atol=1e-4)
+
+
+def test_files_of_other_programs_have_the_contrast_transfer_and_the_doses():
+    series = simulate("imaged", *SMALL, *IMAGING)
+    ctf = np.loadtxt(series.path("tilt_series_ctf.txt"))
+    imod = np.loadtxt(series.path("tilt_series.defocus"), skiprows=1)
+    mdoc = open(series.path("tilt_series.mdoc")).read()
+    for i, view in enumerate(series.views):
+        u, v = view["defocus_A"]
+        assert 3e4 < (u + v) / 2 < 5e4 and abs(u - v - 4000) < 1e-6
+        np.testing.assert_allclose(ctf[i, :5], [i + 1, u, v, view["defocus_angle_deg"], 0])
+        np.testing.assert_allclose(imod[i, [0, 1, 2, 4, 5, 6]],
+                                   [i + 1, i + 1, view["tilt_deg"], u / 10, v / 10,
+                                    view["defocus_angle_deg"]])
+        section = mdoc.split("[ZValue = ")[i + 1]
+        assert f"PriorRecordDose = {view['exposure_before']:.4f}" in section
+        assert "ExposureDose = 20.0000" in section
+    # Tilts in steps of 10 degrees from -60 to 60, in dose-symmetric order
+    order = np.argsort([view["exposure_before"] for view in series.views])
+    assert [10 * (i - 6) for i in order] == [0, 10, -10, -20, 20, 30, -30, -40, 40, 50, -50, -60, 60]
+    # A plain series has none of these files, and removes those of an earlier one.
+    assert run("simulate", series.directory, *SMALL, "--overwrite").returncode == 0
+    assert sorted(os.listdir(series.directory)) == sorted(FILES)
+
+
+def test_noise_is_blurred_and_keeps_its_strength():
+    series = simulate("blurred", *SMALL, "--noise-blur", 0.8)
+    noise = series.read("tilt_series.mrc") - series.read("clean.mrc")
+    sigma = series.record["noise_sigma"]
+    assert abs(noise.std() / sigma - 1) < 0.03
+    for axis in (1, 2):  # a blurred noise has the autocorrelation exp(-d² / (4 blur²))
+        neighbours = (noise * np.roll(noise, 1, axis)).mean() / noise.var()
+        assert abs(neighbours - np.exp(-1 / (4 * 0.8**2))) < 0.03, neighbours
+    assert abs((noise[1:] * noise[:-1]).mean() / noise.var()) < 0.03
+
+
 def test_existing_files_are_kept_unless_asked():
     series = simulate("kept", *SMALL, "--misalign", 1)
     before = open(series.path("tilt_series.mrc"), "rb").read()
@@ -314,6 +398,14 @@ def test_bad_options_are_named_and_nothing_is_written():
         (["--misalign-axis", "200"], "tilt axis"),
         (["--misalign-local", "50"], "local motion"),
         (["--gold", "5", "--gold-diameter", "1e6"], "diameter"),
+        (["--defocus", "3:x"], "low:high"),
+        (["--defocus", "5:3"], "smaller number first"),
+        (["--defocus", "nan"], "defocus"),
+        (["--defocus", "4", "--amplitude-contrast", "2"], "amplitude contrast"),
+        (["--astigmatism", "0.1"], "--defocus"),
+        (["--dose-per-tilt", "-1"], "dose per tilt"),
+        (["--noise-blur", "-1"], "blur"),
+        (["--noise-blur", "1", "--dose", "5"], "--noise-blur"),
         (["--yardstick", "d"], "yardstick"),
         (["--yardstick", "a", "--extended"], "--extended"),
         (["--yardstick", "b", "--tilts", "-60:60:3"], "--tilts"),
