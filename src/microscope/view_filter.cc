@@ -21,14 +21,6 @@ std::pair<double, double> range_of(const DefocusSlope& slope, std::int64_t width
   return {slope.at_centre_A - half_A, slope.at_centre_A + half_A};
 }
 
-std::int64_t reach_of(const ViewTransfer& view, std::int64_t width, std::int64_t height) {
-  const auto [low_A, high_A] = range_of(view.slope, width, height);
-  const double nyquist = 0.5 / view.pixel_size_A;
-  const double reach_A =
-      Ctf(view.optics, view.defocus).reach_A(nyquist, std::max(std::abs(low_A), std::abs(high_A)));
-  return static_cast<std::int64_t>(std::ceil(reach_A / view.pixel_size_A));
-}
-
 // Returns an extension whose two mirror images do not reach over each other into the line.
 LineExtension extension_of(std::int64_t length, std::int64_t reach_px) {
   const std::int64_t margin_px = reach_px + kSmallestMargin_px;
@@ -37,12 +29,19 @@ LineExtension extension_of(std::int64_t length, std::int64_t reach_px) {
 
 }  // namespace
 
+std::int64_t reach_px(const ViewTransfer& view, std::int64_t width, std::int64_t height) {
+  const auto [low_A, high_A] = range_of(view.slope, width, height);
+  const double nyquist = 0.5 / view.pixel_size_A;
+  const double reach_A =
+      Ctf(view.optics, view.defocus).reach_A(nyquist, std::max(std::abs(low_A), std::abs(high_A)));
+  return static_cast<std::int64_t>(std::ceil(reach_A / view.pixel_size_A));
+}
+
 ViewFilter::ViewFilter(std::int64_t width, std::int64_t height, const ViewTransfer& transfer)
     : view_(transfer),
       ctf_(transfer.optics, transfer.defocus),
-      reach_px_(reach_of(transfer, width, height)),
-      across_(extension_of(width, reach_px_)),
-      along_(extension_of(height, reach_px_)),
+      across_(extension_of(width, reach_px(transfer, width, height))),
+      along_(extension_of(height, reach_px(transfer, width, height))),
       transform_(across_.extended_length(), along_.extended_length()) {
   const double nyquist = 0.5 / view_.pixel_size_A;
   const auto [low_A, high_A] = range_of(view_.slope, width, height);

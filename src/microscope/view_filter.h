@@ -21,6 +21,9 @@ struct ViewTransfer {
   bool is_flipped = false;    ///< the view's phases were flipped: |CTF| instead of −CTF
 };
 
+/// Returns how far the transfer moves what is in an image of this size, in pixels.
+std::int64_t reach_px(const ViewTransfer& view, std::int64_t width, std::int64_t height);
+
 /// Applies the transfer H of a view to images [y, x], and its transpose. H is −CTF times what
 /// radiation damage leaves of the signal (signal_after()). Thread-safe; works on one thread.
 ///
@@ -41,8 +44,6 @@ class ViewFilter {
   /// Returns Hᵀ image: ⟨H a, b⟩ = ⟨a, Hᵀ b⟩.
   std::vector<float> apply_transpose(std::span<const float> image) const;
 
-  /// Returns how far H moves what is in the image.
-  std::int64_t reach_px() const { return reach_px_; }
   /// Returns the number of defoci, one for each hat function.
   std::int64_t num_defoci() const { return num_defoci_; }
 
@@ -58,7 +59,6 @@ class ViewFilter {
 
   ViewTransfer view_;
   Ctf ctf_;
-  std::int64_t reach_px_;
   double first_defocus_A_ = 0.0, defocus_step_A_ = 0.0;  // added to that of the view
   std::int64_t num_defoci_ = 1;
   LineExtension across_, along_;  // x and y

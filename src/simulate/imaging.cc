@@ -74,8 +74,7 @@ void image_view(const Phantom& phantom, const ViewFrame& view, const Imaging& im
                 std::span<float> image) {
   const auto transfer = transfer_of(view, imaging, defocus, exposure, pixel_size_A);
   constexpr std::int64_t kDamage_px = 8;  // damage alone blurs, by a few pixels
-  const std::int64_t margin =
-      kDamage_px + microscope::ViewFilter(view.width, view.height, transfer).reach_px();
+  const std::int64_t margin = kDamage_px + microscope::reach_px(transfer, view.width, view.height);
   ViewFrame wide = view;
   wide.width += 2 * margin;
   wide.height += 2 * margin;

@@ -30,23 +30,32 @@ TEST(DrawDefoci, StayInTheRangeAndFollowTheSeed) {
   EXPECT_NE(draw_defoci(imaging, 2, 50)[7]->u_A, defoci[7]->u_A);
 }
 
-// A recorded view that is turned shows the same as the aligned one, turned: the defocus changes
-// across the tilt axis, and the direction of the astigmatism turns with the image.
-TEST(ImageView, OfATurnedViewIsTheTurnedView) {
+// Returns an extended specimen with two spheres, of which one crosses the border of a view of 96
+// pixels.
+Phantom two_spheres() {
   Phantom phantom;
   phantom.shape = {.nx = 96, .ny = 96, .nz = 40};
   phantom.is_extended = true;
   phantom.half_width_px = 48;
-  for (const auto& center : {std::array{20.0, 8.0, 3.0}, std::array{-18.0, -12.0, 0.0}})
+  for (const auto& center : {std::array{20.0, 8.0, 3.0}, std::array{-18.0, -46.0, 0.0}})
     phantom.bodies.push_back(make_sphere(center, 6.0, 1.0));
-  Imaging imaging;
+  return phantom;
+}
+
+std::vector<float> image_of(const ViewFrame& view, const io::Defocus& defocus) {
+  std::vector<float> image(static_cast<std::size_t>(view.width * view.height));
+  image_view(two_spheres(), view, {}, defocus, 30, 5.0, image);
+  return image;
+}
+
+// A recorded view that is turned shows the same as the aligned one, turned: the defocus changes
+// across the tilt axis, and the direction of the astigmatism turns with the image.
+TEST(ImageView, OfATurnedViewIsTheTurnedView) {
   const ViewFrame aligned{.width = 96, .height = 96, .tilt_deg = 50};
   ViewFrame turned = aligned;
   turned.raw_from_aligned = {0, -1, 1, 0, 0, 0};  // by +90 degrees
   const io::Defocus defocus{42000, 36000, 25, 0}, turned_defocus{42000, 36000, 115, 0};
-  std::vector<float> a(96 * 96), b(96 * 96);
-  image_view(phantom, aligned, imaging, defocus, 30, 5.0, a);
-  image_view(phantom, turned, imaging, turned_defocus, 30, 5.0, b);
+  const auto a = image_of(aligned, defocus), b = image_of(turned, turned_defocus);
   float largest = 0.0f;
   for (int y = 0; y < 96; ++y)
     for (int x = 0; x < 96; ++x) {
@@ -55,6 +64,15 @@ TEST(ImageView, OfATurnedViewIsTheTurnedView) {
       largest = std::max(largest, std::abs(a[y * 96 + x] - a[0]));
     }
   EXPECT_GT(largest, 2.0f);
+}
+
+TEST(ImageView, DoesNotDependOnWhereTheViewEnds) {
+  const ViewFrame small{.width = 96, .height = 96, .tilt_deg = -50};
+  const ViewFrame wide{.width = 160, .height = 140, .tilt_deg = -50};
+  const io::Defocus defocus{42000, 36000, 25, 0};
+  const auto a = image_of(small, defocus), b = image_of(wide, defocus);
+  for (int y = 0; y < 96; ++y)
+    for (int x = 0; x < 96; ++x) EXPECT_NEAR(a[y * 96 + x], b[(y + 22) * 160 + x + 32], 0.03);
 }
 
 }  // namespace
