@@ -148,7 +148,7 @@ CtfTable read_imod_defocus(const std::filesystem::path& path) {
   if (form.version == 3) {
     lines.erase(lines.begin());
   } else {  // the version ends the first line
-    lines.front().text.erase(lines.front().text.find_last_not_of("2") + 1);
+    lines.front().text.erase(lines.front().text.find_last_not_of('2') + 1);
   }
   const std::size_t num_words = 5 + (form.has(kHasAstigmatism) ? 2 : 0) +
                                 (form.has(kHasPhase) ? 1 : 0) + (form.has(kHasCutOn) ? 1 : 0);

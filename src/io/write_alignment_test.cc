@@ -41,6 +41,28 @@ TEST(WriteAlignment, TransformsAreReadBackWhateverTheirSize) {
             "   1.0000000   0.0000000   0.0000000   1.0000000       0.000       0.000\n");
 }
 
+TEST(WriteAlignment, AnMdocIsReadBack) {
+  const ScratchDirectory scratch;
+  Mdoc written;
+  written.pixel_spacing_A = 2.17;
+  written.image_file = "a.mrc";
+  written.sections.resize(2);
+  written.sections[1].section = 1;
+  written.sections[1].tilt_deg = -57.5;
+  written.sections[1].dose = 3.25;
+  written.sections[1].prior_dose = 6.5;
+  write_mdoc(scratch / "a.mdoc", written);
+  const Mdoc read = read_mdoc(scratch / "a.mdoc");
+  EXPECT_EQ(read.pixel_spacing_A, 2.17);
+  EXPECT_EQ(read.image_file, "a.mrc");
+  ASSERT_EQ(read.sections.size(), 2u);
+  EXPECT_FALSE(read.sections[0].tilt_deg || read.sections[0].dose || read.sections[0].prior_dose);
+  EXPECT_EQ(read.sections[1].section, 1);
+  EXPECT_EQ(read.sections[1].tilt_deg, -57.5);
+  EXPECT_EQ(read.sections[1].dose, 3.25);
+  EXPECT_EQ(read.sections[1].prior_dose, 6.5);
+}
+
 // Returns an alignment of the sections 2, 3 and 5 of five; 1 and 4 are dark.
 AreTomoAlignment some_alignment() {
   AreTomoAlignment alignment;

@@ -30,6 +30,7 @@ double smallest_step(std::vector<double> values) {
 std::optional<std::vector<Exposure>> exposures_from(
     const std::vector<std::optional<double>>& before) {
   std::vector<double> values;
+  values.reserve(before.size());
   for (const std::optional<double>& value : before) {
     if (!value || *value < 0.0) return std::nullopt;
     values.push_back(*value);
@@ -37,6 +38,7 @@ std::optional<std::vector<Exposure>> exposures_from(
   if (std::ranges::all_of(values, [](double value) { return value == 0.0; })) return std::nullopt;
   const double of_view = smallest_step(values);
   std::vector<Exposure> exposures;
+  exposures.reserve(values.size());
   for (const double value : values) exposures.push_back({value, of_view});
   return exposures;
 }
