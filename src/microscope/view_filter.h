@@ -34,7 +34,8 @@ std::int64_t reach_px(const ViewTransfer& view, std::int64_t width, std::int64_t
 ///
 /// The image is extended on all sides (LineExtension), so that nothing wraps around. Within
 /// reach_px() of its border the result depends on what the extension puts outside: give a wider
-/// projection, where one is known.
+/// projection, where one is known. The extension repeats what lies near the border, so that ‖H‖² is
+/// not at most 1, as |CTF| is, but up to 1.1.
 class ViewFilter {
  public:
   ViewFilter(std::int64_t width, std::int64_t height, const ViewTransfer& transfer);

@@ -103,6 +103,24 @@ TEST(ViewFilter, HasAnExactTranspose) {
   }
 }
 
+// The power iteration for Hᵀ H shows the largest square of a singular value.
+TEST(ViewFilter, HardlyAmplifiesAnyImage) {
+  ViewTransfer view;
+  view.defocus = {41000, 39000, 30, 0};
+  view.pixel_size_A = 5;
+  const ViewFilter filter(48, 48, view);
+  auto image = random_image(48, 48, 4);
+  double square = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    const auto next = filter.apply_transpose(filter.apply(image));
+    square = std::sqrt(dot(next, next) / dot(image, image));
+    for (std::size_t j = 0; j < image.size(); ++j)
+      image[j] = static_cast<float>(double(next[j]) / square);
+  }
+  EXPECT_LT(square, 1.1);
+  EXPECT_GT(square, 0.9);
+}
+
 TEST(ViewFilter, OfPureAbsorptionInFocusChangesNothing) {
   ViewTransfer view;
   view.optics = {300, 0, 1, 0};
