@@ -22,18 +22,10 @@ namespace {
 
 using geometry::ViewCorrection;
 
-// Predicted views take at most this memory together.
-constexpr std::size_t kPredictionBytes = std::size_t{1} << 30;
-
 // A registration to a field that was fitted to the view itself finds a part of the displacement.
 constexpr double kRelaxation = 1.3;
 // A shift changes by at most so many pixels of the stage at once.
 constexpr double kLongestStep = 2.0;
-// The first epochs of a fit show too little of the specimen.
-constexpr std::int64_t kEpochsBefore = 2;
-// With pixels this many times as wide, an update costs as much as an epoch, so every second epoch
-// has one.
-constexpr int kSlowBin = 2;
 // Rotations and magnifications are looked for in pixels at most this many times as wide.
 constexpr int kFreedomBin = 2;
 constexpr double kSure = 3.0;  // standard errors by which a freedom must pay
@@ -68,11 +60,8 @@ class AligningFit {
       take_epoch();
       if (problem_.progress && num_epochs == this->num_epochs())
         problem_.progress(report(running.seconds()));
-      const std::int64_t epochs = epochs_done();
-      const bool is_last = epochs == stage.first_epoch + stage.epochs;
       found_.was_stopped = is_to_stop();
-      const bool is_due = stage.bin != kSlowBin || epochs % 2 == 0;
-      if (epochs > kEpochsBefore && is_due && (!is_last || fit_.is_done())) update(stage);
+      if (is_update_due(stage, epochs_done(), fit_.is_done())) update(stage);
     }
     return std::move(found_);
   }
@@ -151,18 +140,14 @@ class AligningFit {
   // Predicts all views, some at a time, and returns what the registration to the predictions finds.
   std::vector<ViewCorrection> register_views(const fit::Stage& stage) {
     std::vector<std::optional<Registration>> registrations(found_.corrections.size());
-    const auto num_views = static_cast<int>(registrations.size());
-    const int at_once = views_at_once(stage);
-    for (int first = 0; first < num_views; first += at_once) {
-      std::vector<int> views(static_cast<std::size_t>(std::min(at_once, num_views - first)));
-      std::iota(views.begin(), views.end(), first);
-      const auto predicted = fit_.predict(views, std::vector<measurement::ViewModel>(views.size()));
-      base::parallel_for("register views", std::ssize(views), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
-        registrations[static_cast<std::size_t>(views[at])].emplace(
-            image_pair(predicted[at], measurement_, stage), RegistrationOptions{});
-      });
-    }
+    std::vector<LocalRegistration> local;
+    if (fit_.is_done())
+      local.assign(registrations.size(), LocalRegistration(local_options(measurement_, stage)));
+    for_each_prediction(fit_, measurement_, stage, [&](std::size_t view, const ImagePair& images) {
+      registrations[view].emplace(images, RegistrationOptions{},
+                                  local.empty() ? nullptr : &local[view]);
+    });
+    if (!local.empty()) found_.motion = motion_that_pays(local);
     if (stage.bin <= kFreedomBin) open_freedoms(registrations);
     std::vector<ViewCorrection> steps;
     for (std::size_t v = 0; v < registrations.size(); ++v) {
@@ -171,14 +156,6 @@ class AligningFit {
       found_.agreement[v] = {registration.correlation(), registration.shift_error(found_.freedoms)};
     }
     return steps;
-  }
-
-  int views_at_once(const fit::Stage& stage) const {
-    const auto pixels =
-        static_cast<std::size_t>(measurement_.geometry.width * measurement_.rays_shape().num_rows) /
-        static_cast<std::size_t>(stage.bin * stage.bin);
-    return static_cast<int>(
-        std::clamp<std::size_t>(kPredictionBytes / (8 * pixels + 1), 1, found_.corrections.size()));
   }
 
   // Opens each freedom that predicts pixels better which did not decide about it.

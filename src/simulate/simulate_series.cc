@@ -228,7 +228,7 @@ Json view_json(const SimulatedView& view, const Misalignment& misalignment) {
   if (view.warp) {
     json["local_px"] = Json::array();
     for (std::size_t node = 0; node < view.warp->nodes.size(); ++node) {
-      if (node % ViewWarp::kNodes == 0) json["local_px"].push_back(Json::array());
+      if (node % geometry::ViewWarp::kNodes == 0) json["local_px"].push_back(Json::array());
       json["local_px"].back().push_back(view.warp->nodes[node]);
     }
   }

@@ -145,6 +145,12 @@ void require_compatible(const TiltSeriesOptions& options) {
   if (options.take_log && options.contrast == Contrast::kBright) {
     throw Error("--log is for transmitted intensities (--contrast dark); bright data need none");
   }
+  const auto has_motion = [](const geometry::ViewCorrection& c) { return c.local.has_value(); };
+  if (!options.resample && std::ranges::any_of(options.corrections, has_motion)) {
+    throw Error(
+        "the alignment has local motion, which only resampled views can undo: leave out --engine "
+        "ray (of reconstruct)");
+  }
 }
 
 std::array<std::int64_t, 2> aligned_size(const InPlaneAlignment& alignment,
@@ -156,6 +162,7 @@ std::array<std::int64_t, 2> aligned_size(const InPlaneAlignment& alignment,
 void correct(const geometry::ViewCorrection& correction, PlannedView& planned) {
   planned.raw_from_aligned = geometry::corrected(planned.raw_from_aligned, correction);
   planned.view.tilt_deg += correction.tilt_deg;
+  planned.local = correction.local;
 }
 
 }  // namespace

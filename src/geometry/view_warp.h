@@ -2,7 +2,7 @@
 
 #include <array>
 
-namespace tomofield::simulate {
+namespace tomofield::geometry {
 
 /// Describes local motion in a view by a smooth field of displacements d. After the view's
 /// RawFromAligned is undone, the pixel at q shows what belongs at q + d(q), in pixels relative to
@@ -15,6 +15,7 @@ namespace tomofield::simulate {
 struct ViewWarp {
   static constexpr int kNodes = 5;  ///< along each side
   using Vector = std::array<double, 2>;
+  using Weights = std::array<double, kNodes>;
 
   double width_px = 0.0;
   double height_px = 0.0;
@@ -31,6 +32,30 @@ struct ViewWarp {
   Vector displacement(double x, double y) const;
   /// Returns a length that neither component of any displacement exceeds.
   double largest_component() const;
+  /// Returns the place q whose pixel shows what belongs at (x, y): q + d(q) = (x, y).
+  Vector source_of(double x, double y) const;
+  /// Returns the warp that makes this one first and then `next`, which refers to the view in which
+  /// the motion of this one is undone. It is exact at the nodes.
+  ViewWarp then(const ViewWarp& next) const;
+  /// Returns the same warp in pixels that are `factor` times larger.
+  ViewWarp binned(double factor) const;
+  /// Returns the mean square of the displacements over the view, x and y together.
+  double mean_square() const;
+
+  /// Describes the displacements shift + m q + φ (−q_y, q_x).
+  struct Rigid {
+    Vector shift{};
+    double magnification = 0.0, rotation = 0.0;  // m and φ
+  };
+  /// Returns the rigid displacements that are nearest to these over the view in least squares.
+  Rigid rigid_part() const;
+  /// Returns the warp less rigid displacements. In the view this is exact.
+  ViewWarp without(const Rigid& part) const;
+
+  /// Returns the weights of the nodes at a position along one side, from −1/2 to 1/2 of its length.
+  static Weights node_weights(double position);
+
+  bool operator==(const ViewWarp&) const = default;
 };
 
-}  // namespace tomofield::simulate
+}  // namespace tomofield::geometry

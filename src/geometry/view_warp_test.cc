@@ -1,4 +1,4 @@
-#include "simulate/view_warp.h"
+#include "geometry/view_warp.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "base/random.h"
 
-namespace tomofield::simulate {
+namespace tomofield::geometry {
 namespace {
 
 // Returns a warp of a view of 60 × 44 pixels whose nodes are fx and fy at their places.
@@ -100,4 +100,4 @@ TEST(ViewWarp, NoComponentExceedsTheLargest) {
 }
 
 }  // namespace
-}  // namespace tomofield::simulate
+}  // namespace tomofield::geometry
