@@ -3,8 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <vector>
 
+#include "align/joint_alignment.h"
+#include "align/local_registration.h"
 #include "align/registration.h"
+#include "distributed/communicator.h"
 #include "fit/fit.h"
 #include "fit/options.h"
 #include "fit/stages.h"
@@ -36,9 +40,13 @@ void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& me
                          const fit::Stage& stage,
                          const std::function<void(std::size_t, const ImagePair&)>& visit);
 
-/// Says whether an alignment is updated after an epoch of a stage, of which `epochs_done` of all
-/// stages are done. The first epochs show too little of the specimen. At the end of a stage the fit
-/// is already in the next one, unless it is done.
-bool is_update_due(const fit::Stage& stage, std::int64_t epochs_done, bool is_done);
+/// Takes the first `num_epochs` epochs of a fit, and calls update(stage) after those that show
+/// enough for an update of the alignment. The fit must then go on with the updated views. Progress,
+/// with the last of `steps_px`, is reported if these are all epochs. Returns true if a stop was
+/// requested meanwhile. Every process calls it.
+bool run_with_updates(const JointProblem& problem, fit::Fit& fit, std::int64_t num_epochs,
+                      const std::vector<double>& steps_px,
+                      const std::function<void(const fit::Stage&)>& update,
+                      const distributed::Communicator& processes);
 
 }  // namespace tomofield::align

@@ -58,7 +58,10 @@ void add_motion(const JointProblem& problem, const std::vector<double>& errors,
       .held_out = compare(errors, errors_of_held_out_views(problem, found.corrections, processes)),
       .steps_px = std::move(found.steps_px)};
   trial.is_accepted = trial.held_out.gain.exceeds(kSure);
-  if (trial.is_accepted) alignment.corrections = std::move(found.corrections);
+  if (trial.is_accepted) {
+    alignment.corrections = std::move(found.corrections);
+    alignment.joint.agreement = std::move(found.agreement);
+  }
   alignment.local = std::move(trial);
 }
 

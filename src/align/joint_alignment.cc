@@ -1,7 +1,5 @@
 #include "align/joint_alignment.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -10,10 +8,10 @@
 
 #include "align/aligning_fit.h"
 #include "align/gauge.h"
+#include "align/local_registration.h"
+#include "align/mean_gain.h"
 #include "align/registration.h"
 #include "align/slow_modes.h"
-#include "base/parallel.h"
-#include "base/stopwatch.h"
 #include "base/trace.h"
 #include "fit/fit.h"
 
@@ -54,15 +52,9 @@ class AligningFit {
 
   // Aligns in the first `num_epochs` epochs of the fit.
   JointAlignment run(std::int64_t num_epochs) {
-    const base::Stopwatch running;
-    while (epochs_done() < num_epochs && !found_.was_stopped) {
-      const fit::Stage stage = fit_.stage();
-      take_epoch();
-      if (problem_.progress && num_epochs == this->num_epochs())
-        problem_.progress(report(running.seconds()));
-      found_.was_stopped = is_to_stop();
-      if (is_update_due(stage, epochs_done(), fit_.is_done())) update(stage);
-    }
+    found_.was_stopped = run_with_updates(
+        problem_, fit_, num_epochs, found_.steps_px,
+        [this](const fit::Stage& stage) { update(stage); }, processes_);
     return std::move(found_);
   }
 
@@ -71,28 +63,6 @@ class AligningFit {
   double residual() const { return fit_.progress().data_loss.back(); }
 
  private:
-  std::int64_t epochs_done() const { return fit_.progress().step / fit_.steps_per_epoch(); }
-
-  void take_epoch() {
-    fit_.run([](const fit::Fit& fit) { return fit.progress().step % fit.steps_per_epoch() != 0; });
-  }
-
-  // Any process can stop all of them.
-  bool is_to_stop() const {
-    const bool asked = problem_.stop_requested && problem_.stop_requested();
-    return processes_.allreduce_max(asked ? 1.0 : 0.0) > 0.0;
-  }
-
-  base::ProgressReport report(double seconds) const {
-    const double part = fit_.work(fit_.progress().step) / fit_.work(fit_.num_steps());
-    return {.fraction_done = part,
-            .seconds_elapsed = seconds,
-            .seconds_left = (1 - part) / part * seconds,
-            .detail = found_.steps_px.empty()
-                          ? ""
-                          : fmt::format("last step {:.3f} px", found_.steps_px.back())};
-  }
-
   // Registers every view and goes on with the corrected ones.
   void update(const fit::Stage& stage) {
     const base::TraceSpan span("register views");
@@ -172,16 +142,12 @@ class AligningFit {
   // because the question comes up at every update.
   static bool pays(const std::vector<std::optional<Registration>>& registrations,
                    const Freedoms& without, const Freedoms& with) {
-    double n = 0, sum = 0, squares = 0;
+    std::vector<double> gains;
     for (const auto& registration : registrations) {
       const double before = registration->predicted_error(without);
-      if (before <= 0.0) continue;
-      const double gain = 1.0 - registration->predicted_error(with) / before;
-      n += 1, sum += gain, squares += gain * gain;
+      if (before > 0.0) gains.push_back(1.0 - registration->predicted_error(with) / before);
     }
-    const double mean = sum / std::max(n, 1.0);
-    const double variance = squares / std::max(n, 1.0) - mean * mean;
-    return n > 1 && mean > kSure * std::sqrt(std::max(variance, 0.0) / (n - 1));
+    return mean_gain(gains).exceeds(kSure);
   }
 
   const JointProblem& problem_;

@@ -1,16 +1,16 @@
 #include "align/local_alignment.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <numeric>
 #include <utility>
 
 #include "align/aligning_fit.h"
 #include "align/gauge.h"
-#include "align/local_gauge.h"
 #include "align/local_registration.h"
-#include "base/stopwatch.h"
+#include "align/slow_modes.h"
 #include "base/trace.h"
 #include "fit/fit.h"
 
@@ -22,7 +22,12 @@ using geometry::ViewWarp;
 
 // A registration to a field that was fitted to the view itself finds a part of the motion.
 constexpr double kRelaxation = 1.3;
-constexpr int kCoarseEpochs = 80, kFineEpochs = 4;
+// With wider pixels the field shows too little to find motion in it.
+constexpr int kCoarsestBin = 2;
+constexpr int kCoarseEpochs = 40, kFineEpochs = 8;
+constexpr std::size_t kComponents = 2 * ViewWarp::kNodes * ViewWarp::kNodes;
+
+double& component(ViewWarp& motion, std::size_t i) { return motion.nodes[i / 2][i % 2]; }
 
 // Divides motion that a view shows into a correction of the whole view and the rest.
 ViewCorrection step_for(const ViewWarp& motion, const Freedoms& freedoms) {
@@ -38,10 +43,8 @@ ViewCorrection step_for(const ViewWarp& motion, const Freedoms& freedoms) {
 double rms_change(const std::vector<ViewCorrection>& from, const std::vector<ViewCorrection>& to) {
   double squares = 0.0;
   for (std::size_t v = 0; v < from.size(); ++v) {
-    ViewWarp change = *to[v].local;
-    for (std::size_t i = 0; i < change.nodes.size(); ++i)
-      for (std::size_t axis = 0; axis < 2; ++axis)
-        change.nodes[i][axis] -= from[v].local->nodes[i][axis];
+    ViewWarp change = *to[v].local, before = *from[v].local;
+    for (std::size_t i = 0; i < kComponents; ++i) component(change, i) -= component(before, i);
     squares += change.mean_square();
   }
   return std::sqrt(squares / static_cast<double>(from.size()));
@@ -60,44 +63,35 @@ class LocalFit {
                                                     problem.scratch_dir, fit::band_rows(field_),
                                                     processes)),
         fit_(measurement_, field_, aligning_fit(kCoarseEpochs, kFineEpochs, problem.seed),
-             processes) {
+             processes),
+        by_tilt_(start.size()) {
+    std::iota(by_tilt_.begin(), by_tilt_.end(), std::size_t{0});
+    std::ranges::stable_sort(
+        by_tilt_, {}, [&](std::size_t view) { return measurement_.geometry.tilt_deg[view]; });
+    found_.agreement.resize(start.size());
     found_.corrections = std::move(start);
   }
 
   LocalAlignment run() {
-    while (!fit_.is_done() && !found_.was_stopped) {
-      const fit::Stage stage = fit_.stage();
-      fit_.run(
-          [](const fit::Fit& fit) { return fit.progress().step % fit.steps_per_epoch() != 0; });
-      const std::int64_t epochs = fit_.progress().step / fit_.steps_per_epoch();
-      found_.was_stopped = is_to_stop();
-      if (is_update_due(stage, epochs, fit_.is_done())) update(stage);
-    }
+    found_.was_stopped = run_with_updates(
+        problem_, fit_, fit_.num_epochs(), found_.steps_px,
+        [this](const fit::Stage& stage) {
+          if (stage.bin <= kCoarsestBin) update(stage);
+        },
+        processes_);
     return std::move(found_);
   }
 
  private:
-  // Any process can stop all of them.
-  bool is_to_stop() const {
-    const bool asked = problem_.stop_requested && problem_.stop_requested();
-    return processes_.allreduce_max(asked ? 1.0 : 0.0) > 0.0;
-  }
-
   // Registers every view and goes on with the corrected ones.
   void update(const fit::Stage& stage) {
     const base::TraceSpan span("register local motion");
-    const std::vector<ViewWarp> motion = register_views(stage);
+    const std::vector<ViewWarp> steps = amplified(register_views(stage));
     std::vector<ViewCorrection> next = found_.corrections;
-    for (std::size_t v = 0; v < next.size(); ++v) {
-      ViewWarp step = motion[v];
-      for (ViewWarp::Vector& node : step.nodes)
-        node = {kRelaxation * node[0], kRelaxation * node[1]};
-      next[v] = next[v].then(step_for(step, freedoms_));
-    }
+    for (std::size_t v = 0; v < next.size(); ++v)
+      next[v] = next[v].then(step_for(steps[v], freedoms_));
     remove_gauge(measurement_.geometry, next);
-    remove_specimen_warp(measurement_.geometry, next);
     found_.steps_px.push_back(rms_change(found_.corrections, next));
-    fprintf(stderr, "bin %d step %.4f\n", stage.bin, found_.steps_px.back());
     found_.corrections = std::move(next);
     if (fit_.is_done()) return;
     measurement::realign(problem_.recorded, found_.corrections, problem_.scratch_dir,
@@ -105,14 +99,29 @@ class LocalFit {
     fit_.reread_measurement();
   }
 
-  std::vector<ViewWarp> register_views(const fit::Stage& stage) const {
+  // Returns the motion that each view shows beside what is undone already.
+  std::vector<ViewWarp> register_views(const fit::Stage& stage) {
     std::vector<ViewWarp> motion(found_.corrections.size());
     const LocalRegistrationOptions options = local_options(measurement_, stage);
     for_each_prediction(fit_, measurement_, stage, [&](std::size_t view, const ImagePair& images) {
       LocalRegistration local(options);
       const Registration whole(images, {}, &local);
       motion[view] = local.solve(*found_.corrections[view].local);
+      found_.agreement[view] = {whole.correlation(), whole.shift_error(freedoms_)};
     });
+    return motion;
+  }
+
+  // Returns the steps that are taken for the motion that the registrations found.
+  std::vector<ViewWarp> amplified(std::vector<ViewWarp> motion) {
+    std::vector<double> values(motion.size());
+    for (std::size_t i = 0; i < kComponents; ++i) {
+      for (std::size_t at = 0; at < values.size(); ++at)
+        values[at] = component(motion[by_tilt_[at]], i);
+      slow_modes_[i].amplify(values);
+      for (std::size_t at = 0; at < values.size(); ++at)
+        component(motion[by_tilt_[at]], i) = kRelaxation * values[at];
+    }
     return motion;
   }
 
@@ -122,6 +131,8 @@ class LocalFit {
   fit::FieldOptions field_;
   measurement::Measurement measurement_;
   fit::Fit fit_;
+  std::vector<std::size_t> by_tilt_;  // views in order of tilt
+  std::array<SlowModeAmplifier, kComponents> slow_modes_;
   LocalAlignment found_;
 };
 

@@ -11,6 +11,7 @@ namespace tomofield::align {
 /// Holds what a local alignment finds.
 struct LocalAlignment {
   std::vector<geometry::ViewCorrection> corrections;  ///< [view]; each has local motion
+  std::vector<ViewAgreement> agreement;               ///< [view]
   bool was_stopped = false;
   /// Root mean square of the change of the local motion in each update, in pixels before binning.
   std::vector<double> steps_px;
@@ -18,10 +19,9 @@ struct LocalAlignment {
 
 /// Finds the local motion of the views as align_jointly() finds their shifts: a field is fitted
 /// from coarse to fine, and the motion that each view shows against its prediction
-/// (local_registration.h) is undone after each epoch. What is rigid of it goes to the shifts, and
-/// to rotations and magnifications if `freedoms` has them. What a bent specimen explains is removed
-/// (local_gauge.h). Every correction of `start` must have local motion to begin with. Every process
-/// calls it and gets the same.
+/// (local_registration.h) is undone while the fit goes on. What is rigid of it goes to the shifts,
+/// and to rotations and magnifications if `freedoms` has them. Every correction of `start` must
+/// have local motion to begin with. Every process calls it and gets the same.
 LocalAlignment align_locally(const JointProblem& problem, const Freedoms& freedoms,
                              std::vector<geometry::ViewCorrection> start,
                              const distributed::Communicator& processes);

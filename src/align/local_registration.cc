@@ -13,6 +13,12 @@ namespace tomofield::align {
 
 using geometry::ViewWarp;
 
+namespace {
+
+constexpr double kFewestSamples = 20;  // beyond those for scale, trend and an affine motion
+
+}  // namespace
+
 void LocalRegistration::add(std::size_t set, double x, const Pixel& pixel, double weight) {
   const ViewWarp::Weights across = ViewWarp::node_weights(x / frame_.width_px);
   const double part = 2 * x / frame_.width_px;
@@ -118,7 +124,7 @@ double LocalRegistration::gain() const {
 ViewWarp LocalRegistration::solve(const ViewWarp& known) const {
   ViewWarp motion = frame_;
   motion.nodes = {};
-  if (num_pixels() >= kUnknown * options_.pixels_per_sample) {
+  if (num_pixels() >= kFewestSamples * options_.pixels_per_sample) {
     Eigen::VectorXd known_px(kMotion);
     for (std::size_t i = 0; i < kMotion; ++i)
       known_px[static_cast<Eigen::Index>(i)] = known.nodes[i / 2][i % 2] / options_.pixel;
@@ -134,10 +140,8 @@ std::vector<ViewWarp> motion_that_pays(std::span<const LocalRegistration> views)
   constexpr double kSure = 3.0;  // standard errors
   std::vector<double> gains;
   for (const LocalRegistration& view : views) gains.push_back(view.gain());
-  const MeanGain gain = mean_gain(gains);
-  base::log_info(fmt::format("local gate {} +- {}", gain.mean, gain.error));
   std::vector<ViewWarp> motion;
-  if (!gain.exceeds(kSure)) return motion;
+  if (!mean_gain(gains).exceeds(kSure)) return motion;
   for (const LocalRegistration& view : views) motion.push_back(view.solve({}));
   return motion;
 }
