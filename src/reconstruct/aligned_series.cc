@@ -152,10 +152,15 @@ std::string describe_errors(const json& compared) {
 void log_local_motion(const json& local) {
   const std::string errors = describe_errors(local);
   if (local["accepted"].get<bool>()) {
-    base::log_info(fmt::format("undone: local motion of {:.2f} pixels (root mean square); {}",
-                               local["rms_px"].get<double>(), errors));
+    base::log_info(fmt::format(
+        "undone: local motion of {:.2f} pixels (root mean square), which .xf and .aln files cannot "
+        "hold; {}",
+        local["rms_px"].get<double>(), errors));
   } else {
-    base::log_info("local motion is not undone, since it is not sure: " + errors);
+    base::log_info(
+        "local motion that the views seem to have is not undone, since they are not sure to be "
+        "predicted better: " +
+        errors);
   }
 }
 

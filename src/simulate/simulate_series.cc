@@ -103,14 +103,17 @@ ViewFrame frame_of(const SimulatedView& view, const Phantom& phantom) {
           .warp = view.warp};
 }
 
-// Returns the standard deviation of the noise in data units (SimulationOptions::noise).
+// Returns the standard deviation of the noise in data units (SimulationOptions::noise). It is that of
+// the series without local motion, which may move an edge of the specimen into the view.
 double noise_sigma(const Phantom& phantom, const std::vector<SimulatedView>& views, double noise) {
   const auto nearest = std::min_element(views.begin(), views.end(),
                                         [](const SimulatedView& a, const SimulatedView& b) {
                                           return std::abs(a.tilt_deg) < std::abs(b.tilt_deg);
                                         });
   std::vector<float> image(static_cast<std::size_t>(phantom.shape.nx * phantom.shape.ny));
-  project_view(phantom, frame_of(*nearest, phantom), image);
+  ViewFrame frame = frame_of(*nearest, phantom);
+  frame.warp.reset();
+  project_view(phantom, frame, image);
   const double low = base::percentile(image, 0.5);
   return noise * (base::percentile(std::move(image), 99.5) - low);
 }

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <optional>
 
+#include "base/check.h"
 #include "base/log.h"
 #include "base/plausible.h"
 #include "geometry/imod_transform.h"
@@ -145,12 +146,6 @@ void require_compatible(const TiltSeriesOptions& options) {
   if (options.take_log && options.contrast == Contrast::kBright) {
     throw Error("--log is for transmitted intensities (--contrast dark); bright data need none");
   }
-  const auto has_motion = [](const geometry::ViewCorrection& c) { return c.local.has_value(); };
-  if (!options.resample && std::ranges::any_of(options.corrections, has_motion)) {
-    throw Error(
-        "the alignment has local motion, which only resampled views can undo: leave out --engine "
-        "ray (of reconstruct)");
-  }
 }
 
 std::array<std::int64_t, 2> aligned_size(const InPlaneAlignment& alignment,
@@ -214,6 +209,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
                     x_tilts_deg[at] - options.x_axis_tilt_deg};
     if (alignment) planned.raw_from_aligned = *alignment->of_section[at];
     if (!options.corrections.empty()) correct(options.corrections[at], planned);
+    TOMOFIELD_CHECK(options.resample || !planned.local, "local motion of views as recorded");
     plan.views.push_back(planned);
   }
   if (plan.views.empty()) {
