@@ -103,8 +103,8 @@ ViewFrame frame_of(const SimulatedView& view, const Phantom& phantom) {
           .warp = view.warp};
 }
 
-// Returns the standard deviation of the noise in data units (SimulationOptions::noise). It is that of
-// the series without local motion, which may move an edge of the specimen into the view.
+// Returns the standard deviation of the noise in data units (SimulationOptions::noise). It is that
+// of the series without local motion, which may move an edge of the specimen into the view.
 double noise_sigma(const Phantom& phantom, const std::vector<SimulatedView>& views, double noise) {
   const auto nearest = std::min_element(views.begin(), views.end(),
                                         [](const SimulatedView& a, const SimulatedView& b) {
