@@ -48,10 +48,8 @@ Comparison compare(const std::vector<double>& before, const std::vector<double>&
 void add_motion(const JointProblem& problem, const std::vector<double>& errors,
                 const distributed::Communicator& processes, Alignment& alignment) {
   constexpr double kSure = 2.0;  // standard errors
-  std::vector<geometry::ViewCorrection> start = alignment.corrections;
-  for (std::size_t v = 0; v < start.size(); ++v) start[v].local = alignment.joint.motion[v];
-  LocalAlignment found =
-      align_locally(problem, alignment.joint.freedoms, std::move(start), processes);
+  LocalAlignment found = align_locally(problem, alignment.joint.freedoms, alignment.corrections,
+                                       alignment.joint.motion, processes);
   alignment.joint.was_stopped = found.was_stopped;
   if (found.was_stopped) return;
   LocalTrial trial{

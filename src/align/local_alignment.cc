@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include "align/aligning_fit.h"
@@ -29,15 +30,18 @@ constexpr std::size_t kComponents = 2 * ViewWarp::kNodes * ViewWarp::kNodes;
 
 double& component(ViewWarp& motion, std::size_t i) { return motion.nodes[i / 2][i % 2]; }
 
-// Divides motion that a view shows into a correction of the whole view and the rest.
-ViewCorrection step_for(const ViewWarp& motion, const Freedoms& freedoms) {
+// Returns a correction of a view that shows `motion` where the rest of the correction is undone.
+// The rigid part of the motion becomes a part of the rest, as far as that is free.
+ViewCorrection with_motion(ViewCorrection correction, const ViewWarp& motion,
+                           const Freedoms& freedoms) {
   const ViewWarp::Rigid rigid = motion.rigid_part();
-  // The view shows at q what the prediction has at q + e(q), so the view is to be moved by −e.
-  return {.shift_x_px = -rigid.shift[0],
-          .shift_y_px = -rigid.shift[1],
-          .rotation_rad = freedoms.rotation ? -rigid.rotation : 0.0,
-          .log_magnification = freedoms.magnification ? -rigid.magnification : 0.0,
-          .local = motion.without(rigid)};
+  correction.local.reset();
+  // The view shows at q what belongs at q + d(q), so it is to be moved by −d.
+  return correction.then({.shift_x_px = -rigid.shift[0],
+                          .shift_y_px = -rigid.shift[1],
+                          .rotation_rad = freedoms.rotation ? -rigid.rotation : 0.0,
+                          .log_magnification = freedoms.magnification ? -rigid.magnification : 0.0,
+                          .local = motion.without(rigid)});
 }
 
 double rms_change(const std::vector<ViewCorrection>& from, const std::vector<ViewCorrection>& to) {
@@ -89,7 +93,7 @@ class LocalFit {
     const std::vector<ViewWarp> steps = amplified(register_views(stage));
     std::vector<ViewCorrection> next = found_.corrections;
     for (std::size_t v = 0; v < next.size(); ++v)
-      next[v] = next[v].then(step_for(steps[v], freedoms_));
+      next[v] = with_motion(next[v], next[v].local->then(steps[v]), freedoms_);
     remove_gauge(measurement_.geometry, next);
     found_.steps_px.push_back(rms_change(found_.corrections, next));
     found_.corrections = std::move(next);
@@ -139,8 +143,10 @@ class LocalFit {
 }  // namespace
 
 LocalAlignment align_locally(const JointProblem& problem, const Freedoms& freedoms,
-                             std::vector<ViewCorrection> start,
+                             std::vector<ViewCorrection> start, std::span<const ViewWarp> motion,
                              const distributed::Communicator& processes) {
+  for (std::size_t v = 0; v < start.size(); ++v)
+    start[v] = with_motion(start[v], motion[v], freedoms);
   return LocalFit(problem, freedoms, std::move(start), processes).run();
 }
 

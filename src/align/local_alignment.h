@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "align/joint_alignment.h"
@@ -24,6 +25,7 @@ struct LocalAlignment {
 /// have local motion to begin with. Every process calls it and gets the same.
 LocalAlignment align_locally(const JointProblem& problem, const Freedoms& freedoms,
                              std::vector<geometry::ViewCorrection> start,
+                             std::span<const geometry::ViewWarp> motion,
                              const distributed::Communicator& processes);
 
 }  // namespace tomofield::align
