@@ -5,19 +5,16 @@
 
 #include <Eigen/Cholesky>
 
-#include <fmt/format.h>
 #include "align/mean_gain.h"
-#include "base/log.h"
 
 namespace tomofield::align {
-
-using geometry::ViewWarp;
-
 namespace {
 
-constexpr double kFewestSamples = 20;  // beyond those for scale, trend and an affine motion
+constexpr double kFewestSamples = 20;  // fewer do not tell scale, trend and an affine motion
 
 }  // namespace
+
+using geometry::ViewWarp;
 
 void LocalRegistration::add(std::size_t set, double x, const Pixel& pixel, double weight) {
   const ViewWarp::Weights across = ViewWarp::node_weights(x / frame_.width_px);

@@ -39,6 +39,20 @@ ViewWarp::Weights ViewWarp::node_weights(double position) {
   return weights;
 }
 
+ViewWarp::Rows ViewWarp::rows() const {
+  Rows result;
+  for (std::size_t node = 0; node < nodes.size(); ++node)
+    result[node / kNodes][node % kNodes] = nodes[node];
+  return result;
+}
+
+ViewWarp ViewWarp::from_rows(double width_px, double height_px, const Rows& rows) {
+  ViewWarp warp{.width_px = width_px, .height_px = height_px};
+  for (std::size_t node = 0; node < warp.nodes.size(); ++node)
+    warp.nodes[node] = rows[node / kNodes][node % kNodes];
+  return warp;
+}
+
 ViewWarp::Vector ViewWarp::displacement(double x, double y) const {
   const Weights across = node_weights(x / width_px), along = node_weights(y / height_px);
   Vector sum{};

@@ -16,6 +16,7 @@ struct ViewWarp {
   static constexpr int kNodes = 5;  ///< along each side
   using Vector = std::array<double, 2>;
   using Weights = std::array<double, kNodes>;
+  using Rows = std::array<std::array<Vector, kNodes>, kNodes>;
 
   double width_px = 0.0;
   double height_px = 0.0;
@@ -28,6 +29,9 @@ struct ViewWarp {
     return {(static_cast<double>(column) / (kNodes - 1) - 0.5) * width_px,
             (static_cast<double>(row) / (kNodes - 1) - 0.5) * height_px};
   }
+  /// Returns the displacements of the nodes, [row][column].
+  Rows rows() const;
+  static ViewWarp from_rows(double width_px, double height_px, const Rows& rows);
   /// Returns d at a place relative to the view's centre.
   Vector displacement(double x, double y) const;
   /// Returns a length that neither component of any displacement exceeds.

@@ -34,23 +34,6 @@ json relevant_options(const ReconstructOptions& options) {
   return {{"input", all["input"]}, {"specimen", all["specimen"]}, {"seed", options.fit.seed}};
 }
 
-// Returns the displacements of the nodes, [row][column] = (x, y), as `simulate` writes them.
-json local_json(const geometry::ViewWarp& motion) {
-  json rows = json::array();
-  for (std::size_t node = 0; node < motion.nodes.size(); ++node) {
-    if (node % geometry::ViewWarp::kNodes == 0) rows.push_back(json::array());
-    rows.back().push_back(motion.nodes[node]);
-  }
-  return rows;
-}
-
-geometry::ViewWarp local_of(const json& rows, const json& size_px) {
-  geometry::ViewWarp motion{.width_px = size_px[0], .height_px = size_px[1]};
-  for (std::size_t node = 0; node < motion.nodes.size(); ++node)
-    motion.nodes[node] = rows[node / geometry::ViewWarp::kNodes][node % geometry::ViewWarp::kNodes];
-  return motion;
-}
-
 json held_out_json(const align::Comparison& held_out) {
   return {{"held_out_error", {{"before", held_out.before}, {"after", held_out.after}}},
           {"gain", {{"mean", held_out.gain.mean}, {"standard_error", held_out.gain.error}}}};
@@ -80,7 +63,7 @@ json view_json(const tilt_series::View& view, const geometry::ViewCorrection& co
                  {"correlation", agreement.correlation},
                  {"shift_error_px", agreement.error_px},
                  {"left_out", is_unaligned}};
-  if (correction.local) result["local_px"] = local_json(*correction.local);
+  if (correction.local) result["local_px"] = correction.local->rows();
   return result;
 }
 
@@ -133,8 +116,8 @@ void apply_record(const json& record, ReconstructOptions& options) {
         .rotation_rad = view["rotation_deg"].get<double>() / kRadian_deg,
         .log_magnification = view["log_magnification"]};
     if (view.contains("local_px"))
-      corrections[static_cast<std::size_t>(section)].local =
-          local_of(view["local_px"], record["local"]["size_px"]);
+      corrections[static_cast<std::size_t>(section)].local = geometry::ViewWarp::from_rows(
+          record["local"]["size_px"][0], record["local"]["size_px"][1], view["local_px"]);
     if (view["left_out"].get<bool>()) options.input.left_out.push_back(section);
   }
   options.alignment = record;

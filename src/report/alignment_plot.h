@@ -16,8 +16,8 @@ struct AlignmentCurves {
   // before binning: x across the tilt axis and y along it.
   std::vector<double> shift_x_px, shift_y_px;
   std::vector<double> rotation_deg, magnification_percent;
-  std::vector<double> local_px;                ///< root mean square of the local motion
-  std::vector<double> correlation;             ///< of the view with its projection
+  std::vector<double> local_px;     ///< root mean square of the nodes of the local motion
+  std::vector<double> correlation;  ///< of the view with its projection
   std::vector<double> error_x_px, error_y_px;  ///< standard errors of the shift
 };
 

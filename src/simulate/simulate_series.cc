@@ -228,13 +228,7 @@ Json view_json(const SimulatedView& view, const Misalignment& misalignment) {
         std::atan2(map.m21 - map.m12, map.m11 + map.m22) * 180.0 / std::numbers::pi;
     json["magnification"] = std::sqrt(map.m11 * map.m22 - map.m12 * map.m21);
   }
-  if (view.warp) {
-    json["local_px"] = Json::array();
-    for (std::size_t node = 0; node < view.warp->nodes.size(); ++node) {
-      if (node % geometry::ViewWarp::kNodes == 0) json["local_px"].push_back(Json::array());
-      json["local_px"].back().push_back(view.warp->nodes[node]);
-    }
-  }
+  if (view.warp) json["local_px"] = view.warp->rows();
   return json;
 }
 
