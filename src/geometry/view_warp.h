@@ -31,6 +31,7 @@ struct ViewWarp {
   }
   /// Returns the displacements of the nodes, [row][column].
   Rows rows() const;
+  /// Returns the warp of a view of this size whose nodes have these displacements.
   static ViewWarp from_rows(double width_px, double height_px, const Rows& rows);
   /// Returns d at a place relative to the view's centre.
   Vector displacement(double x, double y) const;

@@ -115,9 +115,11 @@ void apply_record(const json& record, ReconstructOptions& options) {
         .shift_y_px = view["shift_px"][1],
         .rotation_rad = view["rotation_deg"].get<double>() / kRadian_deg,
         .log_magnification = view["log_magnification"]};
-    if (view.contains("local_px"))
-      corrections[static_cast<std::size_t>(section)].local = geometry::ViewWarp::from_rows(
-          record["local"]["size_px"][0], record["local"]["size_px"][1], view["local_px"]);
+    if (view.contains("local_px")) {
+      const json& size_px = record.at("local").at("size_px");
+      corrections[static_cast<std::size_t>(section)].local =
+          geometry::ViewWarp::from_rows(size_px.at(0), size_px.at(1), view["local_px"]);
+    }
     if (view["left_out"].get<bool>()) options.input.left_out.push_back(section);
   }
   options.alignment = record;

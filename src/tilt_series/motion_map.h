@@ -8,7 +8,7 @@ namespace tomofield::tilt_series {
 
 /// Tells where each place of a view without local motion is found in the view with it. It holds the
 /// places on a lattice of 128 × 128 cells and interpolates linearly between them. Nodes that
-/// differ by a pixel from their neighbours make an error below 0.002 pixels.
+/// differ by a pixel from their neighbours make an error below 0.005 pixels.
 class MotionMap {
  public:
   explicit MotionMap(const geometry::ViewWarp& warp);
