@@ -82,8 +82,7 @@ def series(options, row, seed, misalignment):
 
 def reconstruct(options, row, volume, folder, *arguments, tlt=None):
     """Reconstructs the series in a folder and returns the core-seconds."""
-    command = [options.program, "reconstruct", *row.fit.split(), *arguments, "-o", volume,
-               "--overwrite"]
+    command = [options.program, "reconstruct", *row.fit.split(), *arguments, "-o", volume]
     command += quality_rows.series_arguments(folder, quality_rows.thickness_of(row.size), tlt)
     command += ["--no-margin"] if row.kind == "A" else []
     return quality_rows.run_measured(command).core_seconds
@@ -110,6 +109,23 @@ def write_in_frame(truth, estimate, kept, size, prefix):
     return ["--exclude", ",".join(str(view + 1) for view in left_out)] if left_out else []
 
 
+def write_record_in_frame(truth, estimate, size, source, target):
+    """Writes the record of an alignment of a series without an .xf file, moved to where the truth has
+    the specimen, for a run that resumes from it. An .xf file has no local motion."""
+    moved = alignment_score.in_frame_of(truth, estimate, size)
+    with open(source, encoding="utf-8") as file:
+        record = json.load(file)
+    for view, matrix, shift, local in zip(record["views"], moved.matrices, moved.shifts, moved.local):
+        inverse = np.linalg.inv(matrix)
+        view.update(
+            shift_px=list(-inverse @ shift),
+            rotation_deg=float(np.degrees(np.arctan2(inverse[1, 0] - inverse[0, 1],
+                                                     inverse[0, 0] + inverse[1, 1]))),
+            log_magnification=float(np.log(np.linalg.det(inverse)) / 2), local_px=local.tolist())
+    with open(target, "w", encoding="utf-8") as file:
+        json.dump(record, file)
+
+
 def psnr(options, volume, folder, scratch):
     truth = os.path.join(folder, "truth.mrc")
     return quality_rows.score(options, volume, truth, scratch)["psnr_affine_dB"]
@@ -125,14 +141,18 @@ def measure(options, row, seed, scratch):
     true_xf = os.path.join(unwarped, "tilt_series.xf")  # simulate wrote none for an aligned series
     seconds_without = reconstruct(options, row, f"{best}.mrc", unwarped,
                                   *(["--xf", true_xf] if os.path.exists(true_xf) else []))
-    seconds = reconstruct(options, row, f"{aligned}.mrc", folder, "--align", case.align,
-                          "--tilt-offset", str(case.tilt_offset_deg))
+    aligning = ["--align", case.align, "--tilt-offset", str(case.tilt_offset_deg)]
+    seconds = reconstruct(options, row, f"{aligned}.mrc", folder, *aligning)
 
     truth, size = alignment_score.read_truth(folder)
     estimate, kept = read_estimate(f"{aligned}_align")
-    exclude = write_in_frame(truth, estimate, kept, size, moved)
-    reconstruct(options, row, f"{moved}.mrc", folder, "--xf", f"{moved}.xf", *exclude,
-                tlt=f"{moved}.tlt")
+    if estimate.local is None:
+        exclude = write_in_frame(truth, estimate, kept, size, moved)
+        reconstruct(options, row, f"{moved}.mrc", folder, "--xf", f"{moved}.xf", *exclude,
+                    tlt=f"{moved}.tlt")
+    else:
+        write_record_in_frame(truth, estimate, size, f"{aligned}_align.json", f"{moved}_align.json")
+        reconstruct(options, row, f"{moved}.mrc", folder, *aligning, "--resume")
 
     given = Alignment(alignment_score.unaligned(len(truth.tilts_deg)),
                       truth.tilts_deg + case.tilt_offset_deg)

@@ -143,13 +143,27 @@ class Differences:
         self.local_px = found - affine @ fits
 
 
+def less_specimen_warp(estimate, found, size):
+    """Returns the local motion of the estimate less the specimen's warp that explains most of its
+    differences `found`."""
+    if estimate.local is None:
+        return None
+    warp = found.local_px - specimen_warp_residual(found.local_px, estimate.tilts_deg, size)
+    across, along = (node_weights(grid(size)[:, axis] / size, 5) for axis in (0, 1))
+    weights = (along[:, :, None] * across[:, None, :]).reshape(-1, 25)
+    return [np.asarray(nodes) - np.linalg.lstsq(weights, of_view, rcond=None)[0].reshape(5, 5, 2)
+            for nodes, of_view in zip(estimate.local, warp)]
+
+
 def in_frame_of(truth, estimate, size):
-    """Returns the estimate with its specimen moved, scaled and tilted to where the truth has it."""
+    """Returns the estimate with its specimen moved, scaled, tilted and bent to where the truth has
+    it."""
     found = Differences(truth, estimate, size)
     scale = np.exp(-found.log_magnifications.mean())
     shifts = estimate.shifts - specimen_shift(found.shifts_px, truth.tilts_deg)
     return Alignment(scale * np.hstack([estimate.matrices.reshape(-1, 4), shifts]),
-                     estimate.tilts_deg - found.tilts_deg.mean(), estimate.local)
+                     estimate.tilts_deg - found.tilts_deg.mean(),
+                     less_specimen_warp(estimate, found, size))
 
 
 def score(truth, estimate, size):

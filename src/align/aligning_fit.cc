@@ -1,8 +1,63 @@
 #include "align/aligning_fit.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <numeric>
+#include <vector>
+
+#include "base/parallel.h"
+#include "base/stopwatch.h"
 
 namespace tomofield::align {
+namespace {
+
+// Predicted views take at most this memory together.
+constexpr std::size_t kPredictionBytes = std::size_t{1} << 30;
+
+// The first epochs of a fit show too little of the specimen.
+constexpr std::int64_t kEpochsBefore = 2;
+// With pixels this many times as wide, an update costs as much as an epoch, so every second epoch
+// has one.
+constexpr int kSlowBin = 2;
+
+int views_at_once(const measurement::Measurement& measurement, const fit::Stage& stage) {
+  const auto pixels =
+      static_cast<std::size_t>(measurement.geometry.width * measurement.rays_shape().num_rows) /
+      static_cast<std::size_t>(stage.bin * stage.bin);
+  return static_cast<int>(
+      std::clamp<std::size_t>(kPredictionBytes / (8 * pixels + 1), 1,
+                              static_cast<std::size_t>(measurement.geometry.num_views())));
+}
+
+std::int64_t epochs_done(const fit::Fit& fit) {
+  return fit.progress().step / fit.steps_per_epoch();
+}
+
+// Says whether an update is due after an epoch of a stage. At the end of a stage the fit is already
+// in the next one, unless it is done.
+bool is_update_due(const fit::Stage& stage, std::int64_t epochs_done, bool is_done) {
+  const bool is_last = epochs_done == stage.first_epoch + stage.epochs;
+  const bool is_turn = stage.bin != kSlowBin || epochs_done % 2 == 0;
+  return epochs_done > kEpochsBefore && is_turn && (!is_last || is_done);
+}
+
+// Any process can stop all of them.
+bool is_to_stop(const JointProblem& problem, const distributed::Communicator& processes) {
+  const bool asked = problem.stop_requested && problem.stop_requested();
+  return processes.allreduce_max(asked ? 1.0 : 0.0) > 0.0;
+}
+
+base::ProgressReport report(const fit::Fit& fit, double seconds,
+                            const std::vector<double>& steps_px) {
+  const double part = fit.work(fit.progress().step) / fit.work(fit.num_steps());
+  return {.fraction_done = part,
+          .seconds_elapsed = seconds,
+          .seconds_left = (1 - part) / part * seconds,
+          .detail = steps_px.empty() ? "" : fmt::format("last step {:.3f} px", steps_px.back())};
+}
+
+}  // namespace
 
 fit::FieldOptions aligning_field(fit::FieldOptions field) {
   field.kind = FieldKind::kGrid;
@@ -37,6 +92,50 @@ ImagePair image_pair(const measurement::PredictedView& view,
           .centre_y = (static_cast<double>(measurement.geometry.height) / 2 - first_row) / bin,
           .measured = view.measured,
           .predicted = view.predicted};
+}
+
+LocalRegistrationOptions local_options(const measurement::Measurement& measurement,
+                                       const fit::Stage& stage) {
+  constexpr double kPrior = 1.0;  // pixels of the fit
+  const double width = static_cast<double>(measurement.geometry.width) * measurement.bin_factor;
+  const double height = static_cast<double>(measurement.geometry.height) * measurement.bin_factor;
+  return {.frame = {.width_px = width, .height_px = height},
+          .pixel = stage.bin * measurement.bin_factor,
+          .prior_px = kPrior * measurement.bin_factor,
+          .pixels_per_sample = pixels_per_sample(RegistrationOptions{}.blur_px)};
+}
+
+void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& measurement,
+                         const fit::Stage& stage,
+                         const std::function<void(std::size_t, const ImagePair&)>& visit) {
+  const int num_views = measurement.geometry.num_views();
+  const int at_once = views_at_once(measurement, stage);
+  for (int first = 0; first < num_views; first += at_once) {
+    std::vector<int> views(static_cast<std::size_t>(std::min(at_once, num_views - first)));
+    std::iota(views.begin(), views.end(), first);
+    const auto predicted = fit.predict(views, std::vector<measurement::ViewModel>(views.size()));
+    base::parallel_for("register views", std::ssize(views), [&](std::int64_t i) {
+      const auto at = static_cast<std::size_t>(i);
+      visit(static_cast<std::size_t>(views[at]), image_pair(predicted[at], measurement, stage));
+    });
+  }
+}
+
+bool run_with_updates(const JointProblem& problem, fit::Fit& fit, std::int64_t num_epochs,
+                      const std::vector<double>& steps_px,
+                      const std::function<void(const fit::Stage&)>& update,
+                      const distributed::Communicator& processes) {
+  const base::Stopwatch running;
+  while (epochs_done(fit) < num_epochs) {
+    const fit::Stage stage = fit.stage();
+    fit.run([](const fit::Fit& f) { return f.progress().step % f.steps_per_epoch() != 0; });
+    if (problem.progress && num_epochs == fit.num_epochs())
+      problem.progress(report(fit, running.seconds(), steps_px));
+    const bool is_stopped = is_to_stop(problem, processes);
+    if (is_update_due(stage, epochs_done(fit), fit.is_done())) update(stage);
+    if (is_stopped) return true;
+  }
+  return false;
 }
 
 }  // namespace tomofield::align

@@ -1,8 +1,15 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <vector>
 
+#include "align/joint_alignment.h"
+#include "align/local_registration.h"
 #include "align/registration.h"
+#include "distributed/communicator.h"
+#include "fit/fit.h"
 #include "fit/options.h"
 #include "fit/stages.h"
 #include "measurement/held_out.h"
@@ -22,5 +29,24 @@ fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t s
 /// view.
 ImagePair image_pair(const measurement::PredictedView& view,
                      const measurement::Measurement& measurement, const fit::Stage& stage);
+
+/// Says how local motion is registered in a stage.
+LocalRegistrationOptions local_options(const measurement::Measurement& measurement,
+                                       const fit::Stage& stage);
+
+/// Predicts all views by a fit in one of its stages, as many at a time as fit into a gigabyte, and
+/// calls visit(view, images) for each of them, from several threads. Every process calls it.
+void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& measurement,
+                         const fit::Stage& stage,
+                         const std::function<void(std::size_t, const ImagePair&)>& visit);
+
+/// Takes the first `num_epochs` epochs of a fit, and calls update(stage) after those that show
+/// enough for an update of the alignment. The fit must then go on with the updated views. Progress,
+/// with the last of `steps_px`, is reported if these are all epochs. Returns true if a stop was
+/// requested meanwhile. Every process calls it.
+bool run_with_updates(const JointProblem& problem, fit::Fit& fit, std::int64_t num_epochs,
+                      const std::vector<double>& steps_px,
+                      const std::function<void(const fit::Stage&)>& update,
+                      const distributed::Communicator& processes);
 
 }  // namespace tomofield::align

@@ -6,6 +6,7 @@
 
 #include "align/correlation_start.h"
 #include "align/gauge.h"
+#include "align/local_alignment.h"
 #include "align/trial.h"
 #include "base/parallel.h"
 #include "base/percentile.h"
@@ -36,18 +37,30 @@ std::vector<int> unalike_views(const std::vector<ViewAgreement>& agreement) {
   return views;
 }
 
-void judge(const std::vector<double>& before, const std::vector<double>& after,
-           Alignment& alignment) {
+Comparison compare(const std::vector<double>& before, const std::vector<double>& after) {
   std::vector<double> gains;
-  double squares = 0.0;
   for (std::size_t i = 0; i < before.size(); ++i) gains.push_back(before[i] - after[i]);
-  alignment.error_before = mean_of(before);
-  alignment.error_after = mean_of(after);
-  alignment.gain = mean_of(gains);
-  for (const double gain : gains) squares += std::pow(gain - alignment.gain, 2);
-  const auto n = static_cast<double>(gains.size());
-  alignment.gain_error = n > 1 ? std::sqrt(squares / (n - 1) / n) : 0.0;
-  alignment.is_accepted = alignment.gain > alignment.gain_error;
+  return {mean_of(before), mean_of(after), mean_gain(gains)};
+}
+
+// Looks for local motion beyond the corrections of an alignment, whose held-out views have
+// `errors`.
+void add_motion(const JointProblem& problem, const std::vector<double>& errors,
+                const distributed::Communicator& processes, Alignment& alignment) {
+  constexpr double kSure = 2.0;  // standard errors
+  LocalAlignment found = align_locally(problem, alignment.joint.freedoms, alignment.corrections,
+                                       alignment.joint.motion, processes);
+  alignment.joint.was_stopped = found.was_stopped;
+  if (found.was_stopped) return;
+  LocalTrial trial{
+      .held_out = compare(errors, errors_of_held_out_views(problem, found.corrections, processes)),
+      .steps_px = std::move(found.steps_px)};
+  trial.is_accepted = trial.held_out.gain.exceeds(kSure);
+  if (trial.is_accepted) {
+    alignment.corrections = std::move(found.corrections);
+    alignment.joint.agreement = std::move(found.agreement);
+  }
+  alignment.local = std::move(trial);
 }
 
 }  // namespace
@@ -82,9 +95,14 @@ Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::Vi
   alignment.joint = align_jointly(problem, std::move(start), processes);
   if (alignment.joint.was_stopped) return alignment;
   alignment.unaligned = unalike_views(alignment.joint.agreement);
-  judge(errors_of_held_out_views(problem, none, processes),
-        errors_of_held_out_views(problem, alignment.joint.corrections, processes), alignment);
+  const std::vector<double> before = errors_of_held_out_views(problem, none, processes);
+  const std::vector<double> after =
+      errors_of_held_out_views(problem, alignment.joint.corrections, processes);
+  alignment.held_out = compare(before, after);
+  alignment.is_accepted = alignment.held_out.gain.exceeds(1.0);
   alignment.corrections = alignment.is_accepted ? alignment.joint.corrections : none;
+  if (!alignment.joint.motion.empty())
+    add_motion(problem, alignment.is_accepted ? after : before, processes, alignment);
   return alignment;
 }
 

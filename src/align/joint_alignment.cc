@@ -1,7 +1,5 @@
 #include "align/joint_alignment.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -10,10 +8,10 @@
 
 #include "align/aligning_fit.h"
 #include "align/gauge.h"
+#include "align/local_registration.h"
+#include "align/mean_gain.h"
 #include "align/registration.h"
 #include "align/slow_modes.h"
-#include "base/parallel.h"
-#include "base/stopwatch.h"
 #include "base/trace.h"
 #include "fit/fit.h"
 
@@ -22,18 +20,10 @@ namespace {
 
 using geometry::ViewCorrection;
 
-// Predicted views take at most this memory together.
-constexpr std::size_t kPredictionBytes = std::size_t{1} << 30;
-
 // A registration to a field that was fitted to the view itself finds a part of the displacement.
 constexpr double kRelaxation = 1.3;
 // A shift changes by at most so many pixels of the stage at once.
 constexpr double kLongestStep = 2.0;
-// The first epochs of a fit show too little of the specimen.
-constexpr std::int64_t kEpochsBefore = 2;
-// With pixels this many times as wide, an update costs as much as an epoch, so every second epoch
-// has one.
-constexpr int kSlowBin = 2;
 // Rotations and magnifications are looked for in pixels at most this many times as wide.
 constexpr int kFreedomBin = 2;
 constexpr double kSure = 3.0;  // standard errors by which a freedom must pay
@@ -62,18 +52,9 @@ class AligningFit {
 
   // Aligns in the first `num_epochs` epochs of the fit.
   JointAlignment run(std::int64_t num_epochs) {
-    const base::Stopwatch running;
-    while (epochs_done() < num_epochs && !found_.was_stopped) {
-      const fit::Stage stage = fit_.stage();
-      take_epoch();
-      if (problem_.progress && num_epochs == this->num_epochs())
-        problem_.progress(report(running.seconds()));
-      const std::int64_t epochs = epochs_done();
-      const bool is_last = epochs == stage.first_epoch + stage.epochs;
-      found_.was_stopped = is_to_stop();
-      const bool is_due = stage.bin != kSlowBin || epochs % 2 == 0;
-      if (epochs > kEpochsBefore && is_due && (!is_last || fit_.is_done())) update(stage);
-    }
+    found_.was_stopped = run_with_updates(
+        problem_, fit_, num_epochs, found_.steps_px,
+        [this](const fit::Stage& stage) { update(stage); }, processes_);
     return std::move(found_);
   }
 
@@ -82,28 +63,6 @@ class AligningFit {
   double residual() const { return fit_.progress().data_loss.back(); }
 
  private:
-  std::int64_t epochs_done() const { return fit_.progress().step / fit_.steps_per_epoch(); }
-
-  void take_epoch() {
-    fit_.run([](const fit::Fit& fit) { return fit.progress().step % fit.steps_per_epoch() != 0; });
-  }
-
-  // Any process can stop all of them.
-  bool is_to_stop() const {
-    const bool asked = problem_.stop_requested && problem_.stop_requested();
-    return processes_.allreduce_max(asked ? 1.0 : 0.0) > 0.0;
-  }
-
-  base::ProgressReport report(double seconds) const {
-    const double part = fit_.work(fit_.progress().step) / fit_.work(fit_.num_steps());
-    return {.fraction_done = part,
-            .seconds_elapsed = seconds,
-            .seconds_left = (1 - part) / part * seconds,
-            .detail = found_.steps_px.empty()
-                          ? ""
-                          : fmt::format("last step {:.3f} px", found_.steps_px.back())};
-  }
-
   // Registers every view and goes on with the corrected ones.
   void update(const fit::Stage& stage) {
     const base::TraceSpan span("register views");
@@ -151,18 +110,14 @@ class AligningFit {
   // Predicts all views, some at a time, and returns what the registration to the predictions finds.
   std::vector<ViewCorrection> register_views(const fit::Stage& stage) {
     std::vector<std::optional<Registration>> registrations(found_.corrections.size());
-    const auto num_views = static_cast<int>(registrations.size());
-    const int at_once = views_at_once(stage);
-    for (int first = 0; first < num_views; first += at_once) {
-      std::vector<int> views(static_cast<std::size_t>(std::min(at_once, num_views - first)));
-      std::iota(views.begin(), views.end(), first);
-      const auto predicted = fit_.predict(views, std::vector<measurement::ViewModel>(views.size()));
-      base::parallel_for("register views", std::ssize(views), [&](std::int64_t i) {
-        const auto at = static_cast<std::size_t>(i);
-        registrations[static_cast<std::size_t>(views[at])].emplace(
-            image_pair(predicted[at], measurement_, stage), RegistrationOptions{});
-      });
-    }
+    std::vector<LocalRegistration> local;
+    if (fit_.is_done())
+      local.assign(registrations.size(), LocalRegistration(local_options(measurement_, stage)));
+    for_each_prediction(fit_, measurement_, stage, [&](std::size_t view, const ImagePair& images) {
+      registrations[view].emplace(images, RegistrationOptions{},
+                                  local.empty() ? nullptr : &local[view]);
+    });
+    if (!local.empty()) found_.motion = motion_that_pays(local);
     if (stage.bin <= kFreedomBin) open_freedoms(registrations);
     std::vector<ViewCorrection> steps;
     for (std::size_t v = 0; v < registrations.size(); ++v) {
@@ -171,14 +126,6 @@ class AligningFit {
       found_.agreement[v] = {registration.correlation(), registration.shift_error(found_.freedoms)};
     }
     return steps;
-  }
-
-  int views_at_once(const fit::Stage& stage) const {
-    const auto pixels =
-        static_cast<std::size_t>(measurement_.geometry.width * measurement_.rays_shape().num_rows) /
-        static_cast<std::size_t>(stage.bin * stage.bin);
-    return static_cast<int>(
-        std::clamp<std::size_t>(kPredictionBytes / (8 * pixels + 1), 1, found_.corrections.size()));
   }
 
   // Opens each freedom that predicts pixels better which did not decide about it.
@@ -195,16 +142,12 @@ class AligningFit {
   // because the question comes up at every update.
   static bool pays(const std::vector<std::optional<Registration>>& registrations,
                    const Freedoms& without, const Freedoms& with) {
-    double n = 0, sum = 0, squares = 0;
+    std::vector<double> gains;
     for (const auto& registration : registrations) {
       const double before = registration->predicted_error(without);
-      if (before <= 0.0) continue;
-      const double gain = 1.0 - registration->predicted_error(with) / before;
-      n += 1, sum += gain, squares += gain * gain;
+      if (before > 0.0) gains.push_back(1.0 - registration->predicted_error(with) / before);
     }
-    const double mean = sum / std::max(n, 1.0);
-    const double variance = squares / std::max(n, 1.0) - mean * mean;
-    return n > 1 && mean > kSure * std::sqrt(std::max(variance, 0.0) / (n - 1));
+    return mean_gain(gains).exceeds(kSure);
   }
 
   const JointProblem& problem_;

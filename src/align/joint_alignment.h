@@ -29,6 +29,9 @@ struct JointAlignment {
   std::vector<geometry::ViewCorrection> corrections;  ///< [view]
   std::vector<ViewAgreement> agreement;               ///< [view]
   Freedoms freedoms;  ///< those that made the prediction of pixels better
+  /// Local motion that the last registration finds in each view, if that makes the prediction of
+  /// pixels better; else empty.
+  std::vector<geometry::ViewWarp> motion;
   bool was_stopped = false;
   /// Root mean square of the change of the shifts in each update, in pixels before binning.
   std::vector<double> steps_px;

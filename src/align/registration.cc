@@ -88,17 +88,22 @@ struct Registration::Prepared {
   std::vector<std::uint8_t> counts;
 };
 
-Registration::Registration(const ImagePair& images, const RegistrationOptions& options)
+double pixels_per_sample(double blur_px) {
+  return std::max(1.0, 4 * std::numbers::pi * blur_px * blur_px);
+}
+
+Registration::Registration(const ImagePair& images, const RegistrationOptions& options,
+                           LocalRegistration* local)
     : options_(options),
       pixel_(images.pixel),
       half_size_(static_cast<double>(std::max(images.width, images.height)) / 2),
       knows_tilt_(!images.by_tilt.empty()),
-      pixels_per_sample_(std::max(1.0, 4 * std::numbers::pi * options.blur_px * options.blur_px)) {
+      pixels_per_sample_(pixels_per_sample(options.blur_px)) {
   const Prepared prepared(images, options.blur_px);
-  add_up(prepared, nullptr);
+  add_up(prepared, nullptr, nullptr);
   if (num_pixels() == 0) return;
   const Solution first = solve_on(all(), {});
-  add_up(prepared, &first);
+  add_up(prepared, &first, local);
   noise_variance_ = residual_variance({});
   scale_ = scale_of(solve_on(all(), {}));
 }
@@ -128,7 +133,7 @@ Registration::Row Registration::row_of(const Prepared& images, std::int64_t x,
 
 // Adds up the products of all columns. With a solution, residuals larger than three standard
 // deviations count less (Huber 1964).
-void Registration::add_up(const Prepared& images, const Solution* last) {
+void Registration::add_up(const Prepared& images, const Solution* last, LocalRegistration* local) {
   double limit = 0.0;
   if (last != nullptr) {
     const double variance = squared_residual(all(), *last) /
@@ -151,7 +156,11 @@ void Registration::add_up(const Prepared& images, const Solution* last) {
       const auto set = static_cast<std::size_t>((x / kBlock + y / kBlock) % 2);
       sums_[set].selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
       ++num_pixels_[set];
+      if (local != nullptr)
+        local->add(set, static_cast<double>(x) + 0.5 - images.centre_x,
+                   {row[kX], row[kY], row[kScale], row[kMeasured]}, weight);
     }
+    if (local != nullptr) local->end_row(static_cast<double>(y) + 0.5 - images.centre_y);
   }
   for (Sums& sums : sums_) sums = Sums(sums.selfadjointView<Eigen::Lower>());
 }

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "align/freedoms.h"
+#include "align/local_registration.h"
 #include "geometry/view_correction.h"
 
 namespace tomofield::align {
@@ -33,6 +34,9 @@ struct RegistrationOptions {
   double tilt_prior_deg = 0.3;
 };
 
+/// Returns how many pixels a Gaussian blur makes one independent sample of.
+double pixels_per_sample(double blur_px);
+
 /// Describes the difference between a view and its prediction to first order, as least squares
 ///
 ///   b ≈ a p + a (εx ∂p/∂x + εy ∂p/∂y) + a δθ ∂p/∂θ + a quadratic trend,
@@ -46,7 +50,9 @@ struct RegistrationOptions {
 /// solution of the other one predicts it.
 class Registration {
  public:
-  Registration(const ImagePair& images, const RegistrationOptions& options);
+  /// Adds the pixels to `local` as well, unless that is null.
+  Registration(const ImagePair& images, const RegistrationOptions& options,
+               LocalRegistration* local = nullptr);
 
   /// Returns the correction of the view that makes it agree with the prediction: none if there are
   /// fewer independent samples than unknowns.
@@ -77,7 +83,7 @@ class Registration {
   };
   struct Prepared;  // the blurred images
   Row row_of(const Prepared& images, std::int64_t x, std::int64_t y) const;
-  void add_up(const Prepared& images, const Solution* last);
+  void add_up(const Prepared& images, const Solution* last, LocalRegistration* local);
   double ridge(int column) const;
   Solution solve_on(const Sums& sums, const Freedoms& freedoms) const;
   static double scale_of(const Solution& solution);

@@ -13,6 +13,12 @@ std::array<double, 4> matrix_of(const ViewCorrection& c) {
   return {cosine, -sine, sine, cosine};
 }
 
+std::optional<ViewWarp> motion_of_both(const std::optional<ViewWarp>& first,
+                                       const std::optional<ViewWarp>& next) {
+  if (first && next) return first->then(*next);
+  return first ? first : next;
+}
+
 }  // namespace
 
 ViewCorrection ViewCorrection::then(const ViewCorrection& next) const {
@@ -21,13 +27,15 @@ ViewCorrection ViewCorrection::then(const ViewCorrection& next) const {
           .shift_y_px = m[2] * next.shift_x_px + m[3] * next.shift_y_px + shift_y_px,
           .rotation_rad = rotation_rad + next.rotation_rad,
           .log_magnification = log_magnification + next.log_magnification,
-          .tilt_deg = tilt_deg + next.tilt_deg};
+          .tilt_deg = tilt_deg + next.tilt_deg,
+          .local = motion_of_both(local, next.local)};
 }
 
 ViewCorrection ViewCorrection::binned(double factor) const {
   ViewCorrection result = *this;
   result.shift_x_px /= factor;
   result.shift_y_px /= factor;
+  if (local) result.local = local->binned(factor);
   return result;
 }
 

@@ -314,10 +314,11 @@ tilt_series::MaskedImage read_aligned(const tilt_series::TiltSeries& recorded, s
                                       const geometry::ViewCorrection& correction) {
   tilt_series::MaskedImage raw(recorded.width(), recorded.height());
   recorded.read_view(view, raw.values, raw.valid);
-  const geometry::RawFromAligned transform = geometry::corrected(
-      recorded.raw_from_aligned(view), correction.binned(recorded.bin_factor()));
+  const geometry::ViewCorrection binned = correction.binned(recorded.bin_factor());
+  const geometry::RawFromAligned transform =
+      geometry::corrected(recorded.raw_from_aligned(view), binned);
   return tilt_series::align_image(raw, transform, recorded.aligned_width(),
-                                  recorded.aligned_height());
+                                  recorded.aligned_height(), binned.local);
 }
 
 Measurement prepare_realigned(const tilt_series::TiltSeries& recorded,

@@ -283,6 +283,26 @@ TEST_F(RecordedSeries, ACorrectionIsThatOfItsAlignment) {
                 20.0 * static_cast<double>(view) - 60 + corrections_[view].tilt_deg, 1e-12);
 }
 
+TEST_F(RecordedSeries, LocalMotionIsUndoneAsInAResampledSeries) {
+  for (ViewCorrection& correction : corrections_) {
+    correction.local = {.width_px = kWidth, .height_px = kHeight};
+    correction.local->nodes[7] = {2.0, -1.5};
+    correction.local->nodes[16] = {-1.0, 0.5};
+  }
+  files_.options().corrections = corrections_;
+  const Measurement expected = resampled(maps_);
+  files_.options().corrections.clear();
+  const Measurement found = realigned(corrections_);
+  expect_same_rays(found, expected);
+  for (ViewCorrection& correction : corrections_) correction.local.reset();
+  const Measurement without = realigned(corrections_);
+  double most = 0.0;
+  for (std::int64_t x = 12; x < kWidth - 12; ++x)
+    most = std::max(most, std::abs(static_cast<double>(found.rays->ray(3, x, kHeight / 3)) -
+                                   static_cast<double>(without.rays->ray(3, x, kHeight / 3))));
+  EXPECT_GT(most * found.unit, 0.1) << "the motion matters";
+}
+
 TEST_F(RecordedSeries, RealigningGivesTheSameRaysAsPreparingSo) {
   Measurement found = realigned(std::vector<ViewCorrection>(kNumViews));
   const double unit = found.unit;

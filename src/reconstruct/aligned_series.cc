@@ -34,16 +34,37 @@ json relevant_options(const ReconstructOptions& options) {
   return {{"input", all["input"]}, {"specimen", all["specimen"]}, {"seed", options.fit.seed}};
 }
 
+json held_out_json(const align::Comparison& held_out) {
+  return {{"held_out_error", {{"before", held_out.before}, {"after", held_out.after}}},
+          {"gain", {{"mean", held_out.gain.mean}, {"standard_error", held_out.gain.error}}}};
+}
+
+json local_trial_json(const align::Alignment& found) {
+  json trial = held_out_json(found.local->held_out);
+  trial["accepted"] = found.local->is_accepted;
+  trial["steps_px"] = found.local->steps_px;
+  if (!found.local->is_accepted) return trial;
+  double squares = 0.0;
+  for (const geometry::ViewCorrection& view : found.corrections)
+    squares += view.local->mean_square();
+  const geometry::ViewWarp& motion = *found.corrections.front().local;
+  trial["size_px"] = {motion.width_px, motion.height_px};
+  trial["rms_px"] = std::sqrt(squares / static_cast<double>(found.corrections.size()));
+  return trial;
+}
+
 json view_json(const tilt_series::View& view, const geometry::ViewCorrection& correction,
                const align::ViewAgreement& agreement, bool is_unaligned) {
-  return {{"section", view.section + 1},
-          {"tilt_deg", view.tilt_deg},
-          {"shift_px", {correction.shift_x_px, correction.shift_y_px}},
-          {"rotation_deg", correction.rotation_rad * kRadian_deg},
-          {"log_magnification", correction.log_magnification},
-          {"correlation", agreement.correlation},
-          {"shift_error_px", agreement.error_px},
-          {"left_out", is_unaligned}};
+  json result = {{"section", view.section + 1},
+                 {"tilt_deg", view.tilt_deg},
+                 {"shift_px", {correction.shift_x_px, correction.shift_y_px}},
+                 {"rotation_deg", correction.rotation_rad * kRadian_deg},
+                 {"log_magnification", correction.log_magnification},
+                 {"correlation", agreement.correlation},
+                 {"shift_error_px", agreement.error_px},
+                 {"left_out", is_unaligned}};
+  if (correction.local) result["local_px"] = correction.local->rows();
+  return result;
 }
 
 json record_of(const tilt_series::TiltSeries& series, const align::Alignment& found,
@@ -53,15 +74,16 @@ json record_of(const tilt_series::TiltSeries& series, const align::Alignment& fo
     views.push_back(view_json(series.views()[v], found.corrections[v], found.joint.agreement[v],
                               std::ranges::binary_search(found.unaligned, static_cast<int>(v))));
   }
-  return {{"made_with", relevant_options(options)},
-          {"accepted", found.is_accepted},
-          {"held_out_error", {{"before", found.error_before}, {"after", found.error_after}}},
-          {"gain", {{"mean", found.gain}, {"standard_error", found.gain_error}}},
-          {"rotation", found.joint.freedoms.rotation},
-          {"magnification", found.joint.freedoms.magnification},
-          {"steps_px", found.joint.steps_px},
-          {"seconds", seconds},
-          {"views", std::move(views)}};
+  json record = {{"made_with", relevant_options(options)},
+                 {"accepted", found.is_accepted},
+                 {"rotation", found.joint.freedoms.rotation},
+                 {"magnification", found.joint.freedoms.magnification},
+                 {"steps_px", found.joint.steps_px},
+                 {"seconds", seconds},
+                 {"views", std::move(views)}};
+  record.update(held_out_json(found.held_out));
+  if (found.local) record["local"] = local_trial_json(found);
+  return record;
 }
 
 // Reads the record of an earlier run of the same options.
@@ -93,9 +115,38 @@ void apply_record(const json& record, ReconstructOptions& options) {
         .shift_y_px = view["shift_px"][1],
         .rotation_rad = view["rotation_deg"].get<double>() / kRadian_deg,
         .log_magnification = view["log_magnification"]};
+    if (view.contains("local_px")) {
+      const json& size_px = record.at("local").at("size_px");
+      corrections[static_cast<std::size_t>(section)].local =
+          geometry::ViewWarp::from_rows(size_px.at(0), size_px.at(1), view["local_px"]);
+    }
     if (view["left_out"].get<bool>()) options.input.left_out.push_back(section);
   }
   options.alignment = record;
+}
+
+std::string describe_errors(const json& compared) {
+  return fmt::format(
+      "held-out views are predicted with an error of {:.4f} (before: {:.4f}; the difference is "
+      "known to {:.4f})",
+      compared["held_out_error"]["after"].get<double>(),
+      compared["held_out_error"]["before"].get<double>(),
+      compared["gain"]["standard_error"].get<double>());
+}
+
+void log_local_motion(const json& local) {
+  const std::string errors = describe_errors(local);
+  if (local["accepted"].get<bool>()) {
+    base::log_info(fmt::format(
+        "undone: local motion of {:.2f} pixels (root mean square), which .xf and .aln files cannot "
+        "hold; {}",
+        local["rms_px"].get<double>(), errors));
+  } else {
+    base::log_info(
+        "local motion that the views seem to have is not undone, since they are not sure to be "
+        "predicted better: " +
+        errors);
+  }
 }
 
 void log_alignment(const json& record) {
@@ -107,12 +158,7 @@ void log_alignment(const json& record) {
     if (view["left_out"].get<bool>())
       left_out.push_back(fmt::format("{}", view["section"].get<int>()));
   }
-  const std::string errors = fmt::format(
-      "held-out views are predicted with an error of {:.4f} (before: {:.4f}; the difference is "
-      "known to {:.4f})",
-      record["held_out_error"]["after"].get<double>(),
-      record["held_out_error"]["before"].get<double>(),
-      record["gain"]["standard_error"].get<double>());
+  const std::string errors = describe_errors(record);
   if (record["accepted"].get<bool>()) {
     base::log_info(fmt::format("aligned: shifts of {:.2f} pixels (root mean square){}{}; {}",
                                std::sqrt(squares / 2 / static_cast<double>(record["views"].size())),
@@ -122,6 +168,7 @@ void log_alignment(const json& record) {
   } else {
     base::log_info("the alignment stays as it was, since a new one is no better: " + errors);
   }
+  if (record.contains("local")) log_local_motion(record["local"]);
   if (!left_out.empty())
     base::log_warning(fmt::format("left out, since they do not resemble the specimen: sections {}",
                                   fmt::join(left_out, ", ")));

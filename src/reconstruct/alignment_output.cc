@@ -17,6 +17,18 @@ std::filesystem::path picture_of(const ReconstructOptions& options) {
   return output_paths(options.resolved.output).alignment.replace_extension(".png");
 }
 
+// Returns the root mean square of the displacements [row][column] = (x, y) of the nodes.
+double rms_of(const nlohmann::json& nodes) {
+  double squares = 0.0, count = 0.0;
+  for (const nlohmann::json& row : nodes) {
+    for (const nlohmann::json& node : row) {
+      squares += std::pow(node[0].get<double>(), 2) + std::pow(node[1].get<double>(), 2);
+      count += 1.0;
+    }
+  }
+  return std::sqrt(squares / count);
+}
+
 report::AlignmentCurves curves_of(const nlohmann::json& record) {
   report::AlignmentCurves curves;
   for (const nlohmann::json& view : record["views"]) {
@@ -26,6 +38,7 @@ report::AlignmentCurves curves_of(const nlohmann::json& record) {
     curves.rotation_deg.push_back(view["rotation_deg"]);
     curves.magnification_percent.push_back(100 *
                                            std::expm1(view["log_magnification"].get<double>()));
+    curves.local_px.push_back(view.contains("local_px") ? rms_of(view["local_px"]) : 0.0);
     curves.correlation.push_back(view["correlation"]);
     curves.error_x_px.push_back(view["shift_error_px"][0]);
     curves.error_y_px.push_back(view["shift_error_px"][1]);

@@ -72,6 +72,10 @@ std::vector<CurvePlot> alignment_plots(const AlignmentCurves& alignment) {
         plot_of("change of the magnification, per cent",
                 {tilt_curve("magnification", alignment, alignment.magnification_percent)}, 0.02));
   }
+  if (has_change(alignment.local_px)) {
+    plots.push_back(plot_of("local motion, pixels before binning",
+                            {tilt_curve("root mean square", alignment, alignment.local_px)}, 0.1));
+  }
   plots.push_back(plot_of("correlation of the view with its projection",
                           {tilt_curve("correlation", alignment, alignment.correlation)}, 0.02));
   plots.push_back(plot_of("standard error of the shift, pixels before binning",

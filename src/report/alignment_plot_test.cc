@@ -75,6 +75,17 @@ TEST(AlignmentPlot, LeavesOutWhatNoViewHas) {
   EXPECT_EQ(alignment_plots(alignment).size(), 4u);
 }
 
+TEST(AlignmentPlot, HasLocalMotionIfAnyViewHas) {
+  AlignmentCurves alignment = some_alignment();
+  alignment.local_px.assign(41, 0.0);
+  EXPECT_EQ(alignment_plots(alignment).size(), 5u);
+  alignment.local_px[3] = 1.5;
+  const auto plots = alignment_plots(alignment);
+  ASSERT_EQ(plots.size(), 6u);
+  EXPECT_EQ(plots[3].axes.y_title, "local motion, pixels before binning");
+  EXPECT_EQ(plots[3].curves[0].points[22].second, 1.5);
+}
+
 TEST(AlignmentPlot, HasRoundTilts) {
   AlignmentCurves alignment = some_alignment();
   const auto ticks = alignment_plots(alignment)[0].axes.x_ticks;

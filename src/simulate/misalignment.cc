@@ -10,6 +10,7 @@ namespace tomofield::simulate {
 namespace {
 
 using geometry::RawFromAligned;
+using geometry::ViewWarp;
 
 constexpr std::uint64_t kShiftStream = 4;
 constexpr std::uint64_t kRotationStream = 9;
@@ -31,54 +32,10 @@ RawFromAligned as_written(const RawFromAligned& map) {
   return geometry::invert(line);
 }
 
-// Calls visit(x, y) for 32 × 32 places that cover a warp's view evenly.
-template <typename Visit>
-void for_each_place(const ViewWarp& warp, const Visit& visit) {
-  constexpr int kPlaces = 32;
-  for (int row = 0; row < kPlaces; ++row) {
-    for (int column = 0; column < kPlaces; ++column)
-      visit(((column + 0.5) / kPlaces - 0.5) * warp.width_px,
-            ((row + 0.5) / kPlaces - 0.5) * warp.height_px);
-  }
-}
-
-// Subtracts the least-squares fit t + m q + φ (−q_y, q_x) from the field of a warp. The places lie
-// evenly about the centre, so that the three parts are orthogonal. The splines have slopes that
-// follow linear functions exactly, so it is enough to subtract the fit at the nodes.
-void remove_rigid_part(ViewWarp& warp) {
-  ViewWarp::Vector shift{};
-  double magnification = 0.0, rotation = 0.0, count = 0.0, squares = 0.0;
-  for_each_place(warp, [&](double x, double y) {
-    const auto d = warp.displacement(x, y);
-    shift[0] += d[0];
-    shift[1] += d[1];
-    magnification += d[0] * x + d[1] * y;
-    rotation += d[1] * x - d[0] * y;
-    count += 1.0;
-    squares += x * x + y * y;
-  });
-  magnification /= squares;
-  rotation /= squares;
-  for (int row = 0; row < ViewWarp::kNodes; ++row) {
-    for (int column = 0; column < ViewWarp::kNodes; ++column) {
-      const auto [x, y] = warp.node_place(row, column);
-      auto& node = warp.nodes[static_cast<std::size_t>(row * ViewWarp::kNodes + column)];
-      node[0] -= shift[0] / count + magnification * x - rotation * y;
-      node[1] -= shift[1] / count + magnification * y + rotation * x;
-    }
-  }
-}
-
 double rms_displacement(const std::vector<ViewWarp>& warps) {
-  double squares = 0.0, count = 0.0;
-  for (const ViewWarp& warp : warps) {
-    for_each_place(warp, [&](double x, double y) {
-      const auto d = warp.displacement(x, y);
-      squares += d[0] * d[0] + d[1] * d[1];
-      count += 1.0;
-    });
-  }
-  return std::sqrt(squares / count);
+  double squares = 0.0;
+  for (const ViewWarp& warp : warps) squares += warp.mean_square();
+  return std::sqrt(squares / static_cast<double>(warps.size()));
 }
 
 }  // namespace
@@ -123,7 +80,7 @@ std::vector<ViewWarp> draw_warps(double local_px, double size_px, std::uint64_t 
       }
     }
   }
-  for (ViewWarp& warp : warps) remove_rigid_part(warp);
+  for (ViewWarp& warp : warps) warp = warp.without(warp.rigid_part());
   const double scale = local_px / rms_displacement(warps);
   for (ViewWarp& warp : warps) {
     for (auto& node : warp.nodes) {

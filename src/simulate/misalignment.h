@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "geometry/raw_from_aligned.h"
-#include "simulate/view_warp.h"
+#include "geometry/view_warp.h"
 
 namespace tomofield::simulate {
 
@@ -34,7 +34,7 @@ std::vector<geometry::RawFromAligned> draw_maps(const Misalignment& misalignment
 /// and magnification: their least-squares fit over the view is removed. Each node follows a walk
 /// over the views in which the correlation of neighbours is 0.9. All views together have the rms
 /// displacement `local_px`.
-std::vector<ViewWarp> draw_warps(double local_px, double size_px, std::uint64_t seed,
-                                 std::size_t num_views);
+std::vector<geometry::ViewWarp> draw_warps(double local_px, double size_px, std::uint64_t seed,
+                                           std::size_t num_views);
 
 }  // namespace tomofield::simulate

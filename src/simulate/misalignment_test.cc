@@ -11,6 +11,7 @@ namespace tomofield::simulate {
 namespace {
 
 using geometry::RawFromAligned;
+using geometry::ViewWarp;
 
 double rotation_deg(const RawFromAligned& map) {
   return std::atan2(map.m21, map.m11) * 180.0 / std::numbers::pi;

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "geometry/raw_from_aligned.h"
+#include "geometry/view_warp.h"
 #include "simulate/phantom.h"
-#include "simulate/view_warp.h"
 
 namespace tomofield::simulate {
 
@@ -22,7 +22,7 @@ struct ViewFrame {
   std::int64_t height = 0;
   double tilt_deg = 0.0;
   geometry::RawFromAligned raw_from_aligned{};  ///< its matrix is regular
-  std::optional<ViewWarp> warp{};               ///< local motion
+  std::optional<geometry::ViewWarp> warp{};     ///< local motion
 
   /// Tells whether y is constant in each recorded row.
   bool keeps_rows() const {

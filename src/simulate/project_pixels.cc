@@ -12,7 +12,7 @@
 namespace tomofield::simulate {
 namespace {
 
-using Vector = ViewWarp::Vector;
+using Vector = geometry::ViewWarp::Vector;
 
 // Holds the places in the aligned view of the pixels of a band of recorded rows.
 class Band {

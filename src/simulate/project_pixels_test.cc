@@ -51,8 +51,8 @@ struct Similarity {
   }
 };
 
-ViewWarp random_warp(double amplitude) {
-  ViewWarp warp{.width_px = 40.0, .height_px = 36.0};
+geometry::ViewWarp random_warp(double amplitude) {
+  geometry::ViewWarp warp{.width_px = 40.0, .height_px = 36.0};
   base::Random random(8);
   for (auto& node : warp.nodes) node = {amplitude * random.normal(), amplitude * random.normal()};
   return warp;
@@ -76,7 +76,7 @@ std::vector<float> project(const Phantom& phantom, const ViewFrame& view) {
 }
 
 void expect_quadrature(const Phantom& phantom, double tilt_deg, const Similarity& similarity,
-                       const std::optional<ViewWarp>& warp) {
+                       const std::optional<geometry::ViewWarp>& warp) {
   const auto image = project(phantom, {.width = 40,
                                        .height = 36,
                                        .tilt_deg = tilt_deg,
@@ -157,7 +157,7 @@ TEST(ProjectPixels, PixelsAgreeWithRows) {
                    .tilt_deg = -33.0,
                    .raw_from_aligned = {.shift_x_px = 1.3, .shift_y_px = -2.6}};
     const auto rows = project(phantom, view);
-    view.warp = ViewWarp{.width_px = 40.0, .height_px = 36.0};
+    view.warp = geometry::ViewWarp{.width_px = 40.0, .height_px = 36.0};
     const auto pixels = project(phantom, view);
     for (std::size_t pixel = 0; pixel < rows.size(); ++pixel)
       EXPECT_NEAR(pixels[pixel], rows[pixel], 1e-5) << pixel;

@@ -108,14 +108,17 @@ ViewFrame frame_of(const SimulatedView& view, const Phantom& phantom) {
           .warp = view.warp};
 }
 
-// Returns the standard deviation of the noise in data units (SimulationOptions::noise).
+// Returns the standard deviation of the noise in data units (SimulationOptions::noise). It is that
+// of the series without local motion, which may move an edge of the specimen into the view.
 double noise_sigma(const Phantom& phantom, const std::vector<SimulatedView>& views, double noise) {
   const auto nearest = std::min_element(views.begin(), views.end(),
                                         [](const SimulatedView& a, const SimulatedView& b) {
                                           return std::abs(a.tilt_deg) < std::abs(b.tilt_deg);
                                         });
   std::vector<float> image(static_cast<std::size_t>(phantom.shape.nx * phantom.shape.ny));
-  project_view(phantom, frame_of(*nearest, phantom), image);
+  ViewFrame frame = frame_of(*nearest, phantom);
+  frame.warp.reset();
+  project_view(phantom, frame, image);
   const double low = base::percentile(image, 0.5);
   return noise * (base::percentile(std::move(image), 99.5) - low);
 }
@@ -299,13 +302,7 @@ Json view_json(const SimulatedView& view, const Misalignment& misalignment) {
     json["exposure_before"] = view.exposure.before;
     json["exposure"] = view.exposure.of_view;
   }
-  if (view.warp) {
-    json["local_px"] = Json::array();
-    for (std::size_t node = 0; node < view.warp->nodes.size(); ++node) {
-      if (node % ViewWarp::kNodes == 0) json["local_px"].push_back(Json::array());
-      json["local_px"].back().push_back(view.warp->nodes[node]);
-    }
-  }
+  if (view.warp) json["local_px"] = view.warp->rows();
   return json;
 }
 

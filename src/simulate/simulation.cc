@@ -126,7 +126,7 @@ std::vector<SimulatedView> plan_views(const SimulationOptions& options) {
   std::vector<SimulatedView> views(static_cast<std::size_t>(count_views(options.tilts)));
   const std::uint64_t seed = options.cell.seed;
   const auto maps = draw_maps(options.misalignment, seed, views.size());
-  std::vector<ViewWarp> warps;
+  std::vector<geometry::ViewWarp> warps;
   if (options.misalignment.local_px > 0.0)
     warps = draw_warps(options.misalignment.local_px, static_cast<double>(options.cell.size_px),
                        seed, views.size());

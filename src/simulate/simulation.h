@@ -9,10 +9,10 @@
 
 #include "base/enum_names.h"
 #include "geometry/raw_from_aligned.h"
+#include "geometry/view_warp.h"
 #include "simulate/imaging.h"
 #include "simulate/misalignment.h"
 #include "simulate/phantom.h"
-#include "simulate/view_warp.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::simulate {
@@ -71,7 +71,7 @@ void apply_yardstick(Yardstick yardstick, SimulationOptions& options);
 struct SimulatedView {
   double tilt_deg = 0.0;
   geometry::RawFromAligned raw_from_aligned{};
-  std::optional<ViewWarp> warp{};  ///< local motion
+  std::optional<geometry::ViewWarp> warp{};  ///< local motion
   double gain = 1.0;
   std::optional<io::Defocus> defocus{};  ///< of the recorded image, on the tilt axis
   microscope::Exposure exposure{};

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "tilt_series/motion_map.h"
 
 namespace tomofield::tilt_series {
 namespace {
@@ -56,17 +57,22 @@ bool interpolate(const MaskedImage& raw, const Taps& x, const Taps& y, float* va
 }  // namespace
 
 MaskedImage align_image(const MaskedImage& raw, const RawFromAligned& transform, std::int64_t width,
-                        std::int64_t height) {
+                        std::int64_t height, const std::optional<geometry::ViewWarp>& local) {
   MaskedImage out(width, height);
   // Pixel centres: i + 1/2 − N/2 on both sides.
   const double out_x = 0.5 * static_cast<double>(width - 1);
   const double out_y = 0.5 * static_cast<double>(height - 1);
   const double raw_x = 0.5 * static_cast<double>(raw.width - 1) + transform.shift_x_px;
   const double raw_y = 0.5 * static_cast<double>(raw.height - 1) + transform.shift_y_px;
+  std::optional<MotionMap> motion;
+  if (local) motion.emplace(*local);
+  const auto source_of = [&](double x, double y) {
+    return motion ? motion->source_of(x, y) : geometry::ViewWarp::Vector{x, y};
+  };
   base::parallel_for("align view", height, [&](std::int64_t y) {
-    const double qy = static_cast<double>(y) - out_y;
     for (std::int64_t x = 0; x < width; ++x) {
-      const double qx = static_cast<double>(x) - out_x;
+      const auto [qx, qy] =
+          source_of(static_cast<double>(x) - out_x, static_cast<double>(y) - out_y);
       const Taps taps_x = make_taps(transform.m11 * qx + transform.m12 * qy + raw_x, raw.width);
       const Taps taps_y = make_taps(transform.m21 * qx + transform.m22 * qy + raw_y, raw.height);
       const std::size_t at = out.index(x, y);

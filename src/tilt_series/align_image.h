@@ -1,6 +1,9 @@
 #pragma once
 
+#include <optional>
+
 #include "geometry/raw_from_aligned.h"
+#include "geometry/view_warp.h"
 #include "tilt_series/image.h"
 
 namespace tomofield::tilt_series {
@@ -11,8 +14,10 @@ using geometry::RawFromAligned;
 /// convolution (Keys 1981, a = −1/2: Catmull–Rom), linear in the outermost
 /// pixel of the raw image. Pixels whose centre lies outside the centres of
 /// the raw image's outermost pixels, or that need a pixel which is no
-/// measurement, are invalid. Centres are N/2 with pixel i at i + 1/2.
+/// measurement, are invalid. Centres are N/2 with pixel i at i + 1/2. With
+/// local motion, the pixel at a place q + d(q) takes the value that the raw
+/// image has for q.
 MaskedImage align_image(const MaskedImage& raw, const RawFromAligned& transform, std::int64_t width,
-                        std::int64_t height);
+                        std::int64_t height, const std::optional<geometry::ViewWarp>& local = {});
 
 }  // namespace tomofield::tilt_series

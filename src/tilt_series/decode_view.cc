@@ -105,11 +105,12 @@ DecodedView ViewDecoder::decode_masked(MaskedImage image, std::size_t view, Fram
 }
 
 MaskedImage ViewDecoder::aligned(MaskedImage recorded, std::size_t view) const {
-  const RawFromAligned& transform = plan_.views[view].raw_from_aligned;
+  const PlannedView& planned = plan_.views[view];
   const bool keeps_sizes =
       plan_.aligned_width == recorded.width && plan_.aligned_height == recorded.height;
-  if (transform.is_identity() && keeps_sizes) return recorded;
-  return align_image(recorded, transform, plan_.aligned_width, plan_.aligned_height);
+  if (planned.raw_from_aligned.is_identity() && !planned.local && keeps_sizes) return recorded;
+  return align_image(recorded, planned.raw_from_aligned, plan_.aligned_width, plan_.aligned_height,
+                     planned.local);
 }
 
 MaskedImage ViewDecoder::binned(MaskedImage image) const {

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <optional>
 
+#include "base/check.h"
 #include "base/log.h"
 #include "base/plausible.h"
 #include "geometry/imod_transform.h"
@@ -156,6 +157,7 @@ std::array<std::int64_t, 2> aligned_size(const InPlaneAlignment& alignment,
 void correct(const geometry::ViewCorrection& correction, PlannedView& planned) {
   planned.raw_from_aligned = geometry::corrected(planned.raw_from_aligned, correction);
   planned.view.tilt_deg += correction.tilt_deg;
+  planned.local = correction.local;
 }
 
 }  // namespace
@@ -207,6 +209,7 @@ SeriesPlan plan_series(const TiltSeriesOptions& options, const io::ImageStack& s
                     x_tilts_deg[at] - options.x_axis_tilt_deg};
     if (alignment) planned.raw_from_aligned = *alignment->of_section[at];
     if (!options.corrections.empty()) correct(options.corrections[at], planned);
+    TOMOFIELD_CHECK(options.resample || !planned.local, "local motion of views as recorded");
     plan.views.push_back(planned);
   }
   if (plan.views.empty()) {

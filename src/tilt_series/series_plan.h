@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@ namespace tomofield::tilt_series {
 struct PlannedView {
   View view;
   RawFromAligned raw_from_aligned;
+  std::optional<geometry::ViewWarp> local{};  ///< local motion in the aligned view, unbinned
 };
 
 /// A series as the small files and the stack's header describe it, before any pixel is read.

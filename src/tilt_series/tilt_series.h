@@ -57,7 +57,8 @@ struct TiltSeriesOptions {
   std::optional<double> bead_diameter_nm;
   /// Finds and removes what stays at one place of the detector in all views.
   bool remove_fixed_pattern = true;
-  /// [section]: changes of the alignment that the files give. Empty: none.
+  /// [section]: changes of the alignment that the files give. Empty: none. Local motion
+  /// needs `resample`.
   std::vector<geometry::ViewCorrection> corrections = {};
   /// Sections that are left out beside `exclude`, counted from 0, ascending.
   std::vector<std::int64_t> left_out = {};

@@ -34,9 +34,10 @@ def series_of(folder, size=SIZE):
 
 
 def errors(folder, prefix, size=SIZE):
-    """Returns the errors of the alignment in PREFIX.xf and PREFIX.tlt."""
-    truth, estimate = (alignment_score.Alignment(np.loadtxt(stem + ".xf"), np.loadtxt(stem + ".tlt"))
-                       for stem in (os.path.join(folder, "tilt_series"), prefix))
+    """Returns the errors of the alignment in PREFIX.xf, PREFIX.tlt and PREFIX.json."""
+    truth, _ = alignment_score.read_truth(folder)
+    estimate = alignment_score.Alignment(np.loadtxt(prefix + ".xf"), np.loadtxt(prefix + ".tlt"),
+                                         alignment_score.read_local(prefix + ".json"))
     return alignment_score.score(truth, estimate, size)
 
 
@@ -74,8 +75,30 @@ def test_full_finds_large_shifts_and_the_axis():
 def test_a_good_alignment_is_hardly_changed():
     folder = simulate("alignment_good")
     harness.succeed("align", *series_of(folder), "-o", os.path.join(folder, "found.mrc"))
-    shifts = np.array([view["shift_px"] for view in record(os.path.join(folder, "found_align"))["views"]])
-    assert np.sqrt(np.mean(shifts**2)) < 0.1
+    made = record(os.path.join(folder, "found_align"))
+    assert np.sqrt(np.mean(np.square([view["shift_px"] for view in made["views"]]))) < 0.1
+    assert "local" not in made and not any("local_px" in view for view in made["views"])
+
+
+def test_local_motion_is_undone():
+    size = 96
+    folder = simulate("alignment_motion", "--misalign-local", 1.5, size=size)
+    volume, prefix = (os.path.join(folder, name) for name in ("found.mrc", "found_align"))
+    command = ["reconstruct", *series_of(folder, size), *FIT[:-2], "--align", "refine", "-o", volume]
+    log = harness.succeed(*command).stderr
+    assert "undone: local motion of 1." in log
+    made = record(prefix)
+    assert made["local"]["accepted"] and made["local"]["size_px"] == [size, size]
+    assert made["local"]["held_out_error"]["after"] < 0.5 * made["local"]["held_out_error"]["before"]
+    truth, _ = alignment_score.read_truth(folder)
+    still = alignment_score.Alignment(alignment_score.unaligned(len(truth.tilts_deg)), truth.tilts_deg)
+    before = alignment_score.score(truth, still, size)["local_less_specimen_warp_px"]
+    assert errors(folder, prefix, size)["local_less_specimen_warp_px"] < 0.6 * before
+    # A resumed run takes it from the record.
+    first = harness.read_bytes(volume)
+    os.remove(os.path.join(folder, "found.h5"))
+    harness.succeed(*command, "--resume")
+    assert harness.read_bytes(volume) == first
 
 
 def test_reconstruct_takes_the_alignment_and_resumes_from_it(shifted):

@@ -54,13 +54,18 @@ BeadSearchOptions search_options(const TiltSeriesOptions& options, const SeriesP
 }
 
 /// Returns where a point of a section is in its aligned, binned view.
-MaskDisc place_in_view(const io::FiducialPoint& point, const RawFromAligned& transform,
+MaskDisc place_in_view(const io::FiducialPoint& point, const PlannedView& view,
                        const SeriesPlan& plan, const io::MrcHeader& header) {
+  const RawFromAligned& transform = view.raw_from_aligned;
   const double px = point.x_px - static_cast<double>(header.nx) / 2 - transform.shift_x_px;
   const double py = point.y_px - static_cast<double>(header.ny) / 2 - transform.shift_y_px;
   const double determinant = transform.m11 * transform.m22 - transform.m12 * transform.m21;
-  const double qx = (transform.m22 * px - transform.m12 * py) / determinant;
-  const double qy = (transform.m11 * py - transform.m21 * px) / determinant;
+  double qx = (transform.m22 * px - transform.m12 * py) / determinant;
+  double qy = (transform.m11 * py - transform.m21 * px) / determinant;
+  if (view.local) {
+    const auto d = view.local->displacement(qx, qy);
+    qx += d[0], qy += d[1];
+  }
   const auto middle = [&](std::int64_t size) {
     return static_cast<double>(reduced_size(size, plan.bin_factor)) / 2;
   };
@@ -93,8 +98,7 @@ std::vector<std::vector<MaskDisc>> place_fiducials(const std::filesystem::path& 
     require_in_stack(point, file, stack);
     for (std::size_t view = 0; view < places.size(); ++view) {
       if (plan.views[view].view.section != std::llround(point.section)) continue;
-      places[view].push_back(
-          place_in_view(point, plan.views[view].raw_from_aligned, plan, stack.header()));
+      places[view].push_back(place_in_view(point, plan.views[view], plan, stack.header()));
     }
   }
   return places;

@@ -1,4 +1,4 @@
-#include "simulate/view_warp.h"
+#include "geometry/view_warp.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "base/random.h"
 
-namespace tomofield::simulate {
+namespace tomofield::geometry {
 namespace {
 
 // Returns a warp of a view of 60 × 44 pixels whose nodes are fx and fy at their places.
@@ -99,5 +99,52 @@ TEST(ViewWarp, NoComponentExceedsTheLargest) {
   }
 }
 
+TEST(ViewWarp, SourcesAreDisplacedToTheirPlaces) {
+  const ViewWarp warp = random_warp(4);
+  for (double x = -33.0; x <= 33.0; x += 4.1) {
+    for (double y = -25.0; y <= 25.0; y += 3.3) {
+      const auto q = warp.source_of(x, y);
+      const auto d = warp.displacement(q[0], q[1]);
+      EXPECT_NEAR(q[0] + d[0], x, 1e-3);
+      EXPECT_NEAR(q[1] + d[1], y, 1e-3);
+    }
+  }
+}
+
+TEST(ViewWarp, OneAfterTheOtherIsExactAtTheNodes) {
+  const ViewWarp first = random_warp(5), next = random_warp(6), both = first.then(next);
+  for (int row = 0; row < 5; ++row) {
+    for (int column = 0; column < 5; ++column) {
+      const auto [x, y] = both.node_place(row, column);
+      const auto once = first.displacement(x, y);
+      const auto twice = next.displacement(x + once[0], y + once[1]);
+      EXPECT_NEAR(both.displacement(x, y)[0], once[0] + twice[0], 1e-12);
+      EXPECT_NEAR(both.displacement(x, y)[1], once[1] + twice[1], 1e-12);
+    }
+  }
+}
+
+TEST(ViewWarp, LargerPixelsShrinkPlacesAndDisplacements) {
+  const ViewWarp warp = random_warp(7), binned = warp.binned(4);
+  for (const double x : {-30.0, -8.0, 21.0}) {
+    EXPECT_NEAR(binned.displacement(x / 4, 2.5)[0], warp.displacement(x, 10.0)[0] / 4, 1e-12);
+    EXPECT_NEAR(binned.displacement(x / 4, 2.5)[1], warp.displacement(x, 10.0)[1] / 4, 1e-12);
+  }
+}
+
+TEST(ViewWarp, WithoutItsRigidPartItHasNone) {
+  const ViewWarp::Rigid added{.shift = {3.0, -2.0}, .magnification = 0.02, .rotation = -0.03};
+  const ViewWarp rest = random_warp(8).without(random_warp(8).rigid_part());
+  const ViewWarp::Rigid none = rest.rigid_part();
+  EXPECT_NEAR(none.shift[0], 0.0, 1e-12);
+  EXPECT_NEAR(none.magnification, 0.0, 1e-12);
+  EXPECT_NEAR(none.rotation, 0.0, 1e-12);
+  const ViewWarp::Rigid less = rest.without(added).rigid_part();
+  EXPECT_NEAR(less.shift[0], -3.0, 1e-12);
+  EXPECT_NEAR(less.shift[1], 2.0, 1e-12);
+  EXPECT_NEAR(less.magnification, -0.02, 1e-12);
+  EXPECT_NEAR(less.rotation, 0.03, 1e-12);
+}
+
 }  // namespace
-}  // namespace tomofield::simulate
+}  // namespace tomofield::geometry
