@@ -21,12 +21,16 @@ constexpr std::int64_t kEpochsBefore = 2;
 // has one.
 constexpr int kSlowBin = 2;
 
-int views_at_once(const measurement::Measurement& measurement, const fit::Stage& stage) {
+// Returns the bytes of a view and its prediction.
+std::size_t prediction_bytes(const measurement::Measurement& measurement, int bin) {
   const auto pixels =
-      static_cast<std::size_t>(measurement.geometry.width * measurement.rays_shape().num_rows) /
-      static_cast<std::size_t>(stage.bin * stage.bin);
+      static_cast<std::size_t>(measurement.geometry.width * measurement.rays_shape().num_rows);
+  return 2 * sizeof(float) * (pixels / static_cast<std::size_t>(bin * bin));
+}
+
+int views_at_once(const measurement::Measurement& measurement, const fit::Stage& stage) {
   return static_cast<int>(
-      std::clamp<std::size_t>(kPredictionBytes / (8 * pixels + 1), 1,
+      std::clamp<std::size_t>(kPredictionBytes / (prediction_bytes(measurement, stage.bin) + 1), 1,
                               static_cast<std::size_t>(measurement.geometry.num_views())));
 }
 
@@ -103,6 +107,12 @@ LocalRegistrationOptions local_options(const measurement::Measurement& measureme
           .pixel = stage.bin * measurement.bin_factor,
           .prior_px = kPrior * measurement.bin_factor,
           .pixels_per_sample = pixels_per_sample(RegistrationOptions{}.blur_px)};
+}
+
+std::size_t prediction_memory(const measurement::Measurement& measurement) {
+  const std::size_t of_view = prediction_bytes(measurement, 1);
+  const auto num_views = static_cast<std::size_t>(measurement.geometry.num_views());
+  return std::max(of_view, std::min(kPredictionBytes, num_views * of_view));
 }
 
 void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& measurement,

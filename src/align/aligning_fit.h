@@ -34,6 +34,9 @@ ImagePair image_pair(const measurement::PredictedView& view,
 LocalRegistrationOptions local_options(const measurement::Measurement& measurement,
                                        const fit::Stage& stage);
 
+/// Returns the bytes that the predictions of for_each_prediction() take at most.
+std::size_t prediction_memory(const measurement::Measurement& measurement);
+
 /// Predicts all views by a fit in one of its stages, as many at a time as fit into a gigabyte, and
 /// calls visit(view, images) for each of them, from several threads. Every process calls it.
 void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& measurement,

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
+#include "align/aligning_fit.h"
+#include "align/axis_search.h"
 #include "align/correlation_start.h"
 #include "align/gauge.h"
 #include "align/local_alignment.h"
@@ -64,6 +67,21 @@ void add_motion(const JointProblem& problem, const std::vector<double>& errors,
 }
 
 }  // namespace
+
+fit::FieldOptions planned_field(const fit::FieldOptions& field) { return aligning_field(field); }
+
+std::size_t memory_beside_fit(const measurement::Measurement& plan) {
+  return prediction_memory(plan);
+}
+
+std::vector<PlannedFits> planned_fits(bool from_raw, std::uint64_t seed) {
+  constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
+  // The held-out views judge the old and the new alignment.
+  std::vector<PlannedFits> fits{{joint_fit(seed), kAll, 1, 2.0},
+                                {held_out_fit(seed), kAll, 2, 2.0}};
+  if (from_raw) fits.push_back({joint_fit(seed), kResidualEpochs, kMostAxisFits, 6.0});
+  return fits;
+}
 
 std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& problem) {
   const base::TraceSpan span("correlate views");

@@ -8,6 +8,9 @@
 
 namespace tomofield::align {
 
+/// Number of fits that with_best_axis() makes, at most.
+inline constexpr int kMostAxisFits = 13;
+
 /// Returns the corrections with the common rotation about the centres of the views at which the
 /// views agree best with a field that is fitted and aligned with coarse pixels. It looks for the
 /// rotation within ±6°. Every process calls it and gets the same.

@@ -28,8 +28,6 @@ constexpr double kLongestStep = 2.0;
 constexpr int kFreedomBin = 2;
 constexpr double kSure = 3.0;  // standard errors by which a freedom must pay
 
-constexpr int kCoarseEpochs = 80, kFineEpochs = 4;
-
 // A fit and the corrections of the views that it is made with.
 class AligningFit {
  public:
@@ -41,8 +39,7 @@ class AligningFit {
         measurement_(measurement::prepare_realigned(problem.recorded, start, problem.specimen,
                                                     problem.scratch_dir, fit::band_rows(field_),
                                                     processes)),
-        fit_(measurement_, field_, aligning_fit(kCoarseEpochs, kFineEpochs, problem.seed),
-             processes) {
+        fit_(measurement_, field_, joint_fit(problem.seed), processes) {
     found_.agreement.resize(start.size());
     // A start with rotations has errors of rotations.
     found_.freedoms.rotation = std::ranges::any_of(
@@ -161,6 +158,11 @@ class AligningFit {
 
 }  // namespace
 
+fit::FitOptions joint_fit(std::uint64_t seed) {
+  constexpr int kCoarseEpochs = 80, kFineEpochs = 4;
+  return aligning_fit(kCoarseEpochs, kFineEpochs, seed);
+}
+
 JointAlignment align_jointly(const JointProblem& problem, std::vector<ViewCorrection> start,
                              const distributed::Communicator& processes) {
   AligningFit fit(problem, std::move(start), processes);
@@ -169,9 +171,8 @@ JointAlignment align_jointly(const JointProblem& problem, std::vector<ViewCorrec
 
 double coarse_residual(const JointProblem& problem, std::vector<ViewCorrection> start,
                        const distributed::Communicator& processes) {
-  constexpr std::int64_t kEpochs = 15;
   AligningFit fit(problem, std::move(start), processes);
-  fit.run(kEpochs);
+  fit.run(kResidualEpochs);
   return fit.residual();
 }
 

@@ -48,6 +48,12 @@ struct JointProblem {
   std::function<bool()> stop_requested;  ///< is asked after each epoch; empty: never stop
 };
 
+/// Returns the options of the fit of align_jointly().
+fit::FitOptions joint_fit(std::uint64_t seed);
+
+/// Number of epochs of the fit of coarse_residual(): the first ones of joint_fit().
+inline constexpr std::int64_t kResidualEpochs = 15;
+
 /// Aligns the views of a series with the projections of a field while the field is being fitted to
 /// them, from coarse to fine. After each epoch the field predicts all views. Each view is
 /// registered to its prediction (registration.h) and resampled anew from the recorded one. The part

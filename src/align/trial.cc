@@ -11,9 +11,13 @@ namespace tomofield::align {
 namespace {
 
 constexpr int kEvery = 8;
-constexpr int kCoarseEpochs = 24, kFineEpochs = 1;
 
 }  // namespace
+
+fit::FitOptions held_out_fit(std::uint64_t seed) {
+  constexpr int kCoarseEpochs = 24, kFineEpochs = 1;
+  return aligning_fit(kCoarseEpochs, kFineEpochs, seed);
+}
 
 std::vector<double> errors_of_held_out_views(const JointProblem& problem,
                                              std::span<const geometry::ViewCorrection> corrections,
@@ -24,8 +28,7 @@ std::vector<double> errors_of_held_out_views(const JointProblem& problem,
       measurement::prepare_realigned(problem.recorded, corrections, problem.specimen,
                                      problem.scratch_dir, fit::band_rows(field), processes);
   measurement.held_out = measurement::held_out_views(measurement.geometry.tilt_deg, kEvery);
-  fit::Fit fit(measurement, field, aligning_fit(kCoarseEpochs, kFineEpochs, problem.seed),
-               processes);
+  fit::Fit fit(measurement, field, held_out_fit(problem.seed), processes);
   fit.run([](const fit::Fit&) { return true; });
   const std::vector<measurement::ViewModel> models(measurement.held_out.size());
   const auto predicted = fit.predict(measurement.held_out, models);

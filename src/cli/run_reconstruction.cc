@@ -155,8 +155,9 @@ std::vector<io::OutputLock> claim_run(const reconstruction::ReconstructOptions& 
 
 tilt_series::TiltSeries open_series(reconstruction::ReconstructOptions& options, bool dry_run,
                                     const distributed::Communicator& processes) {
-  if (dry_run) options.resolved.align = Alignment::kOff;
-  if (options.resolved.align != Alignment::kOff) stop_on_signals(processes.size() > 1);
+  if (dry_run || options.resolved.align == Alignment::kOff)
+    return tilt_series::TiltSeries(options.input, processes);
+  stop_on_signals(processes.size() > 1);
   reconstruction::ReconstructHooks hooks{
       .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};
   if (processes.is_root()) hooks.tune_progress = make_progress_bar("align");

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "align/alignment.h"
 #include "base/check.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -182,6 +183,20 @@ std::size_t estimate_memory(const tilt_series::TiltSeries& series,
                   rays + coarse_rays + std::max({fitting + tracing, factorising, decoding}));
 }
 
+// Returns the peak memory of a process while it aligns the views.
+std::size_t memory_of_alignment(const tilt_series::TiltSeries& series,
+                                const measurement::Measurement& plan, RunPlan run,
+                                ReconstructOptions options,
+                                const distributed::Communicator& processes) {
+  const bool from_raw = options.resolved.align == Alignment::kFull;
+  options.field = align::planned_field(options.field);
+  options.fit = align::planned_fits(from_raw, options.fit.seed).front().options;
+  run.stages = fit::make_stages(options.field, options.fit);
+  const fit::Domain domain = fit::make_domain(plan.geometry, plan.roi, options.field);
+  return estimate_memory(series, plan, domain, run, options, processes) +
+         series.stored_memory(processes) + align::memory_beside_fit(plan);
+}
+
 // Returns the bytes that writing the results of halves takes: the rays, and a model that is
 // sampled, or what compares the volumes or makes linear ones.
 std::size_t memory_of_halves(const tilt_series::TiltSeries& series,
@@ -255,6 +270,9 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.num_steps = (last.first_epoch + last.epochs) * run.steps_an_epoch;
   run.memory_bytes = estimate_memory(series, plan, domain, run, options, processes);
   run.most_vertices = most_vertices(domain);
+  if (options.resolved.align != Alignment::kOff && !plan.ray_geometry)
+    run.memory_bytes =
+        std::max(run.memory_bytes, memory_of_alignment(series, plan, run, options, processes));
   if (options.makes_halves()) {
     require_views_for_halves(plan, options);
     run.num_fits = 2;

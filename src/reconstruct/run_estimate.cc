@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "align/alignment.h"
 #include "base/stopwatch.h"
 #include "fit/stages.h"
 #include "io/scratch_memory.h"
@@ -34,12 +35,15 @@ struct Work {
   double steps_of_vertices = 0, samples_of_vertices = 0;
   double steps_of_factors = 0, samples_of_factors = 0;
 
-  // Adds a fit of at most so many rows, `times` times.
+  // Adds the first epochs of a fit of at most so many rows, `times` times.
   void add_fit(const measurement::Measurement& plan, const fit::FieldOptions& field,
-               const fit::FitOptions& fit, int steps_an_epoch, double max_rows, int times) {
+               const fit::FitOptions& fit, int steps_an_epoch, double max_rows, double times,
+               std::int64_t epochs = std::numeric_limits<std::int64_t>::max()) {
     for (const fit::Stage& stage : fit::make_stages(field, fit)) {
       const bool is_grid = stage.field_kind == FieldKind::kGrid;
-      const double steps = static_cast<double>(times) * stage.epochs * steps_an_epoch;
+      const std::int64_t made =
+          std::clamp<std::int64_t>(epochs - stage.first_epoch, 0, stage.epochs);
+      const double steps = times * static_cast<double>(made) * steps_an_epoch;
       (is_grid ? steps_of_vertices : steps_of_factors) += steps;
       (is_grid ? samples_of_vertices : samples_of_factors) +=
           steps * samples_of(stage, plan, field, max_rows);
@@ -54,12 +58,24 @@ struct Work {
   }
 };
 
-// Returns the work of the fit and of the trials that choose its settings.
+// Adds the fits of the alignment.
+void add_alignment(const measurement::Measurement& plan, const ReconstructOptions& options,
+                   const RunPlan& run, Work& work) {
+  constexpr double kAllRows = std::numeric_limits<double>::infinity();
+  const fit::FieldOptions field = align::planned_field(options.field);
+  const bool from_raw = options.resolved.align == Alignment::kFull;
+  for (const align::PlannedFits& fits : align::planned_fits(from_raw, options.fit.seed))
+    work.add_fit(plan, field, fits.options, run.steps_an_epoch, kAllRows, fits.cost * fits.times,
+                 fits.epochs);
+}
+
+// Returns the work of the alignment, of the fit and of the trials that choose its settings.
 Work work_of(const measurement::Measurement& plan, const ReconstructOptions& options,
              const RunPlan& run) {
   constexpr double kAllRows = std::numeric_limits<double>::infinity();
   Work work;
   work.add_fit(plan, options.field, options.fit, run.steps_an_epoch, kAllRows, run.num_fits);
+  if (options.resolved.align != Alignment::kOff) add_alignment(plan, options, run, work);
   if (run.num_trials == 0) return work;
   const TrialShape trial = options.resolved.tune ? trial_of_tune(options.field, options.fit)
                                                  : short_trial(options.field, options.fit);

@@ -69,6 +69,15 @@ TEST_F(Estimate, TrialsAndFactorsAreMoreWork) {
   EXPECT_GT(*estimate().core_seconds, 0);
 }
 
+TEST_F(Estimate, AnAlignmentIsMoreWork) {
+  const double alone = estimate().sample_steps;
+  options_.align = Alignment::kRefine;
+  const double refined = estimate().sample_steps;
+  EXPECT_GT(refined, alone);
+  options_.align = Alignment::kFull;
+  EXPECT_GT(estimate().sample_steps, refined);
+}
+
 TEST_F(Estimate, DiskHoldsTheResultsAndTwoCheckpoints) {
   const RunEstimate estimated = estimate();
   const auto voxels = static_cast<std::size_t>(kSize * kSize * 24);

@@ -127,3 +127,17 @@ def test_too_few_views_are_refused(shifted):
                                 os.path.join(shifted, "few.mrc"))
     assert refused.returncode == 2 and "at least 12 views" in refused.stderr
     assert not os.path.exists(os.path.join(shifted, "few_align.json"))
+
+
+def test_a_dry_run_counts_the_alignment(shifted):
+    def samples_and_memory(align):
+        plan = os.path.join(shifted, f"plan_{align}.json")
+        harness.succeed("reconstruct", *series_of(shifted), *FIT[:-2], "--align", align, "-o",
+                        os.path.join(shifted, "planned.mrc"), "--plan", plan)
+        with open(plan, encoding="utf-8") as file:
+            made = json.load(file)
+        return made["sample_steps"], made["memory_bytes"]
+
+    without, refine, full = (samples_and_memory(align) for align in ("off", "refine", "full"))
+    assert without[0] < refine[0] < full[0] and without[1] < refine[1]
+    assert not os.path.exists(os.path.join(shifted, "planned_align.json"))
