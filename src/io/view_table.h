@@ -25,7 +25,7 @@ struct Defocus {
   double phase_shift_deg = 0.0;
 };
 
-/// What a file states of the microscope; none: it is not in the file.
+/// Holds what a file states of the microscope; none: it is not in the file.
 struct StatedOptics {
   std::optional<double> voltage_kV, spherical_aberration_mm, amplitude_contrast;
 };
