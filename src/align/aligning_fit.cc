@@ -148,4 +148,13 @@ bool run_with_updates(const JointProblem& problem, fit::Fit& fit, std::int64_t n
   return false;
 }
 
+void go_on_with(const JointProblem& problem, std::span<const geometry::ViewCorrection> corrections,
+                const fit::FieldOptions& field, const distributed::Communicator& processes,
+                measurement::Measurement& measurement, fit::Fit& fit) {
+  if (fit.is_done()) return;
+  measurement::realign(problem.recorded, corrections, problem.scratch_dir, fit::band_rows(field),
+                       processes, measurement);
+  fit.reread_measurement();
+}
+
 }  // namespace tomofield::align

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "align/joint_alignment.h"
@@ -51,5 +52,11 @@ bool run_with_updates(const JointProblem& problem, fit::Fit& fit, std::int64_t n
                       const std::vector<double>& steps_px,
                       const std::function<void(const fit::Stage&)>& update,
                       const distributed::Communicator& processes);
+
+/// Resamples the views of a fit with other corrections, from the recorded ones, and lets the fit go
+/// on with them; does nothing if the fit is done. Every process calls it.
+void go_on_with(const JointProblem& problem, std::span<const geometry::ViewCorrection> corrections,
+                const fit::FieldOptions& field, const distributed::Communicator& processes,
+                measurement::Measurement& measurement, fit::Fit& fit);
 
 }  // namespace tomofield::align

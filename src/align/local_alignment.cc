@@ -97,10 +97,7 @@ class LocalFit {
     remove_gauge(measurement_.geometry, next);
     found_.steps_px.push_back(rms_change(found_.corrections, next));
     found_.corrections = std::move(next);
-    if (fit_.is_done()) return;
-    measurement::realign(problem_.recorded, found_.corrections, problem_.scratch_dir,
-                         fit::band_rows(field_), processes_, measurement_);
-    fit_.reread_measurement();
+    go_on_with(problem_, found_.corrections, field_, processes_, measurement_, fit_);
   }
 
   // Returns the motion that each view shows beside what is undone already.
