@@ -90,7 +90,8 @@ void add_files(py::module_& module) {
       .def_readwrite("mask", &SeriesFiles::mask)
       .def_readwrite("fiducials", &SeriesFiles::fiducials)
       .def_readwrite("even", &SeriesFiles::even)
-      .def_readwrite("odd", &SeriesFiles::odd);
+      .def_readwrite("odd", &SeriesFiles::odd)
+      .def_readwrite("ctf", &SeriesFiles::ctf);
 }
 
 void add_views_and_specimen(Class& options) {
@@ -114,6 +115,16 @@ void add_views_and_specimen(Class& options) {
       .def_readwrite("with_margin", &Options::with_margin);
   add_choice(options, "contrast", &Options::contrast);
   add_rectangle(options);
+}
+
+void add_contrast_transfer(Class& options) {
+  options.def_readwrite("defocus_um", &Options::defocus_um)
+      .def_readwrite("is_phase_flipped", &Options::is_phase_flipped)
+      .def_readwrite("voltage_kV", &Options::voltage_kV)
+      .def_readwrite("spherical_aberration_mm", &Options::spherical_aberration_mm)
+      .def_readwrite("amplitude_contrast", &Options::amplitude_contrast)
+      .def_readwrite("dose_per_tilt", &Options::dose_per_tilt)
+      .def_readwrite("is_dose_weighted", &Options::is_dose_weighted);
 }
 
 void add_field_and_fit(Class& options) {
@@ -171,6 +182,7 @@ void add_options(py::module_& module) {
   Class options(module, "Options");
   options.def(py::init());
   add_views_and_specimen(options);
+  add_contrast_transfer(options);
   add_field_and_fit(options);
   add_halves_volume_and_run(options);
 }

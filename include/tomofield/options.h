@@ -41,6 +41,7 @@ struct SeriesFiles {
   std::optional<std::filesystem::path> fiducials;  ///< text of model2point, stack coordinates
   std::optional<std::filesystem::path> even;       ///< MRC as the stack: the even frames alone
   std::optional<std::filesystem::path> odd;        ///< and the odd frames
+  std::optional<std::filesystem::path> ctf;  ///< contrast transfer of each view; "none": ignore it
 };
 
 /// A rectangle [x0, x1) × [y0, y1) of pixels. A region of interest is one of the aligned view at
@@ -71,6 +72,15 @@ struct Options {
   std::optional<double> black_level;  ///< subtracted from bright intensities, in units of the stack
   std::optional<double> bead_diameter_nm;  ///< of gold beads to find and mask; 0: none
   bool remove_fixed_pattern = true;        ///< what stays at one place of the detector
+
+  // Contrast transfer and dose
+  std::optional<double> defocus_um;    ///< underfocus of all views, in place of SeriesFiles::ctf
+  bool is_phase_flipped = false;       ///< the stack's phases were flipped
+  std::optional<double> voltage_kV;    ///< default: that of the file, else 300
+  std::optional<double> spherical_aberration_mm;  ///< default: that of the file, else 2.7
+  std::optional<double> amplitude_contrast;       ///< default: that of the file, else 0.07
+  std::optional<double> dose_per_tilt;            ///< electrons per Å² a view; 0: no damage
+  bool is_dose_weighted = false;                  ///< the stack was filtered by exposure
 
   // Specimen
   double thickness = 0;          ///< of the tomogram along Z; required

@@ -28,6 +28,15 @@ class Options(TypedDict, total=False):
     bead_diameter_nm: Optional[float]
     remove_fixed_pattern: bool
 
+    # Contrast transfer and dose
+    defocus_um: Optional[float]
+    is_phase_flipped: bool
+    voltage_kV: Optional[float]
+    spherical_aberration_mm: Optional[float]
+    amplitude_contrast: Optional[float]
+    dose_per_tilt: Optional[float]
+    is_dose_weighted: bool
+
     # Specimen
     thickness: float
     roi: Optional[Tuple[int, int, int, int]]  # x0, y0, x1, y1

@@ -12,6 +12,12 @@ constexpr double kAngstroms_in_mm = 1e7;
 
 }  // namespace
 
+Optics without_phase_contrast(Optics optics) {
+  optics.spherical_aberration_mm = 0.0;
+  optics.amplitude_contrast = 1.0;
+  return optics;
+}
+
 // λ = h / √(2 m e U (1 + e U / (2 m c²))), with the constants of CODATA 2018.
 double electron_wavelength_A(double voltage_kV) {
   const double volts = 1000.0 * voltage_kV;

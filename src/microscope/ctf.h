@@ -13,6 +13,9 @@ struct Optics {
   double b_factor_A2 = 0.0;          ///< of the envelope exp(−B k² / 4)
 };
 
+/// Returns the optics of pure absorption, which transfers everything in focus.
+Optics without_phase_contrast(Optics optics);
+
 /// Returns the wavelength of electrons, with the theory of relativity.
 double electron_wavelength_A(double voltage_kV);
 

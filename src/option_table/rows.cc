@@ -107,6 +107,37 @@ constexpr Row kRows[] = {
     {.key = "input.mask", .flag = "--mask", MEMBER(SeriesFiles, mask), .group = Group::kMasks,
      .help = "MRC stack of the same size as the tilt series. Pixels that are 0 in it are left out"},
 
+    // Contrast transfer and dose
+    {.key = "input.ctf", .flag = "--ctf", MEMBER(SeriesFiles, ctf), .group = Group::kTransfer,
+     .help = "Contrast transfer of each section, which the fit takes into account: a table of CTFFIND "
+             "or AreTomo, IMOD's .defocus, a STAR file of RELION or Gctf, or Warp's XML. none: use "
+             "no such file of a project"},
+    {.key = "input.defocus_um", .flag = "--defocus", MEMBER(Options, defocus_um),
+     .group = Group::kTransfer, .unit = "µm", .range = Range::between(-1000, 1000),
+     .automatic = "that of --ctf; without it views are plain projections",
+     .help = "Underfocus of all views on the tilt axis, in place of --ctf"},
+    {.key = "input.is_phase_flipped", .flag = "--ctf-phase-flipped",
+     MEMBER(Options, is_phase_flipped), .group = Group::kTransfer,
+     .help = "The phases of the stack were flipped already: the contrast transfer is |CTF|"},
+    {.key = "input.voltage_kV", .flag = "--voltage", MEMBER(Options, voltage_kV),
+     .group = Group::kTransfer, .unit = "kV", .range = Range::between(1, 10000),
+     .automatic = "that of --ctf, else 300", .help = "Voltage of the microscope"},
+    {.key = "input.spherical_aberration_mm", .flag = "--cs",
+     MEMBER(Options, spherical_aberration_mm), .group = Group::kTransfer, .unit = "mm",
+     .range = Range::between(0, 100), .automatic = "that of --ctf, else 2.7",
+     .help = "Spherical aberration of the microscope"},
+    {.key = "input.amplitude_contrast", .flag = "--amplitude-contrast",
+     MEMBER(Options, amplitude_contrast), .group = Group::kTransfer, .range = Range::between(0, 1),
+     .automatic = "that of --ctf, else 0.07", .help = "Share of the contrast that is absorption"},
+    {.key = "input.dose_per_tilt", .flag = "--dose-per-tilt", MEMBER(Options, dose_per_tilt),
+     .group = Group::kTransfer, .unit = "electrons per Å²", .range = Range::between(0, 1e6),
+     .automatic = "with a contrast transfer the doses of --mdoc or of a table of views, else 0",
+     .help = "Dose of each view, in the order of --mdoc or of a table of views, else in that of the "
+             "stack: the fit expects less detail of late views. 0: no radiation damage"},
+    {.key = "input.is_dose_weighted", .flag = "--dose-weighted", MEMBER(Options, is_dose_weighted),
+     .group = Group::kTransfer,
+     .help = "The views were weighted by dose already: the fit applies no radiation damage"},
+
     // Specimen
     {.key = "specimen.thickness", .flag = "--thickness", MEMBER(Options, thickness),
      .group = Group::kSpecimen, .unit = kUnbinned, .range = Range::between(1, 1e6),
@@ -348,6 +379,8 @@ std::string_view title_of(Group group) {
       return "Images";
     case Group::kMasks:
       return "Masks";
+    case Group::kTransfer:
+      return "Contrast transfer and dose";
     case Group::kSpecimen:
       return "Specimen";
     case Group::kField:

@@ -45,6 +45,7 @@ enum class Group {
   kAlignment,
   kImages,
   kMasks,
+  kTransfer,
   kSpecimen,
   kField,
   kFit,

@@ -18,9 +18,11 @@ namespace {
 
 // The addresses of all members. A member that is added does not compile here until it is named.
 std::vector<const void*> members_of(const Choices& choices) {
-  const auto& [stack, tlt, xf, xtilt, aln, mdoc, mask, fiducials, even, odd] = choices.files;
+  const auto& [stack, tlt, xf, xtilt, aln, mdoc, mask, fiducials, even, odd, ctf] = choices.files;
   const auto& [tilt_offset, x_axis_tilt, exclude, ignore, bin, angpix, pixel_size, contrast,
-               take_log, log_base, black_level, bead_diameter, fixed_pattern, thickness, roi, hand,
+               take_log, log_base, black_level, bead_diameter, fixed_pattern,
+               defocus, phase_flipped, voltage, spherical_aberration, amplitude_contrast,
+               dose_per_tilt, dose_weighted, thickness, roi, hand,
                axis_x, axis_z, shift_z, with_margin, field, leaf_size, tree, leaf_budget,
                vertex_spacing, rank, activation, margin_spacing, epochs, vertex_epochs,
                coarse_epochs, coarse_bin, subsets, engine, ray_samples, rays_per_step,
@@ -38,6 +40,7 @@ std::vector<const void*> members_of(const Choices& choices) {
           &fiducials,
           &even,
           &odd,
+          &ctf,
           &tilt_offset,
           &x_axis_tilt,
           &exclude,
@@ -51,6 +54,13 @@ std::vector<const void*> members_of(const Choices& choices) {
           &black_level,
           &bead_diameter,
           &fixed_pattern,
+          &defocus,
+          &phase_flipped,
+          &voltage,
+          &spherical_aberration,
+          &amplitude_contrast,
+          &dose_per_tilt,
+          &dose_weighted,
           &thickness,
           &roi,
           &hand,

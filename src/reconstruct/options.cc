@@ -195,6 +195,7 @@ std::vector<std::string> ReconstructOptions::faults() const {
   refuse_if(resolved.align != Alignment::kOff && is_ray,
             "--align refine aligns views in their plane: it needs --engine slab");
   for (const char* sentence : faults_of_halves()) all.emplace_back(sentence);
+  for (const char* sentence : faults_of_transfer()) all.emplace_back(sentence);
   return all;
 }
 
@@ -217,6 +218,27 @@ std::vector<const char*> ReconstructOptions::faults_of_halves() const {
   refuse_if(fit.patience > 0,
             "halves need fits of the same length: leave --early-stop out, or choose --epochs");
   refuse_if(resolved.output.empty(), "halves are written as files: name the tomogram");
+  return all;
+}
+
+// Returns a sentence for each option of contrast transfer and dose that does not go with others.
+std::vector<const char*> ReconstructOptions::faults_of_transfer() const {
+  std::vector<const char*> all;
+  const auto refuse_if = [&](bool is_fault, const char* sentence) {
+    if (is_fault) all.push_back(sentence);
+  };
+  refuse_if(has_ctf_file() && resolved.defocus_um,
+            "--ctf and --defocus both set the defocus of the views: give one of them");
+  refuse_if(!has_ctf() && (resolved.is_phase_flipped || resolved.spherical_aberration_mm ||
+                           resolved.amplitude_contrast),
+            "--ctf-phase-flipped, --cs and --amplitude-contrast describe a contrast transfer: give "
+            "--ctf or --defocus as well");
+  const bool has_dose = resolved.dose_per_tilt.value_or(0.0) > 0.0;
+  refuse_if(has_dose && resolved.is_dose_weighted,
+            "--dose-weighted says that the damage of --dose-per-tilt is in the views already: give "
+            "one of them");
+  refuse_if((has_ctf() || has_dose) && fit.engine == Engine::kRay,
+            "--ctf, --defocus and --dose-per-tilt filter aligned views: they need --engine slab");
   return all;
 }
 

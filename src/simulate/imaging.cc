@@ -6,32 +6,12 @@
 
 #include "base/random.h"
 #include "microscope/defocus_slope.h"
-#include "microscope/view_filter.h"
 
 namespace tomofield::simulate {
 namespace {
 
 constexpr std::uint64_t kDefocusStream = 12;
 constexpr double kAngstroms_in_um = 1e4;
-
-// Returns the transfer of a view. Pure absorption in focus transfers everything.
-microscope::ViewTransfer transfer_of(const ViewFrame& view, const Imaging& imaging,
-                                     const std::optional<io::Defocus>& defocus, double exposure,
-                                     double pixel_size_A) {
-  microscope::ViewTransfer transfer;
-  transfer.optics = imaging.optics;
-  transfer.exposure = exposure;
-  transfer.pixel_size_A = pixel_size_A;
-  if (!defocus) {
-    transfer.optics.spherical_aberration_mm = 0.0;
-    transfer.optics.amplitude_contrast = 1.0;
-    return transfer;
-  }
-  transfer.defocus = *defocus;
-  transfer.slope = microscope::slope_of_tilt(
-      view.tilt_deg, pixel_size_A, microscope::DefocusHand::kRight, view.raw_from_aligned);
-  return transfer;
-}
 
 }  // namespace
 
@@ -67,6 +47,23 @@ std::vector<std::size_t> dose_symmetric_order(std::span<const double> tilts_deg)
     return from_zero(a) < from_zero(b);
   });
   return order;
+}
+
+microscope::ViewTransfer transfer_of(const ViewFrame& view, const Imaging& imaging,
+                                     const std::optional<io::Defocus>& defocus, double exposure,
+                                     double pixel_size_A) {
+  microscope::ViewTransfer transfer;
+  transfer.optics = imaging.optics;
+  transfer.exposure = exposure;
+  transfer.pixel_size_A = pixel_size_A;
+  if (!defocus) {
+    transfer.optics = microscope::without_phase_contrast(transfer.optics);
+    return transfer;
+  }
+  transfer.defocus = *defocus;
+  transfer.slope = microscope::slope_of_tilt(
+      view.tilt_deg, pixel_size_A, microscope::DefocusHand::kRight, view.raw_from_aligned);
+  return transfer;
 }
 
 void image_view(const Phantom& phantom, const ViewFrame& view, const Imaging& imaging,

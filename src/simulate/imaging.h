@@ -7,6 +7,7 @@
 
 #include "microscope/ctf.h"
 #include "microscope/exposure.h"
+#include "microscope/view_filter.h"
 #include "simulate/phantom.h"
 #include "simulate/project_phantom.h"
 
@@ -34,6 +35,11 @@ std::vector<std::optional<io::Defocus>> draw_defoci(const Imaging& imaging, std:
 /// 2017): from the tilt nearest to zero outwards, on the positive side first, then two tilts on
 /// each side by turns.
 std::vector<std::size_t> dose_symmetric_order(std::span<const double> tilts_deg);
+
+/// Returns what turns a projection into a view. `defocus` is that of the recorded image.
+microscope::ViewTransfer transfer_of(const ViewFrame& view, const Imaging& imaging,
+                                     const std::optional<io::Defocus>& defocus, double exposure,
+                                     double pixel_size_A);
 
 /// Computes a view [height, width] as project_view() does, filtered by its contrast transfer, with
 /// the defocus of each place on the tilted middle plane of the specimen, and by radiation damage

@@ -1,0 +1,183 @@
+#include "reconstruct/view_transfers.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <string>
+
+#include "base/log.h"
+#include "io/alignment_files.h"
+#include "io/ctf_table.h"
+#include "io/view_table.h"
+#include "microscope/exposure.h"
+#include "tilt_series/open_views.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+using microscope::Exposure;
+using Exposures = std::vector<Exposure>;  // [section]
+
+constexpr double kAngstroms_in_um = 1e4;
+
+// Throws Error if the pixel size is the one that stands for an unknown one.
+void require_pixel_size(const ReconstructOptions& options, const tilt_series::TiltSeries& series,
+                        const std::string& stack) {
+  const double unbinned_A = series.pixel_size_A() / series.bin_factor();
+  if (options.input.pixel_size_A || std::abs(unbinned_A - 1.0) > 1e-6) return;
+  throw Error(fmt::format("contrast transfer and dose depend on the pixel size, which '{}' does not "
+                          "have: give it with --pixel-size",
+                          stack));
+}
+
+void require_sections(std::size_t count, std::int64_t num_sections,
+                      const std::filesystem::path& file, const char* what,
+                      const std::string& stack) {
+  if (static_cast<std::int64_t>(count) == num_sections) return;
+  throw Error(fmt::format("'{}' has the {} of {} sections, but '{}' has {}: give the file of this stack",
+                          file.string(), what, count, stack, num_sections));
+}
+
+// Returns the contrast transfer of each section, or nothing without any.
+std::optional<io::CtfTable> find_ctf(const ReconstructOptions& options, std::int64_t num_sections,
+                                     const std::string& stack) {
+  if (const auto& um = options.resolved.defocus_um) {
+    const double defocus_A = *um * kAngstroms_in_um;
+    io::CtfTable table;
+    table.views.assign(static_cast<std::size_t>(num_sections),
+                       io::Defocus{defocus_A, defocus_A, 0.0, 0.0});
+    base::log_info(fmt::format("ctf: an underfocus of {} µm in all views", *um));
+    return table;
+  }
+  if (!options.has_ctf_file()) return std::nullopt;
+  io::CtfTable table = io::read_ctf(*options.files.ctf);
+  require_sections(table.views.size(), num_sections, table.file, "contrast transfer", stack);
+  for (const std::string& what : table.not_applied)
+    base::log_warning(fmt::format("'{}' has {}, which is not applied", table.file.string(), what));
+  base::log_info(fmt::format("ctf: the defocus of each view from '{}'; --ctf none turns it off",
+                             table.file.string()));
+  return table;
+}
+
+// Returns the optics: those of the options, else those of the file, else the usual ones.
+microscope::Optics find_optics(const Options& options, const std::optional<io::CtfTable>& ctf) {
+  const io::StatedOptics stated = ctf ? ctf->optics : io::StatedOptics{};
+  microscope::Optics optics;
+  const auto choose = [](double& value, const std::optional<double>& given,
+                         const std::optional<double>& in_file) {
+    if (given || in_file) value = given ? *given : *in_file;
+  };
+  choose(optics.voltage_kV, options.voltage_kV, stated.voltage_kV);
+  if (!ctf) return microscope::without_phase_contrast(optics);
+  choose(optics.spherical_aberration_mm, options.spherical_aberration_mm,
+         stated.spherical_aberration_mm);
+  choose(optics.amplitude_contrast, options.amplitude_contrast, stated.amplitude_contrast);
+  return optics;
+}
+
+// What files say of the doses and of the order in which the sections were recorded.
+struct Recording {
+  std::string source;              // the name of the file; empty: no file tells
+  std::optional<Exposures> doses;  // [section]
+  std::vector<std::size_t> order;  // of sections
+};
+
+// Returns the sections in the order of their exposures.
+std::vector<std::size_t> order_of(const Exposures& exposures) {
+  std::vector<std::size_t> order(exposures.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return exposures[i].before; });
+  return order;
+}
+
+Recording find_recording(const ReconstructOptions& options, std::int64_t num_sections,
+                         const std::string& stack) {
+  Recording found;
+  if (options.files.mdoc) {
+    const io::Mdoc mdoc = io::read_mdoc(*options.files.mdoc);
+    require_sections(mdoc.sections.size(), num_sections, *options.files.mdoc, "doses", stack);
+    return {options.files.mdoc->string(), microscope::exposures_of(mdoc),
+            io::acquisition_order(mdoc)};
+  }
+  if (!options.input.images && io::is_view_table(options.files.stack)) {
+    found.doses = microscope::exposures_of(io::read_view_table(options.files.stack));
+    if (found.doses) {
+      require_sections(found.doses->size(), num_sections, options.files.stack, "doses", stack);
+      return {options.files.stack.string(), found.doses, order_of(*found.doses)};
+    }
+  }
+  found.order.resize(static_cast<std::size_t>(num_sections));
+  std::iota(found.order.begin(), found.order.end(), std::size_t{0});
+  return found;
+}
+
+// Returns the exposure of each section, or nothing if it is not known or not wanted.
+std::optional<Exposures> find_exposures(const ReconstructOptions& options,
+                                        std::int64_t num_sections, const std::string& stack) {
+  const std::optional<double>& of_view = options.resolved.dose_per_tilt;
+  if (options.resolved.is_dose_weighted) {
+    base::log_info("dose: the views are weighted by it already, so no radiation damage is applied");
+    return std::nullopt;
+  }
+  if (of_view && *of_view == 0.0) return std::nullopt;
+  const Recording recording = find_recording(options, num_sections, stack);
+  if (!of_view) {
+    if (recording.doses) base::log_info(fmt::format("dose: from '{}'", recording.source));
+    return recording.doses;
+  }
+  base::log_info(fmt::format(
+      "dose: {} electrons per Å² a view, in the order of {}", *of_view,
+      recording.source.empty() ? "the stack's sections, because no file has the order of recording"
+                               : "'" + recording.source + "'"));
+  return microscope::exposures_in_order(recording.order, *of_view);
+}
+
+// Sets the defocus of a view, turned to the aligned image, and its slope over that image.
+void set_defocus(const ReconstructOptions& options, const tilt_series::TiltSeries& series,
+                 std::size_t view, const io::CtfTable& ctf, microscope::ViewTransfer& transfer) {
+  const tilt_series::View& of = series.views()[view];
+  const std::optional<io::Defocus>& recorded = ctf.views[static_cast<std::size_t>(of.section)];
+  if (!recorded)
+    throw Error(fmt::format("'{}' has no defocus of section {}: add it, or leave the section out "
+                            "with --exclude {}",
+                            ctf.file.string(), of.section + 1, of.section + 1));
+  const auto hand = options.resolved.hand < 0 ? microscope::DefocusHand::kLeft
+                                              : microscope::DefocusHand::kRight;
+  transfer.defocus = microscope::aligned_defocus(*recorded, series.raw_from_aligned(view));
+  transfer.slope = microscope::slope_of_tilt(of.tilt_deg, series.pixel_size_A(), hand);
+  transfer.is_flipped = options.resolved.is_phase_flipped;
+}
+
+}  // namespace
+
+std::vector<microscope::ViewTransfer> view_transfers(const ReconstructOptions& options,
+                                                     const tilt_series::TiltSeries& series) {
+  const bool has_dose = options.resolved.dose_per_tilt.value_or(0.0) > 0.0;
+  if (!options.has_ctf() && !options.files.ctf && options.resolved.contrast == Contrast::kDark)
+    base::log_info("ctf: none is given (--ctf or --defocus), so the views count as plain projections: "
+                   "the tomogram lacks contrast at low resolution and keeps the fringes of defocus");
+  if (!options.has_ctf() && !has_dose) return {};
+  const auto stack = tilt_series::open_views(options.input);
+  const std::int64_t num_sections = stack->header().nz;
+  require_pixel_size(options, series, stack->name());
+  const auto ctf = find_ctf(options, num_sections, stack->name());
+  const auto exposures = find_exposures(options, num_sections, stack->name());
+  if (!ctf && !exposures) return {};
+  const microscope::Optics optics = find_optics(options.resolved, ctf);
+  std::vector<microscope::ViewTransfer> transfers(series.views().size());
+  for (std::size_t view = 0; view < transfers.size(); ++view) {
+    microscope::ViewTransfer& transfer = transfers[view];
+    const auto section = static_cast<std::size_t>(series.views()[view].section);
+    transfer.optics = optics;
+    transfer.pixel_size_A = series.pixel_size_A();
+    if (exposures) transfer.exposure = (*exposures)[section].at_middle();
+    if (ctf) set_defocus(options, series, view, *ctf, transfer);
+  }
+  return transfers;
+}
+
+}  // namespace tomofield::reconstruction
