@@ -74,9 +74,9 @@ struct Options {
   bool remove_fixed_pattern = true;        ///< what stays at one place of the detector
 
   // Contrast transfer and dose
-  std::optional<double> defocus_um;    ///< underfocus of all views, in place of SeriesFiles::ctf
-  bool is_phase_flipped = false;       ///< the stack's phases were flipped
-  std::optional<double> voltage_kV;    ///< default: that of the file, else 300
+  std::optional<double> defocus_um;  ///< underfocus of all views, in place of SeriesFiles::ctf
+  bool is_phase_flipped = false;     ///< the stack's phases were flipped
+  std::optional<double> voltage_kV;  ///< default: that of the file, else 300
   std::optional<double> spherical_aberration_mm;  ///< default: that of the file, else 2.7
   std::optional<double> amplitude_contrast;       ///< default: that of the file, else 0.07
   std::optional<double> dose_per_tilt;            ///< electrons per Å² a view; 0: no damage

@@ -270,7 +270,7 @@ void add_batch_command(CLI::App& program) {
   const auto own_options = add_own_options(command, *arguments);
   add_series_options(command, arguments->choices);
   add_groups(command, arguments->choices,
-             {Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume});
+             {Group::kTransfer, Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume});
   add_row(command, "running.checkpoint_minutes", arguments->choices);
   for (CLI::Option* option : command.get_options()) {  // a table may have what a series needs
     const bool is_required_of_a_run = row_of_option(*option) != nullptr && option->get_required();

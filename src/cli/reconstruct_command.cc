@@ -58,7 +58,8 @@ void add_reconstruct_command(CLI::App& program, const distributed::Communicator&
   auto arguments = std::make_shared<Arguments>();
   add_input_options(command, arguments->choices);
   add_groups(command, arguments->choices,
-             {Group::kTransfer, Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume, Group::kHalves});
+             {Group::kTransfer, Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume,
+              Group::kHalves});
   add_run_options(command, arguments->choices, arguments->dry_run);
   add_common_options(command);
   add_trace_option(command, arguments->trace);

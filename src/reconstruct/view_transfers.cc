@@ -29,17 +29,19 @@ void require_pixel_size(const ReconstructOptions& options, const tilt_series::Ti
                         const std::string& stack) {
   const double unbinned_A = series.pixel_size_A() / series.bin_factor();
   if (options.input.pixel_size_A || std::abs(unbinned_A - 1.0) > 1e-6) return;
-  throw Error(fmt::format("contrast transfer and dose depend on the pixel size, which '{}' does not "
-                          "have: give it with --pixel-size",
-                          stack));
+  throw Error(
+      fmt::format("contrast transfer and dose depend on the pixel size, which '{}' does not "
+                  "have: give it with --pixel-size",
+                  stack));
 }
 
 void require_sections(std::size_t count, std::int64_t num_sections,
                       const std::filesystem::path& file, const char* what,
                       const std::string& stack) {
   if (static_cast<std::int64_t>(count) == num_sections) return;
-  throw Error(fmt::format("'{}' has the {} of {} sections, but '{}' has {}: give the file of this stack",
-                          file.string(), what, count, stack, num_sections));
+  throw Error(
+      fmt::format("'{}' has the {} of {} sections, but '{}' has {}: give the file of this stack",
+                  file.string(), what, count, stack, num_sections));
 }
 
 // Returns the contrast transfer of each section, or nothing without any.
@@ -142,11 +144,12 @@ void set_defocus(const ReconstructOptions& options, const tilt_series::TiltSerie
   const tilt_series::View& of = series.views()[view];
   const std::optional<io::Defocus>& recorded = ctf.views[static_cast<std::size_t>(of.section)];
   if (!recorded)
-    throw Error(fmt::format("'{}' has no defocus of section {}: add it, or leave the section out "
-                            "with --exclude {}",
-                            ctf.file.string(), of.section + 1, of.section + 1));
-  const auto hand = options.resolved.hand < 0 ? microscope::DefocusHand::kLeft
-                                              : microscope::DefocusHand::kRight;
+    throw Error(
+        fmt::format("'{}' has no defocus of section {}: add it, or leave the section out "
+                    "with --exclude {}",
+                    ctf.file.string(), of.section + 1, of.section + 1));
+  const auto hand =
+      options.resolved.hand < 0 ? microscope::DefocusHand::kLeft : microscope::DefocusHand::kRight;
   transfer.defocus = microscope::aligned_defocus(*recorded, series.raw_from_aligned(view));
   transfer.slope = microscope::slope_of_tilt(of.tilt_deg, series.pixel_size_A(), hand);
   transfer.is_flipped = options.resolved.is_phase_flipped;
@@ -158,8 +161,9 @@ std::vector<microscope::ViewTransfer> view_transfers(const ReconstructOptions& o
                                                      const tilt_series::TiltSeries& series) {
   const bool has_dose = options.resolved.dose_per_tilt.value_or(0.0) > 0.0;
   if (!options.has_ctf() && !options.files.ctf && options.resolved.contrast == Contrast::kDark)
-    base::log_info("ctf: none is given (--ctf or --defocus), so the views count as plain projections: "
-                   "the tomogram lacks contrast at low resolution and keeps the fringes of defocus");
+    base::log_info(
+        "ctf: none is given (--ctf or --defocus), so the views count as plain projections: "
+        "the tomogram lacks contrast at low resolution and keeps the fringes of defocus");
   if (!options.has_ctf() && !has_dose) return {};
   const auto stack = tilt_series::open_views(options.input);
   const std::int64_t num_sections = stack->header().nz;

@@ -9,8 +9,8 @@
 namespace tomofield::reconstruction {
 
 /// Returns what the microscope did to each aligned view of a series, as the options for contrast
-/// transfer and dose say: [view], with pixels of `series`. It is empty if the options name neither a
-/// contrast transfer nor a dose, so that the views are plain projections. The defocus is that on
+/// transfer and dose say: [view], with pixels of `series`. It is empty if the options name neither
+/// a contrast transfer nor a dose, so that the views are plain projections. The defocus is that on
 /// the tilt axis, and its slope is that of the middle plane of the specimen, whose hand is --hand.
 /// Doses come from --dose-per-tilt, else from --mdoc, else from the table of views that is the
 /// stack. Logs what it took. Throws Error if the pixel size is not known, and for a file that is

@@ -1,0 +1,153 @@
+#include "reconstruct/view_transfers.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+
+#include "expect_parts.h"
+#include "scratch_directory.h"
+#include "simulate/simulate_series.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+using microscope::ViewTransfer;
+using testing::message_of;
+using testing::ScratchDirectory;
+
+simulate::SimulationOptions simulation() {
+  simulate::SimulationOptions options;
+  options.cell.size_px = 32;
+  options.cell.thickness_px = 12;
+  options.tilts = {-40, 40, 20};
+  options.voxel_size_A = 8.0;
+  options.imaging.defocus = simulate::Imaging::Range{3.0, 5.0};
+  options.imaging.astigmatism_um = 0.2;
+  options.imaging.dose_per_tilt = 3.0;
+  options.write_truth = false;
+  return options;
+}
+
+SeriesFiles files_in(const ScratchDirectory& folder) {
+  SeriesFiles files;
+  files.stack = folder / "s/tilt_series.mrc";
+  files.tlt = folder / "s/tilt_series.tlt";
+  return files;
+}
+
+Options options_of_run() {
+  Options options;
+  options.contrast = Contrast::kBright;
+  options.thickness = 12;
+  return options;
+}
+
+std::vector<ViewTransfer> transfers_of(const SeriesFiles& files, const Options& options) {
+  const ReconstructOptions run = run_options(files, options);
+  return view_transfers(run, tilt_series::TiltSeries(run.input));
+}
+
+void expect_same(const ViewTransfer& a, const ViewTransfer& b) {
+  EXPECT_DOUBLE_EQ(a.optics.voltage_kV, b.optics.voltage_kV);
+  EXPECT_DOUBLE_EQ(a.optics.spherical_aberration_mm, b.optics.spherical_aberration_mm);
+  EXPECT_DOUBLE_EQ(a.optics.amplitude_contrast, b.optics.amplitude_contrast);
+  EXPECT_NEAR(a.defocus.u_A, b.defocus.u_A, 1e-3);
+  EXPECT_NEAR(a.defocus.v_A, b.defocus.v_A, 1e-3);
+  EXPECT_NEAR(a.defocus.angle_deg, b.defocus.angle_deg, 1e-6);
+  EXPECT_NEAR(a.slope.at(7, 5), b.slope.at(7, 5), 1e-3);
+  EXPECT_NEAR(a.exposure, b.exposure, 1e-6);
+  EXPECT_NEAR(a.pixel_size_A, b.pixel_size_A, 1e-6);
+  EXPECT_EQ(a.is_flipped, b.is_flipped);
+}
+
+TEST(ViewTransfers, AreThoseThatASeriesWasSimulatedWith) {
+  const ScratchDirectory folder;
+  const simulate::SimulationOptions simulated = simulation();
+  simulate::simulate_series(folder / "s", simulated, false);
+  const auto views = simulate::plan_views(simulated);
+  for (const char* ctf : {"s/tilt_series_ctf.txt", "s/tilt_series.defocus"}) {
+    SeriesFiles files = files_in(folder);
+    files.ctf = folder / ctf;
+    files.mdoc = folder / "s/tilt_series.mdoc";
+    const auto transfers = transfers_of(files, options_of_run());
+    ASSERT_EQ(transfers.size(), views.size());
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      expect_same(transfers[i],
+                  simulate::transfer_of({.width = 32,
+                                         .height = 32,
+                                         .tilt_deg = views[i].tilt_deg,
+                                         .raw_from_aligned = views[i].raw_from_aligned,
+                                         .warp = {}},
+                                        simulated.imaging, views[i].defocus,
+                                        views[i].exposure.at_middle(), simulated.voxel_size_A));
+    }
+  }
+}
+
+TEST(ViewTransfers, FollowTheOptions) {
+  const ScratchDirectory folder;
+  simulate::simulate_series(folder / "s", simulation(), false);
+  SeriesFiles files = files_in(folder);
+  Options options = options_of_run();
+  EXPECT_TRUE(transfers_of(files, options).empty());
+  options.dose_per_tilt = 2.0;  // and no order but that of the stack
+  EXPECT_EQ(transfers_of(files, options).back().exposure, 9.0);
+  EXPECT_EQ(transfers_of(files, options).back().optics.amplitude_contrast, 1.0);
+  options.exclude = "1";
+  options.defocus_um = 4.0;
+  options.is_phase_flipped = true;
+  options.voltage_kV = 200.0;
+  options.hand = -1;
+  const auto transfers = transfers_of(files, options);
+  ASSERT_EQ(transfers.size(), 4u);
+  EXPECT_EQ(transfers[0].exposure, 3.0);  // of the second section
+  EXPECT_EQ(transfers[0].defocus.u_A, 4e4);
+  EXPECT_EQ(transfers[0].optics.voltage_kV, 200.0);
+  EXPECT_TRUE(transfers[0].is_flipped);
+  EXPECT_GT(transfers[0].slope.x_A, 0.0);  // at −20°, mirrored
+}
+
+TEST(ViewTransfers, AreRefusedWithoutWhatTheyNeed) {
+  const ScratchDirectory folder;
+  simulate::SimulationOptions simulated = simulation();
+  simulate::simulate_series(folder / "s", simulated, false);
+  simulated.tilts.last_deg = 20;
+  simulate::simulate_series(folder / "fewer", simulated, false);
+  SeriesFiles files = files_in(folder);
+  files.ctf = folder / "fewer/tilt_series_ctf.txt";
+  expect_parts(message_of<Error>([&] { transfers_of(files, options_of_run()); }),
+               {"fewer/tilt_series_ctf.txt", "4 sections", "has 5"});
+  simulated = simulation();
+  simulated.voxel_size_A = 1.0;
+  simulate::simulate_series(folder / "s", simulated, true);
+  files.ctf = folder / "s/tilt_series_ctf.txt";
+  expect_parts(message_of<Error>([&] { transfers_of(files, options_of_run()); }),
+               {"s/tilt_series.mrc", "pixel size", "--pixel-size"});
+}
+
+TEST(ViewTransfers, ContradictionsAreFaults) {
+  const auto num_faults = [](const Options& options, const char* ctf) {
+    SeriesFiles files;
+    if (ctf != nullptr) files.ctf = ctf;
+    return run_options(files, options).faults().size();
+  };
+  Options options = options_of_run();
+  EXPECT_EQ(num_faults(options, "a.defocus"), 0u);
+  options.defocus_um = 3.0;
+  EXPECT_EQ(num_faults(options, "none"), 0u);
+  EXPECT_EQ(num_faults(options, "a.defocus"), 1u);
+  options.engine = Engine::kRay;
+  EXPECT_EQ(num_faults(options, nullptr), 1u);
+  options = options_of_run();
+  options.is_phase_flipped = true;
+  EXPECT_EQ(num_faults(options, nullptr), 1u);
+  options = options_of_run();
+  options.dose_per_tilt = 3.0;
+  options.is_dose_weighted = true;
+  EXPECT_EQ(num_faults(options, nullptr), 1u);
+}
+
+}  // namespace
+}  // namespace tomofield::reconstruction
