@@ -14,6 +14,7 @@ namespace tomofield::reconstruction {
 namespace {
 
 using microscope::ViewTransfer;
+using testing::expect_parts;
 using testing::message_of;
 using testing::ScratchDirectory;
 
