@@ -12,6 +12,7 @@
 #include "base/trace.h"
 #include "field/vm/factorise.h"
 #include "measurement/noise_fit.h"
+#include "measurement/surrogate_views.h"
 #include "objective/ray_data_term.h"
 #include "objective/slab_objective.h"
 #include "objective/terms.h"
@@ -111,6 +112,7 @@ void Fit::enter_stage() {
   objective_.reset();
   binned_.reset();  // its successor needs the memory
   binned_ = std::make_unique<measurement::Measurement>(binned(measurement_, stage().bin));
+  filters_ = measurement::view_filters(*binned_);
   projector_ = std::make_unique<projection::SlabProjector>(
       binned_->geometry, sample_grid(domain_, measurement_.geometry.thickness, stage().bin));
 }
@@ -217,12 +219,25 @@ bool Fit::is_done() const {
 }
 
 measurement::ViewErrors Fit::held_out_error(bool fit_view_scale) const {
-  return objective_->held_out_error(binned_->noise_weights(), fit_view_scale);
+  if (filters_.empty()) return objective_->held_out_error(binned_->noise_weights(), fit_view_scale);
+  const std::vector<int>& views = measurement_.held_out;
+  measurement::SlabSums sums(1);
+  for (const int view : views) {
+    const auto predicted = predict(std::span(&view, 1), std::vector<measurement::ViewModel>(1));
+    sums.front().push_back(measurement::sums_of(predicted.front(), {}));
+  }
+  return measurement::view_errors(views, sums, binned_->noise_weights(), fit_view_scale);
 }
 
 std::vector<measurement::PredictedView> Fit::predict(
     std::span<const int> views, std::span<const measurement::ViewModel> models) const {
-  return objective_->predict(views, models);
+  if (filters_.empty()) return objective_->predict(views, models);
+  auto predicted = objective_->predict(views, std::vector<measurement::ViewModel>(views.size()));
+  measurement::filter_predictions(filters_, views, predicted, processes());
+  for (std::size_t i = 0; i < predicted.size(); ++i)
+    for (float& value : predicted[i].predicted)
+      value = static_cast<float>(models[i].scale * static_cast<double>(value) + models[i].offset);
+  return predicted;
 }
 
 void Fit::run(const AfterStep& after_step) {
@@ -268,6 +283,21 @@ bool Fit::is_traced_in_detail() const {
   return progress_.step == stage().first_epoch * steps_per_epoch() + 1;
 }
 
+// Makes the surrogates of the views of a step, if the microscope filters them, and adds up the sums
+// of their residuals. They are made from the present field, so that the step has the gradient of
+// the filtered views' own data term.
+std::optional<measurement::SurrogateViews> Fit::make_surrogates(const std::vector<int>& views) {
+  if (filters_.empty()) return std::nullopt;
+  const base::TraceSpan span("make surrogate views");
+  const auto predicted =
+      objective_->predict(views, std::vector<measurement::ViewModel>(views.size()));
+  measurement::SurrogateViews surrogates(*binned_->rays, filters_, views, predicted,
+                                         progress_.views, processes());
+  for (std::size_t i = 0; i < views.size(); ++i)
+    progress_.epoch_sums[static_cast<std::size_t>(views[i])] += surrogates.sums()[i];
+  return surrogates;
+}
+
 void Fit::take_step() {
   const base::TraceSpan span("step");
   const base::TraceTasks tasks(is_traced_in_detail());
@@ -275,9 +305,14 @@ void Fit::take_step() {
   const double multiplicity =
       static_cast<double>(fitted_views_.size()) / std::max(static_cast<double>(views.size()), 1.0);
   const double rate = learning_rate(progress_.step);
+  const auto surrogates = make_surrogates(views);
+  // What the slabs are compared with tells nothing of the measured views then.
+  std::vector<measurement::ViewSums> unused(surrogates ? progress_.views.size() : 0);
   const double grad_bias = objective_->add_gradient(
-      {progress_.step, views, progress_.views, multiplicity}, gradient_.data(),
-      progress_.epoch_sums, [&](int leaf) { optimizer_.step(*field_, leaf, gradient_, rate); });
+      {progress_.step, views, surrogates ? surrogates->models() : progress_.views, multiplicity,
+       surrogates ? &surrogates->rays() : nullptr},
+      gradient_.data(), surrogates ? unused : progress_.epoch_sums,
+      [&](int leaf) { optimizer_.step(*field_, leaf, gradient_, rate); });
   optimizer_.step_bias(*field_, grad_bias, kBiasRate * rate);
   halo_->refresh(*field_);
 }

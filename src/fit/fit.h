@@ -20,6 +20,7 @@
 #include "measurement/held_out.h"
 #include "measurement/measurement.h"
 #include "measurement/row_share.h"
+#include "measurement/surrogate_views.h"
 #include "objective/objective.h"
 #include "projection/slab_projector.h"
 
@@ -131,6 +132,7 @@ class Fit {
   const Traffic& traffic() const { return traffic_; }
 
  private:
+  std::optional<measurement::SurrogateViews> make_surrogates(const std::vector<int>& views);
   void take_step();
   bool is_traced_in_detail() const;
   void end_epoch();
@@ -165,6 +167,7 @@ class Fit {
   // These belong to one stage or one tree and are made anew for the next. The objective refers to
   // the first two, so they must stay where they are when a fit is moved.
   std::unique_ptr<measurement::Measurement> binned_;
+  std::vector<microscope::ViewFilter> filters_;  // of each view; empty: no microscope
   std::unique_ptr<projection::SlabProjector> projector_;
   std::unique_ptr<objective::Objective> objective_;
   base::AlignedBuffer<float> gradient_;

@@ -53,6 +53,11 @@ Measurement binned(const Measurement& fine, int bin) {
   coarse.geometry.axis_x /= bin;
   coarse.geometry.axis_z /= bin;
   for (double& sigma : coarse.noise_sigma) sigma /= bin * bin;
+  for (microscope::ViewTransfer& transfer : coarse.transfers) {
+    transfer.pixel_size_A *= bin;
+    transfer.slope.x_A *= bin;
+    transfer.slope.y_A *= bin;
+  }
   for (auto& discs : coarse.undecided_beads)
     for (auto& [x, y, radius] : discs) x /= bin, y /= bin, radius /= bin;
   return coarse;
@@ -71,6 +76,7 @@ Measurement middle_rows(const Measurement& whole, std::int64_t max_rows, std::sp
   part.roi.y1 = part.roi.y0 + rows;
   part.geometry.tilt_deg = chosen(whole.geometry.tilt_deg, views);
   part.noise_sigma = chosen(whole.noise_sigma, views);
+  part.transfers = chosen(whole.transfers, views);
   part.masks.beads_found = chosen(whole.masks.beads_found, views);
   part.masks.beads_masked = chosen(whole.masks.beads_masked, views);
   part.masked_part = chosen(whole.masked_part, views);

@@ -10,6 +10,7 @@
 #include "geometry/ray_geometry.h"
 #include "geometry/tilt_geometry.h"
 #include "measurement/slab_views.h"
+#include "microscope/view_filter.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::measurement {
@@ -31,6 +32,9 @@ struct Measurement {
   std::vector<double> noise_sigma = {};             ///< [view]
   double mean_density = 0.0;
   std::optional<geometry::RayGeometry> ray_geometry = std::nullopt;
+  /// [view]: what the microscope makes of the projections, in the pixels of the rays. Empty: the
+  /// views are the projections themselves.
+  std::vector<microscope::ViewTransfer> transfers = {};
   /// Views that carry no loss: they only tell how well the others predict them. Ascending.
   std::vector<int> held_out = {};
   /// Views that carry no loss and tell nothing, because another fit has them. Ascending.

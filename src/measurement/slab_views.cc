@@ -197,6 +197,25 @@ void SlabViews::add_row(int view, std::int64_t y, int bin, std::span<double> sum
   }
 }
 
+std::unique_ptr<SlabViews> SlabViews::blank(std::size_t num_views) const {
+  Shape shape = shape_;
+  shape.num_views = num_views;
+  return std::unique_ptr<SlabViews>(
+      new SlabViews(shape, holding_, scratch_dir_, io::ScratchMemory::kInMemoryBytes));
+}
+
+void SlabViews::set_view(int view, std::span<const float> image) {
+  const Slabs held = holding_.all();
+  base::parallel_for("set view", held.size(), [&](std::int64_t i) {
+    const int slab = held.begin + static_cast<int>(i);
+    const std::size_t to = line(slab, view);
+    for (std::int64_t x = 0; x < shape_.width; ++x)
+      for (int lane = 0; lane < rows_of(slab); ++lane)
+        set_ray(to + static_cast<std::size_t>(x), lane,
+                image[static_cast<std::size_t>((slab * kRows + lane) * shape_.width + x)]);
+  });
+}
+
 std::unique_ptr<SlabViews> SlabViews::middle_rows(
     std::int64_t max_rows, std::span<const int> views,
     const distributed::Communicator& processes) const {

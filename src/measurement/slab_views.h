@@ -85,6 +85,8 @@ class SlabViews {
   std::unique_ptr<SlabViews> middle_rows(
       std::int64_t max_rows, std::span<const int> views,
       const distributed::Communicator& processes = distributed::Communicator::alone()) const;
+  /// Returns zeros in the place of so many views, none of which counts, in the same slabs.
+  std::unique_ptr<SlabViews> blank(std::size_t num_views) const;
   /// Returns the shape of binned views.
   static Shape binned_shape(const Shape& shape, int bin);
 
@@ -108,6 +110,9 @@ class SlabViews {
   /// Returns the part of each view's rays that does not count, of all processes.
   std::vector<double> masked_parts(
       const distributed::Communicator& processes = distributed::Communicator::alone()) const;
+  /// Sets all rays of a view, in all slabs that this process holds, and lets them count. `image` is
+  /// [y, x], from the first row on.
+  void set_view(int view, std::span<const float> image);
   /// Masks the rays of the pixels whose centres lie in the discs of their view, in all slabs that
   /// this process holds. `discs` are [view], in pixels, with y from the first row.
   void hide(std::span<const std::vector<tilt_series::MaskDisc>> discs);

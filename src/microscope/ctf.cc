@@ -32,18 +32,24 @@ Ctf::Ctf(const Optics& optics, const io::Defocus& defocus)
       sin_2angle_(std::sin(2 * kRadians * defocus.angle_deg)),
       aberration_A3_(wavelength_A_ * wavelength_A_ * kAngstroms_in_mm *
                      optics.spherical_aberration_mm / 2),
-      phase_rad_(kRadians * defocus.phase_shift_deg + std::asin(optics.amplitude_contrast)),
+      phase_turns_((kRadians * defocus.phase_shift_deg + std::asin(optics.amplitude_contrast)) /
+                   (2 * std::numbers::pi)),
       quarter_b_factor_A2_(optics.b_factor_A2 / 4) {}
 
 double Ctf::value(double kx, double ky, double more_defocus_A) const {
+  return -std::sin(2 * std::numbers::pi * turns(kx, ky, more_defocus_A)) *
+         envelope(kx * kx + ky * ky);
+}
+
+double Ctf::envelope(double k2) const { return std::exp(-quarter_b_factor_A2_ * k2); }
+
+double Ctf::turns(double kx, double ky, double more_defocus_A) const {
   const double k2 = kx * kx + ky * ky;
   // k² cos(2 (α − angle))
   const double k2_cosine = (kx * kx - ky * ky) * cos_2angle_ + 2 * kx * ky * sin_2angle_;
   const double defocus_k2 =
       (mean_defocus_A_ + more_defocus_A) * k2 + half_difference_A_ * k2_cosine;
-  const double phase =
-      std::numbers::pi * wavelength_A_ * (defocus_k2 - aberration_A3_ * k2 * k2) + phase_rad_;
-  return -std::sin(phase) * std::exp(-quarter_b_factor_A2_ * k2);
+  return wavelength_A_ / 2 * (defocus_k2 - aberration_A3_ * k2 * k2) + phase_turns_;
 }
 
 double Ctf::reach_A(double k, double more_defocus_A) const {

@@ -36,6 +36,10 @@ class Ctf {
   /// Returns the function at a frequency, in cycles per Å along x and y. `more_defocus_A` is added
   /// to the underfocus in all directions, as for a part of a tilted view.
   double value(double kx, double ky, double more_defocus_A = 0.0) const;
+  /// Returns the argument of the sine in it over 2π.
+  double turns(double kx, double ky, double more_defocus_A = 0.0) const;
+  /// Returns its envelope, where `k2` is the square of the frequency.
+  double envelope(double k2) const;
 
   /// Returns how far the function displaces what has frequencies up to `k`, in cycles per Å: a
   /// wave of frequency k moves by |dχ/dk| / 2π. The underfocus is that of the view, greater or
@@ -49,7 +53,7 @@ class Ctf {
   double mean_defocus_A_, half_difference_A_;  // (u + v) / 2 and (u − v) / 2
   double cos_2angle_, sin_2angle_;
   double aberration_A3_;  // λ² Cs / 2
-  double phase_rad_;      // phase shift and amplitude contrast
+  double phase_turns_;    // phase shift and amplitude contrast, over 2π
   double quarter_b_factor_A2_;
 };
 

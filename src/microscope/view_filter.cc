@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <numbers>
 #include <utility>
 
 #include "base/check.h"
@@ -19,6 +20,23 @@ std::pair<double, double> range_of(const DefocusSlope& slope, std::int64_t width
   const double half_A = std::abs(slope.x_A) * static_cast<double>(width - 1) / 2 +
                         std::abs(slope.y_A) * static_cast<double>(height - 1) / 2;
   return {slope.at_centre_A - half_A, slope.at_centre_A + half_A};
+}
+
+// The sine is interpolated to 3·10⁻⁷.
+constexpr std::size_t kStepsOfTables = 4096;
+
+// Returns the sine of an angle in turns, from 0 to 1.
+float sine_of_turns(double turns) {
+  static const InterpolatedTable table(1.0, kStepsOfTables,
+                                       [](double t) { return std::sin(2 * std::numbers::pi * t); });
+  return table(turns);
+}
+
+std::vector<double> frequencies(std::int64_t size, double pixel_size_A) {
+  std::vector<double> k;
+  for (std::int64_t i = 0; i < size; ++i)
+    k.push_back(fourier::cycles_per_pixel(i, size) / pixel_size_A);
+  return k;
 }
 
 // Returns an extension whose two mirror images do not reach over each other into the line.
@@ -42,7 +60,14 @@ ViewFilter::ViewFilter(std::int64_t width, std::int64_t height, const ViewTransf
       ctf_(transfer.optics, transfer.defocus),
       across_(extension_of(width, reach_px(transfer, width, height))),
       along_(extension_of(height, reach_px(transfer, width, height))),
-      transform_(across_.extended_length(), along_.extended_length()) {
+      transform_(across_.extended_length(), along_.extended_length()),
+      kx_(frequencies(transform_.width(), transfer.pixel_size_A)),
+      ky_(frequencies(transform_.height(), transfer.pixel_size_A)),
+      signal_(0.5 / (transfer.pixel_size_A * transfer.pixel_size_A), kStepsOfTables,
+              [&](double k2) {
+                return ctf_.envelope(k2) *
+                       signal_after(transfer.exposure, std::sqrt(k2), transfer.optics.voltage_kV);
+              }) {
   const double nyquist = 0.5 / view_.pixel_size_A;
   const auto [low_A, high_A] = range_of(view_.slope, width, height);
   const double largest_step_A = 1.0 / (8.0 * ctf_.wavelength_A() * nyquist * nyquist);
@@ -50,29 +75,37 @@ ViewFilter::ViewFilter(std::int64_t width, std::int64_t height, const ViewTransf
   first_defocus_A_ = low_A;
   num_defoci_ = num_steps + 1;
   if (num_steps > 0) defocus_step_A_ = (high_A - low_A) / static_cast<double>(num_steps);
-
-  signal_.reserve(static_cast<std::size_t>(transform_.width() * transform_.height()));
-  for (std::int64_t y = 0; y < transform_.height(); ++y) {
-    for (std::int64_t x = 0; x < transform_.width(); ++x) {
-      const double k = std::hypot(fourier::cycles_per_pixel(x, transform_.width()),
-                                  fourier::cycles_per_pixel(y, transform_.height())) /
-                       view_.pixel_size_A;
-      signal_.push_back(
-          static_cast<float>(signal_after(view_.exposure, k, view_.optics.voltage_kV)));
-    }
-  }
 }
 
 // Returns H_s at a frequency of the padded grid. Frequency ½ stands for −½ too, where astigmatism
 // may give another value: their mean is the same at k and −k, so that real images stay real.
-double ViewFilter::transfer(std::int64_t x, std::int64_t y, double more_defocus_A) const {
-  const double kx = fourier::cycles_per_pixel(x, transform_.width()) / view_.pixel_size_A;
-  const double ky = fourier::cycles_per_pixel(y, transform_.height()) / view_.pixel_size_A;
-  double ctf = ctf_.value(kx, ky, more_defocus_A);
-  if (2 * x == transform_.width() || 2 * y == transform_.height())
-    ctf = (ctf + ctf_.value(kx, -ky, more_defocus_A)) / 2;
-  const float signal = signal_[static_cast<std::size_t>(y * transform_.width() + x)];
-  return static_cast<double>(signal) * (view_.is_flipped ? std::abs(ctf) : -ctf);
+float ViewFilter::transfer(std::int64_t x, std::int64_t y, std::int64_t s) const {
+  const double kx = kx_[static_cast<std::size_t>(x)], ky = ky_[static_cast<std::size_t>(y)];
+  const auto sine = [&](double of_ky) {
+    // An angle is that many turns, of which a whole number makes no difference.
+    constexpr double kWholeTurns = 1 << 20;
+    const double turns = ctf_.turns(kx, of_ky, defocus_of(s)) + kWholeTurns;
+    return sine_of_turns(turns - static_cast<double>(static_cast<std::int64_t>(turns)));
+  };
+  float ctf = sine(ky);  // −CTF
+  if (2 * x == transform_.width() || 2 * y == transform_.height()) ctf = (ctf + sine(-ky)) / 2;
+  return signal_(kx * kx + ky * ky) * (view_.is_flipped ? std::abs(ctf) : ctf);
+}
+
+// Calls a function with kx, ky and the place of each frequency k, and the place of −k. Of the two,
+// it visits one.
+template <typename Visit>
+void ViewFilter::for_opposite_frequencies(const Visit& visit) const {
+  const std::int64_t width = transform_.width(), height = transform_.height();
+  for (std::int64_t y = 0; 2 * y <= height; ++y) {
+    const bool is_own_opposite = 2 * y % height == 0;
+    const std::int64_t opposite_y = (height - y) % height;
+    for (std::int64_t x = 0; x < (is_own_opposite ? width / 2 + 1 : width); ++x) {
+      const std::int64_t opposite_x = (width - x) % width;
+      visit(x, y, static_cast<std::size_t>(y * width + x),
+            static_cast<std::size_t>(opposite_y * width + opposite_x));
+    }
+  }
 }
 
 // Returns w_s at a pixel of the image. There is none beyond the last hat function.
@@ -94,56 +127,62 @@ ViewFilter::Image ViewFilter::extended_pair(std::span<const float> image, std::i
       const auto i = static_cast<std::size_t>(y * across_.length() + x);
       weighted[i] = image[i] * std::complex<float>(weight_at(x, y, s), weight_at(x, y, s + 1));
     }
-  Image extended;
-  extended.reserve(static_cast<std::size_t>(transform_.width() * transform_.height()));
-  for (std::int64_t y = 0; y < along_.extended_length(); ++y) {
-    const LineExtension::Value& row = along_[y];
+  const auto width = static_cast<std::size_t>(transform_.width());
+  Image wide;  // extended along x
+  wide.reserve(width * static_cast<std::size_t>(along_.length()));
+  for (std::int64_t y = 0; y < along_.length(); ++y) {
+    const auto* row = weighted.data() + y * across_.length();
     for (std::int64_t x = 0; x < across_.extended_length(); ++x) {
-      const LineExtension::Value& column = across_[x];
-      std::complex<float> value = 0.0f;
-      for (int j = 0; j < 2; ++j)
-        for (int i = 0; i < 2; ++i)
-          value += row.weights[j] * column.weights[i] *
-                   weighted[static_cast<std::size_t>(row.pixels[j] * across_.length() +
-                                                     column.pixels[i])];
-      extended.push_back(value);
+      const auto& [pixels, weights] = across_[x];
+      wide.push_back(weights[0] * row[pixels[0]] + weights[1] * row[pixels[1]]);
     }
+  }
+  Image extended;
+  extended.reserve(width * static_cast<std::size_t>(transform_.height()));
+  for (std::int64_t y = 0; y < along_.extended_length(); ++y) {
+    const auto& [rows, weights] = along_[y];
+    const auto* first = wide.data() + static_cast<std::size_t>(rows[0]) * width;
+    const auto* second = wide.data() + static_cast<std::size_t>(rows[1]) * width;
+    for (std::size_t x = 0; x < width; ++x)
+      extended.push_back(weights[0] * first[x] + weights[1] * second[x]);
   }
   return extended;
 }
 
 // Adds H_s A + H_{s+1} B to `sum`, where A and B are the transforms of the two real images whose
-// sum A + iB is given. A is half the sum of the value at k and the conjugate of that at −k.
+// sum A + iB is given. A is half the sum of the value at k and the conjugate of that at −k, where
+// the transfer is the same.
 void ViewFilter::add_filtered_pair(const Image& pair, std::int64_t s, Image& sum) const {
-  const std::int64_t width = transform_.width(), height = transform_.height();
-  for (std::int64_t y = 0; y < height; ++y) {
-    const std::int64_t opposite_y = (height - y) % height;
-    for (std::int64_t x = 0; x < width; ++x) {
-      const std::int64_t opposite_x = (width - x) % width;
-      const auto i = static_cast<std::size_t>(y * width + x);
-      const std::complex<float> here = pair[i];
-      const std::complex<float> there =
-          std::conj(pair[static_cast<std::size_t>(opposite_y * width + opposite_x)]);
-      const std::complex<float> a = 0.5f * (here + there);
-      const std::complex<float> b = std::complex<float>(0.0f, -0.5f) * (here - there);
-      sum[i] += static_cast<float>(transfer(x, y, defocus_of(s))) * a;
-      if (s + 1 < num_defoci_) sum[i] += static_cast<float>(transfer(x, y, defocus_of(s + 1))) * b;
-    }
-  }
+  for_opposite_frequencies(
+      [&](std::int64_t x, std::int64_t y, std::size_t at, std::size_t opposite) {
+        const std::complex<float> a = 0.5f * (pair[at] + std::conj(pair[opposite]));
+        const std::complex<float> b =
+            std::complex<float>(0.0f, -0.5f) * (pair[at] - std::conj(pair[opposite]));
+        std::complex<float> filtered = transfer(x, y, s) * a;
+        if (s + 1 < num_defoci_) filtered += transfer(x, y, s + 1) * b;
+        sum[at] += filtered;
+        if (at != opposite) sum[opposite] += std::conj(filtered);
+      });
 }
 
 // Adds the transpose of extended_pair() to `sum`.
 void ViewFilter::add_folded_pair(const Image& pair, std::int64_t s, std::vector<float>& sum) const {
-  std::vector<std::complex<float>> folded(sum.size());
+  const auto width = static_cast<std::size_t>(transform_.width());
+  Image wide(width * static_cast<std::size_t>(along_.length()));  // folded along y
   for (std::int64_t y = 0; y < along_.extended_length(); ++y) {
     const LineExtension::Value& row = along_[y];
+    for (int j = 0; j < 2; ++j) {
+      auto* to = wide.data() + static_cast<std::size_t>(row.pixels[j]) * width;
+      const auto* from = pair.data() + static_cast<std::size_t>(y) * width;
+      for (std::size_t x = 0; x < width; ++x) to[x] += row.weights[j] * from[x];
+    }
+  }
+  std::vector<std::complex<float>> folded(sum.size());
+  for (std::int64_t y = 0; y < along_.length(); ++y) {
+    auto* to = folded.data() + y * across_.length();
     for (std::int64_t x = 0; x < across_.extended_length(); ++x) {
-      const LineExtension::Value& column = across_[x];
-      const std::complex<float> value = pair[static_cast<std::size_t>(y * transform_.width() + x)];
-      for (int j = 0; j < 2; ++j)
-        for (int i = 0; i < 2; ++i)
-          folded[static_cast<std::size_t>(row.pixels[j] * across_.length() + column.pixels[i])] +=
-              row.weights[j] * column.weights[i] * value;
+      const auto value = wide[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)];
+      for (int i = 0; i < 2; ++i) to[across_[x].pixels[i]] += across_[x].weights[i] * value;
     }
   }
   for (std::int64_t y = 0; y < along_.length(); ++y)
@@ -180,12 +219,13 @@ std::vector<float> ViewFilter::apply_transpose(std::span<const float> image) con
   std::vector<float> result(image.size());
   for (std::int64_t s = 0; s < num_defoci_; s += 2) {
     Image pair = spectrum;
-    for (std::int64_t y = 0; y < transform_.height(); ++y)
-      for (std::int64_t x = 0; x < transform_.width(); ++x) {
-        const double second = s + 1 < num_defoci_ ? transfer(x, y, defocus_of(s + 1)) : 0.0;
-        pair[static_cast<std::size_t>(y * transform_.width() + x)] *= std::complex<float>(
-            static_cast<float>(transfer(x, y, defocus_of(s))), static_cast<float>(second));
-      }
+    for_opposite_frequencies(
+        [&](std::int64_t x, std::int64_t y, std::size_t at, std::size_t opposite) {
+          const float second = s + 1 < num_defoci_ ? transfer(x, y, s + 1) : 0.0f;
+          const std::complex<float> both(transfer(x, y, s), second);
+          pair[at] *= both;
+          if (at != opposite) pair[opposite] *= both;
+        });
     transform_.inverse(pair);
     add_folded_pair(pair, s, result);
   }

@@ -7,6 +7,7 @@
 #include "fourier/image_transform.h"
 #include "microscope/ctf.h"
 #include "microscope/defocus_slope.h"
+#include "microscope/interpolated_table.h"
 #include "microscope/line_extension.h"
 
 namespace tomofield::microscope {
@@ -51,8 +52,10 @@ class ViewFilter {
  private:
   using Image = fourier::ImageTransform::Image;
 
-  double transfer(std::int64_t x, std::int64_t y, double more_defocus_A) const;
+  float transfer(std::int64_t x, std::int64_t y, std::int64_t s) const;
   double defocus_of(std::int64_t s) const { return first_defocus_A_ + defocus_step_A_ * double(s); }
+  template <typename Visit>
+  void for_opposite_frequencies(const Visit& visit) const;
   float weight_at(std::int64_t x, std::int64_t y, std::int64_t s) const;
   Image extended_pair(std::span<const float> image, std::int64_t s) const;
   void add_filtered_pair(const Image& pair, std::int64_t s, Image& sum) const;
@@ -64,7 +67,8 @@ class ViewFilter {
   std::int64_t num_defoci_ = 1;
   LineExtension across_, along_;  // x and y
   fourier::ImageTransform transform_;
-  std::vector<float> signal_;  // what damage leaves, [ky, kx]
+  std::vector<double> kx_, ky_;  // frequencies of the transform, in cycles per Å
+  InterpolatedTable signal_;     // what damage and the envelope leave, of the square of k
 };
 
 }  // namespace tomofield::microscope

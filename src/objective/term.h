@@ -24,6 +24,9 @@ struct Step {
   std::span<const int> views;                      ///< views that the slabs are compared with
   std::span<const measurement::ViewModel> models;  ///< of every view of the series
   double multiplicity = 1.0;  ///< scales the step's views up to the whole series
+  /// What the step's views, in their order, are compared with in place of the measured rays
+  /// (measurement::SurrogateViews); null: the measured rays.
+  const measurement::SlabViews* surrogates = nullptr;
 };
 
 /// A pair of consecutive slabs of one band, or the last slab of an odd number: decoded samples, and

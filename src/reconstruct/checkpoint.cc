@@ -247,6 +247,20 @@ void save(const std::filesystem::path& path, const fit::Fit& fit, const output::
 
 }  // namespace
 
+namespace {
+
+nlohmann::json transfers_json(const std::vector<microscope::ViewTransfer>& transfers) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const microscope::ViewTransfer& t : transfers)
+    json.push_back({t.optics.voltage_kV, t.optics.spherical_aberration_mm,
+                    t.optics.amplitude_contrast, t.optics.b_factor_A2, t.defocus.u_A, t.defocus.v_A,
+                    t.defocus.angle_deg, t.defocus.phase_shift_deg, t.slope.at_centre_A,
+                    t.slope.x_A, t.slope.y_A, t.exposure, t.pixel_size_A, t.is_flipped});
+  return json;
+}
+
+}  // namespace
+
 std::string fingerprint_of(const ReconstructOptions& options,
                            const measurement::Measurement& series,
                            const distributed::Communicator& processes) {
@@ -259,6 +273,7 @@ std::string fingerprint_of(const ReconstructOptions& options,
   json["unit"] = series.unit;
   json["noise_sigma"] = series.noise_sigma;
   if (!series.left_out.empty()) json["left_out"] = series.left_out;
+  if (!series.transfers.empty()) json["transfers"] = transfers_json(series.transfers);
   json["rays"] = fmt::format("{:016x}", series.rays->checksum(processes));
   return json.dump();
 }

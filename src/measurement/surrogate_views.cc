@@ -1,0 +1,117 @@
+#include "measurement/surrogate_views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "base/parallel.h"
+#include "microscope/view_filter.h"
+
+namespace tomofield::measurement {
+namespace {
+
+// The bound of max |H|². It is above 1, since a filter repeats what lies near the border of its
+// image (microscope::ViewFilter).
+constexpr double kLargestTransfer = 1.1;
+
+using microscope::ViewFilter;
+
+// Calls a function with each index that this process works on, on all threads.
+template <typename Body>
+void for_own(const char* what, std::size_t count, const distributed::Communicator& processes,
+             const Body& body) {
+  const std::int64_t every = processes.size(), first = processes.rank();
+  const std::int64_t own = (static_cast<std::int64_t>(count) - first + every - 1) / every;
+  base::parallel_for(what, std::max<std::int64_t>(own, 0),
+                     [&](std::int64_t i) { body(static_cast<std::size_t>(first + i * every)); });
+}
+
+// Holds what one process finds of one view.
+struct Surrogate {
+  std::vector<float> image;  // d′
+  ViewSums sums;
+};
+
+Surrogate surrogate_of(const PredictedView& view, const ViewFilter& filter,
+                       const ViewModel& model) {
+  PredictedView filtered = view;
+  filtered.predicted = filter.apply(view.predicted);
+  const double limit = model.largest_residual;
+  std::vector<float> residual(view.predicted.size());
+  for (std::size_t i = 0; i < residual.size(); ++i) {
+    const double missing = static_cast<double>(view.measured[i]) -
+                           model.scale * static_cast<double>(filtered.predicted[i]) - model.offset;
+    residual[i] =
+        std::isnan(missing) ? 0.0f : static_cast<float>(std::clamp(missing, -limit, limit));
+  }
+  Surrogate surrogate{filter.apply_transpose(residual), sums_of(filtered, model)};
+  const auto step = static_cast<float>(1.0 / (model.scale * kLargestTransfer));
+  for (std::size_t i = 0; i < residual.size(); ++i)
+    surrogate.image[i] = view.predicted[i] + step * surrogate.image[i];
+  return surrogate;
+}
+
+}  // namespace
+
+std::vector<ViewFilter> view_filters(const Measurement& measurement) {
+  const SlabViews::Shape& shape = measurement.rays->shape();
+  std::vector<ViewFilter> filters;
+  for (const microscope::ViewTransfer& transfer : measurement.transfers)
+    filters.emplace_back(shape.width, shape.num_rows, transfer);
+  return filters;
+}
+
+void filter_predictions(std::span<const ViewFilter> filters, std::span<const int> views,
+                        std::span<PredictedView> predicted,
+                        const distributed::Communicator& processes) {
+  std::vector<std::vector<float>> filtered(views.size());
+  for_own("filter views", views.size(), processes, [&](std::size_t i) {
+    filtered[i] = filters[static_cast<std::size_t>(views[i])].apply(predicted[i].predicted);
+  });
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    filtered[i].resize(predicted[i].predicted.size());
+    processes.allreduce_sum(std::span(filtered[i]));
+    predicted[i].predicted = std::move(filtered[i]);
+  }
+}
+
+ViewSums sums_of(const PredictedView& view, const ViewModel& model) {
+  ViewSums sums;
+  for (std::size_t i = 0; i < view.measured.size(); ++i) {
+    const double b = static_cast<double>(view.measured[i]);
+    if (std::isnan(b)) continue;
+    const double p = static_cast<double>(view.predicted[i]);
+    const double residual = std::clamp(model.scale * p + model.offset - b, -model.largest_residual,
+                                       model.largest_residual);
+    sums += {1.0, p, b, p * p, p * b, b * b, residual * residual};
+  }
+  return sums;
+}
+
+SurrogateViews::SurrogateViews(const SlabViews& measured,
+                               std::span<const microscope::ViewFilter> filters,
+                               std::span<const int> views, std::span<const PredictedView> predicted,
+                               std::span<const ViewModel> models,
+                               const distributed::Communicator& processes)
+    : rays_(measured.blank(views.size())),
+      models_(models.begin(), models.end()),
+      sums_(views.size()) {
+  std::vector<std::vector<float>> images(views.size());
+  for_own("make surrogate views", views.size(), processes, [&](std::size_t i) {
+    const auto view = static_cast<std::size_t>(views[i]);
+    Surrogate made = surrogate_of(predicted[i], filters[view], models[view]);
+    images[i] = std::move(made.image);
+    sums_[i] = made.sums;
+  });
+  allreduce_sum(processes, sums_);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    images[i].resize(predicted[i].predicted.size());
+    processes.allreduce_sum(std::span(images[i]));
+    rays_->set_view(static_cast<int>(i), images[i]);
+    ViewModel& model = models_[static_cast<std::size_t>(views[i])];
+    model = {1.0, 0.0, model.weight * model.scale * model.scale * kLargestTransfer};
+  }
+}
+
+}  // namespace tomofield::measurement

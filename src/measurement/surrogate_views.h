@@ -1,0 +1,61 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "distributed/communicator.h"
+#include "measurement/held_out.h"
+#include "measurement/measurement.h"
+#include "measurement/view_residuals.h"
+
+namespace tomofield::measurement {
+
+/// Returns the filter H of each view of a measurement that has transfers, on the rows of its rays.
+std::vector<microscope::ViewFilter> view_filters(const Measurement& measurement);
+
+/// Replaces the predictions of some views by what the microscope makes of them: p by H p. `filters`
+/// are those of all views. Every process calls it and gets the same.
+void filter_predictions(std::span<const microscope::ViewFilter> filters, std::span<const int> views,
+                        std::span<PredictedView> predicted,
+                        const distributed::Communicator& processes);
+
+/// Returns the sums over the pixels of a view that count, of what is predicted and measured.
+/// `largest_residual` limits the squares of residuals by the model (ViewSums::limited_squares).
+ViewSums sums_of(const PredictedView& view, const ViewModel& model);
+
+/// Views that take the place of the measured ones in the steps of a fit, so that the transfer H of
+/// the microscope, which mixes rows, does not concern the slabs.
+///
+/// A view's data term ½ w |a H p + o − d|² of its projection p is nowhere above the quadratic
+/// ½ w L |p − d′|² + constant that touches it at the present projection p₀, where
+///
+///   d′ = p₀ + (a / L) Hᵀ (d − a H p₀ − o)   and   L = a² max |H|².
+///
+/// (Surrogates of this kind: De Pierro 1995; Daubechies, Defrise and De Mol 2004.) Its gradient at
+/// p₀ is that of the data term itself. A residual of a masked pixel counts as 0, and one that is
+/// larger than the model's limit counts as that limit.
+class SurrogateViews {
+ public:
+  /// Makes the surrogates of `views` from their predictions without a model (scale 1, offset 0).
+  /// `filters` and `models` are those of all views. Every process calls it and gets the slabs that
+  /// it has of `measured`.
+  SurrogateViews(const SlabViews& measured, std::span<const microscope::ViewFilter> filters,
+                 std::span<const int> views, std::span<const PredictedView> predicted,
+                 std::span<const ViewModel> models, const distributed::Communicator& processes);
+
+  /// Returns d′ of each view, in the order of `views`; all of its rays count.
+  const SlabViews& rays() const { return *rays_; }
+  /// Returns the models to fit the surrogates with: all of `models`, but scale 1, offset 0 and
+  /// weight w L for each of `views`.
+  const std::vector<ViewModel>& models() const { return models_; }
+  /// Returns the sums over the measured pixels of each view, of H p₀ and d.
+  const std::vector<ViewSums>& sums() const { return sums_; }
+
+ private:
+  std::unique_ptr<SlabViews> rays_;
+  std::vector<ViewModel> models_;
+  std::vector<ViewSums> sums_;
+};
+
+}  // namespace tomofield::measurement
