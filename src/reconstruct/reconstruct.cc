@@ -20,6 +20,7 @@
 #include "reconstruct/run.h"
 #include "reconstruct/run_fit.h"
 #include "reconstruct/tuning.h"
+#include "reconstruct/view_transfers.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -32,6 +33,7 @@ measurement::Measurement prepare(const tilt_series::TiltSeries& series,
   measurement::Measurement measurement = measurement::prepare_measurement(
       series, options.specimen, io::scratch_directory(options.resolved.output),
       fit::band_rows(options.field), processes);
+  processes.run_collectively([&] { measurement.transfers = view_transfers(options, series); });
   measurement.held_out =
       measurement::held_out_views(measurement.geometry.tilt_deg, options.fit.hold_out);
   return measurement;
