@@ -122,10 +122,14 @@ TEST(ViewTransfers, AreRefusedWithoutWhatTheyNeed) {
                {"fewer/tilt_series_ctf.txt", "4 sections", "has 5"});
   simulated = simulation();
   simulated.voxel_size_A = 1.0;
-  simulate::simulate_series(folder / "s", simulated, true);
-  files.ctf = folder / "s/tilt_series_ctf.txt";
-  expect_parts(message_of<Error>([&] { transfers_of(files, options_of_run()); }),
-               {"s/tilt_series.mrc", "pixel size", "--pixel-size"});
+  simulated.imaging = {};
+  simulate::simulate_series(folder / "plain", simulated, false);
+  files.stack = folder / "plain/tilt_series.mrc";
+  files.ctf.reset();
+  Options options = options_of_run();
+  options.defocus_um = 4.0;
+  expect_parts(message_of<Error>([&] { transfers_of(files, options); }),
+               {"plain/tilt_series.mrc", "pixel size", "--pixel-size"});
 }
 
 TEST(ViewTransfers, ContradictionsAreFaults) {
