@@ -42,6 +42,10 @@ if(TOMOFIELD_WITH_CBC)
   pkg_check_modules(CBC REQUIRED IMPORTED_TARGET cbc)
   set(TOMOFIELD_fit_LIBRARIES PkgConfig::CBC)
 endif()
+if(TOMOFIELD_WITH_FFTW)
+  pkg_check_modules(FFTW REQUIRED IMPORTED_TARGET fftw3f)
+  set(TOMOFIELD_fourier_LIBRARIES PkgConfig::FFTW)
+endif()
 
 add_library(tomofield_warnings INTERFACE)
 target_compile_options(tomofield_warnings INTERFACE

@@ -39,6 +39,11 @@ if(TOMOFIELD_WITH_CBC)
 else()
   list(APPEND unused_sources fit/integer_program.cc)
 endif()
+if(TOMOFIELD_WITH_FFTW)
+  list(APPEND unused_sources fourier/image_transform_kissfft.cc)
+else()
+  list(APPEND unused_sources fourier/image_transform_fftw.cc)
+endif()
 list(TRANSFORM unused_sources PREPEND ${PROJECT_SOURCE_DIR}/src/)
 
 # The head of this source says why.

@@ -26,6 +26,13 @@ constexpr double kBiasRate = 0.02;
 // Random streams from here on give the order of an epoch's subsets.
 constexpr std::uint64_t kOrderStream = 1000;
 
+// Surrogates are made anew after so many steps. With more of them they are cheaper, because a
+// prediction decodes the whole volume, but the fit follows older surrogates (docs/results/ctf.md).
+constexpr int kStepsOfSurrogates = 8;
+
+// Predictions of views that surrogates are made from are at most so large at a time, or one view.
+constexpr std::size_t kPredictionBytes = std::size_t{256} << 20;
+
 FitOptions with_at_most_one_subset_a_view(FitOptions options, int num_views) {
   if (options.engine == Engine::kSlab) options.subsets = std::min(options.subsets, num_views);
   return options;
@@ -113,6 +120,7 @@ void Fit::enter_stage() {
   binned_.reset();  // its successor needs the memory
   binned_ = std::make_unique<measurement::Measurement>(binned(measurement_, stage().bin));
   filters_ = measurement::view_filters(*binned_);
+  surrogates_.reset();
   projector_ = std::make_unique<projection::SlabProjector>(
       binned_->geometry, sample_grid(domain_, measurement_.geometry.thickness, stage().bin));
 }
@@ -250,7 +258,9 @@ void Fit::run(const AfterStep& after_step) {
     traffic_.seconds += after.seconds - before.seconds;
     traffic_.bytes += after.bytes - before.bytes;
     ++traffic_.steps;
-    if (!after_step(*this)) return;
+    // Another run can go on from here to the same bits only if it has the same surrogates.
+    const bool may_stop = filters_.empty() || needs_surrogates() || is_done();
+    if (may_stop && !after_step(*this)) return;
   }
 }
 
@@ -283,19 +293,29 @@ bool Fit::is_traced_in_detail() const {
   return progress_.step == stage().first_epoch * steps_per_epoch() + 1;
 }
 
-// Makes the surrogates of the views of a step, if the microscope filters them, and adds up the sums
-// of their residuals. They are made from the present field, so that the step has the gradient of
-// the filtered views' own data term.
-std::optional<measurement::SurrogateViews> Fit::make_surrogates(const std::vector<int>& views) {
-  if (filters_.empty()) return std::nullopt;
+bool Fit::needs_surrogates() const {
+  const std::int64_t first = stage().first_epoch * steps_per_epoch();
+  return !filters_.empty() && (!surrogates_ || (progress_.step - first) % kStepsOfSurrogates == 0);
+}
+
+// Makes the surrogates of the views of the next steps from the present field.
+void Fit::make_surrogates() {
   const base::TraceSpan span("make surrogate views");
-  const auto predicted =
-      objective_->predict(views, std::vector<measurement::ViewModel>(views.size()));
-  measurement::SurrogateViews surrogates(*binned_->rays, filters_, views, predicted,
-                                         progress_.views, processes());
-  for (std::size_t i = 0; i < views.size(); ++i)
-    progress_.epoch_sums[static_cast<std::size_t>(views[i])] += surrogates.sums()[i];
-  return surrogates;
+  std::vector<int> views;
+  for (std::int64_t s = 0; s < std::min(kStepsOfSurrogates, steps_per_epoch()); ++s)
+    std::ranges::copy(views_of_step(progress_.step + s), std::back_inserter(views));
+  surrogates_.reset();  // its successor needs the memory
+  surrogates_.emplace(*binned_->rays, views, progress_.views);
+  const auto& shape = binned_->rays->shape();
+  const auto at_once = std::max<std::size_t>(
+      1, kPredictionBytes /
+             (2 * sizeof(float) * static_cast<std::size_t>(shape.width * shape.num_rows)));
+  for (std::size_t first = 0; first < views.size(); first += at_once) {
+    const auto some = std::span(views).subspan(first, std::min(at_once, views.size() - first));
+    surrogates_->set(filters_, some,
+                     objective_->predict(some, std::vector<measurement::ViewModel>(some.size())),
+                     processes());
+  }
 }
 
 void Fit::take_step() {
@@ -305,13 +325,16 @@ void Fit::take_step() {
   const double multiplicity =
       static_cast<double>(fitted_views_.size()) / std::max(static_cast<double>(views.size()), 1.0);
   const double rate = learning_rate(progress_.step);
-  const auto surrogates = make_surrogates(views);
-  // What the slabs are compared with tells nothing of the measured views then.
-  std::vector<measurement::ViewSums> unused(surrogates ? progress_.views.size() : 0);
+  if (needs_surrogates()) make_surrogates();
+  const measurement::SurrogateViews* surrogates = surrogates_ ? &*surrogates_ : nullptr;
+  std::vector<measurement::ViewSums> of_surrogates(surrogates ? progress_.views.size() : 0);
+  if (surrogates)
+    for (const int view : views)
+      progress_.epoch_sums[static_cast<std::size_t>(view)] += surrogates->sums(view);
   const double grad_bias = objective_->add_gradient(
       {progress_.step, views, surrogates ? surrogates->models() : progress_.views, multiplicity,
-       surrogates ? &surrogates->rays() : nullptr},
-      gradient_.data(), surrogates ? unused : progress_.epoch_sums,
+       surrogates},
+      gradient_.data(), surrogates ? of_surrogates : progress_.epoch_sums,
       [&](int leaf) { optimizer_.step(*field_, leaf, gradient_, rate); });
   optimizer_.step_bias(*field_, grad_bias, kBiasRate * rate);
   halo_->refresh(*field_);

@@ -66,7 +66,8 @@ class Fit {
   /// step, and before go_on_from().
   void keep_views(std::vector<measurement::ViewModel> models);
 
-  /// Is called after every step; returning false stops the fit.
+  /// Is called after every step; returning false stops the fit. If the views are filtered by a
+  /// microscope, it is called where the fit is about to make new surrogates of them.
   using AfterStep = std::function<bool(const Fit&)>;
   /// Takes steps until the fit is done or `after_step` stops it.
   void run(const AfterStep& after_step);
@@ -132,7 +133,8 @@ class Fit {
   const Traffic& traffic() const { return traffic_; }
 
  private:
-  std::optional<measurement::SurrogateViews> make_surrogates(const std::vector<int>& views);
+  bool needs_surrogates() const;
+  void make_surrogates();
   void take_step();
   bool is_traced_in_detail() const;
   void end_epoch();
@@ -167,7 +169,8 @@ class Fit {
   // These belong to one stage or one tree and are made anew for the next. The objective refers to
   // the first two, so they must stay where they are when a fit is moved.
   std::unique_ptr<measurement::Measurement> binned_;
-  std::vector<microscope::ViewFilter> filters_;  // of each view; empty: no microscope
+  std::vector<microscope::ViewFilter> filters_;            // of each view; empty: no microscope
+  std::optional<measurement::SurrogateViews> surrogates_;  // of the next steps
   std::unique_ptr<projection::SlabProjector> projector_;
   std::unique_ptr<objective::Objective> objective_;
   base::AlignedBuffer<float> gradient_;

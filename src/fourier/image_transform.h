@@ -5,11 +5,9 @@
 #include <memory>
 #include <vector>
 
-struct kiss_fft_state;
-
 namespace tomofield::fourier {
 
-/// Transforms images [y, x] of one size by Fourier and back. Thread-safe.
+/// Transforms images [y, x] of one size by Fourier and back. Thread-safe. Copies share the plans.
 class ImageTransform {
  public:
   using Image = std::vector<std::complex<float>>;
@@ -25,11 +23,12 @@ class ImageTransform {
   std::int64_t height() const { return height_; }
 
  private:
-  using Plan = std::unique_ptr<kiss_fft_state, void (*)(kiss_fft_state*)>;
-  void transform(Image& image, const Plan& rows, const Plan& columns) const;
+  struct Plan;  // of the library that computes the transforms
+  std::shared_ptr<const Plan> make_plan(bool is_inverse) const;
+  void transform(Image& image, const Plan& plan) const;
 
   std::int64_t width_, height_;
-  Plan forward_rows_, forward_columns_, inverse_rows_, inverse_columns_;
+  std::shared_ptr<const Plan> forward_, inverse_;
 };
 
 /// Returns the smallest even length of at least `size` whose transform is fast.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include "base/parallel.h"
 #include "microscope/view_filter.h"
@@ -89,28 +90,41 @@ ViewSums sums_of(const PredictedView& view, const ViewModel& model) {
   return sums;
 }
 
-SurrogateViews::SurrogateViews(const SlabViews& measured,
-                               std::span<const microscope::ViewFilter> filters,
-                               std::span<const int> views, std::span<const PredictedView> predicted,
-                               std::span<const ViewModel> models,
-                               const distributed::Communicator& processes)
-    : rays_(measured.blank(views.size())),
-      models_(models.begin(), models.end()),
-      sums_(views.size()) {
-  std::vector<std::vector<float>> images(views.size());
+SurrogateViews::SurrogateViews(const SlabViews& measured, std::vector<int> views,
+                               std::span<const ViewModel> models)
+    : views_(std::move(views)),
+      places_(models.size(), -1),
+      rays_(measured.blank(views_.size())),
+      measured_models_(models.begin(), models.end()),
+      models_(measured_models_),
+      sums_(models.size()) {
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    const auto view = static_cast<std::size_t>(views_[i]);
+    places_[view] = static_cast<int>(i);
+    const ViewModel& model = measured_models_[view];
+    models_[view] = {1.0, 0.0, model.weight * model.scale * model.scale * kLargestTransfer};
+  }
+}
+
+void SurrogateViews::set(std::span<const ViewFilter> filters, std::span<const int> views,
+                         std::vector<PredictedView> predicted,
+                         const distributed::Communicator& processes) {
+  std::vector<ViewSums> sums(views.size());
   for_own("make surrogate views", views.size(), processes, [&](std::size_t i) {
     const auto view = static_cast<std::size_t>(views[i]);
-    Surrogate made = surrogate_of(predicted[i], filters[view], models[view]);
-    images[i] = std::move(made.image);
-    sums_[i] = made.sums;
+    Surrogate made = surrogate_of(predicted[i], filters[view], measured_models_[view]);
+    predicted[i].measured = std::move(made.image);
+    predicted[i].predicted.clear();
+    sums[i] = made.sums;
   });
-  allreduce_sum(processes, sums_);
+  allreduce_sum(processes, sums);
   for (std::size_t i = 0; i < views.size(); ++i) {
-    images[i].resize(predicted[i].predicted.size());
-    processes.allreduce_sum(std::span(images[i]));
-    rays_->set_view(static_cast<int>(i), images[i]);
-    ViewModel& model = models_[static_cast<std::size_t>(views[i])];
-    model = {1.0, 0.0, model.weight * model.scale * model.scale * kLargestTransfer};
+    // A process has the surrogates of some views, and gives up the others' measured pixels.
+    std::vector<float>& image = predicted[i].measured;
+    if (!predicted[i].predicted.empty()) std::ranges::fill(image, 0.0f);
+    processes.allreduce_sum(std::span(image));
+    rays_->set_view(place(views[i]), image);
+    sums_[static_cast<std::size_t>(views[i])] = sums[i];
   }
 }
 

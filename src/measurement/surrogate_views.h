@@ -37,25 +37,32 @@ ViewSums sums_of(const PredictedView& view, const ViewModel& model);
 /// larger than the model's limit counts as that limit.
 class SurrogateViews {
  public:
-  /// Makes the surrogates of `views` from their predictions without a model (scale 1, offset 0).
-  /// `filters` and `models` are those of all views. Every process calls it and gets the slabs that
-  /// it has of `measured`.
-  SurrogateViews(const SlabViews& measured, std::span<const microscope::ViewFilter> filters,
-                 std::span<const int> views, std::span<const PredictedView> predicted,
-                 std::span<const ViewModel> models, const distributed::Communicator& processes);
+  /// Makes room for the surrogates of `views`. `models` are those of all views. The surrogates have
+  /// the slabs of `measured`.
+  SurrogateViews(const SlabViews& measured, std::vector<int> views,
+                 std::span<const ViewModel> models);
 
-  /// Returns d′ of each view, in the order of `views`; all of its rays count.
+  /// Makes the surrogates of some of the views from their predictions without a model (scale 1,
+  /// offset 0), which it gives up. `filters` are those of all views. Every process calls it.
+  void set(std::span<const microscope::ViewFilter> filters, std::span<const int> views,
+           std::vector<PredictedView> predicted, const distributed::Communicator& processes);
+
+  const std::vector<int>& views() const { return views_; }
+  /// Returns the place of a view in rays(), or −1 if it has no surrogate.
+  int place(int view) const { return places_[static_cast<std::size_t>(view)]; }
+  /// Returns d′ of each view at its place; all of its rays count.
   const SlabViews& rays() const { return *rays_; }
   /// Returns the models to fit the surrogates with: all of `models`, but scale 1, offset 0 and
   /// weight w L for each of `views`.
   const std::vector<ViewModel>& models() const { return models_; }
-  /// Returns the sums over the measured pixels of each view, of H p₀ and d.
-  const std::vector<ViewSums>& sums() const { return sums_; }
+  /// Returns the sums over the measured pixels of a view, of H p₀ and d.
+  const ViewSums& sums(int view) const { return sums_[static_cast<std::size_t>(view)]; }
 
  private:
+  std::vector<int> views_, places_;  // places of all views
   std::unique_ptr<SlabViews> rays_;
-  std::vector<ViewModel> models_;
-  std::vector<ViewSums> sums_;
+  std::vector<ViewModel> measured_models_, models_;  // of all views
+  std::vector<ViewSums> sums_;                       // of all views
 };
 
 }  // namespace tomofield::measurement

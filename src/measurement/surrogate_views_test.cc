@@ -59,7 +59,9 @@ struct Scene {
   }
 
   SurrogateViews surrogates() const {
-    return {*rays, filters, views, predicted, models, distributed::Communicator::alone()};
+    SurrogateViews surrogates(*rays, views, models);
+    surrogates.set(filters, views, predicted, distributed::Communicator::alone());
+    return surrogates;
   }
 
   // Returns ½ w Σ |a H p + o − d|² over the pixels of a view that count.
@@ -131,8 +133,8 @@ TEST(SurrogateViews, LimitResidualsAndTellTheSumsOfTheMeasuredPixels) {
   Scene scene;
   scene.models[0].largest_residual = 0.05;
   const SurrogateViews surrogates = scene.surrogates();
-  EXPECT_EQ(surrogates.sums()[0].n, kWidth * kHeight - 70);
-  EXPECT_LE(surrogates.sums()[0].limited_squares, 0.05 * 0.05 * surrogates.sums()[0].n);
+  EXPECT_EQ(surrogates.sums(0).n, kWidth * kHeight - 70);
+  EXPECT_LE(surrogates.sums(0).limited_squares, 0.05 * 0.05 * surrogates.sums(0).n);
   for (std::int64_t y = 0; y < kHeight; ++y)
     for (std::int64_t x = 0; x < kWidth; ++x) EXPECT_TRUE(surrogates.rays().counts(0, x, y));
   const double limited = largest_change(scene, surrogates);

@@ -49,7 +49,7 @@ void SlabDataTerm::add_pixels(const Step& step, const SlabBatch& batch, base::Ra
                               float* detector, std::span<measurement::ViewSums> sums) const {
   const std::int64_t width = batch.projector.geometry().width;
   const std::size_t detector_size = batch.projector.detector_size(step.views.size());
-  const measurement::SlabViews& measured = step.surrogates ? *step.surrogates : measured_;
+  const measurement::SlabViews& measured = step.surrogates ? step.surrogates->rays() : measured_;
   const auto rays_of = [&](int slab, std::size_t v) {
     return detector + static_cast<std::size_t>(slab - batch.slabs.begin) * detector_size +
            (static_cast<std::int64_t>(v) * width + pixels.begin) * kLanes;
@@ -63,7 +63,7 @@ void SlabDataTerm::add_pixels(const Step& step, const SlabBatch& batch, base::Ra
   for (int slab = batch.slabs.begin; slab < batch.slabs.end; ++slab) {
     for (std::size_t v = 0; v < step.views.size(); ++v) {
       const int view = step.views[v];
-      const int place = step.surrogates ? static_cast<int>(v) : view;
+      const int place = step.surrogates ? step.surrogates->place(view) : view;
       sums[v] += measurement::data_term(
           step.models[static_cast<std::size_t>(view)], step.multiplicity,
           measured.rays(slab, place) + pixels.begin * kLanes,

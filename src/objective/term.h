@@ -11,6 +11,7 @@
 #include "field/field.h"
 #include "geometry/ray_geometry.h"
 #include "measurement/measurement.h"
+#include "measurement/surrogate_views.h"
 #include "measurement/view_residuals.h"
 #include "objective/options.h"
 #include "projection/slab_projector.h"
@@ -24,9 +25,8 @@ struct Step {
   std::span<const int> views;                      ///< views that the slabs are compared with
   std::span<const measurement::ViewModel> models;  ///< of every view of the series
   double multiplicity = 1.0;  ///< scales the step's views up to the whole series
-  /// What the step's views, in their order, are compared with in place of the measured rays
-  /// (measurement::SurrogateViews); null: the measured rays.
-  const measurement::SlabViews* surrogates = nullptr;
+  /// What the step's views are compared with in place of the measured rays; null: these rays.
+  const measurement::SurrogateViews* surrogates = nullptr;
 };
 
 /// A pair of consecutive slabs of one band, or the last slab of an odd number: decoded samples, and
