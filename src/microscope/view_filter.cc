@@ -22,6 +22,9 @@ std::pair<double, double> range_of(const DefocusSlope& slope, std::int64_t width
   return {slope.at_centre_A - half_A, slope.at_centre_A + half_A};
 }
 
+// A filter keeps at most so many transfers: 1 MiB.
+constexpr std::int64_t kMostKept = std::int64_t{1} << 18;
+
 // The sine is interpolated to 3·10⁻⁷.
 constexpr std::size_t kStepsOfTables = 4096;
 
@@ -75,12 +78,13 @@ ViewFilter::ViewFilter(std::int64_t width, std::int64_t height, const ViewTransf
   first_defocus_A_ = low_A;
   num_defoci_ = num_steps + 1;
   if (num_steps > 0) defocus_step_A_ = (high_A - low_A) / static_cast<double>(num_steps);
+  keep_transfers();
 }
 
 // Returns H_s at a frequency of the padded grid. Frequency ½ stands for −½ too, where astigmatism
 // may give another value: their mean is the same at k and −k, so that real images stay real.
-float ViewFilter::transfer(std::int64_t x, std::int64_t y, std::int64_t s) const {
-  const double kx = kx_[static_cast<std::size_t>(x)], ky = ky_[static_cast<std::size_t>(y)];
+float ViewFilter::computed_transfer(const Frequency& k, std::int64_t s) const {
+  const double kx = kx_[static_cast<std::size_t>(k.x)], ky = ky_[static_cast<std::size_t>(k.y)];
   const auto sine = [&](double of_ky) {
     // An angle is that many turns, of which a whole number makes no difference.
     constexpr double kWholeTurns = 1 << 20;
@@ -88,7 +92,7 @@ float ViewFilter::transfer(std::int64_t x, std::int64_t y, std::int64_t s) const
     return sine_of_turns(turns - static_cast<double>(static_cast<std::int64_t>(turns)));
   };
   float ctf = sine(ky);  // −CTF
-  if (2 * x == transform_.width() || 2 * y == transform_.height()) ctf = (ctf + sine(-ky)) / 2;
+  if (2 * k.x == transform_.width() || 2 * k.y == transform_.height()) ctf = (ctf + sine(-ky)) / 2;
   return signal_(kx * kx + ky * ky) * (view_.is_flipped ? std::abs(ctf) : ctf);
 }
 
@@ -97,15 +101,33 @@ float ViewFilter::transfer(std::int64_t x, std::int64_t y, std::int64_t s) const
 template <typename Visit>
 void ViewFilter::for_opposite_frequencies(const Visit& visit) const {
   const std::int64_t width = transform_.width(), height = transform_.height();
+  std::size_t number = 0;
   for (std::int64_t y = 0; 2 * y <= height; ++y) {
     const bool is_own_opposite = 2 * y % height == 0;
     const std::int64_t opposite_y = (height - y) % height;
     for (std::int64_t x = 0; x < (is_own_opposite ? width / 2 + 1 : width); ++x) {
       const std::int64_t opposite_x = (width - x) % width;
-      visit(x, y, static_cast<std::size_t>(y * width + x),
-            static_cast<std::size_t>(opposite_y * width + opposite_x));
+      visit(Frequency{x, y, static_cast<std::size_t>(y * width + x),
+                      static_cast<std::size_t>(opposite_y * width + opposite_x), number++});
     }
   }
+}
+
+// Computes the transfers once, if they do not take much memory.
+void ViewFilter::keep_transfers() {
+  const std::int64_t frequencies = transform_.width() * (transform_.height() / 2 + 1);
+  if (frequencies * num_defoci_ > kMostKept) return;
+  std::vector<float> transfers;
+  for (std::int64_t s = 0; s < num_defoci_; ++s)
+    for_opposite_frequencies(
+        [&](const Frequency& k) { transfers.push_back(computed_transfer(k, s)); });
+  transfers_ = std::move(transfers);
+}
+
+float ViewFilter::transfer(const Frequency& k, std::int64_t s) const {
+  if (transfers_.empty()) return computed_transfer(k, s);
+  const std::size_t of_a_defocus = transfers_.size() / static_cast<std::size_t>(num_defoci_);
+  return transfers_[static_cast<std::size_t>(s) * of_a_defocus + k.number];
 }
 
 // Returns w_s at a pixel of the image. There is none beyond the last hat function.
@@ -153,16 +175,14 @@ ViewFilter::Image ViewFilter::extended_pair(std::span<const float> image, std::i
 // sum A + iB is given. A is half the sum of the value at k and the conjugate of that at −k, where
 // the transfer is the same.
 void ViewFilter::add_filtered_pair(const Image& pair, std::int64_t s, Image& sum) const {
-  for_opposite_frequencies(
-      [&](std::int64_t x, std::int64_t y, std::size_t at, std::size_t opposite) {
-        const std::complex<float> a = 0.5f * (pair[at] + std::conj(pair[opposite]));
-        const std::complex<float> b =
-            std::complex<float>(0.0f, -0.5f) * (pair[at] - std::conj(pair[opposite]));
-        std::complex<float> filtered = transfer(x, y, s) * a;
-        if (s + 1 < num_defoci_) filtered += transfer(x, y, s + 1) * b;
-        sum[at] += filtered;
-        if (at != opposite) sum[opposite] += std::conj(filtered);
-      });
+  for_opposite_frequencies([&](const Frequency& k) {
+    const std::complex<float> here = pair[k.at], there = std::conj(pair[k.opposite]);
+    std::complex<float> filtered = transfer(k, s) * 0.5f * (here + there);
+    if (s + 1 < num_defoci_)
+      filtered += transfer(k, s + 1) * std::complex<float>(0.0f, -0.5f) * (here - there);
+    sum[k.at] += filtered;
+    if (k.at != k.opposite) sum[k.opposite] += std::conj(filtered);
+  });
 }
 
 // Adds the transpose of extended_pair() to `sum`.
@@ -219,13 +239,12 @@ std::vector<float> ViewFilter::apply_transpose(std::span<const float> image) con
   std::vector<float> result(image.size());
   for (std::int64_t s = 0; s < num_defoci_; s += 2) {
     Image pair = spectrum;
-    for_opposite_frequencies(
-        [&](std::int64_t x, std::int64_t y, std::size_t at, std::size_t opposite) {
-          const float second = s + 1 < num_defoci_ ? transfer(x, y, s + 1) : 0.0f;
-          const std::complex<float> both(transfer(x, y, s), second);
-          pair[at] *= both;
-          if (at != opposite) pair[opposite] *= both;
-        });
+    for_opposite_frequencies([&](const Frequency& k) {
+      const std::complex<float> both(transfer(k, s),
+                                     s + 1 < num_defoci_ ? transfer(k, s + 1) : 0.0f);
+      pair[k.at] *= both;
+      if (k.at != k.opposite) pair[k.opposite] *= both;
+    });
     transform_.inverse(pair);
     add_folded_pair(pair, s, result);
   }

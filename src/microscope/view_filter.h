@@ -52,7 +52,15 @@ class ViewFilter {
  private:
   using Image = fourier::ImageTransform::Image;
 
-  float transfer(std::int64_t x, std::int64_t y, std::int64_t s) const;
+  // A frequency k of the transform, and −k.
+  struct Frequency {
+    std::int64_t x, y;
+    std::size_t at, opposite;  // their places in a spectrum
+    std::size_t number;        // in the order in which they are visited
+  };
+  float transfer(const Frequency& k, std::int64_t s) const;
+  float computed_transfer(const Frequency& k, std::int64_t s) const;
+  void keep_transfers();
   double defocus_of(std::int64_t s) const { return first_defocus_A_ + defocus_step_A_ * double(s); }
   template <typename Visit>
   void for_opposite_frequencies(const Visit& visit) const;
@@ -67,8 +75,9 @@ class ViewFilter {
   std::int64_t num_defoci_ = 1;
   LineExtension across_, along_;  // x and y
   fourier::ImageTransform transform_;
-  std::vector<double> kx_, ky_;  // frequencies of the transform, in cycles per Å
-  InterpolatedTable signal_;     // what damage and the envelope leave, of the square of k
+  std::vector<double> kx_, ky_;   // frequencies of the transform, in cycles per Å
+  std::vector<float> transfers_;  // H_s [s, number of k]; empty if they would take much memory
+  InterpolatedTable signal_;      // what damage and the envelope leave, of the square of k
 };
 
 }  // namespace tomofield::microscope
