@@ -69,11 +69,16 @@ std::string word_of(const CLI::Option& option, const Setting& setting) {
 // text.
 std::string winner_over(const Setting& setting, const CLI::App& command, const Words& given) {
   // A user gives one option of each pair.
-  constexpr std::pair<std::string_view, std::string_view> kRivals[] = {
-      {"--bin", "--angpix"}, {"--angpix", "--bin"}, {"--xf", "--aln"}, {"--aln", "--xf"}};
+  constexpr std::pair<std::string_view, std::string_view> kRivals[] = {{"--bin", "--angpix"},
+                                                                       {"--angpix", "--bin"},
+                                                                       {"--xf", "--aln"},
+                                                                       {"--aln", "--xf"},
+                                                                       {"--ctf", "--defocus"}};
   if (is_given(*command.get_option(setting.option), given)) return setting.option;
   const bool is_of_intensities = setting.option == "--log" || setting.option == "--log-base";
   if (is_of_intensities && value_of("--contrast", given) == "bright") return "--contrast bright";
+  const bool is_transfer = setting.option == "--ctf";
+  if (is_transfer && value_of("--engine", given) == "ray") return "--engine ray";
   for (const auto& [option, rival] : kRivals) {
     if (option == setting.option && is_given(*command.get_option(std::string(rival)), given))
       return std::string(rival);

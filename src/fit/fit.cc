@@ -26,8 +26,9 @@ constexpr double kBiasRate = 0.02;
 // Random streams from here on give the order of an epoch's subsets.
 constexpr std::uint64_t kOrderStream = 1000;
 
-// Surrogates are made anew after so many steps. With more of them they are cheaper, because a
-// prediction decodes the whole volume, but the fit follows older surrogates (docs/results/ctf.md).
+// Surrogates are made anew after at most so many steps. With more of them they are cheaper, because
+// a prediction decodes the whole volume, but the fit follows older surrogates
+// (docs/results/ctf.md).
 constexpr int kStepsOfSurrogates = 8;
 
 // Predictions of views that surrogates are made from are at most so large at a time, or one view.
@@ -293,16 +294,20 @@ bool Fit::is_traced_in_detail() const {
   return progress_.step == stage().first_epoch * steps_per_epoch() + 1;
 }
 
+// Returns after how many steps surrogates are made anew.
+int Fit::steps_of_surrogates() const { return std::min(kStepsOfSurrogates, steps_per_epoch()); }
+
 bool Fit::needs_surrogates() const {
   const std::int64_t first = stage().first_epoch * steps_per_epoch();
-  return !filters_.empty() && (!surrogates_ || (progress_.step - first) % kStepsOfSurrogates == 0);
+  return !filters_.empty() &&
+         (!surrogates_ || (progress_.step - first) % steps_of_surrogates() == 0);
 }
 
 // Makes the surrogates of the views of the next steps from the present field.
 void Fit::make_surrogates() {
   const base::TraceSpan span("make surrogate views");
   std::vector<int> views;
-  for (std::int64_t s = 0; s < std::min(kStepsOfSurrogates, steps_per_epoch()); ++s)
+  for (std::int64_t s = 0; s < steps_of_surrogates(); ++s)
     std::ranges::copy(views_of_step(progress_.step + s), std::back_inserter(views));
   surrogates_.reset();  // its successor needs the memory
   surrogates_.emplace(*binned_->rays, views, progress_.views);

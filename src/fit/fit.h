@@ -133,6 +133,7 @@ class Fit {
   const Traffic& traffic() const { return traffic_; }
 
  private:
+  int steps_of_surrogates() const;
   bool needs_surrogates() const;
   void make_surrogates();
   void take_step();

@@ -26,6 +26,12 @@ double distance_from_middle_px(CentreRule rule, std::int64_t num_pixels) {
   return centre - (size - 1) / 2;
 }
 
+bool has_defocus(const ViewTable& table) {
+  return std::ranges::all_of(table.views, [](const ListedView& view) {
+    return !view.is_used || view.defocus.has_value();
+  });
+}
+
 bool is_view_table(const std::filesystem::path& path) {
   const std::string extension = extension_of(path);
   return extension == ".star" || extension == ".tomostar" || extension == ".xml";

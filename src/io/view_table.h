@@ -59,6 +59,9 @@ struct ViewTable {
   StatedOptics optics{};
 };
 
+/// Says whether every view of a table that is used has a defocus.
+bool has_defocus(const ViewTable& table);
+
 /// Tells by the end of its name whether a file is a table of views: .star, .tomostar, or .xml.
 bool is_view_table(const std::filesystem::path& path);
 

@@ -41,14 +41,7 @@ void set_views(Project& project, const fs::path& views, const fs::path& named_by
   const io::ViewTable table = io::read_view_table(views);
   for (const io::ImageInFile& image : io::find_view_images(table)) project.add_file(image.file);
   project.set("stack", views.string(), named_by, entry);
-  const bool has_defocus = std::ranges::any_of(
-      table.views, [](const io::ListedView& view) { return view.defocus.has_value(); });
-  if (has_defocus) {
-    project.warn(
-        fmt::format("'{}' has a defocus for each view, which is not corrected for: the "
-                    "views are used as they are",
-                    views.string()));
-  }
+  if (io::has_defocus(table)) project.set("--ctf", views.string(), views, "rlnDefocusU");
 }
 
 }  // namespace

@@ -163,15 +163,21 @@ std::vector<report::HtmlCell> option_cells(const ReportedOption& option) {
           {option.meaning, ""}};
 }
 
+// Says whether the views of a dark series were fitted without a contrast transfer.
+bool lacks_transfer(const nlohmann::json& input) {
+  const auto is_given = [&](const char* key) {
+    return input.contains(key) && !input[key].is_null() && input[key] != "" && input[key] != "none";
+  };
+  return input.at("contrast") == "dark" && !is_given("ctf") && !is_given("defocus_um");
+}
+
 void add_input(const ReportSource& source, HtmlPage& page) {
   page.add_heading("What went in, and what was assumed");
-  const bool is_dark = source.record.at("options").at("input").at("contrast") == "dark";
-  if (is_dark)
+  if (lacks_transfer(source.record.at("options").at("input")))
     page.add_paragraph(
-        "CTF and dose: the views are taken as plain projections of the specimen. Neither the "
-        "contrast transfer function nor radiation damage is modelled yet, so fringes of defocus "
-        "stay in the tomogram, and the views of high dose count as much as the others unless their "
-        "noise is larger. What was corrected in the stack before stays corrected.");
+        "CTF and dose: the views are taken as plain projections of the specimen, because no "
+        "contrast transfer was given (--ctf or --defocus). So fringes of defocus stay in the "
+        "tomogram. What was corrected in the stack before stays corrected.");
   using Rows = std::vector<std::vector<report::HtmlCell>>;
   Rows chosen{{{"option", ""}, {"value", ""}, {"from", ""}, {"meaning", ""}}}, defaults = chosen;
   for (const ReportedOption& option :

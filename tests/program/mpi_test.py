@@ -104,6 +104,8 @@ def test_results_have_the_bytes_of_one_process(command):
              "vertices": (["--leaf-size", 32, "--vertex-epochs", 3, "--coarse-epochs", 2], (2,)),
              "tune": (["--field", "grid", "--epochs", 2, "--tune"], (2, 3)),
              "coarser": (["--field", "grid", "--leaf-size", 64, "--coarse-epochs", 4], (2,)),
+             "filtered": (["--field", "grid", "--leaf-size", 32, "--coarse-epochs", 3, "--defocus", 3,
+                           "--pixel-size", 8, "--dose-per-tilt", 2, "--hold-out", 5], (2,)),
              "margin": (["--contrast", "dark", "--hold-out", 5, "--axes", "xzy", "--mode", 12],
                         (3,))}
     for name, (options, numbers) in cases.items():

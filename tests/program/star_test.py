@@ -28,7 +28,8 @@ class RelionProject:
         return result, output
 
 
-QUICK = [word for word in harness.QUICK if word not in ("--thickness", THICKNESS)]
+# The views are plain projections, whatever defocus their table has.
+QUICK = [*(word for word in harness.QUICK if word not in ("--thickness", THICKNESS)), "--ctf", "none"]
 
 
 def agreement(volume, truth):
@@ -59,12 +60,25 @@ def test_a_project_of_relion_is_reconstructed(series, plain, finished):
     result, output = finished
     for setting in ("rlnTomoTiltSeriesStarFile", "--pixel-size 13.37", "rlnTomoSizeZ"):
         assert setting in result.stdout, result.stdout
-    assert "defocus" in result.stderr
+    assert "rlnDefocusU (not used: --ctf is given)" in result.stdout, result.stdout
     volume = harness.read_volume(output)
     assert volume.shape == (THICKNESS, HEIGHT, WIDTH)
     # The fill at the edges of shifted views and their interpolation cost a little.
     assert agreement(volume, series.truth) > agreement(plain.volume, series.truth) - 0.02
     assert agreement(volume, plain.volume) > 0.97
+
+
+def test_the_defocus_of_a_project_is_used(relion, finished):
+    output = relion.path("filtered.mrc")
+    options = [word for word in QUICK if word not in ("--ctf", "none")]
+    command = ["reconstruct", relion.star, "--series", "TS_01", "--overwrite", "-o", output, *options]
+    result = harness.succeed(*command, cwd=relion.folder)
+    assert "ctf: the defocus of each view from" in result.stderr, result.stderr
+    assert "dose: from" in result.stderr, result.stderr
+    assert not np.array_equal(harness.read_volume(output), harness.read_volume(finished[1]))
+    # One defocus in place of those of the table.
+    result = harness.succeed(*command, "--defocus", 3, cwd=relion.folder)
+    assert "(not used: --defocus is given)" in result.stdout, result.stdout
 
 
 def test_the_result_goes_back_to_relion(relion, finished):

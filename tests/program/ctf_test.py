@@ -1,0 +1,99 @@
+"""Tests reconstructions of views that a microscope filtered: --ctf, --defocus and the doses."""
+
+import json
+import os
+
+import harness
+import numpy as np
+import pytest
+
+SIZE = 64
+FIT = ["--epochs", 4, "--coarse-epochs", 12, "--tv-penalty", "smooth", "--tv", 5, "--view-scale", "off",
+       "--black-level", 0, "--bead-diameter", 0]
+
+
+class Filtered:
+    """A series with a contrast transfer and radiation damage, and runs on it."""
+
+    def __init__(self, name):
+        self.folder = os.path.join(harness.fresh_directory(name), "cell")
+        harness.succeed("simulate", self.folder, "--size", SIZE, "--yardstick", "a", "--noise", 0.02,
+                        "--seed", 31, "--voxel-size", 8, "--defocus", "3:5", "--dose-per-tilt", 1)
+        self.truth = harness.read_volume(self.path("truth.mrc"))
+        self.transfer = ["--ctf", self.path("tilt_series_ctf.txt"), "--mdoc", self.path("tilt_series.mdoc")]
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def arguments(self, output, *options):
+        return ["reconstruct", self.path("tilt_series.mrc"), "--tlt", self.path("tilt_series.tlt"),
+                "--thickness", len(self.truth), "--contrast", "bright", "--no-margin", "--overwrite",
+                "-o", self.path(output), *harness.merge(FIT, options)]
+
+    def run(self, output, *options):
+        return harness.succeed(*self.arguments(output, *options))
+
+    def volume(self, output):
+        return harness.read_volume(self.path(output))
+
+    def psnr(self, output):
+        """Returns the PSNR against the truth at the best scale and offset, in dB."""
+        found = self.volume(output).ravel().astype(float)
+        truth = self.truth.ravel().astype(float)
+        scale, offset = np.polyfit(found, truth, 1)
+        error = np.mean((scale * found + offset - truth) ** 2)
+        return 10 * np.log10(np.ptp(truth) ** 2 / error)
+
+
+@pytest.fixture(scope="module", name="series")
+def make_series():
+    return Filtered("ctf")
+
+
+@pytest.fixture(scope="module", name="modelled")
+def make_modelled(series):
+    """Reconstructs with the contrast transfer and the doses."""
+    return series.run("modelled.mrc", *series.transfer)
+
+
+def test_the_contrast_transfer_gains_decibels(series, modelled):
+    assert "ctf: the defocus of each view from" in modelled.stderr
+    assert "dose: from" in modelled.stderr
+    series.run("ignored.mrc")
+    assert series.psnr("modelled.mrc") > series.psnr("ignored.mrc") + 2
+
+
+def test_a_wrong_defocus_predicts_held_out_views_worse(series):
+    def held_out(output, *options):
+        series.run(output, "--hold-out", 8, *options)
+        with open(series.path(output)[:-4] + ".json", encoding="utf-8") as file:
+            return json.load(file)["metrics"]["held_out"]["error"]
+    right = held_out("right.mrc", *series.transfer)
+    wrong = held_out("wrong.mrc", "--defocus", 2, "--mdoc", series.path("tilt_series.mdoc"))
+    assert right < 0.9 * wrong
+
+
+@pytest.mark.usefixtures("modelled")
+def test_threads_change_no_bit(series):
+    series.run("one.mrc", *series.transfer, "--threads", 1)
+    np.testing.assert_array_equal(series.volume("one.mrc"), series.volume("modelled.mrc"))
+
+
+@pytest.mark.usefixtures("modelled")
+def test_stopping_and_resuming_change_no_bit(series):
+    command = [word for word in series.arguments("resumed.mrc", *series.transfer)
+               if word != "--overwrite"]
+    harness.finish_with_stops([*command, "--resume"], lambda: None, most=3)
+    np.testing.assert_array_equal(series.volume("resumed.mrc"), series.volume("modelled.mrc"))
+
+
+def test_files_of_another_stack_are_refused(series):
+    short = series.path("short.txt")
+    with open(series.path("tilt_series_ctf.txt"), encoding="utf-8") as file:
+        lines = file.readlines()
+    with open(short, "w", encoding="utf-8") as file:
+        file.writelines(lines[:-1])
+    result = harness.tomofield(*series.arguments("short.mrc", "--ctf", short))
+    assert result.returncode == 2 and "give the file of this stack" in result.stderr, result.stderr
+    result = harness.tomofield(*series.arguments("both.mrc", *series.transfer, "--defocus", 3))
+    assert result.returncode == 2 and "give one of them" in result.stderr, result.stderr
