@@ -113,6 +113,7 @@ def reconstruct(
     fiducials: Optional[Path] = None,
     even: Optional[Path] = None,
     odd: Optional[Path] = None,
+    ctf: Optional[Path] = None,
     progress: Optional[Callable[[Progress], Optional[bool]]] = None,
     **options: Unpack[Options],
 ) -> Reconstruction:
@@ -122,6 +123,7 @@ def reconstruct(
         runs along y through the image centre.
     tilt_deg: an angle a view, for views in memory.
     tlt, xf, xtilt, aln, mdoc, mask, fiducials: files that belong to an MRC stack.
+    ctf: a table of the defocus of each view, from CTFFIND, AreTomo, IMOD, RELION, Gctf or Warp.
     even, odd: MRC stacks of the even and the odd frames, for a reconstruction in halves. Its models
         are files beside the tomogram, so `model` is None.
     progress: called after every step; returns False to stop.
@@ -131,7 +133,7 @@ def reconstruct(
     KeyboardInterrupt stops it too; with `output`, both leave a checkpoint for `resume=True`.
     """
     files = {"tlt": tlt, "xf": xf, "xtilt": xtilt, "aln": aln, "mdoc": mdoc, "mask": mask,
-             "fiducials": fiducials, "even": even, "odd": odd}
+             "fiducials": fiducials, "even": even, "odd": odd, "ctf": ctf}
     made = _core.reconstruct(_series(series, tilt_deg, files), _options(options), progress)
     return Reconstruction(
         made["is_finished"], made["tomogram"],
