@@ -9,12 +9,15 @@
 #include <utility>
 
 #include "base/enum_names.h"
+#include "base/memory.h"
 #include "base/parallel.h"
 #include "base/plausible.h"
 #include "base/trace.h"
+#include "compact/leaf_code.h"
 #include "io/atomic_file.h"
 #include "io/hdf5_file.h"
 #include "io/hdf5_reader.h"
+#include "output/compact_model.h"
 #include "tomofield/error.h"
 #include "tomofield/version.h"
 
@@ -28,6 +31,7 @@ using Integers = std::vector<std::int64_t>;
 // Both values are in files: do not change either without a new version.
 constexpr const char* kFormat = "tomofield model";
 constexpr std::int64_t kFormatVersion = 2;
+constexpr std::int64_t kCompactVersion = 3;  // of models with codes in place of parameters
 
 // Writes one member of a list of structs as an array.
 template <typename Items, typename Get>
@@ -128,14 +132,20 @@ class KeptCopy {
   int leaf_ = 0;
 };
 
-void write_field(Hdf5Group group, const field::Field& field, const FloatSource& parameters) {
+// Writes what is the same for all fields.
+void write_structure(Hdf5Group& group, const field::Field& field) {
   group.write_text("kind", base::name_of(field.kind()));
   group.write_number("thickness", field.thickness());
   group.write_number("bias", static_cast<double>(field.bias));
   group.write_number("softplus_beta", static_cast<double>(field.activation.beta));
   write_tree(group.create_group("tree"), field.tree());
   write_leaves(group.create_group("leaves"), field);
-  group.write_floats("parameters", parameters.size, parameters.hand_out);
+}
+
+void write_codes(Hdf5Group group, const compact::LeafCodes& codes) {
+  group.write_number("step", codes.step);
+  group.write_array<std::int64_t>("offset", codes.offset);
+  group.write_array<std::uint8_t>("bytes", codes.bytes);
 }
 
 template <typename T>
@@ -150,6 +160,31 @@ void write_training(Hdf5Group group, const TrainingState& state, const FloatArra
     floats.write_floats(name, source.size, source.hand_out);
   write_arrays(group.create_group("doubles"), state.doubles);
   write_arrays(group.create_group("integers"), state.integers);
+}
+
+// Writes a model whose field and training state come from `write_rest`.
+void write_model(const std::filesystem::path& path, const ModelInfo& info, std::int64_t version,
+                 const std::function<void(Hdf5Group&)>& write_rest) {
+  const base::TraceSpan span("write model");
+  io::AtomicFile target(path);
+  {
+    io::Hdf5File file = io::Hdf5File::create(target.temporary_path());
+    {
+      Hdf5Group root = file.root();
+      root.write_text("format", kFormat);
+      root.write_integer("format_version", version);
+      root.write_text("written_by", fmt::format("tomofield {}", library_version()));
+      root.write_number("x_tilt_deg", info.x_tilt_deg);
+      root.write_number("pixel_size_A", info.pixel_size_A);
+      root.write_number("density_unit", info.density_unit);
+      root.write_text("contrast", info.is_dark ? "dark" : "bright");
+      root.write_text("options_json", info.options_json);
+      write_geometry(root.create_group("geometry"), info);
+      write_rest(root);
+    }
+    file.close();
+  }
+  target.commit();
 }
 
 // Reads a model. Every fault is an Error that names the file.
@@ -215,12 +250,13 @@ class ModelReader {
     if (!root.has_attribute("format") || root.text("format") != kFormat)
       throw Error(fmt::format("'{}' is an HDF5 file, but no model of tomofield", path_));
     const std::int64_t version = root.integer("format_version");
-    if (version != kFormatVersion)
+    if (version != kFormatVersion && version != kCompactVersion)
       throw Error(
           fmt::format("'{}' is a model of format {}, written by {}; this is tomofield {}, which "
-                      "reads format {}: "
+                      "reads formats {} and {}: "
                       "use the tomofield that wrote it",
-                      path_, version, root.text("written_by"), library_version(), kFormatVersion));
+                      path_, version, root.text("written_by"), library_version(), kFormatVersion,
+                      kCompactVersion));
   }
 
   int small_integer(std::int64_t value) const {
@@ -350,29 +386,75 @@ class ModelReader {
         const std::string name = group.text("kind");
         const auto kind = base::enum_named<FieldKind>(name);
         if (!kind) fail(fmt::format("there is no field '{}'", name));
-        require_enough_parameters(*kind, shapes, group.array_size("parameters"));
-        if (!choose) group.require_room("parameters");
+        if (group.has("code")) {
+          require(*kind == FieldKind::kVm, "only factors have codes");
+          require_room_for_decoded(shapes);
+        } else {
+          require_enough_parameters(*kind, shapes, group.array_size("parameters"));
+          if (!choose) group.require_room("parameters");
+        }
         field = field::make_field(*kind, std::move(tree), thickness, std::move(shapes));
       });
     } catch (const std::bad_alloc&) {
-      throw Error(fmt::format("'{}' holds {} parameters, more than there is memory for", path_,
-                              group.array_size("parameters")));
+      throw Error(fmt::format("'{}' holds more parameters than there is memory for", path_));
     }
     field->bias = static_cast<float>(group.number("bias"));
     field->activation.beta = static_cast<float>(group.number("softplus_beta"));
     require(std::isfinite(field->bias) && std::isfinite(field->activation.beta) &&
                 field->activation.beta >= 0,
             "its decoder is no usable number");
-    if (choose) {
+    if (choose) field->keep_only(kept);
+    if (group.has("code")) {
+      read_codes(group.group("code"), *field);
+    } else if (choose) {
       require(group.array_size("parameters") == field->num_parameters(),
               "its parameters are not those of its leaves");
-      field->keep_only(kept);
       group.read_floats("parameters", KeptCopy(*field, field->parameters()));
     } else {
       group.read_array<float>("parameters", field->parameters());
     }
     require_finite_parameters(*field, fmt::format("'{}' is a damaged model", path_));
     return field;
+  }
+
+  // Counts leaf by leaf, since the sum of all leaves could wrap.
+  void require_room_for_decoded(const std::vector<field::LeafShape>& shapes) const {
+    constexpr std::size_t kMost = std::size_t{1} << 40;
+    std::size_t count = 0;
+    for (const field::LeafShape& shape : shapes) {
+      const std::size_t more = field::count_parameters(FieldKind::kVm, {shape});
+      require(more <= kMost - count, "its leaves need more parameters than any file holds");
+      count += more;
+    }
+    constexpr std::size_t kSmall = std::size_t{1} << 22;
+    if (count > kSmall) {
+      base::require_memory(count * sizeof(float), fmt::format("'{}'", path_).c_str(),
+                           "use a machine with more, or another copy");
+    }
+  }
+
+  // Decodes the leaves that the field keeps; the codes of others are not read.
+  void read_codes(const StoredGroup& group, field::Field& field) const {
+    const double step = group.number("step");
+    require(step >= 0 && std::isfinite(step), "its step is no usable number");
+    const Integers offset = group.read_array<std::int64_t>("offset");
+    const int num_leaves = field.tree().num_leaves();
+    require(std::ssize(offset) == num_leaves + 1 && offset.front() == 0 &&
+                std::ranges::is_sorted(offset) &&
+                offset.back() == static_cast<std::int64_t>(group.array_size("bytes")),
+            "the index of its codes is wrong");
+    name_file_in_faults([&] {
+      base::parallel_for("decode leaves", num_leaves, [&](std::int64_t i) {
+        const int leaf = static_cast<int>(i);
+        if (!field.keeps(leaf)) return;
+        const auto first = static_cast<std::size_t>(offset[static_cast<std::size_t>(i)]);
+        std::vector<std::uint8_t> code(
+            static_cast<std::size_t>(offset[static_cast<std::size_t>(i) + 1]) - first);
+        group.read_bytes("bytes", first, code);
+        compact::dequantise(compact::decode(code, field.shape(leaf)), step,
+                            field.parameters().subspan(field.offset(leaf)));
+      });
+    });
   }
 
   template <typename T>
@@ -403,28 +485,21 @@ void save_model(const std::filesystem::path& path, const field::Field& field, co
 void save_model(const std::filesystem::path& path, const field::Field& field,
                 const FloatSource& parameters, const ModelInfo& info, const TrainingState* training,
                 const FloatArrays& more_floats) {
-  const base::TraceSpan span("write model");
-  io::AtomicFile target(path);
-  {
-    io::Hdf5File file = io::Hdf5File::create(target.temporary_path());
-    {
-      Hdf5Group root = file.root();
-      root.write_text("format", kFormat);
-      root.write_integer("format_version", kFormatVersion);
-      root.write_text("written_by", fmt::format("tomofield {}", library_version()));
-      root.write_number("x_tilt_deg", info.x_tilt_deg);
-      root.write_number("pixel_size_A", info.pixel_size_A);
-      root.write_number("density_unit", info.density_unit);
-      root.write_text("contrast", info.is_dark ? "dark" : "bright");
-      root.write_text("options_json", info.options_json);
-      write_geometry(root.create_group("geometry"), info);
-      write_field(root.create_group("field"), field, parameters);
-      if (training != nullptr)
-        write_training(root.create_group("training"), *training, more_floats);
-    }
-    file.close();
-  }
-  target.commit();
+  write_model(path, info, kFormatVersion, [&](Hdf5Group& root) {
+    Hdf5Group group = root.create_group("field");
+    write_structure(group, field);
+    group.write_floats("parameters", parameters.size, parameters.hand_out);
+    if (training != nullptr) write_training(root.create_group("training"), *training, more_floats);
+  });
+}
+
+void save_model(const std::filesystem::path& path, const field::Field& field,
+                const compact::LeafCodes& codes, const ModelInfo& info) {
+  write_model(path, info, kCompactVersion, [&](Hdf5Group& root) {
+    Hdf5Group group = root.create_group("field");
+    write_structure(group, field);
+    write_codes(group.create_group("code"), codes);
+  });
 }
 
 void save_model(const std::filesystem::path& path, const Model& model,
