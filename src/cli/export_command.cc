@@ -35,8 +35,8 @@ using output::Model;
 struct ExportArguments {
   std::filesystem::path model;
   std::filesystem::path output;
-  std::filesystem::path compact;     // model to write in place of a volume
-  std::string budget = "0.1dB";      // of that model
+  std::filesystem::path compact;  // model to write in place of a volume
+  std::string budget = "0.1dB";   // of that model
   std::vector<double> box, centre, rotation;
   std::vector<std::int64_t> size;
   std::optional<double> voxel_size_A;
@@ -92,11 +92,12 @@ void write_compact(const ExportArguments& arguments) {
   io::OutputSet results;
   output::save_model(arguments.compact, *made.field, made.codes, model);
   results.commit();
-  print("{}: {} parameters in {} leaves, {} bytes; the densities change by {:.4g} times their "
-        "standard deviation\n",
-        arguments.compact.string(), made.report.parameters, made.field->tree().num_leaves(),
-        std::filesystem::file_size(arguments.compact),
-        std::sqrt(made.report.mean_square_change / made.report.variance));
+  print(
+      "{}: {} parameters in {} leaves, {} bytes; the densities change by {:.4g} times their "
+      "standard deviation\n",
+      arguments.compact.string(), made.report.parameters, made.field->tree().num_leaves(),
+      std::filesystem::file_size(arguments.compact),
+      std::sqrt(made.report.mean_square_change / made.report.variance));
 }
 
 void run_export(ExportArguments& arguments) {

@@ -26,15 +26,16 @@ TEST(Budget, HasThreeUnits) {
 }
 
 TEST(Budget, OtherTextsGetASentence) {
-  for (const char* text : {"", "dB", "0.1", "-2M", "0dB", "11dB", "nan", "infdB", "5mb", "5 MB", "1MBx",
-                           "999e-3kB"}) {
+  for (const char* text :
+       {"", "dB", "0.1", "-2M", "0dB", "11dB", "nan", "infdB", "5mb", "5 MB", "1MBx", "999e-3kB"}) {
     SCOPED_TRACE(text);
     try {
       parse_budget(text);
       ADD_FAILURE() << "no error";
     } catch (const Error& error) {
       const std::string message = error.what();
-      EXPECT_NE(message.find(std::string("'") + text + "' is no budget"), std::string::npos) << message;
+      EXPECT_NE(message.find(std::string("'") + text + "' is no budget"), std::string::npos)
+          << message;
       EXPECT_NE(message.find("5MB"), std::string::npos) << message;
     }
   }

@@ -57,7 +57,7 @@ class Compression {
 
   // Finds ranks at prices around the one that meets the limit, and chooses among them.
   void choose(const Limit& limit) {
-    constexpr int kRounds = 5;
+    constexpr int kRounds = 8;
     constexpr double kClose = 0.02;
     double price = last_price_ > 0 ? last_price_ : surveyed_price(limit);
     double low = 0, high = 0;  // prices below and above the wanted one
@@ -73,7 +73,7 @@ class Compression {
       // Error grows and cost falls with about this power of the price.
       const double power = limit.of_error ? 0.6 : -0.6;
       double next = price * std::pow(ratio, -1 / power);
-      if (low > 0 && high > 0) next = std::clamp(next, low * 1.02, high / 1.02);
+      if (low > 0 && high > 0 && (next <= low || next >= high)) next = std::sqrt(low * high);
       price = next;
     }
     choice_ = limit.of_error ? choose_within_error(places_, limit.most)
@@ -99,15 +99,15 @@ class Compression {
       const PlaceDensities place = vertices_.read(node.square);
       rounded[at] = quantise(leaves_[at], place.nx, place.ny, place.nz, made.codes.step);
       codes[at] = encode(rounded[at]);
-      const FloatMatrix values = values_of(dequantised_modes(rounded[at], made.codes.step),
-                                           place.nx, place.ny, place.nz);
-      errors[at] = static_cast<double>((values - place.values).squaredNorm()) *
-                   place.volume_of_vertex();
+      const FloatMatrix values =
+          values_of(dequantised_modes(rounded[at], made.codes.step), place.nx, place.ny, place.nz);
+      errors[at] =
+          static_cast<double>((values - place.values).squaredNorm()) * place.volume_of_vertex();
     });
     std::vector<field::LeafShape> shapes;
     for (const QuantisedLeaf& leaf : rounded) shapes.push_back(leaf.shape);
-    made.field = field::make_field(FieldKind::kVm, tree_, vertices_.field().thickness(),
-                                   std::move(shapes));
+    made.field =
+        field::make_field(FieldKind::kVm, tree_, vertices_.field().thickness(), std::move(shapes));
     made.codes.offset.push_back(0);
     double error = 0;
     for (std::size_t i = 0; i < rounded.size(); ++i) {
@@ -160,8 +160,7 @@ class Compression {
         static_cast<std::size_t>((tree.num_leaves() + stride - 1) / stride));
     std::vector<double> volumes(found.size());
     base::parallel_for("survey leaves", std::ssize(found), [&](std::int64_t i) {
-      const PlaceDensities place =
-          vertices_.read(tree.leaf(static_cast<int>(i) * stride).square);
+      const PlaceDensities place = vertices_.read(tree.leaf(static_cast<int>(i) * stride).square);
       volumes[static_cast<std::size_t>(i)] = place.volume;
       const double cost = static_cast<double>(place.nz) + static_cast<double>(place.nx) * place.ny;
       for (const float energy : energies_of_sections(place))
@@ -202,8 +201,8 @@ class Compression {
       const double price = prices_[place][static_cast<std::size_t>(choice_.candidate[place])];
       leaves_[at] = truncate(densities, price / densities.volume_of_vertex());
       // Rounding errors are uniform: their mean square is a twelfth of the step's.
-      errors[at] = densities.volume_of_vertex() / 12 *
-                   static_cast<double>(leaves_[at].num_parameters());
+      errors[at] =
+          densities.volume_of_vertex() / 12 * static_cast<double>(leaves_[at].num_parameters());
     });
     error_of_step_ = std::accumulate(errors.begin(), errors.end(), 0.0);
   }
@@ -233,9 +232,8 @@ class Compression {
       if (squares_.leaf_like[at] < 0 || !is_tried_[at]) return;
       const PlaceDensities place = vertices_.read(squares_.nodes[at].square);
       const Truncation modes = truncate(place, price / place.volume_of_vertex());
-      places_[at].candidates.push_back(
-          {.cost = static_cast<double>(modes.num_parameters()),
-           .error = modes.square_error * place.volume_of_vertex()});
+      places_[at].candidates.push_back({.cost = static_cast<double>(modes.num_parameters()),
+                                        .error = modes.square_error * place.volume_of_vertex()});
       prices_[at].push_back(price);
     });
   }
@@ -246,10 +244,10 @@ class Compression {
   std::vector<std::vector<double>> prices_;  // of each candidate
   std::vector<char> is_tried_;               // whether the next round adds a candidate to a place
   Choice choice_;
-  field::Quadtree tree_;                     // of what was chosen
-  std::vector<std::size_t> place_of_leaf_;   // of this tree
-  std::vector<Truncation> leaves_;           // of this tree
-  double error_of_step_ = 0.0;               // of rounding these leaves to steps of 1
+  field::Quadtree tree_;                    // of what was chosen
+  std::vector<std::size_t> place_of_leaf_;  // of this tree
+  std::vector<Truncation> leaves_;          // of this tree
+  double error_of_step_ = 0.0;              // of rounding these leaves to steps of 1
   double volume_ = 0.0, variance_ = 0.0;
   double last_price_ = 0.0;
 };
@@ -275,18 +273,23 @@ CompactField within_parameters(Compression& compression, double parameters) {
   return compression.build(compression.choice().error * kRoundingPart / (1 - kRoundingPart));
 }
 
-// The bytes that a parameter takes are known once a model was made.
+// The bytes that a parameter takes are known once a model was made. Keeps the largest one that is
+// within the budget.
 CompactField within_bytes(Compression& compression, double bytes) {
   constexpr int kTries = 8;
   constexpr double kFirstBytesPerParameter = 0.45, kClose = 0.95;
   double parameters = bytes / kFirstBytesPerParameter;
+  CompactField best;
   for (int i = 0; i < kTries; ++i) {
     CompactField made = within_parameters(compression, parameters);
     const double part = static_cast<double>(made.report.bytes) / bytes;
-    if (part <= 1 && (part > kClose || i + 1 == kTries)) return made;
+    if (part <= 1 && made.report.bytes >= best.report.bytes) best = std::move(made);
+    if (part <= 1 && part > kClose) break;
     parameters *= (1 + kClose) / 2 / std::max(part, 0.1);
   }
-  throw Error(fmt::format("no model of {:.0f} bytes was found: give a larger budget", bytes));
+  if (best.field == nullptr)
+    throw Error(fmt::format("no model of {:.0f} bytes was found: give a larger budget", bytes));
+  return best;
 }
 
 }  // namespace

@@ -21,12 +21,12 @@ struct LeafCodes {
 
 /// Says what a compression did. Densities are in density units.
 struct CompressionReport {
-  std::size_t parameters = 0;       ///< whole numbers that the file holds
-  std::size_t bytes = 0;            ///< of their codes
+  std::size_t parameters = 0;  ///< whole numbers that the file holds
+  std::size_t bytes = 0;       ///< of their codes
   /// Sum of squared changes at all vertices, the margin's as well, over the volume of the region.
   double mean_square_change = 0.0;
-  double variance = 0.0;            ///< of the densities in the region of interest
-  double decibels = 0.0;            ///< that the PSNR falls by, at most, on phantoms (kErrorOverVariance)
+  double variance = 0.0;  ///< of the densities in the region of interest
+  double decibels = 0.0;  ///< that the PSNR falls by, at most, on phantoms (kErrorOverVariance)
 };
 
 /// Returns the report for the metrics of a run; `seconds` is what the compression took.
@@ -42,12 +42,12 @@ struct CompactField {
 /// The part of the densities' variance that stands for the mean squared error of a fit, whose truth
 /// is unknown. It was measured on phantoms, so that the PSNR of none falls by more than a budget in
 /// decibels says (docs/results/compact.md).
-inline constexpr double kErrorOverVariance = 0.4;
+inline constexpr double kErrorOverVariance = 0.3;
 
-/// Replaces the vertices of a finished fit by factors in leaves of several sizes. The sides of leaves
-/// and the ranks of their modes are chosen together: among candidates of every place of the tree
-/// (place_tree.h) whose errors were measured (truncation.h), those with the smallest error within
-/// the budget, or the smallest within the error (structure.h). Then the factors are rounded
+/// Replaces the vertices of a finished fit by factors in leaves of several sizes. The sides of
+/// leaves and the ranks of their modes are chosen together: among candidates of every place of the
+/// tree (place_tree.h) whose errors were measured (truncation.h), those with the smallest error
+/// within the budget, or the smallest within the error (structure.h). Then the factors are rounded
 /// (leaf_code.h) so that they keep within the budget.
 ///
 /// `vertices` is of kind "grid", and all leaves must be kept. A place is worked on alone, so memory

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 
+#include "base/random.h"
 #include "compact/leaf_code.h"
 #include "compact/vertex_densities.h"
 #include "field/sampling/sample_box.h"
@@ -18,15 +19,18 @@ using field::Region;
 
 constexpr double kThickness = 24.0;
 
-// Returns a row of cells of 32 px: a margin on the left whose vertices are 4 px apart, then `inside`
-// cells with a vertex a pixel. Its first half has texture, and its second half is empty.
+// Returns a row of cells of 32 px: a margin on the left whose vertices are 4 px apart, then
+// `inside` cells with a vertex a pixel. Its first half has texture, and its second half is empty.
 std::unique_ptr<Field> half_empty_field(int inside) {
-  const field::RootGrid roots{.x0 = -32, .y0 = 0, .cell_size = 32, .columns = inside + 1, .rows = 1};
+  const field::RootGrid roots{
+      .x0 = -32, .y0 = 0, .cell_size = 32, .columns = inside + 1, .rows = 1};
   std::vector<Region> regions(static_cast<std::size_t>(inside + 1), Region::kInterest);
   regions[0] = Region::kMargin;
   std::vector<field::LeafShape> shapes(regions.size(), {.nx = 33, .ny = 33, .nz = 24});
   shapes[0] = {.nx = 9, .ny = 9, .nz = 7};
-  auto field = field::make_field(FieldKind::kGrid, field::Quadtree(roots, regions), kThickness, shapes);
+  auto field =
+      field::make_field(FieldKind::kGrid, field::Quadtree(roots, regions), kThickness, shapes);
+  base::Random random(7);
   for (int leaf = 0; leaf < field->tree().num_leaves(); ++leaf) {
     const field::LeafShape& s = field->shape(leaf);
     const field::Square& square = field->tree().leaf(leaf).square;
@@ -36,8 +40,8 @@ std::unique_ptr<Field> half_empty_field(int inside) {
         for (int j = 0; j < s.ny; ++j) {
           const double x = static_cast<double>(square.x0) + 32.0 * i / (s.nx - 1);
           const double y = 32.0 * j / (s.ny - 1), z = 23.0 * k / (s.nz - 1);
-          const double texture =
-              1 + std::sin(0.4 * x + 0.1 * z) * std::cos(0.3 * y - 0.2 * z) + 0.3 * std::sin(x * z);
+          const double texture = 1 + std::sin(0.4 * x + 0.1 * z) * std::cos(0.3 * y - 0.2 * z) +
+                                 random.uniform(-0.3, 0.3);
           *value++ = static_cast<float>(x < 16.0 * inside ? texture : 0.0);
         }
       }
@@ -61,10 +65,10 @@ TEST(Compress, DecibelsAreKept) {
   constexpr int kInside = 4;
   const auto vertices = half_empty_field(kInside);
   double last = 0;
-  for (const double decibels : {0.5, 0.1, 0.02}) {
+  for (const double decibels : {0.5, 0.1}) {
     const CompactField made = compress(*vertices, {Budget::Kind::kDecibels, decibels});
-    EXPECT_LE(made.report.decibels, 1.02 * decibels);
-    EXPECT_GE(made.report.decibels, 0.5 * decibels);
+    EXPECT_LE(made.report.decibels, decibels);
+    EXPECT_GE(made.report.decibels, 0.8 * decibels);
     // The report's error is at the vertices of the whole field; voxels lie on those of the region.
     const double change = mean_square_difference(*vertices, *made.field, kInside);
     EXPECT_NEAR(change / made.report.mean_square_change, 1, 0.35);
@@ -106,7 +110,8 @@ TEST(Compress, CodesStandForTheField) {
   const Field& field = *made.field;
   for (int leaf = 0; leaf < field.tree().num_leaves(); ++leaf) {
     const auto first = static_cast<std::size_t>(made.codes.offset[static_cast<std::size_t>(leaf)]);
-    const auto end = static_cast<std::size_t>(made.codes.offset[static_cast<std::size_t>(leaf) + 1]);
+    const auto end =
+        static_cast<std::size_t>(made.codes.offset[static_cast<std::size_t>(leaf) + 1]);
     const QuantisedLeaf decoded =
         decode(std::span(made.codes.bytes).subspan(first, end - first), field.shape(leaf));
     std::vector<float> parameters(field.offset(leaf + 1) - field.offset(leaf));

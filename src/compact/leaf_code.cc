@@ -17,8 +17,8 @@ namespace {
 
 using field::LeafShape;
 
-constexpr int kLevel = 19;         // of Zstandard; leaves are small
-constexpr int kMostBytes = 5;      // of a number of 32 bits, seven a byte
+constexpr int kLevel = 19;     // of Zstandard; leaves are small
+constexpr int kMostBytes = 5;  // of a number of 32 bits, seven a byte
 
 // The lengths of vectors and matrices and the rank of one mode.
 struct ModeShape {
@@ -82,8 +82,10 @@ std::vector<std::uint8_t> encode(const QuantisedLeaf& leaf) {
   std::vector<std::uint8_t> plain;
   plain.reserve(leaf.numbers.size());
   for (const std::int32_t number : leaf.numbers) {
-    auto rest = (static_cast<std::uint32_t>(number) << 1) ^ static_cast<std::uint32_t>(number >> 31);
-    for (; rest >= 0x80; rest >>= 7) plain.push_back(static_cast<std::uint8_t>(0x80 | (rest & 0x7F)));
+    auto rest =
+        (static_cast<std::uint32_t>(number) << 1) ^ static_cast<std::uint32_t>(number >> 31);
+    for (; rest >= 0x80; rest >>= 7)
+      plain.push_back(static_cast<std::uint8_t>(0x80 | (rest & 0x7F)));
     plain.push_back(static_cast<std::uint8_t>(rest));
   }
   thread_local const Compressor compressor;

@@ -9,12 +9,13 @@
 
 namespace tomofield::compact {
 
-/// The modes of a leaf (truncation.h) as whole numbers. A step stands for the same error of the densities in every
-/// one of them: entries of a matrix M are counted in steps; its vector, which has length 1, in steps
-/// over the length of M. So one step size serves a whole file.
+/// The modes of a leaf (truncation.h) as whole numbers. A step stands for the same error of the
+/// densities in every one of them: entries of a matrix M are counted in steps; its vector, which
+/// has length 1, in steps over the length of M. So one step size serves a whole file.
 ///
-/// The order of the numbers is VX, MYZ, VY, MXZ, VZ, MXY, each component by component, which is that
-/// of a leaf of factors (field/vm/vm_field.h) but for the components, which are innermost there.
+/// The order of the numbers is VX, MYZ, VY, MXZ, VZ, MXY, each component by component, which is
+/// that of a leaf of factors (field/vm/vm_field.h) but for the components, which are innermost
+/// there.
 struct QuantisedLeaf {
   field::LeafShape shape;
   std::vector<std::int32_t> numbers;

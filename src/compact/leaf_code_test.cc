@@ -5,8 +5,8 @@
 #include "base/random.h"
 #include "compact/quantise.h"
 #include "field/field.h"
-#include "scratch_directory.h"
 #include "random_arrays.h"
+#include "scratch_directory.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compact {

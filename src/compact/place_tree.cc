@@ -40,7 +40,8 @@ PlaceSquares place_squares(const VertexDensities& vertices, std::int64_t largest
   for (std::size_t i = 0; i < squares.nodes.size(); ++i) {
     const QuadtreeNode node = squares.nodes[i];
     int like = vertices.leaf_like(node.square);
-    if (like < 0) like = vertices.is_outside(node.square) ? PlaceSquares::kOutside : PlaceSquares::kNone;
+    if (like < 0)
+      like = vertices.is_outside(node.square) ? PlaceSquares::kOutside : PlaceSquares::kNone;
     squares.leaf_like.push_back(like);
     squares.nodes[i].region =
         like >= 0 ? vertices.field().tree().leaf(like).region : Region::kMargin;
@@ -70,15 +71,18 @@ field::Quadtree chosen_tree(const PlaceSquares& squares, const Choice& choice,
     nodes.push_back(node);
   }
   for (QuadtreeNode& node : nodes) {
-    const auto place = static_cast<std::size_t>(place_of_node[static_cast<std::size_t>(&node - nodes.data())]);
-    node.first_child = choice.candidate[place] == kSplit
-                           ? node_of_place[static_cast<std::size_t>(squares.nodes[place].first_child)]
-                           : -1;
+    const auto place =
+        static_cast<std::size_t>(place_of_node[static_cast<std::size_t>(&node - nodes.data())]);
+    node.first_child =
+        choice.candidate[place] == kSplit
+            ? node_of_place[static_cast<std::size_t>(squares.nodes[place].first_child)]
+            : -1;
   }
   field::Quadtree tree(squares.roots, std::move(nodes));
   place_of_leaf.clear();
   for (const int node : tree.leaves())
-    place_of_leaf.push_back(static_cast<std::size_t>(place_of_node[static_cast<std::size_t>(node)]));
+    place_of_leaf.push_back(
+        static_cast<std::size_t>(place_of_node[static_cast<std::size_t>(node)]));
   return tree;
 }
 

@@ -5,8 +5,8 @@
 
 namespace tomofield::compact {
 
-/// Rounds modes to whole numbers of steps. Components that become zero are left out, so the ranks may
-/// fall.
+/// Rounds modes to whole numbers of steps. Components that become zero are left out, so the ranks
+/// may fall.
 QuantisedLeaf quantise(const Truncation& modes, int nx, int ny, int nz, double step);
 
 /// Returns the modes that the parameters stand for.

@@ -108,9 +108,8 @@ Truncation truncate(const PlaceDensities& place, double price, const Truncation&
 Eigen::VectorXf energies_of_sections(const PlaceDensities& place) {
   const FloatMatrix sections = sections_of(place.values, place.ny);
   const bool is_flat = sections.rows() <= sections.cols();
-  const Eigen::MatrixXf gram =
-      is_flat ? Eigen::MatrixXf(sections * sections.transpose())
-              : Eigen::MatrixXf(sections.transpose() * sections);
+  const Eigen::MatrixXf gram = is_flat ? Eigen::MatrixXf(sections * sections.transpose())
+                                       : Eigen::MatrixXf(sections.transpose() * sections);
   return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXf>(gram, Eigen::EigenvaluesOnly).eigenvalues();
 }
 

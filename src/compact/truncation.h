@@ -7,8 +7,9 @@ namespace tomofield::compact {
 /// One mode of the vector–matrix form (TensoRF, Chen et al. 2022): vectors along one axis, times
 /// matrices over the other two. The columns of the vectors are orthonormal.
 struct Mode {
-  FloatMatrix vectors;   ///< [n, rank]
-  FloatMatrix matrices;  ///< [product of the two other axes in the order x, z, y (z mode: x, y), rank]
+  FloatMatrix vectors;  ///< [n, rank]
+  FloatMatrix
+      matrices;  ///< [product of the two other axes in the order x, z, y (z mode: x, y), rank]
   Eigen::Index rank() const { return vectors.cols(); }
   std::size_t num_parameters() const {
     return static_cast<std::size_t>(vectors.size() + matrices.size());

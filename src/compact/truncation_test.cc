@@ -81,8 +81,7 @@ TEST(Truncation, FindsMixedModes) {
   const PlaceDensities place = place_of(sum_of(random_modes(1, 1, 1)));
   const Truncation found = truncate(place, 1e-7);
   EXPECT_LT(found.square_error, 1e-4 * static_cast<double>(place.values.squaredNorm()));
-  EXPECT_NEAR(static_cast<double>(
-                  (values_of(found, kX, kY, kZ) - place.values).squaredNorm()),
+  EXPECT_NEAR(static_cast<double>((values_of(found, kX, kY, kZ) - place.values).squaredNorm()),
               found.square_error, 1e-5 * static_cast<double>(place.values.squaredNorm()));
 }
 

@@ -29,11 +29,12 @@ double spacing_of(const Square& square, int vertices) {
 }  // namespace
 
 VertexDensities::VertexDensities(const field::Field& vertices) : vertices_(vertices) {
-  TOMOFIELD_CHECK(vertices.kind() == FieldKind::kGrid, "plain vertices, which are their own values");
+  TOMOFIELD_CHECK(vertices.kind() == FieldKind::kGrid,
+                  "plain vertices, which are their own values");
   smallest_side_ = vertices.tree().roots().cell_size;
   for (int leaf = 0; leaf < vertices.tree().num_leaves(); ++leaf) {
-    smallest_side_ = std::min(smallest_side_, smallest_side_in(vertices.tree().leaf(leaf).square,
-                                                               vertices.shape(leaf)));
+    smallest_side_ = std::min(
+        smallest_side_, smallest_side_in(vertices.tree().leaf(leaf).square, vertices.shape(leaf)));
   }
 }
 
@@ -68,8 +69,8 @@ bool VertexDensities::are_alike(int leaf, int other) const {
 
 int VertexDensities::leaf_like(const Square& square) const {
   const std::vector<int> leaves = leaves_near(square, 0);
-  const bool all = std::ranges::all_of(
-      leaves, [&](int leaf) { return are_alike(leaves.front(), leaf); });
+  const bool all =
+      std::ranges::all_of(leaves, [&](int leaf) { return are_alike(leaves.front(), leaf); });
   return all ? leaves.front() : -1;
 }
 

@@ -184,7 +184,8 @@ void StoredGroup::read_bytes(const std::string& name, std::size_t first,
   const std::size_t size = array_size(name);
   if (first > size || bytes.size() > size - first) fail(name, "it is shorter than its index says");
   if (!bytes.empty())
-    file_->file.read_at(found.address + static_cast<std::int64_t>(first), bytes.data(), bytes.size());
+    file_->file.read_at(found.address + static_cast<std::int64_t>(first), bytes.data(),
+                        bytes.size());
 }
 
 template <typename T>

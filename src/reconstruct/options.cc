@@ -201,7 +201,8 @@ std::vector<std::string> ReconstructOptions::faults() const {
     } catch (const Error& error) {
       all.push_back(fmt::format("--budget {}", error.what()));
     }
-    refuse_if(field.kind != FieldKind::kGrid, "--budget makes plain vertices compact: give --field grid");
+    refuse_if(field.kind != FieldKind::kGrid,
+              "--budget makes plain vertices compact: give --field grid");
     refuse_if(makes_halves(), "--budget is for one fit, and halves are two: leave it out");
   }
   for (const char* sentence : faults_of_halves()) all.emplace_back(sentence);

@@ -171,9 +171,10 @@ void write_results(Results& results, const ReconstructOptions& options,
   try {
     throw;
   } catch (const Error& error) {
-    throw Error(fmt::format("{}; the compact model is kept in '{}': tomofield export writes its "
-                            "volume",
-                            error.what(), model.string()));
+    throw Error(
+        fmt::format("{}; the compact model is kept in '{}': tomofield export writes its "
+                    "volume",
+                    error.what(), model.string()));
   }
 }
 
@@ -182,8 +183,7 @@ compact::LeafCodes make_compact(const compact::Budget& budget, Results& results)
   const base::Stopwatch running;
   compact::CompactField made = compact::compress(*results.model->field, budget);
   results.model->field = std::move(made.field);
-  results.metrics["metrics"]["compact"] =
-      compact::report_json(made.report, running.seconds());
+  results.metrics["metrics"]["compact"] = compact::report_json(made.report, running.seconds());
   return std::move(made.codes);
 }
 
