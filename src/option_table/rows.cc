@@ -185,6 +185,10 @@ constexpr Row kRows[] = {
      .group = Group::kField,
      .automatic = "identity for dark contrast, whose zero is uncertain, else softplus",
      .help = "softplus keeps densities above zero; identity lets them have either sign"},
+    {.key = "field.budget", .flag = "--budget", MEMBER(Options, budget), .group = Group::kField,
+     .label = "AMOUNT",
+     .help = "Replace the finished fit by a compact model: within decibels of PSNR (0.1dB), "
+             "parameters (500k, 2M) or bytes (800kB, 5MB)"},
 
     // Fit
     {.key = "fit.align", .flag = "--align", MEMBER(Options, align), .group = Group::kFit,
@@ -262,10 +266,6 @@ constexpr Row kRows[] = {
     {.key = "field.margin_spacing", .flag = "--margin-spacing", MEMBER(Options, margin_spacing),
      .group = Group::kFit, .unit = kBinned, .range = Range::between(1, 64),
      .help = "Distance between samples of the margin around the region of interest"},
-    {.key = "field.budget", .flag = "--budget", MEMBER(Options, budget), .group = Group::kField,
-     .label = "AMOUNT",
-     .help = "Replace the finished fit by a compact model: within decibels of PSNR (0.1dB), "
-             "parameters (500k, 2M) or bytes (800kB, 5MB)"},
     {.key = "fit.hold_out", .flag = "--hold-out", MEMBER(Options, hold_out),
      .group = Group::kFit, .range = Range::zero_or_between(2, kMaxCount),
      .help = "Leave every Nth view out of the fit and score it. 0: none"},
