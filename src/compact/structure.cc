@@ -4,9 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "base/check.h"
-#include "fit/integer_program.h"
-
 namespace tomofield::compact {
 namespace {
 
@@ -88,46 +85,6 @@ Choice choose_within_cost(const PlaceTree& places, double budget) {
 
 Choice choose_within_error(const PlaceTree& places, double most) {
   return bisect(places, false, [&](const Choice& choice) { return choice.error <= most; });
-}
-
-// A variable says that a candidate is chosen. On the path from a root to a place without children,
-// exactly one candidate is chosen: two rows for "at most" and "at least".
-Choice choose_exactly(const PlaceTree& places, double budget) {
-  TOMOFIELD_CHECK(fit::can_solve_integer_programs(), "this build has CBC");
-  fit::IntegerProgram program;
-  std::vector<int> first_variable, parent(places.size(), -1);
-  fit::IntegerProgram::Row within{.terms = {}, .bound = budget};
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    first_variable.push_back(static_cast<int>(program.costs.size()));
-    for (const Candidate& candidate : places[i].candidates) {
-      within.terms.push_back({static_cast<int>(program.costs.size()), candidate.cost});
-      program.costs.push_back(candidate.error);
-    }
-    for (int child = 0; child < 4 && places[i].first_child >= 0; ++child)
-      parent[static_cast<std::size_t>(places[i].first_child + child)] = static_cast<int>(i);
-  }
-  program.rows.push_back(std::move(within));
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    if (places[i].first_child >= 0) continue;
-    fit::IntegerProgram::Row most{.terms = {}, .bound = 1}, least{.terms = {}, .bound = -1};
-    for (int place = static_cast<int>(i); place >= 0; place = parent[place]) {
-      const auto at = static_cast<std::size_t>(place);
-      for (int c = 0; c < std::ssize(places[at].candidates); ++c) {
-        most.terms.push_back({first_variable[at] + c, 1});
-        least.terms.push_back({first_variable[at] + c, -1});
-      }
-    }
-    program.rows.push_back(std::move(most));
-    program.rows.push_back(std::move(least));
-  }
-  const std::vector<bool> solution = fit::solve(program);
-  Choice choice{.candidate = std::vector<int>(places.size(), kSplit)};
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    for (int c = 0; c < std::ssize(places[i].candidates); ++c)
-      if (solution[static_cast<std::size_t>(first_variable[i] + c)]) choice.candidate[i] = c;
-  }
-  finish(places, choice);
-  return choice;
 }
 
 }  // namespace tomofield::compact

@@ -43,9 +43,4 @@ Choice choose_within_cost(const PlaceTree& places, double budget);
 /// is none, the one of the smallest error is returned.
 Choice choose_within_error(const PlaceTree& places, double most);
 
-/// Solves the same problem exactly as an integer program, with one variable a candidate (COIN-OR
-/// CBC; fit::can_solve_integer_programs() must be true). The time may grow exponentially: for some
-/// hundred candidates.
-Choice choose_exactly(const PlaceTree& places, double budget);
-
 }  // namespace tomofield::compact

@@ -55,6 +55,54 @@ void expect_valid(const PlaceTree& places, const Choice& choice) {
   EXPECT_NEAR(choice.error, error, 1e-9);
 }
 
+// Solves the problem exactly. A variable says that a candidate is chosen. On the path from a root
+// to a place without children, exactly one candidate is chosen: two rows for "at most" and "at
+// least".
+Choice choose_exactly(const PlaceTree& places, double budget) {
+  fit::IntegerProgram program;
+  std::vector<int> first_variable, parent(places.size(), -1);
+  fit::IntegerProgram::Row within{.terms = {}, .bound = budget};
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    first_variable.push_back(static_cast<int>(program.costs.size()));
+    for (const Candidate& candidate : places[i].candidates) {
+      within.terms.push_back({static_cast<int>(program.costs.size()), candidate.cost});
+      program.costs.push_back(candidate.error);
+    }
+    for (int child = 0; child < 4 && places[i].first_child >= 0; ++child)
+      parent[static_cast<std::size_t>(places[i].first_child + child)] = static_cast<int>(i);
+  }
+  program.rows.push_back(std::move(within));
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (places[i].first_child >= 0) continue;
+    fit::IntegerProgram::Row most{.terms = {}, .bound = 1}, least{.terms = {}, .bound = -1};
+    for (int place = static_cast<int>(i); place >= 0; place = parent[place]) {
+      const auto at = static_cast<std::size_t>(place);
+      for (int c = 0; c < std::ssize(places[at].candidates); ++c) {
+        most.terms.push_back({first_variable[at] + c, 1});
+        least.terms.push_back({first_variable[at] + c, -1});
+      }
+    }
+    program.rows.push_back(std::move(most));
+    program.rows.push_back(std::move(least));
+  }
+  const std::vector<bool> solution = fit::solve(program);
+  Choice choice{.candidate = std::vector<int>(places.size(), kSplit)};
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    for (int c = 0; c < std::ssize(places[i].candidates); ++c)
+      if (solution[static_cast<std::size_t>(first_variable[i] + c)]) {
+        choice.candidate[i] = c;
+        choice.cost += places[i].candidates[static_cast<std::size_t>(c)].cost;
+        choice.error += places[i].candidates[static_cast<std::size_t>(c)].error;
+      }
+  }
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    for (int child = 0; child < 4 && places[i].first_child >= 0; ++child)
+      if (choice.candidate[i] != kSplit)
+        choice.candidate[static_cast<std::size_t>(places[i].first_child + child)] = kUnused;
+  }
+  return choice;
+}
+
 TEST(Structure, BudgetsAreKept) {
   const PlaceTree places = random_places(4, 1);
   double last_error = INFINITY;
