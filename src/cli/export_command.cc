@@ -101,6 +101,8 @@ void write_compact(const ExportArguments& arguments) {
 }
 
 void run_export(ExportArguments& arguments) {
+  if (arguments.output.empty() && arguments.compact.empty())
+    throw Error("nothing to write: give -o VOLUME.mrc, or --compact MODEL.h5");
   const std::vector<io::OutputLock> locks = claim_output(arguments);
   if (!arguments.compact.empty()) return write_compact(arguments);
   const Model model = output::load_model(arguments.model);
@@ -179,11 +181,12 @@ void add_export_command(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "export", "Write any box of a model, at any voxel size and orientation, as an MRC volume");
   command->add_option("model", arguments->model, "Model file (.h5) of reconstruct")->required();
-  CLI::Option_group* result = command->add_option_group("Result");
-  result->add_option("-o,--output", arguments->output, "The MRC volume to write");
-  CLI::Option* compact = result->add_option(
-      "--compact", arguments->compact, "The compact model (.h5) to write in place of a volume");
-  result->require_option(1);
+  CLI::Option* volume =
+      command->add_option("-o,--output", arguments->output, "The MRC volume to write");
+  CLI::Option* compact = command
+                             ->add_option("--compact", arguments->compact,
+                                          "The compact model (.h5) to write in place of a volume")
+                             ->excludes(volume);
   command
       ->add_option("--budget", arguments->budget,
                    "How close or how small the compact model is: decibels (0.1dB), parameters "
