@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,7 +9,6 @@
 #include <numeric>
 #include <utility>
 
-#include "base/check.h"
 #include "base/parallel.h"
 #include "base/trace.h"
 #include "compact/place_tree.h"
@@ -58,14 +56,14 @@ class Compression {
   // Finds ranks at prices around the one that meets the limit, and chooses among them.
   void choose(const Limit& limit) {
     constexpr int kRounds = 8;
-    constexpr double kClose = 0.02;
+    constexpr double kClose = 0.02, kFar = 1e-3;
     double price = last_price_ > 0 ? last_price_ : surveyed_price(limit);
     double low = 0, high = 0;  // prices below and above the wanted one
     for (int round = 0; round < kRounds; ++round) {
       add_candidates(price);
       last_price_ = price;
       const Choice cheapest = cheapest_choice(places_, price);
-      const double ratio = limit.value(cheapest) / limit.most;
+      const double ratio = std::clamp(limit.value(cheapest) / limit.most, kFar, 1 / kFar);
       keep_near(cheapest);
       if (std::abs(ratio - 1) < kClose) break;
       const bool is_too_high = limit.of_error == (ratio > 1);
@@ -78,13 +76,13 @@ class Compression {
     }
     choice_ = limit.of_error ? choose_within_error(places_, limit.most)
                              : choose_within_cost(places_, limit.most);
+    truncate_chosen();
   }
 
   const Choice& choice() const { return choice_; }
 
   // Rounds the factors of what was chosen, so that rounding alone adds this error.
-  CompactField build(double rounding_error) {
-    truncate_chosen();
+  CompactField build(double rounding_error) const {
     CompactField made;
     made.codes.step = std::sqrt(rounding_error / std::max(error_of_step_, 1e-300));
     const auto num_leaves = std::ssize(leaves_);
@@ -145,7 +143,8 @@ class Compression {
       for (std::size_t k = 0; k < all.size(); ++k) all[k] += sum[k];
     }
     volume_ = all[0];
-    variance_ = all[2] / all[0] - std::pow(all[1] / all[0], 2);
+    constexpr double kSmallest = 1e-12;  // for a field without any contrast
+    variance_ = std::max(kSmallest, all[2] / all[0] - std::pow(all[1] / all[0], 2));
   }
 
   // Estimates the price at which the z mode alone would meet a limit, from some leaves.

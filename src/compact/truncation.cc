@@ -75,16 +75,13 @@ void add_z(const Mode& mode, float factor, FloatMatrix& values) {
 
 }  // namespace
 
-Truncation truncate(const PlaceDensities& place, double price, const Truncation& start) {
+Truncation truncate(const PlaceDensities& place, double price) {
   const Index nx = place.nx, ny = place.ny, nz = place.nz;
   const auto threshold = [&](Index a, Index b, Index c) {
     return price * static_cast<double>(a + b * c);
   };
-  Truncation modes = start;
+  Truncation modes;
   FloatMatrix rest = place.values;
-  add_x(modes.x, -1, rest);
-  add_y(modes.y, -1, rest);
-  add_z(modes.z, -1, rest);
   double sum = -1;
   for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
     add_z(modes.z, 1, rest);

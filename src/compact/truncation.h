@@ -32,8 +32,9 @@ struct Truncation {
 ///
 /// by alternating least squares: each mode in turn becomes the leading singular vectors of what the
 /// two others leave, as many as pay for their parameters (Eckart and Young 1936). No step increases
-/// the sum. It starts from `start`, or from nothing. The ranks follow from the price.
-Truncation truncate(const PlaceDensities& place, double price, const Truncation& start = {});
+/// the sum. It begins with the z mode, which serves thick specimens best. The ranks follow from the
+/// price.
+Truncation truncate(const PlaceDensities& place, double price);
 
 /// Returns the energy of each component of the z mode alone, in any order.
 Eigen::VectorXf energies_of_sections(const PlaceDensities& place);
