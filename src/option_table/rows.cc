@@ -186,7 +186,7 @@ constexpr Row kRows[] = {
      .automatic = "identity for dark contrast, whose zero is uncertain, else softplus",
      .help = "softplus keeps densities above zero; identity lets them have either sign"},
     {.key = "field.budget", .flag = "--budget", MEMBER(Options, budget), .group = Group::kField,
-     .label = "AMOUNT", .automatic = "all vertices are kept",
+     .label = "AMOUNT",
      .help = "Replace the finished fit by a compact model: within decibels of PSNR (0.1dB), "
              "parameters (500k, 2M) or bytes (800kB, 5MB)"},
 
