@@ -145,7 +145,7 @@ void add_field_and_fit(Class& options) {
       .def_readwrite("factor_variation", &Options::factor_variation)
       .def_readwrite("boundary", &Options::boundary)
       .def_readwrite("fourier", &Options::fourier)
-      .def_readwrite("keep_spikes", &Options::keep_spikes)
+      .def_readwrite("spike_rank", &Options::spike_rank)
       .def_readwrite("fit_noise", &Options::fit_noise)
       .def_readwrite("fit_view_scale", &Options::fit_view_scale)
       .def_readwrite("hold_out", &Options::hold_out)

@@ -117,7 +117,8 @@ struct Options {
   double boundary = 4.0;                    ///< weight of the boundary consistency (eq. 6)
   double fourier = 0.0;                     ///< weight of the isotropic Fourier prior (eq. 7)
   RingReference fourier_ring = RingReference::kMean;
-  bool keep_spikes = false;            ///< plain vertices may stand out from all their neighbours
+  /// A plain vertex is at most the one of this rank among the 26 around it; 0: no limit.
+  std::optional<int> spike_rank;
   bool fit_noise = true;               ///< weight views by their residuals, and limit these
   std::optional<bool> fit_view_scale;  ///< fit a scale and an offset a view
   int hold_out = 0;                    ///< keep every Nth view from the fit and score it; 0: none

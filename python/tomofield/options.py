@@ -72,7 +72,7 @@ class Options(TypedDict, total=False):
     boundary: float
     fourier: float
     fourier_ring: Literal["mean", "max"]
-    keep_spikes: bool
+    spike_rank: int | None
     fit_noise: bool
     fit_view_scale: Optional[bool]
     hold_out: int

@@ -349,11 +349,11 @@ void Fit::take_step() {
 // plug-and-play step of a prior (Venkatakrishnan, Bouman and Wohlberg 2013): total variation makes
 // an isolated vertex cheap enough to fit the noise of some rays.
 void Fit::limit_spikes() {
-  if (options_.keep_spikes || field_->kind() != FieldKind::kGrid) return;
+  if (options_.spike_rank == 0 || field_->kind() != FieldKind::kGrid) return;
   const base::TraceSpan span("limit spikes");
   const base::Range own = own_leaves();
   base::parallel_for("limit spikes", own.size(), [&](std::int64_t i) {
-    field_->limit_spikes(own.begin + static_cast<int>(i));
+    field_->limit_spikes(own.begin + static_cast<int>(i), options_.spike_rank);
   });
   halo_->refresh(*field_);
 }

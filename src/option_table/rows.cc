@@ -247,10 +247,11 @@ constexpr Row kRows[] = {
     {.key = "fit.fourier_ring", .flag = "--ifp-ring", MEMBER(Options, fourier_ring),
      .group = Group::kFit,
      .help = "Compare the Fourier axes with the mean or the maximum of each ring"},
-    {.key = "fit.keep_spikes", .flag = "--keep-spikes", MEMBER(Options, keep_spikes),
-     .group = Group::kFit,
-     .help = "Keep plain vertices that stand out from all but two of their neighbours. By default "
-             "each epoch ends with moving them back"},
+    {.key = "fit.spike_rank", .flag = "--spike-rank", MEMBER(Options, spike_rank),
+     .group = Group::kFit, .range = Range::between(0, 8),
+     .automatic = "3, or 0 if trials with the smooth penalty clearly prefer it",
+     .help = "After each epoch, plain vertices are at most as large as the one of this rank among "
+             "the 26 around them, and as small: single black and white voxels go. 0: no limit"},
     {.key = "fit.fit_noise", .flag = "--no-noise-fit", MEMBER(Options, fit_noise),
      .group = Group::kFit,
      .help = "Weight each view by the noise measured on it alone, and residuals of any size fully. "

@@ -48,7 +48,7 @@ fit::FitOptions fit_options(const Options& options) {
   fit.fourier = options.fourier;
   fit.fourier_ring = options.fourier_ring;
   fit.penalty = options.penalty.value_or(fit.penalty);
-  fit.keep_spikes = options.keep_spikes;
+  fit.spike_rank = options.spike_rank.value_or(fit.spike_rank);
   fit.fit_noise = options.fit_noise;
   fit.fit_view_scale = options.fit_view_scale.value_or(fit.fit_view_scale);
   fit.seed = options.seed;
@@ -116,6 +116,7 @@ ReconstructOptions run_options(const SeriesFiles& files, const Options& requeste
   run.resolved = resolve(requested);
   const bool is_bright = run.resolved.contrast == Contrast::kBright;
   run.open = {.variation = !run.resolved.penalty,
+              .spikes = !run.resolved.penalty && !requested.spike_rank,
               .view_scale = !requested.fit_view_scale,
               .background = is_bright && !requested.black_level,
               .beads = is_bright && !requested.bead_diameter_nm};

@@ -67,6 +67,7 @@ void apply(const TrialSettings& settings, Run& run) {
   }
   if (options.open.view_scale)
     resolved.fit_view_scale = options.fit.fit_view_scale = settings.fits_view_scale;
+  if (options.open.spikes) resolved.spike_rank = options.fit.spike_rank = settings.spike_rank;
   if (run.options.open.background) {
     resolved.black_level =
         settings.background_part * run.measurement.background * run.measurement.unit;
