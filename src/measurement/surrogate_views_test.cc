@@ -31,7 +31,7 @@ microscope::ViewTransfer transfer_of(double defocus_A) {
 
 // Two views of which some pixels do not count, and what is predicted of them.
 struct Scene {
-  std::vector<microscope::ViewFilter> filters;
+  DataFilters filters;
   std::vector<PredictedView> predicted;
   std::unique_ptr<SlabViews> rays;
   std::vector<ViewModel> models{{1.2, 0.3, 4.0}, {0.8, -0.1, 9.0}};
@@ -39,7 +39,7 @@ struct Scene {
 
   Scene() {
     for (const int view : views) {
-      filters.emplace_back(kWidth, kHeight, transfer_of(20000.0 + 3000.0 * view));
+      filters.transfers.emplace_back(kWidth, kHeight, transfer_of(20000.0 + 3000.0 * view));
       predicted.push_back({.width = kWidth,
                            .height = kHeight,
                            .measured = random_image(static_cast<std::uint64_t>(10 + view)),
@@ -67,7 +67,7 @@ struct Scene {
   // Returns ½ w Σ |a H p + o − d|² over the pixels of a view that count.
   double loss(std::size_t view, const std::vector<float>& projection) const {
     PredictedView filtered = predicted[view];
-    filtered.predicted = filters[view].apply(projection);
+    filtered.predicted = filters.transfers[view].apply(projection);
     return models[view].weight / 2 * sums_of(filtered, models[view]).squared_residual(models[view]);
   }
 };

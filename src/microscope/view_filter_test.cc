@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "base/random.h"
+#include "fourier/image_transform.h"
 #include "microscope/exposure.h"
 
 namespace tomofield::microscope {
