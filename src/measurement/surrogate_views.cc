@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <utility>
 
 #include "base/parallel.h"
@@ -79,8 +78,7 @@ Surrogate surrogate_of(const PredictedView& view, const ViewFilter* transfer,
   std::vector<float> residual = residual_of(filtered, model);
   std::vector<double> weights;
   if (noise) weights = weigh_frequencies(*noise, view, residual);
-  static const bool balanced = std::getenv("TF_BAL") != nullptr;
-  Surrogate surrogate{transfer ? (balanced && view.width <= std::atoi(std::getenv("TF_BAL")) ? transfer->apply_balanced_transpose(residual) : transfer->apply_transpose(residual)) : std::move(residual),
+  Surrogate surrogate{transfer ? transfer->apply_transpose(residual) : std::move(residual),
                       sums_of(filtered, model), bound_of(transfer, weights)};
   const auto step = static_cast<float>(1.0 / (model.scale * surrogate.bound));
   for (std::size_t i = 0; i < surrogate.image.size(); ++i)

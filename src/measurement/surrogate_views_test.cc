@@ -150,5 +150,44 @@ TEST(SurrogateViews, FollowTheModelOfTheView) {
   EXPECT_NEAR(surrogates.models()[0].weight, 4.0 * 1.2 * 1.2 * 1.1, 1e-9);
 }
 
+// The step to a surrogate is (a / L) Hᵀ W r, and the weight of the view is w L.
+TEST(SurrogateViews, WeightFrequenciesByTheNoise) {
+  Scene scene;
+  scene.filters.noise.emplace(kWidth, kHeight);
+  const SurrogateViews surrogates = scene.surrogates();
+  for (std::size_t v = 0; v < 2; ++v) {
+    const PredictedView& view = scene.predicted[v];
+    const ViewModel& model = scene.models[v];
+    const std::vector<float> filtered = scene.filters.transfers[v].apply(view.predicted);
+    std::vector<float> residual(filtered.size());
+    for (std::size_t i = 0; i < residual.size(); ++i)
+      if (!std::isnan(view.measured[i]))
+        residual[i] = static_cast<float>(static_cast<double>(view.measured[i]) - model.offset -
+                                         model.scale * static_cast<double>(filtered[i]));
+    scene.filters.noise->weigh(residual);
+    for (std::size_t i = 0; i < residual.size(); ++i)
+      if (std::isnan(view.measured[i])) residual[i] = 0.0f;
+    const std::vector<float> step = scene.filters.transfers[v].apply_transpose(residual);
+    const int place = static_cast<int>(v);
+    const double bound = surrogates.models()[v].weight / model.weight;  // a² L
+    for (std::int64_t y = 0; y < kHeight; ++y)
+      for (std::int64_t x = 0; x < kWidth; ++x) {
+        const auto i = static_cast<std::size_t>(y * kWidth + x);
+        const double change = static_cast<double>(surrogates.rays().ray(place, x, y)) -
+                              static_cast<double>(view.predicted[i]);
+        EXPECT_NEAR(change, model.scale / bound * static_cast<double>(step[i]), 1e-5);
+      }
+  }
+}
+
+TEST(SurrogateViews, OfColouredNoiseAloneNeedNoTransfer) {
+  Scene scene;
+  scene.filters.transfers.clear();
+  scene.filters.noise.emplace(kWidth, kHeight);
+  const SurrogateViews surrogates = scene.surrogates();
+  EXPECT_GE(surrogates.models()[0].weight, 4.0 * 1.2 * 1.2 * 0.9);
+  EXPECT_EQ(surrogates.sums(0).n, kWidth * kHeight - 70);
+}
+
 }  // namespace
 }  // namespace tomofield::measurement

@@ -274,19 +274,6 @@ std::vector<float> ViewFilter::apply_transpose(std::span<const float> image) con
   return result;
 }
 
-std::vector<float> ViewFilter::apply_balanced_transpose(std::span<const float> image) const {
-  const float values = static_cast<float>(transform_.image_size());
-  std::vector<float> result(image.size());
-  spread(
-      spectrum_of(image),
-      [values](float transfer) {
-        const float h = values * transfer;
-        return transfer * (1.0f + kWienerConstant) / (h * h + kWienerConstant);
-      },
-      [&](Image& filtered, std::int64_t s) { add_folded(filtered, s, result); });
-  return result;
-}
-
 std::vector<float> ViewFilter::corrected(std::span<const float> view,
                                          CtfCorrection correction) const {
   TOMOFIELD_CHECK(std::ssize(view) == across_.length() * along_.length(), "size of the view");

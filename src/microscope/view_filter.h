@@ -43,9 +43,6 @@ class ViewFilter {
   /// Returns Hᵀ image: ⟨H a, b⟩ = ⟨a, Hᵀ b⟩.
   std::vector<float> apply_transpose(std::span<const float> image) const;
 
-  /// Returns Hᵀ image with the factor (1 + ε) / (H² + ε) of each frequency, where ε = 0.1: the step
-  /// that brings weakly transferred frequencies nearly as far as others.
-  std::vector<float> apply_balanced_transpose(std::span<const float> image) const;
   /// Returns a view whose contrast transfer is corrected.
   std::vector<float> corrected(std::span<const float> view, CtfCorrection correction) const;
 
