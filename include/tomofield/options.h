@@ -119,8 +119,8 @@ struct Options {
   double boundary = 4.0;                    ///< weight of the boundary consistency (eq. 6)
   double fourier = 0.0;                     ///< weight of the isotropic Fourier prior (eq. 7)
   RingReference fourier_ring = RingReference::kMean;
-  bool keep_spikes = false;            ///< plain vertices may stand out from all their neighbours
-  bool fit_noise = true;               ///< weight views by their residuals, and limit these
+  bool keep_spikes = false;  ///< plain vertices may stand out from all their neighbours
+  bool fit_noise = true;     ///< weight views by their residuals, and limit these
   NoiseModel noise_model = NoiseModel::kWhite;
   std::optional<bool> fit_view_scale;  ///< fit a scale and an offset a view
   int hold_out = 0;                    ///< keep every Nth view from the fit and score it; 0: none

@@ -86,9 +86,10 @@ fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t s
   return options;
 }
 
-measurement::Measurement aligning_measurement(
-    const JointProblem& problem, std::span<const geometry::ViewCorrection> corrections,
-    const fit::FieldOptions& field, const distributed::Communicator& processes) {
+measurement::Measurement aligning_measurement(const JointProblem& problem,
+                                              std::span<const geometry::ViewCorrection> corrections,
+                                              const fit::FieldOptions& field,
+                                              const distributed::Communicator& processes) {
   measurement::Measurement prepared =
       measurement::prepare_realigned(problem.recorded, corrections, problem.specimen,
                                      problem.scratch_dir, fit::band_rows(field), processes);

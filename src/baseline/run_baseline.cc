@@ -196,8 +196,8 @@ void correct_views(const BaselineOptions& options, const tilt_series::TiltSeries
   if (series.transfers.empty()) return;
   const base::TraceSpan span("correct contrast transfer");
   measurement::correct_ctf(options.ctf_correction, series);
-  base::log_info(fmt::format("ctf: views are corrected before ({})",
-                             base::name_of(options.ctf_correction)));
+  base::log_info(
+      fmt::format("ctf: views are corrected before ({})", base::name_of(options.ctf_correction)));
 }
 
 }  // namespace

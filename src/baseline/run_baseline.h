@@ -18,8 +18,9 @@ namespace tomofield::baseline {
 /// The settings of a baseline reconstruction.
 struct BaselineOptions {
   SeriesFiles files;
-  /// The options that do not depend on the method: images, masks, contrast transfer and dose, specimen, margin_spacing,
-  /// fit_view_scale, hold_out, tune (tune.h), volume, output and overwrite. Others have no effect.
+  /// The options that do not depend on the method: images, masks, contrast transfer and dose,
+  /// specimen, margin_spacing, fit_view_scale, hold_out, tune (tune.h), volume, output and
+  /// overwrite. Others have no effect.
   Options shared;
   Method method;
   /// Corrects the views before, if there is a contrast transfer.

@@ -43,8 +43,8 @@ struct FitOptions : objective::ObjectiveOptions {
   bool keep_spikes = false;        ///< else each epoch of plain vertices ends without any
   bool fit_noise = true;           ///< weight views by their residuals, and limit these
   NoiseModel noise_model = NoiseModel::kWhite;
-  bool fit_view_scale = false;     ///< fit a scale and an offset of every view
-  int hold_out = 0;                ///< keep every Nth view from the fit; 0: none
+  bool fit_view_scale = false;  ///< fit a scale and an offset of every view
+  int hold_out = 0;             ///< keep every Nth view from the fit; 0: none
   int patience = 0;  ///< stop after this many epochs without a better held-out error; 0: never
 };
 

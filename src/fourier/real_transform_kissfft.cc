@@ -34,8 +34,8 @@ void RealTransform::inverse(Spectrum& spectrum, Image& image) const {
     for (std::int64_t x = 0; x < width_; ++x) {
       const bool is_kept = x < half_width();
       const std::int64_t kept_y = is_kept ? y : (height_ - y) % height_;
-      const auto value = spectrum[static_cast<std::size_t>(kept_y * half_width() +
-                                                           (is_kept ? x : width_ - x))];
+      const auto value =
+          spectrum[static_cast<std::size_t>(kept_y * half_width() + (is_kept ? x : width_ - x))];
       whole[static_cast<std::size_t>(y * width_ + x)] = is_kept ? value : std::conj(value);
     }
   plans_->complex.inverse(whole);

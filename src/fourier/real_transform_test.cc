@@ -33,8 +33,7 @@ TEST(RealTransform, IsTheSumOfItsDefinition) {
                  std::polar(1.0, -2 * std::numbers::pi *
                                      (static_cast<double>(kx * x) / kWidth +
                                       static_cast<double>(ky * y) / kHeight));
-      const auto found =
-          spectrum[static_cast<std::size_t>(ky * transform.half_width() + kx)];
+      const auto found = spectrum[static_cast<std::size_t>(ky * transform.half_width() + kx)];
       EXPECT_NEAR(std::abs(std::complex<double>(found) - sum), 0.0, 1e-4) << kx << ", " << ky;
     }
 }

@@ -37,8 +37,8 @@ void correct_ctf(microscope::CtfCorrection correction, Measurement& measurement)
   std::shared_ptr<SlabViews> corrected = rays->blank(rays->shape().num_views);
   base::parallel_for("correct contrast transfer", std::ssize(filters), [&](std::int64_t i) {
     const int view = static_cast<int>(i);
-    corrected->set_view(view, filters[static_cast<std::size_t>(i)].corrected(
-                                  filled_view(*rays, view), correction));
+    corrected->set_view(
+        view, filters[static_cast<std::size_t>(i)].corrected(filled_view(*rays, view), correction));
   });
   corrected->hide_where_hidden(*rays);
   measurement.rays = corrected;

@@ -44,8 +44,7 @@ TEST(CorrectCtf, ChangesTheRaysThatCountAndNoOthers) {
   for (std::int64_t y = 0; y < kHeight; ++y)
     for (std::int64_t x = 0; x < kWidth; ++x) {
       EXPECT_EQ(series.rays->counts(0, x, y), x != 7);
-      change += static_cast<double>(
-          std::abs(series.rays->ray(0, x, y) - before->ray(0, x, y)));
+      change += static_cast<double>(std::abs(series.rays->ray(0, x, y) - before->ray(0, x, y)));
     }
   EXPECT_GT(change, 0.1 * kWidth * kHeight);
   EXPECT_TRUE(before->counts(0, 8, 0));

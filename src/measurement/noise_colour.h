@@ -9,9 +9,9 @@
 
 namespace tomofield::measurement {
 
-/// Weights the frequencies of a view's residual by the noise that the residual itself shows, so that
-/// the data term becomes ½ w rᵀ W r: W is the inverse of the noise's power, which depends on the
-/// length of a frequency alone.
+/// Weights the frequencies of a view's residual by the noise that the residual itself shows, so
+/// that the data term becomes ½ w rᵀ W r: W is the inverse of the noise's power, which depends on
+/// the length of a frequency alone.
 ///
 /// The power of the residual is averaged over shells of frequencies, and smoothed over them. W is
 /// its mean over all frequencies divided by it, between kLeast and kMost, times the factor that
@@ -25,8 +25,8 @@ class NoiseColour {
   /// Makes ready for residuals of this size.
   NoiseColour(std::int64_t width, std::int64_t height);
 
-  /// Replaces a residual [y, x] by W residual, and returns W of each shell. Pixels that do not count
-  /// are 0 before, and have to be set to 0 afterwards.
+  /// Replaces a residual [y, x] by W residual, and returns W of each shell. Pixels that do not
+  /// count are 0 before, and have to be set to 0 afterwards.
   std::vector<double> weigh(std::span<float> residual) const;
 
   /// Returns the middle of a shell, in cycles a pixel.

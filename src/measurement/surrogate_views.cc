@@ -63,9 +63,9 @@ double bound_of(const ViewFilter* transfer, std::span<const double> weights) {
   double bound = 0.0;
   for (std::size_t s = 0; s < weights.size(); ++s) {
     // The signal only falls with the frequency. Between two shells, W is between theirs.
-    const double signal =
-        transfer && s > 0 ? transfer->signal(NoiseColour::frequency_of(static_cast<int>(s) - 1))
-                          : 1.0;
+    const double signal = transfer && s > 0
+                              ? transfer->signal(NoiseColour::frequency_of(static_cast<int>(s) - 1))
+                              : 1.0;
     bound = std::max(bound, weights[s] * signal * signal);
   }
   return repetition * bound;
@@ -111,16 +111,22 @@ void filter_predictions(std::span<const ViewFilter> filters, std::span<const int
 }
 
 ViewSums sums_of(const PredictedView& view, const ViewModel& model) {
-  ViewSums sums;
+  double n = 0, sp = 0, sb = 0, spp = 0, spb = 0, sbb = 0, squares = 0;
   for (std::size_t i = 0; i < view.measured.size(); ++i) {
     const double b = static_cast<double>(view.measured[i]);
     if (std::isnan(b)) continue;
     const double p = static_cast<double>(view.predicted[i]);
     const double residual = std::clamp(model.scale * p + model.offset - b, -model.largest_residual,
                                        model.largest_residual);
-    sums += {1.0, p, b, p * p, p * b, b * b, residual * residual};
+    n += 1.0;
+    sp += p;
+    sb += b;
+    spp += p * p;
+    spb += p * b;
+    sbb += b * b;
+    squares += residual * residual;
   }
-  return sums;
+  return {n, sp, sb, spp, spb, sbb, squares};
 }
 
 SurrogateViews::SurrogateViews(const SlabViews& measured, std::vector<int> views,

@@ -102,8 +102,7 @@ Recording find_recording(const SeriesFiles& files, const tilt_series::TiltSeries
   if (files.mdoc) {
     const io::Mdoc mdoc = io::read_mdoc(*files.mdoc);
     require_sections(mdoc.sections.size(), num_sections, *files.mdoc, "doses", stack);
-    return {files.mdoc->string(), microscope::exposures_of(mdoc),
-            io::acquisition_order(mdoc)};
+    return {files.mdoc->string(), microscope::exposures_of(mdoc), io::acquisition_order(mdoc)};
   }
   if (!input.images && io::is_view_table(files.stack)) {
     found.doses = microscope::exposures_of(io::read_view_table(files.stack));
@@ -140,8 +139,8 @@ std::optional<Exposures> find_exposures(const SeriesFiles& files, const Options&
 }
 
 // Sets the defocus of a view, turned to the aligned image, and its slope over that image.
-void set_defocus(const Options& options, const tilt_series::TiltSeries& series,
-                 std::size_t view, const io::CtfTable& ctf, microscope::ViewTransfer& transfer) {
+void set_defocus(const Options& options, const tilt_series::TiltSeries& series, std::size_t view,
+                 const io::CtfTable& ctf, microscope::ViewTransfer& transfer) {
   const tilt_series::View& of = series.views()[view];
   const std::optional<io::Defocus>& recorded = ctf.views[static_cast<std::size_t>(of.section)];
   if (!recorded)
@@ -165,11 +164,11 @@ std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const Opti
   };
   refuse_if(has_ctf_file(files) && options.defocus_um,
             "--ctf and --defocus both set the defocus of the views: give one of them");
-  refuse_if(!has_ctf(files, options) && (options.is_phase_flipped ||
-                                         options.spherical_aberration_mm ||
-                                         options.amplitude_contrast),
-            "--ctf-phase-flipped, --cs and --amplitude-contrast describe a contrast transfer: give "
-            "--ctf or --defocus as well");
+  refuse_if(
+      !has_ctf(files, options) && (options.is_phase_flipped || options.spherical_aberration_mm ||
+                                   options.amplitude_contrast),
+      "--ctf-phase-flipped, --cs and --amplitude-contrast describe a contrast transfer: give "
+      "--ctf or --defocus as well");
   refuse_if(options.dose_per_tilt.value_or(0.0) > 0.0 && options.is_dose_weighted,
             "--dose-weighted says that the damage of --dose-per-tilt is in the views already: give "
             "one of them");

@@ -121,10 +121,9 @@ void ViewFilter::keep_transfers() {
   for (std::int64_t s = 0; s < num_defoci_; ++s)
     for (std::int64_t ky = 0; ky < transform_.height(); ++ky)
       compute_row(ky, s,
-                  std::span(transfers)
-                      .subspan(static_cast<std::size_t>(s) * of_a_defocus +
-                                   static_cast<std::size_t>(ky) * width,
-                               width));
+                  std::span(transfers).subspan(static_cast<std::size_t>(s) * of_a_defocus +
+                                                   static_cast<std::size_t>(ky) * width,
+                                               width));
   transfers_ = std::move(transfers);
 }
 
@@ -225,8 +224,7 @@ std::vector<float> ViewFilter::apply(std::span<const float> image) const {
       if (s == 0) {
         for (std::size_t x = 0; x < transfers.size(); ++x) values[x] *= transfers[x];
       } else {
-        for (std::size_t x = 0; x < transfers.size(); ++x)
-          sum[at + x] += values[x] * transfers[x];
+        for (std::size_t x = 0; x < transfers.size(); ++x) sum[at + x] += values[x] * transfers[x];
       }
     });
     if (s == 0 && num_defoci_ > 1) std::swap(spectrum, sum);

@@ -192,8 +192,7 @@ std::optional<json> make_record(const ReconstructOptions& options, const Reconst
                     kFewestViews, recorded.stack.string(), series.views().size()));
   std::vector<microscope::ViewTransfer> transfers;
   processes.run_collectively([&] {
-    transfers =
-        measurement::view_transfers(options.files, options.resolved, options.input, series);
+    transfers = measurement::view_transfers(options.files, options.resolved, options.input, series);
   });
   const align::JointProblem problem{.recorded = series,
                                     .specimen = options.specimen,

@@ -32,13 +32,12 @@ microscope::ViewTransfer with_defocus(microscope::ViewTransfer transfer, double 
   return transfer;
 }
 
-// Fits the change of the defocus to what a view's prediction lacks, by least squares. `projected` is
-// the view with its projection.
+// Fits the change of the defocus to what a view's prediction lacks, by least squares. `projected`
+// is the view with its projection.
 OfView check_view(const measurement::PredictedView& projected,
                   const microscope::ViewTransfer& transfer, const measurement::ViewModel& model) {
   const auto filtered = [&](double factor) {
-    return microscope::ViewFilter(projected.width, projected.height,
-                                  with_defocus(transfer, factor))
+    return microscope::ViewFilter(projected.width, projected.height, with_defocus(transfer, factor))
         .apply(projected.predicted);
   };
   const std::vector<float> given = filtered(1.0), more = filtered(1.0 + kStep),

@@ -7,9 +7,9 @@
 
 namespace tomofield::reconstruction {
 
-/// Tells whether the views have another defocus than the one that they were fitted with. Where it is
-/// wrong, the residual of a view has rings in its spectrum: it resembles the change of the filtered
-/// prediction with the defocus.
+/// Tells whether the views have another defocus than the one that they were fitted with. Where it
+/// is wrong, the residual of a view has rings in its spectrum: it resembles the change of the
+/// filtered prediction with the defocus.
 struct DefocusCheck {
   /// True defocus over the given one, less 1: the median of the views, and its standard error by
   /// their scatter.

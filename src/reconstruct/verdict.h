@@ -45,7 +45,7 @@ struct Verdict {
   std::optional<HeldOutSummary> held_out;
   evaluate::FieldArtefacts artefacts;
   SectionProfile sections;
-  std::optional<ViewAgreement> views;  ///< none for views as recorded (ray engine)
+  std::optional<ViewAgreement> views;   ///< none for views as recorded (ray engine)
   std::optional<DefocusCheck> defocus;  ///< of views with a contrast transfer
   double seconds = 0.0;
   double peak_GiB = 0.0;  ///< of the process that used most

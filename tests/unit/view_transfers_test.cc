@@ -6,8 +6,8 @@
 #include <string>
 
 #include "expect_parts.h"
-#include "scratch_directory.h"
 #include "reconstruct/options.h"
+#include "scratch_directory.h"
 #include "simulate/simulate_series.h"
 #include "tomofield/error.h"
 
