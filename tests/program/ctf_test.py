@@ -113,7 +113,7 @@ def test_the_verdict_tells_a_wrong_defocus(series):
 
 def test_coloured_noise_gains_and_resumes_to_the_bit():
     folder = os.path.join(harness.fresh_directory("coloured"), "cell")
-    harness.succeed("simulate", folder, "--size", SIZE, "--yardstick", "b", "--noise", 0.1,
+    harness.succeed("simulate", folder, "--size", SIZE, "--yardstick", "a", "--noise", 0.1,
                     "--noise-blur", 1, "--seed", 31)
     series = Filtered.__new__(Filtered)
     series.folder = folder
