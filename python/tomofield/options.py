@@ -74,6 +74,7 @@ class Options(TypedDict, total=False):
     fourier_ring: Literal["mean", "max"]
     spike_rank: int | None
     fit_noise: bool
+    noise_model: Literal["white", "coloured"]
     fit_view_scale: Optional[bool]
     hold_out: int
     tune: bool

@@ -82,7 +82,19 @@ fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t s
   options.coarse_epochs = coarse_epochs;
   options.epochs = fine_epochs;
   options.fit_noise = false;
+  options.noise_model = NoiseModel::kWhite;
   return options;
+}
+
+measurement::Measurement aligning_measurement(const JointProblem& problem,
+                                              std::span<const geometry::ViewCorrection> corrections,
+                                              const fit::FieldOptions& field,
+                                              const distributed::Communicator& processes) {
+  measurement::Measurement prepared =
+      measurement::prepare_realigned(problem.recorded, corrections, problem.specimen,
+                                     problem.scratch_dir, fit::band_rows(field), processes);
+  prepared.transfers = problem.transfers;
+  return prepared;
 }
 
 ImagePair image_pair(const measurement::PredictedView& view,

@@ -36,9 +36,7 @@ class AligningFit {
       : problem_(problem),
         processes_(processes),
         field_(aligning_field(problem.field)),
-        measurement_(measurement::prepare_realigned(problem.recorded, start, problem.specimen,
-                                                    problem.scratch_dir, fit::band_rows(field_),
-                                                    processes)),
+        measurement_(aligning_measurement(problem, start, field_, processes)),
         fit_(measurement_, field_, joint_fit(problem.seed), processes) {
     found_.agreement.resize(start.size());
     // A start with rotations has errors of rotations.

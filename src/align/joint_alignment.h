@@ -12,6 +12,7 @@
 #include "fit/options.h"
 #include "geometry/view_correction.h"
 #include "measurement/prepare.h"
+#include "microscope/view_transfer.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::align {
@@ -42,6 +43,9 @@ struct JointProblem {
   const tilt_series::TiltSeries& recorded;  ///< views that are not resampled, and keep their pixels
   const measurement::SpecimenOptions& specimen;
   fit::FieldOptions field;  ///< its kind is replaced by plain vertices
+  /// [view]: what the microscope does to the projections that views are registered to; empty:
+  /// nothing.
+  std::vector<microscope::ViewTransfer> transfers = {};
   std::uint64_t seed = 1;
   const std::filesystem::path& scratch_dir;
   base::ProgressSink progress;

@@ -257,6 +257,10 @@ constexpr Row kRows[] = {
      .help = "Weight each view by the noise measured on it alone, and residuals of any size fully. "
              "By default views that the volume predicts worse than others count less, and a "
              "residual counts at most as one of 4 standard deviations"},
+    {.key = "fit.noise_model", .flag = "--noise-model", MEMBER(Options, noise_model),
+     .group = Group::kFit,
+     .help = "coloured: late in the fit, weight the frequencies of each view by the inverse of the "
+             "noise that its residual shows there. white: count all frequencies alike"},
     {.key = "fit.fit_view_scale", .flag = "--view-scale", MEMBER(Options, fit_view_scale),
      .group = Group::kFit, .automatic = "what trials prefer; without trials on for dark contrast, else off",
      .help = "Fit a scale and an offset for every view"},

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "align/alignment.h"
@@ -17,6 +18,7 @@
 #include "base/stopwatch.h"
 #include "base/trace.h"
 #include "io/json.h"
+#include "measurement/view_transfers.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
 
@@ -188,9 +190,14 @@ std::optional<json> make_record(const ReconstructOptions& options, const Reconst
         fmt::format("--align needs at least {} views, since it judges the alignment by "
                     "views that it holds out; '{}' has {}",
                     kFewestViews, recorded.stack.string(), series.views().size()));
+  std::vector<microscope::ViewTransfer> transfers;
+  processes.run_collectively([&] {
+    transfers = measurement::view_transfers(options.files, options.resolved, options.input, series);
+  });
   const align::JointProblem problem{.recorded = series,
                                     .specimen = options.specimen,
                                     .field = options.field,
+                                    .transfers = std::move(transfers),
                                     .seed = options.fit.seed,
                                     .scratch_dir = recorded.scratch_dir,
                                     .progress = hooks.tune_progress,
