@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
+#include <utility>
 
 #include "base/trace.h"
 
@@ -23,16 +24,18 @@ std::vector<std::vector<float>> predictions_by_tilt(measurement::Measurement& me
     std::ranges::transform(tilt_deg, measurement.geometry.tilt_deg.begin(),
                            [step_deg](double tilt) { return tilt + step_deg; });
     fit.reread_measurement();
-    return fit.predict(views, std::vector<measurement::ViewModel>(views.size()));
+    std::vector<std::vector<float>> images;
+    for (auto& view : fit.predict(views, std::vector<measurement::ViewModel>(views.size())))
+      images.push_back(std::move(view.predicted));
+    return images;
   };
-  const auto before = predicted_at(-kStep_deg), after = predicted_at(kStep_deg);
+  const auto before = predicted_at(-kStep_deg);
+  auto derivatives = predicted_at(kStep_deg);
   measurement.geometry.tilt_deg = tilt_deg;
   fit.reread_measurement();
-  std::vector<std::vector<float>> derivatives(views.size());
   for (std::size_t v = 0; v < views.size(); ++v) {
-    derivatives[v].resize(after[v].predicted.size());
     std::ranges::transform(
-        after[v].predicted, before[v].predicted, derivatives[v].begin(),
+        derivatives[v], before[v], derivatives[v].begin(),
         [](float high, float low) { return (high - low) / static_cast<float>(2 * kStep_deg); });
   }
   return derivatives;

@@ -19,10 +19,10 @@ FIT = ["--epochs", 2, "--coarse-epochs", 4, "--tv-penalty", "smooth", "--view-sc
        "--black-level", 0, "--bead-diameter", 0]
 
 
-def simulate(name, *options, size=SIZE):
+def simulate(name, *options, size=SIZE, noise=0.05):
     """Returns the folder of a series of a cell that ends in the field of view."""
     folder = os.path.join(harness.fresh_directory(name), "cell")
-    harness.succeed("simulate", folder, "--size", size, "--yardstick", "a", "--noise", 0.05,
+    harness.succeed("simulate", folder, "--size", size, "--yardstick", "a", "--noise", noise,
                     "--seed", 21, "--no-truth", *options)
     return folder
 
@@ -124,8 +124,8 @@ def test_reconstruct_takes_the_alignment_and_resumes_from_it(shifted):
 
 def test_wrong_tilt_angles_are_found_and_reach_the_files_of_other_programs():
     size = 96
-    folder = simulate("alignment_tilts", "--misalign", 1.5, "--misalign-tilt", 0.6, "--noise", 0.03,
-                      size=size)
+    folder = simulate("alignment_tilts", "--misalign", 1.5, "--misalign-tilt", 0.6, size=size,
+                      noise=0.03)
     raw = [argument.replace(".tlt", ".rawtlt") if isinstance(argument, str) else argument
            for argument in series_of(folder, size)]
     prefix, volume = (os.path.join(folder, name) for name in ("found_align", "found.mrc"))
