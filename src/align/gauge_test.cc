@@ -98,7 +98,8 @@ TEST_P(Gauge, TheRestIsOrthogonalAndStays) {
     size += std::abs(corrections[v].shift_x_px);
   }
   EXPECT_GT(size, 3.0);
-  for (const double sum : {along_x, along_z, y, tilt, cubic, magnification}) EXPECT_NEAR(sum, 0.0, 1e-9);
+  for (const double sum : {along_x, along_z, y, tilt, cubic, magnification})
+    EXPECT_NEAR(sum, 0.0, 1e-9);
   const std::vector<ViewCorrection> once = corrections;
   remove_gauge(geometry_, corrections);
   for (std::size_t v = 0; v < once.size(); ++v) expect_near(corrections[v], once[v], 1e-9);

@@ -113,8 +113,7 @@ class AligningFit {
     std::vector<std::optional<Registration>> registrations(found_.corrections.size());
     std::vector<LocalRegistration> local;
     const geometry::TiltGeometry& g = measurement_.geometry;
-    SlabPoseSearch search(g.tilt_deg, g.hand, g.width / stage.bin,
-                          !problem_.field.with_margin);
+    SlabPoseSearch search(g.tilt_deg, g.hand, g.width / stage.bin, !problem_.field.with_margin);
     if (fit_.is_done())
       local.assign(registrations.size(), LocalRegistration(local_options(measurement_, stage)));
     std::vector<std::vector<float>> by_tilt;
@@ -161,8 +160,8 @@ class AligningFit {
     }
   }
 
-  // Says whether the error of the views falls by so many standard errors that it is no accident. One
-  // is too few, because the question comes up at every update.
+  // Says whether the error of the views falls by so many standard errors that it is no accident.
+  // One is too few, because the question comes up at every update.
   static bool pays(const std::vector<std::optional<Registration>>& registrations,
                    const Freedoms& without, const Freedoms& with) {
     std::vector<double> gains;

@@ -7,10 +7,10 @@
 
 namespace tomofield::align {
 
-/// Returns the derivative of the prediction of each view by its tilt angle in degrees, [view][y, x],
-/// as the difference between predictions at larger and smaller tilts. `measurement` must be that of
-/// the fit; it comes back as it was. Every process calls it. It takes the memory of three images of
-/// each view.
+/// Returns the derivative of the prediction of each view by its tilt angle in degrees, [view][y,
+/// x], as the difference between predictions at larger and smaller tilts. `measurement` must be
+/// that of the fit; it comes back as it was. Every process calls it. It takes the memory of three
+/// images of each view.
 std::vector<std::vector<float>> predictions_by_tilt(measurement::Measurement& measurement,
                                                     fit::Fit& fit);
 

@@ -14,12 +14,12 @@ namespace {
 
 // The values of a row of all views are factorised together, which limits their number.
 constexpr double kMostValues = 1000, kMostColumns = 16, kFewestColumns = 6;
-constexpr double kWidth = 0.6;     // σ of a column's Gaussian, in distances between columns
-constexpr double kGrain = 0.6;     // σ of the specimen's correlation, in the same
-constexpr double kHighPass = 0.1;  // σ of the trend along y that is removed, a share of the width
-constexpr double kNoise = 0.1;     // variance over that of the signal
+constexpr double kWidth = 0.6;      // σ of a column's Gaussian, in distances between columns
+constexpr double kGrain = 0.6;      // σ of the specimen's correlation, in the same
+constexpr double kHighPass = 0.1;   // σ of the trend along y that is removed, a share of the width
+constexpr double kNoise = 0.1;      // variance over that of the signal
 constexpr Eigen::Index kParts = 8;  // of the rows, whose differences tell the error
-constexpr double kNoCount = 1e6;   // variance of values that do not count
+constexpr double kNoCount = 1e6;    // variance of values that do not count
 // The search fits parabolas through poses that are a step apart, in turn along pitch and thickness.
 // The first steps are wider than the others.
 constexpr double kFirstStep_deg = 3.0, kStep_deg = 1.5;
@@ -119,7 +119,8 @@ void SlabPoseSearch::add(std::size_t view, const ImagePair& images) {
   views_[view] = reduce(image);
 }
 
-// Says whether the rays at a place of a view leave the specimen through its faces, not at its sides.
+// Says whether the rays at a place of a view leave the specimen through its faces, not at its
+// sides.
 bool SlabPoseSearch::counts(std::size_t view, double place, double thickness_px) const {
   const double tilt = radians(tilt_deg_[view]);
   const double faces = static_cast<double>(width_) / 2 * std::cos(tilt) -
@@ -127,8 +128,9 @@ bool SlabPoseSearch::counts(std::size_t view, double place, double thickness_px)
   return !is_bounded_ || std::abs(place) < faces;
 }
 
-// Returns the logarithm of the likelihood of each part of the rows, but for a constant. The variance
-// of the values is the likeliest one. `thickness_px` decides which values count, in all poses.
+// Returns the logarithm of the likelihood of each part of the rows, but for a constant. The
+// variance of the values is the likeliest one. `thickness_px` decides which values count, in all
+// poses.
 Eigen::VectorXd SlabPoseSearch::log_likelihood(const SlabPose& pose, double thickness_px) const {
   const Eigen::Index columns = std::ssize(place_), n = columns * std::ssize(views_);
   const double grain = kGrain / kWidth * sigma_px_;
@@ -163,7 +165,8 @@ Eigen::VectorXd SlabPoseSearch::log_likelihood(const SlabPose& pose, double thic
   factor.matrixL().solveInPlace(values);
   const double mean_square = values.squaredNorm() / static_cast<double>(values.size());
   const double half_log_determinant = covariance.diagonal().array().log().sum();
-  const double of_row = -half_log_determinant - 0.5 * static_cast<double>(n) * std::log(mean_square);
+  const double of_row =
+      -half_log_determinant - 0.5 * static_cast<double>(n) * std::log(mean_square);
   Eigen::VectorXd parts = Eigen::VectorXd::Zero(kParts);
   for (Eigen::Index row = 0; row < values.cols(); ++row)
     parts[row * kParts / values.cols()] +=
@@ -176,15 +179,13 @@ std::optional<FoundPose> SlabPoseSearch::find(const SlabPose& start) const {
   SlabPose best = start;
   const auto pitch_near = [&](double step_deg) {
     const auto at = [&](double deg) {
-      return log_likelihood({best.thickness_px, best.pitch_deg + deg},
-                            start.thickness_px);
+      return log_likelihood({best.thickness_px, best.pitch_deg + deg}, start.thickness_px);
     };
     return peak_of(at(-step_deg), at(0.0), at(step_deg));
   };
   const auto thickness_near = [&](double factor) {
     const auto at = [&](double part) {
-      return log_likelihood({best.thickness_px * part, best.pitch_deg},
-                            start.thickness_px);
+      return log_likelihood({best.thickness_px * part, best.pitch_deg}, start.thickness_px);
     };
     return peak_of(at(1 / factor), at(1.0), at(factor));
   };
@@ -198,7 +199,8 @@ std::optional<FoundPose> SlabPoseSearch::find(const SlabPose& start) const {
     best.pitch_deg += step_deg * std::clamp(pitch->place, -kLongestStep, kLongestStep);
     const auto thickness = thickness_near(factor);
     if (!thickness) return std::nullopt;
-    best.thickness_px *= std::pow(factor, std::clamp(thickness->place, -kLongestStep, kLongestStep));
+    best.thickness_px *=
+        std::pow(factor, std::clamp(thickness->place, -kLongestStep, kLongestStep));
     found = {best,
              {best.thickness_px * std::log(factor) * thickness->error, step_deg * pitch->error}};
     is_near = round > 0 && std::abs(pitch->place) < kNear && std::abs(thickness->place) < kNear;

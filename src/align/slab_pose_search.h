@@ -15,16 +15,17 @@ namespace tomofield::align {
 
 /// Finds how thick and how level a specimen is that fills a slab.
 ///
-/// Each view is reduced to a few columns: weighted means over x, under a Gaussian. Along y they keep
-/// a band of frequencies. Rows of the same y of all views see the same section of the specimen. If
-/// the specimen is uncorrelated from place to place within the slab, the values of such a row are a
-/// Gaussian process: the covariance of two of them is the integral over the slab of the product of
-/// both Gaussians. The pose is that of the largest likelihood. Views must be aligned, because a
-/// shift of a view counts for more than the pose.
+/// Each view is reduced to a few columns: weighted means over x, under a Gaussian. Along y they
+/// keep a band of frequencies. Rows of the same y of all views see the same section of the
+/// specimen. If the specimen is uncorrelated from place to place within the slab, the values of
+/// such a row are a Gaussian process: the covariance of two of them is the integral over the slab
+/// of the product of both Gaussians. The pose is that of the largest likelihood. Views must be
+/// aligned, because a shift of a view counts for more than the pose.
 class SlabPoseSearch {
  public:
   /// `width` is that of the images. `tilt_deg` and the hand (±1) are as in TiltGeometry. A specimen
-  /// that is bounded ends where the untilted view does: rays that leave it at its sides do not count.
+  /// that is bounded ends where the untilted view does: rays that leave it at its sides do not
+  /// count.
   SlabPoseSearch(std::span<const double> tilt_deg, int hand, std::int64_t width, bool is_bounded);
 
   /// Takes a view. Its prediction replaces pixels that are no measurement. Different views may be

@@ -12,15 +12,15 @@
 namespace tomofield::align {
 namespace {
 
-constexpr std::int64_t kSize = 96;
-constexpr double kThickness = 40;
+constexpr std::int64_t kSize = 64;
+constexpr double kThickness = 30;
 
 // Returns the pose that views of an extended slab tell whose tilt angles are given with an error.
 std::optional<FoundPose> find_pose(double given_thickness, double tilt_error_deg, int hand = 1) {
-  const testing::GaussianScene scene(1200, {130, 60, kThickness / 2});
+  const testing::GaussianScene scene(500, {95, 40, kThickness / 2});
   base::Random random(3);
   std::vector<double> given_deg;
-  for (double tilt = -60; tilt <= 60; tilt += 4) given_deg.push_back(tilt + tilt_error_deg);
+  for (double tilt = -60; tilt <= 60; tilt += 6) given_deg.push_back(tilt + tilt_error_deg);
   SlabPoseSearch search(given_deg, hand, kSize, false);
   for (std::size_t view = 0; view < given_deg.size(); ++view) {
     std::vector<float> image;
@@ -39,19 +39,19 @@ std::optional<FoundPose> find_pose(double given_thickness, double tilt_error_deg
 
 TEST(SlabPoseSearch, FindsThicknessAndPitch) {
   for (const double error_deg : {0.0, 6.0, -6.0}) {
-    const auto found = find_pose(50, error_deg);
+    const auto found = find_pose(36, error_deg);
     ASSERT_TRUE(found);
-    EXPECT_NEAR(found->pose.pitch_deg, -error_deg, 1.0);
-    EXPECT_NEAR(found->pose.thickness_px, kThickness, 0.2 * kThickness);
+    EXPECT_NEAR(found->pose.pitch_deg, -error_deg, 1.5);
+    EXPECT_NEAR(found->pose.thickness_px, kThickness, 0.25 * kThickness);
     EXPECT_GT(found->error.pitch_deg, 0.0);
-    EXPECT_LT(found->error.pitch_deg, 1.5);
+    EXPECT_LT(found->error.pitch_deg, 3.0);
   }
 }
 
 TEST(SlabPoseSearch, TheHandTurnsThePitchWithTheTilts) {
-  const auto found = find_pose(40, 6.0, -1);
+  const auto found = find_pose(30, 6.0, -1);
   ASSERT_TRUE(found);
-  EXPECT_NEAR(found->pose.pitch_deg, -6.0, 1.0);
+  EXPECT_NEAR(found->pose.pitch_deg, -6.0, 1.5);
 }
 
 TEST(SlabPoseSearch, LowImagesTellNothing) {

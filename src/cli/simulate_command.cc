@@ -163,9 +163,10 @@ void add_misalignment_options(CLI::App& command, SimulateArguments& arguments) {
                   "slowly from view to view")
       ->capture_default_str();
   command
-      .add_option("--misalign-tilt", misalignment.tilt_spread_deg,
-                  "Standard deviation in degrees of the errors of the tilt angles in a .rawtlt file; "
-                  "the .tlt file has the true ones")
+      .add_option(
+          "--misalign-tilt", misalignment.tilt_spread_deg,
+          "Standard deviation in degrees of the errors of the tilt angles in a .rawtlt file; "
+          "the .tlt file has the true ones")
       ->capture_default_str();
 }
 

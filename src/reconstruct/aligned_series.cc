@@ -162,11 +162,12 @@ void log_local_motion(const json& local) {
 
 // Says what the views tell about the specimen's pose. Nothing of it is applied.
 void log_pose(const json& pose) {
-  base::log_info(fmt::format(
-      "the specimen is {:.0f} ± {:.0f} pixels thick and has a pitch of {:.1f} ± {:.1f}° against the "
-      "tilt angles (--thickness and --tilt-offset apply them)",
-      pose["thickness_px"].get<double>(), pose["thickness_error_px"].get<double>(),
-      pose["pitch_deg"].get<double>(), pose["pitch_error_deg"].get<double>()));
+  base::log_info(
+      fmt::format("the specimen is {:.0f} ± {:.0f} pixels thick and has a pitch of {:.1f} ± "
+                  "{:.1f}° against the "
+                  "tilt angles (--thickness and --tilt-offset apply them)",
+                  pose["thickness_px"].get<double>(), pose["thickness_error_px"].get<double>(),
+                  pose["pitch_deg"].get<double>(), pose["pitch_error_deg"].get<double>()));
 }
 
 void log_alignment(const json& record) {
@@ -184,8 +185,7 @@ void log_alignment(const json& record) {
                                std::sqrt(squares / 2 / static_cast<double>(record["views"].size())),
                                record["rotation"].get<bool>() ? ", rotations" : "",
                                record["magnification"].get<bool>() ? ", magnifications" : "",
-                               record["tilt"].get<bool>() ? ", tilt angles" : "",
-                               errors));
+                               record["tilt"].get<bool>() ? ", tilt angles" : "", errors));
   } else {
     base::log_info("the alignment stays as it was, since a new one is no better: " + errors);
   }

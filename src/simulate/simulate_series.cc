@@ -55,9 +55,10 @@ struct OutputFiles {
 // Checks that the files can be written, and locks the series, which every simulation writes.
 std::vector<io::OutputLock> claim_files(const OutputFiles& files, bool overwrite) {
   return io::claim_outputs({files.series}, [&] {
-    io::check_output_files({files.series, files.clean, files.truth, files.angles,
-                            files.recorded_angles, files.transforms, files.ctf, files.defocus, files.mdoc, files.record},
-                           {}, overwrite, "give another directory, or --overwrite to replace it");
+    io::check_output_files(
+        {files.series, files.clean, files.truth, files.angles, files.recorded_angles,
+         files.transforms, files.ctf, files.defocus, files.mdoc, files.record},
+        {}, overwrite, "give another directory, or --overwrite to replace it");
   });
 }
 
@@ -181,8 +182,7 @@ void write_angles(const fs::path& path, const std::vector<SimulatedView>& views)
 // Writes the angles with the errors that the microscope made.
 void write_recorded_angles(const fs::path& path, const std::vector<SimulatedView>& views) {
   std::vector<double> angles_deg;
-  for (const SimulatedView& view : views)
-    angles_deg.push_back(view.tilt_deg + view.tilt_error_deg);
+  for (const SimulatedView& view : views) angles_deg.push_back(view.tilt_deg + view.tilt_error_deg);
   io::write_number_column(path, angles_deg);
 }
 
