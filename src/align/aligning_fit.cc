@@ -124,7 +124,9 @@ LocalRegistrationOptions local_options(const measurement::Measurement& measureme
 std::size_t prediction_memory(const measurement::Measurement& measurement) {
   const std::size_t of_view = prediction_bytes(measurement, 1);
   const auto num_views = static_cast<std::size_t>(measurement.geometry.num_views());
-  return std::max(of_view, std::min(kPredictionBytes, num_views * of_view));
+  // Three images of each view tell the derivatives by the tilt, with wider pixels.
+  const std::size_t by_tilt = num_views * prediction_bytes(measurement, kSlowBin) * 3 / 2;
+  return std::max({of_view, by_tilt, std::min(kPredictionBytes, num_views * of_view)});
 }
 
 void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& measurement,

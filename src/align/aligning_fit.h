@@ -41,7 +41,8 @@ ImagePair image_pair(const measurement::PredictedView& view,
 LocalRegistrationOptions local_options(const measurement::Measurement& measurement,
                                        const fit::Stage& stage);
 
-/// Returns the bytes that the predictions of for_each_prediction() take at most.
+/// Returns the bytes that the predictions of for_each_prediction() and of predictions_by_tilt()
+/// take at most.
 std::size_t prediction_memory(const measurement::Measurement& measurement);
 
 /// Predicts all views by a fit in one of its stages, as many at a time as fit into a gigabyte, and

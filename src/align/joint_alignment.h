@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "align/freedoms.h"
+#include "align/slab_pose.h"
 #include "base/progress.h"
 #include "distributed/communicator.h"
 #include "fit/options.h"
@@ -33,6 +35,8 @@ struct JointAlignment {
   /// Local motion that the last registration finds in each view, if that makes the prediction of
   /// pixels better; else empty.
   std::vector<geometry::ViewWarp> motion;
+  /// Thickness and pitch of the specimen, in pixels before binning; none if the views do not tell.
+  std::optional<FoundPose> pose;
   bool was_stopped = false;
   /// Root mean square of the change of the shifts in each update, in pixels before binning.
   std::vector<double> steps_px;
