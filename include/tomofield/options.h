@@ -102,6 +102,7 @@ struct Options {
   int rank = 24;                ///< components of each mode (vm)
   std::optional<Activation> activation;
   double margin_spacing = 2.0;  ///< binned pixels between samples of the margin
+  std::string budget;           ///< makes the finished model compact: "0.1dB", "2M", "5MB"
 
   // Fit
   std::optional<int> epochs;         ///< passes over all views at full resolution

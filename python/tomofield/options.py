@@ -55,6 +55,7 @@ class Options(TypedDict, total=False):
     rank: int
     activation: Optional[Literal["softplus", "identity"]]
     margin_spacing: float
+    budget: str
 
     # Fit
     epochs: Optional[int]

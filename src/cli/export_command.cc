@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "cli/commands.h"
@@ -14,9 +15,12 @@
 #include "cli/help_formatter.h"
 #include "cli/number_checks.h"
 #include "cli/table_options.h"
+#include "compact/budget.h"
+#include "compact/compress.h"
 #include "io/output_files.h"
 #include "io/output_lock.h"
 #include "io/output_set.h"
+#include "output/compact_model.h"
 #include "output/model_file.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
@@ -31,6 +35,8 @@ using output::Model;
 struct ExportArguments {
   std::filesystem::path model;
   std::filesystem::path output;
+  std::filesystem::path compact;  // model to write in place of a volume
+  std::string budget = "0.1dB";   // of that model
   std::vector<double> box, centre, rotation;
   std::vector<std::int64_t> size;
   std::optional<double> voxel_size_A;
@@ -39,12 +45,14 @@ struct ExportArguments {
   bool overwrite = false;
 };
 
-// Checks that the volume can be written, and locks it.
+// Checks that the file can be written, and locks it.
 std::vector<io::OutputLock> claim_output(const ExportArguments& arguments) {
-  return io::claim_outputs({arguments.output}, [&] {
+  const std::filesystem::path& written =
+      arguments.compact.empty() ? arguments.output : arguments.compact;
+  return io::claim_outputs({written}, [&] {
     constexpr const char* kAdvice = "give another name, or --overwrite to replace it";
-    io::check_output_files({arguments.output}, {arguments.model}, arguments.overwrite, kAdvice);
-    if (arguments.choices.options.zarr)
+    io::check_output_files({written}, {arguments.model}, arguments.overwrite, kAdvice);
+    if (arguments.compact.empty() && arguments.choices.options.zarr)
       output::check_zarr(arguments.output, arguments.overwrite, kAdvice);
   });
 }
@@ -71,8 +79,32 @@ OrientedBox unrotated_box(const ExportArguments& arguments, const Model& model) 
   return field::box_between(low, high, voxel_px);
 }
 
+// Writes the model again with factors in place of its vertices.
+void write_compact(const ExportArguments& arguments) {
+  const compact::Budget budget = compact::parse_budget(arguments.budget);
+  const Model model = output::load_model(arguments.model);
+  if (model.field->kind() != FieldKind::kGrid) {
+    throw Error(fmt::format(
+        "'{}' is a model of factors, and --compact is for models of vertices (--field grid)",
+        arguments.model.string()));
+  }
+  const compact::CompactField made = compact::compress(*model.field, budget);
+  io::OutputSet results;
+  output::save_model(arguments.compact, *made.field, made.codes, model);
+  results.commit();
+  print(
+      "{}: {} parameters in {} leaves, {} bytes; the densities change by {:.4g} times their "
+      "standard deviation\n",
+      arguments.compact.string(), made.report.parameters, made.field->tree().num_leaves(),
+      std::filesystem::file_size(arguments.compact),
+      std::sqrt(made.report.mean_square_change / made.report.variance));
+}
+
 void run_export(ExportArguments& arguments) {
+  if (arguments.output.empty() && arguments.compact.empty())
+    throw Error("nothing to write: give -o VOLUME.mrc, or --compact MODEL.h5");
   const std::vector<io::OutputLock> locks = claim_output(arguments);
+  if (!arguments.compact.empty()) return write_compact(arguments);
   const Model model = output::load_model(arguments.model);
   OrientedBox box = unrotated_box(arguments, model);
   const auto& angles = arguments.rotation;
@@ -149,8 +181,19 @@ void add_export_command(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "export", "Write any box of a model, at any voxel size and orientation, as an MRC volume");
   command->add_option("model", arguments->model, "Model file (.h5) of reconstruct")->required();
-  command->add_option("-o,--output", arguments->output, "The MRC volume to write")->required();
-  command->add_flag("--overwrite", arguments->overwrite, "Replace an existing volume");
+  CLI::Option* volume =
+      command->add_option("-o,--output", arguments->output, "The MRC volume to write");
+  CLI::Option* compact = command
+                             ->add_option("--compact", arguments->compact,
+                                          "The compact model (.h5) to write in place of a volume")
+                             ->excludes(volume);
+  command
+      ->add_option("--budget", arguments->budget,
+                   "How close or how small the compact model is: decibels (0.1dB), parameters "
+                   "(500k, 2M) or bytes (800kB, 5MB)")
+      ->type_name("AMOUNT")
+      ->needs(compact);
+  command->add_flag("--overwrite", arguments->overwrite, "Replace an existing file");
   add_box_options(*command, *arguments);
   add_groups(*command, arguments->choices, {option_table::Group::kVolume});
   add_common_options(*command);

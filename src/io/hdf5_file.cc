@@ -118,6 +118,11 @@ struct Stored<std::int64_t> {
   static hid_t in_memory() { return H5T_NATIVE_INT64; }
   static hid_t in_file() { return H5T_STD_I64LE; }
 };
+template <>
+struct Stored<std::uint8_t> {
+  static hid_t in_memory() { return H5T_NATIVE_UINT8; }
+  static hid_t in_file() { return H5T_STD_U8LE; }
+};
 
 [[noreturn]] void fail_writing(const std::string& file, const std::string& item) {
   throw Error(
@@ -290,6 +295,8 @@ void Hdf5Group::write_floats(const std::string& name, std::size_t size,
 template void Hdf5Group::write_array(const std::string&, std::span<const float>);
 template void Hdf5Group::write_array(const std::string&, std::span<const double>);
 template void Hdf5Group::write_array(const std::string&, std::span<const std::int64_t>);
+template void Hdf5Group::write_array(const std::string&, std::span<const std::uint8_t>);
+
 Hdf5File Hdf5File::create(const std::filesystem::path& path) {
   require_memory_of_a_file();
   const QuietErrors quiet;

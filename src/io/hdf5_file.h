@@ -20,8 +20,8 @@ namespace tomofield::io {
 /// checksum included.) Arrays are written contiguously, without chunks. The same contents make the
 /// same bytes.
 ///
-/// T is float, double or std::int64_t. Only one thread at a time may write HDF5 files. Groups must
-/// not outlive their file.
+/// T is float, double, std::int64_t or std::uint8_t. Only one thread at a time may write HDF5
+/// files. Groups must not outlive their file.
 class Hdf5Group {
  public:
   Hdf5Group(std::string file, std::string name, std::int64_t id);

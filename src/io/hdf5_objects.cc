@@ -163,6 +163,7 @@ Hdf5Values read_type(Cursor at) {
   if (is(1, 0x003F20, 8, "\0\0\x40\0\x34\x0B\0\x34\xFF\x03\0\0"sv))
     return {.type = Type::kFloat64, .bytes_each = 8};
   if (is(0, 0x08, 8, "\0\0\x40\0"sv)) return {.type = Type::kInteger64, .bytes_each = 8};
+  if (is(0, 0x00, 1, "\0\0\x08\0"sv)) return {.type = Type::kByte, .bytes_each = 1};
   constexpr std::size_t kLongestText = std::size_t{1} << 30;
   if ((class_and_version & 0x0F) == 3 && bytes > 0 && bytes <= kLongestText)
     return {.type = Type::kText, .bytes_each = bytes};

@@ -17,7 +17,7 @@ namespace tomofield::io {
 
 /// The type and the number of some values.
 struct Hdf5Values {
-  enum class Type { kFloat32, kFloat64, kInteger64, kText };
+  enum class Type { kFloat32, kFloat64, kInteger64, kByte, kText };
   Type type = Type::kText;
   std::size_t bytes_each = 0;  ///< of a text: its length with padding
   int rank = 0;                ///< number of dimensions; 0 for a single value

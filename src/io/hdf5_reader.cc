@@ -27,6 +27,8 @@ constexpr Type type_of() {
     return Type::kFloat32;
   else if constexpr (std::is_same_v<T, double>)
     return Type::kFloat64;
+  else if constexpr (std::is_same_v<T, std::uint8_t>)
+    return Type::kByte;
   else
     return Type::kInteger64;
 }
@@ -92,6 +94,7 @@ double StoredGroup::number(const std::string& name) const {
       return first<double>(found);
     case Type::kInteger64:
       return static_cast<double>(first<std::int64_t>(found));
+    case Type::kByte:
     case Type::kText:
       break;
   }
@@ -175,6 +178,16 @@ void StoredGroup::read_floats(const std::string& name, const FloatSink& sink) co
   require_checksum(name, found, checksum.value());
 }
 
+void StoredGroup::read_bytes(const std::string& name, std::size_t first,
+                             std::span<std::uint8_t> bytes) const {
+  const Hdf5Object& found = array_of(name, Type::kByte);
+  const std::size_t size = array_size(name);
+  if (first > size || bytes.size() > size - first) fail(name, "it is shorter than its index says");
+  if (!bytes.empty())
+    file_->file.read_at(found.address + static_cast<std::int64_t>(first), bytes.data(),
+                        bytes.size());
+}
+
 template <typename T>
 void StoredGroup::read_array(const std::string& name, std::span<T> values) const {
   const std::size_t size = array_size(name);
@@ -189,6 +202,7 @@ void StoredGroup::read_array(const std::string& name, std::span<T> values) const
 template void StoredGroup::read_array(const std::string&, std::span<float>) const;
 template void StoredGroup::read_array(const std::string&, std::span<double>) const;
 template void StoredGroup::read_array(const std::string&, std::span<std::int64_t>) const;
+template void StoredGroup::read_array(const std::string&, std::span<std::uint8_t>) const;
 
 Hdf5Reader::Hdf5Reader(const std::filesystem::path& path) {
   const std::string name = path.string();

@@ -185,6 +185,10 @@ constexpr Row kRows[] = {
      .group = Group::kField,
      .automatic = "identity for dark contrast, whose zero is uncertain, else softplus",
      .help = "softplus keeps densities above zero; identity lets them have either sign"},
+    {.key = "field.budget", .flag = "--budget", MEMBER(Options, budget), .group = Group::kField,
+     .label = "AMOUNT", .automatic = "all vertices are kept",
+     .help = "Replace the finished fit by a compact model: within decibels of PSNR (0.1dB), "
+             "parameters (500k, 2M) or bytes (800kB, 5MB)"},
 
     // Fit
     {.key = "fit.align", .flag = "--align", MEMBER(Options, align), .group = Group::kFit,

@@ -24,12 +24,12 @@ std::vector<const void*> members_of(const Choices& choices) {
                phase_flipped, voltage, spherical_aberration, amplitude_contrast, dose_per_tilt,
                dose_weighted, thickness, roi, hand, axis_x, axis_z, shift_z, with_margin, field,
                leaf_size, tree, leaf_budget, vertex_spacing, rank, activation, margin_spacing,
-               epochs, vertex_epochs, coarse_epochs, coarse_bin, subsets, engine, ray_samples,
-               rays_per_step, learning_rate, density_variation, factor_variation, penalty, boundary,
-               fourier, fourier_ring, spike_rank, fit_noise, noise_model, fit_view_scale, hold_out,
-               tune, patience, seed, align, split_tilts, denoising_halves, voxel_type, axes, invert,
-               zarr, output, overwrite, resume, checkpoint_minutes, alignment_json] =
-      choices.options;
+               budget, epochs, vertex_epochs, coarse_epochs, coarse_bin, subsets, engine,
+               ray_samples, rays_per_step, learning_rate, density_variation, factor_variation,
+               penalty, boundary, fourier, fourier_ring, spike_rank, fit_noise, noise_model,
+               fit_view_scale, hold_out, tune, patience, seed, align, split_tilts, denoising_halves,
+               voxel_type, axes, invert, zarr, output, overwrite, resume, checkpoint_minutes,
+               alignment_json] = choices.options;
   return {&stack,
           &tlt,
           &xf,
@@ -76,6 +76,7 @@ std::vector<const void*> members_of(const Choices& choices) {
           &rank,
           &activation,
           &margin_spacing,
+          &budget,
           &epochs,
           &vertex_epochs,
           &coarse_epochs,

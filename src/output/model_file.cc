@@ -9,99 +9,20 @@
 #include <utility>
 
 #include "base/enum_names.h"
+#include "base/memory.h"
 #include "base/parallel.h"
 #include "base/plausible.h"
-#include "base/trace.h"
-#include "io/atomic_file.h"
-#include "io/hdf5_file.h"
+#include "compact/leaf_code.h"
 #include "io/hdf5_reader.h"
+#include "output/model_format.h"
 #include "tomofield/error.h"
 #include "tomofield/version.h"
 
 namespace tomofield::output {
 namespace {
 
-using io::Hdf5Group;
 using io::StoredGroup;
 using Integers = std::vector<std::int64_t>;
-
-// Both values are in files: do not change either without a new version.
-constexpr const char* kFormat = "tomofield model";
-constexpr std::int64_t kFormatVersion = 2;
-
-// Writes one member of a list of structs as an array.
-template <typename Items, typename Get>
-void write_column(Hdf5Group& group, const char* name, const Items& items, Get get) {
-  Integers column;
-  for (const auto& item : items) column.push_back(static_cast<std::int64_t>(get(item)));
-  group.write_array<std::int64_t>(name, column);
-}
-
-void require_finite_parameters(const field::Field& field, const std::string& complaint) {
-  const std::span<const float> parameters = field.parameters();
-  std::vector<std::size_t> bad(static_cast<std::size_t>(field.tree().num_leaves()),
-                               parameters.size());  // the first one of each leaf
-  base::parallel_for("check parameters", std::ssize(bad), [&](std::int64_t i) {
-    const int leaf = static_cast<int>(i);
-    if (!field.keeps(leaf)) return;
-    const auto first = parameters.begin() + std::ptrdiff_t(field.offset(leaf)),
-               end = parameters.begin() + std::ptrdiff_t(field.offset(leaf + 1));
-    const auto found = std::find_if(first, end, [](float value) { return !std::isfinite(value); });
-    if (found != end)
-      bad[static_cast<std::size_t>(i)] = static_cast<std::size_t>(found - parameters.begin());
-  });
-  const auto first_bad = std::ranges::min_element(bad);
-  if (first_bad == bad.end() || *first_bad == parameters.size()) return;
-  throw Error(fmt::format("{}: parameter {} is {}", complaint, *first_bad, parameters[*first_bad]));
-}
-
-void write_geometry(Hdf5Group group, const ModelInfo& info) {
-  const geometry::TiltGeometry& g = info.geometry;
-  group.write_integer("width", g.width);
-  group.write_integer("height", g.height);
-  group.write_number("thickness", g.thickness);
-  group.write_integer("hand", g.hand);
-  group.write_number("axis_x", g.axis_x);
-  group.write_number("axis_z", g.axis_z);
-  group.write_array<double>("tilt_deg", g.tilt_deg);
-  const Integers roi{info.roi.x0, info.roi.y0, info.roi.x1, info.roi.y1};
-  group.write_array<std::int64_t>("roi", roi);
-}
-
-void write_tree(Hdf5Group group, const field::Quadtree& tree) {
-  const field::RootGrid& roots = tree.roots();
-  group.write_integer("x0", roots.x0);
-  group.write_integer("y0", roots.y0);
-  group.write_integer("cell_size", roots.cell_size);
-  group.write_integer("columns", roots.columns);
-  group.write_integer("rows", roots.rows);
-  const auto& nodes = tree.nodes();
-  using Node = const field::QuadtreeNode&;
-  write_column(group, "node_x0", nodes, [](Node n) { return n.square.x0; });
-  write_column(group, "node_y0", nodes, [](Node n) { return n.square.y0; });
-  write_column(group, "node_size", nodes, [](Node n) { return n.square.size; });
-  write_column(group, "node_level", nodes, [](Node n) { return n.level; });
-  write_column(group, "node_is_margin", nodes,
-               [](Node n) { return n.region == field::Region::kMargin; });
-  write_column(group, "node_parent", nodes, [](Node n) { return n.parent; });
-  write_column(group, "node_first_child", nodes, [](Node n) { return n.first_child; });
-}
-
-void write_leaves(Hdf5Group group, const field::Field& field) {
-  write_column(group, "node", field.tree().leaves(), [](int node) { return node; });
-  const auto& shapes = field.shapes();
-  using Shape = const field::LeafShape&;
-  write_column(group, "nx", shapes, [](Shape s) { return s.nx; });
-  write_column(group, "ny", shapes, [](Shape s) { return s.ny; });
-  write_column(group, "nz", shapes, [](Shape s) { return s.nz; });
-  write_column(group, "rank_x", shapes, [](Shape s) { return s.rank_x; });
-  write_column(group, "rank_y", shapes, [](Shape s) { return s.rank_y; });
-  write_column(group, "rank_z", shapes, [](Shape s) { return s.rank_z; });
-  Integers offsets;
-  for (int i = 0; i <= field.tree().num_leaves(); ++i)
-    offsets.push_back(static_cast<std::int64_t>(field.offset(i)));
-  group.write_array<std::int64_t>("offset", offsets);
-}
 
 // Copies floats that arrive in pieces, one a parameter, and keeps those of the leaves that a field
 // keeps.
@@ -127,30 +48,6 @@ class KeptCopy {
   std::size_t at_ = 0;
   int leaf_ = 0;
 };
-
-void write_field(Hdf5Group group, const field::Field& field, const FloatSource& parameters) {
-  group.write_text("kind", base::name_of(field.kind()));
-  group.write_number("thickness", field.thickness());
-  group.write_number("bias", static_cast<double>(field.bias));
-  group.write_number("softplus_beta", static_cast<double>(field.activation.beta));
-  write_tree(group.create_group("tree"), field.tree());
-  write_leaves(group.create_group("leaves"), field);
-  group.write_floats("parameters", parameters.size, parameters.hand_out);
-}
-
-template <typename T>
-void write_arrays(Hdf5Group group, const std::map<std::string, std::vector<T>>& arrays) {
-  for (const auto& [name, values] : arrays) group.write_array<T>(name, values);
-}
-
-void write_training(Hdf5Group group, const TrainingState& state, const FloatArrays& more_floats) {
-  Hdf5Group floats = group.create_group("floats");
-  for (const auto& [name, values] : state.floats) floats.write_array<float>(name, values);
-  for (const auto& [name, source] : more_floats)
-    floats.write_floats(name, source.size, source.hand_out);
-  write_arrays(group.create_group("doubles"), state.doubles);
-  write_arrays(group.create_group("integers"), state.integers);
-}
 
 // Reads a model. Every fault is an Error that names the file.
 class ModelReader {
@@ -215,12 +112,13 @@ class ModelReader {
     if (!root.has_attribute("format") || root.text("format") != kFormat)
       throw Error(fmt::format("'{}' is an HDF5 file, but no model of tomofield", path_));
     const std::int64_t version = root.integer("format_version");
-    if (version != kFormatVersion)
+    if (version != kFormatVersion && version != kCompactVersion)
       throw Error(
           fmt::format("'{}' is a model of format {}, written by {}; this is tomofield {}, which "
-                      "reads format {}: "
+                      "reads formats {} and {}: "
                       "use the tomofield that wrote it",
-                      path_, version, root.text("written_by"), library_version(), kFormatVersion));
+                      path_, version, root.text("written_by"), library_version(), kFormatVersion,
+                      kCompactVersion));
   }
 
   int small_integer(std::int64_t value) const {
@@ -350,29 +248,75 @@ class ModelReader {
         const std::string name = group.text("kind");
         const auto kind = base::enum_named<FieldKind>(name);
         if (!kind) fail(fmt::format("there is no field '{}'", name));
-        require_enough_parameters(*kind, shapes, group.array_size("parameters"));
-        if (!choose) group.require_room("parameters");
+        if (group.has("code")) {
+          require(*kind == FieldKind::kVm, "only factors have codes");
+          require_room_for_decoded(shapes);
+        } else {
+          require_enough_parameters(*kind, shapes, group.array_size("parameters"));
+          if (!choose) group.require_room("parameters");
+        }
         field = field::make_field(*kind, std::move(tree), thickness, std::move(shapes));
       });
     } catch (const std::bad_alloc&) {
-      throw Error(fmt::format("'{}' holds {} parameters, more than there is memory for", path_,
-                              group.array_size("parameters")));
+      throw Error(fmt::format("'{}' holds more parameters than there is memory for", path_));
     }
     field->bias = static_cast<float>(group.number("bias"));
     field->activation.beta = static_cast<float>(group.number("softplus_beta"));
     require(std::isfinite(field->bias) && std::isfinite(field->activation.beta) &&
                 field->activation.beta >= 0,
             "its decoder is no usable number");
-    if (choose) {
+    if (choose) field->keep_only(kept);
+    if (group.has("code")) {
+      read_codes(group.group("code"), *field);
+    } else if (choose) {
       require(group.array_size("parameters") == field->num_parameters(),
               "its parameters are not those of its leaves");
-      field->keep_only(kept);
       group.read_floats("parameters", KeptCopy(*field, field->parameters()));
     } else {
       group.read_array<float>("parameters", field->parameters());
     }
     require_finite_parameters(*field, fmt::format("'{}' is a damaged model", path_));
     return field;
+  }
+
+  // Counts leaf by leaf, since the sum of all leaves could wrap.
+  void require_room_for_decoded(const std::vector<field::LeafShape>& shapes) const {
+    constexpr std::size_t kMost = std::size_t{1} << 40;
+    std::size_t count = 0;
+    for (const field::LeafShape& shape : shapes) {
+      const std::size_t more = field::count_parameters(FieldKind::kVm, {shape});
+      require(more <= kMost - count, "its leaves need more parameters than any file holds");
+      count += more;
+    }
+    constexpr std::size_t kSmall = std::size_t{1} << 22;
+    if (count > kSmall) {
+      base::require_memory(count * sizeof(float), fmt::format("'{}'", path_).c_str(),
+                           "use a machine with more, or another copy");
+    }
+  }
+
+  // Decodes the leaves that the field keeps; the codes of others are not read.
+  void read_codes(const StoredGroup& group, field::Field& field) const {
+    const double step = group.number("step");
+    require(step >= 0 && std::isfinite(step), "its step is no usable number");
+    const Integers offset = group.read_array<std::int64_t>("offset");
+    const int num_leaves = field.tree().num_leaves();
+    require(std::ssize(offset) == num_leaves + 1 && offset.front() == 0 &&
+                std::ranges::is_sorted(offset) &&
+                offset.back() == static_cast<std::int64_t>(group.array_size("bytes")),
+            "the index of its codes is wrong");
+    name_file_in_faults([&] {
+      base::parallel_for("decode leaves", num_leaves, [&](std::int64_t i) {
+        const int leaf = static_cast<int>(i);
+        if (!field.keeps(leaf)) return;
+        const auto first = static_cast<std::size_t>(offset[static_cast<std::size_t>(i)]);
+        std::vector<std::uint8_t> code(
+            static_cast<std::size_t>(offset[static_cast<std::size_t>(i) + 1]) - first);
+        group.read_bytes("bytes", first, code);
+        compact::dequantise(compact::decode(code, field.shape(leaf)), step,
+                            field.parameters().subspan(field.offset(leaf)));
+      });
+    });
   }
 
   template <typename T>
@@ -387,50 +331,6 @@ class ModelReader {
 };
 
 }  // namespace
-
-void require_finite(const field::Field& field, const std::filesystem::path& path) {
-  require_finite_parameters(field, fmt::format("the fit diverged, so '{}' is left as it was; a "
-                                               "lower learning rate may help",
-                                               path.string()));
-}
-
-void save_model(const std::filesystem::path& path, const field::Field& field, const ModelInfo& info,
-                const TrainingState* training, const FloatArrays& more_floats) {
-  require_finite(field, path);
-  save_model(path, field, FloatSource(field.parameters()), info, training, more_floats);
-}
-
-void save_model(const std::filesystem::path& path, const field::Field& field,
-                const FloatSource& parameters, const ModelInfo& info, const TrainingState* training,
-                const FloatArrays& more_floats) {
-  const base::TraceSpan span("write model");
-  io::AtomicFile target(path);
-  {
-    io::Hdf5File file = io::Hdf5File::create(target.temporary_path());
-    {
-      Hdf5Group root = file.root();
-      root.write_text("format", kFormat);
-      root.write_integer("format_version", kFormatVersion);
-      root.write_text("written_by", fmt::format("tomofield {}", library_version()));
-      root.write_number("x_tilt_deg", info.x_tilt_deg);
-      root.write_number("pixel_size_A", info.pixel_size_A);
-      root.write_number("density_unit", info.density_unit);
-      root.write_text("contrast", info.is_dark ? "dark" : "bright");
-      root.write_text("options_json", info.options_json);
-      write_geometry(root.create_group("geometry"), info);
-      write_field(root.create_group("field"), field, parameters);
-      if (training != nullptr)
-        write_training(root.create_group("training"), *training, more_floats);
-    }
-    file.close();
-  }
-  target.commit();
-}
-
-void save_model(const std::filesystem::path& path, const Model& model,
-                const TrainingState* training) {
-  save_model(path, *model.field, model, training);
-}
 
 Model load_model(const std::filesystem::path& path, TrainingState* training) {
   return ModelReader(path).read(training, {});

@@ -239,11 +239,11 @@ TEST(ModelFile, RefusesANewerFormatAndNamesItsWriter) {
   const ScratchDirectory scratch;
   auto file = io::Hdf5File::create(scratch / "newer.h5");
   file.root().write_text("format", "tomofield model");
-  file.root().write_integer("format_version", 3);
+  file.root().write_integer("format_version", 4);
   file.root().write_text("written_by", "tomofield 9.8.7");
   file.close();
   expect_refusal(scratch / "newer.h5", "tomofield 9.8.7");
-  expect_refusal(scratch / "newer.h5", "format 2");
+  expect_refusal(scratch / "newer.h5", "formats 2 and 3");
 }
 
 // Edits models with h5py and corrects the checksums of the arrays.

@@ -267,6 +267,7 @@ std::string fingerprint_of(const ReconstructOptions& options,
   nlohmann::json json = options_json(options);
   json.erase("input");
   json.erase("volume");
+  json["field"].erase("budget");  // it changes what is made from the fit, not the fit
   json["tilt_deg"] = series.geometry.tilt_deg;
   if (series.ray_geometry) json["alignment"] = alignment_json(*series.ray_geometry);
   json["bin_factor"] = series.bin_factor;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/check.h"
+#include "compact/budget.h"
 #include "fit/integer_program.h"
 #include "fit/stages.h"
 #include "io/output_files.h"
@@ -197,6 +198,16 @@ std::vector<std::string> ReconstructOptions::faults() const {
             "--resume continues from the files of an interrupted run: give their output");
   refuse_if(resolved.align != Alignment::kOff && is_ray,
             "--align refine aligns views in their plane: it needs --engine slab");
+  if (!resolved.budget.empty()) {
+    try {
+      compact::parse_budget(resolved.budget);
+    } catch (const Error& error) {
+      all.push_back(fmt::format("--budget {}", error.what()));
+    }
+    refuse_if(field.kind != FieldKind::kGrid,
+              "--budget makes plain vertices compact: give --field grid");
+    refuse_if(makes_halves(), "--budget is for one fit, and halves are two: leave it out");
+  }
   for (const char* sentence : faults_of_halves()) all.emplace_back(sentence);
   for (const char* sentence : faults_of_transfer()) all.emplace_back(sentence);
   return all;
@@ -247,6 +258,7 @@ std::vector<std::string> ReconstructOptions::faults_of_job() const {
   if (field.tree == TreeKind::kAdaptive) refuse("--tree adaptive");
   if (fit.engine == Engine::kRay) refuse("--engine ray");
   if (resolved.denoising_halves) refuse("--denoising-halves");
+  if (!resolved.budget.empty()) refuse("--budget");
   return all;
 }
 

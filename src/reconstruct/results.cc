@@ -16,11 +16,15 @@
 
 #include "base/parallel.h"
 #include "base/range.h"
+#include "base/stopwatch.h"
 #include "base/trace.h"
+#include "compact/budget.h"
+#include "compact/compress.h"
 #include "evaluate/artefacts.h"
 #include "io/json.h"
 #include "io/output_set.h"
 #include "option_table/setting.h"
+#include "output/compact_model.h"
 #include "output/metrics.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
@@ -93,12 +97,19 @@ void write_all(const Writers& writers, const distributed::Communicator& processe
 void write_results(Results& results, const ReconstructOptions& options,
                    const std::optional<TunedFit>& tuned, const output::TrainingState& state,
                    const output::VolumeShare& share,
-                   const std::optional<measurement::PredictedView>& held_out_view) {
+                   const std::optional<measurement::PredictedView>& held_out_view,
+                   const std::optional<compact::LeafCodes>& codes) {
   const OutputPaths paths = output_paths(options.resolved.output);
   const distributed::Communicator& processes = share.processes;
   Writers writers;
-  if (processes.size() == 1)
-    writers.push_back([&] { output::save_model(paths.model, *results.model, &state); });
+  if (processes.size() == 1) {
+    writers.push_back([&] {
+      if (codes)
+        output::save_model(paths.model, *results.model->field, *codes, *results.model);
+      else
+        output::save_model(paths.model, *results.model, &state);
+    });
+  }
   writers.push_back(
       [&] { output::write_volume(*results.model, options.volume, paths.volume, share); });
   if (held_out_view) {
@@ -147,6 +158,33 @@ void write_results(Results& results, const ReconstructOptions& options,
   } catch (const Error& error) {
     throw Error(error.what() + advice);
   }
+}
+
+// Does the same for a compact model, which is no checkpoint.
+[[noreturn]] void keep_compact_model(const std::filesystem::path& model, io::OutputSet& outputs) {
+  bool is_kept = false;
+  try {
+    is_kept = outputs.commit_only(model);
+  } catch (const Error&) {  // the first failure says more
+  }
+  if (!is_kept) throw;
+  try {
+    throw;
+  } catch (const Error& error) {
+    throw Error(
+        fmt::format("{}; the compact model is kept in '{}': tomofield export writes its "
+                    "volume",
+                    error.what(), model.string()));
+  }
+}
+
+// Replaces the field of the results by a compact one, and returns its codes.
+compact::LeafCodes make_compact(const compact::Budget& budget, Results& results) {
+  const base::Stopwatch running;
+  compact::CompactField made = compact::compress(*results.model->field, budget);
+  results.model->field = std::move(made.field);
+  results.metrics["metrics"]["compact"] = compact::report_json(made.report, running.seconds());
+  return std::move(made.codes);
 }
 
 }  // namespace
@@ -202,15 +240,19 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
                               {"metrics", std::move(found.metrics)}},
                   .verdict = std::move(found.verdict),
                   .bead_masking = series.masks.bead_masking};
+  std::optional<compact::LeafCodes> codes;
+  if (!options.resolved.budget.empty())
+    codes = make_compact(compact::parse_budget(options.resolved.budget), results);
   if (!writes_files) return results;
   try {
-    write_results(results, options, origin.tuned, state, share, view);
+    write_results(results, options, origin.tuned, state, share, view, codes);
     processes.run_collectively([&] {
       if (!processes.is_root()) return;
       if (write_more) write_more(results, outputs->location_of(paths.volume));
       outputs->commit();
     });
   } catch (...) {
+    if (codes) keep_compact_model(paths.model, *outputs);
     std::function<void()> save_again;  // several processes have saved theirs together
     if (processes.size() == 1)
       save_again = [&] { output::save_model(paths.model, *results.model, &state); };

@@ -68,7 +68,7 @@ Quadtree::Quadtree(const RootGrid& roots, std::vector<QuadtreeNode> nodes)
     num_reached += 4;
     for (int c = 0; c < 4; ++c) {
       const QuadtreeNode& child = nodes_[static_cast<std::size_t>(node.first_child + c)];
-      require(child.parent == n && child.level == node.level + 1 && child.region == node.region &&
+      require(child.parent == n && child.level == node.level + 1 &&
                   child.square == quarter_of(node.square, c),
               "a child is not a quarter of its parent");
     }

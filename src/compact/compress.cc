@@ -1,0 +1,318 @@
+#include "compact/compress.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "base/parallel.h"
+#include "base/trace.h"
+#include "compact/place_tree.h"
+#include "compact/quantise.h"
+#include "compact/structure.h"
+#include "compact/truncation.h"
+#include "compact/vertex_densities.h"
+#include "tomofield/error.h"
+
+namespace tomofield::compact {
+namespace {
+
+constexpr std::int64_t kLargestSide = 128;  // px
+// The part of the error that rounding may add; the ranks leave the rest. A larger part gives more
+// parameters for as many bytes (docs/results/compact.md).
+constexpr double kRoundingPart = 0.1;
+
+// What limits a choice: the sum of errors or the sum of costs.
+struct Limit {
+  bool of_error = true;
+  double most = 0.0;
+  double value(const Choice& choice) const { return of_error ? choice.error : choice.cost; }
+};
+
+class Compression {
+ public:
+  explicit Compression(const field::Field& vertices)
+      : vertices_(vertices), squares_(place_squares(vertices_, kLargestSide)) {
+    places_.resize(squares_.nodes.size());
+    prices_.resize(places_.size());
+    is_tried_.assign(places_.size(), 1);
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      places_[i].first_child = squares_.nodes[i].first_child;
+      if (squares_.leaf_like[i] == PlaceSquares::kOutside) {
+        places_[i].candidates.push_back({});
+        prices_[i].push_back(std::numeric_limits<double>::infinity());
+      }
+    }
+    measure();
+  }
+
+  double variance() const { return variance_; }
+  double volume() const { return volume_; }  // of the region of interest
+
+  // Finds ranks at prices around the one that meets the limit, and chooses among them.
+  void choose(const Limit& limit) {
+    constexpr int kRounds = 8;
+    constexpr double kClose = 0.02, kFar = 1e-3;
+    double price = last_price_ > 0 ? last_price_ : surveyed_price(limit);
+    double low = 0, high = 0;  // prices below and above the wanted one
+    for (int round = 0; round < kRounds; ++round) {
+      add_candidates(price);
+      last_price_ = price;
+      const Choice cheapest = cheapest_choice(places_, price);
+      const double ratio = std::clamp(limit.value(cheapest) / limit.most, kFar, 1 / kFar);
+      keep_near(cheapest);
+      if (std::abs(ratio - 1) < kClose) break;
+      const bool is_too_high = limit.of_error == (ratio > 1);
+      (is_too_high ? high : low) = price;
+      // Error grows and cost falls with about this power of the price.
+      const double power = limit.of_error ? 0.6 : -0.6;
+      double next = price * std::pow(ratio, -1 / power);
+      if (low > 0 && high > 0 && (next <= low || next >= high)) next = std::sqrt(low * high);
+      price = next;
+    }
+    choice_ = limit.of_error ? choose_within_error(places_, limit.most)
+                             : choose_within_cost(places_, limit.most);
+    truncate_chosen();
+  }
+
+  const Choice& choice() const { return choice_; }
+
+  // Rounds the factors of what was chosen, so that rounding alone adds this error.
+  CompactField build(double rounding_error) const {
+    CompactField made;
+    made.codes.step = std::sqrt(rounding_error / std::max(error_of_step_, 1e-300));
+    const auto num_leaves = std::ssize(leaves_);
+    std::vector<QuantisedLeaf> rounded(leaves_.size());
+    std::vector<std::vector<std::uint8_t>> codes(leaves_.size());
+    std::vector<double> errors(leaves_.size());
+    base::parallel_for("code leaves", num_leaves, [&](std::int64_t i) {
+      const auto at = static_cast<std::size_t>(i);
+      rounded[at].shape = {.nx = 2, .ny = 2, .nz = 2};
+      const field::QuadtreeNode& node = tree_.leaf(static_cast<int>(i));
+      if (squares_.leaf_like[place_of_leaf_[at]] < 0) return;
+      const PlaceDensities place = vertices_.read(node.square);
+      rounded[at] = quantise(leaves_[at], place.nx, place.ny, place.nz, made.codes.step);
+      codes[at] = encode(rounded[at]);
+      const FloatMatrix values =
+          values_of(dequantised_modes(rounded[at], made.codes.step), place.nx, place.ny, place.nz);
+      errors[at] =
+          static_cast<double>((values - place.values).squaredNorm()) * place.volume_of_vertex();
+    });
+    std::vector<field::LeafShape> shapes;
+    for (const QuantisedLeaf& leaf : rounded) shapes.push_back(leaf.shape);
+    made.field =
+        field::make_field(FieldKind::kVm, tree_, vertices_.field().thickness(), std::move(shapes));
+    made.codes.offset.push_back(0);
+    double error = 0;
+    for (std::size_t i = 0; i < rounded.size(); ++i) {
+      dequantise(rounded[i], made.codes.step,
+                 made.field->parameters().subspan(made.field->offset(static_cast<int>(i))));
+      made.codes.bytes.insert(made.codes.bytes.end(), codes[i].begin(), codes[i].end());
+      made.codes.offset.push_back(static_cast<std::int64_t>(made.codes.bytes.size()));
+      made.report.parameters += rounded[i].numbers.size();
+      error += errors[i];
+    }
+    made.report.bytes = made.codes.bytes.size();
+    made.report.mean_square_change = error / volume_;
+    made.report.variance = variance_;
+    made.report.decibels =
+        10 * std::log10(1 + made.report.mean_square_change / (kErrorOverVariance * variance_));
+    return made;
+  }
+
+ private:
+  // Measures the region of interest: its volume, and the variance of its densities.
+  void measure() {
+    const field::Field& field = vertices_.field();
+    const int num_leaves = field.tree().num_leaves();
+    std::vector<std::array<double, 3>> sums(static_cast<std::size_t>(num_leaves));
+    base::parallel_for("measure densities", num_leaves, [&](std::int64_t i) {
+      const int leaf = static_cast<int>(i);
+      if (field.tree().leaf(leaf).region != field::Region::kInterest) return;
+      const PlaceDensities place = vertices_.read(field.tree().leaf(leaf).square);
+      sums[static_cast<std::size_t>(i)] = {
+          place.volume, place.values.cast<double>().sum() * place.volume_of_vertex(),
+          place.values.cast<double>().squaredNorm() * place.volume_of_vertex()};
+    });
+    std::array<double, 3> all{};
+    for (const auto& sum : sums) {
+      for (std::size_t k = 0; k < all.size(); ++k) all[k] += sum[k];
+    }
+    volume_ = all[0];
+    constexpr double kSmallest = 1e-12;  // for a field without any contrast
+    variance_ = std::max(kSmallest, all[2] / all[0] - std::pow(all[1] / all[0], 2));
+  }
+
+  // Estimates the price at which the z mode alone would meet a limit, from some leaves.
+  double surveyed_price(const Limit& limit) const {
+    constexpr int kMostLeaves = 48;
+    const field::Quadtree& tree = vertices_.field().tree();
+    const int stride = std::max(1, tree.num_leaves() / kMostLeaves);
+    struct Component {
+      double energy, cost;
+    };
+    std::vector<std::vector<Component>> found(
+        static_cast<std::size_t>((tree.num_leaves() + stride - 1) / stride));
+    std::vector<double> volumes(found.size());
+    base::parallel_for("survey leaves", std::ssize(found), [&](std::int64_t i) {
+      const PlaceDensities place = vertices_.read(tree.leaf(static_cast<int>(i) * stride).square);
+      volumes[static_cast<std::size_t>(i)] = place.volume;
+      const double cost = static_cast<double>(place.nz) + static_cast<double>(place.nx) * place.ny;
+      for (const float energy : energies_of_sections(place))
+        found[static_cast<std::size_t>(i)].push_back(
+            {static_cast<double>(energy) * place.volume_of_vertex(), cost});
+    });
+    std::vector<Component> all;
+    double volume = 0, error = 0, cost = 0;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      all.insert(all.end(), found[i].begin(), found[i].end());
+      volume += volumes[i];
+    }
+    for (const Component& component : all) error += component.energy;
+    std::ranges::sort(all, [](const Component& a, const Component& b) {
+      return a.energy * b.cost > b.energy * a.cost;
+    });
+    const double most = limit.most * volume / volume_of_field();
+    double price = 1e-30;
+    for (const Component& component : all) {
+      if (limit.of_error ? error <= most : cost >= most) break;
+      error -= component.energy;
+      cost += component.cost;
+      price = component.energy / component.cost;
+    }
+    return std::max(price, 1e-30);
+  }
+
+  // Finds the factors of the places that are chosen.
+  void truncate_chosen() {
+    tree_ = chosen_tree(squares_, choice_, place_of_leaf_);
+    leaves_.assign(place_of_leaf_.size(), {});
+    std::vector<double> errors(leaves_.size());
+    base::parallel_for("truncate leaves", std::ssize(leaves_), [&](std::int64_t i) {
+      const auto at = static_cast<std::size_t>(i);
+      const std::size_t place = place_of_leaf_[at];
+      if (squares_.leaf_like[place] < 0) return;
+      const PlaceDensities densities = vertices_.read(squares_.nodes[place].square);
+      const double price = prices_[place][static_cast<std::size_t>(choice_.candidate[place])];
+      leaves_[at] = truncate(densities, price / densities.volume_of_vertex());
+      // Rounding errors are uniform: their mean square is a twelfth of the step's.
+      errors[at] =
+          densities.volume_of_vertex() / 12 * static_cast<double>(leaves_[at].num_parameters());
+    });
+    error_of_step_ = std::accumulate(errors.begin(), errors.end(), 0.0);
+  }
+
+  double volume_of_field() const {
+    const field::RootGrid& roots = vertices_.field().tree().roots();
+    const auto side = static_cast<double>(roots.cell_size);
+    return side * side * roots.columns * roots.rows * vertices_.field().thickness();
+  }
+
+  // Restricts further rounds to the places of a choice, their parents and their children.
+  void keep_near(const Choice& choice) {
+    is_tried_.assign(places_.size(), 0);
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      if (choice.candidate[i] < 0) continue;
+      is_tried_[i] = 1;
+      const field::QuadtreeNode& node = squares_.nodes[i];
+      if (node.parent >= 0) is_tried_[static_cast<std::size_t>(node.parent)] = 1;
+      for (int child = 0; child < 4 && node.first_child >= 0; ++child)
+        is_tried_[static_cast<std::size_t>(node.first_child + child)] = 1;
+    }
+  }
+
+  void add_candidates(double price) {
+    base::parallel_for("truncate places", std::ssize(places_), [&](std::int64_t i) {
+      const auto at = static_cast<std::size_t>(i);
+      if (squares_.leaf_like[at] < 0 || !is_tried_[at]) return;
+      const PlaceDensities place = vertices_.read(squares_.nodes[at].square);
+      const Truncation modes = truncate(place, price / place.volume_of_vertex());
+      places_[at].candidates.push_back({.cost = static_cast<double>(modes.num_parameters()),
+                                        .error = modes.square_error * place.volume_of_vertex()});
+      prices_[at].push_back(price);
+    });
+  }
+
+  VertexDensities vertices_;
+  PlaceSquares squares_;
+  PlaceTree places_;
+  std::vector<std::vector<double>> prices_;  // of each candidate
+  std::vector<char> is_tried_;               // whether the next round adds a candidate to a place
+  Choice choice_;
+  field::Quadtree tree_;                    // of what was chosen
+  std::vector<std::size_t> place_of_leaf_;  // of this tree
+  std::vector<Truncation> leaves_;          // of this tree
+  double error_of_step_ = 0.0;              // of rounding these leaves to steps of 1
+  double volume_ = 0.0, variance_ = 0.0;
+  double last_price_ = 0.0;
+};
+
+// Rounding adds less than uniform errors would where components vanish, and more where vectors are
+// short, so the step is corrected once it was tried.
+CompactField within_decibels(Compression& compression, double decibels) {
+  constexpr int kTries = 4;
+  const double change = (std::pow(10, decibels / 10) - 1) * kErrorOverVariance *
+                        compression.variance() * compression.volume();
+  compression.choose({.of_error = true, .most = (1 - kRoundingPart) * change});
+  double rounding = kRoundingPart * change;
+  CompactField made = compression.build(rounding);
+  for (int i = 1; i < kTries && made.report.decibels > decibels; ++i) {
+    rounding *= 0.8;
+    made = compression.build(rounding);
+  }
+  return made;
+}
+
+CompactField within_parameters(Compression& compression, double parameters) {
+  compression.choose({.of_error = false, .most = parameters});
+  return compression.build(compression.choice().error * kRoundingPart / (1 - kRoundingPart));
+}
+
+// The bytes that a parameter takes are known once a model was made. Keeps the largest one that is
+// within the budget.
+CompactField within_bytes(Compression& compression, double bytes) {
+  constexpr int kTries = 8;
+  constexpr double kFirstBytesPerParameter = 0.45, kClose = 0.95;
+  double parameters = bytes / kFirstBytesPerParameter;
+  CompactField best;
+  for (int i = 0; i < kTries; ++i) {
+    CompactField made = within_parameters(compression, parameters);
+    const double part = static_cast<double>(made.report.bytes) / bytes;
+    if (part <= 1 && made.report.bytes >= best.report.bytes) best = std::move(made);
+    if (part <= 1 && part > kClose) break;
+    parameters *= (1 + kClose) / 2 / std::max(part, 0.1);
+  }
+  if (best.field == nullptr)
+    throw Error(fmt::format("no model of {:.0f} bytes was found: give a larger budget", bytes));
+  return best;
+}
+
+}  // namespace
+
+nlohmann::json report_json(const CompressionReport& report, double seconds) {
+  return {{"parameters", report.parameters},
+          {"bytes", report.bytes},
+          {"rms_change_over_deviation", std::sqrt(report.mean_square_change / report.variance)},
+          {"decibels", report.decibels},
+          {"seconds", seconds}};
+}
+
+CompactField compress(const field::Field& vertices, const Budget& budget) {
+  const base::TraceSpan span("compress");
+  Compression compression(vertices);
+  switch (budget.kind) {
+    case Budget::Kind::kDecibels:
+      return within_decibels(compression, budget.amount);
+    case Budget::Kind::kParameters:
+      return within_parameters(compression, budget.amount);
+    case Budget::Kind::kBytes:
+      break;
+  }
+  return within_bytes(compression, budget.amount);
+}
+
+}  // namespace tomofield::compact

@@ -1,0 +1,141 @@
+#include "compact/compress.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+#include "base/random.h"
+#include "compact/leaf_code.h"
+#include "compact/vertex_densities.h"
+#include "field/sampling/sample_box.h"
+#include "tomofield/error.h"
+
+namespace tomofield::compact {
+namespace {
+
+using field::Field;
+using field::Region;
+
+constexpr double kThickness = 24.0;
+
+// Returns a row of cells of 32 px: a margin on the left whose vertices are 4 px apart, then
+// `inside` cells with a vertex a pixel. Its first half has texture, and its second half is empty.
+std::unique_ptr<Field> half_empty_field(int inside) {
+  const field::RootGrid roots{
+      .x0 = -32, .y0 = 0, .cell_size = 32, .columns = inside + 1, .rows = 1};
+  std::vector<Region> regions(static_cast<std::size_t>(inside + 1), Region::kInterest);
+  regions[0] = Region::kMargin;
+  std::vector<field::LeafShape> shapes(regions.size(), {.nx = 33, .ny = 33, .nz = 24});
+  shapes[0] = {.nx = 9, .ny = 9, .nz = 7};
+  auto field =
+      field::make_field(FieldKind::kGrid, field::Quadtree(roots, regions), kThickness, shapes);
+  base::Random random(7);
+  for (int leaf = 0; leaf < field->tree().num_leaves(); ++leaf) {
+    const field::LeafShape& s = field->shape(leaf);
+    const field::Square& square = field->tree().leaf(leaf).square;
+    float* value = field->parameters().data() + field->offset(leaf);
+    for (int i = 0; i < s.nx; ++i) {
+      for (int k = 0; k < s.nz; ++k) {
+        for (int j = 0; j < s.ny; ++j) {
+          const double x = static_cast<double>(square.x0) + 32.0 * i / (s.nx - 1);
+          const double y = 32.0 * j / (s.ny - 1), z = 23.0 * k / (s.nz - 1);
+          const double texture = 1 + std::sin(0.4 * x + 0.1 * z) * std::cos(0.3 * y - 0.2 * z) +
+                                 random.uniform(-0.3, 0.3);
+          *value++ = static_cast<float>(x < 16.0 * inside ? texture : 0.0);
+        }
+      }
+    }
+  }
+  return field;
+}
+
+// Returns the mean squared difference of two fields at the voxels of the region of interest.
+double mean_square_difference(const Field& a, const Field& b, int inside) {
+  const field::OrientedBox box =
+      field::box_between({0, 0, 0}, {32.0 * inside, 32, kThickness}, 1.0);
+  const std::vector<float> of_a = field::sample_box(a, box), of_b = field::sample_box(b, box);
+  double square = 0;
+  for (std::size_t i = 0; i < of_a.size(); ++i)
+    square += std::pow(static_cast<double>(of_a[i] - of_b[i]), 2);
+  return square / static_cast<double>(of_a.size());
+}
+
+TEST(Compress, DecibelsAreKept) {
+  constexpr int kInside = 4;
+  const auto vertices = half_empty_field(kInside);
+  double last = 0;
+  for (const double decibels : {0.5, 0.1}) {
+    const CompactField made = compress(*vertices, {Budget::Kind::kDecibels, decibels});
+    EXPECT_LE(made.report.decibels, decibels);
+    EXPECT_GE(made.report.decibels, 0.8 * decibels);
+    // The report's error is at the vertices of the whole field; voxels lie on those of the region.
+    const double change = mean_square_difference(*vertices, *made.field, kInside);
+    EXPECT_NEAR(change / made.report.mean_square_change, 1, 0.35);
+    EXPECT_GT(static_cast<double>(made.report.parameters), last);
+    last = static_cast<double>(made.report.parameters);
+  }
+}
+
+TEST(Compress, ParametersAndBytesAreKept) {
+  const auto vertices = half_empty_field(4);
+  for (const double parameters : {2e3, 2e4}) {
+    const CompactField made = compress(*vertices, {Budget::Kind::kParameters, parameters});
+    EXPECT_LE(static_cast<double>(made.report.parameters), parameters);
+    EXPECT_GT(static_cast<double>(made.report.parameters), 0.8 * parameters);
+  }
+  for (const double bytes : {3e3, 2e4}) {
+    const CompactField made = compress(*vertices, {Budget::Kind::kBytes, bytes});
+    EXPECT_LE(static_cast<double>(made.report.bytes), bytes);
+    EXPECT_GT(static_cast<double>(made.report.bytes), 0.8 * bytes);
+  }
+}
+
+TEST(Compress, EmptyRegionsAreLargeLeavesWithoutParameters) {
+  const auto vertices = half_empty_field(16);
+  const CompactField made = compress(*vertices, {Budget::Kind::kDecibels, 0.1});
+  const field::Quadtree& tree = made.field->tree();
+  const int textured = tree.find_leaf(40, 10), empty = tree.find_leaf(500, 10);
+  EXPECT_GT(made.field->shape(textured).rank_z + made.field->shape(textured).rank_x +
+                made.field->shape(textured).rank_y,
+            0);
+  EXPECT_EQ(made.field->offset(empty), made.field->offset(empty + 1));
+  EXPECT_LE(tree.leaf(textured).square.size, 32);
+  EXPECT_EQ(made.field->density(500.2, 10.1, 12.3), 0.0);
+}
+
+TEST(Compress, CodesStandForTheField) {
+  const auto vertices = half_empty_field(4);
+  const CompactField made = compress(*vertices, {Budget::Kind::kDecibels, 0.1});
+  const Field& field = *made.field;
+  for (int leaf = 0; leaf < field.tree().num_leaves(); ++leaf) {
+    const auto first = static_cast<std::size_t>(made.codes.offset[static_cast<std::size_t>(leaf)]);
+    const auto end =
+        static_cast<std::size_t>(made.codes.offset[static_cast<std::size_t>(leaf) + 1]);
+    const QuantisedLeaf decoded =
+        decode(std::span(made.codes.bytes).subspan(first, end - first), field.shape(leaf));
+    std::vector<float> parameters(field.offset(leaf + 1) - field.offset(leaf));
+    dequantise(decoded, made.codes.step, parameters);
+    for (std::size_t i = 0; i < decoded.numbers.size(); ++i)
+      ASSERT_EQ(parameters[i], field.parameters()[field.offset(leaf) + i]);
+  }
+}
+
+// Where leaves meet at a face, a square reads the mean of their values, and so do both neighbours.
+TEST(VertexDensities, AgreeOnFaces) {
+  const auto field = half_empty_field(2);
+  for (float& value : field->parameters().subspan(field->offset(2))) value += 0.5f;
+  const VertexDensities vertices(*field);
+  EXPECT_EQ(vertices.smallest_side(), 16);
+  const PlaceDensities left = vertices.read({0, 0, 32}), right = vertices.read({32, 0, 16});
+  for (int k = 0; k < left.nz; ++k) {
+    for (int j = 0; j < right.ny; ++j)
+      EXPECT_EQ(left.values(32, k * left.ny + j), right.values(0, k * right.ny + j));
+  }
+  EXPECT_EQ(vertices.leaf_like({-32, 0, 64}), -1) << "margin and region";
+  EXPECT_TRUE(vertices.is_outside({64, 0, 32}));
+  EXPECT_FALSE(vertices.is_outside({32, 0, 64}));
+}
+
+}  // namespace
+}  // namespace tomofield::compact

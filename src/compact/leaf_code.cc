@@ -1,0 +1,125 @@
+#include "compact/leaf_code.h"
+
+#include <fmt/format.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "base/check.h"
+#include "tomofield/error.h"
+
+namespace tomofield::compact {
+namespace {
+
+using field::LeafShape;
+
+constexpr int kLevel = 19;     // of Zstandard; leaves are small
+constexpr int kMostBytes = 5;  // of a number of 32 bits, seven a byte
+
+// The lengths of vectors and matrices and the rank of one mode.
+struct ModeShape {
+  std::size_t vector = 0, matrix = 0, rank = 0;
+  std::size_t size() const { return (vector + matrix) * rank; }
+};
+
+std::array<ModeShape, 3> modes_of(const LeafShape& s) {
+  const auto nx = static_cast<std::size_t>(s.nx), ny = static_cast<std::size_t>(s.ny),
+             nz = static_cast<std::size_t>(s.nz);
+  return {{{nx, nz * ny, static_cast<std::size_t>(s.rank_x)},
+           {ny, nx * nz, static_cast<std::size_t>(s.rank_y)},
+           {nz, nx * ny, static_cast<std::size_t>(s.rank_z)}}};
+}
+
+std::size_t count_numbers(const LeafShape& shape) {
+  std::size_t count = 0;
+  for (const ModeShape& mode : modes_of(shape)) count += mode.size();
+  return count;
+}
+
+// Returns what a mode's vector of whole numbers is to be multiplied by: it has length 1.
+double scale_of(std::span<const std::int32_t> vector) {
+  double square = 0;
+  for (const std::int32_t number : vector) square += static_cast<double>(number) * number;
+  return square > 0 ? 1 / std::sqrt(square) : 0;
+}
+
+struct Compressor {
+  Compressor() : context(ZSTD_createCCtx(), ZSTD_freeCCtx) {
+    if (!context) throw std::bad_alloc();
+    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kLevel);
+    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
+  }
+  std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context;
+};
+
+}  // namespace
+
+void dequantise(const QuantisedLeaf& leaf, double step, std::span<float> parameters) {
+  TOMOFIELD_CHECK(leaf.numbers.size() == count_numbers(leaf.shape), "one number a parameter");
+  std::span<const std::int32_t> numbers(leaf.numbers);
+  float* to = parameters.data();
+  for (const ModeShape& mode : modes_of(leaf.shape)) {
+    for (std::size_t r = 0; r < mode.rank; ++r) {
+      const auto vector = numbers.subspan(r * mode.vector, mode.vector);
+      const auto matrix = numbers.subspan(mode.rank * mode.vector + r * mode.matrix, mode.matrix);
+      const double scale = scale_of(vector);
+      for (std::size_t i = 0; i < vector.size(); ++i)
+        to[i * mode.rank + r] = static_cast<float>(vector[i] * scale);
+      for (std::size_t i = 0; i < matrix.size(); ++i)
+        to[(mode.vector + i) * mode.rank + r] = static_cast<float>(matrix[i] * step);
+    }
+    to += mode.size();
+    numbers = numbers.subspan(mode.size());
+  }
+}
+
+std::vector<std::uint8_t> encode(const QuantisedLeaf& leaf) {
+  if (leaf.numbers.empty()) return {};
+  std::vector<std::uint8_t> plain;
+  plain.reserve(leaf.numbers.size());
+  for (const std::int32_t number : leaf.numbers) {
+    auto rest =
+        (static_cast<std::uint32_t>(number) << 1) ^ static_cast<std::uint32_t>(number >> 31);
+    for (; rest >= 0x80; rest >>= 7)
+      plain.push_back(static_cast<std::uint8_t>(0x80 | (rest & 0x7F)));
+    plain.push_back(static_cast<std::uint8_t>(rest));
+  }
+  thread_local const Compressor compressor;
+  std::vector<std::uint8_t> code(ZSTD_compressBound(plain.size()));
+  const std::size_t size = ZSTD_compress2(compressor.context.get(), code.data(), code.size(),
+                                          plain.data(), plain.size());
+  TOMOFIELD_CHECK(ZSTD_isError(size) == 0, "Zstandard packs any bytes");
+  code.resize(size);
+  return code;
+}
+
+QuantisedLeaf decode(std::span<const std::uint8_t> code, const LeafShape& shape) {
+  const std::size_t count = count_numbers(shape);
+  QuantisedLeaf leaf{.shape = shape, .numbers = std::vector<std::int32_t>(count)};
+  if (count == 0 && code.empty()) return leaf;
+  std::vector<std::uint8_t> plain(count * kMostBytes);
+  const std::size_t size = ZSTD_decompress(plain.data(), plain.size(), code.data(), code.size());
+  if (ZSTD_isError(size) != 0)
+    throw Error(fmt::format("the code of a leaf is damaged ({})", ZSTD_getErrorName(size)));
+  plain.resize(size);
+  auto at = plain.begin();
+  for (std::int32_t& number : leaf.numbers) {
+    std::uint32_t bits = 0;
+    for (int shift = 0;; shift += 7) {
+      if (at == plain.end() || shift >= 7 * kMostBytes)
+        throw Error("the code of a leaf ends early or has no numbers");
+      const auto byte = static_cast<std::uint32_t>(*at++);
+      bits |= (byte & 0x7F) << shift;
+      if (byte < 0x80) break;
+    }
+    number = static_cast<std::int32_t>((bits >> 1) ^ (0U - (bits & 1U)));
+  }
+  if (at != plain.end()) throw Error("the code of a leaf has more numbers than its shape says");
+  return leaf;
+}
+
+}  // namespace tomofield::compact

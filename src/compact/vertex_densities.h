@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "field/field.h"
+
+namespace tomofield::compact {
+
+using FloatMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// Holds the densities of a finished field at the vertices of a square of the specimen's plane. The
+/// vertices are as far apart as those of the field.
+struct PlaceDensities {
+  int nx = 0, ny = 0, nz = 0;
+  FloatMatrix values;   ///< [nx, nz·ny], y fastest
+  double volume = 0.0;  ///< of the square and the whole thickness, in cubic pixels
+
+  /// Returns the volume that a vertex stands for.
+  double volume_of_vertex() const { return volume / static_cast<double>(values.size()); }
+};
+
+/// Reads the densities of a field of plain vertices in squares that need not be its leaves. Where
+/// leaves share a face, a density is the mean of theirs, so that all squares agree on their faces.
+class VertexDensities {
+ public:
+  /// `vertices` is of kind "grid" and must outlive the object.
+  explicit VertexDensities(const field::Field& vertices);
+
+  const field::Field& field() const { return vertices_; }
+  /// Returns the smallest side of a square that can be read: half a leaf, and so on, as long as
+  /// sides stay multiples of a slab's rows and vertices fall on vertices.
+  std::int64_t smallest_side() const { return smallest_side_; }
+  /// Returns a leaf that holds a part of the square if every part of it belongs to leaves of one
+  /// region whose vertices are equally far apart, and −1 otherwise.
+  int leaf_like(const field::Square& square) const;
+  /// Returns true if no leaf of the field reaches into the square.
+  bool is_outside(const field::Square& square) const;
+  /// Returns the densities of a square for which leaf_like() finds a leaf.
+  PlaceDensities read(const field::Square& square) const;
+
+ private:
+  std::vector<int> leaves_near(const field::Square& square, std::int64_t reach) const;
+  bool are_alike(int leaf, int other) const;
+
+  const field::Field& vertices_;
+  std::int64_t smallest_side_ = 0;
+};
+
+}  // namespace tomofield::compact

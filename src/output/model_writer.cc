@@ -1,0 +1,193 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "base/enum_names.h"
+#include "base/parallel.h"
+#include "base/trace.h"
+#include "io/atomic_file.h"
+#include "io/hdf5_file.h"
+#include "output/compact_model.h"
+#include "output/model_file.h"
+#include "output/model_format.h"
+#include "tomofield/error.h"
+#include "tomofield/version.h"
+
+namespace tomofield::output {
+namespace {
+
+using io::Hdf5Group;
+using Integers = std::vector<std::int64_t>;
+
+// Writes one member of a list of structs as an array.
+template <typename Items, typename Get>
+void write_column(Hdf5Group& group, const char* name, const Items& items, Get get) {
+  Integers column;
+  for (const auto& item : items) column.push_back(static_cast<std::int64_t>(get(item)));
+  group.write_array<std::int64_t>(name, column);
+}
+
+void write_geometry(Hdf5Group group, const ModelInfo& info) {
+  const geometry::TiltGeometry& g = info.geometry;
+  group.write_integer("width", g.width);
+  group.write_integer("height", g.height);
+  group.write_number("thickness", g.thickness);
+  group.write_integer("hand", g.hand);
+  group.write_number("axis_x", g.axis_x);
+  group.write_number("axis_z", g.axis_z);
+  group.write_array<double>("tilt_deg", g.tilt_deg);
+  const Integers roi{info.roi.x0, info.roi.y0, info.roi.x1, info.roi.y1};
+  group.write_array<std::int64_t>("roi", roi);
+}
+
+void write_tree(Hdf5Group group, const field::Quadtree& tree) {
+  const field::RootGrid& roots = tree.roots();
+  group.write_integer("x0", roots.x0);
+  group.write_integer("y0", roots.y0);
+  group.write_integer("cell_size", roots.cell_size);
+  group.write_integer("columns", roots.columns);
+  group.write_integer("rows", roots.rows);
+  const auto& nodes = tree.nodes();
+  using Node = const field::QuadtreeNode&;
+  write_column(group, "node_x0", nodes, [](Node n) { return n.square.x0; });
+  write_column(group, "node_y0", nodes, [](Node n) { return n.square.y0; });
+  write_column(group, "node_size", nodes, [](Node n) { return n.square.size; });
+  write_column(group, "node_level", nodes, [](Node n) { return n.level; });
+  write_column(group, "node_is_margin", nodes,
+               [](Node n) { return n.region == field::Region::kMargin; });
+  write_column(group, "node_parent", nodes, [](Node n) { return n.parent; });
+  write_column(group, "node_first_child", nodes, [](Node n) { return n.first_child; });
+}
+
+void write_leaves(Hdf5Group group, const field::Field& field) {
+  write_column(group, "node", field.tree().leaves(), [](int node) { return node; });
+  const auto& shapes = field.shapes();
+  using Shape = const field::LeafShape&;
+  write_column(group, "nx", shapes, [](Shape s) { return s.nx; });
+  write_column(group, "ny", shapes, [](Shape s) { return s.ny; });
+  write_column(group, "nz", shapes, [](Shape s) { return s.nz; });
+  write_column(group, "rank_x", shapes, [](Shape s) { return s.rank_x; });
+  write_column(group, "rank_y", shapes, [](Shape s) { return s.rank_y; });
+  write_column(group, "rank_z", shapes, [](Shape s) { return s.rank_z; });
+  Integers offsets;
+  for (int i = 0; i <= field.tree().num_leaves(); ++i)
+    offsets.push_back(static_cast<std::int64_t>(field.offset(i)));
+  group.write_array<std::int64_t>("offset", offsets);
+}
+
+// Writes what is the same for all fields.
+void write_structure(Hdf5Group& group, const field::Field& field) {
+  group.write_text("kind", base::name_of(field.kind()));
+  group.write_number("thickness", field.thickness());
+  group.write_number("bias", static_cast<double>(field.bias));
+  group.write_number("softplus_beta", static_cast<double>(field.activation.beta));
+  write_tree(group.create_group("tree"), field.tree());
+  write_leaves(group.create_group("leaves"), field);
+}
+
+void write_codes(Hdf5Group group, const compact::LeafCodes& codes) {
+  group.write_number("step", codes.step);
+  group.write_array<std::int64_t>("offset", codes.offset);
+  group.write_array<std::uint8_t>("bytes", codes.bytes);
+}
+
+template <typename T>
+void write_arrays(Hdf5Group group, const std::map<std::string, std::vector<T>>& arrays) {
+  for (const auto& [name, values] : arrays) group.write_array<T>(name, values);
+}
+
+void write_training(Hdf5Group group, const TrainingState& state, const FloatArrays& more_floats) {
+  Hdf5Group floats = group.create_group("floats");
+  for (const auto& [name, values] : state.floats) floats.write_array<float>(name, values);
+  for (const auto& [name, source] : more_floats)
+    floats.write_floats(name, source.size, source.hand_out);
+  write_arrays(group.create_group("doubles"), state.doubles);
+  write_arrays(group.create_group("integers"), state.integers);
+}
+
+// Writes a model whose field and training state come from `write_rest`.
+void write_model(const std::filesystem::path& path, const ModelInfo& info, std::int64_t version,
+                 const std::function<void(Hdf5Group&)>& write_rest) {
+  const base::TraceSpan span("write model");
+  io::AtomicFile target(path);
+  {
+    io::Hdf5File file = io::Hdf5File::create(target.temporary_path());
+    {
+      Hdf5Group root = file.root();
+      root.write_text("format", kFormat);
+      root.write_integer("format_version", version);
+      root.write_text("written_by", fmt::format("tomofield {}", library_version()));
+      root.write_number("x_tilt_deg", info.x_tilt_deg);
+      root.write_number("pixel_size_A", info.pixel_size_A);
+      root.write_number("density_unit", info.density_unit);
+      root.write_text("contrast", info.is_dark ? "dark" : "bright");
+      root.write_text("options_json", info.options_json);
+      write_geometry(root.create_group("geometry"), info);
+      write_rest(root);
+    }
+    file.close();
+  }
+  target.commit();
+}
+
+}  // namespace
+
+void require_finite_parameters(const field::Field& field, const std::string& complaint) {
+  const std::span<const float> parameters = field.parameters();
+  std::vector<std::size_t> bad(static_cast<std::size_t>(field.tree().num_leaves()),
+                               parameters.size());  // the first one of each leaf
+  base::parallel_for("check parameters", std::ssize(bad), [&](std::int64_t i) {
+    const int leaf = static_cast<int>(i);
+    if (!field.keeps(leaf)) return;
+    const auto first = parameters.begin() + std::ptrdiff_t(field.offset(leaf)),
+               end = parameters.begin() + std::ptrdiff_t(field.offset(leaf + 1));
+    const auto found = std::find_if(first, end, [](float value) { return !std::isfinite(value); });
+    if (found != end)
+      bad[static_cast<std::size_t>(i)] = static_cast<std::size_t>(found - parameters.begin());
+  });
+  const auto first_bad = std::ranges::min_element(bad);
+  if (first_bad == bad.end() || *first_bad == parameters.size()) return;
+  throw Error(fmt::format("{}: parameter {} is {}", complaint, *first_bad, parameters[*first_bad]));
+}
+
+void require_finite(const field::Field& field, const std::filesystem::path& path) {
+  require_finite_parameters(field, fmt::format("the fit diverged, so '{}' is left as it was; a "
+                                               "lower learning rate may help",
+                                               path.string()));
+}
+
+void save_model(const std::filesystem::path& path, const field::Field& field, const ModelInfo& info,
+                const TrainingState* training, const FloatArrays& more_floats) {
+  require_finite(field, path);
+  save_model(path, field, FloatSource(field.parameters()), info, training, more_floats);
+}
+
+void save_model(const std::filesystem::path& path, const field::Field& field,
+                const FloatSource& parameters, const ModelInfo& info, const TrainingState* training,
+                const FloatArrays& more_floats) {
+  write_model(path, info, kFormatVersion, [&](Hdf5Group& root) {
+    Hdf5Group group = root.create_group("field");
+    write_structure(group, field);
+    group.write_floats("parameters", parameters.size, parameters.hand_out);
+    if (training != nullptr) write_training(root.create_group("training"), *training, more_floats);
+  });
+}
+
+void save_model(const std::filesystem::path& path, const field::Field& field,
+                const compact::LeafCodes& codes, const ModelInfo& info) {
+  write_model(path, info, kCompactVersion, [&](Hdf5Group& root) {
+    Hdf5Group group = root.create_group("field");
+    write_structure(group, field);
+    write_codes(group.create_group("code"), codes);
+  });
+}
+
+void save_model(const std::filesystem::path& path, const Model& model,
+                const TrainingState* training) {
+  save_model(path, *model.field, model, training);
+}
+
+}  // namespace tomofield::output
