@@ -4,6 +4,7 @@ import dataclasses
 import json
 import os
 import re
+import subprocess
 
 import numpy as np
 
@@ -11,6 +12,7 @@ import alignment_score
 import quality_rows
 from alignment_score import Alignment
 
+PUBLISHED = ("xcorr", "matching")  # methods of published_alignment.py
 QUICK_FIT = "--tv-penalty smooth --coarse-epochs 1 --vertex-epochs 1 --epochs 1 --rank 4"
 
 
@@ -19,11 +21,12 @@ class Case:
     """Describes a misaligned series, how it is aligned, and what is asked: {figure: limit}."""
 
     name: str
-    align: str  # refine or full
+    align: str  # refine or full, or a method of published_alignment.py
     moved: str  # options of simulate that its .xf file undoes
     asked: dict
     warped: str = ""  # options of simulate that no .xf file undoes
     tilt_offset_deg: float = 0.0  # error of the given tilt angles
+    tilt_spread_deg: float = 0.0  # of the random errors of the given tilt angles
     noise: float = 0.05
 
 
@@ -40,6 +43,9 @@ def cases(kind):
         Case("10 px", "full", moved_10, roughly),
         Case("3 px, axis 3°", "full", f"{moved_3} --misalign-axis 3", {"axis_error_deg": 0.05}),
         Case("3 px, tilt offset 2°", "refine", moved_3, {"tilt_offset_deg": 0.2}, tilt_offset_deg=2),
+        Case("3 px, tilts 0.3°", "refine", moved_3, {}, tilt_spread_deg=0.3),
+        Case("3 px", "xcorr", moved_3, {}),
+        Case("3 px", "matching", moved_3, {}),
         Case("warp 2 px", "refine", "", {"warp_left": 0.2, "loss_dB": 0.4},
              warped="--misalign-local 2"),
         Case("aligned", "refine", "", {"x_px": 0.05, "y_px": 0.05}),
@@ -64,7 +70,7 @@ class Row:
         """Returns what has changed if a row must be measured again."""
         case = self.case
         return (f"noise {case.noise} {case.moved} {case.warped} tilt offset {case.tilt_offset_deg} "
-                f"{case.align} {self.fit}")
+                f"spread {case.tilt_spread_deg} {case.align} {self.fit}")
 
 
 def all_rows(size, fit=""):
@@ -126,6 +132,17 @@ def write_record_in_frame(truth, estimate, size, source, target):
         json.dump(record, file)
 
 
+def align_as_published(row, folder, prefix):
+    """Aligns the series in a folder with published_alignment.py and writes PREFIX.xf, .tlt, .json."""
+    program = os.path.join(os.path.dirname(os.path.abspath(__file__)), "published_alignment.py")
+    subprocess.run([program, folder, str(quality_rows.thickness_of(row.size)), row.case.align,
+                    f"{prefix}.xf"], check=True)
+    tilts = np.loadtxt(os.path.join(folder, "tilt_series.tlt"))
+    np.savetxt(f"{prefix}.tlt", tilts, fmt="%.6f")
+    with open(f"{prefix}.json", "w", encoding="utf-8") as file:
+        json.dump({"views": [{"left_out": False} for _ in tilts]}, file)
+
+
 def psnr(options, volume, folder, scratch):
     truth = os.path.join(folder, "truth.mrc")
     return quality_rows.score(options, volume, truth, scratch)["psnr_affine_dB"]
@@ -135,14 +152,20 @@ def measure(options, row, seed, scratch):
     """Reconstructs a series with its true alignment, with the one that tomofield finds, and with
     that one moved to where the truth has the specimen. Returns the figures."""
     case = row.case
-    folder = series(options, row, seed, f"{case.moved} {case.warped}")
+    wrong_tilts = f"--misalign-tilt {case.tilt_spread_deg}" if case.tilt_spread_deg else ""
+    folder = series(options, row, seed, f"{case.moved} {case.warped} {wrong_tilts}")
+    given_tlt = os.path.join(folder, "tilt_series.rawtlt") if wrong_tilts else None
     unwarped = series(options, row, seed, case.moved)
     best, aligned, moved = (os.path.join(scratch, name) for name in ("best", "aligned", "moved"))
     true_xf = os.path.join(unwarped, "tilt_series.xf")  # simulate wrote none for an aligned series
     seconds_without = reconstruct(options, row, f"{best}.mrc", unwarped,
                                   *(["--xf", true_xf] if os.path.exists(true_xf) else []))
     aligning = ["--align", case.align, "--tilt-offset", str(case.tilt_offset_deg)]
-    seconds = reconstruct(options, row, f"{aligned}.mrc", folder, *aligning)
+    if case.align in PUBLISHED:
+        seconds = None
+        align_as_published(row, folder, f"{aligned}_align")
+    else:
+        seconds = reconstruct(options, row, f"{aligned}.mrc", folder, *aligning, tlt=given_tlt)
 
     truth, size = alignment_score.read_truth(folder)
     estimate, kept = read_estimate(f"{aligned}_align")
@@ -155,7 +178,8 @@ def measure(options, row, seed, scratch):
         reconstruct(options, row, f"{moved}.mrc", folder, *aligning, "--resume")
 
     given = Alignment(alignment_score.unaligned(len(truth.tilts_deg)),
-                      truth.tilts_deg + case.tilt_offset_deg)
+                      (np.loadtxt(given_tlt) if given_tlt else truth.tilts_deg)
+                      + case.tilt_offset_deg)
     start = alignment_score.score(truth, given, size)
     found = alignment_score.score(truth.of_views(kept), estimate.of_views(kept), size)
     if case.warped:
@@ -163,7 +187,8 @@ def measure(options, row, seed, scratch):
                               / start["local_less_specimen_warp_px"])
     best_dB = psnr(options, f"{best}.mrc", unwarped, scratch)
     found["loss_dB"] = best_dB - psnr(options, f"{moved}.mrc", folder, scratch)
-    found["cost"] = seconds / seconds_without
+    if seconds is not None:
+        found["cost"] = seconds / seconds_without
     return {"start": start, "found": found, "psnr_true_dB": best_dB,
             "core_seconds": {"without": seconds_without, "with": seconds},
             "left_out": len(truth.tilts_deg) - len(kept)}

@@ -146,7 +146,7 @@ void add_field_and_fit(Class& options) {
       .def_readwrite("factor_variation", &Options::factor_variation)
       .def_readwrite("boundary", &Options::boundary)
       .def_readwrite("fourier", &Options::fourier)
-      .def_readwrite("keep_spikes", &Options::keep_spikes)
+      .def_readwrite("spike_rank", &Options::spike_rank)
       .def_readwrite("fit_noise", &Options::fit_noise)
       .def_readwrite("fit_view_scale", &Options::fit_view_scale)
       .def_readwrite("hold_out", &Options::hold_out)
@@ -160,6 +160,7 @@ void add_field_and_fit(Class& options) {
   add_choice(options, "engine", &Options::engine);
   add_choice(options, "penalty", &Options::penalty);
   add_choice(options, "fourier_ring", &Options::fourier_ring);
+  add_choice(options, "noise_model", &Options::noise_model);
 }
 
 void add_halves_volume_and_run(Class& options) {

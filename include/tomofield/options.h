@@ -24,6 +24,8 @@ enum class Engine { kSlab, kRay };
 enum class Penalty { kConcave, kSmooth };
 /// The Fourier prior compares an axis with its ring's mean or largest amplitude.
 enum class RingReference { kMean, kMax };
+/// The noise of a view has the same power at all frequencies, or that of the residual.
+enum class NoiseModel { kWhite, kColoured };
 /// Order of the axes in a volume file: sections along Z, or along Y as IMOD's tilt writes them.
 enum class VolumeAxes { kXyz, kXzy };
 /// Type of a voxel in a volume file: MRC modes 2, 12 and 1 (scaled).
@@ -118,8 +120,10 @@ struct Options {
   double boundary = 4.0;                    ///< weight of the boundary consistency (eq. 6)
   double fourier = 0.0;                     ///< weight of the isotropic Fourier prior (eq. 7)
   RingReference fourier_ring = RingReference::kMean;
-  bool keep_spikes = false;            ///< plain vertices may stand out from all their neighbours
-  bool fit_noise = true;               ///< weight views by their residuals, and limit these
+  /// A plain vertex is at most the one of this rank among the 26 around it; 0: no limit.
+  std::optional<int> spike_rank;
+  bool fit_noise = true;  ///< weight views by their residuals, and limit these
+  NoiseModel noise_model = NoiseModel::kWhite;
   std::optional<bool> fit_view_scale;  ///< fit a scale and an offset a view
   int hold_out = 0;                    ///< keep every Nth view from the fit and score it; 0: none
   bool tune = false;                   ///< choose penalty, weight, rank and epochs by trials

@@ -73,8 +73,9 @@ class Options(TypedDict, total=False):
     boundary: float
     fourier: float
     fourier_ring: Literal["mean", "max"]
-    keep_spikes: bool
+    spike_rank: int | None
     fit_noise: bool
+    noise_model: Literal["white", "coloured"]
     fit_view_scale: Optional[bool]
     hold_out: int
     tune: bool

@@ -82,7 +82,19 @@ fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t s
   options.coarse_epochs = coarse_epochs;
   options.epochs = fine_epochs;
   options.fit_noise = false;
+  options.noise_model = NoiseModel::kWhite;
   return options;
+}
+
+measurement::Measurement aligning_measurement(const JointProblem& problem,
+                                              std::span<const geometry::ViewCorrection> corrections,
+                                              const fit::FieldOptions& field,
+                                              const distributed::Communicator& processes) {
+  measurement::Measurement prepared =
+      measurement::prepare_realigned(problem.recorded, corrections, problem.specimen,
+                                     problem.scratch_dir, fit::band_rows(field), processes);
+  prepared.transfers = problem.transfers;
+  return prepared;
 }
 
 ImagePair image_pair(const measurement::PredictedView& view,
@@ -112,7 +124,9 @@ LocalRegistrationOptions local_options(const measurement::Measurement& measureme
 std::size_t prediction_memory(const measurement::Measurement& measurement) {
   const std::size_t of_view = prediction_bytes(measurement, 1);
   const auto num_views = static_cast<std::size_t>(measurement.geometry.num_views());
-  return std::max(of_view, std::min(kPredictionBytes, num_views * of_view));
+  // Three images of each view tell the derivatives by the tilt, with wider pixels.
+  const std::size_t by_tilt = num_views * prediction_bytes(measurement, kSlowBin) * 3 / 2;
+  return std::max({of_view, by_tilt, std::min(kPredictionBytes, num_views * of_view)});
 }
 
 void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& measurement,

@@ -26,6 +26,12 @@ fit::FieldOptions aligning_field(fit::FieldOptions field);
 /// blurs until it explains wrong shifts.
 fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t seed);
 
+/// Prepares the views of a problem, each aligned with a correction.
+measurement::Measurement aligning_measurement(const JointProblem& problem,
+                                              std::span<const geometry::ViewCorrection> corrections,
+                                              const fit::FieldOptions& field,
+                                              const distributed::Communicator& processes);
+
 /// Returns a view and its prediction by a fit in one of its stages, with their place in the aligned
 /// view.
 ImagePair image_pair(const measurement::PredictedView& view,
@@ -35,7 +41,8 @@ ImagePair image_pair(const measurement::PredictedView& view,
 LocalRegistrationOptions local_options(const measurement::Measurement& measurement,
                                        const fit::Stage& stage);
 
-/// Returns the bytes that the predictions of for_each_prediction() take at most.
+/// Returns the bytes that the predictions of for_each_prediction() and of predictions_by_tilt()
+/// take at most.
 std::size_t prediction_memory(const measurement::Measurement& measurement);
 
 /// Predicts all views by a fit in one of its stages, as many at a time as fit into a gigabyte, and

@@ -12,7 +12,8 @@ namespace tomofield::align {
 ///
 /// - shifts in x that are a combination of cos θ and sin θ: a translation of the specimen;
 /// - the mean of the shifts in y: a translation as well;
-/// - the mean of the tilt corrections: a rotation of the specimen about Y;
+/// - tilt corrections that are a cubic function of the tilt: the constant part is a rotation of the
+///   specimen about Y, and a specimen that is stretched a little explains most of the rest;
 /// - the mean logarithm of the magnifications: the size of a pixel.
 ///
 /// The rest is the nearest in least squares. So the specimen stays where the given alignment has

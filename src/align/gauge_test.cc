@@ -86,18 +86,20 @@ TEST_P(Gauge, ASpecimensMoveDoesNotChangeTheResult) {
 TEST_P(Gauge, TheRestIsOrthogonalAndStays) {
   std::vector<ViewCorrection> corrections = random_corrections(geometry_.tilt_deg.size());
   remove_gauge(geometry_, corrections);
-  double along_x = 0, along_z = 0, y = 0, tilt = 0, magnification = 0, size = 0;
+  double along_x = 0, along_z = 0, y = 0, tilt = 0, cubic = 0, magnification = 0, size = 0;
   for (std::size_t v = 0; v < corrections.size(); ++v) {
     const double angle = geometry_.tilt_deg[v] * std::numbers::pi / 180;
     along_x += corrections[v].shift_x_px * std::cos(angle);
     along_z += corrections[v].shift_x_px * std::sin(angle);
     y += corrections[v].shift_y_px;
     tilt += corrections[v].tilt_deg;
+    cubic += corrections[v].tilt_deg * std::pow(angle, 3);
     magnification += corrections[v].log_magnification;
     size += std::abs(corrections[v].shift_x_px);
   }
   EXPECT_GT(size, 3.0);
-  for (const double sum : {along_x, along_z, y, tilt, magnification}) EXPECT_NEAR(sum, 0.0, 1e-9);
+  for (const double sum : {along_x, along_z, y, tilt, cubic, magnification})
+    EXPECT_NEAR(sum, 0.0, 1e-9);
   const std::vector<ViewCorrection> once = corrections;
   remove_gauge(geometry_, corrections);
   for (std::size_t v = 0; v < once.size(); ++v) expect_near(corrections[v], once[v], 1e-9);

@@ -10,7 +10,9 @@
 #include "align/gauge.h"
 #include "align/local_registration.h"
 #include "align/mean_gain.h"
+#include "align/prediction_by_tilt.h"
 #include "align/registration.h"
+#include "align/slab_pose_search.h"
 #include "align/slow_modes.h"
 #include "base/trace.h"
 #include "fit/fit.h"
@@ -24,8 +26,12 @@ using geometry::ViewCorrection;
 constexpr double kRelaxation = 1.3;
 // A shift changes by at most so many pixels of the stage at once.
 constexpr double kLongestStep = 2.0;
-// Rotations and magnifications are looked for in pixels at most this many times as wide.
+// Rotations, magnifications and tilts are looked for in pixels at most this many times as wide.
 constexpr int kFreedomBin = 2;
+// Tilts open only if it is very sure: a shift that the field blurs looks like an error of the tilt.
+constexpr double kSureOfTilts = 5.0;
+// Tilts are looked for in every so many updates with these pixels: they cost two more predictions.
+constexpr int kTiltEvery = 2;
 constexpr double kSure = 3.0;  // standard errors by which a freedom must pay
 
 // A fit and the corrections of the views that it is made with.
@@ -36,9 +42,7 @@ class AligningFit {
       : problem_(problem),
         processes_(processes),
         field_(aligning_field(problem.field)),
-        measurement_(measurement::prepare_realigned(problem.recorded, start, problem.specimen,
-                                                    problem.scratch_dir, fit::band_rows(field_),
-                                                    processes)),
+        measurement_(aligning_measurement(problem, start, field_, processes)),
         fit_(measurement_, field_, joint_fit(problem.seed), processes) {
     found_.agreement.resize(start.size());
     // A start with rotations has errors of rotations.
@@ -97,6 +101,7 @@ class AligningFit {
         *shift = std::clamp(kRelaxation * *shift, -most, most);
       step.rotation_rad *= kRelaxation;
       step.log_magnification *= kRelaxation;
+      step.tilt_deg *= kRelaxation;
     }
     return steps;
   }
@@ -105,13 +110,24 @@ class AligningFit {
   std::vector<ViewCorrection> register_views(const fit::Stage& stage) {
     std::vector<std::optional<Registration>> registrations(found_.corrections.size());
     std::vector<LocalRegistration> local;
+    const geometry::TiltGeometry& g = measurement_.geometry;
+    SlabPoseSearch search(g.tilt_deg, g.hand, g.width / stage.bin, !problem_.field.with_margin);
     if (fit_.is_done())
       local.assign(registrations.size(), LocalRegistration(local_options(measurement_, stage)));
+    std::vector<std::vector<float>> by_tilt;
+    if (stage.bin == kFreedomBin && num_updates_++ % kTiltEvery == 0)
+      by_tilt = predictions_by_tilt(measurement_, fit_);
     for_each_prediction(fit_, measurement_, stage, [&](std::size_t view, const ImagePair& images) {
-      registrations[view].emplace(images, RegistrationOptions{},
+      if (fit_.is_done()) search.add(view, images);
+      ImagePair pair = images;
+      if (!by_tilt.empty()) pair.by_tilt = by_tilt[view];
+      registrations[view].emplace(pair, RegistrationOptions{},
                                   local.empty() ? nullptr : &local[view]);
     });
-    if (!local.empty()) found_.motion = motion_that_pays(local);
+    if (fit_.is_done()) {
+      found_.motion = motion_that_pays(local);
+      find_pose(search);
+    }
     if (stage.bin <= kFreedomBin) open_freedoms(registrations);
     std::vector<ViewCorrection> steps;
     for (std::size_t v = 0; v < registrations.size(); ++v) {
@@ -122,9 +138,19 @@ class AligningFit {
     return steps;
   }
 
+  // Finds thickness and pitch of the specimen in the aligned views of full width.
+  void find_pose(const SlabPoseSearch& search) {
+    const base::TraceSpan span("find pose");
+    found_.pose = search.find({.thickness_px = measurement_.geometry.thickness});
+    if (!found_.pose) return;
+    found_.pose->pose.thickness_px *= measurement_.bin_factor;
+    found_.pose->error.thickness_px *= measurement_.bin_factor;
+  }
+
   // Opens each freedom that predicts pixels better which did not decide about it.
   void open_freedoms(const std::vector<std::optional<Registration>>& registrations) {
-    for (bool Freedoms::*freedom : {&Freedoms::rotation, &Freedoms::magnification}) {
+    for (bool Freedoms::*freedom :
+         {&Freedoms::rotation, &Freedoms::magnification, &Freedoms::tilt}) {
       Freedoms with = found_.freedoms;
       with.*freedom = true;
       if (with == found_.freedoms) continue;
@@ -132,8 +158,8 @@ class AligningFit {
     }
   }
 
-  // Says whether the error of the views falls by more than three standard errors. One is too few,
-  // because the question comes up at every update.
+  // Says whether the error of the views falls by so many standard errors that it is no accident.
+  // One is too few, because the question comes up at every update.
   static bool pays(const std::vector<std::optional<Registration>>& registrations,
                    const Freedoms& without, const Freedoms& with) {
     std::vector<double> gains;
@@ -141,7 +167,7 @@ class AligningFit {
       const double before = registration->predicted_error(without);
       if (before > 0.0) gains.push_back(1.0 - registration->predicted_error(with) / before);
     }
-    return mean_gain(gains).exceeds(kSure);
+    return mean_gain(gains).exceeds(with.tilt && !without.tilt ? kSureOfTilts : kSure);
   }
 
   const JointProblem& problem_;
@@ -150,6 +176,7 @@ class AligningFit {
   measurement::Measurement measurement_;
   fit::Fit fit_;
   SlowModeAmplifier slow_modes_;
+  int num_updates_ = 0;  // with pixels of kFreedomBin
   JointAlignment found_;
 };
 

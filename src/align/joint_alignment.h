@@ -4,14 +4,17 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "align/freedoms.h"
+#include "align/slab_pose.h"
 #include "base/progress.h"
 #include "distributed/communicator.h"
 #include "fit/options.h"
 #include "geometry/view_correction.h"
 #include "measurement/prepare.h"
+#include "microscope/view_transfer.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::align {
@@ -32,6 +35,8 @@ struct JointAlignment {
   /// Local motion that the last registration finds in each view, if that makes the prediction of
   /// pixels better; else empty.
   std::vector<geometry::ViewWarp> motion;
+  /// Thickness and pitch of the specimen, in pixels before binning; none if the views do not tell.
+  std::optional<FoundPose> pose;
   bool was_stopped = false;
   /// Root mean square of the change of the shifts in each update, in pixels before binning.
   std::vector<double> steps_px;
@@ -42,6 +47,9 @@ struct JointProblem {
   const tilt_series::TiltSeries& recorded;  ///< views that are not resampled, and keep their pixels
   const measurement::SpecimenOptions& specimen;
   fit::FieldOptions field;  ///< its kind is replaced by plain vertices
+  /// [view]: what the microscope does to the projections that views are registered to; empty:
+  /// nothing.
+  std::vector<microscope::ViewTransfer> transfers = {};
   std::uint64_t seed = 1;
   const std::filesystem::path& scratch_dir;
   base::ProgressSink progress;

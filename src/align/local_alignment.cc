@@ -63,9 +63,7 @@ class LocalFit {
         freedoms_(freedoms),
         processes_(processes),
         field_(aligning_field(problem.field)),
-        measurement_(measurement::prepare_realigned(problem.recorded, start, problem.specimen,
-                                                    problem.scratch_dir, fit::band_rows(field_),
-                                                    processes)),
+        measurement_(aligning_measurement(problem, start, field_, processes)),
         fit_(measurement_, field_, aligning_fit(kCoarseEpochs, kFineEpochs, problem.seed),
              processes),
         by_tilt_(start.size()) {

@@ -31,7 +31,7 @@ struct RegistrationOptions {
   // little about.
   double rotation_prior_deg = 0.5;
   double magnification_prior = 0.002;
-  double tilt_prior_deg = 0.3;
+  double tilt_prior_deg = 0.2;
 };
 
 /// Returns how many pixels a Gaussian blur makes one independent sample of.

@@ -25,8 +25,7 @@ std::vector<double> errors_of_held_out_views(const JointProblem& problem,
   const base::TraceSpan span("try alignment");
   const fit::FieldOptions field = aligning_field(problem.field);
   measurement::Measurement measurement =
-      measurement::prepare_realigned(problem.recorded, corrections, problem.specimen,
-                                     problem.scratch_dir, fit::band_rows(field), processes);
+      aligning_measurement(problem, corrections, field, processes);
   measurement.held_out = measurement::held_out_views(measurement.geometry.tilt_deg, kEvery);
   fit::Fit fit(measurement, field, held_out_fit(problem.seed), processes);
   fit.run([](const fit::Fit&) { return true; });

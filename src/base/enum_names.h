@@ -57,6 +57,11 @@ struct EnumNames<RingReference> {
                                      std::pair{RingReference::kMax, "max"}};
 };
 template <>
+struct EnumNames<NoiseModel> {
+  static constexpr std::array kNames{std::pair{NoiseModel::kWhite, "white"},
+                                     std::pair{NoiseModel::kColoured, "coloured"}};
+};
+template <>
 struct EnumNames<VolumeAxes> {
   static constexpr std::array kNames{std::pair{VolumeAxes::kXyz, "xyz"},
                                      std::pair{VolumeAxes::kXzy, "xzy"}};

@@ -19,8 +19,10 @@
 #include "io/output_files.h"
 #include "io/scratch_memory.h"
 #include "kernels/lanes.h"
+#include "measurement/ctf_correction.h"
 #include "measurement/held_out.h"
 #include "measurement/undecided_beads.h"
+#include "measurement/view_transfers.h"
 #include "option_table/values.h"
 #include "output/metrics.h"
 #include "output/shared_options.h"
@@ -104,6 +106,7 @@ nlohmann::json options_json(const BaselineOptions& options) {
   const Options& shared = options.shared;
   const nlohmann::json all = option_table::to_json(options.files, shared);
   return {{"input", all["input"]},
+          {"ctf_correction", base::name_of(options.ctf_correction)},
           {"specimen", all["specimen"]},
           {"with_margin", shared.with_margin},
           {"margin_spacing", shared.margin_spacing},
@@ -184,6 +187,19 @@ BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays,
           series.masks.bead_masking};
 }
 
+// Corrects the contrast transfer of the views, if the options have one.
+void correct_views(const BaselineOptions& options, const tilt_series::TiltSeries& tilt_series,
+                   measurement::Measurement& series) {
+  series.transfers = measurement::view_transfers(
+      options.files, options.shared, output::series_options(options.files, options.shared),
+      tilt_series);
+  if (series.transfers.empty()) return;
+  const base::TraceSpan span("correct contrast transfer");
+  measurement::correct_ctf(options.ctf_correction, series);
+  base::log_info(
+      fmt::format("ctf: views are corrected before ({})", base::name_of(options.ctf_correction)));
+}
+
 }  // namespace
 
 BaselinePaths baseline_paths(const std::filesystem::path& volume) {
@@ -195,6 +211,8 @@ BaselinePaths baseline_paths(const std::filesystem::path& volume) {
 void check_options(const BaselineOptions& options) {
   constexpr const char* kAdvice = "give --overwrite to replace it, or another name with -o";
   base::require_no_faults(option_table::range_faults(options.shared));
+  const auto faults = measurement::faults_of_transfer(options.files, options.shared);
+  base::require_no_faults({faults.begin(), faults.end()});
   const BaselinePaths paths = baseline_paths(options.shared.output);
   io::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
                          options.shared.overwrite, kAdvice);
@@ -247,6 +265,7 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   const bool fit_view_scale = fits_view_scale(options);
   measurement::Measurement series = prepare_measurement(
       tilt_series, output::specimen_options(options.shared), io::scratch_directory(paths.volume));
+  correct_views(options, tilt_series, series);
   keep_beads(series);  // as bright particles may be the specimen
   const std::vector<int> held_out =
       measurement::held_out_views(series.geometry.tilt_deg, options.shared.hold_out);

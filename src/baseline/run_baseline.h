@@ -8,6 +8,7 @@
 #include "baseline/method.h"
 #include "io/output_lock.h"
 #include "measurement/prepare.h"
+#include "microscope/view_filter.h"
 #include "option_table/setting.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
@@ -17,10 +18,13 @@ namespace tomofield::baseline {
 /// The settings of a baseline reconstruction.
 struct BaselineOptions {
   SeriesFiles files;
-  /// The options that do not depend on the method: images, masks, specimen, margin_spacing,
-  /// fit_view_scale, hold_out, tune (tune.h), volume, output and overwrite. Others have no effect.
+  /// The options that do not depend on the method: images, masks, contrast transfer and dose,
+  /// specimen, margin_spacing, fit_view_scale, hold_out, tune (tune.h), volume, output and
+  /// overwrite. Others have no effect.
   Options shared;
   Method method;
+  /// Corrects the views before, if there is a contrast transfer.
+  microscope::CtfCorrection ctf_correction = microscope::CtfCorrection::kFlip;
   /// Settings that the files of a project made, for the metrics; they are among the options.
   std::vector<option_table::Setting> origins = {};
 };

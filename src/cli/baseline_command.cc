@@ -35,6 +35,7 @@ template <typename Method>
 struct Arguments {
   option_table::Choices choices;
   Method method;
+  microscope::CtfCorrection ctf_correction = microscope::CtfCorrection::kFlip;
   std::optional<bool> non_negative;
   bool dry_run = false;
   std::optional<std::filesystem::path> trace;
@@ -88,7 +89,8 @@ void run(Arguments<Method>& arguments, const Origins& origins) {
   Method& method = arguments.method;
   if constexpr (requires { method.non_negative; })
     method.non_negative = arguments.non_negative.value_or(shared.contrast != Contrast::kDark);
-  const baseline::BaselineOptions options{arguments.choices.files, shared, method, origins};
+  const baseline::BaselineOptions options{arguments.choices.files, shared, method,
+                                          arguments.ctf_correction, origins};
   std::vector<io::OutputLock> locks;
   if (arguments.dry_run)
     baseline::check_options(options);
@@ -137,7 +139,13 @@ template <typename Method>
 std::shared_ptr<Arguments<Method>> add_method(CLI::App& command, const Origins& origins) {
   auto arguments = std::make_shared<Arguments<Method>>();
   add_input_options(command, arguments->choices);
-  add_groups(command, arguments->choices, {Group::kSpecimen});
+  add_groups(command, arguments->choices, {Group::kTransfer, Group::kSpecimen});
+  add_enum_option<microscope::CtfCorrection>(
+      command, "--ctf-correction", arguments->ctf_correction,
+      "What takes the contrast transfer of --ctf or --defocus back before the reconstruction, each "
+      "place of a view with its own defocus: flip its phases, multiply by it, or Wiener's filter")
+      ->default_str(base::name_of(arguments->ctf_correction))
+      ->group(std::string(title_of(Group::kTransfer)));
   if constexpr (requires { arguments->method.iterations; })
     add_iteration_options(command, *arguments);
   add_fit_options(command, *arguments);

@@ -166,7 +166,8 @@ void add_compare_command(CLI::App& program) {
       "Run several methods on one series, and write their volumes, a table and report.html");
   auto arguments = std::make_shared<Arguments>();
   add_input_options(command, arguments->choices);
-  add_groups(command, arguments->choices, {option_table::Group::kSpecimen});
+  add_groups(command, arguments->choices,
+             {option_table::Group::kTransfer, option_table::Group::kSpecimen});
   add_row(command, "fit.fit_view_scale", arguments->choices);
   const auto own_options = add_own_options(command, *arguments);
   add_common_options(command);

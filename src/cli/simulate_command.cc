@@ -162,6 +162,12 @@ void add_misalignment_options(CLI::App& command, SimulateArguments& arguments) {
                   "Rms displacement in pixels by a smooth random warp of each view, which changes "
                   "slowly from view to view")
       ->capture_default_str();
+  command
+      .add_option(
+          "--misalign-tilt", misalignment.tilt_spread_deg,
+          "Standard deviation in degrees of the errors of the tilt angles in a .rawtlt file; "
+          "the .tlt file has the true ones")
+      ->capture_default_str();
 }
 
 void add_imaging_options(CLI::App& command, SimulateArguments& arguments) {

@@ -62,7 +62,8 @@ void add_tensorf(CLI::App& baseline, const std::vector<option_table::Setting>& o
       "tensorf", "One factorised tensor for the whole region, coarse to fine, as in TensoRF");
   const auto arguments = std::make_shared<Arguments>();
   add_input_options(command, arguments->choices);
-  add_groups(command, arguments->choices, {option_table::Group::kSpecimen});
+  add_groups(command, arguments->choices,
+             {option_table::Group::kTransfer, option_table::Group::kSpecimen});
   add_method_options(command, *arguments);
   add_shared_fit_options(command, arguments->choices);
   add_groups(command, arguments->choices, {option_table::Group::kVolume});

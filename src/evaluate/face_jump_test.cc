@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <vector>
+
 namespace tomofield::evaluate {
 namespace {
 
 using enum field::Region;
+using enum PairPlace;
 
 // Returns two leaves of 32 px beside each other; the second is split into four.
 field::Quadtree split_tree() {
@@ -34,15 +38,30 @@ base::Volume steps(const LeafFaces& faces, float inside, float across) {
 TEST(FaceJump, FacesAreThoseOfTheLeavesInARegion) {
   const field::Quadtree tree = split_tree();  // faces at x = 40, at x = 56 and at y = 12
   const LeafFaces faces(tree, {10, 0, 70, 28});
-  std::vector<char> row(59), next(60);
-  row[40 - 10 - 1] = row[56 - 10 - 1] = 1;
-  EXPECT_EQ(faces.after_voxels(0), row);
-  EXPECT_EQ(faces.after_row(0), next);
-  for (std::size_t x = 40 - 10; x < 60; ++x) next[x] = 1;
-  EXPECT_EQ(faces.after_row(11), next);
+  std::vector<PairPlace> row(59, kElsewhere), next(60, kElsewhere);
+  std::fill(row.begin() + 40 - 10 - 9, row.begin() + 56 - 10 + 8, kNearFace);
+  row[40 - 10 - 1] = row[56 - 10 - 1] = kAcrossFace;
+  EXPECT_EQ(faces.pairs_along_x(0), row);
+  EXPECT_EQ(faces.pairs_along_y(0), next);
+  std::fill(next.begin() + 40 - 10, next.end(), kNearFace);
+  EXPECT_EQ(faces.pairs_along_y(3), next);
+  EXPECT_EQ(faces.pairs_along_y(19), next);
+  std::fill(next.begin() + 40 - 10, next.end(), kAcrossFace);
+  EXPECT_EQ(faces.pairs_along_y(11), next);
 }
 
-TEST(FaceJump, IsTheMeanAcrossOverTheMeanInside) {
+TEST(FaceJump, DoesNotDependOnVoxelsFarFromFaces) {
+  const field::Quadtree tree = split_tree();
+  const LeafFaces faces(tree, {8, -4, 72, 28});
+  base::Volume volume = steps(faces, 0.5f, 0.0f);
+  const double before = face_jump(volume, faces)->both;
+  volume.at(10, 10, 1) += 100.0f;  // 22 voxels from the nearest face
+  EXPECT_EQ(face_jump(volume, faces)->both, before);
+  volume.at(25, 10, 1) += 100.0f;
+  EXPECT_LT(face_jump(volume, faces)->both, before);
+}
+
+TEST(FaceJump, IsTheMeanAcrossOverTheMeanNearFaces) {
   const field::Quadtree tree = split_tree();
   const LeafFaces faces(tree, {8, -4, 72, 28});
   const auto even = face_jump(steps(faces, 0.5f, 0.0f), faces);

@@ -118,8 +118,8 @@ void add_speckle_and_faces(const field::Field& field, const field::OrientedBox& 
         std::span(rows).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count)));
   });
   processes.allreduce_sum(std::span(speckles));
-  processes.allreduce_sum(std::span(rows), &RowJumps::across_x, &RowJumps::inside_x,
-                          &RowJumps::across_y, &RowJumps::inside_y);
+  processes.allreduce_sum(std::span(rows), &RowJumps::across_x, &RowJumps::near_x,
+                          &RowJumps::across_y, &RowJumps::near_y);
   const std::int64_t inner = num_inner_voxels({box.size[0], box.size[1], box.size[2]});
   const auto all = std::accumulate(speckles.begin(), speckles.end(), std::int64_t{0});
   if (inner > 0) found.speckle = static_cast<double>(all) / static_cast<double>(inner);

@@ -127,9 +127,9 @@ class Field {
   virtual double parameter_variation(int leaf, const kernels::VariationPenalty& penalty,
                                      double weight, float* gradient) const = 0;
 
-  /// Moves vertices of a leaf that stand out from all but two of their neighbours in the leaf back
-  /// to these (kernels/spikes.h). A leaf of factors stays as it is.
-  virtual void limit_spikes(int leaf) = 0;
+  /// Moves vertices of a leaf that stand out from all but `rank` - 1 of their neighbours in the
+  /// leaf back to these (kernels/spikes.h). A leaf of factors stays as it is.
+  virtual void limit_spikes(int leaf, int rank) = 0;
 
   /// Sets random starting values, uniform in ± scale, which make every density close to act(bias).
   void initialise(base::Random random, double scale);

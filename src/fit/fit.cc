@@ -26,10 +26,9 @@ constexpr double kBiasRate = 0.02;
 // Random streams from here on give the order of an epoch's subsets.
 constexpr std::uint64_t kOrderStream = 1000;
 
-// Surrogates are made anew after at most so many steps. With more of them they are cheaper, because
-// a prediction decodes the whole volume, but the fit follows older surrogates
-// (docs/results/ctf.md).
-constexpr int kStepsOfSurrogates = 8;
+// Surrogates are made anew so many times in an epoch. With fewer they are cheaper, because a
+// prediction decodes the whole volume, but the fit follows older surrogates (docs/results/ctf.md).
+constexpr int kSurrogatesInEpoch = 2;
 
 // Predictions of views that surrogates are made from are at most so large at a time, or one view.
 constexpr std::size_t kPredictionBytes = std::size_t{256} << 20;
@@ -120,8 +119,9 @@ void Fit::enter_stage() {
   objective_.reset();
   binned_.reset();  // its successor needs the memory
   binned_ = std::make_unique<measurement::Measurement>(binned(measurement_, stage().bin));
-  filters_ = measurement::view_filters(*binned_);
+  filters_ = {measurement::view_filters(*binned_), std::nullopt};
   surrogates_.reset();
+  follow_noise();
   projector_ = std::make_unique<projection::SlabProjector>(
       binned_->geometry, sample_grid(domain_, measurement_.geometry.thickness, stage().bin));
 }
@@ -228,7 +228,8 @@ bool Fit::is_done() const {
 }
 
 measurement::ViewErrors Fit::held_out_error(bool fit_view_scale) const {
-  if (filters_.empty()) return objective_->held_out_error(binned_->noise_weights(), fit_view_scale);
+  if (filters_.transfers.empty())
+    return objective_->held_out_error(binned_->noise_weights(), fit_view_scale);
   const std::vector<int>& views = measurement_.held_out;
   measurement::SlabSums sums(1);
   for (const int view : views) {
@@ -240,13 +241,17 @@ measurement::ViewErrors Fit::held_out_error(bool fit_view_scale) const {
 
 std::vector<measurement::PredictedView> Fit::predict(
     std::span<const int> views, std::span<const measurement::ViewModel> models) const {
-  if (filters_.empty()) return objective_->predict(views, models);
-  auto predicted = objective_->predict(views, std::vector<measurement::ViewModel>(views.size()));
-  measurement::filter_predictions(filters_, views, predicted, processes());
+  if (filters_.transfers.empty()) return objective_->predict(views, models);
+  auto predicted = project(views);
+  measurement::filter_predictions(filters_.transfers, views, predicted, processes());
   for (std::size_t i = 0; i < predicted.size(); ++i)
     for (float& value : predicted[i].predicted)
       value = static_cast<float>(models[i].scale * static_cast<double>(value) + models[i].offset);
   return predicted;
+}
+
+std::vector<measurement::PredictedView> Fit::project(std::span<const int> views) const {
+  return objective_->predict(views, std::vector<measurement::ViewModel>(views.size()));
 }
 
 void Fit::run(const AfterStep& after_step) {
@@ -294,20 +299,31 @@ bool Fit::is_traced_in_detail() const {
   return progress_.step == stage().first_epoch * steps_per_epoch() + 1;
 }
 
-// Returns after how many steps surrogates are made anew.
-int Fit::steps_of_surrogates() const { return std::min(kStepsOfSurrogates, steps_per_epoch()); }
+// Begins to weight frequencies by the noise when the residuals show it.
+void Fit::follow_noise() {
+  if (options_.noise_model == NoiseModel::kWhite || filters_.noise || !residuals_are_noise())
+    return;
+  const measurement::SlabViews::Shape& shape = binned_->rays->shape();
+  filters_.noise.emplace(shape.width, shape.num_rows);
+  surrogates_.reset();
+}
+
+// Returns after how many steps surrogates are made anew, and in any case after an epoch.
+int Fit::steps_of_surrogates() const {
+  return (steps_per_epoch() + kSurrogatesInEpoch - 1) / kSurrogatesInEpoch;
+}
 
 bool Fit::needs_surrogates() const {
-  const std::int64_t first = stage().first_epoch * steps_per_epoch();
-  return !filters_.empty() &&
-         (!surrogates_ || (progress_.step - first) % steps_of_surrogates() == 0);
+  const std::int64_t in_epoch = progress_.step % steps_per_epoch();
+  return !filters_.empty() && (!surrogates_ || in_epoch % steps_of_surrogates() == 0);
 }
 
 // Makes the surrogates of the views of the next steps from the present field.
 void Fit::make_surrogates() {
   const base::TraceSpan span("make surrogate views");
   std::vector<int> views;
-  for (std::int64_t s = 0; s < steps_of_surrogates(); ++s)
+  const std::int64_t left = steps_per_epoch() - progress_.step % steps_per_epoch();
+  for (std::int64_t s = 0; s < std::min<std::int64_t>(steps_of_surrogates(), left); ++s)
     std::ranges::copy(views_of_step(progress_.step + s), std::back_inserter(views));
   surrogates_.reset();  // its successor needs the memory
   surrogates_.emplace(*binned_->rays, views, progress_.views);
@@ -317,9 +333,7 @@ void Fit::make_surrogates() {
              (2 * sizeof(float) * static_cast<std::size_t>(shape.width * shape.num_rows)));
   for (std::size_t first = 0; first < views.size(); first += at_once) {
     const auto some = std::span(views).subspan(first, std::min(at_once, views.size() - first));
-    surrogates_->set(filters_, some,
-                     objective_->predict(some, std::vector<measurement::ViewModel>(some.size())),
-                     processes());
+    surrogates_->set(filters_, some, project(some), processes());
   }
 }
 
@@ -349,11 +363,11 @@ void Fit::take_step() {
 // plug-and-play step of a prior (Venkatakrishnan, Bouman and Wohlberg 2013): total variation makes
 // an isolated vertex cheap enough to fit the noise of some rays.
 void Fit::limit_spikes() {
-  if (options_.keep_spikes || field_->kind() != FieldKind::kGrid) return;
+  if (options_.spike_rank == 0 || field_->kind() != FieldKind::kGrid) return;
   const base::TraceSpan span("limit spikes");
   const base::Range own = own_leaves();
   base::parallel_for("limit spikes", own.size(), [&](std::int64_t i) {
-    field_->limit_spikes(own.begin + static_cast<int>(i));
+    field_->limit_spikes(own.begin + static_cast<int>(i), options_.spike_rank);
   });
   halo_->refresh(*field_);
 }
@@ -405,6 +419,7 @@ void Fit::end_epoch() {
   const std::int64_t epochs_done = progress_.step / steps_per_epoch();
   if (tree_updates_.update(epochs_done, *field_, optimizer_.state(), progress_.tree)) follow_tree();
   if (epochs_done > 0 && epochs_done == stage().first_epoch) refine();
+  follow_noise();
 }
 
 }  // namespace tomofield::fit

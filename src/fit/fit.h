@@ -110,6 +110,9 @@ class Fit {
   std::vector<measurement::PredictedView> predict(
       std::span<const int> views, std::span<const measurement::ViewModel> models) const;
 
+  /// Does the same without what the microscope does to the projections, and without models.
+  std::vector<measurement::PredictedView> project(std::span<const int> views) const;
+
   const field::Field& field() const { return *field_; }
   field::Field& field() { return *field_; }
   /// Hands over the fitted field; the fit cannot go on afterwards.
@@ -133,6 +136,7 @@ class Fit {
   const Traffic& traffic() const { return traffic_; }
 
  private:
+  void follow_noise();
   int steps_of_surrogates() const;
   bool needs_surrogates() const;
   void make_surrogates();
@@ -170,7 +174,7 @@ class Fit {
   // These belong to one stage or one tree and are made anew for the next. The objective refers to
   // the first two, so they must stay where they are when a fit is moved.
   std::unique_ptr<measurement::Measurement> binned_;
-  std::vector<microscope::ViewFilter> filters_;            // of each view; empty: no microscope
+  measurement::DataFilters filters_;
   std::optional<measurement::SurrogateViews> surrogates_;  // of the next steps
   std::unique_ptr<projection::SlabProjector> projector_;
   std::unique_ptr<objective::Objective> objective_;

@@ -40,10 +40,12 @@ struct FitOptions : objective::ObjectiveOptions {
   double refined_rate = 0.5;       ///< at the start of a stage that follows a coarse one
   double vertex_rate = 0.7;        ///< multiplies the rates of plain vertices that become factors
   double factorised_rate = 0.3;    ///< at the start of factors that were plain vertices
-  bool keep_spikes = false;        ///< else each epoch of plain vertices ends without any
-  bool fit_noise = true;           ///< weight views by their residuals, and limit these
-  bool fit_view_scale = false;     ///< fit a scale and an offset of every view
-  int hold_out = 0;                ///< keep every Nth view from the fit; 0: none
+  /// After each epoch, a plain vertex is at most the one of this rank around it; 0: no limit.
+  int spike_rank = 3;
+  bool fit_noise = true;  ///< weight views by their residuals, and limit these
+  NoiseModel noise_model = NoiseModel::kWhite;
+  bool fit_view_scale = false;  ///< fit a scale and an offset of every view
+  int hold_out = 0;             ///< keep every Nth view from the fit; 0: none
   int patience = 0;  ///< stop after this many epochs without a better held-out error; 0: never
 };
 

@@ -27,9 +27,9 @@ class Ones {
                        static_cast<std::size_t>(shape_.ny) +
                    static_cast<std::size_t>(y)];
   }
-  std::vector<float> limited() const {
+  std::vector<float> limited(int rank = 3) const {
     std::vector<float> values = values_;
-    limit_spikes(shape_, values.data());
+    limit_spikes(shape_, rank, values.data());
     return values;
   }
   const std::vector<float>& values() const { return values_; }
@@ -45,11 +45,14 @@ TEST(Spikes, AgreeWithTheReferenceForEveryShape) {
     for (const LatticeShape& shape :
          {LatticeShape{1, 1, 1}, LatticeShape{2, 2, 2}, LatticeShape{1, 40, 3},
           LatticeShape{4, 33, 5}, LatticeShape{5, 3, 4}, LatticeShape{3, 17, 1}}) {
-      std::vector<float> found = random_floats(shape.size(), 7);
-      std::vector<double> expected = to_double(found);
-      limit_spikes(shape, found.data());
-      reference::limit_spikes(shape, expected.data());
-      EXPECT_EQ(to_double(found), expected) << shape.nx << " " << shape.ny << " " << shape.nz;
+      for (int rank = 1; rank <= kMostSpikeRank; ++rank) {
+        std::vector<float> found = random_floats(shape.size(), 7);
+        std::vector<double> expected = to_double(found);
+        limit_spikes(shape, rank, found.data());
+        reference::limit_spikes(shape, rank, expected.data());
+        EXPECT_EQ(to_double(found), expected)
+            << shape.nx << " " << shape.ny << " " << shape.nz << ", rank " << rank;
+      }
     }
   });
 }
@@ -79,6 +82,9 @@ TEST(Spikes, AreNotSheetsThreadsAndSteps) {
   for (int y = 0; y < 20; ++y)
     thread.at(2, y, 2) = thread.at(2, y, 3) = thread.at(3, y, 2) = thread.at(3, y, 3) = 1.0f;
   EXPECT_EQ(sheet.values(), sheet.limited());
+  EXPECT_EQ(sheet.values(), sheet.limited(8));
+  EXPECT_NE(thread.values(), thread.limited(8));
+  EXPECT_EQ(step.values(), step.limited(8));
   EXPECT_EQ(thread.values(), thread.limited());
   EXPECT_EQ(step.values(), step.limited());
 }

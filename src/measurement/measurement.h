@@ -10,7 +10,7 @@
 #include "geometry/ray_geometry.h"
 #include "geometry/tilt_geometry.h"
 #include "measurement/slab_views.h"
-#include "microscope/view_filter.h"
+#include "microscope/view_transfer.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::measurement {

@@ -7,14 +7,13 @@
 #include <utility>
 
 #include "base/parallel.h"
-#include "microscope/view_filter.h"
 
 namespace tomofield::measurement {
 namespace {
 
-// The bound of max |H|². It is above 1, since a filter repeats what lies near the border of its
-// image (microscope::ViewFilter).
-constexpr double kLargestTransfer = 1.1;
+// ‖H‖² may be so much larger than the largest |CTF|², since a filter repeats what lies near the
+// border of its image (microscope::ViewFilter).
+constexpr double kRepetition = 1.1;
 
 using microscope::ViewFilter;
 
@@ -32,23 +31,57 @@ void for_own(const char* what, std::size_t count, const distributed::Communicato
 struct Surrogate {
   std::vector<float> image;  // d′
   ViewSums sums;
+  double bound = 0.0;  // of max |H|² W
 };
 
-Surrogate surrogate_of(const PredictedView& view, const ViewFilter& filter,
-                       const ViewModel& model) {
-  PredictedView filtered = view;
-  filtered.predicted = filter.apply(view.predicted);
+// Returns the residuals of a view by its filtered prediction; 0 where nothing was measured.
+std::vector<float> residual_of(const PredictedView& filtered, const ViewModel& model) {
   const double limit = model.largest_residual;
-  std::vector<float> residual(view.predicted.size());
+  std::vector<float> residual(filtered.predicted.size());
   for (std::size_t i = 0; i < residual.size(); ++i) {
-    const double missing = static_cast<double>(view.measured[i]) -
+    const double missing = static_cast<double>(filtered.measured[i]) -
                            model.scale * static_cast<double>(filtered.predicted[i]) - model.offset;
     residual[i] =
         std::isnan(missing) ? 0.0f : static_cast<float>(std::clamp(missing, -limit, limit));
   }
-  Surrogate surrogate{filter.apply_transpose(residual), sums_of(filtered, model)};
-  const auto step = static_cast<float>(1.0 / (model.scale * kLargestTransfer));
+  return residual;
+}
+
+// Replaces residuals by W times them, and returns the weights of the shells.
+std::vector<double> weigh_frequencies(const NoiseColour& noise, const PredictedView& view,
+                                      std::vector<float>& residual) {
+  std::vector<double> weights = noise.weigh(residual);
   for (std::size_t i = 0; i < residual.size(); ++i)
+    if (std::isnan(view.measured[i])) residual[i] = 0.0f;
+  return weights;
+}
+
+// Returns a bound of max |H|² W. Without weights, W is 1.
+double bound_of(const ViewFilter* transfer, std::span<const double> weights) {
+  const double repetition = transfer ? kRepetition : 1.0;
+  if (weights.empty()) return repetition;
+  double bound = 0.0;
+  for (std::size_t s = 0; s < weights.size(); ++s) {
+    // The signal only falls with the frequency. Between two shells, W is between theirs.
+    const double signal = transfer && s > 0
+                              ? transfer->signal(NoiseColour::frequency_of(static_cast<int>(s) - 1))
+                              : 1.0;
+    bound = std::max(bound, weights[s] * signal * signal);
+  }
+  return repetition * bound;
+}
+
+Surrogate surrogate_of(const PredictedView& view, const ViewFilter* transfer,
+                       const std::optional<NoiseColour>& noise, const ViewModel& model) {
+  PredictedView filtered = view;
+  if (transfer) filtered.predicted = transfer->apply(view.predicted);
+  std::vector<float> residual = residual_of(filtered, model);
+  std::vector<double> weights;
+  if (noise) weights = weigh_frequencies(*noise, view, residual);
+  Surrogate surrogate{transfer ? transfer->apply_transpose(residual) : std::move(residual),
+                      sums_of(filtered, model), bound_of(transfer, weights)};
+  const auto step = static_cast<float>(1.0 / (model.scale * surrogate.bound));
+  for (std::size_t i = 0; i < surrogate.image.size(); ++i)
     surrogate.image[i] = view.predicted[i] + step * surrogate.image[i];
   return surrogate;
 }
@@ -78,16 +111,22 @@ void filter_predictions(std::span<const ViewFilter> filters, std::span<const int
 }
 
 ViewSums sums_of(const PredictedView& view, const ViewModel& model) {
-  ViewSums sums;
+  double n = 0, sp = 0, sb = 0, spp = 0, spb = 0, sbb = 0, squares = 0;
   for (std::size_t i = 0; i < view.measured.size(); ++i) {
     const double b = static_cast<double>(view.measured[i]);
     if (std::isnan(b)) continue;
     const double p = static_cast<double>(view.predicted[i]);
     const double residual = std::clamp(model.scale * p + model.offset - b, -model.largest_residual,
                                        model.largest_residual);
-    sums += {1.0, p, b, p * p, p * b, b * b, residual * residual};
+    n += 1.0;
+    sp += p;
+    sb += b;
+    spp += p * p;
+    spb += p * b;
+    sbb += b * b;
+    squares += residual * residual;
   }
-  return sums;
+  return {n, sp, sb, spp, spb, sbb, squares};
 }
 
 SurrogateViews::SurrogateViews(const SlabViews& measured, std::vector<int> views,
@@ -98,33 +137,37 @@ SurrogateViews::SurrogateViews(const SlabViews& measured, std::vector<int> views
       measured_models_(models.begin(), models.end()),
       models_(measured_models_),
       sums_(models.size()) {
-  for (std::size_t i = 0; i < views_.size(); ++i) {
-    const auto view = static_cast<std::size_t>(views_[i]);
-    places_[view] = static_cast<int>(i);
-    const ViewModel& model = measured_models_[view];
-    models_[view] = {1.0, 0.0, model.weight * model.scale * model.scale * kLargestTransfer};
-  }
+  for (std::size_t i = 0; i < views_.size(); ++i)
+    places_[static_cast<std::size_t>(views_[i])] = static_cast<int>(i);
 }
 
-void SurrogateViews::set(std::span<const ViewFilter> filters, std::span<const int> views,
+void SurrogateViews::set(const DataFilters& filters, std::span<const int> views,
                          std::vector<PredictedView> predicted,
                          const distributed::Communicator& processes) {
   std::vector<ViewSums> sums(views.size());
+  std::vector<double> bounds(views.size());
   for_own("make surrogate views", views.size(), processes, [&](std::size_t i) {
     const auto view = static_cast<std::size_t>(views[i]);
-    Surrogate made = surrogate_of(predicted[i], filters[view], measured_models_[view]);
+    Surrogate made =
+        surrogate_of(predicted[i], filters.transfers.empty() ? nullptr : &filters.transfers[view],
+                     filters.noise, measured_models_[view]);
     predicted[i].measured = std::move(made.image);
     predicted[i].predicted.clear();
     sums[i] = made.sums;
+    bounds[i] = made.bound;
   });
   allreduce_sum(processes, sums);
+  processes.allreduce_sum(std::span(bounds));
   for (std::size_t i = 0; i < views.size(); ++i) {
     // A process has the surrogates of some views, and gives up the others' measured pixels.
     std::vector<float>& image = predicted[i].measured;
     if (!predicted[i].predicted.empty()) std::ranges::fill(image, 0.0f);
     processes.allreduce_sum(std::span(image));
     rays_->set_view(place(views[i]), image);
-    sums_[static_cast<std::size_t>(views[i])] = sums[i];
+    const auto view = static_cast<std::size_t>(views[i]);
+    sums_[view] = sums[i];
+    const ViewModel& model = measured_models_[view];
+    models_[view] = {1.0, 0.0, model.weight * model.scale * model.scale * bounds[i]};
   }
 }
 

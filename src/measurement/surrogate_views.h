@@ -1,13 +1,16 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "distributed/communicator.h"
 #include "measurement/held_out.h"
 #include "measurement/measurement.h"
+#include "measurement/noise_colour.h"
 #include "measurement/view_residuals.h"
+#include "microscope/view_filter.h"
 
 namespace tomofield::measurement {
 
@@ -24,17 +27,25 @@ void filter_predictions(std::span<const microscope::ViewFilter> filters, std::sp
 /// `largest_residual` limits the squares of residuals by the model (ViewSums::limited_squares).
 ViewSums sums_of(const PredictedView& view, const ViewModel& model);
 
+/// Holds what stands between the projections of the views and their data term.
+struct DataFilters {
+  std::vector<microscope::ViewFilter> transfers;  ///< [view]: H; empty: views are projections
+  std::optional<NoiseColour> noise;               ///< W; none: the noise is white
+
+  bool empty() const { return transfers.empty() && !noise; }
+};
+
 /// Views that take the place of the measured ones in the steps of a fit, so that the transfer H of
 /// the microscope, which mixes rows, does not concern the slabs.
 ///
-/// A view's data term ½ w |a H p + o − d|² of its projection p is nowhere above the quadratic
+/// A view's data term ½ w |W^½ (a H p + o − d)|² of its projection p is nowhere above the quadratic
 /// ½ w L |p − d′|² + constant that touches it at the present projection p₀, where
 ///
-///   d′ = p₀ + (a / L) Hᵀ (d − a H p₀ − o)   and   L = a² max |H|².
+///   d′ = p₀ + (a / L) Hᵀ W (d − a H p₀ − o)   and   L = a² max |H|² W.
 ///
 /// (Surrogates of this kind: De Pierro 1995; Daubechies, Defrise and De Mol 2004.) Its gradient at
 /// p₀ is that of the data term itself. A residual of a masked pixel counts as 0, and one that is
-/// larger than the model's limit counts as that limit.
+/// larger than the model's limit counts as that limit. W is that of the present residual.
 class SurrogateViews {
  public:
   /// Makes room for the surrogates of `views`. `models` are those of all views. The surrogates have
@@ -44,7 +55,7 @@ class SurrogateViews {
 
   /// Makes the surrogates of some of the views from their predictions without a model (scale 1,
   /// offset 0), which it gives up. `filters` are those of all views. Every process calls it.
-  void set(std::span<const microscope::ViewFilter> filters, std::span<const int> views,
+  void set(const DataFilters& filters, std::span<const int> views,
            std::vector<PredictedView> predicted, const distributed::Communicator& processes);
 
   const std::vector<int>& views() const { return views_; }

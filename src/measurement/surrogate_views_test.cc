@@ -31,7 +31,7 @@ microscope::ViewTransfer transfer_of(double defocus_A) {
 
 // Two views of which some pixels do not count, and what is predicted of them.
 struct Scene {
-  std::vector<microscope::ViewFilter> filters;
+  DataFilters filters;
   std::vector<PredictedView> predicted;
   std::unique_ptr<SlabViews> rays;
   std::vector<ViewModel> models{{1.2, 0.3, 4.0}, {0.8, -0.1, 9.0}};
@@ -39,7 +39,7 @@ struct Scene {
 
   Scene() {
     for (const int view : views) {
-      filters.emplace_back(kWidth, kHeight, transfer_of(20000.0 + 3000.0 * view));
+      filters.transfers.emplace_back(kWidth, kHeight, transfer_of(20000.0 + 3000.0 * view));
       predicted.push_back({.width = kWidth,
                            .height = kHeight,
                            .measured = random_image(static_cast<std::uint64_t>(10 + view)),
@@ -67,7 +67,7 @@ struct Scene {
   // Returns ½ w Σ |a H p + o − d|² over the pixels of a view that count.
   double loss(std::size_t view, const std::vector<float>& projection) const {
     PredictedView filtered = predicted[view];
-    filtered.predicted = filters[view].apply(projection);
+    filtered.predicted = filters.transfers[view].apply(projection);
     return models[view].weight / 2 * sums_of(filtered, models[view]).squared_residual(models[view]);
   }
 };
@@ -148,6 +148,45 @@ TEST(SurrogateViews, FollowTheModelOfTheView) {
   EXPECT_EQ(surrogates.models()[0].scale, 1.0);
   EXPECT_EQ(surrogates.models()[0].offset, 0.0);
   EXPECT_NEAR(surrogates.models()[0].weight, 4.0 * 1.2 * 1.2 * 1.1, 1e-9);
+}
+
+// The step to a surrogate is (a / L) Hᵀ W r, and the weight of the view is w L.
+TEST(SurrogateViews, WeightFrequenciesByTheNoise) {
+  Scene scene;
+  scene.filters.noise.emplace(kWidth, kHeight);
+  const SurrogateViews surrogates = scene.surrogates();
+  for (std::size_t v = 0; v < 2; ++v) {
+    const PredictedView& view = scene.predicted[v];
+    const ViewModel& model = scene.models[v];
+    const std::vector<float> filtered = scene.filters.transfers[v].apply(view.predicted);
+    std::vector<float> residual(filtered.size());
+    for (std::size_t i = 0; i < residual.size(); ++i)
+      if (!std::isnan(view.measured[i]))
+        residual[i] = static_cast<float>(static_cast<double>(view.measured[i]) - model.offset -
+                                         model.scale * static_cast<double>(filtered[i]));
+    scene.filters.noise->weigh(residual);
+    for (std::size_t i = 0; i < residual.size(); ++i)
+      if (std::isnan(view.measured[i])) residual[i] = 0.0f;
+    const std::vector<float> step = scene.filters.transfers[v].apply_transpose(residual);
+    const int place = static_cast<int>(v);
+    const double bound = surrogates.models()[v].weight / model.weight;  // a² L
+    for (std::int64_t y = 0; y < kHeight; ++y)
+      for (std::int64_t x = 0; x < kWidth; ++x) {
+        const auto i = static_cast<std::size_t>(y * kWidth + x);
+        const double change = static_cast<double>(surrogates.rays().ray(place, x, y)) -
+                              static_cast<double>(view.predicted[i]);
+        EXPECT_NEAR(change, model.scale / bound * static_cast<double>(step[i]), 1e-5);
+      }
+  }
+}
+
+TEST(SurrogateViews, OfColouredNoiseAloneNeedNoTransfer) {
+  Scene scene;
+  scene.filters.transfers.clear();
+  scene.filters.noise.emplace(kWidth, kHeight);
+  const SurrogateViews surrogates = scene.surrogates();
+  EXPECT_GE(surrogates.models()[0].weight, 4.0 * 1.2 * 1.2 * 0.9);
+  EXPECT_EQ(surrogates.sums(0).n, kWidth * kHeight - 70);
 }
 
 }  // namespace

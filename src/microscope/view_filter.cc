@@ -7,12 +7,16 @@
 #include <utility>
 
 #include "base/check.h"
+#include "fourier/image_transform.h"
 #include "microscope/exposure.h"
 
 namespace tomofield::microscope {
 namespace {
 
 constexpr std::int64_t kSmallestMargin_px = 8;
+
+// Over a range of defocus of this part of a step, one defocus errs no more than the interpolation.
+constexpr double kNoStep = 0.2;
 
 // Returns the smallest and the largest defocus that a slope adds within an image.
 std::pair<double, double> range_of(const DefocusSlope& slope, std::int64_t width,
@@ -23,7 +27,9 @@ std::pair<double, double> range_of(const DefocusSlope& slope, std::int64_t width
 }
 
 // A filter keeps at most so many transfers: 1 MiB.
-constexpr std::int64_t kMostKept = std::int64_t{1} << 18;
+constexpr std::size_t kMostKept = std::size_t{1} << 18;
+
+constexpr float kWienerConstant = 0.1f;
 
 // The sine is interpolated to 3·10⁻⁷.
 constexpr std::size_t kStepsOfTables = 4096;
@@ -35,9 +41,10 @@ float sine_of_turns(double turns) {
   return table(turns);
 }
 
-std::vector<double> frequencies(std::int64_t size, double pixel_size_A) {
+// Returns the frequencies of a transform, of which `count` are kept, in cycles per Å.
+std::vector<double> frequencies(std::int64_t size, std::int64_t count, double pixel_size_A) {
   std::vector<double> k;
-  for (std::int64_t i = 0; i < size; ++i)
+  for (std::int64_t i = 0; i < count; ++i)
     k.push_back(fourier::cycles_per_pixel(i, size) / pixel_size_A);
   return k;
 }
@@ -64,8 +71,8 @@ ViewFilter::ViewFilter(std::int64_t width, std::int64_t height, const ViewTransf
       across_(extension_of(width, reach_px(transfer, width, height))),
       along_(extension_of(height, reach_px(transfer, width, height))),
       transform_(across_.extended_length(), along_.extended_length()),
-      kx_(frequencies(transform_.width(), transfer.pixel_size_A)),
-      ky_(frequencies(transform_.height(), transfer.pixel_size_A)),
+      kx_(frequencies(transform_.width(), transform_.half_width(), transfer.pixel_size_A)),
+      ky_(frequencies(transform_.height(), transform_.height(), transfer.pixel_size_A)),
       signal_(0.5 / (transfer.pixel_size_A * transfer.pixel_size_A), kStepsOfTables,
               [&](double k2) {
                 return ctf_.envelope(k2) *
@@ -73,18 +80,21 @@ ViewFilter::ViewFilter(std::int64_t width, std::int64_t height, const ViewTransf
               }) {
   const double nyquist = 0.5 / view_.pixel_size_A;
   const auto [low_A, high_A] = range_of(view_.slope, width, height);
-  const double largest_step_A = 1.0 / (8.0 * ctf_.wavelength_A() * nyquist * nyquist);
-  const std::int64_t num_steps = std::llround(std::ceil((high_A - low_A) / largest_step_A));
-  first_defocus_A_ = low_A;
+  const double largest_step_A = 1.0 / (4.0 * ctf_.wavelength_A() * nyquist * nyquist);
+  const bool is_even = high_A - low_A <= kNoStep * largest_step_A;
+  const std::int64_t num_steps =
+      is_even ? 0 : std::llround(std::ceil((high_A - low_A) / largest_step_A));
+  first_defocus_A_ = is_even ? (low_A + high_A) / 2 : low_A;
   num_defoci_ = num_steps + 1;
   if (num_steps > 0) defocus_step_A_ = (high_A - low_A) / static_cast<double>(num_steps);
   keep_transfers();
 }
 
-// Returns H_s at a frequency of the padded grid. Frequency ½ stands for −½ too, where astigmatism
-// may give another value: their mean is the same at k and −k, so that real images stay real.
-float ViewFilter::computed_transfer(const Frequency& k, std::int64_t s) const {
-  const double kx = kx_[static_cast<std::size_t>(k.x)], ky = ky_[static_cast<std::size_t>(k.y)];
+// Returns H_s at a frequency of the padded grid, over the number of its values, which an inverse
+// transform leaves out. Frequency ½ stands for −½ too, where astigmatism may give another value:
+// their mean is the same at k and −k, so that real images stay real.
+float ViewFilter::computed_transfer(std::int64_t x, std::int64_t y, std::int64_t s) const {
+  const double kx = kx_[static_cast<std::size_t>(x)], ky = ky_[static_cast<std::size_t>(y)];
   const auto sine = [&](double of_ky) {
     // An angle is that many turns, of which a whole number makes no difference.
     constexpr double kWholeTurns = 1 << 20;
@@ -92,162 +102,206 @@ float ViewFilter::computed_transfer(const Frequency& k, std::int64_t s) const {
     return sine_of_turns(turns - static_cast<double>(static_cast<std::int64_t>(turns)));
   };
   float ctf = sine(ky);  // −CTF
-  if (2 * k.x == transform_.width() || 2 * k.y == transform_.height()) ctf = (ctf + sine(-ky)) / 2;
-  return signal_(kx * kx + ky * ky) * (view_.is_flipped ? std::abs(ctf) : ctf);
+  if (2 * x == transform_.width() || 2 * y == transform_.height()) ctf = (ctf + sine(-ky)) / 2;
+  const float values = static_cast<float>(transform_.image_size());
+  return signal_(kx * kx + ky * ky) * (view_.is_flipped ? std::abs(ctf) : ctf) / values;
 }
 
-// Calls a function with kx, ky and the place of each frequency k, and the place of −k. Of the two,
-// it visits one.
-template <typename Visit>
-void ViewFilter::for_opposite_frequencies(const Visit& visit) const {
-  const std::int64_t width = transform_.width(), height = transform_.height();
-  std::size_t number = 0;
-  for (std::int64_t y = 0; 2 * y <= height; ++y) {
-    const bool is_own_opposite = 2 * y % height == 0;
-    const std::int64_t opposite_y = (height - y) % height;
-    for (std::int64_t x = 0; x < (is_own_opposite ? width / 2 + 1 : width); ++x) {
-      const std::int64_t opposite_x = (width - x) % width;
-      visit(Frequency{x, y, static_cast<std::size_t>(y * width + x),
-                      static_cast<std::size_t>(opposite_y * width + opposite_x), number++});
-    }
-  }
+void ViewFilter::compute_row(std::int64_t ky, std::int64_t s, std::span<float> row) const {
+  for (std::size_t x = 0; x < row.size(); ++x)
+    row[x] = computed_transfer(static_cast<std::int64_t>(x), ky, s);
 }
 
 // Computes the transfers once, if they do not take much memory.
 void ViewFilter::keep_transfers() {
-  const std::int64_t frequencies = transform_.width() * (transform_.height() / 2 + 1);
-  if (frequencies * num_defoci_ > kMostKept) return;
-  std::vector<float> transfers;
+  const auto width = static_cast<std::size_t>(transform_.half_width());
+  const std::size_t of_a_defocus = transform_.spectrum_size();
+  if (of_a_defocus * static_cast<std::size_t>(num_defoci_) > kMostKept) return;
+  std::vector<float> transfers(of_a_defocus * static_cast<std::size_t>(num_defoci_));
   for (std::int64_t s = 0; s < num_defoci_; ++s)
-    for_opposite_frequencies(
-        [&](const Frequency& k) { transfers.push_back(computed_transfer(k, s)); });
+    for (std::int64_t ky = 0; ky < transform_.height(); ++ky)
+      compute_row(ky, s,
+                  std::span(transfers).subspan(static_cast<std::size_t>(s) * of_a_defocus +
+                                                   static_cast<std::size_t>(ky) * width,
+                                               width));
   transfers_ = std::move(transfers);
 }
 
-float ViewFilter::transfer(const Frequency& k, std::int64_t s) const {
-  if (transfers_.empty()) return computed_transfer(k, s);
-  const std::size_t of_a_defocus = transfers_.size() / static_cast<std::size_t>(num_defoci_);
-  return transfers_[static_cast<std::size_t>(s) * of_a_defocus + k.number];
+// Calls a function with the place of each row of a spectrum and with H_s on it.
+template <typename Visit>
+void ViewFilter::for_transfers(std::int64_t s, const Visit& visit) const {
+  const auto width = static_cast<std::size_t>(transform_.half_width());
+  std::vector<float> computed(transfers_.empty() ? width : 0);
+  for (std::int64_t ky = 0; ky < transform_.height(); ++ky) {
+    const std::size_t at = static_cast<std::size_t>(ky) * width;
+    if (transfers_.empty()) {
+      compute_row(ky, s, computed);
+      visit(at, std::span<const float>(computed));
+    } else {
+      const std::size_t first = static_cast<std::size_t>(s) * transform_.spectrum_size();
+      visit(at, std::span(transfers_).subspan(first + at, width));
+    }
+  }
 }
 
-// Returns w_s at a pixel of the image. There is none beyond the last hat function.
-float ViewFilter::weight_at(std::int64_t x, std::int64_t y, std::int64_t s) const {
-  if (s >= num_defoci_) return 0.0f;
-  if (num_defoci_ == 1) return 1.0f;
-  const double defocus_A =
-      view_.slope.at(static_cast<double>(x) + 0.5 - static_cast<double>(across_.length()) / 2,
+double ViewFilter::signal(double cycles_per_pixel) const {
+  const double k = cycles_per_pixel / view_.pixel_size_A;
+  return static_cast<double>(signal_(k * k));
+}
+
+// Computes w_s on a row of the image.
+void ViewFilter::weigh_row(std::int64_t y, std::int64_t s, std::span<float> weights) const {
+  if (num_defoci_ == 1 || s == kEverywhere) {
+    std::ranges::fill(weights, 1.0f);
+    return;
+  }
+  const double first_A =
+      view_.slope.at(0.5 - static_cast<double>(across_.length()) / 2,
                      static_cast<double>(y) + 0.5 - static_cast<double>(along_.length()) / 2);
-  const double distance = std::abs(defocus_A - defocus_of(s)) / defocus_step_A_;
-  return static_cast<float>(std::max(0.0, 1.0 - distance));
+  const auto first = static_cast<float>((first_A - defocus_of(s)) / defocus_step_A_);
+  const auto step = static_cast<float>(view_.slope.x_A / defocus_step_A_);
+  for (std::size_t x = 0; x < weights.size(); ++x)
+    weights[x] = std::max(0.0f, 1.0f - std::abs(first + step * static_cast<float>(x)));
 }
 
-// Returns the extensions of w_s image, as real part, and of w_{s+1} image, as imaginary part.
-ViewFilter::Image ViewFilter::extended_pair(std::span<const float> image, std::int64_t s) const {
-  std::vector<std::complex<float>> weighted(image.size());
-  for (std::int64_t y = 0; y < along_.length(); ++y)
-    for (std::int64_t x = 0; x < across_.length(); ++x) {
-      const auto i = static_cast<std::size_t>(y * across_.length() + x);
-      weighted[i] = image[i] * std::complex<float>(weight_at(x, y, s), weight_at(x, y, s + 1));
-    }
+// Computes the extension of w_s image.
+void ViewFilter::extend(std::span<const float> image, std::int64_t s, Image& extended) const {
   const auto width = static_cast<std::size_t>(transform_.width());
-  Image wide;  // extended along x
-  wide.reserve(width * static_cast<std::size_t>(along_.length()));
+  const auto length = static_cast<std::size_t>(across_.length());
+  std::vector<float> weights(length);
   for (std::int64_t y = 0; y < along_.length(); ++y) {
-    const auto* row = weighted.data() + y * across_.length();
-    for (std::int64_t x = 0; x < across_.extended_length(); ++x) {
-      const auto& [pixels, weights] = across_[x];
-      wide.push_back(weights[0] * row[pixels[0]] + weights[1] * row[pixels[1]]);
+    const float* from = image.data() + static_cast<std::size_t>(y) * length;
+    float* row = extended.data() + static_cast<std::size_t>(y) * width;
+    weigh_row(y, s, weights);
+    for (std::size_t x = 0; x < length; ++x) row[x] = weights[x] * from[x];
+    for (std::size_t x = length; x < width; ++x) {
+      const auto& [pixels, shares] = across_[static_cast<std::int64_t>(x)];
+      row[x] = shares[0] * row[pixels[0]] + shares[1] * row[pixels[1]];
     }
   }
-  Image extended;
-  extended.reserve(width * static_cast<std::size_t>(transform_.height()));
-  for (std::int64_t y = 0; y < along_.extended_length(); ++y) {
-    const auto& [rows, weights] = along_[y];
-    const auto* first = wide.data() + static_cast<std::size_t>(rows[0]) * width;
-    const auto* second = wide.data() + static_cast<std::size_t>(rows[1]) * width;
-    for (std::size_t x = 0; x < width; ++x)
-      extended.push_back(weights[0] * first[x] + weights[1] * second[x]);
+  for (std::int64_t y = along_.length(); y < along_.extended_length(); ++y) {
+    const auto& [rows, shares] = along_[y];
+    const float* first = extended.data() + static_cast<std::size_t>(rows[0]) * width;
+    const float* second = extended.data() + static_cast<std::size_t>(rows[1]) * width;
+    float* row = extended.data() + static_cast<std::size_t>(y) * width;
+    for (std::size_t x = 0; x < width; ++x) row[x] = shares[0] * first[x] + shares[1] * second[x];
   }
-  return extended;
 }
 
-// Adds H_s A + H_{s+1} B to `sum`, where A and B are the transforms of the two real images whose
-// sum A + iB is given. A is half the sum of the value at k and the conjugate of that at −k, where
-// the transfer is the same.
-void ViewFilter::add_filtered_pair(const Image& pair, std::int64_t s, Image& sum) const {
-  for_opposite_frequencies([&](const Frequency& k) {
-    const std::complex<float> here = pair[k.at], there = std::conj(pair[k.opposite]);
-    std::complex<float> filtered = transfer(k, s) * 0.5f * (here + there);
-    if (s + 1 < num_defoci_)
-      filtered += transfer(k, s + 1) * std::complex<float>(0.0f, -0.5f) * (here - there);
-    sum[k.at] += filtered;
-    if (k.at != k.opposite) sum[k.opposite] += std::conj(filtered);
-  });
-}
-
-// Adds the transpose of extended_pair() to `sum`.
-void ViewFilter::add_folded_pair(const Image& pair, std::int64_t s, std::vector<float>& sum) const {
+// Adds the transpose of extend() to `sum`. The contents of `extended` are unspecified afterwards.
+void ViewFilter::add_folded(Image& extended, std::int64_t s, std::span<float> sum) const {
   const auto width = static_cast<std::size_t>(transform_.width());
-  Image wide(width * static_cast<std::size_t>(along_.length()));  // folded along y
-  for (std::int64_t y = 0; y < along_.extended_length(); ++y) {
-    const LineExtension::Value& row = along_[y];
+  const auto length = static_cast<std::size_t>(across_.length());
+  for (std::int64_t y = along_.length(); y < along_.extended_length(); ++y) {
+    const float* row = extended.data() + static_cast<std::size_t>(y) * width;
     for (int j = 0; j < 2; ++j) {
-      auto* to = wide.data() + static_cast<std::size_t>(row.pixels[j]) * width;
-      const auto* from = pair.data() + static_cast<std::size_t>(y) * width;
-      for (std::size_t x = 0; x < width; ++x) to[x] += row.weights[j] * from[x];
+      float* to = extended.data() + static_cast<std::size_t>(along_[y].pixels[j]) * width;
+      for (std::size_t x = 0; x < width; ++x) to[x] += along_[y].weights[j] * row[x];
     }
   }
-  std::vector<std::complex<float>> folded(sum.size());
+  std::vector<float> weights(length);
   for (std::int64_t y = 0; y < along_.length(); ++y) {
-    auto* to = folded.data() + y * across_.length();
-    for (std::int64_t x = 0; x < across_.extended_length(); ++x) {
-      const auto value = wide[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)];
-      for (int i = 0; i < 2; ++i) to[across_[x].pixels[i]] += across_[x].weights[i] * value;
+    float* row = extended.data() + static_cast<std::size_t>(y) * width;
+    for (std::size_t x = length; x < width; ++x) {
+      const auto& [pixels, shares] = across_[static_cast<std::int64_t>(x)];
+      for (int i = 0; i < 2; ++i) row[pixels[i]] += shares[i] * row[x];
     }
+    weigh_row(y, s, weights);
+    float* to = sum.data() + static_cast<std::size_t>(y) * length;
+    for (std::size_t x = 0; x < length; ++x) to[x] += weights[x] * row[x];
   }
-  for (std::int64_t y = 0; y < along_.length(); ++y)
-    for (std::int64_t x = 0; x < across_.length(); ++x) {
-      const auto i = static_cast<std::size_t>(y * across_.length() + x);
-      sum[i] += weight_at(x, y, s) * folded[i].real() + weight_at(x, y, s + 1) * folded[i].imag();
-    }
 }
 
 std::vector<float> ViewFilter::apply(std::span<const float> image) const {
   TOMOFIELD_CHECK(std::ssize(image) == across_.length() * along_.length(), "size of the image");
-  Image sum(static_cast<std::size_t>(transform_.width() * transform_.height()));
-  for (std::int64_t s = 0; s < num_defoci_; s += 2) {
-    Image pair = extended_pair(image, s);
-    transform_.forward(pair);
-    add_filtered_pair(pair, s, sum);
+  Image extended(transform_.image_size());
+  Spectrum spectrum(transform_.spectrum_size()), sum(num_defoci_ > 1 ? spectrum.size() : 0);
+  for (std::int64_t s = 0; s < num_defoci_; ++s) {
+    extend(image, s, extended);
+    transform_.forward(extended, spectrum);
+    for_transfers(s, [&](std::size_t at, std::span<const float> transfers) {
+      std::complex<float>* values = spectrum.data() + at;
+      if (s == 0) {
+        for (std::size_t x = 0; x < transfers.size(); ++x) values[x] *= transfers[x];
+      } else {
+        for (std::size_t x = 0; x < transfers.size(); ++x) sum[at + x] += values[x] * transfers[x];
+      }
+    });
+    if (s == 0 && num_defoci_ > 1) std::swap(spectrum, sum);
   }
-  transform_.inverse(sum);
+  transform_.inverse(num_defoci_ > 1 ? sum : spectrum, extended);
   std::vector<float> filtered;
   filtered.reserve(image.size());
   for (std::int64_t y = 0; y < along_.length(); ++y)
-    for (std::int64_t x = 0; x < across_.length(); ++x)
-      filtered.push_back(sum[static_cast<std::size_t>(y * transform_.width() + x)].real());
+    filtered.insert(filtered.end(), extended.begin() + y * transform_.width(),
+                    extended.begin() + y * transform_.width() + across_.length());
   return filtered;
 }
 
-std::vector<float> ViewFilter::apply_transpose(std::span<const float> image) const {
+// Returns the transform of an image with zeros around it.
+ViewFilter::Spectrum ViewFilter::spectrum_of(std::span<const float> image) const {
   TOMOFIELD_CHECK(std::ssize(image) == across_.length() * along_.length(), "size of the image");
-  Image spectrum(static_cast<std::size_t>(transform_.width() * transform_.height()));
+  Image extended(transform_.image_size());
   for (std::int64_t y = 0; y < along_.length(); ++y)
     std::copy_n(image.begin() + y * across_.length(), across_.length(),
-                spectrum.begin() + y * transform_.width());
-  transform_.forward(spectrum);
-  std::vector<float> result(image.size());
-  for (std::int64_t s = 0; s < num_defoci_; s += 2) {
-    Image pair = spectrum;
-    for_opposite_frequencies([&](const Frequency& k) {
-      const std::complex<float> both(transfer(k, s),
-                                     s + 1 < num_defoci_ ? transfer(k, s + 1) : 0.0f);
-      pair[k.at] *= both;
-      if (k.at != k.opposite) pair[k.opposite] *= both;
+                extended.begin() + y * transform_.width());
+  Spectrum spectrum(transform_.spectrum_size());
+  transform_.forward(extended, spectrum);
+  return spectrum;
+}
+
+template <typename Factor, typename Add>
+void ViewFilter::spread(const Spectrum& spectrum, const Factor& factor, const Add& add) const {
+  Spectrum filtered(transform_.spectrum_size());
+  Image image(transform_.image_size());
+  for (std::int64_t s = 0; s < num_defoci_; ++s) {
+    for_transfers(s, [&](std::size_t at, std::span<const float> transfers) {
+      for (std::size_t x = 0; x < transfers.size(); ++x)
+        filtered[at + x] = spectrum[at + x] * factor(transfers[x]);
     });
-    transform_.inverse(pair);
-    add_folded_pair(pair, s, result);
+    transform_.inverse(filtered, image);
+    add(image, s);
   }
+}
+
+std::vector<float> ViewFilter::apply_transpose(std::span<const float> image) const {
+  std::vector<float> result(image.size());
+  spread(
+      spectrum_of(image), [](float transfer) { return transfer; },
+      [&](Image& filtered, std::int64_t s) { add_folded(filtered, s, result); });
+  return result;
+}
+
+std::vector<float> ViewFilter::corrected(std::span<const float> view,
+                                         CtfCorrection correction) const {
+  TOMOFIELD_CHECK(std::ssize(view) == across_.length() * along_.length(), "size of the view");
+  Image extended(transform_.image_size());
+  Spectrum spectrum(transform_.spectrum_size());
+  extend(view, kEverywhere, extended);
+  transform_.forward(extended, spectrum);
+  const float values = static_cast<float>(transform_.image_size());
+  const auto factor = [&](float transfer) {
+    const float h = values * transfer;
+    switch (correction) {
+      case CtfCorrection::kFlip:
+        return (h < 0.0f ? -1.0f : 1.0f) / values;
+      case CtfCorrection::kMultiply:
+        return transfer;
+      case CtfCorrection::kWiener:
+        return transfer / (h * h + kWienerConstant);
+    }
+    return transfer;
+  };
+  const auto length = static_cast<std::size_t>(across_.length());
+  std::vector<float> result(view.size()), weights(length);
+  spread(spectrum, factor, [&](const Image& image, std::int64_t s) {
+    for (std::int64_t y = 0; y < along_.length(); ++y) {
+      weigh_row(y, s, weights);
+      const float* from = image.data() + y * transform_.width();
+      float* to = result.data() + static_cast<std::size_t>(y) * length;
+      for (std::size_t x = 0; x < length; ++x) to[x] += weights[x] * from[x];
+    }
+  });
   return result;
 }
 

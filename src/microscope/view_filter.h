@@ -1,37 +1,34 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
-#include "fourier/image_transform.h"
+#include "base/enum_names.h"
+#include "fourier/real_transform.h"
 #include "microscope/ctf.h"
-#include "microscope/defocus_slope.h"
 #include "microscope/interpolated_table.h"
 #include "microscope/line_extension.h"
+#include "microscope/view_transfer.h"
 
 namespace tomofield::microscope {
 
-/// Describes what turns a projection of density, in which dense is high, into a view.
-struct ViewTransfer {
-  Optics optics;
-  io::Defocus defocus;        ///< with its angle in the image that is filtered
-  DefocusSlope slope;         ///< over that image
-  double exposure = 0.0;      ///< electrons per Å² (Exposure::at_middle()); 0: no damage
-  double pixel_size_A = 1.0;  ///< of that image
-  bool is_flipped = false;    ///< the view's phases were flipped: |CTF| instead of −CTF
-};
-
 /// Returns how far the transfer moves what is in an image of this size, in pixels.
 std::int64_t reach_px(const ViewTransfer& view, std::int64_t width, std::int64_t height);
+
+/// Names what takes the contrast transfer of a view back, at each place by the transfer H of its
+/// defocus: the sign of H (phase flipping), H itself, or Wiener's filter H / (H² + 0.1).
+enum class CtfCorrection { kFlip, kMultiply, kWiener };
 
 /// Applies the transfer H of a view to images [y, x], and its transpose. H is −CTF times what
 /// radiation damage leaves of the signal (signal_after()). Thread-safe; works on one thread.
 ///
 /// Where the defocus changes over the image, each pixel of the projection is spread with the
 /// defocus at its own place: with hat functions w_s of the local defocus, H = Σ_s H_s w_s. Their
-/// spacing is 1 / (8 λ k²), where k is the Nyquist frequency. There it changes the phase of H_s by
-/// π / 8, so the interpolation errs by at most 2 percent.
+/// spacing is 1 / (4 λ k²), where k is the Nyquist frequency. There it changes the phase of H_s by
+/// π / 4, so the interpolation errs by at most 8 percent; at half of that frequency by 0.5.
 ///
 /// The image is extended on all sides (LineExtension), so that nothing wraps around. Within
 /// reach_px() of its border the result depends on what the extension puts outside: give a wider
@@ -46,38 +43,55 @@ class ViewFilter {
   /// Returns Hᵀ image: ⟨H a, b⟩ = ⟨a, Hᵀ b⟩.
   std::vector<float> apply_transpose(std::span<const float> image) const;
 
+  /// Returns a view whose contrast transfer is corrected.
+  std::vector<float> corrected(std::span<const float> view, CtfCorrection correction) const;
+
   /// Returns the number of defoci, one for each hat function.
   std::int64_t num_defoci() const { return num_defoci_; }
 
- private:
-  using Image = fourier::ImageTransform::Image;
+  /// Returns the share of the signal that is left at a frequency in cycles a pixel, up to 1 / √2:
+  /// a bound of |CTF| times the damage.
+  double signal(double cycles_per_pixel) const;
 
-  // A frequency k of the transform, and −k.
-  struct Frequency {
-    std::int64_t x, y;
-    std::size_t at, opposite;  // their places in a spectrum
-    std::size_t number;        // in the order in which they are visited
-  };
-  float transfer(const Frequency& k, std::int64_t s) const;
-  float computed_transfer(const Frequency& k, std::int64_t s) const;
+ private:
+  using Image = fourier::RealTransform::Image;
+  using Spectrum = fourier::RealTransform::Spectrum;
+
+  // Multiplies a spectrum by a function of H_s, for all defoci, and adds each to an image by `add`.
+  template <typename Factor, typename Add>
+  void spread(const Spectrum& spectrum, const Factor& factor, const Add& add) const;
+  Spectrum spectrum_of(std::span<const float> image) const;
+  float computed_transfer(std::int64_t kx, std::int64_t ky, std::int64_t s) const;
+  void compute_row(std::int64_t ky, std::int64_t s, std::span<float> row) const;
   void keep_transfers();
-  double defocus_of(std::int64_t s) const { return first_defocus_A_ + defocus_step_A_ * double(s); }
   template <typename Visit>
-  void for_opposite_frequencies(const Visit& visit) const;
-  float weight_at(std::int64_t x, std::int64_t y, std::int64_t s) const;
-  Image extended_pair(std::span<const float> image, std::int64_t s) const;
-  void add_filtered_pair(const Image& pair, std::int64_t s, Image& sum) const;
-  void add_folded_pair(const Image& pair, std::int64_t s, std::vector<float>& sum) const;
+  void for_transfers(std::int64_t s, const Visit& visit) const;
+  static constexpr std::int64_t kEverywhere = -1;  // in the place of s: w_s is 1
+  void weigh_row(std::int64_t y, std::int64_t s, std::span<float> weights) const;
+  void extend(std::span<const float> image, std::int64_t s, Image& extended) const;
+  void add_folded(Image& extended, std::int64_t s, std::span<float> sum) const;
+  double defocus_of(std::int64_t s) const { return first_defocus_A_ + defocus_step_A_ * double(s); }
 
   ViewTransfer view_;
   Ctf ctf_;
   double first_defocus_A_ = 0.0, defocus_step_A_ = 0.0;  // added to that of the view
   std::int64_t num_defoci_ = 1;
   LineExtension across_, along_;  // x and y
-  fourier::ImageTransform transform_;
+  fourier::RealTransform transform_;
   std::vector<double> kx_, ky_;   // frequencies of the transform, in cycles per Å
-  std::vector<float> transfers_;  // H_s [s, number of k]; empty if they would take much memory
+  std::vector<float> transfers_;  // H_s [s, ky, kx]; empty if they would take much memory
   InterpolatedTable signal_;      // what damage and the envelope leave, of the square of k
 };
 
 }  // namespace tomofield::microscope
+
+namespace tomofield::base {
+
+template <>
+struct EnumNames<microscope::CtfCorrection> {
+  static constexpr std::array kNames{std::pair{microscope::CtfCorrection::kFlip, "flip"},
+                                     std::pair{microscope::CtfCorrection::kMultiply, "multiply"},
+                                     std::pair{microscope::CtfCorrection::kWiener, "wiener"}};
+};
+
+}  // namespace tomofield::base

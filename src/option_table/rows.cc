@@ -251,15 +251,20 @@ constexpr Row kRows[] = {
     {.key = "fit.fourier_ring", .flag = "--ifp-ring", MEMBER(Options, fourier_ring),
      .group = Group::kFit,
      .help = "Compare the Fourier axes with the mean or the maximum of each ring"},
-    {.key = "fit.keep_spikes", .flag = "--keep-spikes", MEMBER(Options, keep_spikes),
-     .group = Group::kFit,
-     .help = "Keep plain vertices that stand out from all but two of their neighbours. By default "
-             "each epoch ends with moving them back"},
+    {.key = "fit.spike_rank", .flag = "--spike-rank", MEMBER(Options, spike_rank),
+     .group = Group::kFit, .range = Range::between(0, 8),
+     .automatic = "3, or 0 if trials with the smooth penalty clearly prefer it",
+     .help = "After each epoch, plain vertices are at most as large as the one of this rank among "
+             "the 26 around them, and as small: single black and white voxels go. 0: no limit"},
     {.key = "fit.fit_noise", .flag = "--no-noise-fit", MEMBER(Options, fit_noise),
      .group = Group::kFit,
      .help = "Weight each view by the noise measured on it alone, and residuals of any size fully. "
              "By default views that the volume predicts worse than others count less, and a "
              "residual counts at most as one of 4 standard deviations"},
+    {.key = "fit.noise_model", .flag = "--noise-model", MEMBER(Options, noise_model),
+     .group = Group::kFit,
+     .help = "coloured: late in the fit, weight the frequencies of each view by the inverse of the "
+             "noise that its residual shows there. white: count all frequencies alike"},
     {.key = "fit.fit_view_scale", .flag = "--view-scale", MEMBER(Options, fit_view_scale),
      .group = Group::kFit, .automatic = "what trials prefer; without trials on for dark contrast, else off",
      .help = "Fit a scale and an offset for every view"},

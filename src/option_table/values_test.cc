@@ -26,10 +26,10 @@ std::vector<const void*> members_of(const Choices& choices) {
                leaf_size, tree, leaf_budget, vertex_spacing, rank, activation, margin_spacing,
                budget, epochs, vertex_epochs, coarse_epochs, coarse_bin, subsets, engine,
                ray_samples, rays_per_step, learning_rate, density_variation, factor_variation,
-               penalty, boundary, fourier, fourier_ring, keep_spikes, fit_noise, fit_view_scale,
-               hold_out, tune, patience, seed, align, split_tilts, denoising_halves, voxel_type,
-               axes, invert, zarr, output, overwrite, resume, checkpoint_minutes, alignment_json] =
-      choices.options;
+               penalty, boundary, fourier, fourier_ring, spike_rank, fit_noise, noise_model,
+               fit_view_scale, hold_out, tune, patience, seed, align, split_tilts, denoising_halves,
+               voxel_type, axes, invert, zarr, output, overwrite, resume, checkpoint_minutes,
+               alignment_json] = choices.options;
   return {&stack,
           &tlt,
           &xf,
@@ -92,8 +92,9 @@ std::vector<const void*> members_of(const Choices& choices) {
           &boundary,
           &fourier,
           &fourier_ring,
-          &keep_spikes,
+          &spike_rank,
           &fit_noise,
+          &noise_model,
           &fit_view_scale,
           &hold_out,
           &tune,

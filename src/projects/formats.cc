@@ -13,7 +13,11 @@ constexpr Format kFormats[] = {
      .read = read_imod_project},
     {.name = "AreTomo's alignment (.aln)",
      .extension = ".aln",
-     .is_main_file = [](std::string_view name) { return name.ends_with(".aln"); },
+     .is_main_file =
+         [](std::string_view name) {
+           // NAME_align.aln is a result of this program.
+           return name.ends_with(".aln") && !name.ends_with("_align.aln");
+         },
      .read = read_aretomo_project},
     {.name = "RELION's tomograms.star",
      .extension = ".star",

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "align/alignment.h"
@@ -17,6 +18,7 @@
 #include "base/stopwatch.h"
 #include "base/trace.h"
 #include "io/json.h"
+#include "measurement/view_transfers.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
 
@@ -53,6 +55,13 @@ json local_trial_json(const align::Alignment& found) {
   return trial;
 }
 
+json pose_json(const align::FoundPose& found) {
+  return {{"pitch_deg", found.pose.pitch_deg},
+          {"pitch_error_deg", found.error.pitch_deg},
+          {"thickness_px", found.pose.thickness_px},
+          {"thickness_error_px", found.error.thickness_px}};
+}
+
 json view_json(const tilt_series::View& view, const geometry::ViewCorrection& correction,
                const align::ViewAgreement& agreement, bool is_unaligned) {
   json result = {{"section", view.section + 1},
@@ -60,6 +69,7 @@ json view_json(const tilt_series::View& view, const geometry::ViewCorrection& co
                  {"shift_px", {correction.shift_x_px, correction.shift_y_px}},
                  {"rotation_deg", correction.rotation_rad * kRadian_deg},
                  {"log_magnification", correction.log_magnification},
+                 {"tilt_change_deg", correction.tilt_deg},
                  {"correlation", agreement.correlation},
                  {"shift_error_px", agreement.error_px},
                  {"left_out", is_unaligned}};
@@ -78,10 +88,12 @@ json record_of(const tilt_series::TiltSeries& series, const align::Alignment& fo
                  {"accepted", found.is_accepted},
                  {"rotation", found.joint.freedoms.rotation},
                  {"magnification", found.joint.freedoms.magnification},
+                 {"tilt", found.joint.freedoms.tilt},
                  {"steps_px", found.joint.steps_px},
                  {"seconds", seconds},
                  {"views", std::move(views)}};
   record.update(held_out_json(found.held_out));
+  if (found.joint.pose) record["pose"] = pose_json(*found.joint.pose);
   if (found.local) record["local"] = local_trial_json(found);
   return record;
 }
@@ -114,7 +126,8 @@ void apply_record(const json& record, ReconstructOptions& options) {
         .shift_x_px = view["shift_px"][0],
         .shift_y_px = view["shift_px"][1],
         .rotation_rad = view["rotation_deg"].get<double>() / kRadian_deg,
-        .log_magnification = view["log_magnification"]};
+        .log_magnification = view["log_magnification"],
+        .tilt_deg = view["tilt_change_deg"]};
     if (view.contains("local_px")) {
       const json& size_px = record.at("local").at("size_px");
       corrections[static_cast<std::size_t>(section)].local =
@@ -149,6 +162,16 @@ void log_local_motion(const json& local) {
   }
 }
 
+// Says what the views tell about the specimen's pose. Nothing of it is applied.
+void log_pose(const json& pose) {
+  base::log_info(
+      fmt::format("the specimen is {:.0f} ± {:.0f} pixels thick and has a pitch of {:.1f} ± "
+                  "{:.1f}° against the "
+                  "tilt angles (--thickness and --tilt-offset apply them)",
+                  pose["thickness_px"].get<double>(), pose["thickness_error_px"].get<double>(),
+                  pose["pitch_deg"].get<double>(), pose["pitch_error_deg"].get<double>()));
+}
+
 void log_alignment(const json& record) {
   double squares = 0.0;
   std::vector<std::string> left_out;
@@ -160,14 +183,15 @@ void log_alignment(const json& record) {
   }
   const std::string errors = describe_errors(record);
   if (record["accepted"].get<bool>()) {
-    base::log_info(fmt::format("aligned: shifts of {:.2f} pixels (root mean square){}{}; {}",
+    base::log_info(fmt::format("aligned: shifts of {:.2f} pixels (root mean square){}{}{}; {}",
                                std::sqrt(squares / 2 / static_cast<double>(record["views"].size())),
                                record["rotation"].get<bool>() ? ", rotations" : "",
                                record["magnification"].get<bool>() ? ", magnifications" : "",
-                               errors));
+                               record["tilt"].get<bool>() ? ", tilt angles" : "", errors));
   } else {
     base::log_info("the alignment stays as it was, since a new one is no better: " + errors);
   }
+  if (record.contains("pose")) log_pose(record["pose"]);
   if (record.contains("local")) log_local_motion(record["local"]);
   if (!left_out.empty())
     base::log_warning(fmt::format("left out, since they do not resemble the specimen: sections {}",
@@ -188,9 +212,14 @@ std::optional<json> make_record(const ReconstructOptions& options, const Reconst
         fmt::format("--align needs at least {} views, since it judges the alignment by "
                     "views that it holds out; '{}' has {}",
                     kFewestViews, recorded.stack.string(), series.views().size()));
+  std::vector<microscope::ViewTransfer> transfers;
+  processes.run_collectively([&] {
+    transfers = measurement::view_transfers(options.files, options.resolved, options.input, series);
+  });
   const align::JointProblem problem{.recorded = series,
                                     .specimen = options.specimen,
                                     .field = options.field,
+                                    .transfers = std::move(transfers),
                                     .seed = options.fit.seed,
                                     .scratch_dir = recorded.scratch_dir,
                                     .progress = hooks.tune_progress,

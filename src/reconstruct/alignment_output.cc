@@ -38,6 +38,7 @@ report::AlignmentCurves curves_of(const nlohmann::json& record) {
     curves.rotation_deg.push_back(view["rotation_deg"]);
     curves.magnification_percent.push_back(100 *
                                            std::expm1(view["log_magnification"].get<double>()));
+    curves.tilt_change_deg.push_back(view["tilt_change_deg"]);
     curves.local_px.push_back(view.contains("local_px") ? rms_of(view["local_px"]) : 0.0);
     curves.correlation.push_back(view["correlation"]);
     curves.error_x_px.push_back(view["shift_error_px"][0]);

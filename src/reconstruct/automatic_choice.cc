@@ -15,8 +15,9 @@ constexpr double kWeightFactor = 1.8;
 constexpr int kMostSteps = 3;  // to one side of the usual weight
 // A concave penalty of a smaller weight leaves isolated voxels, whatever the held-out views say.
 constexpr int kMostStepsDownIfConcave = 1;
-// Another concave weight than the usual one must predict better by this part. Trials are too short
-// to tell smaller differences: those of the yardsticks prefer a larger weight by up to 0.5 %.
+// Another concave weight than the usual one, and a fit without a limit of isolated vertices, must
+// predict better by this part. Trials are too short to tell smaller differences: those of the
+// yardsticks prefer a larger weight by up to 0.5 %.
 constexpr double kLeastGain = 0.01;
 
 // The part of speckle that hardly anybody sees, and the face jump from which leaves show.
@@ -114,6 +115,16 @@ TrialSettings choose_variation(const TrialSettings& start, FitTrials& trials) {
   return choose_weight(choose_penalty(start, trials), trials);
 }
 
+TrialSettings choose_spike_rank(const TrialSettings& start, FitTrials& trials) {
+  if (start.penalty != Penalty::kSmooth) return start;
+  TrialSettings unlimited = start;
+  unlimited.spike_rank = 0;
+  trials.make({start, unlimited});
+  const selection::Difference loss =
+      selection::difference(trials.trial(start).score, trials.trial(unlimited).score);
+  return loss.is_beyond(kClearErrors) && loss.log_ratio > kLeastGain ? unlimited : start;
+}
+
 TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings& open,
                                  FitTrials& trials) {
   if (!open.view_scale && !open.background && !open.beads) return start;
@@ -137,7 +148,7 @@ TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings&
 
 int usual_trials(const OpenSettings& open) {
   const int corrections = open.view_scale + open.background + open.beads;
-  if (open.variation) return 4 + corrections;
+  if (open.variation) return 4 + open.spikes + corrections;
   return corrections > 0 ? 1 + corrections : 0;
 }
 

@@ -7,10 +7,11 @@ namespace tomofield::reconstruction {
 /// Says which settings a run leaves to trials.
 struct OpenSettings {
   bool variation = false;   ///< penalty and weight of total variation
+  bool spikes = false;      ///< the limit of isolated vertices
   bool view_scale = false;  ///< scales and offsets of the views
   bool background = false;  ///< subtraction of the series' background
   bool beads = false;       ///< masks of the beads that were found
-  bool any() const { return variation || view_scale || background || beads; }
+  bool any() const { return variation || spikes || view_scale || background || beads; }
   bool operator==(const OpenSettings&) const = default;
 };
 
@@ -39,6 +40,11 @@ TrialSettings choose_penalty(const TrialSettings& start, FitTrials& trials);
 /// voxels, or leaves that do not show), goes before.
 TrialSettings choose_variation(const TrialSettings& start, FitTrials& trials);
 
+/// Chooses whether isolated vertices are limited in a smooth fit: not if that predicts clearly
+/// better and by 1 %, as where the peaks of atoms are as narrow as a vertex. Concave fits keep the
+/// limit, which they need on every yardstick.
+TrialSettings choose_spike_rank(const TrialSettings& start, FitTrials& trials);
+
 /// Chooses the corrections of the views that are open, each by trials that differ in it alone.
 /// Scales are fitted if that is clearly better. Beads are masked unless a fit to them is clearly
 /// better: they were found because they clearly are beads, few trials show how they streak, and
@@ -48,7 +54,7 @@ TrialSettings choose_variation(const TrialSettings& start, FitTrials& trials);
 TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings& open,
                                  FitTrials& trials);
 
-/// Returns the number of trials that choose_variation() and choose_corrections() usually make.
+/// Returns the number of trials that the functions above usually make for what is open.
 int usual_trials(const OpenSettings& open);
 
 }  // namespace tomofield::reconstruction

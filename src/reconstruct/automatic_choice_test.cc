@@ -87,6 +87,20 @@ TEST(ChooseVariation, PrefersAWeightThatIsAsGoodAndClearlyCleaner) {
   EXPECT_NEAR(choose_variation(kStart, trials).variation, 14 * 1.8, 1e-9);
 }
 
+TEST(ChooseSpikeRank, KeepsSpikesOnlyIfThatIsBetterByOnePerCent) {
+  const auto chosen_if_kept_is = [](double error, Penalty penalty) {
+    FitTrials trials =
+        trials_with([=](const TrialSettings& s) { return s.spike_rank == 0 ? error : 1.0; }, 1e-4);
+    TrialSettings start = kStart;
+    start.penalty = penalty;
+    return choose_spike_rank(start, trials).spike_rank;
+  };
+  EXPECT_EQ(chosen_if_kept_is(0.98, Penalty::kSmooth), 0);
+  EXPECT_EQ(chosen_if_kept_is(0.995, Penalty::kSmooth), kStart.spike_rank);
+  EXPECT_EQ(chosen_if_kept_is(1.02, Penalty::kSmooth), kStart.spike_rank);
+  EXPECT_EQ(chosen_if_kept_is(0.9, Penalty::kConcave), kStart.spike_rank);
+}
+
 TEST(ChooseCorrections, FitsScalesIfThatIsBetterAndMasksBeadsUnlessThatIsWorse) {
   const OpenSettings open{.view_scale = true, .beads = true};
   const auto scales_help = [](const TrialSettings& s) { return s.fits_view_scale ? 1.0 : 1.2; };

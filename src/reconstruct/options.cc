@@ -9,6 +9,7 @@
 #include "fit/integer_program.h"
 #include "fit/stages.h"
 #include "io/output_files.h"
+#include "measurement/view_transfers.h"
 #include "option_table/values.h"
 #include "output/shared_options.h"
 #include "reconstruct/exchange_files.h"
@@ -49,8 +50,9 @@ fit::FitOptions fit_options(const Options& options) {
   fit.fourier = options.fourier;
   fit.fourier_ring = options.fourier_ring;
   fit.penalty = options.penalty.value_or(fit.penalty);
-  fit.keep_spikes = options.keep_spikes;
+  fit.spike_rank = options.spike_rank.value_or(fit.spike_rank);
   fit.fit_noise = options.fit_noise;
+  fit.noise_model = options.noise_model;
   fit.fit_view_scale = options.fit_view_scale.value_or(fit.fit_view_scale);
   fit.seed = options.seed;
   fit.hold_out = options.hold_out;
@@ -117,6 +119,7 @@ ReconstructOptions run_options(const SeriesFiles& files, const Options& requeste
   run.resolved = resolve(requested);
   const bool is_bright = run.resolved.contrast == Contrast::kBright;
   run.open = {.variation = !run.resolved.penalty,
+              .spikes = !run.resolved.penalty && !requested.spike_rank,
               .view_scale = !requested.fit_view_scale,
               .background = is_bright && !requested.black_level,
               .beads = is_bright && !requested.bead_diameter_nm};
@@ -232,24 +235,17 @@ std::vector<const char*> ReconstructOptions::faults_of_halves() const {
   return all;
 }
 
-// Returns a sentence for each option of contrast transfer and dose that does not go with others.
+// Returns a sentence for each option of contrast transfer, dose and noise that does not go with
+// others.
 std::vector<const char*> ReconstructOptions::faults_of_transfer() const {
-  std::vector<const char*> all;
-  const auto refuse_if = [&](bool is_fault, const char* sentence) {
-    if (is_fault) all.push_back(sentence);
-  };
-  refuse_if(has_ctf_file() && resolved.defocus_um,
-            "--ctf and --defocus both set the defocus of the views: give one of them");
-  refuse_if(!has_ctf() && (resolved.is_phase_flipped || resolved.spherical_aberration_mm ||
-                           resolved.amplitude_contrast),
-            "--ctf-phase-flipped, --cs and --amplitude-contrast describe a contrast transfer: give "
-            "--ctf or --defocus as well");
-  const bool has_dose = resolved.dose_per_tilt.value_or(0.0) > 0.0;
-  refuse_if(has_dose && resolved.is_dose_weighted,
-            "--dose-weighted says that the damage of --dose-per-tilt is in the views already: give "
-            "one of them");
-  refuse_if((has_ctf() || has_dose) && fit.engine == Engine::kRay,
-            "--ctf, --defocus and --dose-per-tilt filter aligned views: they need --engine slab");
+  std::vector<const char*> all = measurement::faults_of_transfer(files, resolved);
+  if (fit.engine != Engine::kRay) return all;
+  if (measurement::has_ctf(files, resolved) || resolved.dose_per_tilt.value_or(0.0) > 0.0)
+    all.push_back(
+        "--ctf, --defocus and --dose-per-tilt filter aligned views: they need --engine slab");
+  if (fit.noise_model == NoiseModel::kColoured)
+    all.push_back(
+        "--noise-model coloured weights the frequencies of aligned views: it needs --engine slab");
   return all;
 }
 

@@ -64,10 +64,6 @@ struct ReconstructOptions {
 
   /// Says whether the run makes two fits, of one half of the data each.
   bool makes_halves() const { return (files.even && files.odd) || resolved.split_tilts; }
-  /// Says whether a file has the contrast transfer of the views; --ctf none names no file.
-  bool has_ctf_file() const { return files.ctf && *files.ctf != "none"; }
-  /// Says whether the contrast transfer of the views is known.
-  bool has_ctf() const { return has_ctf_file() || resolved.defocus_um; }
   /// Returns the model that the run writes first. Its checkpoint has the chosen settings.
   const std::filesystem::path& first_model(const OutputPaths& paths) const {
     return makes_halves() ? paths.halves.front().model : paths.model;

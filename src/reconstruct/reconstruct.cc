@@ -14,13 +14,13 @@
 #include "measurement/background.h"
 #include "measurement/held_out.h"
 #include "measurement/undecided_beads.h"
+#include "measurement/view_transfers.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/halves.h"
 #include "reconstruct/results.h"
 #include "reconstruct/run.h"
 #include "reconstruct/run_fit.h"
 #include "reconstruct/tuning.h"
-#include "reconstruct/view_transfers.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -33,7 +33,10 @@ measurement::Measurement prepare(const tilt_series::TiltSeries& series,
   measurement::Measurement measurement = measurement::prepare_measurement(
       series, options.specimen, io::scratch_directory(options.resolved.output),
       fit::band_rows(options.field), processes);
-  processes.run_collectively([&] { measurement.transfers = view_transfers(options, series); });
+  processes.run_collectively([&] {
+    measurement.transfers =
+        measurement::view_transfers(options.files, options.resolved, options.input, series);
+  });
   measurement.held_out =
       measurement::held_out_views(measurement.geometry.tilt_deg, options.fit.hold_out);
   return measurement;
@@ -67,6 +70,7 @@ void apply(const TrialSettings& settings, Run& run) {
   }
   if (options.open.view_scale)
     resolved.fit_view_scale = options.fit.fit_view_scale = settings.fits_view_scale;
+  if (options.open.spikes) resolved.spike_rank = options.fit.spike_rank = settings.spike_rank;
   if (run.options.open.background) {
     resolved.black_level =
         settings.background_part * run.measurement.background * run.measurement.unit;

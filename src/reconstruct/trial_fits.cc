@@ -32,6 +32,7 @@ class TrialFits::Running {
     options.penalty = settings_.penalty;
     options.density_variation = settings_.variation;
     options.epochs = settings_.epochs;
+    options.spike_rank = settings_.spike_rank;
     options.fit_view_scale = settings_.fits_view_scale;
     options.patience = 0;
     scores_with_view_scale_ = trials.scores_with_view_scale_;

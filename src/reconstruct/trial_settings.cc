@@ -12,6 +12,7 @@
 #include "base/enum_names.h"
 #include "base/plausible.h"
 #include "io/json_numbers.h"
+#include "kernels/spikes.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
@@ -30,7 +31,9 @@ TrialSettings settings_from(const json& entry) {
           .epochs = static_cast<int>(io::integer_at(entry, "epochs", 1, kMostOfAnything)),
           .fits_view_scale = entry.at("view_scale"),
           .background_part = io::number_at(entry, "background_part", 0, 1),
-          .masks_beads = entry.at("masks_beads")};
+          .masks_beads = entry.at("masks_beads"),
+          .spike_rank =
+              static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank))};
 }
 
 }  // namespace
@@ -59,6 +62,9 @@ std::string describe(const TrialSettings& settings, const TrialSettings& usual) 
     text += settings.fits_view_scale ? ", view scales" : ", no view scales";
   if (settings.masks_beads != usual.masks_beads)
     text += settings.masks_beads ? ", beads masked" : ", beads not masked";
+  if (settings.spike_rank != usual.spike_rank)
+    text += settings.spike_rank == 0 ? std::string(", spikes kept")
+                                     : fmt::format(", spike rank {}", settings.spike_rank);
   if (settings.background_part != usual.background_part)
     text += fmt::format(", {:.0f} % of the background subtracted", 100 * settings.background_part);
   return text;
@@ -71,7 +77,8 @@ json settings_json(const TrialSettings& s) {
           {"epochs", s.epochs},
           {"view_scale", s.fits_view_scale},
           {"background_part", s.background_part},
-          {"masks_beads", s.masks_beads}};
+          {"masks_beads", s.masks_beads},
+          {"spike_rank", s.spike_rank}};
 }
 
 FitTrial trial_from(const json& entry) {

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "fit/options.h"
 #include "selection/trial_file.h"
 #include "selection/trials.h"
 #include "tomofield/options.h"
@@ -18,6 +19,7 @@ struct TrialSettings {
   bool fits_view_scale = false;         ///< FitOptions::fit_view_scale
   double background_part = 0;           ///< that is subtracted (measurement/background.h)
   bool masks_beads = false;             ///< whose search left that open (undecided_beads.h)
+  int spike_rank = fit::FitOptions{}.spike_rank;  ///< FitOptions::spike_rank
   bool operator==(const TrialSettings&) const = default;
 };
 using FitTrial = selection::Trial<TrialSettings>;

@@ -122,10 +122,17 @@ std::optional<TunedFit> tune(const measurement::Measurement& measurement,
   // A run without total variation still needs a weight to search from.
   const double first =
       fit.density_variation > 0 ? fit.density_variation : objective::usual_variation(fit.penalty);
-  const TrialSettings start =
-      with_safe_corrections({fit.penalty, first, field.rank, fit.epochs, fit.fit_view_scale}, open);
+  const TrialSettings start = with_safe_corrections({.penalty = fit.penalty,
+                                                     .variation = first,
+                                                     .rank = field.rank,
+                                                     .epochs = fit.epochs,
+                                                     .fits_view_scale = fit.fit_view_scale,
+                                                     .spike_rank = fit.spike_rank},
+                                                    open);
   const std::optional<TunedFit> tuned = searched(fits, &file, [&](FitTrials& trials) {
-    return choose_corrections(search_settings(start, space, trials), open, trials);
+    TrialSettings best = search_settings(start, space, trials);
+    if (open.spikes) best = choose_spike_rank(best, trials);
+    return choose_corrections(best, open, trials);
   });
   if (!tuned) return std::nullopt;
   log_trials(*tuned);
@@ -145,11 +152,17 @@ std::optional<TunedFit> choose_by_short_trials(const measurement::Measurement& m
   const TrialShape shape = short_trial(field, fit);
   TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
                  open.view_scale || fit.fit_view_scale, hooks, usual_trials(open), processes);
-  const TrialSettings start = with_safe_corrections(
-      {fit.penalty, fit.density_variation, field.rank, shape.fit.epochs, fit.fit_view_scale}, open);
+  const TrialSettings start = with_safe_corrections({.penalty = fit.penalty,
+                                                     .variation = fit.density_variation,
+                                                     .rank = field.rank,
+                                                     .epochs = shape.fit.epochs,
+                                                     .fits_view_scale = fit.fit_view_scale,
+                                                     .spike_rank = fit.spike_rank},
+                                                    open);
   std::optional<TunedFit> tuned = searched(fits, nullptr, [&](FitTrials& trials) {
-    return choose_corrections(open.variation ? choose_variation(start, trials) : start, open,
-                              trials);
+    TrialSettings best = open.variation ? choose_variation(start, trials) : start;
+    if (open.spikes) best = choose_spike_rank(best, trials);
+    return choose_corrections(best, open, trials);
   });
   if (!tuned) return std::nullopt;
   log_trials(*tuned);

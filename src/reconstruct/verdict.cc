@@ -38,6 +38,10 @@ nlohmann::json views_json(const ViewAgreement& agreement) {
           {"compared", views}};
 }
 
+nlohmann::json defocus_json(const DefocusCheck& check) {
+  return {{"error", check.error}, {"standard_error", check.standard_error}, {"rings", check.rings}};
+}
+
 nlohmann::json sections_json(const SectionProfile& sections) {
   return {{"faces", sections.faces}, {"empty_part", sections.empty_part}};
 }
@@ -74,6 +78,7 @@ nlohmann::json verdict_json(const Verdict& verdict) {
   json["held_out"] = verdict.held_out ? held_out_json(*verdict.held_out) : nlohmann::json(nullptr);
   json["sections"] = sections_json(verdict.sections);
   json["views"] = verdict.views ? views_json(*verdict.views) : nlohmann::json(nullptr);
+  json["defocus"] = verdict.defocus ? defocus_json(*verdict.defocus) : nlohmann::json(nullptr);
   json["seconds"] = verdict.seconds;
   json["peak_GiB"] = verdict.peak_GiB;
   json["warnings"] = nlohmann::json::array();

@@ -8,6 +8,7 @@
 #include "evaluate/field_artefacts.h"
 #include "fit/fit.h"
 #include "measurement/measurement.h"
+#include "reconstruct/defocus_check.h"
 #include "reconstruct/view_agreement.h"
 
 namespace tomofield::reconstruction {
@@ -44,7 +45,8 @@ struct Verdict {
   std::optional<HeldOutSummary> held_out;
   evaluate::FieldArtefacts artefacts;
   SectionProfile sections;
-  std::optional<ViewAgreement> views;  ///< none for views as recorded (ray engine)
+  std::optional<ViewAgreement> views;   ///< none for views as recorded (ray engine)
+  std::optional<DefocusCheck> defocus;  ///< of views with a contrast transfer
   double seconds = 0.0;
   double peak_GiB = 0.0;  ///< of the process that used most
   std::vector<Warning> warnings;

@@ -24,17 +24,6 @@ constexpr int kFewestOrderedViews = 12;
 // are so small that detail moves by a pixel or two between views that are some degrees apart.
 constexpr std::int64_t kSide = 256, kSmallSide = 64;
 
-std::vector<int> views_by_tilt(const std::vector<double>& tilt_deg) {
-  std::vector<int> all(tilt_deg.size());
-  std::iota(all.begin(), all.end(), 0);
-  std::ranges::stable_sort(all, {}, [&](int v) { return tilt_deg[static_cast<std::size_t>(v)]; });
-  const int last = static_cast<int>(all.size()) - 1, count = std::min(kViews, last + 1);
-  std::vector<int> chosen;
-  for (int i = 0; i < count; ++i)
-    chosen.push_back(all[static_cast<std::size_t>(count == 1 ? 0 : i * last / (count - 1))]);
-  return chosen;
-}
-
 // Returns the side of the smallest blocks whose means make an image no larger than `side`.
 std::int64_t block_for(const Image& image, std::int64_t side) {
   return (std::max(image.width, image.height) + side - 1) / side;
@@ -126,19 +115,29 @@ std::vector<ComparedView> compare(const fit::Fit& fit, std::span<const int> view
   return compared;
 }
 
-// Returns the number of views of which the images may be in memory together.
+double usual(std::vector<float> values) {
+  return values.empty() ? 0.0 : base::percentile(std::move(values), 90);
+}
+
+}  // namespace
+
+std::vector<int> views_to_compare(const std::vector<double>& tilt_deg) {
+  std::vector<int> all(tilt_deg.size());
+  std::iota(all.begin(), all.end(), 0);
+  std::ranges::stable_sort(all, {}, [&](int v) { return tilt_deg[static_cast<std::size_t>(v)]; });
+  const int last = static_cast<int>(all.size()) - 1, count = std::min(kViews, last + 1);
+  std::vector<int> chosen;
+  for (int i = 0; i < count; ++i)
+    chosen.push_back(all[static_cast<std::size_t>(count == 1 ? 0 : i * last / (count - 1))]);
+  return chosen;
+}
+
 std::size_t views_at_once(const measurement::Measurement& series) {
   constexpr std::int64_t kBytes = std::int64_t{1} << 26;
   const std::int64_t of_view =
       series.geometry.width * series.roi.height() * std::int64_t{2 * sizeof(float)};
   return static_cast<std::size_t>(std::clamp<std::int64_t>(kBytes / of_view, 1, kViews));
 }
-
-double usual(std::vector<float> values) {
-  return values.empty() ? 0.0 : base::percentile(std::move(values), 90);
-}
-
-}  // namespace
 
 double ViewAgreement::usual_displacement_px() const {
   std::vector<float> lengths;
@@ -157,7 +156,7 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
                             bool has_margin) {
   const base::TraceSpan span("compare views");
   ViewAgreement found;
-  found.views = views_by_tilt(series.geometry.tilt_deg);
+  found.views = views_to_compare(series.geometry.tilt_deg);
   LineFit brightness;
   std::vector<Image> small;
   std::vector<float> along_x, along_y;

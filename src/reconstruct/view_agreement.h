@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -39,9 +40,14 @@ struct ViewAgreement {
   double usual_displacement_y_px() const;
 };
 
-/// Predicts up to 16 views, evenly spaced in order of tilt, and compares them with the measured
-/// ones. `has_margin` says that the specimen continues outside the volume. Every process calls it
-/// and gets the same. The series must be resampled, and the fit must be at full resolution.
+/// Returns up to 16 views, evenly spaced in order of tilt, and how many of them may be in memory
+/// together.
+std::vector<int> views_to_compare(const std::vector<double>& tilt_deg);
+std::size_t views_at_once(const measurement::Measurement& series);
+
+/// Predicts views_to_compare() and compares them with the measured ones. `has_margin` says that the
+/// specimen continues outside the volume. Every process calls it and gets the same. The series must
+/// be resampled, and the fit must be at full resolution.
 ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement& series,
                             bool has_margin);
 

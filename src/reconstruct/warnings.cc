@@ -48,6 +48,9 @@ constexpr double kMostEmpty = 0.4;
 // the noise is structure, which is smooth in any case.
 constexpr double kMostCorrelated = 0.6;
 
+// Error of the defocus, as a part of it and in standard errors: docs/results/ctf.md.
+constexpr double kLeastDefocusError = 0.01, kDefocusErrors = 4.0;
+
 // Beside the sections that are not empty, the suggested thickness has this part of them.
 constexpr double kRoom = 0.2;
 
@@ -172,6 +175,18 @@ std::optional<Warning> correlated_noise(const Verdict& verdict, double bin_facto
                   std::min(x, y), 2 * bin_factor)};
 }
 
+std::optional<Warning> wrong_defocus(const DefocusCheck& check) {
+  if (std::abs(check.error) < kLeastDefocusError ||
+      std::abs(check.error) < kDefocusErrors * check.standard_error)
+    return std::nullopt;
+  return Warning{"defocus",
+                 fmt::format("the residuals have rings as if the defocus were {:.1f} % {} than "
+                             "given (rings explain {:.2f} % of them): check --ctf or --defocus, "
+                             "the pixel size and the voltage",
+                             100 * std::abs(check.error), check.error > 0 ? "larger" : "smaller",
+                             100 * check.rings)};
+}
+
 }  // namespace
 
 std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& input) {
@@ -186,6 +201,7 @@ std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& inp
     if (!is_contrast_wrong) add(misaligned(*verdict.views, input.alignment));
   }
   if (warnings.empty()) {
+    if (verdict.defocus) add(wrong_defocus(*verdict.defocus));
     add(thickness_warning(verdict, input));
     if (verdict.views) add(correlated_noise(verdict, input.bin_factor));
   }

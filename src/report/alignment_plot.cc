@@ -72,6 +72,11 @@ std::vector<CurvePlot> alignment_plots(const AlignmentCurves& alignment) {
         plot_of("change of the magnification, per cent",
                 {tilt_curve("magnification", alignment, alignment.magnification_percent)}, 0.02));
   }
+  if (has_change(alignment.tilt_change_deg)) {
+    plots.push_back(plot_of("change of the tilt angle, degrees",
+                            {tilt_curve("tilt angle", alignment, alignment.tilt_change_deg)},
+                            0.05));
+  }
   if (has_change(alignment.local_px)) {
     plots.push_back(plot_of("local motion, pixels before binning",
                             {tilt_curve("root mean square", alignment, alignment.local_px)}, 0.1));

@@ -15,15 +15,15 @@ struct AlignmentCurves {
   // The change from the alignment that was given to the one that was found. Shifts are in pixels
   // before binning: x across the tilt axis and y along it.
   std::vector<double> shift_x_px, shift_y_px;
-  std::vector<double> rotation_deg, magnification_percent;
+  std::vector<double> rotation_deg, magnification_percent, tilt_change_deg;
   std::vector<double> local_px;     ///< root mean square of the nodes of the local motion
   std::vector<double> correlation;  ///< of the view with its projection
   std::vector<double> error_x_px, error_y_px;  ///< standard errors of the shift
 };
 
-/// Returns plots over the tilt: shift, rotation, magnification, local motion, correlation, and
-/// standard error of the shift. A rotation, a magnification or local motion that no view has is
-/// left out.
+/// Returns plots over the tilt: shift, rotation, magnification, tilt angle, local motion,
+/// correlation, and standard error of the shift. A rotation, a magnification, a change of the tilt
+/// angle or local motion that no view has is left out.
 std::vector<CurvePlot> alignment_plots(const AlignmentCurves& alignment);
 
 /// Draws these plots one below the other as a PNG. Replaces `path`. Throws Error if it cannot be

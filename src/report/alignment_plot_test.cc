@@ -23,6 +23,7 @@ AlignmentCurves some_alignment() {
     alignment.shift_y_px.push_back(0.05 * tilt + 0.6 * std::cos(5.0 * k));
     alignment.rotation_deg.push_back(0.2 + 0.05 * std::sin(2.0 * k));
     alignment.magnification_percent.push_back(0.1 * std::cos(tilt / 15));
+    alignment.tilt_change_deg.push_back(0.0);
     alignment.correlation.push_back(0.8 - 0.3 * std::pow(tilt / 60, 2));
     alignment.error_x_px.push_back(0.02 + 0.03 * std::pow(tilt / 60, 2));
     alignment.error_y_px.push_back(0.015 + 0.01 * std::pow(tilt / 60, 2));
@@ -84,6 +85,15 @@ TEST(AlignmentPlot, HasLocalMotionIfAnyViewHas) {
   ASSERT_EQ(plots.size(), 6u);
   EXPECT_EQ(plots[3].axes.y_title, "local motion, pixels before binning");
   EXPECT_EQ(plots[3].curves[0].points[22].second, 1.5);
+}
+
+TEST(AlignmentPlot, HasTiltAnglesIfAnyChanges) {
+  AlignmentCurves alignment = some_alignment();
+  alignment.tilt_change_deg[3] = -0.25;
+  const auto plots = alignment_plots(alignment);
+  ASSERT_EQ(plots.size(), 6u);
+  EXPECT_EQ(plots[3].axes.y_title, "change of the tilt angle, degrees");
+  EXPECT_EQ(plots[3].curves[0].points[22].second, -0.25);
 }
 
 TEST(AlignmentPlot, HasRoundTilts) {

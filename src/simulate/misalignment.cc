@@ -16,6 +16,7 @@ constexpr std::uint64_t kShiftStream = 4;
 constexpr std::uint64_t kRotationStream = 9;
 constexpr std::uint64_t kMagnificationStream = 10;
 constexpr std::uint64_t kLocalStream = 11;
+constexpr std::uint64_t kTiltStream = 12;
 constexpr double kMatrixUnit = 1e7;  // an .xf file has 7 decimals for the matrix
 constexpr double kShiftUnit = 1e3;   // and 3 for the shift
 constexpr double kCorrelation = 0.9;
@@ -63,6 +64,14 @@ std::vector<RawFromAligned> draw_maps(const Misalignment& misalignment, std::uin
     map = as_written(map);
   }
   return maps;
+}
+
+std::vector<double> draw_tilt_errors(double spread_deg, std::uint64_t seed, std::size_t num_views) {
+  base::Random random(seed, kTiltStream);
+  std::vector<double> errors_deg;
+  for (std::size_t view = 0; view < num_views; ++view)
+    errors_deg.push_back(spread_deg * random.normal());
+  return errors_deg;
 }
 
 std::vector<ViewWarp> draw_warps(double local_px, double size_px, std::uint64_t seed,

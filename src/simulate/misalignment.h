@@ -17,6 +17,7 @@ struct Misalignment {
   double magnification_spread = 0.0;  ///< of the logarithms of the magnifications
   double axis_deg = 0.0;              ///< is added to the rotation of every view
   double local_px = 0.0;              ///< rms displacement by local motion over all views
+  double tilt_spread_deg = 0.0;       ///< of the errors of the recorded tilt angles
 
   bool turns_or_scales() const {
     return rotation_spread_deg > 0.0 || magnification_spread > 0.0 || axis_deg != 0.0;
@@ -29,6 +30,9 @@ struct Misalignment {
 /// and 3 for the shift: the numbers are rounded so that the file tells the map exactly.
 std::vector<geometry::RawFromAligned> draw_maps(const Misalignment& misalignment,
                                                 std::uint64_t seed, std::size_t num_views);
+
+/// Returns for each view the error of its recorded tilt angle in degrees.
+std::vector<double> draw_tilt_errors(double spread_deg, std::uint64_t seed, std::size_t num_views);
 
 /// Returns for each view a warp of an image of size × size pixels that is free of shift, rotation
 /// and magnification: their least-squares fit over the view is removed. Each node follows a walk

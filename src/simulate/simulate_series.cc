@@ -43,20 +43,22 @@ struct OutputFiles {
         clean(directory / "clean.mrc"),
         truth(directory / "truth.mrc"),
         angles(directory / "tilt_series.tlt"),
+        recorded_angles(directory / "tilt_series.rawtlt"),
         transforms(directory / "tilt_series.xf"),
         ctf(directory / "tilt_series_ctf.txt"),
         defocus(directory / "tilt_series.defocus"),
         mdoc(directory / "tilt_series.mdoc"),
         record(directory / "phantom.json") {}
-  fs::path series, clean, truth, angles, transforms, ctf, defocus, mdoc, record;
+  fs::path series, clean, truth, angles, recorded_angles, transforms, ctf, defocus, mdoc, record;
 };
 
 // Checks that the files can be written, and locks the series, which every simulation writes.
 std::vector<io::OutputLock> claim_files(const OutputFiles& files, bool overwrite) {
   return io::claim_outputs({files.series}, [&] {
-    io::check_output_files({files.series, files.clean, files.truth, files.angles, files.transforms,
-                            files.ctf, files.defocus, files.mdoc, files.record},
-                           {}, overwrite, "give another directory, or --overwrite to replace it");
+    io::check_output_files(
+        {files.series, files.clean, files.truth, files.angles, files.recorded_angles,
+         files.transforms, files.ctf, files.defocus, files.mdoc, files.record},
+        {}, overwrite, "give another directory, or --overwrite to replace it");
   });
 }
 
@@ -177,6 +179,13 @@ void write_angles(const fs::path& path, const std::vector<SimulatedView>& views)
   io::write_number_column(path, angles_deg);
 }
 
+// Writes the angles with the errors that the microscope made.
+void write_recorded_angles(const fs::path& path, const std::vector<SimulatedView>& views) {
+  std::vector<double> angles_deg;
+  for (const SimulatedView& view : views) angles_deg.push_back(view.tilt_deg + view.tilt_error_deg);
+  io::write_number_column(path, angles_deg);
+}
+
 // Writes the transforms that undo the misalignment except for local motion.
 void write_transforms(const fs::path& path, const std::vector<SimulatedView>& views) {
   std::vector<io::ImodTransform> transforms;
@@ -249,6 +258,7 @@ Json options_json(const SimulationOptions& options) {
     json["magnification_spread"] = misalignment.magnification_spread;
     json["axis_deg"] = misalignment.axis_deg;
   }
+  if (misalignment.tilt_spread_deg > 0.0) json["tilt_spread_deg"] = misalignment.tilt_spread_deg;
   if (misalignment.local_px > 0.0) json["local_px"] = misalignment.local_px;
   if (cell.content == Content::kTextured) json["content"] = "textured";
   if (!options.reference_has_beads) json["reference_has_gold"] = false;
@@ -289,6 +299,7 @@ Json view_json(const SimulatedView& view, const Misalignment& misalignment) {
   Json json{{"tilt_deg", view.tilt_deg},
             {"shift_px", {map.shift_x_px, map.shift_y_px}},
             {"gain", view.gain}};
+  if (misalignment.tilt_spread_deg > 0.0) json["tilt_error_deg"] = view.tilt_error_deg;
   if (misalignment.turns_or_scales()) {
     json["rotation_deg"] =
         std::atan2(map.m21 - map.m12, map.m11 + map.m22) * 180.0 / std::numbers::pi;
@@ -371,6 +382,10 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
     results.remove_old(files.truth);
   write_views(files, phantom, views, options, summary.sigma);
   write_angles(files.angles, views);
+  if (options.misalignment.tilt_spread_deg > 0.0)
+    write_recorded_angles(files.recorded_angles, views);
+  else
+    results.remove_old(files.recorded_angles);
   if (options.misalignment.is_none())
     results.remove_old(files.transforms);
   else

@@ -29,6 +29,7 @@ struct SimulationSummary {
 ///   truth.mrc        thickness × size × size, the density, high = dense; with or without gold
 ///                    beads (SimulationOptions::reference_has_beads)
 ///   tilt_series.tlt  the true angles
+///   tilt_series.rawtlt  only with errors of the tilt angles: the angles with these errors
 ///   tilt_series.xf   only with misalignment: transforms that undo all of it but local motion
 ///   tilt_series_ctf.txt, tilt_series.defocus
 ///                    only with a defocus: the contrast transfer, as CTFFIND and IMOD write it

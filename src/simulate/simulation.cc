@@ -91,6 +91,8 @@ std::vector<std::string> SimulationOptions::validate() const {
           "-180 to 180 degrees");
   require(is_spread(m.local_px, size / 20.0), "the local motion", m.local_px,
           "0 to a twentieth of the size");
+  require(is_spread(m.tilt_spread_deg, 5.0), "the tilt angles' spread", m.tilt_spread_deg,
+          "0 to 5 degrees");
   const Imaging& i = imaging;
   if (i.defocus) {
     const auto [low, high] = *i.defocus;
@@ -130,7 +132,10 @@ std::vector<SimulatedView> plan_views(const SimulationOptions& options) {
   if (options.misalignment.local_px > 0.0)
     warps = draw_warps(options.misalignment.local_px, static_cast<double>(options.cell.size_px),
                        seed, views.size());
+  const auto tilt_errors_deg =
+      draw_tilt_errors(options.misalignment.tilt_spread_deg, seed, views.size());
   for (std::size_t i = 0; i < views.size(); ++i) {
+    views[i].tilt_error_deg = tilt_errors_deg[i];
     views[i].tilt_deg = options.tilts.first_deg + options.tilts.step_deg * static_cast<double>(i);
     views[i].gain = std::exp(options.gain_spread * gains.normal());
     views[i].raw_from_aligned = maps[i];

@@ -70,6 +70,7 @@ void apply_yardstick(Yardstick yardstick, SimulationOptions& options);
 /// Holds the tilt, the alignment and the gain of a simulated view.
 struct SimulatedView {
   double tilt_deg = 0.0;
+  double tilt_error_deg = 0.0;  ///< of the angle that the microscope recorded
   geometry::RawFromAligned raw_from_aligned{};
   std::optional<geometry::ViewWarp> warp{};  ///< local motion
   double gain = 1.0;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -70,6 +71,13 @@ SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::Im
   if (alignment.num_local_rows > 0) {
     base::log_warning(
         fmt::format("'{}' has local alignment, which is not applied: views are aligned as a whole",
+                    path.string()));
+  }
+  if (std::ranges::any_of(alignment.rows,
+                          [](const io::AreTomoRow& row) { return row.magnification != 1.0; })) {
+    base::log_warning(
+        fmt::format("'{}' has magnifications (GMAG), which are not applied, as in AreTomo's own "
+                    "volumes: an .xf file holds magnifications",
                     path.string()));
   }
   return table;

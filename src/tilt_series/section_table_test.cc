@@ -4,6 +4,10 @@
 
 #include <Eigen/Dense>
 #include <numbers>
+#include <string>
+
+#include "scratch_directory.h"
+#include "warning_catcher.h"
 
 namespace tomofield::tilt_series {
 namespace {
@@ -65,6 +69,20 @@ io::ListedView some_view() {
 AlignedSection convert(io::CentreRule centre, const SizedStack& stack) {
   const io::ViewTable table{"a.star", centre, false, {some_view()}, {}, {}};
   return *sections_of_views(table, stack, kPixel_A).of_section[0];
+}
+
+TEST(SectionTable, SaysThatMagnificationsOfAreTomoAreNotApplied) {
+  const testing::ScratchDirectory folder;
+  const SizedStack stack(64, 48, 2);
+  const auto warnings_with = [&](const std::string& magnification) {
+    const auto aln = folder.write("a.aln", "# RawSize = 64 48 2\n1 0 1 0 0 0 0 0 0 -10\n2 0 " +
+                                               magnification + " 0 0 0 0 0 0 10\n");
+    const testing::WarningCatcher warnings;
+    EXPECT_EQ(sections_of_aretomo(aln, stack).of_section[1]->raw_from_aligned.m11, 1.0);
+    return warnings.text();
+  };
+  EXPECT_EQ(warnings_with("1.00000"), "");
+  EXPECT_NE(warnings_with("1.00200").find("GMAG"), std::string::npos);
 }
 
 // RELION 5, Tomogram::setProjectionMatrix: the shift, int(size / 2) of the image, the rotations,

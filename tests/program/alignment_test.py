@@ -19,10 +19,10 @@ FIT = ["--epochs", 2, "--coarse-epochs", 4, "--tv-penalty", "smooth", "--view-sc
        "--black-level", 0, "--bead-diameter", 0]
 
 
-def simulate(name, *options, size=SIZE):
+def simulate(name, *options, size=SIZE, noise=0.05):
     """Returns the folder of a series of a cell that ends in the field of view."""
     folder = os.path.join(harness.fresh_directory(name), "cell")
-    harness.succeed("simulate", folder, "--size", size, "--yardstick", "a", "--noise", 0.05,
+    harness.succeed("simulate", folder, "--size", size, "--yardstick", "a", "--noise", noise,
                     "--seed", 21, "--no-truth", *options)
     return folder
 
@@ -120,6 +120,35 @@ def test_reconstruct_takes_the_alignment_and_resumes_from_it(shifted):
     resumed = harness.succeed(*command, "--resume")
     assert "last step" not in resumed.stderr
     assert harness.read_bytes(volume) == first
+
+
+def test_wrong_tilt_angles_are_found_and_reach_the_files_of_other_programs():
+    size = 96
+    folder = simulate("alignment_tilts", "--misalign", 1.5, "--misalign-tilt", 0.6, size=size,
+                      noise=0.03)
+    raw = [argument.replace(".tlt", ".rawtlt") if isinstance(argument, str) else argument
+           for argument in series_of(folder, size)]
+    prefix, volume = (os.path.join(folder, name) for name in ("found_align", "found.mrc"))
+    harness.succeed("reconstruct", *raw, *FIT[:-2], "--align", "refine", "--alignment-json", "-o",
+                    volume)
+    given = np.loadtxt(os.path.join(folder, "tilt_series.rawtlt"))
+    start = np.std(given - np.loadtxt(os.path.join(folder, "tilt_series.tlt")))
+    found = errors(folder, prefix, size)
+    assert start > 0.5 and found["tilt_deg"] < 0.5 * start, found
+    made = record(prefix)
+    changes = [view["tilt_change_deg"] for view in made["views"]]
+    assert made["tilt"] and abs(np.mean(changes)) < 1e-6
+    assert np.allclose(np.loadtxt(prefix + ".tlt"), given + changes, atol=0.006)
+    # The CryoET Data Portal has maps to the recorded views.
+    with open(volume[:-4] + "_alignment.json", encoding="utf-8") as file:
+        sections = json.load(file)["per_section_alignment_parameters"]
+    assert np.allclose([section["tilt_angle"] for section in sections], given + changes, atol=1e-6)
+    lines = np.loadtxt(prefix + ".xf")
+    for section, line in zip(sections, lines):
+        inverse = np.linalg.inv(line[:4].reshape(2, 2))
+        assert np.allclose(section["in_plane_rotation"], inverse, atol=1e-5)
+        assert np.allclose([section["x_offset"], section["y_offset"]], -inverse @ line[4:],
+                           atol=0.01)
 
 
 def test_too_few_views_are_refused(shifted):

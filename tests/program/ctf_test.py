@@ -88,6 +88,66 @@ def test_stopping_and_resuming_change_no_bit(series):
     np.testing.assert_array_equal(series.volume("resumed.mrc"), series.volume("modelled.mrc"))
 
 
+def metrics(series, output):
+    with open(series.path(output)[:-4] + ".json", encoding="utf-8") as file:
+        return json.load(file)["metrics"]
+
+
+@pytest.mark.usefixtures("modelled")
+def test_the_verdict_tells_a_wrong_defocus(series):
+    right = metrics(series, "modelled.mrc")["verdict"]["defocus"]
+    scaled = series.path("scaled.txt")
+    with open(series.path("tilt_series_ctf.txt"), encoding="utf-8") as file:
+        lines = file.readlines()
+    with open(scaled, "w", encoding="utf-8") as file:
+        for line in lines:
+            words = line.split()
+            if not line.startswith("#"):
+                words[1:3] = [str(1.15 * float(word)) for word in words[1:3]]
+            file.write(" ".join(words) + "\n")
+    series.run("scaled.mrc", "--ctf", scaled, "--mdoc", series.path("tilt_series.mdoc"))
+    wrong = metrics(series, "scaled.mrc")["verdict"]["defocus"]
+    assert wrong["error"] < right["error"] - 0.03, (right, wrong)
+    assert wrong["rings"] > right["rings"], (right, wrong)
+
+
+def test_coloured_noise_gains_and_resumes_to_the_bit():
+    folder = os.path.join(harness.fresh_directory("coloured"), "cell")
+    harness.succeed("simulate", folder, "--size", SIZE, "--yardstick", "a", "--noise", 0.1,
+                    "--noise-blur", 1, "--seed", 31)
+    series = Filtered.__new__(Filtered)
+    series.folder = folder
+    series.truth = harness.read_volume(series.path("truth.mrc"))
+    series.run("white.mrc")
+    series.run("coloured.mrc", "--noise-model", "coloured")
+    assert series.psnr("coloured.mrc") > series.psnr("white.mrc") + 0.2
+    command = [word for word in series.arguments("resumed.mrc", "--noise-model", "coloured")
+               if word != "--overwrite"]
+    harness.finish_with_stops([*command, "--resume"], lambda: None, most=3)
+    np.testing.assert_array_equal(series.volume("resumed.mrc"), series.volume("coloured.mrc"))
+
+
+def test_baselines_correct_the_contrast_transfer(series):
+    def psnr(output, *options):
+        harness.succeed("baseline", "sirt", series.path("tilt_series.mrc"), "--tlt",
+                        series.path("tilt_series.tlt"), "--thickness", len(series.truth), "--contrast",
+                        "bright", "--no-margin", "--overwrite", "-o", series.path(output), *options)
+        return series.psnr(output)
+    ignored = psnr("sirt.mrc")
+    flipped = psnr("flipped.mrc", *series.transfer)
+    wiener = psnr("wiener.mrc", *series.transfer, "--ctf-correction", "wiener")
+    assert abs(flipped - ignored) > 1e-3
+    assert wiener > ignored, (ignored, flipped, wiener)
+
+
+def test_views_are_aligned_with_filtered_projections(series):
+    series.run("aligned.mrc", *series.transfer, "--align", "refine")
+    with open(series.path("aligned_align.json"), encoding="utf-8") as file:
+        views = json.load(file)["views"]
+    shifts = np.array([view["shift_px"] for view in views])
+    assert np.sqrt(np.mean(shifts ** 2)) < 0.5, shifts
+
+
 def test_files_of_another_stack_are_refused(series):
     short = series.path("short.txt")
     with open(series.path("tilt_series_ctf.txt"), encoding="utf-8") as file:

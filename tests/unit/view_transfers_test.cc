@@ -1,4 +1,4 @@
-#include "reconstruct/view_transfers.h"
+#include "measurement/view_transfers.h"
 
 #include <gtest/gtest.h>
 
@@ -6,6 +6,7 @@
 #include <string>
 
 #include "expect_parts.h"
+#include "reconstruct/options.h"
 #include "scratch_directory.h"
 #include "simulate/simulate_series.h"
 #include "tomofield/error.h"
@@ -47,7 +48,8 @@ Options options_of_run() {
 
 std::vector<ViewTransfer> transfers_of(const SeriesFiles& files, const Options& options) {
   const ReconstructOptions run = run_options(files, options);
-  return view_transfers(run, tilt_series::TiltSeries(run.input));
+  return measurement::view_transfers(run.files, run.resolved, run.input,
+                                     tilt_series::TiltSeries(run.input));
 }
 
 void expect_same(const ViewTransfer& a, const ViewTransfer& b) {

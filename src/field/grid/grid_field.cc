@@ -147,9 +147,9 @@ double GridField::parameter_variation(int leaf, const kernels::VariationPenalty&
   return array_variation(leaf_parameters(leaf), s.nx, s.nz, s.ny, 1, penalty, weight, gradient);
 }
 
-void GridField::limit_spikes(int leaf) {
+void GridField::limit_spikes(int leaf, int rank) {
   const LeafShape& s = shape(leaf);
-  kernels::limit_spikes({.nx = s.nx, .ny = s.ny, .nz = s.nz}, leaf_parameters(leaf));
+  kernels::limit_spikes({.nx = s.nx, .ny = s.ny, .nz = s.nz}, rank, leaf_parameters(leaf));
 }
 
 void GridField::sample_quarter(const LeafShape& s, const float* leaf, double x0, double y0,

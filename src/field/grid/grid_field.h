@@ -26,7 +26,7 @@ class GridField final : public Field {
                      float* gradient) const override;
   double parameter_variation(int leaf, const kernels::VariationPenalty& penalty, double weight,
                              float* gradient) const override;
-  void limit_spikes(int leaf) override;
+  void limit_spikes(int leaf, int rank) override;
 
  protected:
   std::size_t parameter_count(const LeafShape& shape) const override { return count(shape); }

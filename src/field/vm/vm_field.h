@@ -35,7 +35,7 @@ class VmField final : public Field {
                      float* gradient) const override;
   double parameter_variation(int leaf, const kernels::VariationPenalty& penalty, double weight,
                              float* gradient) const override;
-  void limit_spikes(int) override {}
+  void limit_spikes(int, int) override {}
 
  protected:
   std::size_t parameter_count(const LeafShape& shape) const override { return count(shape); }

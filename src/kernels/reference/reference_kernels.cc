@@ -238,7 +238,7 @@ int mirrored_vertex(int i, int n) {
 
 }  // namespace
 
-void limit_spikes(const LatticeShape& s, double* values) {
+void limit_spikes(const LatticeShape& s, int rank, double* values) {
   const std::vector<double> before(values, values + s.size());
   const auto at = [&](int x, int y, int z) {
     return (static_cast<std::size_t>(mirrored_vertex(x, s.nx)) * static_cast<std::size_t>(s.nz) +
@@ -254,8 +254,8 @@ void limit_spikes(const LatticeShape& s, double* values) {
           if (i != 13)
             around.push_back(before[at(x + i / 9 - 1, y + i / 3 % 3 - 1, z + i % 3 - 1)]);
         std::sort(around.begin(), around.end());
-        values[at(x, y, z)] =
-            std::clamp(values[at(x, y, z)], around[kSpikeRank - 1], around[26 - kSpikeRank]);
+        const auto lowest = static_cast<std::size_t>(rank - 1);
+        values[at(x, y, z)] = std::clamp(values[at(x, y, z)], around[lowest], around[25 - lowest]);
       }
     }
   }

@@ -77,6 +77,6 @@ void adam_step(const AdamStep& step, std::ptrdiff_t count, double* parameters, d
                double* m, double* v);
 
 /// Moves values beyond the kSpikeRank-th of the 26 values around them to that one.
-void limit_spikes(const LatticeShape& shape, double* values);
+void limit_spikes(const LatticeShape& shape, int rank, double* values);
 
 }  // namespace tomofield::kernels::reference

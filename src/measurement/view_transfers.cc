@@ -1,4 +1,4 @@
-#include "reconstruct/view_transfers.h"
+#include "measurement/view_transfers.h"
 
 #include <fmt/format.h>
 
@@ -16,7 +16,7 @@
 #include "tilt_series/open_views.h"
 #include "tomofield/error.h"
 
-namespace tomofield::reconstruction {
+namespace tomofield::measurement {
 namespace {
 
 using microscope::Exposure;
@@ -25,10 +25,10 @@ using Exposures = std::vector<Exposure>;  // [section]
 constexpr double kAngstroms_in_um = 1e4;
 
 // Throws Error if the pixel size is the one that stands for an unknown one.
-void require_pixel_size(const ReconstructOptions& options, const tilt_series::TiltSeries& series,
-                        const std::string& stack) {
+void require_pixel_size(const tilt_series::TiltSeriesOptions& input,
+                        const tilt_series::TiltSeries& series, const std::string& stack) {
   const double unbinned_A = series.pixel_size_A() / series.bin_factor();
-  if (options.input.pixel_size_A || std::abs(unbinned_A - 1.0) > 1e-6) return;
+  if (input.pixel_size_A || std::abs(unbinned_A - 1.0) > 1e-6) return;
   throw Error(
       fmt::format("contrast transfer and dose depend on the pixel size, which '{}' does not "
                   "have: give it with --pixel-size",
@@ -45,9 +45,9 @@ void require_sections(std::size_t count, std::int64_t num_sections,
 }
 
 // Returns the contrast transfer of each section, or nothing without any.
-std::optional<io::CtfTable> find_ctf(const ReconstructOptions& options, std::int64_t num_sections,
-                                     const std::string& stack) {
-  if (const auto& um = options.resolved.defocus_um) {
+std::optional<io::CtfTable> find_ctf(const SeriesFiles& files, const Options& options,
+                                     std::int64_t num_sections, const std::string& stack) {
+  if (const auto& um = options.defocus_um) {
     const double defocus_A = *um * kAngstroms_in_um;
     io::CtfTable table;
     table.views.assign(static_cast<std::size_t>(num_sections),
@@ -55,8 +55,8 @@ std::optional<io::CtfTable> find_ctf(const ReconstructOptions& options, std::int
     base::log_info(fmt::format("ctf: an underfocus of {} µm in all views", *um));
     return table;
   }
-  if (!options.has_ctf_file()) return std::nullopt;
-  io::CtfTable table = io::read_ctf(*options.files.ctf);
+  if (!has_ctf_file(files)) return std::nullopt;
+  io::CtfTable table = io::read_ctf(*files.ctf);
   require_sections(table.views.size(), num_sections, table.file, "contrast transfer", stack);
   for (const std::string& what : table.not_applied)
     base::log_warning(fmt::format("'{}' has {}, which is not applied", table.file.string(), what));
@@ -96,20 +96,19 @@ std::vector<std::size_t> order_of(const Exposures& exposures) {
   return order;
 }
 
-Recording find_recording(const ReconstructOptions& options, std::int64_t num_sections,
-                         const std::string& stack) {
+Recording find_recording(const SeriesFiles& files, const tilt_series::TiltSeriesOptions& input,
+                         std::int64_t num_sections, const std::string& stack) {
   Recording found;
-  if (options.files.mdoc) {
-    const io::Mdoc mdoc = io::read_mdoc(*options.files.mdoc);
-    require_sections(mdoc.sections.size(), num_sections, *options.files.mdoc, "doses", stack);
-    return {options.files.mdoc->string(), microscope::exposures_of(mdoc),
-            io::acquisition_order(mdoc)};
+  if (files.mdoc) {
+    const io::Mdoc mdoc = io::read_mdoc(*files.mdoc);
+    require_sections(mdoc.sections.size(), num_sections, *files.mdoc, "doses", stack);
+    return {files.mdoc->string(), microscope::exposures_of(mdoc), io::acquisition_order(mdoc)};
   }
-  if (!options.input.images && io::is_view_table(options.files.stack)) {
-    found.doses = microscope::exposures_of(io::read_view_table(options.files.stack));
+  if (!input.images && io::is_view_table(files.stack)) {
+    found.doses = microscope::exposures_of(io::read_view_table(files.stack));
     if (found.doses) {
-      require_sections(found.doses->size(), num_sections, options.files.stack, "doses", stack);
-      return {options.files.stack.string(), found.doses, order_of(*found.doses)};
+      require_sections(found.doses->size(), num_sections, files.stack, "doses", stack);
+      return {files.stack.string(), found.doses, order_of(*found.doses)};
     }
   }
   found.order.resize(static_cast<std::size_t>(num_sections));
@@ -118,15 +117,16 @@ Recording find_recording(const ReconstructOptions& options, std::int64_t num_sec
 }
 
 // Returns the exposure of each section, or nothing if it is not known or not wanted.
-std::optional<Exposures> find_exposures(const ReconstructOptions& options,
+std::optional<Exposures> find_exposures(const SeriesFiles& files, const Options& options,
+                                        const tilt_series::TiltSeriesOptions& input,
                                         std::int64_t num_sections, const std::string& stack) {
-  const std::optional<double>& of_view = options.resolved.dose_per_tilt;
-  if (options.resolved.is_dose_weighted) {
+  const std::optional<double>& of_view = options.dose_per_tilt;
+  if (options.is_dose_weighted) {
     base::log_info("dose: the views are weighted by it already, so no radiation damage is applied");
     return std::nullopt;
   }
   if (of_view && *of_view == 0.0) return std::nullopt;
-  const Recording recording = find_recording(options, num_sections, stack);
+  const Recording recording = find_recording(files, input, num_sections, stack);
   if (!of_view) {
     if (recording.doses) base::log_info(fmt::format("dose: from '{}'", recording.source));
     return recording.doses;
@@ -139,8 +139,8 @@ std::optional<Exposures> find_exposures(const ReconstructOptions& options,
 }
 
 // Sets the defocus of a view, turned to the aligned image, and its slope over that image.
-void set_defocus(const ReconstructOptions& options, const tilt_series::TiltSeries& series,
-                 std::size_t view, const io::CtfTable& ctf, microscope::ViewTransfer& transfer) {
+void set_defocus(const Options& options, const tilt_series::TiltSeries& series, std::size_t view,
+                 const io::CtfTable& ctf, microscope::ViewTransfer& transfer) {
   const tilt_series::View& of = series.views()[view];
   const std::optional<io::Defocus>& recorded = ctf.views[static_cast<std::size_t>(of.section)];
   if (!recorded)
@@ -149,29 +149,49 @@ void set_defocus(const ReconstructOptions& options, const tilt_series::TiltSerie
                     "with --exclude {}",
                     ctf.file.string(), of.section + 1, of.section + 1));
   const auto hand =
-      options.resolved.hand < 0 ? microscope::DefocusHand::kLeft : microscope::DefocusHand::kRight;
+      options.hand < 0 ? microscope::DefocusHand::kLeft : microscope::DefocusHand::kRight;
   transfer.defocus = microscope::aligned_defocus(*recorded, series.raw_from_aligned(view));
   transfer.slope = microscope::slope_of_tilt(of.tilt_deg, series.pixel_size_A(), hand);
-  transfer.is_flipped = options.resolved.is_phase_flipped;
+  transfer.is_flipped = options.is_phase_flipped;
 }
 
 }  // namespace
 
-std::vector<microscope::ViewTransfer> view_transfers(const ReconstructOptions& options,
+std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const Options& options) {
+  std::vector<const char*> all;
+  const auto refuse_if = [&](bool is_fault, const char* sentence) {
+    if (is_fault) all.push_back(sentence);
+  };
+  refuse_if(has_ctf_file(files) && options.defocus_um,
+            "--ctf and --defocus both set the defocus of the views: give one of them");
+  refuse_if(
+      !has_ctf(files, options) && (options.is_phase_flipped || options.spherical_aberration_mm ||
+                                   options.amplitude_contrast),
+      "--ctf-phase-flipped, --cs and --amplitude-contrast describe a contrast transfer: give "
+      "--ctf or --defocus as well");
+  refuse_if(options.dose_per_tilt.value_or(0.0) > 0.0 && options.is_dose_weighted,
+            "--dose-weighted says that the damage of --dose-per-tilt is in the views already: give "
+            "one of them");
+  return all;
+}
+
+std::vector<microscope::ViewTransfer> view_transfers(const SeriesFiles& files,
+                                                     const Options& options,
+                                                     const tilt_series::TiltSeriesOptions& input,
                                                      const tilt_series::TiltSeries& series) {
-  const bool has_dose = options.resolved.dose_per_tilt.value_or(0.0) > 0.0;
-  if (!options.has_ctf() && !options.files.ctf && options.resolved.contrast == Contrast::kDark)
+  const bool has_dose = options.dose_per_tilt.value_or(0.0) > 0.0;
+  if (!has_ctf(files, options) && !files.ctf && options.contrast == Contrast::kDark)
     base::log_info(
         "ctf: none is given (--ctf or --defocus), so the views count as plain projections: "
         "the tomogram lacks contrast at low resolution and keeps the fringes of defocus");
-  if (!options.has_ctf() && !has_dose) return {};
-  const auto stack = tilt_series::open_views(options.input);
+  if (!has_ctf(files, options) && !has_dose) return {};
+  const auto stack = tilt_series::open_views(input);
   const std::int64_t num_sections = stack->header().nz;
-  require_pixel_size(options, series, stack->name());
-  const auto ctf = find_ctf(options, num_sections, stack->name());
-  const auto exposures = find_exposures(options, num_sections, stack->name());
+  require_pixel_size(input, series, stack->name());
+  const auto ctf = find_ctf(files, options, num_sections, stack->name());
+  const auto exposures = find_exposures(files, options, input, num_sections, stack->name());
   if (!ctf && !exposures) return {};
-  const microscope::Optics optics = find_optics(options.resolved, ctf);
+  const microscope::Optics optics = find_optics(options, ctf);
   std::vector<microscope::ViewTransfer> transfers(series.views().size());
   for (std::size_t view = 0; view < transfers.size(); ++view) {
     microscope::ViewTransfer& transfer = transfers[view];
@@ -184,4 +204,4 @@ std::vector<microscope::ViewTransfer> view_transfers(const ReconstructOptions& o
   return transfers;
 }
 
-}  // namespace tomofield::reconstruction
+}  // namespace tomofield::measurement

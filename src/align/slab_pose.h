@@ -1,0 +1,16 @@
+#pragma once
+
+namespace tomofield::align {
+
+/// Describes a slab in the tilted views.
+struct SlabPose {
+  double thickness_px = 0.0;  ///< in pixels of the images
+  double pitch_deg = 0.0;     ///< is added to all tilt angles: the slab lies level with them
+};
+
+/// Holds the most likely pose, and how well it is known.
+struct FoundPose {
+  SlabPose pose, error;
+};
+
+}  // namespace tomofield::align

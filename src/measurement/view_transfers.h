@@ -1,0 +1,34 @@
+#pragma once
+
+#include <vector>
+
+#include "microscope/view_transfer.h"
+#include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
+
+namespace tomofield::measurement {
+
+/// Says whether a file has the contrast transfer of the views; --ctf none names no file.
+inline bool has_ctf_file(const SeriesFiles& files) { return files.ctf && *files.ctf != "none"; }
+
+/// Says whether the contrast transfer of the views is known.
+inline bool has_ctf(const SeriesFiles& files, const Options& options) {
+  return has_ctf_file(files) || options.defocus_um;
+}
+
+/// Returns a sentence for each option of contrast transfer and dose that does not go with others.
+std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const Options& options);
+
+/// Returns what the microscope did to each aligned view of a series, as the options for contrast
+/// transfer and dose say: [view], with pixels of `series`. `input` is what the series was read by.
+/// The result is empty if the options name neither a contrast transfer nor a dose, so that the
+/// views are plain projections. The defocus is that on the tilt axis, and its slope is that of the
+/// middle plane of the specimen, whose hand is --hand. Doses come from --dose-per-tilt, else from
+/// --mdoc, else from the table of views that is the stack. Logs what it took. Throws Error if the
+/// pixel size is not known, and for a file that is not of this stack or has no defocus of a view.
+std::vector<microscope::ViewTransfer> view_transfers(const SeriesFiles& files,
+                                                     const Options& options,
+                                                     const tilt_series::TiltSeriesOptions& input,
+                                                     const tilt_series::TiltSeries& series);
+
+}  // namespace tomofield::measurement

@@ -1,0 +1,19 @@
+#pragma once
+
+#include "io/view_table.h"
+#include "microscope/ctf.h"
+#include "microscope/defocus_slope.h"
+
+namespace tomofield::microscope {
+
+/// Describes what turns a projection of density, in which dense is high, into a view.
+struct ViewTransfer {
+  Optics optics;
+  io::Defocus defocus;        ///< with its angle in the image that is filtered
+  DefocusSlope slope;         ///< over that image
+  double exposure = 0.0;      ///< electrons per Å² (Exposure::at_middle()); 0: no damage
+  double pixel_size_A = 1.0;  ///< of that image
+  bool is_flipped = false;    ///< the view's phases were flipped: |CTF| instead of −CTF
+};
+
+}  // namespace tomofield::microscope
