@@ -2,12 +2,12 @@
 """Measures how visible the faces of leaves are in a tomogram.
 
 The ratio is the mean jump of the density between voxels on either side of a leaf's face, over the
-mean jump between neighbouring voxels inside leaves, along X and Y. 1 means that no face is visible;
-the target is at most 1.1.
+mean jump between neighbouring voxels of one leaf within eight voxels of such a face, along X and Y.
+1 means that no face is visible; the target is at most 1.1.
 
 usage: seam.py TOMOGRAM.mrc [--model MODEL.h5] [--truth TRUTH.mrc]
 
-By default the model lies beside the tomogram. Prints JSON: jump_across and jump_inside in data
+By default the model lies beside the tomogram. Prints JSON: jump_across and jump_near in data
 units, ratio, and the ratio along each axis. There are few faces and the content is not even, so the
 truth of a phantom has a ratio other than 1 at the same places. With --truth the script prints that
 ratio too, and the quotient of both."""
@@ -22,12 +22,25 @@ import mrcfile
 import numpy as np
 
 
+NEAR = 8  # pairs of voxels on each side of a face
+
+
+def mark(begin, end, size, across, near):
+    """Marks the pairs [pair, …] of a leaf from voxel `begin` to `end` of `size` along one axis."""
+    pairs = slice(max(begin, 0), min(end, size) - 1)
+    if 0 < begin < size:
+        across[begin - 1] = True
+        near[begin:min(begin + NEAR, pairs.stop)] = True
+    if 0 < end < size:
+        near[max(end - 1 - NEAR, pairs.start):pairs.stop] = True
+
+
 def face_masks(model_path, shape):
-    """Returns, for pairs of voxels along X and along Y, [y, x], true where a leaf's face lies
-    between the two."""
+    """Returns two masks each for pairs of voxels along X and along Y, [y, x]: true where a leaf's
+    face lies between the two, and true near such a face."""
     num_y, num_x = shape
-    across_x = np.zeros((num_y, num_x - 1), bool)
-    across_y = np.zeros((num_y - 1, num_x), bool)
+    across = [np.zeros((num_y, num_x - 1), bool), np.zeros((num_y - 1, num_x), bool)]
+    near = [np.zeros_like(mask) for mask in across]
     with h5py.File(model_path, "r") as model:
         roi_x, roi_y = model["geometry/roi"][:2]
         tree = model["field/tree"]
@@ -36,16 +49,13 @@ def face_masks(model_path, shape):
             x0, y0 = int(tree["node_x0"][node] - roi_x), int(tree["node_y0"][node] - roi_y)
             rows = slice(max(y0, 0), max(y0 + size, 0))
             columns = slice(max(x0, 0), max(x0 + size, 0))
-            if 0 < x0 < num_x:
-                across_x[rows, x0 - 1] = True
-            if 0 < y0 < num_y:
-                across_y[y0 - 1, columns] = True
-    return across_x, across_y
+            mark(x0, x0 + size, num_x, across[0][rows].T, near[0][rows].T)
+            mark(y0, y0 + size, num_y, across[1][:, columns], near[1][:, columns])
+    return across, near
 
 
-def ratio(jumps, across):
-    inside = [~a for a in across]
-    return mean_jump(jumps, across) / mean_jump(jumps, inside)
+def ratio(jumps, across, near):
+    return mean_jump(jumps, across) / mean_jump(jumps, near)
 
 
 def mean_jump(jumps, selected):
@@ -67,16 +77,16 @@ def main():
     arguments = parser.parse_args()
     jumps = read_jumps(arguments.tomogram)
     shape = (jumps[0].shape[0], jumps[1].shape[1])
-    across = face_masks(arguments.model or os.path.splitext(arguments.tomogram)[0] + ".h5", shape)
+    across, near = face_masks(arguments.model or os.path.splitext(arguments.tomogram)[0] + ".h5", shape)
     if not all(mask.any() for mask in across):
         sys.exit("seam.py: the tomogram lies in a single leaf along X or Y")
     figures = {"jump_across": mean_jump(jumps, across),
-               "jump_inside": mean_jump(jumps, [~mask for mask in across]),
-               "ratio": round(ratio(jumps, across), 4),
-               "ratio_x": round(ratio(jumps[:1], across[:1]), 4),
-               "ratio_y": round(ratio(jumps[1:], across[1:]), 4)}
+               "jump_near": mean_jump(jumps, near),
+               "ratio": round(ratio(jumps, across, near), 4),
+               "ratio_x": round(ratio(jumps[:1], across[:1], near[:1]), 4),
+               "ratio_y": round(ratio(jumps[1:], across[1:], near[1:]), 4)}
     if arguments.truth:
-        truth = ratio(read_jumps(arguments.truth), across)
+        truth = ratio(read_jumps(arguments.truth), across, near)
         figures |= {"truth_ratio": round(truth, 4),
                     "over_truth": round(figures["ratio"] / truth, 4)}
     print(json.dumps(figures))
