@@ -26,7 +26,7 @@ constexpr std::int64_t kLargestSide = 128;  // px
 // parameters for as many bytes (docs/results/compact.md).
 constexpr double kRoundingPart = 0.1;
 
-// What limits a choice: the sum of errors or the sum of costs.
+// Names the sum that a choice keeps within a limit: that of errors or that of costs.
 struct Limit {
   bool of_error = true;
   double most = 0.0;

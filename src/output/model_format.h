@@ -5,7 +5,7 @@
 
 #include "field/field.h"
 
-// What the writer and the reader of model files share (model_writer.cc, model_file.cc).
+// Declares what the writer and the reader of model files share (model_writer.cc, model_file.cc).
 namespace tomofield::output {
 
 // These values are in files: do not change one without a new version.
