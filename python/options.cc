@@ -120,6 +120,7 @@ void add_views_and_specimen(Class& options) {
 void add_contrast_transfer(Class& options) {
   options.def_readwrite("defocus_um", &Options::defocus_um)
       .def_readwrite("is_phase_flipped", &Options::is_phase_flipped)
+      .def_readwrite("defocus_hand", &Options::defocus_hand)
       .def_readwrite("voltage_kV", &Options::voltage_kV)
       .def_readwrite("spherical_aberration_mm", &Options::spherical_aberration_mm)
       .def_readwrite("amplitude_contrast", &Options::amplitude_contrast)

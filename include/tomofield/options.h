@@ -78,6 +78,8 @@ struct Options {
   // Contrast transfer and dose
   std::optional<double> defocus_um;  ///< underfocus of all views, in place of SeriesFiles::ctf
   bool is_phase_flipped = false;     ///< the stack's phases were flipped
+  std::optional<int> defocus_hand;  ///< 1, −1: the right, left side of a view at a positive tilt is
+                                    ///< farther from focus; default: hand
   std::optional<double> voltage_kV;  ///< default: that of the file, else 300
   std::optional<double> spherical_aberration_mm;  ///< default: that of the file, else 2.7
   std::optional<double> amplitude_contrast;       ///< default: that of the file, else 0.07

@@ -31,6 +31,7 @@ class Options(TypedDict, total=False):
     # Contrast transfer and dose
     defocus_um: Optional[float]
     is_phase_flipped: bool
+    defocus_hand: Optional[Literal[1, -1]]
     voltage_kV: Optional[float]
     spherical_aberration_mm: Optional[float]
     amplitude_contrast: Optional[float]

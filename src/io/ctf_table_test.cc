@@ -159,6 +159,25 @@ TEST(CtfTable, ReadsRelion) {
                {"rlnDefocusU"});
 }
 
+TEST(CtfTable, ReadsGctf) {
+  const CtfTable table =
+      read("series_gctf.star",
+           "\ndata_\n\nloop_\n_rlnMicrographName #1\n_rlnCtfImage #2\n_rlnDefocusU #3\n"
+           "_rlnDefocusV #4\n_rlnDefocusAngle #5\n_rlnVoltage #6\n_rlnSphericalAberration #7\n"
+           "_rlnAmplitudeContrast #8\n_rlnMagnification #9\n_rlnDetectorPixelSize #10\n"
+           "_rlnCtfFigureOfMerit #11\n_rlnFinalResolution #12\n"
+           "part.mrc.01 part.mrc.01.ctf:mrc 41234.562500 40987.125000    21.500000   200.000000"
+           "     1.400000     0.080000 50000.000000    14.000000     0.040000     6.500000\n"
+           "part.mrc.02 part.mrc.02.ctf:mrc 42000.000000 43000.500000    88.250000   200.000000"
+           "     1.400000     0.080000 50000.000000    14.000000     0.050000     7.500000\n\n");
+  ASSERT_EQ(table.views.size(), 2u);
+  expect_defocus(table.views[0], 41234.5625, 40987.125, 21.5, 0);
+  expect_defocus(table.views[1], 42000, 43000.5, 88.25, 0);
+  EXPECT_EQ(table.optics.voltage_kV, 200.0);
+  EXPECT_EQ(table.optics.spherical_aberration_mm, 1.4);
+  EXPECT_EQ(table.optics.amplitude_contrast, 0.08);
+}
+
 const std::string kWarp =
     "<TiltSeries AreAnglesInverted=\"True\"><Angles>-60\n-57</Angles><MoviePath>a.tif\nb.tif"
     "</MoviePath><CTF><Param Name=\"Voltage\" Value=\"300\"/><Param Name=\"Cs\" Value=\"2.7\"/>"

@@ -42,6 +42,11 @@ std::optional<Defocus> defocus_of(const StarRow& row) {
   return defocus;
 }
 
+StatedOptics optics_of(const StarRow& row) {
+  return {row.find_number("rlnVoltage"), row.find_number("rlnSphericalAberration"),
+          row.find_number("rlnAmplitudeContrast")};
+}
+
 // Returns the number in the first row of whichever table has the column.
 std::optional<double> first_number(const std::filesystem::path& path,
                                    const std::vector<StarTable>& tables, std::string_view column) {
@@ -94,6 +99,7 @@ RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
     tomogram.tilt_series_star = row.text("rlnTomoTiltSeriesStarFile");
     tomogram.pixel_size_A = row.find_number("rlnTomoTiltSeriesPixelSize");
     tomogram.hand = row.find_number("rlnTomoHand");
+    tomogram.optics = optics_of(row);
     tomogram.size_px = size_of(row);
     all.tomograms.push_back(std::move(tomogram));
   }

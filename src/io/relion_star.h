@@ -8,15 +8,17 @@
 #include <vector>
 
 #include "io/star_file.h"
+#include "io/view_table.h"
 
 namespace tomofield::io {
 
-/// One tomogram of RELION 5's tomograms.star. (io/view_table.h has its views.)
+/// One tomogram of RELION 5's tomograms.star, whose views are read by read_view_table().
 struct RelionTomogram {
   std::string name;
   std::string tilt_series_star;  ///< as it is written, from RELION's project folder
   std::optional<double> pixel_size_A;
   std::optional<double> hand;  ///< of the defocus across a tilted view, not of the geometry
+  StatedOptics optics;
   std::optional<std::array<std::int64_t, 3>> size_px;  ///< unbinned
 };
 

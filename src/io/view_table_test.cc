@@ -70,7 +70,8 @@ TEST(RelionTomograms, AreReadWithTheirColumns) {
       "tomograms.star",
       "data_global\nloop_\n_rlnTomoName #1\n_rlnTomoTiltSeriesStarFile #2\n_rlnTomoHand #3\n"
       "_rlnTomoTiltSeriesPixelSize #4\n_rlnTomoSizeX #5\n_rlnTomoSizeY #6\n_rlnTomoSizeZ #7\n"
-      "TS_01 t/TS_01.star -1.0 2.39 4092 4000 1392\nTS_02 t/TS_02.star -1.0 2.39 4092 4000 None\n");
+      "_rlnAmplitudeContrast #8\nTS_01 t/TS_01.star -1.0 2.39 4092 4000 1392 0.1\n"
+      "TS_02 t/TS_02.star -1.0 2.39 4092 4000 None 0.1\n");
   EXPECT_TRUE(lists_tomograms(path));
   const RelionTomograms all = read_relion_tomograms(path);
   ASSERT_EQ(all.tomograms.size(), 2u);
@@ -78,9 +79,11 @@ TEST(RelionTomograms, AreReadWithTheirColumns) {
   EXPECT_EQ(all.tomograms[0].tilt_series_star, "t/TS_01.star");
   EXPECT_EQ(all.tomograms[0].pixel_size_A, 2.39);
   EXPECT_EQ(all.tomograms[0].hand, -1.0);
+  EXPECT_EQ(all.tomograms[0].optics.amplitude_contrast, 0.1);
+  EXPECT_EQ(all.tomograms[0].optics.voltage_kV, std::nullopt);
   EXPECT_EQ(all.tomograms[0].size_px, (std::array<std::int64_t, 3>{4092, 4000, 1392}));
   EXPECT_EQ(all.tomograms[1].size_px, std::nullopt);
-  EXPECT_EQ(all.table.columns().size(), 7u);
+  EXPECT_EQ(all.table.columns().size(), 8u);
   const auto views = scratch.write("TS_01.star", kRelionHead);
   EXPECT_FALSE(lists_tomograms(views));
   expect_parts(message_of<Error>([&] { read_relion_tomograms(views); }),

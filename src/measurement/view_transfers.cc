@@ -148,8 +148,8 @@ void set_defocus(const Options& options, const tilt_series::TiltSeries& series, 
         fmt::format("'{}' has no defocus of section {}: add it, or leave the section out "
                     "with --exclude {}",
                     ctf.file.string(), of.section + 1, of.section + 1));
-  const auto hand =
-      options.hand < 0 ? microscope::DefocusHand::kLeft : microscope::DefocusHand::kRight;
+  const bool is_right = options.defocus_hand.value_or(options.hand) > 0;
+  const auto hand = is_right ? microscope::DefocusHand::kRight : microscope::DefocusHand::kLeft;
   transfer.defocus = microscope::aligned_defocus(*recorded, series.raw_from_aligned(view));
   transfer.slope = microscope::slope_of_tilt(of.tilt_deg, series.pixel_size_A(), hand);
   transfer.is_flipped = options.is_phase_flipped;
@@ -165,10 +165,11 @@ std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const Opti
   refuse_if(has_ctf_file(files) && options.defocus_um,
             "--ctf and --defocus both set the defocus of the views: give one of them");
   refuse_if(
-      !has_ctf(files, options) && (options.is_phase_flipped || options.spherical_aberration_mm ||
-                                   options.amplitude_contrast),
-      "--ctf-phase-flipped, --cs and --amplitude-contrast describe a contrast transfer: give "
-      "--ctf or --defocus as well");
+      !has_ctf(files, options) && !files.ctf &&
+          (options.is_phase_flipped || options.defocus_hand || options.spherical_aberration_mm ||
+           options.amplitude_contrast),
+      "--ctf-phase-flipped, --defocus-hand, --cs and --amplitude-contrast describe a contrast "
+      "transfer: give --ctf or --defocus as well");
   refuse_if(options.dose_per_tilt.value_or(0.0) > 0.0 && options.is_dose_weighted,
             "--dose-weighted says that the damage of --dose-per-tilt is in the views already: give "
             "one of them");

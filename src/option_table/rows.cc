@@ -119,6 +119,11 @@ constexpr Row kRows[] = {
     {.key = "input.is_phase_flipped", .flag = "--ctf-phase-flipped",
      MEMBER(Options, is_phase_flipped), .group = Group::kTransfer,
      .help = "The phases of the stack were flipped already: the contrast transfer is |CTF|"},
+    {.key = "input.defocus_hand", .flag = "--defocus-hand", MEMBER(Options, defocus_hand),
+     .group = Group::kTransfer, .range = Range::either(1, -1),
+     .automatic = "that of a RELION project, else --hand",
+     .help = "Side of a view at a positive tilt that is farther from focus: 1 is the right one, -1 the "
+             "left one. rlnTomoHand has the opposite sign"},
     {.key = "input.voltage_kV", .flag = "--voltage", MEMBER(Options, voltage_kV),
      .group = Group::kTransfer, .unit = "kV", .range = Range::between(1, 10000),
      .automatic = "that of --ctf, else 300", .help = "Voltage of the microscope"},

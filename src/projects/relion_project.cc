@@ -35,25 +35,45 @@ const io::RelionTomogram& choose_tomogram(const std::vector<io::RelionTomogram>&
                                 request.path.string(), request.series, names_of(tomograms)));
 }
 
-// Sets what a table of one tilt series says.
-void set_views(Project& project, const fs::path& views, const fs::path& named_by,
+// Sets what a table of one tilt series says, and tells whether it has the defocus of its views.
+bool set_views(Project& project, const fs::path& views, const fs::path& named_by,
                std::string_view entry) {
   const io::ViewTable table = io::read_view_table(views);
   for (const io::ImageInFile& image : io::find_view_images(table)) project.add_file(image.file);
   project.set("stack", views.string(), named_by, entry);
-  if (io::has_defocus(table)) project.set("--ctf", views.string(), views, "rlnDefocusU");
+  const bool has_defocus = io::has_defocus(table);
+  if (has_defocus) project.set("--ctf", views.string(), views, "rlnDefocusU");
+  return has_defocus;
+}
+
+// Sets what the row of a tomogram says of the microscope.
+void set_optics(Project& project, const io::RelionTomogram& tomogram, const fs::path& star) {
+  const auto set = [&](std::string_view option, std::string_view column,
+                       const std::optional<double>& value) {
+    if (value) project.set(option, fmt::format("{}", *value), star, column);
+  };
+  set("--voltage", "rlnVoltage", tomogram.optics.voltage_kV);
+  set("--cs", "rlnSphericalAberration", tomogram.optics.spherical_aberration_mm);
+  set("--amplitude-contrast", "rlnAmplitudeContrast", tomogram.optics.amplitude_contrast);
+  // RELION adds rlnTomoHand · z to the defocus, and z falls to the right at a positive tilt.
+  if (tomogram.hand)
+    project.set("--defocus-hand", *tomogram.hand < 0.0 ? "1" : "-1", star, "rlnTomoHand");
 }
 
 }  // namespace
 
 void read_relion_project(Project& project) {
   const fs::path star = project.request().path;
-  if (!io::lists_tomograms(star)) return set_views(project, star, star, "rlnMicrographName");
+  if (!io::lists_tomograms(star)) {
+    set_views(project, star, star, "rlnMicrographName");
+    return;
+  }
   const auto tomograms = io::read_relion_tomograms(star).tomograms;
   const io::RelionTomogram& tomogram = choose_tomogram(tomograms, project.request());
   const fs::path views = io::find_listed_file(tomogram.tilt_series_star, star);
   project.add_file(views);
-  set_views(project, views, star, "rlnTomoTiltSeriesStarFile");
+  if (set_views(project, views, star, "rlnTomoTiltSeriesStarFile"))
+    set_optics(project, tomogram, star);
   if (tomogram.pixel_size_A) {
     project.set("--pixel-size", fmt::format("{}", *tomogram.pixel_size_A), star,
                 "rlnTomoTiltSeriesPixelSize");

@@ -18,7 +18,7 @@ from harness import read_bytes
 
 # Processes share the cores of one machine, and a container may forbid what the last line turns off.
 MPI = {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-       "OMPI_MCA_rmaps_base_oversubscribe": "1",
+       "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_mpi_yield_when_idle": "1",
        "OMPI_MCA_btl_vader_single_copy_mechanism": "none"}
 ROWS, COLUMNS, THICKNESS = 120, 40, 16  # rows end in the middle of a slab and of a root cell
 PRIORS = ["--tv-factors", 0.5, "--bcc", 5, "--ifp", 0.2]

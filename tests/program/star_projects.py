@@ -78,10 +78,10 @@ def write_relion(folder, series):
     star = os.path.join(folder, "Tomograms/job009/tomograms.star")
     write_star(star, "global",
                ["rlnTomoName", "rlnTomoTiltSeriesStarFile", "rlnVoltage", "rlnTomoHand",
-                "rlnOpticsGroupName", "rlnTomoTiltSeriesPixelSize", "rlnTomoSizeX",
+                "rlnAmplitudeContrast", "rlnOpticsGroupName", "rlnTomoTiltSeriesPixelSize", "rlnTomoSizeX",
                 "rlnTomoSizeY", "rlnTomoSizeZ"],
-               [[name, f"Tomograms/job009/tilt_series/{name}.star", "300.000000", "-1.00000",
-                 "'the optics'", PIXEL_SIZE, WIDTH, HEIGHT, THICKNESS]
+               [[name, f"Tomograms/job009/tilt_series/{name}.star", "200.000000", "1.00000",
+                 0.1, "'the optics'", PIXEL_SIZE, WIDTH, HEIGHT, THICKNESS]
                 for name in ("TS_01", "TS_02")])
     return star
 

@@ -75,6 +75,8 @@ def test_the_defocus_of_a_project_is_used(relion, finished):
     result = harness.succeed(*command, cwd=relion.folder)
     assert "ctf: the defocus of each view from" in result.stderr, result.stderr
     assert "dose: from" in result.stderr, result.stderr
+    for setting in ("--voltage 200", "--amplitude-contrast 0.1", "--defocus-hand -1"):
+        assert setting in result.stdout, result.stdout
     assert not np.array_equal(harness.read_volume(output), harness.read_volume(finished[1]))
     # One defocus in place of those of the table.
     result = harness.succeed(*command, "--defocus", 3, cwd=relion.folder)

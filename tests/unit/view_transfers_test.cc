@@ -110,6 +110,8 @@ TEST(ViewTransfers, FollowTheOptions) {
   EXPECT_EQ(transfers[0].optics.voltage_kV, 200.0);
   EXPECT_TRUE(transfers[0].is_flipped);
   EXPECT_GT(transfers[0].slope.x_A, 0.0);  // at −20°, mirrored
+  options.defocus_hand = 1;                // mirrored or not
+  EXPECT_LT(transfers_of(files, options)[0].slope.x_A, 0.0);
 }
 
 TEST(ViewTransfers, AreRefusedWithoutWhatTheyNeed) {
