@@ -91,7 +91,8 @@ void add_files(py::module_& module) {
       .def_readwrite("fiducials", &SeriesFiles::fiducials)
       .def_readwrite("even", &SeriesFiles::even)
       .def_readwrite("odd", &SeriesFiles::odd)
-      .def_readwrite("ctf", &SeriesFiles::ctf);
+      .def_readwrite("ctf", &SeriesFiles::ctf)
+      .def_readwrite("mtf", &SeriesFiles::mtf);
 }
 
 void add_views_and_specimen(Class& options) {

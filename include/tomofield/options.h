@@ -44,6 +44,7 @@ struct SeriesFiles {
   std::optional<std::filesystem::path> even;       ///< MRC as the stack: the even frames alone
   std::optional<std::filesystem::path> odd;        ///< and the odd frames
   std::optional<std::filesystem::path> ctf;  ///< contrast transfer of each view; "none": ignore it
+  std::optional<std::filesystem::path> mtf;  ///< STAR: the detector's modulation transfer function
 };
 
 /// A rectangle [x0, x1) × [y0, y1) of pixels. A region of interest is one of the aligned view at
@@ -80,7 +81,7 @@ struct Options {
   bool is_phase_flipped = false;     ///< the stack's phases were flipped
   std::optional<int> defocus_hand;  ///< 1, −1: the right, left side of a view at a positive tilt is
                                     ///< farther from focus; default: hand
-  std::optional<double> voltage_kV;  ///< default: that of the file, else 300
+  std::optional<double> voltage_kV;               ///< default: that of the file, else 300
   std::optional<double> spherical_aberration_mm;  ///< default: that of the file, else 2.7
   std::optional<double> amplitude_contrast;       ///< default: that of the file, else 0.07
   std::optional<double> dose_per_tilt;            ///< electrons per Å² a view; 0: no damage

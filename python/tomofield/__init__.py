@@ -114,6 +114,7 @@ def reconstruct(
     even: Optional[Path] = None,
     odd: Optional[Path] = None,
     ctf: Optional[Path] = None,
+    mtf: Optional[Path] = None,
     progress: Optional[Callable[[Progress], Optional[bool]]] = None,
     **options: Unpack[Options],
 ) -> Reconstruction:
@@ -124,6 +125,7 @@ def reconstruct(
     tilt_deg: an angle a view, for views in memory.
     tlt, xf, xtilt, aln, mdoc, mask, fiducials: files that belong to an MRC stack.
     ctf: a table of the defocus of each view, from CTFFIND, AreTomo, IMOD, RELION, Gctf or Warp.
+    mtf: a STAR file with the modulation transfer function of the detector.
     even, odd: MRC stacks of the even and the odd frames, for a reconstruction in halves. Its models
         are files beside the tomogram, so `model` is None.
     progress: called after every step; returns False to stop.
@@ -133,7 +135,7 @@ def reconstruct(
     KeyboardInterrupt stops it too; with `output`, both leave a checkpoint for `resume=True`.
     """
     files = {"tlt": tlt, "xf": xf, "xtilt": xtilt, "aln": aln, "mdoc": mdoc, "mask": mask,
-             "fiducials": fiducials, "even": even, "odd": odd, "ctf": ctf}
+             "fiducials": fiducials, "even": even, "odd": odd, "ctf": ctf, "mtf": mtf}
     made = _core.reconstruct(_series(series, tilt_deg, files), _options(options), progress)
     return Reconstruction(
         made["is_finished"], made["tomogram"],

@@ -61,7 +61,7 @@ void check_output_files(const std::vector<fs::path>& results, const std::vector<
 std::vector<fs::path> input_files(const SeriesFiles& input) {
   std::vector<fs::path> files{input.stack};
   for (const auto& file : {input.tlt, input.xf, input.xtilt, input.aln, input.mdoc, input.fiducials,
-                           input.mask, input.even, input.odd, input.ctf}) {
+                           input.mask, input.even, input.odd, input.ctf, input.mtf}) {
     if (file) files.push_back(*file);
   }
   return files;

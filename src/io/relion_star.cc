@@ -14,12 +14,6 @@ namespace {
 constexpr double kLargestShift_A = base::kLargestPosition_px;
 constexpr double kLargestDose = 1e6;
 
-const StarTable* find_table(const std::vector<StarTable>& tables, std::string_view column) {
-  const auto found = std::find_if(tables.begin(), tables.end(),
-                                  [&](const StarTable& table) { return table.has_column(column); });
-  return found == tables.end() ? nullptr : &*found;
-}
-
 std::optional<std::array<std::int64_t, 3>> size_of(const StarRow& row) {
   std::array<std::int64_t, 3> size{};
   constexpr std::array kColumns{"rlnTomoSizeX", "rlnTomoSizeY", "rlnTomoSizeZ"};

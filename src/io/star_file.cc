@@ -84,6 +84,12 @@ std::vector<StarTable> read_star_file(const std::filesystem::path& path) {
   return tables;
 }
 
+const StarTable* find_table(const std::vector<StarTable>& tables, std::string_view column) {
+  const auto found = std::find_if(tables.begin(), tables.end(),
+                                  [&](const StarTable& table) { return table.has_column(column); });
+  return found == tables.end() ? nullptr : &*found;
+}
+
 std::string star_file_text(const StarTable& table) {
   std::string text = fmt::format("\n# version 50001\n\ndata_{}\n\nloop_\n", table.name());
   int number = 0;

@@ -42,6 +42,9 @@ class StarTable {
 /// Reads the tables of a STAR file. Throws Error with the line for a file that is none.
 std::vector<StarTable> read_star_file(const std::filesystem::path& path);
 
+/// Returns the first table that has a column, or nothing.
+const StarTable* find_table(const std::vector<StarTable>& tables, std::string_view column);
+
 /// Returns a STAR file with one table, in RELION's form. Values with spaces are quoted.
 std::string star_file_text(const StarTable& table);
 

@@ -11,6 +11,7 @@
 #include "base/log.h"
 #include "io/alignment_files.h"
 #include "io/ctf_table.h"
+#include "io/mtf_table.h"
 #include "io/view_table.h"
 #include "microscope/exposure.h"
 #include "tilt_series/open_views.h"
@@ -138,6 +139,17 @@ std::optional<Exposures> find_exposures(const SeriesFiles& files, const Options&
   return microscope::exposures_in_order(recording.order, *of_view);
 }
 
+// Returns what the detector passes of the signal, or nothing if it is not known.
+std::shared_ptr<const microscope::Detector> find_detector(const SeriesFiles& files,
+                                                          const tilt_series::TiltSeries& series) {
+  if (!files.mtf) return nullptr;
+  const io::MtfTable table = io::read_mtf(*files.mtf);
+  base::log_info(
+      fmt::format("mtf: what the detector passes of the signal, from '{}'", files.mtf->string()));
+  return std::make_shared<microscope::Detector>(microscope::Detector{
+      table.frequencies, table.values, series.pixel_size_A() / series.bin_factor()});
+}
+
 // Sets the defocus of a view, turned to the aligned image, and its slope over that image.
 void set_defocus(const Options& options, const tilt_series::TiltSeries& series, std::size_t view,
                  const io::CtfTable& ctf, microscope::ViewTransfer& transfer) {
@@ -185,13 +197,14 @@ std::vector<microscope::ViewTransfer> view_transfers(const SeriesFiles& files,
     base::log_info(
         "ctf: none is given (--ctf or --defocus), so the views count as plain projections: "
         "the tomogram lacks contrast at low resolution and keeps the fringes of defocus");
-  if (!has_ctf(files, options) && !has_dose) return {};
+  if (!has_ctf(files, options) && !has_dose && !files.mtf) return {};
   const auto stack = tilt_series::open_views(input);
   const std::int64_t num_sections = stack->header().nz;
   require_pixel_size(input, series, stack->name());
   const auto ctf = find_ctf(files, options, num_sections, stack->name());
   const auto exposures = find_exposures(files, options, input, num_sections, stack->name());
-  if (!ctf && !exposures) return {};
+  const auto detector = find_detector(files, series);
+  if (!ctf && !exposures && !detector) return {};
   const microscope::Optics optics = find_optics(options, ctf);
   std::vector<microscope::ViewTransfer> transfers(series.views().size());
   for (std::size_t view = 0; view < transfers.size(); ++view) {
@@ -199,6 +212,7 @@ std::vector<microscope::ViewTransfer> view_transfers(const SeriesFiles& files,
     const auto section = static_cast<std::size_t>(series.views()[view].section);
     transfer.optics = optics;
     transfer.pixel_size_A = series.pixel_size_A();
+    transfer.detector = detector;
     if (exposures) transfer.exposure = (*exposures)[section].at_middle();
     if (ctf) set_defocus(options, series, view, *ctf, transfer);
   }

@@ -21,9 +21,11 @@ std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const Opti
 
 /// Returns what the microscope did to each aligned view of a series, as the options for contrast
 /// transfer and dose say: [view], with pixels of `series`. `input` is what the series was read by.
-/// The result is empty if the options name neither a contrast transfer nor a dose, so that the
-/// views are plain projections. The defocus is that on the tilt axis, and its slope is that of the
-/// middle plane of the specimen, on the side that --defocus-hand says, else --hand. Doses come from --dose-per-tilt, else from
+/// The result is empty if the options name neither a contrast transfer nor a dose nor a detector,
+/// so that the views are plain projections. The defocus is that on the tilt axis, and its slope is
+/// that of the middle plane of the specimen, on the side that --defocus-hand says, else --hand.
+/// Doses come from
+/// --dose-per-tilt, else from
 /// --mdoc, else from the table of views that is the stack. Logs what it took. Throws Error if the
 /// pixel size is not known, and for a file that is not of this stack or has no defocus of a view.
 std::vector<microscope::ViewTransfer> view_transfers(const SeriesFiles& files,

@@ -73,11 +73,12 @@ ViewFilter::ViewFilter(std::int64_t width, std::int64_t height, const ViewTransf
       transform_(across_.extended_length(), along_.extended_length()),
       kx_(frequencies(transform_.width(), transform_.half_width(), transfer.pixel_size_A)),
       ky_(frequencies(transform_.height(), transform_.height(), transfer.pixel_size_A)),
-      signal_(0.5 / (transfer.pixel_size_A * transfer.pixel_size_A), kStepsOfTables,
-              [&](double k2) {
-                return ctf_.envelope(k2) *
-                       signal_after(transfer.exposure, std::sqrt(k2), transfer.optics.voltage_kV);
-              }) {
+      signal_(
+          0.5 / (transfer.pixel_size_A * transfer.pixel_size_A), kStepsOfTables, [&](double k2) {
+            const double k = std::sqrt(k2);
+            return ctf_.envelope(k2) * (transfer.detector ? transfer.detector->transfer(k) : 1.0) *
+                   signal_after(transfer.exposure, k, transfer.optics.voltage_kV);
+          }) {
   const double nyquist = 0.5 / view_.pixel_size_A;
   const auto [low_A, high_A] = range_of(view_.slope, width, height);
   const double largest_step_A = 1.0 / (4.0 * ctf_.wavelength_A() * nyquist * nyquist);

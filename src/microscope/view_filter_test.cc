@@ -220,5 +220,27 @@ TEST(ViewFilter, CorrectsTheTransferOfEachPlace) {
   EXPECT_GT(dot(filter.corrected(seen, CtfCorrection::kMultiply), image), 0.0);
 }
 
+TEST(ViewFilter, PassesWhatTheDetectorPasses) {
+  constexpr std::int64_t kWidth = 48, kHeight = 40;
+  ViewTransfer view;
+  view.optics = without_phase_contrast({});
+  view.pixel_size_A = 10;
+  // The detector's pixels are half as large, so that ¼ of theirs is Nyquist here.
+  view.detector = std::make_shared<Detector>(Detector{{0.0, 0.25, 0.5}, {1.0, 0.6, 0.0}, 5.0});
+  EXPECT_NEAR(view.detector->transfer(0.025), 0.8, 1e-12);
+  EXPECT_NEAR(view.detector->transfer(0.2), 0.0, 1e-12);
+  const ViewFilter filter(kWidth, kHeight, view);
+  std::vector<float> wave(kWidth * kHeight), passed(kWidth * kHeight);
+  for (std::int64_t i = 0; i < kWidth * kHeight; ++i) {  // four pixels a period
+    wave[i] = static_cast<float>(std::cos(std::numbers::pi / 2 * (double(i % kWidth) + 0.5)));
+    passed[i] = 0.8f * wave[i];
+  }
+  const std::vector<float> filtered = filter.apply(wave);
+  double error = 0.0;
+  for (std::int64_t i = 0; i < kWidth * kHeight; ++i)
+    error = std::max(error, std::abs(double(filtered[i]) - double(passed[i])));
+  EXPECT_LT(error, 2e-3);
+}
+
 }  // namespace
 }  // namespace tomofield::microscope

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <memory>
+
 #include "io/view_table.h"
 #include "microscope/ctf.h"
 #include "microscope/defocus_slope.h"
+#include "microscope/detector.h"
 
 namespace tomofield::microscope {
 
@@ -14,6 +17,7 @@ struct ViewTransfer {
   double exposure = 0.0;      ///< electrons per Å² (Exposure::at_middle()); 0: no damage
   double pixel_size_A = 1.0;  ///< of that image
   bool is_flipped = false;    ///< the view's phases were flipped: |CTF| instead of −CTF
+  std::shared_ptr<const Detector> detector = {};  ///< none: it passes all of the signal
 };
 
 }  // namespace tomofield::microscope

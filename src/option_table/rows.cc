@@ -124,6 +124,9 @@ constexpr Row kRows[] = {
      .automatic = "that of a RELION project, else --hand",
      .help = "Side of a view at a positive tilt that is farther from focus: 1 is the right one, -1 the "
              "left one. rlnTomoHand has the opposite sign"},
+    {.key = "input.mtf", .flag = "--mtf", MEMBER(SeriesFiles, mtf), .group = Group::kTransfer,
+     .help = "How much of the signal the detector passes at each frequency (MTF): a STAR file as "
+             "RELION takes it. Its pixel is that of the stack"},
     {.key = "input.voltage_kV", .flag = "--voltage", MEMBER(Options, voltage_kV),
      .group = Group::kTransfer, .unit = "kV", .range = Range::between(1, 10000),
      .automatic = "that of --ctf, else 300", .help = "Voltage of the microscope"},

@@ -18,18 +18,19 @@ namespace {
 
 // The addresses of all members. A member that is added does not compile here until it is named.
 std::vector<const void*> members_of(const Choices& choices) {
-  const auto& [stack, tlt, xf, xtilt, aln, mdoc, mask, fiducials, even, odd, ctf] = choices.files;
+  const auto& [stack, tlt, xf, xtilt, aln, mdoc, mask, fiducials, even, odd, ctf, mtf] =
+      choices.files;
   const auto& [tilt_offset, x_axis_tilt, exclude, ignore, bin, angpix, pixel_size, contrast,
                take_log, log_base, black_level, bead_diameter, fixed_pattern, defocus,
-               phase_flipped, defocus_hand, voltage, spherical_aberration, amplitude_contrast, dose_per_tilt,
-               dose_weighted, thickness, roi, hand, axis_x, axis_z, shift_z, with_margin, field,
-               leaf_size, tree, leaf_budget, vertex_spacing, rank, activation, margin_spacing,
-               budget, epochs, vertex_epochs, coarse_epochs, coarse_bin, subsets, engine,
-               ray_samples, rays_per_step, learning_rate, density_variation, factor_variation,
-               penalty, boundary, fourier, fourier_ring, spike_rank, fit_noise, noise_model,
-               fit_view_scale, hold_out, tune, patience, seed, align, split_tilts, denoising_halves,
-               voxel_type, axes, invert, zarr, output, overwrite, resume, checkpoint_minutes,
-               alignment_json] = choices.options;
+               phase_flipped, defocus_hand, voltage, spherical_aberration, amplitude_contrast,
+               dose_per_tilt, dose_weighted, thickness, roi, hand, axis_x, axis_z, shift_z,
+               with_margin, field, leaf_size, tree, leaf_budget, vertex_spacing, rank, activation,
+               margin_spacing, budget, epochs, vertex_epochs, coarse_epochs, coarse_bin, subsets,
+               engine, ray_samples, rays_per_step, learning_rate, density_variation,
+               factor_variation, penalty, boundary, fourier, fourier_ring, spike_rank, fit_noise,
+               noise_model, fit_view_scale, hold_out, tune, patience, seed, align, split_tilts,
+               denoising_halves, voxel_type, axes, invert, zarr, output, overwrite, resume,
+               checkpoint_minutes, alignment_json] = choices.options;
   return {&stack,
           &tlt,
           &xf,
@@ -41,6 +42,7 @@ std::vector<const void*> members_of(const Choices& choices) {
           &even,
           &odd,
           &ctf,
+          &mtf,
           &tilt_offset,
           &x_axis_tilt,
           &exclude,

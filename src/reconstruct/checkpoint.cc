@@ -256,6 +256,8 @@ nlohmann::json transfers_json(const std::vector<microscope::ViewTransfer>& trans
                     t.optics.amplitude_contrast, t.optics.b_factor_A2, t.defocus.u_A, t.defocus.v_A,
                     t.defocus.angle_deg, t.defocus.phase_shift_deg, t.slope.at_centre_A,
                     t.slope.x_A, t.slope.y_A, t.exposure, t.pixel_size_A, t.is_flipped});
+  if (!transfers.empty() && transfers.front().detector)  // that of all views
+    json.push_back(transfers.front().detector->values);
   return json;
 }
 

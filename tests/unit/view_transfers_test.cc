@@ -112,6 +112,13 @@ TEST(ViewTransfers, FollowTheOptions) {
   EXPECT_GT(transfers[0].slope.x_A, 0.0);  // at −20°, mirrored
   options.defocus_hand = 1;                // mirrored or not
   EXPECT_LT(transfers_of(files, options)[0].slope.x_A, 0.0);
+  EXPECT_EQ(transfers[0].detector, nullptr);
+  files.mtf = folder.write("mtf.star",
+                           "data_\nloop_\n_rlnResolutionInversePixel #1\n_rlnMtfValue #2\n"
+                           "0 1\n0.5 0.25\n");
+  options.bin = 2;
+  const auto binned = transfers_of(files, options);
+  EXPECT_NEAR(binned[0].detector->transfer(0.5 / binned[0].pixel_size_A), 0.625, 1e-9);
 }
 
 TEST(ViewTransfers, AreRefusedWithoutWhatTheyNeed) {

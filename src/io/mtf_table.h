@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+namespace tomofield::io {
+
+/// Holds how much of the signal a detector passes at rising frequencies.
+struct MtfTable {
+  std::vector<double> frequencies;  ///< cycles per pixel of the detector, 0 to ½
+  std::vector<double> values;       ///< 0 to 1, at each frequency
+};
+
+/// Reads a STAR file as RELION takes it (rlnMtfFileName), with the columns
+/// rlnResolutionInversePixel and rlnMtfValue. Throws Error with the file and the row for what is
+/// missing or cannot be.
+MtfTable read_mtf(const std::filesystem::path& path);
+
+}  // namespace tomofield::io
