@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "compact/compress.h"
 #include "io/mrc.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/tuning.h"
@@ -184,6 +185,11 @@ void write_models(const fs::path& folder) {
   for (const FieldKind kind : {FieldKind::kVm, FieldKind::kGrid})
     output::save_model(folder / "model" / (kind == FieldKind::kVm ? "vm" : "grid"),
                        testing::uneven_model(kind));
+  output::Model compact = testing::uneven_model(FieldKind::kGrid);
+  compact::CompactField made = compact::compress(*compact.field, {});
+  compact.field = std::move(made.field);
+  compact.codes = std::move(made.codes);
+  output::save_model(folder / "model" / "compact", compact);
   const testing::SmallFit series;
   for (const int steps : {1, 7, 12}) {
     const auto fit = series.make();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "cli/given_options.h"
 #include "cli/help_formatter.h"
 #include "cli/number_checks.h"
+#include "cli/place_options.h"
 #include "cli/stop_signal.h"
 #include "cli/table_options.h"
 #include "compare/comparison.h"
@@ -34,6 +36,8 @@ struct Arguments {
   std::string truth, folder;
   bool tune = false, halves = false, overwrite = false;
   int hold_out = 0;
+  evaluate::Regions regions;
+  std::optional<evaluate::LineSegment> profile;
 };
 
 // Returns the words that describe the series, as they were given. Every method gets them.
@@ -95,6 +99,8 @@ void run(const CLI::App& command, const Arguments& arguments,
   options.tune = arguments.tune;
   options.halves = arguments.halves;
   options.hold_out = arguments.hold_out;
+  options.regions = arguments.regions;
+  options.profile = arguments.profile;
   options.folder = arguments.folder;
   options.overwrite = arguments.overwrite;
   compare::check_comparison(options);
@@ -148,14 +154,19 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
                   "these views")
       ->check(number_between(2, kMaxViews))
       ->group(group);
+  add_region_options(command, "the volumes", group, arguments.regions);
+  add_profile_option(command,
+                     "Line whose densities the report draws, in voxels, as across a membrane "
+                     "(default: along X through the detail); profile.csv has the numbers",
+                     group, arguments.profile);
   command.add_option("-o,--output", arguments.folder, "Folder of all results")
       ->required()
       ->group(group);
   command
       .add_flag("--overwrite", arguments.overwrite, "Remove old results and run all methods again")
       ->group(group);
-  return {"--methods",  "--also",   "--truth",     "--tune",   "--halves",
-          "--hold-out", "--output", "--overwrite", "--exclude"};
+  return {"--methods",    "--also",       "--truth",   "--tune",   "--halves",    "--hold-out",
+          "--foreground", "--background", "--profile", "--output", "--overwrite", "--exclude"};
 }
 
 }  // namespace

@@ -8,49 +8,13 @@
 
 #include "base/check.h"
 #include "cli/number_checks.h"
+#include "cli/place_options.h"
 #include "cli/table_options.h"
 #include "io/output_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
 namespace {
-
-constexpr const char* kBoxType = "X0,Y0,Z0,X1,Y1,Z1";
-
-/// Parses a box of whole numbers. Returns nothing for any other text.
-std::optional<base::Box> parse_box(const std::string& text) {
-  const auto numbers = parse_whole_numbers(text);
-  if (!numbers || numbers->size() != 6) return std::nullopt;
-  base::Box box;
-  for (std::size_t i = 0; i < 6; ++i) (i < 3 ? box.begin : box.end)[i % 3] = (*numbers)[i];
-  return box;
-}
-
-CLI::Validator box_check() {
-  return {[](std::string& text) -> std::string {
-            if (parse_box(text)) return {};
-            return fmt::format(
-                "a box must be six whole numbers, x0,y0,z0,x1,y1,z1: zero-based voxels, the last "
-                "excluded; not {}",
-                text);
-          },
-          ""};
-}
-
-CLI::Option* add_boxes(CLI::App& command, const std::string& name, std::vector<base::Box>& boxes,
-                       const char* help) {
-  return command
-      .add_option_function<std::vector<std::string>>(
-          name,
-          [&boxes](const std::vector<std::string>& texts) {
-            for (const std::string& text : texts) boxes.push_back(*parse_box(text));
-          },
-          help)
-      ->check(box_check())
-      ->type_name(kBoxType)
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-}
 
 void add_comparison_options(CLI::App& command, EvaluateArguments& arguments) {
   command.add_option("volume", arguments.volume, "MRC volume to score")
@@ -112,14 +76,7 @@ void add_contrast_options(CLI::App& command, EvaluateArguments& arguments) {
           "program chooses the regions unless --foreground and --background give them (default if "
           "no other score is asked for)")
       ->group(group);
-  CLI::Option* foreground =
-      add_boxes(command, "--foreground", arguments.regions.foreground,
-                "Voxels of VOLUME that show structure; may be given several times");
-  CLI::Option* background =
-      add_boxes(command, "--background", arguments.regions.background,
-                "Voxels of VOLUME that show no structure; may be given several times");
-  foreground->needs(background)->group(group);
-  background->needs(foreground)->group(group);
+  add_region_options(command, "VOLUME", group, arguments.regions);
 }
 
 void add_artefact_options(CLI::App& command, EvaluateArguments& arguments) {
@@ -133,20 +90,11 @@ void add_artefact_options(CLI::App& command, EvaluateArguments& arguments) {
 
 void add_profile_options(CLI::App& command, EvaluateArguments& arguments) {
   const char* group = "Line profile";
-  CLI::Option* line =
-      command
-          .add_option_function<std::vector<double>>(
-              "--profile",
-              [&arguments](const std::vector<double>& v) {
-                arguments.profile = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
-              },
-              "Sample a line between two points, in voxels (of TRUTH, if there is one); voxel i "
-              "covers [i, i+1)")
-          ->delimiter(',')
-          ->expected(6)
-          ->check(number_between(-1e9, 1e9))
-          ->type_name(kBoxType)
-          ->group(group);
+  CLI::Option* line = add_profile_option(
+      command,
+      "Sample a line between two points, in voxels (of TRUTH, if there is one); voxel i covers [i, "
+      "i+1)",
+      group, arguments.profile);
   CLI::Option* csv =
       command.add_option("--profile-csv", arguments.profile_csv, "Write the profile to this table")
           ->type_name("FILE")

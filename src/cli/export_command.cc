@@ -20,7 +20,6 @@
 #include "io/output_files.h"
 #include "io/output_lock.h"
 #include "io/output_set.h"
-#include "output/compact_model.h"
 #include "output/model_file.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
@@ -82,20 +81,22 @@ OrientedBox unrotated_box(const ExportArguments& arguments, const Model& model) 
 // Writes the model again with factors in place of its vertices.
 void write_compact(const ExportArguments& arguments) {
   const compact::Budget budget = compact::parse_budget(arguments.budget);
-  const Model model = output::load_model(arguments.model);
-  if (model.field->kind() != FieldKind::kGrid) {
+  Model model = output::load_model(arguments.model);
+  if (model.codes || model.field->kind() != FieldKind::kGrid) {
     throw Error(fmt::format(
         "'{}' is a model of factors, and --compact is for models of vertices (--field grid)",
         arguments.model.string()));
   }
-  const compact::CompactField made = compact::compress(*model.field, budget);
+  compact::CompactField made = compact::compress(*model.field, budget);
+  model.field = std::move(made.field);
+  model.codes = std::move(made.codes);
   io::OutputSet results;
-  output::save_model(arguments.compact, *made.field, made.codes, model);
+  output::save_model(arguments.compact, model);
   results.commit();
   print(
       "{}: {} parameters in {} leaves, {} bytes; the densities change by {:.4g} times their "
       "standard deviation\n",
-      arguments.compact.string(), made.report.parameters, made.field->tree().num_leaves(),
+      arguments.compact.string(), made.report.parameters, model.field->tree().num_leaves(),
       std::filesystem::file_size(arguments.compact),
       std::sqrt(made.report.mean_square_change / made.report.variance));
 }

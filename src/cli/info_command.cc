@@ -147,11 +147,12 @@ std::string describe(const LeafShape& shape) {
 }
 
 // Prints a line for each kind of leaves, large ones first.
-void print_leaves(const Field& field) {
+void print_leaves(const field::Quadtree& tree, const std::vector<LeafShape>& shapes) {
   std::map<std::tuple<bool, std::int64_t, std::string>, int> kinds;
-  for (int i = 0; i < field.tree().num_leaves(); ++i) {
-    const field::QuadtreeNode& leaf = field.tree().leaf(i);
-    ++kinds[{leaf.region == field::Region::kMargin, -leaf.square.size, describe(field.shape(i))}];
+  for (int i = 0; i < tree.num_leaves(); ++i) {
+    const field::QuadtreeNode& leaf = tree.leaf(i);
+    ++kinds[{leaf.region == field::Region::kMargin, -leaf.square.size,
+             describe(shapes[static_cast<std::size_t>(i)])}];
   }
   for (const auto& [kind, count] : kinds) {
     const auto& [is_margin, size, shape] = kind;
@@ -159,16 +160,22 @@ void print_leaves(const Field& field) {
   }
 }
 
-void print_field(const Field& field) {
+void print_field(const output::Model& model) {
+  const Field& field = *model.field;
   const field::RootGrid& roots = field.tree().roots();
-  print("  field            {}, {} parameters, bias {:.6g}, {}\n", base::name_of(field.kind()),
-        field.num_parameters(), field.bias,
-        field.activation.beta > 0
-            ? fmt::format("softplus of sharpness {:.6g}", field.activation.beta)
-            : "no activation");
+  const std::string activation =
+      field.activation.beta > 0 ? fmt::format("softplus of sharpness {:.6g}", field.activation.beta)
+                                : "no activation";
+  if (model.codes) {
+    print("  field            compact, {} parameters in {} bytes\n", model.codes->num_parameters(),
+          model.codes->bytes.size());
+  } else {
+    print("  field            {}, {} parameters, bias {:.6g}, {}\n", base::name_of(field.kind()),
+          field.num_parameters(), field.bias, activation);
+  }
   print("  quadtree         {} × {} root cells of {} px from {},{}; {} leaves\n", roots.columns,
         roots.rows, roots.cell_size, roots.x0, roots.y0, field.tree().num_leaves());
-  print_leaves(field);
+  print_leaves(field.tree(), model.codes ? model.codes->shapes : field.shapes());
 }
 
 void print_training(const output::TrainingState& state) {
@@ -189,7 +196,7 @@ void print_model(const std::filesystem::path& path) {
   const output::Model model = output::load_model(path, &training);
   print("{}: model, written by {}\n", path.string(), model.written_by);
   print_geometry(model);
-  print_field(*model.field);
+  print_field(model);
   print_training(training);
   print("  options          {}\n", model.options_json);
 }

@@ -22,9 +22,20 @@ namespace tomofield::compact {
 namespace {
 
 constexpr std::int64_t kLargestSide = 128;  // px
-// The part of the error that rounding may add; the ranks leave the rest. A larger part gives more
-// parameters for as many bytes (docs/results/compact.md).
-constexpr double kRoundingPart = 0.1;
+// The parts of the error that rounding may add; the ranks leave the rest. The first one makes the
+// file small, and the second one the number of parameters (docs/results/compact.md).
+constexpr double kRoundingForBytes = 0.3, kRoundingForParameters = 0.02;
+
+// Relates decibels D of PSNR to a mean squared change, k D^p times the variance
+// (docs/results/compact.md).
+constexpr double kChangeOfDecibel = 0.032, kPowerOfDecibels = 0.7;
+
+double allowed_change(double decibels) {
+  return kChangeOfDecibel * std::pow(decibels, kPowerOfDecibels);
+}
+double decibels_of(double change) {
+  return std::pow(change / kChangeOfDecibel, 1 / kPowerOfDecibels);
+}
 
 // Names the sum that a choice keeps within a limit: that of errors or that of costs.
 struct Limit {
@@ -84,43 +95,32 @@ class Compression {
   // Rounds the factors of what was chosen, so that rounding alone adds this error.
   CompactField build(double rounding_error) const {
     CompactField made;
-    made.codes.step = std::sqrt(rounding_error / std::max(error_of_step_, 1e-300));
-    const auto num_leaves = std::ssize(leaves_);
-    std::vector<QuantisedLeaf> rounded(leaves_.size());
-    std::vector<std::vector<std::uint8_t>> codes(leaves_.size());
-    std::vector<double> errors(leaves_.size());
-    base::parallel_for("code leaves", num_leaves, [&](std::int64_t i) {
+    LeafCodes& codes = made.codes;
+    codes.step = std::sqrt(rounding_error / std::max(error_of_step_, 1e-300));
+    codes.shapes.assign(leaves_.size(), kNoLeaf);
+    std::vector<std::vector<std::uint8_t>> code(leaves_.size());
+    base::parallel_for("code leaves", std::ssize(leaves_), [&](std::int64_t i) {
       const auto at = static_cast<std::size_t>(i);
-      rounded[at].shape = {.nx = 2, .ny = 2, .nz = 2};
-      const field::QuadtreeNode& node = tree_.leaf(static_cast<int>(i));
       if (squares_.leaf_like[place_of_leaf_[at]] < 0) return;
-      const PlaceDensities place = vertices_.read(node.square);
-      rounded[at] = quantise(leaves_[at], place.nx, place.ny, place.nz, made.codes.step);
-      codes[at] = encode(rounded[at]);
-      const FloatMatrix values =
-          values_of(dequantised_modes(rounded[at], made.codes.step), place.nx, place.ny, place.nz);
-      errors[at] =
-          static_cast<double>((values - place.values).squaredNorm()) * place.volume_of_vertex();
+      const PlaceDensities place = vertices_.read(tree_.leaf(static_cast<int>(i)).square);
+      const QuantisedLeaf rounded = quantise(leaves_[at], place.nx, place.ny, place.nz, codes.step);
+      codes.shapes[at] = rounded.shape;
+      code[at] = encode(rounded);
     });
-    std::vector<field::LeafShape> shapes;
-    for (const QuantisedLeaf& leaf : rounded) shapes.push_back(leaf.shape);
-    made.field =
-        field::make_field(FieldKind::kVm, tree_, vertices_.field().thickness(), std::move(shapes));
-    made.codes.offset.push_back(0);
-    double error = 0;
-    for (std::size_t i = 0; i < rounded.size(); ++i) {
-      dequantise(rounded[i], made.codes.step,
-                 made.field->parameters().subspan(made.field->offset(static_cast<int>(i))));
-      made.codes.bytes.insert(made.codes.bytes.end(), codes[i].begin(), codes[i].end());
-      made.codes.offset.push_back(static_cast<std::int64_t>(made.codes.bytes.size()));
-      made.report.parameters += rounded[i].numbers.size();
-      error += errors[i];
+    codes.offset.push_back(0);
+    for (const auto& of_leaf : code) {
+      codes.bytes.insert(codes.bytes.end(), of_leaf.begin(), of_leaf.end());
+      codes.offset.push_back(std::ssize(codes.bytes));
     }
-    made.report.bytes = made.codes.bytes.size();
-    made.report.mean_square_change = error / volume_;
-    made.report.variance = variance_;
-    made.report.decibels =
-        10 * std::log10(1 + made.report.mean_square_change / (kErrorOverVariance * variance_));
+    const double thickness = vertices_.field().thickness();
+    codes.face_weight =
+        matching_face_weight(*decode_field(tree_, thickness, codes), codes, vertices_.field());
+    made.field = decode_field(tree_, thickness, codes);
+    made.report = {.parameters = codes.num_parameters(),
+                   .bytes = codes.bytes.size(),
+                   .mean_square_change = square_change(*made.field) / volume_,
+                   .variance = variance_};
+    made.report.decibels = decibels_of(made.report.mean_square_change / variance_);
     return made;
   }
 
@@ -185,6 +185,28 @@ class Compression {
       price = component.energy / component.cost;
     }
     return std::max(price, 1e-30);
+  }
+
+  // Returns the squared difference of a field with the chosen tree from the vertices, times volume.
+  double square_change(const field::Field& made) const {
+    std::vector<double> errors(leaves_.size());
+    base::parallel_for("measure the change", std::ssize(leaves_), [&](std::int64_t i) {
+      const int leaf = static_cast<int>(i);
+      if (squares_.leaf_like[place_of_leaf_[static_cast<std::size_t>(i)]] < 0) return;
+      const PlaceDensities place = vertices_.read(tree_.leaf(leaf).square);
+      const field::LeafShape& s = made.shape(leaf);
+      const float* value = made.parameters().data() + made.offset(leaf);
+      double sum = 0;
+      for (int x = 0; x < place.nx; ++x) {
+        for (int z = 0; z < place.nz; ++z, value += s.ny) {
+          for (int y = 0; y < place.ny; ++y)
+            sum += std::pow(
+                static_cast<double>(value[y] - place.values(x, Eigen::Index{z} * place.ny + y)), 2);
+        }
+      }
+      errors[static_cast<std::size_t>(i)] = sum * place.volume_of_vertex();
+    });
+    return std::accumulate(errors.begin(), errors.end(), 0.0);
   }
 
   // Finds the factors of the places that are chosen.
@@ -254,22 +276,29 @@ class Compression {
 // Rounding adds less than uniform errors would where components vanish, and more where vectors are
 // short, so the step is corrected once it was tried.
 CompactField within_decibels(Compression& compression, double decibels) {
-  constexpr int kTries = 4;
-  const double change = (std::pow(10, decibels / 10) - 1) * kErrorOverVariance *
-                        compression.variance() * compression.volume();
-  compression.choose({.of_error = true, .most = (1 - kRoundingPart) * change});
-  double rounding = kRoundingPart * change;
-  CompactField made = compression.build(rounding);
-  for (int i = 1; i < kTries && made.report.decibels > decibels; ++i) {
-    rounding *= 0.8;
-    made = compression.build(rounding);
+  constexpr int kTries = 5;
+  constexpr double kClose = 0.98;
+  const double change = allowed_change(decibels) * compression.variance() * compression.volume();
+  compression.choose({.of_error = true, .most = (1 - kRoundingForBytes) * change});
+  const double left = std::max(change - compression.choice().error, 0.01 * change);
+  double rounding = left;
+  CompactField best;
+  for (int i = 0; i < kTries; ++i) {
+    CompactField made = compression.build(rounding);
+    const double added =
+        made.report.mean_square_change * compression.volume() - compression.choice().error;
+    const bool is_within = made.report.decibels <= decibels;
+    if (is_within || best.field == nullptr) best = std::move(made);
+    if (is_within && added > kClose * left) break;
+    rounding *= (1 + kClose) / 2 * left / std::max(added, 0.1 * left);
   }
-  return made;
+  return best;
 }
 
-CompactField within_parameters(Compression& compression, double parameters) {
+CompactField within_parameters(Compression& compression, double parameters,
+                               double part_of_rounding) {
   compression.choose({.of_error = false, .most = parameters});
-  return compression.build(compression.choice().error * kRoundingPart / (1 - kRoundingPart));
+  return compression.build(compression.choice().error * part_of_rounding / (1 - part_of_rounding));
 }
 
 // The bytes that a parameter takes are known once a model was made. Keeps the largest one that is
@@ -280,7 +309,7 @@ CompactField within_bytes(Compression& compression, double bytes) {
   double parameters = bytes / kFirstBytesPerParameter;
   CompactField best;
   for (int i = 0; i < kTries; ++i) {
-    CompactField made = within_parameters(compression, parameters);
+    CompactField made = within_parameters(compression, parameters, kRoundingForBytes);
     const double part = static_cast<double>(made.report.bytes) / bytes;
     if (part <= 1 && made.report.bytes >= best.report.bytes) best = std::move(made);
     if (part <= 1 && part > kClose) break;
@@ -308,7 +337,7 @@ CompactField compress(const field::Field& vertices, const Budget& budget) {
     case Budget::Kind::kDecibels:
       return within_decibels(compression, budget.amount);
     case Budget::Kind::kParameters:
-      return within_parameters(compression, budget.amount);
+      return within_parameters(compression, budget.amount, kRoundingForParameters);
     case Budget::Kind::kBytes:
       break;
   }

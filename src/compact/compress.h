@@ -1,23 +1,15 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <vector>
 
 #include "compact/budget.h"
+#include "compact/decoded_field.h"
 #include "field/field.h"
 
 namespace tomofield::compact {
-
-/// The codes of all leaves (leaf_code.h), one after the other.
-struct LeafCodes {
-  double step = 0.0;                 ///< of the densities' whole numbers
-  std::vector<std::int64_t> offset;  ///< [leaf + 1] index in `bytes` of a leaf's first byte
-  std::vector<std::uint8_t> bytes;
-};
 
 /// Says what a compression did. Densities are in density units.
 struct CompressionReport {
@@ -26,7 +18,7 @@ struct CompressionReport {
   /// Sum of squared changes at all vertices, the margin's as well, over the volume of the region.
   double mean_square_change = 0.0;
   double variance = 0.0;  ///< of the densities in the region of interest
-  double decibels = 0.0;  ///< that the PSNR falls by, at most, on phantoms (kErrorOverVariance)
+  double decibels = 0.0;  ///< that the PSNR falls by, at most, on phantoms
 };
 
 /// Returns the report for the metrics of a run; `seconds` is what the compression took.
@@ -34,15 +26,10 @@ nlohmann::json report_json(const CompressionReport& report, double seconds);
 
 /// A field as factors that are few and have short codes.
 struct CompactField {
-  std::unique_ptr<field::Field> field;  ///< of kind "vm", as the codes say
   LeafCodes codes;
+  std::unique_ptr<field::Field> field;  ///< what the codes stand for (decode_field)
   CompressionReport report;
 };
-
-/// The part of the densities' variance that stands for the mean squared error of a fit, whose truth
-/// is unknown. It was measured on phantoms, so that the PSNR of none falls by more than a budget in
-/// decibels says (docs/results/compact.md).
-inline constexpr double kErrorOverVariance = 0.3;
 
 /// Replaces the vertices of a finished fit by factors in leaves of several sizes. The sides of
 /// leaves and the ranks of their modes are chosen together: among candidates of every place of the

@@ -1,7 +1,7 @@
 #include "compact/leaf_code.h"
 
 #include <fmt/format.h>
-#include <zstd.h>
+#include <lzma.h>
 
 #include <algorithm>
 #include <array>
@@ -17,7 +17,6 @@ namespace {
 
 using field::LeafShape;
 
-constexpr int kLevel = 19;     // of Zstandard; leaves are small
 constexpr int kMostBytes = 5;  // of a number of 32 bits, seven a byte
 
 // The lengths of vectors and matrices and the rank of one mode.
@@ -47,14 +46,28 @@ double scale_of(std::span<const std::int32_t> vector) {
   return square > 0 ? 1 / std::sqrt(square) : 0;
 }
 
-struct Compressor {
-  Compressor() : context(ZSTD_createCCtx(), ZSTD_freeCCtx) {
-    if (!context) throw std::bad_alloc();
-    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kLevel);
-    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
+// Describes the codes: numbers have no patterns, so no byte before or position tells of the next.
+struct Filters {
+  Filters() {
+    if (lzma_lzma_preset(&options, LZMA_PRESET_DEFAULT)) throw std::bad_alloc();
+    options.dict_size = kDictionary;
+    options.lc = options.lp = options.pb = 0;
   }
-  std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context;
+  static constexpr std::uint32_t kDictionary = 1 << 16;
+  lzma_options_lzma options{};
+  std::array<lzma_filter, 2> chain{{{.id = LZMA_FILTER_LZMA2, .options = &options},
+                                    {.id = LZMA_VLI_UNKNOWN, .options = nullptr}}};
 };
+
+constexpr std::size_t kChecksumBytes = 4;
+
+std::array<std::uint8_t, kChecksumBytes> checksum(std::span<const std::uint8_t> bytes) {
+  const std::uint32_t sum = lzma_crc32(bytes.data(), bytes.size(), 0);
+  std::array<std::uint8_t, kChecksumBytes> little_endian{};
+  for (std::size_t i = 0; i < little_endian.size(); ++i)
+    little_endian[i] = static_cast<std::uint8_t>(sum >> (8 * i));
+  return little_endian;
+}
 
 }  // namespace
 
@@ -88,12 +101,15 @@ std::vector<std::uint8_t> encode(const QuantisedLeaf& leaf) {
       plain.push_back(static_cast<std::uint8_t>(0x80 | (rest & 0x7F)));
     plain.push_back(static_cast<std::uint8_t>(rest));
   }
-  thread_local const Compressor compressor;
-  std::vector<std::uint8_t> code(ZSTD_compressBound(plain.size()));
-  const std::size_t size = ZSTD_compress2(compressor.context.get(), code.data(), code.size(),
-                                          plain.data(), plain.size());
-  TOMOFIELD_CHECK(ZSTD_isError(size) == 0, "Zstandard packs any bytes");
+  const Filters filters;
+  std::vector<std::uint8_t> code(lzma_stream_buffer_bound(plain.size()));
+  std::size_t size = 0;
+  const lzma_ret result = lzma_raw_buffer_encode(filters.chain.data(), nullptr, plain.data(),
+                                                 plain.size(), code.data(), &size, code.size());
+  if (result == LZMA_MEM_ERROR) throw std::bad_alloc();
+  TOMOFIELD_CHECK(result == LZMA_OK, "LZMA packs any bytes");
   code.resize(size);
+  std::ranges::copy(checksum(plain), std::back_inserter(code));
   return code;
 }
 
@@ -102,10 +118,15 @@ QuantisedLeaf decode(std::span<const std::uint8_t> code, const LeafShape& shape)
   QuantisedLeaf leaf{.shape = shape, .numbers = std::vector<std::int32_t>(count)};
   if (count == 0 && code.empty()) return leaf;
   std::vector<std::uint8_t> plain(count * kMostBytes);
-  const std::size_t size = ZSTD_decompress(plain.data(), plain.size(), code.data(), code.size());
-  if (ZSTD_isError(size) != 0)
-    throw Error(fmt::format("the code of a leaf is damaged ({})", ZSTD_getErrorName(size)));
+  const std::size_t end = code.size() < kChecksumBytes ? 0 : code.size() - kChecksumBytes;
+  const Filters filters;
+  std::size_t read = 0, size = 0;
+  const lzma_ret result = lzma_raw_buffer_decode(filters.chain.data(), nullptr, code.data(), &read,
+                                                 end, plain.data(), &size, plain.size());
+  if (result == LZMA_MEM_ERROR) throw std::bad_alloc();
   plain.resize(size);
+  if (result != LZMA_OK || read != end || !std::ranges::equal(checksum(plain), code.subspan(end)))
+    throw Error("the code of a leaf is damaged");
   auto at = plain.begin();
   for (std::int32_t& number : leaf.numbers) {
     std::uint32_t bits = 0;

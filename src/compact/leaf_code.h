@@ -25,8 +25,9 @@ struct QuantisedLeaf {
 /// the shape says.
 void dequantise(const QuantisedLeaf& leaf, double step, std::span<float> parameters);
 
-/// Packs the numbers: numbers of seven bits a byte, the sign first (zigzag), as one frame of
-/// Zstandard with its checksum. A leaf without numbers takes no bytes.
+/// Packs the numbers: numbers of seven bits a byte, the sign first (zigzag), by LZMA2 without a
+/// header, and a checksum. A leaf without numbers takes no bytes. LZMA adapts to the sizes of the
+/// numbers of one component after the other, which a code with one table a leaf does not.
 std::vector<std::uint8_t> encode(const QuantisedLeaf& leaf);
 
 /// Unpacks the numbers of a leaf of this shape. Throws Error if the code is damaged or has another

@@ -90,8 +90,8 @@ PlaceDensities VertexDensities::read(const Square& square) const {
   };
   PlaceDensities place;
   const auto side = static_cast<double>(square.size);
-  place.nx = steps(side, hx) + 1;
-  place.ny = steps(side, hy) + 1;
+  place.nx = steps(side, hx);
+  place.ny = steps(side, hy);
   place.nz = shape.nz;
   place.volume = side * side * vertices_.thickness();
   place.values.setZero(place.nx, Eigen::Index{place.nz} * place.ny);

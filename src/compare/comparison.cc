@@ -8,10 +8,13 @@
 
 #include "base/utf8.h"
 #include "compare/folder.h"
+#include "compare/grid.h"
 #include "compare/pictures.h"
 #include "compare/runs.h"
 #include "compare/scores.h"
 #include "compare/table.h"
+#include "evaluate/box.h"
+#include "evaluate/profile.h"
 #include "io/atomic_file.h"
 #include "io/json.h"
 #include "io/mrc.h"
@@ -19,6 +22,7 @@
 #include "io/output_lock.h"
 #include "io/output_set.h"
 #include "output/shared_options.h"
+#include "report/curve_plot.h"
 #include "report/html.h"
 #include "report/pictures.h"
 #include "tilt_series/tilt_series.h"
@@ -47,13 +51,61 @@ std::vector<Shown> shown_volumes(const std::vector<Row>& rows,
   return shown;
 }
 
+// The densities of all volumes along one line.
+struct Profiles {
+  evaluate::LineSegment line;
+  double voxel_A = 0;  // 0 if not known
+  std::vector<evaluate::ProfileColumn> columns;
+};
+
+// Samples the volumes along the line that is given, or along x through the detail. The truth goes
+// last if it has their size, so that methods keep the colours of the plots without a truth.
+Profiles profiles_of(const CompareOptions& options, const std::vector<Row>& rows,
+                     const Rectangle& detail) {
+  const Grid grid = read_grid(rows.front().volume);
+  Profiles profiles{.line = options.profile ? *options.profile : line_through(detail, grid.size[2]),
+                    .voxel_A = grid.voxel_A,
+                    .columns = {}};
+  const auto add = [&](const std::string& name, const fs::path& path) {
+    const base::Volume volume = evaluate::read_volume(path);
+    profiles.columns.push_back(
+        {name, evaluate::line_profile(volume, evaluate::whole_box(volume.shape), profiles.line)});
+  };
+  for (const Row& row : rows) add(row.run.name, row.volume);
+  if (options.truth && read_grid(*options.truth).size == grid.size) add("truth", *options.truth);
+  return profiles;
+}
+
+void add_profiles(const std::vector<Row>& rows, const Profiles& profiles, report::HtmlPage& page) {
+  const auto& [line, voxel_A, columns] = profiles;
+  page.add_heading("Profile");
+  page.add_paragraph(fmt::format(
+      "Density from {:g}, {:g}, {:g} to {:g}, {:g}, {:g} (voxels), in the file's units; "
+      "profile.csv has the numbers.",
+      line.from[0], line.from[1], line.from[2], line.to[0], line.to[1], line.to[2]));
+  const double step = voxel_A > 0 ? voxel_A : 1.0;
+  std::vector<report::Curve> curves;
+  for (std::size_t column = 0; column < columns.size(); ++column) {
+    const auto& [name, values] = columns[column];
+    curves.push_back({column < rows.size() ? rows[column].run.method.title : name, {}});
+    for (std::size_t i = 0; i < values.size(); ++i)
+      curves.back().points.emplace_back(static_cast<double>(i) * step, values[i]);
+  }
+  page.add_svg(report::curve_plot_svg(
+      {.x_title = voxel_A > 0 ? "distance, Å" : "distance, voxels", .y_title = "density"}, curves));
+}
+
+// Returns the part of the central planes that is enlarged, which the main method does not choose.
+Rectangle chosen_detail(const std::vector<Row>& rows) {
+  return busiest_detail(report::read_central_slices(rows[reference_row(rows)].volume).front());
+}
+
 void add_pictures(const CompareOptions& options, const std::vector<Row>& rows,
-                  report::HtmlPage& page) {
+                  const Rectangle& detail, report::HtmlPage& page) {
   const fs::path folder = options.folder / "pictures";
   fs::create_directories(folder);
   const std::vector<Shown> shown = shown_volumes(rows, options.truth);
   const report::GreyScale scale = report::grey_scale_of(shown.front().planes);
-  const Rectangle detail = busiest_detail(shown.front().planes.front());
   page.add_heading("Central slices");
   page.add_paragraph(
       "All slices and details share one grey scale: the 0.5 to 99.5 percentiles of the first "
@@ -64,20 +116,10 @@ void add_pictures(const CompareOptions& options, const std::vector<Row>& rows,
   }
   page.add_heading("Detail");
   page.add_paragraph(
-      fmt::format("The detail lies where the XY slice varies most: x {} to {}, y {} to {}.",
-                  detail.x0, detail.x1 - 1, detail.y0, detail.y1 - 1));
+      fmt::format("The detail lies where the XY slice of {} varies most: x {} to {}, y {} to {}.",
+                  rows[reference_row(rows)].run.method.title, detail.x0, detail.x1 - 1, detail.y0,
+                  detail.y1 - 1));
   page.add_figures(detail_figures(shown, detail, scale, folder));
-  const double voxel_A = io::MrcReader(rows.front().volume).header().voxel_size_A[0];
-  page.add_heading("Profile");
-  page.add_paragraph("Density along x through the middle of the detail, in the file's units.");
-  std::vector<report::Curve> profiles = detail_profiles(shown, detail, voxel_A);
-  // The truth goes last, so that methods keep the colours of the plots without a truth.
-  std::rotate(profiles.begin(),
-              profiles.begin() + static_cast<std::ptrdiff_t>(shown.size() - rows.size()),
-              profiles.end());
-  page.add_svg(report::curve_plot_svg(
-      {.x_title = voxel_A > 0 ? "distance, Å" : "distance, voxels", .y_title = "density"},
-      profiles));
 }
 
 void add_commands(const std::vector<Row>& rows, report::HtmlPage& page) {
@@ -100,7 +142,8 @@ void add_correlations(const Scores& scores, report::HtmlPage& page) {
 }
 
 std::string report_page(const CompareOptions& options, const std::vector<Row>& rows,
-                        const Table& table, const Scores& scores) {
+                        const Table& table, const Scores& scores, const Rectangle& detail,
+                        const Profiles& profiles) {
   report::HtmlPage page("Comparison: " + options.files.stack.filename().string());
   page.add_paragraph(fmt::format(
       "tomofield {}; {} methods on {}. The main method is {}; bold is the best of a column, an "
@@ -108,7 +151,8 @@ std::string report_page(const CompareOptions& options, const std::vector<Row>& r
       TOMOFIELD_VERSION, rows.size(), options.files.stack.string(), rows.front().run.method.title));
   page.add_table(table_cells(table));
   page.add_paragraph(scores.remark);
-  add_pictures(options, rows, page);
+  add_pictures(options, rows, detail, page);
+  add_profiles(rows, profiles, page);
   add_correlations(scores, page);
   add_commands(rows, page);
   return page.document();
@@ -154,10 +198,14 @@ Outcome compare_methods(const CompareOptions& options, const RunHooks& hooks) {
       rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(options.methods.size()));
   Table table = table_of_costs(volumes);
   const Scores scores = add_scores(options, plan.purposes, rows, table);
-  const std::string page = report_page(options, volumes, table, scores);
+  const Rectangle detail = chosen_detail(volumes);
+  const Profiles profiles = profiles_of(options, volumes, detail);
+  const std::string page = report_page(options, volumes, table, scores, detail, profiles);
   io::OutputSet results;
   io::write_json(options.folder / "comparison.json", comparison_json(options, volumes, table));
   io::write_text_file(options.folder / "comparison.csv", table_csv(table));
+  io::write_text_file(options.folder / "profile.csv",
+                      evaluate::profile_csv(profiles.line, profiles.voxel_A, profiles.columns));
   io::write_text_file(options.folder / "report.html", page);
   results.commit();
   return Outcome::kFinished;

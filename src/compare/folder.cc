@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 // Returns the files of the report and its pictures (pictures.h).
 std::vector<fs::path> report_files(const CompareOptions& options) {
   std::vector<fs::path> files;
-  for (const char* name : {"report.html", "comparison.json", "comparison.csv"})
+  for (const char* name : {"report.html", "comparison.json", "comparison.csv", "profile.csv"})
     files.push_back(options.folder / name);
   std::vector<std::string> shown = names_of(options.methods);
   shown.emplace_back("truth");

@@ -25,7 +25,7 @@ bool can_do(bool Method::*what, const std::vector<std::string>& arguments) {
 
 // Refuses a name whose files would be those of the comparison or of another method.
 void require_free_name(const std::string& name) {
-  constexpr std::array kTaken{"comparison", "report", "pictures", "truth"};
+  constexpr std::array kTaken{"comparison", "profile", "report", "pictures", "truth"};
   constexpr std::string_view kTrials = "_tune";  // NAME_tune.json: trials of the method NAME
   if (std::ranges::count(kTaken, name) == 0 && !name.ends_with(kTrials)) return;
   throw Error(

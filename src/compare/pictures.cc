@@ -74,20 +74,11 @@ std::vector<report::HtmlFigure> detail_figures(const std::vector<Shown>& volumes
   return figures;
 }
 
-std::vector<report::Curve> detail_profiles(const std::vector<Shown>& volumes,
-                                           const Rectangle& detail, double voxel_size_A) {
-  const double step = voxel_size_A > 0 ? voxel_size_A : 1.0;
-  const std::int64_t row = (detail.y0 + detail.y1) / 2;
-  std::vector<report::Curve> curves;
-  for (const Shown& volume : volumes) {
-    report::Curve curve{volume.title, {}};
-    for (std::int64_t x = detail.x0; x < detail.x1; ++x) {
-      curve.points.emplace_back(static_cast<double>(x - detail.x0) * step,
-                                static_cast<double>(volume.planes.front().row(row)[x]));
-    }
-    curves.push_back(std::move(curve));
-  }
-  return curves;
+evaluate::LineSegment line_through(const Rectangle& detail, std::int64_t num_planes) {
+  const double y = static_cast<double>((detail.y0 + detail.y1) / 2) + 0.5;
+  const double z = static_cast<double>(num_planes / 2) + 0.5;
+  return {{static_cast<double>(detail.x0) + 0.5, y, z},
+          {static_cast<double>(detail.x1) - 0.5, y, z}};
 }
 
 }  // namespace tomofield::compare

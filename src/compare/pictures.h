@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "report/curve_plot.h"
+#include "evaluate/profile.h"
 #include "report/html.h"
 #include "report/slice.h"
 #include "tomofield/options.h"
@@ -32,9 +32,7 @@ std::vector<report::HtmlFigure> detail_figures(const std::vector<Shown>& volumes
                                                const Rectangle& detail,
                                                const report::GreyScale& scale,
                                                const std::filesystem::path& folder);
-/// Returns the densities along x through the middle of the detail. Distances are in Å, or in voxels
-/// if their size is not known.
-std::vector<report::Curve> detail_profiles(const std::vector<Shown>& volumes,
-                                           const Rectangle& detail, double voxel_size_A);
+/// Returns the line along x through the middle of the detail in the central xy plane.
+evaluate::LineSegment line_through(const Rectangle& detail, std::int64_t num_planes);
 
 }  // namespace tomofield::compare

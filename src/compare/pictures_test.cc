@@ -28,12 +28,11 @@ TEST(BusiestDetail, FitsIntoSmallPlanes) {
   EXPECT_EQ(detail.y1, 9);
 }
 
-TEST(DetailProfiles, RunThroughTheMiddleOfTheDetail) {
-  const Shown volume{"a", "A", {plane_with_texture()}};
-  const auto curves = detail_profiles({volume}, {62, 60, 66, 70}, 2.5);
-  ASSERT_EQ(curves.size(), 1u);
-  const std::vector<std::pair<double, double>> expected{{0, 1}, {2.5, 0}, {5, 1}, {7.5, 0}};
-  EXPECT_EQ(curves[0].points, expected);  // row 65
+TEST(LineThrough, RunsThroughTheMiddlesOfVoxels) {
+  const evaluate::LineSegment line = line_through({62, 60, 66, 70}, 9);
+  EXPECT_EQ(line.from, (std::array{62.5, 65.5, 4.5}));
+  EXPECT_EQ(line.to, (std::array{65.5, 65.5, 4.5}));
+  EXPECT_EQ(line.points().size(), 4u);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "base/child_process.h"
 #include "compare/grid.h"
+#include "evaluate/box.h"
 #include "io/is_file.h"
 #include "io/output_files.h"
 #include "io/scratch_folder.h"
@@ -98,6 +99,21 @@ std::optional<Grid> grid_to_be(const CompareOptions& options, const RunHooks& ho
   return planned_grid(io::read_text_file(log));
 }
 
+// Throws Error unless the regions and the profile that are given lie in the volumes.
+void require_places_within(const CompareOptions& options, const Grid& grid) {
+  const base::Box all{.begin = {0, 0, 0}, .end = grid.size};
+  for (const auto* boxes : {&options.regions.foreground, &options.regions.background}) {
+    for (const base::Box& box : *boxes) {
+      if (evaluate::lies_within(box, all)) continue;
+      throw Error(
+          fmt::format("the region {} does not lie in the volumes' voxels {}: give "
+                      "--foreground and --background inside",
+                      evaluate::to_text(box), evaluate::to_text(all)));
+    }
+  }
+  if (options.profile) evaluate::require_line_within(*options.profile, all);
+}
+
 }  // namespace
 
 PlannedRuns plan_runs(const CompareOptions& options, const tilt_series::TiltSeries& series) {
@@ -124,6 +140,7 @@ bool rehearse(const CompareOptions& options, const RunHooks& hooks, const std::v
       const bool is_a_part =
           std::ranges::find(options.series_words, "--roi") != options.series_words.end();
       if (options.truth) require_truth_fits(*options.truth, *main, is_a_part);
+      require_places_within(options, *grid);
     }
     require_one_grid(*main, {row.run.name, *grid});
   }

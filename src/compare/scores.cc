@@ -43,13 +43,16 @@ std::string boxes_text(const std::vector<base::Box>& boxes) {
 }
 
 // Adds the scores of single volumes: speckle, the face jump of those that have a model, and CNR and
-// ENL on the main method's regions. Returns a sentence that names the regions.
-std::string add_scores_of_volumes(std::span<const Row> rows, Table& table) {
-  evaluate::Regions regions;
+// ENL. Returns a sentence that names the regions of the latter.
+std::string add_scores_of_volumes(std::span<const Row> rows, const evaluate::Regions& given,
+                                  Table& table) {
+  const bool is_given = !given.foreground.empty();
+  const Row& reference = rows[reference_row(rows)];
+  const evaluate::Regions regions =
+      is_given ? given : evaluate::choose_regions(evaluate::read_volume(reference.volume));
   Metrics cnr, enl, speckle_percent, face_jump;
   for (const Row& row : rows) {
     const base::Volume volume = evaluate::read_volume(row.volume);
-    if (&row == &rows.front()) regions = evaluate::choose_regions(volume);
     const auto score = evaluate::contrast_score(volume, regions);
     cnr.push_back(score.cnr);
     enl.push_back(score.enl);
@@ -61,8 +64,10 @@ std::string add_scores_of_volumes(std::span<const Row> rows, Table& table) {
   table.add({"enl", "ENL", Better::kHigher, 1}, enl);
   table.add({"speckle_percent", "speckle, %", Better::kLower, 3}, speckle_percent);
   table.add({"face_jump", "face jump", Better::kNeither, 3}, face_jump);
-  return fmt::format("CNR and ENL: foreground {}, background {} (x0,y0,z0,x1,y1,z1 in voxels).",
-                     boxes_text(regions.foreground), boxes_text(regions.background));
+  return fmt::format(
+      "CNR and ENL: foreground {}, background {} (x0,y0,z0,x1,y1,z1 in voxels), {}.",
+      boxes_text(regions.foreground), boxes_text(regions.background),
+      is_given ? "as given" : "chosen on the volume of " + reference.run.method.title);
 }
 
 // Returns the resolution at which the correlation falls to `threshold`. If it never does, returns
@@ -103,6 +108,15 @@ void add_held_out_errors(std::span<const Row> rows, Table& table) {
 
 }  // namespace
 
+std::size_t reference_row(std::span<const Row> rows) {
+  const auto is_sirt = [](const Row& row) {
+    const std::vector<std::string>& words = row.run.method.arguments;
+    return words.size() > 1 && words[0] == "baseline" && words[1] == "sirt";
+  };
+  const auto found = std::ranges::find_if(rows, is_sirt);
+  return static_cast<std::size_t>(found == rows.end() ? rows.size() - 1 : found - rows.begin());
+}
+
 Scores add_scores(const CompareOptions& options, const std::vector<Purpose>& purposes,
                   const std::vector<Row>& rows, Table& table) {
   const auto rows_for = [&](Purpose purpose) -> std::span<const Row> {
@@ -123,7 +137,7 @@ Scores add_scores(const CompareOptions& options, const std::vector<Purpose>& pur
                         {"fsc_truth_0.5_A", "FSC 0.5 with the truth, Å", Better::kLower, 1},
                         table));
   }
-  scores.remark = add_scores_of_volumes(volumes, table);
+  scores.remark = add_scores_of_volumes(volumes, options.regions, table);
   if (options.halves) {
     std::vector<fs::path> even;
     for (const Row& row : rows_for(Purpose::kEvenViews)) even.push_back(row.volume);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +12,11 @@
 
 namespace tomofield::compare {
 
+/// Returns the row on whose volume regions and details are chosen: SIRT's, which has no prior, or
+/// else the last one, so that the main method does not choose what it is scored on unless it is
+/// alone.
+std::size_t reference_row(std::span<const Row> rows);
+
 /// The scores that the report shows beside the table.
 struct Scores {
   std::string remark;  ///< the note below the table
@@ -20,9 +26,9 @@ struct Scores {
 
 /// Adds the columns of scores to a table with a row a method. If there is a truth, these are PSNR,
 /// SSIM and the resolution at which the shell correlation with it falls to 0.5. Contrast (CNR, ENL)
-/// is measured on regions that are chosen on the main method's volume. Speckle is added, and the
-/// face jump of methods that have leaves. With halves, the resolution
-/// at which their correlation falls to 0.143 is added; with held-out views, their error. `rows` are
+/// is measured on the given regions, or on some that are chosen on the reference's volume. Speckle
+/// is added, and the face jump of methods that have leaves. With halves, the resolution at which
+/// their correlation falls to 0.143 is added; with held-out views, their error. `rows` are
 /// [purpose][method].
 Scores add_scores(const CompareOptions& options, const std::vector<Purpose>& purposes,
                   const std::vector<Row>& rows, Table& table);

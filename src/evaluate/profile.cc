@@ -35,22 +35,22 @@ double trilinear(const base::Volume& volume, const std::array<double, 3>& point)
   return std::lerp(along_y(z.low), along_y(z.high), z.share);
 }
 
-void check_line(const LineSegment& line, const base::Box& place) {
+}  // namespace
+
+void require_line_within(const LineSegment& line, const base::Box& voxels) {
   for (const auto& end : {line.from, line.to}) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (end[axis] >= static_cast<double>(place.begin[axis]) &&
-          end[axis] <= static_cast<double>(place.end[axis]))
+      if (end[axis] >= static_cast<double>(voxels.begin[axis]) &&
+          end[axis] <= static_cast<double>(voxels.end[axis]))
         continue;
       throw Error(fmt::format("the profile's end {:g},{:g},{:g} lies outside of the voxels {}",
-                              end[0], end[1], end[2], to_text(place)));
+                              end[0], end[1], end[2], to_text(voxels)));
     }
   }
   if (line.length() < 1.0)
     throw Error(
         fmt::format("the profile is {:g} voxels long: it needs at least one", line.length()));
 }
-
-}  // namespace
 
 double LineSegment::length() const {
   return std::hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
@@ -71,7 +71,7 @@ std::vector<std::array<double, 3>> LineSegment::points() const {
 
 std::vector<double> line_profile(const base::Volume& volume, const base::Box& place,
                                  const LineSegment& line) {
-  check_line(line, place);
+  require_line_within(line, place);
   std::vector<double> values;
   for (auto point : line.points()) {
     for (std::size_t axis = 0; axis < 3; ++axis)

@@ -17,6 +17,9 @@ struct LineSegment {
   std::vector<std::array<double, 3>> points() const;
 };
 
+/// Throws Error for a line that leaves the voxels or is shorter than one voxel.
+void require_line_within(const LineSegment& line, const base::Box& voxels);
+
 /// Returns the trilinear value at each point of a line. Beyond the centres of the outermost voxels,
 /// the outermost values continue. `place` is where the volume lies among the voxels that the line
 /// counts. Throws Error for a line that leaves the volume or is shorter than one voxel.

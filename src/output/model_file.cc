@@ -12,7 +12,6 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/plausible.h"
-#include "compact/leaf_code.h"
 #include "io/hdf5_reader.h"
 #include "output/model_format.h"
 #include "tomofield/error.h"
@@ -59,7 +58,11 @@ class ModelReader {
     const StoredGroup root = file_.root();
     Model model;
     read_info(root, model);
-    model.field = read_field(root.group("field"), choose);
+    const StoredGroup group = root.group("field");
+    if (group.has("code"))
+      read_compact_field(group, choose, model);
+    else
+      model.field = read_field(group, choose);
     if (training != nullptr) *training = read_training(/*with_floats=*/true);
     return model;
   }
@@ -203,7 +206,8 @@ class ModelReader {
     return field::Quadtree(roots, std::move(nodes));
   }
 
-  std::vector<field::LeafShape> read_shapes(const StoredGroup& group, int num_leaves) const {
+  std::vector<field::LeafShape> read_shapes(const StoredGroup& group, int num_leaves,
+                                            int fewest = 2) const {
     std::vector<field::LeafShape> shapes(static_cast<std::size_t>(num_leaves));
     const auto read = [&](const char* name, int field::LeafShape::*member, std::int64_t min) {
       Integers column(shapes.size());
@@ -214,8 +218,8 @@ class ModelReader {
         shapes[i].*member = static_cast<int>(column[i]);
       }
     };
-    read("nx", &field::LeafShape::nx, 2);
-    read("ny", &field::LeafShape::ny, 2);
+    read("nx", &field::LeafShape::nx, fewest);
+    read("ny", &field::LeafShape::ny, fewest);
     read("nz", &field::LeafShape::nz, 2);
     read("rank_x", &field::LeafShape::rank_x, 0);
     read("rank_y", &field::LeafShape::rank_y, 0);
@@ -234,41 +238,48 @@ class ModelReader {
     }
   }
 
+  double read_thickness(const StoredGroup& group) const {
+    const double thickness = group.number("thickness");
+    require(thickness > 0 && base::is_plausible(thickness), "its thickness is no usable number");
+    return thickness;
+  }
+
+  // Calls what makes the field. Its errors may not name the file yet.
+  void make_room(const std::function<void()>& make) const {
+    try {
+      name_file_in_faults(make);
+    } catch (const std::bad_alloc&) {
+      throw Error(fmt::format("'{}' holds more parameters than there is memory for", path_));
+    }
+  }
+
+  void read_decoder(const StoredGroup& group, field::Field& field) const {
+    field.bias = static_cast<float>(group.number("bias"));
+    field.activation.beta = static_cast<float>(group.number("softplus_beta"));
+    require(std::isfinite(field.bias) && std::isfinite(field.activation.beta) &&
+                field.activation.beta >= 0,
+            "its decoder is no usable number");
+  }
+
   std::unique_ptr<field::Field> read_field(const StoredGroup& group,
                                            const ChooseLeaves& choose) const {
     std::unique_ptr<field::Field> field;
     std::vector<int> kept;
-    const double thickness = group.number("thickness");
-    require(thickness > 0 && base::is_plausible(thickness), "its thickness is no usable number");
-    try {
-      name_file_in_faults([&] {
-        field::Quadtree tree = read_tree(group.group("tree"));
-        if (choose) kept = choose(tree);
-        auto shapes = read_shapes(group.group("leaves"), tree.num_leaves());
-        const std::string name = group.text("kind");
-        const auto kind = base::enum_named<FieldKind>(name);
-        if (!kind) fail(fmt::format("there is no field '{}'", name));
-        if (group.has("code")) {
-          require(*kind == FieldKind::kVm, "only factors have codes");
-          require_room_for_decoded(shapes);
-        } else {
-          require_enough_parameters(*kind, shapes, group.array_size("parameters"));
-          if (!choose) group.require_room("parameters");
-        }
-        field = field::make_field(*kind, std::move(tree), thickness, std::move(shapes));
-      });
-    } catch (const std::bad_alloc&) {
-      throw Error(fmt::format("'{}' holds more parameters than there is memory for", path_));
-    }
-    field->bias = static_cast<float>(group.number("bias"));
-    field->activation.beta = static_cast<float>(group.number("softplus_beta"));
-    require(std::isfinite(field->bias) && std::isfinite(field->activation.beta) &&
-                field->activation.beta >= 0,
-            "its decoder is no usable number");
-    if (choose) field->keep_only(kept);
-    if (group.has("code")) {
-      read_codes(group.group("code"), *field);
-    } else if (choose) {
+    const double thickness = read_thickness(group);
+    make_room([&] {
+      field::Quadtree tree = read_tree(group.group("tree"));
+      if (choose) kept = choose(tree);
+      auto shapes = read_shapes(group.group("leaves"), tree.num_leaves());
+      const std::string name = group.text("kind");
+      const auto kind = base::enum_named<FieldKind>(name);
+      if (!kind) fail(fmt::format("there is no field '{}'", name));
+      require_enough_parameters(*kind, shapes, group.array_size("parameters"));
+      if (!choose) group.require_room("parameters");
+      field = field::make_field(*kind, std::move(tree), thickness, std::move(shapes));
+    });
+    read_decoder(group, *field);
+    if (choose) {
+      field->keep_only(kept);
       require(group.array_size("parameters") == field->num_parameters(),
               "its parameters are not those of its leaves");
       group.read_floats("parameters", KeptCopy(*field, field->parameters()));
@@ -279,13 +290,48 @@ class ModelReader {
     return field;
   }
 
+  void read_compact_field(const StoredGroup& group, const ChooseLeaves& choose,
+                          Model& model) const {
+    std::vector<int> kept;
+    const double thickness = read_thickness(group);
+    make_room([&] {
+      field::Quadtree tree = read_tree(group.group("tree"));
+      if (choose) kept = choose(tree);
+      model.codes = read_codes(group, tree.num_leaves());
+      model.field = compact::decode_field(std::move(tree), thickness, *model.codes);
+    });
+    read_decoder(group, *model.field);
+    if (choose) model.field->keep_only(kept);
+    require_finite_parameters(*model.field, fmt::format("'{}' is a damaged model", path_));
+  }
+
+  compact::LeafCodes read_codes(const StoredGroup& field, int num_leaves) const {
+    const StoredGroup group = field.group("code");
+    compact::LeafCodes codes{.step = group.number("step"),
+                             .face_weight = group.number("face_weight"),
+                             .shapes = read_shapes(field.group("leaves"), num_leaves, 1),
+                             .offset = group.read_array<std::int64_t>("offset"),
+                             .bytes = group.read_array<std::uint8_t>("bytes")};
+    require(codes.step >= 0 && std::isfinite(codes.step), "its step is no usable number");
+    require(codes.face_weight >= 0 && codes.face_weight <= 0.5,
+            "the weight of its faces is no usable number");
+    require(std::ssize(codes.offset) == num_leaves + 1 && codes.offset.front() == 0 &&
+                std::ranges::is_sorted(codes.offset) &&
+                codes.offset.back() == std::ssize(codes.bytes),
+            "the index of its codes is wrong");
+    require_room_for_decoded(codes.shapes);
+    return codes;
+  }
+
   // Counts leaf by leaf, since the sum of all leaves could wrap.
   void require_room_for_decoded(const std::vector<field::LeafShape>& shapes) const {
     constexpr std::size_t kMost = std::size_t{1} << 40;
     std::size_t count = 0;
     for (const field::LeafShape& shape : shapes) {
-      const std::size_t more = field::count_parameters(FieldKind::kVm, {shape});
-      require(more <= kMost - count, "its leaves need more parameters than any file holds");
+      const std::size_t more =
+          field::count_parameters(FieldKind::kVm, {shape}) +
+          field::count_parameters(FieldKind::kGrid, {compact::with_upper_faces(shape)});
+      require(more <= kMost - count, "its leaves need more numbers than any file holds");
       count += more;
     }
     constexpr std::size_t kSmall = std::size_t{1} << 22;
@@ -293,30 +339,6 @@ class ModelReader {
       base::require_memory(count * sizeof(float), fmt::format("'{}'", path_).c_str(),
                            "use a machine with more, or another copy");
     }
-  }
-
-  // Decodes the leaves that the field keeps; the codes of others are not read.
-  void read_codes(const StoredGroup& group, field::Field& field) const {
-    const double step = group.number("step");
-    require(step >= 0 && std::isfinite(step), "its step is no usable number");
-    const Integers offset = group.read_array<std::int64_t>("offset");
-    const int num_leaves = field.tree().num_leaves();
-    require(std::ssize(offset) == num_leaves + 1 && offset.front() == 0 &&
-                std::ranges::is_sorted(offset) &&
-                offset.back() == static_cast<std::int64_t>(group.array_size("bytes")),
-            "the index of its codes is wrong");
-    name_file_in_faults([&] {
-      base::parallel_for("decode leaves", num_leaves, [&](std::int64_t i) {
-        const int leaf = static_cast<int>(i);
-        if (!field.keeps(leaf)) return;
-        const auto first = static_cast<std::size_t>(offset[static_cast<std::size_t>(i)]);
-        std::vector<std::uint8_t> code(
-            static_cast<std::size_t>(offset[static_cast<std::size_t>(i) + 1]) - first);
-        group.read_bytes("bytes", first, code);
-        compact::dequantise(compact::decode(code, field.shape(leaf)), step,
-                            field.parameters().subspan(field.offset(leaf)));
-      });
-    });
   }
 
   template <typename T>

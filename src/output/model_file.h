@@ -5,11 +5,13 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "compact/decoded_field.h"
 #include "field/field.h"
 #include "geometry/tilt_geometry.h"
 #include "tomofield/options.h"
@@ -34,6 +36,8 @@ struct ModelInfo {
 /// A fitted field with all that is needed to use it.
 struct Model : ModelInfo {
   std::unique_ptr<field::Field> field;
+  std::optional<compact::LeafCodes>
+      codes;  ///< of a compact model, whose `field` is decoded from them
 };
 
 /// The place and the tree of a model, without its parameters.
@@ -81,6 +85,7 @@ void save_model(const std::filesystem::path& path, const field::Field& field,
 /// Throws Error if a parameter that is kept is not finite. The message names `path`, the file that
 /// would have been written.
 void require_finite(const field::Field& field, const std::filesystem::path& path);
+/// Writes a model; of a compact one the codes, and no training state.
 void save_model(const std::filesystem::path& path, const Model& model,
                 const TrainingState* training = nullptr);
 
@@ -95,7 +100,8 @@ ModelOutline load_outline(const std::filesystem::path& path);
 /// Returns the leaves of a tree whose parameters shall be kept. An empty function keeps all.
 using ChooseLeaves = std::function<std::vector<int>(const field::Quadtree&)>;
 /// Reads a model and keeps only some of its leaves (Field::keep_only). `choose` sees the tree
-/// before anything is made from it, and may throw.
+/// before anything is made from it, and may throw. A compact model is decoded whole, since leaves
+/// take faces from their neighbours.
 Model load_part(const std::filesystem::path& path, const ChooseLeaves& choose);
 /// Reads the training state of a model without its floats.
 TrainingState load_training(const std::filesystem::path& path);

@@ -10,7 +10,6 @@
 #include "base/trace.h"
 #include "io/atomic_file.h"
 #include "io/hdf5_file.h"
-#include "output/compact_model.h"
 #include "output/model_file.h"
 #include "output/model_format.h"
 #include "tomofield/error.h"
@@ -62,9 +61,9 @@ void write_tree(Hdf5Group group, const field::Quadtree& tree) {
   write_column(group, "node_first_child", nodes, [](Node n) { return n.first_child; });
 }
 
-void write_leaves(Hdf5Group group, const field::Field& field) {
-  write_column(group, "node", field.tree().leaves(), [](int node) { return node; });
-  const auto& shapes = field.shapes();
+void write_leaves(Hdf5Group& group, const field::Quadtree& tree,
+                  const std::vector<field::LeafShape>& shapes) {
+  write_column(group, "node", tree.leaves(), [](int node) { return node; });
   using Shape = const field::LeafShape&;
   write_column(group, "nx", shapes, [](Shape s) { return s.nx; });
   write_column(group, "ny", shapes, [](Shape s) { return s.ny; });
@@ -72,24 +71,27 @@ void write_leaves(Hdf5Group group, const field::Field& field) {
   write_column(group, "rank_x", shapes, [](Shape s) { return s.rank_x; });
   write_column(group, "rank_y", shapes, [](Shape s) { return s.rank_y; });
   write_column(group, "rank_z", shapes, [](Shape s) { return s.rank_z; });
+}
+
+// Writes what all fields have but their leaves.
+void write_structure(Hdf5Group& group, const field::Field& field, FieldKind kind) {
+  group.write_text("kind", base::name_of(kind));
+  group.write_number("thickness", field.thickness());
+  group.write_number("bias", static_cast<double>(field.bias));
+  group.write_number("softplus_beta", static_cast<double>(field.activation.beta));
+  write_tree(group.create_group("tree"), field.tree());
+}
+
+void write_offsets(Hdf5Group& group, const field::Field& field) {
   Integers offsets;
   for (int i = 0; i <= field.tree().num_leaves(); ++i)
     offsets.push_back(static_cast<std::int64_t>(field.offset(i)));
   group.write_array<std::int64_t>("offset", offsets);
 }
 
-// Writes what is the same for all fields.
-void write_structure(Hdf5Group& group, const field::Field& field) {
-  group.write_text("kind", base::name_of(field.kind()));
-  group.write_number("thickness", field.thickness());
-  group.write_number("bias", static_cast<double>(field.bias));
-  group.write_number("softplus_beta", static_cast<double>(field.activation.beta));
-  write_tree(group.create_group("tree"), field.tree());
-  write_leaves(group.create_group("leaves"), field);
-}
-
 void write_codes(Hdf5Group group, const compact::LeafCodes& codes) {
   group.write_number("step", codes.step);
+  group.write_number("face_weight", codes.face_weight);
   group.write_array<std::int64_t>("offset", codes.offset);
   group.write_array<std::uint8_t>("bytes", codes.bytes);
 }
@@ -170,24 +172,29 @@ void save_model(const std::filesystem::path& path, const field::Field& field,
                 const FloatArrays& more_floats) {
   write_model(path, info, kFormatVersion, [&](Hdf5Group& root) {
     Hdf5Group group = root.create_group("field");
-    write_structure(group, field);
+    write_structure(group, field, field.kind());
+    {
+      Hdf5Group leaves = group.create_group("leaves");
+      write_leaves(leaves, field.tree(), field.shapes());
+      write_offsets(leaves, field);
+    }
     group.write_floats("parameters", parameters.size, parameters.hand_out);
     if (training != nullptr) write_training(root.create_group("training"), *training, more_floats);
   });
 }
 
-void save_model(const std::filesystem::path& path, const field::Field& field,
-                const compact::LeafCodes& codes, const ModelInfo& info) {
-  write_model(path, info, kCompactVersion, [&](Hdf5Group& root) {
-    Hdf5Group group = root.create_group("field");
-    write_structure(group, field);
-    write_codes(group.create_group("code"), codes);
-  });
-}
-
 void save_model(const std::filesystem::path& path, const Model& model,
                 const TrainingState* training) {
-  save_model(path, *model.field, model, training);
+  if (!model.codes) return save_model(path, *model.field, model, training);
+  write_model(path, model, kCompactVersion, [&](Hdf5Group& root) {
+    Hdf5Group group = root.create_group("field");
+    write_structure(group, *model.field, FieldKind::kVm);
+    {
+      Hdf5Group leaves = group.create_group("leaves");
+      write_leaves(leaves, model.field->tree(), model.codes->shapes);
+    }
+    write_codes(group.create_group("code"), *model.codes);
+  });
 }
 
 }  // namespace tomofield::output

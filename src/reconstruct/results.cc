@@ -24,7 +24,6 @@
 #include "io/json.h"
 #include "io/output_set.h"
 #include "option_table/setting.h"
-#include "output/compact_model.h"
 #include "output/metrics.h"
 #include "output/shared_options.h"
 #include "output/volume.h"
@@ -97,18 +96,12 @@ void write_all(const Writers& writers, const distributed::Communicator& processe
 void write_results(Results& results, const ReconstructOptions& options,
                    const std::optional<TunedFit>& tuned, const output::TrainingState& state,
                    const output::VolumeShare& share,
-                   const std::optional<measurement::PredictedView>& held_out_view,
-                   const std::optional<compact::LeafCodes>& codes) {
+                   const std::optional<measurement::PredictedView>& held_out_view) {
   const OutputPaths paths = output_paths(options.resolved.output);
   const distributed::Communicator& processes = share.processes;
   Writers writers;
   if (processes.size() == 1) {
-    writers.push_back([&] {
-      if (codes)
-        output::save_model(paths.model, *results.model->field, *codes, *results.model);
-      else
-        output::save_model(paths.model, *results.model, &state);
-    });
+    writers.push_back([&] { output::save_model(paths.model, *results.model, &state); });
   }
   writers.push_back(
       [&] { output::write_volume(*results.model, options.volume, paths.volume, share); });
@@ -178,13 +171,13 @@ void write_results(Results& results, const ReconstructOptions& options,
   }
 }
 
-// Replaces the field of the results by a compact one, and returns its codes.
-compact::LeafCodes make_compact(const compact::Budget& budget, Results& results) {
+// Replaces the model of the results by a compact one.
+void make_compact(const compact::Budget& budget, Results& results) {
   const base::Stopwatch running;
   compact::CompactField made = compact::compress(*results.model->field, budget);
   results.model->field = std::move(made.field);
+  results.model->codes = std::move(made.codes);
   results.metrics["metrics"]["compact"] = compact::report_json(made.report, running.seconds());
-  return std::move(made.codes);
 }
 
 }  // namespace
@@ -233,26 +226,25 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   std::optional<io::OutputSet> outputs;
   if (writes_files) outputs.emplace();
   if (writes_files && processes.size() > 1) save_fit(paths.model, fit, info, state);
-  Results results{.model = output::Model{info, fit.take_field()},
+  Results results{.model = output::Model{info, fit.take_field(), std::nullopt},
                   .metrics = {{"tomofield", TOMOFIELD_VERSION},
                               {"options", options_json(options)},
                               {"origins", option_table::to_json(options.origins)},
                               {"metrics", std::move(found.metrics)}},
                   .verdict = std::move(found.verdict),
                   .bead_masking = series.masks.bead_masking};
-  std::optional<compact::LeafCodes> codes;
   if (!options.resolved.budget.empty())
-    codes = make_compact(compact::parse_budget(options.resolved.budget), results);
+    make_compact(compact::parse_budget(options.resolved.budget), results);
   if (!writes_files) return results;
   try {
-    write_results(results, options, origin.tuned, state, share, view, codes);
+    write_results(results, options, origin.tuned, state, share, view);
     processes.run_collectively([&] {
       if (!processes.is_root()) return;
       if (write_more) write_more(results, outputs->location_of(paths.volume));
       outputs->commit();
     });
   } catch (...) {
-    if (codes) keep_compact_model(paths.model, *outputs);
+    if (results.model->codes) keep_compact_model(paths.model, *outputs);
     std::function<void()> save_again;  // several processes have saved theirs together
     if (processes.size() == 1)
       save_again = [&] { output::save_model(paths.model, *results.model, &state); };

@@ -77,6 +77,41 @@ def test_every_method_is_run_scored_and_shown(compare, truth):
     assert abs(shades[0] - shades[1]) < 40, shades
 
 
+def test_regions_and_a_profile_can_be_given(series):
+    folder = harness.fresh_directory("places")
+    line, boxes = "4.5,20.5,8.5,27.5,20.5,8.5", ("2,2,2,8,8,8", "12,12,4,20,20,10")
+    arguments = ("compare", *series.input, *QUICK, "--methods", "wbp,sirt", "-o", folder)
+    harness.succeed(*arguments, "--foreground", boxes[0], "--background", boxes[1], "--profile", line)
+    for row in json.loads(read(folder, "comparison.json"))["methods"]:
+        scores, table = (os.path.join(folder, name) for name in ("scores.json", "by_hand.csv"))
+        harness.succeed("evaluate", row["volume"], "--cnr", "--foreground", boxes[0], "--background",
+                        boxes[1], "--profile", line, "--profile-csv", table, "--json", scores,
+                        "--overwrite")
+        with open(scores) as file:
+            assert json.load(file)["contrast"]["cnr"] == pytest.approx(row["cnr"])
+        profile = list(csv.DictReader(read(folder, "profile.csv").splitlines()))
+        by_hand = list(csv.DictReader(read(folder, "by_hand.csv").splitlines()))
+        assert [p[row["method"]] for p in profile] == [p["volume"] for p in by_hand]
+        assert len(profile) == 24
+    assert "as given" in read(folder, "report.html")
+    for wrong, says in ((("--profile", "0,0,0,900,0,0"), "outside"),
+                        (("--foreground", "0,0,0,900,9,9", "--background", boxes[1]), "--foreground")):
+        result = harness.tomofield(*arguments, "--overwrite", *wrong)
+        assert result.returncode == 2 and says in result.stderr, result.stderr
+    assert os.path.exists(os.path.join(folder, "wbp.mrc")), "nothing was removed"
+
+
+def test_regions_are_chosen_on_sirt(series):
+    folder = harness.fresh_directory("chosen")
+    harness.succeed("compare", *series.input, *QUICK, "--methods", "wbp,sirt", "-o", folder)
+    scores = os.path.join(folder, "scores.json")
+    harness.succeed("evaluate", os.path.join(folder, "sirt.mrc"), "--cnr", "--json", scores)
+    rows = json.loads(read(folder, "comparison.json"))["methods"]
+    with open(scores) as file:
+        assert json.load(file)["contrast"]["cnr"] == pytest.approx(rows[1]["cnr"])
+    assert "chosen on the volume of SIRT" in read(folder, "report.html")
+
+
 def test_halves_and_held_out_views_give_metrics_without_a_truth(compare):
     folder = harness.fresh_directory("halves")
     compare(folder, "--halves", "--hold-out", 4, "--exclude", "3")

@@ -1,0 +1,249 @@
+#include "compact/decoded_field.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "base/check.h"
+#include "base/parallel.h"
+#include "compact/quantise.h"
+
+namespace tomofield::compact {
+namespace {
+
+using field::Field;
+using field::LeafShape;
+
+// Names the two vertices of an axis around a position, and the weight of the upper one. Positions
+// beyond the last of n vertices are moved to it.
+struct Taps {
+  int lower, upper;
+  float fraction;
+  Taps(double vertex, int n) {
+    const double clamped = std::clamp(vertex, 0.0, static_cast<double>(n - 1));
+    lower = static_cast<int>(clamped);
+    upper = std::min(lower + 1, n - 1);
+    fraction = static_cast<float>(clamped - lower);
+  }
+};
+
+float between(float low, float high, float fraction) { return low + fraction * (high - low); }
+
+// Returns the position of a leaf's vertex in the plane.
+std::array<double, 2> position(const Field& field, const std::vector<LeafShape>& shapes, int leaf,
+                               int i, int j) {
+  const LeafShape& own = shapes[static_cast<std::size_t>(leaf)];
+  const field::Square& square = field.tree().leaf(leaf).square;
+  const auto size = static_cast<double>(square.size);
+  return {static_cast<double>(square.x0) + size * i / own.nx + field::kPixelCentre,
+          static_cast<double>(square.y0) + size * j / own.ny + field::kPixelCentre};
+}
+
+// Returns the index of a vertex among all parameters.
+std::size_t vertex(const Field& field, int leaf, int i, int k, int j) {
+  const LeafShape& s = field.shape(leaf);
+  return field.offset(leaf) + (static_cast<std::size_t>(i) * s.nz + k) * s.ny + j;
+}
+
+// Two neighbouring columns of vertices of different leaves.
+struct Neighbours {
+  int leaf, i, j, other, other_i, other_j;
+};
+
+// Calls body(Neighbours) for the columns on both sides of the upper face of a leaf along x or y.
+// Columns of other spacing than the leaf's are left out, and so are those of leaves one vertex
+// wide.
+template <typename Body>
+void for_each_neighbours(const Field& field, const std::vector<LeafShape>& shapes, int leaf,
+                         bool along_x, const Body& body) {
+  const LeafShape& own = shapes[static_cast<std::size_t>(leaf)];
+  if (own.nx < 2 || own.ny < 2) return;
+  const std::int64_t size = field.tree().leaf(leaf).square.size;
+  for (int n = 0; n < (along_x ? own.ny : own.nx); ++n) {
+    const auto [x, y] = position(field, shapes, leaf, along_x ? own.nx : n, along_x ? n : own.ny);
+    const int other = field.tree().find_leaf(x, y);
+    if (other < 0) continue;
+    const LeafShape& s = shapes[static_cast<std::size_t>(other)];
+    const std::int64_t other_size = field.tree().leaf(other).square.size;
+    const bool is_alike = s.nx > 1 && s.ny > 1 && s.nz == own.nz &&
+                          s.nx * size == own.nx * other_size && s.ny * size == own.ny * other_size;
+    if (!is_alike) continue;
+    body(Neighbours{.leaf = leaf,
+                    .i = along_x ? own.nx - 1 : n,
+                    .j = along_x ? n : own.ny - 1,
+                    .other = other,
+                    .other_i = static_cast<int>(std::lround(field.vertex_x(other, x))),
+                    .other_j = static_cast<int>(std::lround(field.vertex_y(other, y)))});
+  }
+}
+
+// Moves the vertices on both sides of faces towards each other. A leaf changes its own last columns
+// and the first ones of its neighbours, which no other leaf changes along the same axis.
+void soften_faces(Field& field, const LeafCodes& codes) {
+  const auto weight = static_cast<float>(codes.face_weight);
+  if (weight == 0) return;
+  for (const bool along_x : {true, false}) {
+    base::parallel_for("soften faces", std::ssize(codes.shapes), [&](std::int64_t leaf) {
+      for_each_neighbours(
+          field, codes.shapes, static_cast<int>(leaf), along_x, [&](const Neighbours& at) {
+            for (int k = 0; k < field.shape(at.leaf).nz; ++k) {
+              float& a = field.parameters()[vertex(field, at.leaf, at.i, k, at.j)];
+              float& b = field.parameters()[vertex(field, at.other, at.other_i, k, at.other_j)];
+              const float move = weight * (b - a);
+              a += move;
+              b -= move;
+            }
+          });
+    });
+  }
+}
+
+// Fills the upper faces of leaves whose other vertices are known.
+class UpperFaces {
+ public:
+  UpperFaces(Field& field, const std::vector<LeafShape>& shapes) : field_(field), shapes_(shapes) {}
+
+  void fill(int leaf) const {
+    const LeafShape& own = shapes_[static_cast<std::size_t>(leaf)];
+    if (own == kNoLeaf) return;
+    for (int i = 0; i <= own.nx; ++i) {
+      for (int j = i == own.nx ? 0 : own.ny; j <= own.ny; ++j) fill_column(leaf, i, j);
+    }
+  }
+
+ private:
+  // Fills the vertices above a point of the plane.
+  void fill_column(int leaf, int i, int j) const {
+    const LeafShape& own = shapes_[static_cast<std::size_t>(leaf)];
+    const auto [x, y] = position(field_, shapes_, leaf, i, j);
+    int from = field_.tree().find_leaf(x, y);
+    if (from < 0 || shapes_[static_cast<std::size_t>(from)] == kNoLeaf) from = leaf;
+    const LeafShape& other = shapes_[static_cast<std::size_t>(from)];
+    const Taps at_x(field_.vertex_x(from, x), other.nx), at_y(field_.vertex_y(from, y), other.ny);
+    const auto value = [&](int column, int z, int row) {
+      return field_.parameters()[vertex(field_, from, column, z, row)];
+    };
+    const auto in_plane = [&](int z) {
+      const auto at_column = [&](int column) {
+        return between(value(column, z, at_y.lower), value(column, z, at_y.upper), at_y.fraction);
+      };
+      return between(at_column(at_x.lower), at_column(at_x.upper), at_x.fraction);
+    };
+    for (int k = 0; k < own.nz; ++k) {
+      const Taps at_z(static_cast<double>(k) * (other.nz - 1) / (own.nz - 1), other.nz);
+      field_.parameters()[vertex(field_, leaf, i, k, j)] =
+          between(in_plane(at_z.lower), in_plane(at_z.upper), at_z.fraction);
+    }
+  }
+
+  Field& field_;
+  const std::vector<LeafShape>& shapes_;
+};
+
+// Returns the densities of a field above a point of the plane.
+std::vector<float> column(const Field& field, const std::array<double, 2>& at,
+                          const std::vector<double>& z) {
+  const std::vector<double> x(z.size(), at[0]), y(z.size(), at[1]);
+  std::vector<float> densities(z.size());
+  field.point_densities(field.tree().find_leaf(at[0], at[1]), {x, y, z}, densities);
+  return densities;
+}
+
+// Returns the sum of absolute differences.
+double distance(const std::vector<float>& a, const std::vector<float>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += static_cast<double>(std::abs(a[i] - b[i]));
+  return sum;
+}
+
+// Writes the densities of a leaf but those of its upper faces.
+void decode_leaf(const LeafCodes& codes, int leaf, Field& field) {
+  const LeafShape& own = codes.shapes[static_cast<std::size_t>(leaf)];
+  const FloatMatrix values = values_of(dequantised_modes(decode(codes.code(leaf), own), codes.step),
+                                       own.nx, own.ny, own.nz);
+  const LeafShape& s = field.shape(leaf);
+  float* to = field.parameters().data() + field.offset(leaf);
+  for (int i = 0; i < own.nx; ++i) {
+    for (int k = 0; k < own.nz; ++k, to += s.ny)
+      std::copy_n(values.row(i).data() + static_cast<std::ptrdiff_t>(k) * own.ny, own.ny, to);
+  }
+}
+
+// Returns the mean absolute difference of the neighbouring columns of different leaves over that of
+// neighbours in the middle of a leaf, or 0 if the latter do not differ. The places are those of the
+// leaves of `decoded`; the densities are those of `field`.
+double face_jump(const Field& field, const Field& decoded, const std::vector<LeafShape>& shapes) {
+  struct Sums {
+    double across = 0, inside = 0;
+  };
+  std::vector<Sums> sums(shapes.size());
+  base::parallel_for("measure faces", std::ssize(sums), [&](std::int64_t i) {
+    const int leaf = static_cast<int>(i);
+    const LeafShape& own = shapes[static_cast<std::size_t>(i)];
+    std::vector<double> z;
+    for (int k = 0; k < own.nz; ++k)
+      z.push_back(field::kPixelCentre +
+                  field::vertex_height(decoded.thickness()) * k / (own.nz - 1));
+    const auto densities = [&](int of, int x, int y) {
+      return column(field, position(decoded, shapes, of, x, y), z);
+    };
+    for (const bool along_x : {true, false}) {
+      for_each_neighbours(decoded, shapes, leaf, along_x, [&](const Neighbours& at) {
+        const int x = along_x ? own.nx / 2 : at.i, y = along_x ? at.j : own.ny / 2;
+        Sums& sum = sums[static_cast<std::size_t>(i)];
+        sum.across +=
+            distance(densities(leaf, at.i, at.j), densities(at.other, at.other_i, at.other_j));
+        sum.inside += distance(densities(leaf, x, y),
+                               densities(leaf, along_x ? x - 1 : x, along_x ? y : y - 1));
+      });
+    }
+  });
+  Sums all;
+  for (const Sums& sum : sums) {
+    all.across += sum.across;
+    all.inside += sum.inside;
+  }
+  return all.inside > 0 ? all.across / all.inside : 0;
+}
+
+}  // namespace
+
+std::size_t LeafCodes::num_parameters() const {
+  return field::count_parameters(FieldKind::kVm, shapes);
+}
+
+std::span<const std::uint8_t> LeafCodes::code(int leaf) const {
+  const auto at = static_cast<std::size_t>(leaf);
+  const auto first = static_cast<std::size_t>(offset[at]);
+  return std::span(bytes).subspan(first, static_cast<std::size_t>(offset[at + 1]) - first);
+}
+
+LeafShape with_upper_faces(const LeafShape& shape) {
+  return {.nx = shape.nx + 1, .ny = shape.ny + 1, .nz = shape.nz};
+}
+
+std::unique_ptr<Field> decode_field(field::Quadtree tree, double thickness,
+                                    const LeafCodes& codes) {
+  const int num_leaves = tree.num_leaves();
+  TOMOFIELD_CHECK(std::ssize(codes.shapes) == num_leaves, "one shape a leaf");
+  std::vector<LeafShape> shapes;
+  std::ranges::transform(codes.shapes, std::back_inserter(shapes), with_upper_faces);
+  auto field = field::make_field(FieldKind::kGrid, std::move(tree), thickness, std::move(shapes));
+  base::parallel_for("decode leaves", num_leaves,
+                     [&](std::int64_t i) { decode_leaf(codes, static_cast<int>(i), *field); });
+  soften_faces(*field, codes);
+  const UpperFaces faces(*field, codes.shapes);
+  base::parallel_for("fill upper faces", num_leaves,
+                     [&](std::int64_t i) { faces.fill(static_cast<int>(i)); });
+  return field;
+}
+
+double matching_face_weight(const Field& decoded, const LeafCodes& codes, const Field& original) {
+  const double of_decoded = face_jump(decoded, decoded, codes.shapes);
+  const double of_original = face_jump(original, decoded, codes.shapes);
+  // A weight w leaves the part 1 - 2 w of a difference across a face.
+  return of_decoded > of_original ? (1 - of_original / of_decoded) / 2 : 0;
+}
+
+}  // namespace tomofield::compact
