@@ -24,7 +24,7 @@ namespace {
 constexpr std::int64_t kLargestSide = 128;  // px
 // The parts of the error that rounding may add; the ranks leave the rest. The first one makes the
 // file small, and the second one the number of parameters (docs/results/compact.md).
-constexpr double kRoundingForBytes = 0.3, kRoundingForParameters = 0.02;
+constexpr double kRoundingForBytes = 0.3, kRoundingForParameters = 0.005;
 
 // Relates decibels D of PSNR to a mean squared change, k D^p times the variance
 // (docs/results/compact.md).
@@ -67,7 +67,7 @@ class Compression {
   // Finds ranks at prices around the one that meets the limit, and chooses among them.
   void choose(const Limit& limit) {
     constexpr int kRounds = 8;
-    constexpr double kClose = 0.02, kFar = 1e-3;
+    constexpr double kClose = 0.005, kFar = 1e-3;
     double price = last_price_ > 0 ? last_price_ : surveyed_price(limit);
     double low = 0, high = 0;  // prices below and above the wanted one
     for (int round = 0; round < kRounds; ++round) {
