@@ -185,11 +185,11 @@ void write_models(const fs::path& folder) {
   for (const FieldKind kind : {FieldKind::kVm, FieldKind::kGrid})
     output::save_model(folder / "model" / (kind == FieldKind::kVm ? "vm" : "grid"),
                        testing::uneven_model(kind));
-  output::Model compact = testing::uneven_model(FieldKind::kGrid);
-  compact::CompactField made = compact::compress(*compact.field, {});
-  compact.field = std::move(made.field);
-  compact.codes = std::move(made.codes);
-  output::save_model(folder / "model" / "compact", compact);
+  output::Model small = testing::uneven_model(FieldKind::kGrid);
+  compact::CompactField made = compact::compress(*small.field, {});
+  small.field = std::move(made.field);
+  small.codes = std::move(made.codes);
+  output::save_model(folder / "model" / "compact", small);
   const testing::SmallFit series;
   for (const int steps : {1, 7, 12}) {
     const auto fit = series.make();
