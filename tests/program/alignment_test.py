@@ -64,7 +64,7 @@ def test_align_finds_shifts_and_writes_them_for_other_programs(shifted):
 
 def test_full_finds_large_shifts_and_the_axis():
     size = 128
-    folder = simulate("alignment_raw", "--misalign", 5, "--misalign-axis", 2, size=size)
+    folder = simulate("alignment_raw", "--misalign", 10, "--misalign-axis", 2, size=size)
     harness.succeed("align", *series_of(folder, size), "--align", "full", "-o",
                     os.path.join(folder, "found.mrc"))
     found = errors(folder, os.path.join(folder, "found_align"), size)
