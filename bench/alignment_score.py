@@ -190,7 +190,10 @@ def read_local(path):
     """Returns the local motion of a JSON file's views, or None if they have none."""
     with open(path, encoding="utf-8") as file:
         views = json.load(file)["views"]
-    return [view["local_px"] for view in views] if "local_px" in views[0] else None
+    if not any("local_px" in view for view in views):
+        return None
+    none = np.zeros((5, 5, 2)).tolist()  # of views that were left out
+    return [view.get("local_px", none) for view in views]
 
 
 def read_truth(folder):

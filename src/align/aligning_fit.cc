@@ -146,8 +146,7 @@ void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& me
 }
 
 bool run_with_updates(const JointProblem& problem, fit::Fit& fit, std::int64_t num_epochs,
-                      const std::vector<double>& steps_px,
-                      const std::function<void(const fit::Stage&)>& update,
+                      const std::vector<double>& steps_px, const UpdateSteps& steps,
                       const distributed::Communicator& processes) {
   const base::Stopwatch running;
   while (epochs_done(fit) < num_epochs) {
@@ -156,7 +155,9 @@ bool run_with_updates(const JointProblem& problem, fit::Fit& fit, std::int64_t n
     if (problem.progress && num_epochs == fit.num_epochs())
       problem.progress(report(fit, running.seconds(), steps_px));
     const bool is_stopped = is_to_stop(problem, processes);
-    if (is_update_due(stage, epochs_done(fit), fit.is_done())) update(stage);
+    const bool is_updated =
+        is_update_due(stage, epochs_done(fit), fit.is_done()) && steps.update(stage);
+    if (is_updated || fit.stage().bin != stage.bin) steps.resample();
     if (is_stopped) return true;
   }
   return false;
@@ -166,8 +167,8 @@ void go_on_with(const JointProblem& problem, std::span<const geometry::ViewCorre
                 const fit::FieldOptions& field, const distributed::Communicator& processes,
                 measurement::Measurement& measurement, fit::Fit& fit) {
   if (fit.is_done()) return;
-  measurement::realign(problem.recorded, corrections, problem.scratch_dir, fit::band_rows(field),
-                       processes, measurement);
+  measurement::realign(problem.recorded, corrections, fit.stage().bin, problem.scratch_dir,
+                       fit::band_rows(field), processes, measurement);
   fit.reread_measurement();
 }
 

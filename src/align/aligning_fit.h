@@ -51,17 +51,25 @@ void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& me
                          const fit::Stage& stage,
                          const std::function<void(std::size_t, const ImagePair&)>& visit);
 
-/// Takes the first `num_epochs` epochs of a fit, and calls update(stage) after those that show
-/// enough for an update of the alignment. The fit must then go on with the updated views. Progress,
-/// with the last of `steps_px`, is reported if these are all epochs. Returns true if a stop was
-/// requested meanwhile. Every process calls it.
+/// Says what run_with_updates() does with a fit.
+struct UpdateSteps {
+  /// Updates the alignment after an epoch of a stage. Returns false if it leaves it as it is.
+  std::function<bool(const fit::Stage&)> update;
+  /// Lets the fit go on with the views of the present alignment.
+  std::function<void()> resample;
+};
+
+/// Takes the first `num_epochs` epochs of a fit. Updates the alignment after those that show enough
+/// for it, and resamples the views after an update and for each new stage. Progress, with the last
+/// of `steps_px`, is reported if these are all epochs. Returns true if a stop was requested
+/// meanwhile. Every process calls it.
 bool run_with_updates(const JointProblem& problem, fit::Fit& fit, std::int64_t num_epochs,
-                      const std::vector<double>& steps_px,
-                      const std::function<void(const fit::Stage&)>& update,
+                      const std::vector<double>& steps_px, const UpdateSteps& steps,
                       const distributed::Communicator& processes);
 
-/// Resamples the views of a fit with other corrections, from the recorded ones, and lets the fit go
-/// on with them; does nothing if the fit is done. Every process calls it.
+/// Resamples the views of a fit with other corrections, from the recorded ones to the pixels of the
+/// fit's stage, and lets the fit go on with them; does nothing if the fit is done. Every process
+/// calls it.
 void go_on_with(const JointProblem& problem, std::span<const geometry::ViewCorrection> corrections,
                 const fit::FieldOptions& field, const distributed::Communicator& processes,
                 measurement::Measurement& measurement, fit::Fit& fit);

@@ -11,16 +11,13 @@
 #include "align/gauge.h"
 #include "align/local_alignment.h"
 #include "align/trial.h"
+#include "align/unalike.h"
 #include "base/parallel.h"
-#include "base/percentile.h"
 #include "base/trace.h"
 #include "tilt_series/binning.h"
 
 namespace tomofield::align {
 namespace {
-
-// A view that resembles its projection so much less than the others is not of this specimen.
-constexpr double kUnalike = 0.2;
 
 // Views are correlated in images of at most about this width and height.
 constexpr double kCorrelatedSize = 96;
@@ -29,15 +26,13 @@ double mean_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-// Returns the views whose correlation with their projections is far below the median.
-std::vector<int> unalike_views(const std::vector<ViewAgreement>& agreement) {
-  std::vector<double> correlations;
+// Returns the views that do not resemble their projections.
+std::vector<int> unalike_views(const tilt_series::TiltSeries& series,
+                               const std::vector<ViewAgreement>& agreement) {
+  std::vector<double> tilts, correlations;
+  for (const tilt_series::View& view : series.views()) tilts.push_back(view.tilt_deg);
   for (const ViewAgreement& view : agreement) correlations.push_back(view.correlation);
-  const double median = base::percentile(correlations, 50);
-  std::vector<int> views;
-  for (std::size_t v = 0; v < agreement.size(); ++v)
-    if (agreement[v].correlation < kUnalike * median) views.push_back(static_cast<int>(v));
-  return views;
+  return unalike(tilts, correlations);
 }
 
 Comparison compare(const std::vector<double>& before, const std::vector<double>& after) {
@@ -112,7 +107,7 @@ Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::Vi
   Alignment alignment;
   alignment.joint = align_jointly(problem, std::move(start), processes);
   if (alignment.joint.was_stopped) return alignment;
-  alignment.unaligned = unalike_views(alignment.joint.agreement);
+  alignment.unaligned = unalike_views(problem.recorded, alignment.joint.agreement);
   const std::vector<double> before = errors_of_held_out_views(problem, none, processes);
   const std::vector<double> after =
       errors_of_held_out_views(problem, alignment.joint.corrections, processes);

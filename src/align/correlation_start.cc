@@ -14,6 +14,7 @@
 #include "align/stretched_view.h"
 #include "base/check.h"
 #include "base/parallel.h"
+#include "base/percentile.h"
 #include "fourier/image_transform.h"
 
 namespace tomofield::align {
@@ -28,6 +29,7 @@ constexpr double kTrend = 0.08;     // σ of the local mean that is removed, a s
 constexpr double kTaper = 0.15;     // of the size, at each edge
 constexpr double kNoise = 0.3;      // power of the noise over that of the signal, in predictions
 constexpr std::size_t kOthers = 8;  // views that predict another one
+constexpr int kPasses = 2;          // over all views, after their first shifts are known
 // The low pass of IMOD's tiltxcorr, cycles a pixel.
 constexpr double kCutoff = 0.25, kFalloff = 0.05;
 
@@ -87,7 +89,6 @@ class PoseSearch {
     });
     for (std::size_t i = 1; i < order.size(); ++i) {
       const auto others = nearest(order[i], std::span(order).first(i));
-      poses_[order[i]].shift_px = poses_[others.front()].shift_px;
       move(order[i], find(order[i], others));
     }
     first_ = order.front();
@@ -97,12 +98,12 @@ class PoseSearch {
   void compare_with_neighbours() {
     std::vector<std::size_t> all(poses_.size());
     std::iota(all.begin(), all.end(), 0);
-    std::vector<ShiftPeak> peaks(poses_.size());
+    std::vector<FoundShift> found(poses_.size());
     base::parallel_for("compare with neighbours", std::ssize(poses_), [&](std::int64_t i) {
       const auto view = static_cast<std::size_t>(i);
-      peaks[view] = find(view, nearest(view, all));
+      found[view] = find(view, nearest(view, all));
     });
-    for (const std::size_t view : all) move(view, peaks[view]);
+    for (const std::size_t view : all) move(view, found[view]);
   }
 
   CorrelationStart result() const {
@@ -119,6 +120,11 @@ class PoseSearch {
   }
 
  private:
+  struct FoundShift {
+    std::array<double, 2> shift_px{};
+    double confidence = 0.0;
+  };
+
   std::vector<std::size_t> nearest(std::size_t view, std::span<const std::size_t> among) const {
     std::vector<std::size_t> others(among.begin(), among.end());
     std::erase(others, view);
@@ -129,6 +135,18 @@ class PoseSearch {
                      [&](std::size_t a, std::size_t b) { return distance(a) < distance(b); });
     others.resize(std::min(others.size(), kOthers));
     return others;
+  }
+
+  // Returns the median of the shifts of some views along each axis. A view whose shift is wrong
+  // does not lead the search for others astray.
+  std::array<double, 2> median_shift(const std::vector<std::size_t>& views) const {
+    std::array<double, 2> median{};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      std::vector<double> shifts;
+      for (const std::size_t view : views) shifts.push_back(poses_[view].shift_px[axis]);
+      median[axis] = base::percentile(shifts, 50);
+    }
+    return median;
   }
 
   float window(std::int64_t x, std::int64_t y) const {
@@ -191,24 +209,28 @@ class PoseSearch {
     return reference;
   }
 
-  ShiftPeak find(std::size_t view, const std::vector<std::size_t>& others) const {
+  // Looks for the shift of a view around those of others.
+  FoundShift find(std::size_t view, const std::vector<std::size_t>& others) const {
+    const ViewPose start{poses_[view].tilt_deg, median_shift(others)};
     MaskedImage image =
-        stretched_view(images_[view], poses_[view], poses_[view].tilt_deg, 2 * width_, 2 * height_);
+        stretched_view(images_[view], start, start.tilt_deg, 2 * width_, 2 * height_);
     Image values(image.values.begin(), image.values.end());
     wide_transform_.forward(values);
     filter(wide_transform_, values);
     wide_transform_.inverse(values);
     for (std::size_t i = 0; i < values.size(); ++i)
       image.values[i] = image.valid[i] ? values[i].real() : 0.0f;
-    return find_shift(wide_transform_, predict(view, others), image,
-                      {options_.largest_shift * static_cast<double>(images_[view].width),
-                       options_.largest_shift * static_cast<double>(images_[view].height)});
+    const ShiftPeak peak =
+        find_shift(wide_transform_, predict(view, others), image,
+                   {options_.largest_shift * static_cast<double>(images_[view].width),
+                    options_.largest_shift * static_cast<double>(images_[view].height)});
+    return {{start.shift_px[0] + peak.moved_px[0], start.shift_px[1] + peak.moved_px[1]},
+            peak.prominence};
   }
 
-  void move(std::size_t view, const ShiftPeak& peak) {
-    poses_[view].shift_px[0] += peak.moved_px[0];
-    poses_[view].shift_px[1] += peak.moved_px[1];
-    confidence_[view] = peak.prominence;
+  void move(std::size_t view, const FoundShift& found) {
+    poses_[view].shift_px = found.shift_px;
+    confidence_[view] = found.confidence;
   }
 
   CorrelationOptions options_;
@@ -228,7 +250,7 @@ CorrelationStart correlate_views(std::span<const CoarseView> views,
   TOMOFIELD_CHECK(views.size() >= 2, "views to correlate");
   PoseSearch search(views, options);
   search.go_outwards();
-  search.compare_with_neighbours();
+  for (int pass = 0; pass < kPasses; ++pass) search.compare_with_neighbours();
   return search.result();
 }
 

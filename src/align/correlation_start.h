@@ -17,7 +17,7 @@ struct CoarseView {
 /// Says what a correlation expects. Lengths are in pixels of the given images.
 struct CorrelationOptions {
   double thickness_px = 0.0;    ///< of the specimen, roughly
-  double largest_shift = 0.25;  ///< from one view to the next, as a share of the image's size
+  double largest_shift = 0.35;  ///< from one view to the next, as a share of the image's size
 };
 
 /// Holds what a correlation finds. A position q of a corrected view, relative to its centre, lies

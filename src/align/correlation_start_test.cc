@@ -59,11 +59,12 @@ struct Series {
   std::vector<Shift> shifts;
 };
 
-Series make_series(int jumping_view = -1) {
+Series make_series(int jumping_view = -1, double largest_shift = 4) {
   Series series;
   base::Random random(3);
+  const auto any = [&] { return random.uniform(-largest_shift, largest_shift); };
   for (int i = 0; i < 31; ++i) {
-    Shift shift{random.uniform(-4, 4), random.uniform(-4, 4)};
+    Shift shift{any(), any()};
     if (i == jumping_view) shift[0] += 0.2 * kSize;
     series.shifts.push_back(shift);
     series.views.push_back(make_view(-60.0 + 4.0 * i, shift, static_cast<std::uint64_t>(i)));
@@ -106,6 +107,12 @@ TEST(CorrelationStart, FindsKnownShifts) {
 TEST(CorrelationStart, FindsAViewThatJumped) {
   const Series series = make_series(18);
   EXPECT_LT(largest_error(series, correlate_views(series.views, kOptions).shift_px), 0.5);
+}
+
+// Views next to each other are up to 3/8 of the width apart.
+TEST(CorrelationStart, FindsLargeShiftsOfAllViews) {
+  const Series series = make_series(-1, 12);
+  EXPECT_LT(largest_error(series, correlate_views(series.views, kOptions).shift_px), 0.6);
 }
 
 TEST(CorrelationStart, MaskedPixelsDoNotPull) {

@@ -53,9 +53,14 @@ class AligningFit {
 
   // Aligns in the first `num_epochs` epochs of the fit.
   JointAlignment run(std::int64_t num_epochs) {
-    found_.was_stopped = run_with_updates(
-        problem_, fit_, num_epochs, found_.steps_px,
-        [this](const fit::Stage& stage) { update(stage); }, processes_);
+    const UpdateSteps steps{.update = [this](const fit::Stage& stage) { return update(stage); },
+                            .resample =
+                                [this] {
+                                  go_on_with(problem_, found_.corrections, field_, processes_,
+                                             measurement_, fit_);
+                                }};
+    found_.was_stopped =
+        run_with_updates(problem_, fit_, num_epochs, found_.steps_px, steps, processes_);
     return std::move(found_);
   }
 
@@ -64,8 +69,8 @@ class AligningFit {
   double residual() const { return fit_.progress().data_loss.back(); }
 
  private:
-  // Registers every view and goes on with the corrected ones.
-  void update(const fit::Stage& stage) {
+  // Registers every view.
+  bool update(const fit::Stage& stage) {
     const base::TraceSpan span("register views");
     std::vector<ViewCorrection> steps = limited(register_views(stage), stage);
     std::vector<ViewCorrection> next = found_.corrections;
@@ -73,7 +78,7 @@ class AligningFit {
     remove_gauge(measurement_.geometry, next);
     found_.steps_px.push_back(rms_change(found_.corrections, next));
     found_.corrections = std::move(next);
-    go_on_with(problem_, found_.corrections, field_, processes_, measurement_, fit_);
+    return true;
   }
 
   static double rms_change(const std::vector<ViewCorrection>& from,

@@ -75,18 +75,21 @@ class LocalFit {
   }
 
   LocalAlignment run() {
-    found_.was_stopped = run_with_updates(
-        problem_, fit_, fit_.num_epochs(), found_.steps_px,
-        [this](const fit::Stage& stage) {
-          if (stage.bin <= kCoarsestBin) update(stage);
-        },
-        processes_);
+    const UpdateSteps steps{.update = [this](const fit::Stage& stage) { return update(stage); },
+                            .resample =
+                                [this] {
+                                  go_on_with(problem_, found_.corrections, field_, processes_,
+                                             measurement_, fit_);
+                                }};
+    found_.was_stopped =
+        run_with_updates(problem_, fit_, fit_.num_epochs(), found_.steps_px, steps, processes_);
     return std::move(found_);
   }
 
  private:
-  // Registers every view and goes on with the corrected ones.
-  void update(const fit::Stage& stage) {
+  // Registers every view where the field shows enough.
+  bool update(const fit::Stage& stage) {
+    if (stage.bin > kCoarsestBin) return false;
     const base::TraceSpan span("register local motion");
     const std::vector<ViewWarp> steps = amplified(register_views(stage));
     std::vector<ViewCorrection> next = found_.corrections;
@@ -95,7 +98,7 @@ class LocalFit {
     remove_gauge(measurement_.geometry, next);
     found_.steps_px.push_back(rms_change(found_.corrections, next));
     found_.corrections = std::move(next);
-    go_on_with(problem_, found_.corrections, field_, processes_, measurement_, fit_);
+    return true;
   }
 
   // Returns the motion that each view shows beside what is undone already.

@@ -88,6 +88,28 @@ struct Registration::Prepared {
   std::vector<std::uint8_t> counts;
 };
 
+// Gathers rows, since the products of many are faster to add up than those of one.
+class Registration::RowBatch {
+ public:
+  // Adds a row, and its products to `sums` when there are enough.
+  void add(const Row& row, double weight, Sums& sums) {
+    rows_.col(count_) = row;
+    weighted_.col(count_) = weight * row;
+    if (++count_ == kRows) add_up(sums);
+  }
+
+  // Adds the products of the rows to `sums` and begins anew.
+  void add_up(Sums& sums) {
+    sums.noalias() += weighted_.leftCols(count_) * rows_.leftCols(count_).transpose();
+    count_ = 0;
+  }
+
+ private:
+  static constexpr Eigen::Index kRows = 128;
+  Eigen::Matrix<double, kColumns, kRows> rows_, weighted_;
+  Eigen::Index count_ = 0;
+};
+
 double pixels_per_sample(double blur_px) {
   return std::max(1.0, 4 * std::numbers::pi * blur_px * blur_px);
 }
@@ -142,6 +164,7 @@ void Registration::add_up(const Prepared& images, const Solution* last, LocalReg
   }
   for (Sums& sums : sums_) sums.setZero();
   num_pixels_ = {};
+  std::array<RowBatch, 2> batches;  // of each set
   for (std::int64_t y = 0; y < images.height; ++y) {
     for (std::int64_t x = 0; x < images.width; ++x) {
       if (images.counts[static_cast<std::size_t>(y * images.width + x)] == 0) continue;
@@ -154,7 +177,7 @@ void Registration::add_up(const Prepared& images, const Solution* last, LocalReg
         if (std::abs(residual) > limit) weight = limit / std::abs(residual);
       }
       const auto set = static_cast<std::size_t>((x / kBlock + y / kBlock) % 2);
-      sums_[set].selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
+      batches[set].add(row, weight, sums_[set]);
       ++num_pixels_[set];
       if (local != nullptr)
         local->add(set, static_cast<double>(x) + 0.5 - images.centre_x,
@@ -162,7 +185,7 @@ void Registration::add_up(const Prepared& images, const Solution* last, LocalReg
     }
     if (local != nullptr) local->end_row(static_cast<double>(y) + 0.5 - images.centre_y);
   }
-  for (Sums& sums : sums_) sums = Sums(sums.selfadjointView<Eigen::Lower>());
+  for (std::size_t set = 0; set < sums_.size(); ++set) batches[set].add_up(sums_[set]);
 }
 
 std::int64_t Registration::num_pixels() const { return num_pixels_[0] + num_pixels_[1]; }

@@ -82,6 +82,7 @@ class Registration {
     Eigen::MatrixXd covariance;  // without the noise's variance
   };
   struct Prepared;  // the blurred images
+  class RowBatch;
   Row row_of(const Prepared& images, std::int64_t x, std::int64_t y) const;
   void add_up(const Prepared& images, const Solution* last, LocalRegistration* local);
   double ridge(int column) const;

@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "io/ctf_table.h"
-#include "io/view_table.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -47,6 +46,15 @@ std::optional<double> first_number(const std::filesystem::path& path,
   const StarTable* const table = find_table(tables, column);
   if (table == nullptr || table->num_rows() == 0) return std::nullopt;
   return StarRow(path, *table, 0).find_number(column);
+}
+
+// Returns the table that lists views.
+const StarTable& rows_of_views(const std::filesystem::path& path,
+                               const std::vector<StarTable>& tables) {
+  const StarTable* const table = find_table(tables, "rlnMicrographName");
+  if (table != nullptr) return *table;
+  throw Error(fmt::format(
+      "'{}' has no column _rlnMicrographName, so it is no tilt series of RELION 5", path.string()));
 }
 
 StatedOptics optics_of(const std::filesystem::path& path, const std::vector<StarTable>& tables) {
@@ -102,24 +110,33 @@ RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
   return all;
 }
 
+StarTable read_relion_rows(const std::filesystem::path& path) {
+  return rows_of_views(path, read_star_file(path));
+}
+
+void set_relion_alignment(const ListedView& view, std::size_t row, StarTable& table) {
+  const auto set = [&](const char* column, double value) {
+    table.set(row, column, fmt::format("{:.6f}", value));
+  };
+  set("rlnTomoXTilt", view.x_tilt_deg);
+  set("rlnTomoYTilt", view.tilt_deg);
+  set("rlnTomoZRot", view.rotation_deg);
+  set("rlnTomoXShiftAngst", view.shift_x_A);
+  set("rlnTomoYShiftAngst", view.shift_y_A);
+}
+
 ViewTable read_relion_views(const std::filesystem::path& path) {
   const std::vector<StarTable> tables = read_star_file(path);
-  const StarTable* const table = find_table(tables, "rlnMicrographName");
-  if (table == nullptr) {
-    throw Error(
-        fmt::format("'{}' has no column _rlnMicrographName, so it is no tilt series of "
-                    "RELION 5",
-                    path.string()));
-  }
-  if (!table->has_column("rlnTomoYTilt")) {
+  const StarTable& table = rows_of_views(path, tables);
+  if (!table.has_column("rlnTomoYTilt")) {
     throw Error(
         fmt::format("'{}' has no column _rlnTomoYTilt, so the tilt series is not aligned "
                     "yet: give the table that RELION's job 'Align tilt-series' wrote",
                     path.string()));
   }
   ViewTable views{path, CentreRule::kWholePixel, false, {}, {}, {}, optics_of(path, tables)};
-  for (std::size_t i = 0; i < table->num_rows(); ++i)
-    views.views.push_back(view_of(StarRow(path, *table, i)));
+  for (std::size_t i = 0; i < table.num_rows(); ++i)
+    views.views.push_back(view_of(StarRow(path, table, i)));
   return views;
 }
 

@@ -35,4 +35,11 @@ bool lists_tomograms(const std::filesystem::path& path);
 /// Reads a tomograms.star. Throws Error with the row for what is missing or cannot be.
 RelionTomograms read_relion_tomograms(const std::filesystem::path& path);
 
+/// Returns the table of the views of a tilt-series STAR file with all columns; read_relion_views()
+/// says what they mean. Throws Error if there is none.
+StarTable read_relion_rows(const std::filesystem::path& path);
+
+/// Writes the angles and the shift of a view into the columns of a row of such a table.
+void set_relion_alignment(const ListedView& view, std::size_t row, StarTable& table);
+
 }  // namespace tomofield::io

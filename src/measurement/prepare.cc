@@ -190,6 +190,21 @@ std::vector<std::vector<tilt_series::MaskDisc>> undecided_discs(
   return discs;
 }
 
+// Holds a view as recorded, and how it is to be resampled.
+struct RecordedView {
+  RecordedView(const tilt_series::TiltSeries& recorded, std::size_t view,
+               const geometry::ViewCorrection& correction)
+      : raw(recorded.width(), recorded.height()) {
+    recorded.read_view(view, raw.values, raw.valid);
+    const geometry::ViewCorrection binned = correction.binned(recorded.bin_factor());
+    transform = geometry::corrected(recorded.raw_from_aligned(view), binned);
+    local = binned.local;
+  }
+  tilt_series::MaskedImage raw;
+  geometry::RawFromAligned transform;
+  std::optional<geometry::ViewWarp> local;
+};
+
 // Returns a function that reads views as recorded and resamples them to aligned ones.
 ReadView aligning(const tilt_series::TiltSeries& recorded,
                   std::span<const geometry::ViewCorrection> corrections) {
@@ -198,6 +213,26 @@ ReadView aligning(const tilt_series::TiltSeries& recorded,
     const tilt_series::MaskedImage aligned = read_aligned(recorded, view, corrections[view]);
     std::ranges::copy(aligned.values, image.begin());
     std::ranges::copy(aligned.valid, valid.begin());
+  };
+}
+
+// Returns a function that reads views as recorded and resamples them to means over bin × bin pixels
+// of the aligned ones, from `first_row` on. All pixels of a square get its mean.
+ReadView aligning_means(const tilt_series::TiltSeries& recorded,
+                        std::span<const geometry::ViewCorrection> corrections, int bin,
+                        std::int64_t first_row) {
+  return [=, &recorded](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
+    const RecordedView read(recorded, view, corrections[view]);
+    const std::int64_t width = recorded.aligned_width(), height = recorded.aligned_height();
+    const tilt_series::MaskedImage means = tilt_series::align_means(
+        read.raw, read.transform, width, height, first_row, bin, read.local);
+    for (std::int64_t y = first_row; y < height; ++y)
+      for (std::int64_t x = 0; x < width; ++x) {
+        const std::size_t from = means.index(x / bin, (y - first_row) / bin);
+        const auto to = static_cast<std::size_t>(y * width + x);
+        image[to] = means.values[from];
+        valid[to] = means.valid[from];
+      }
   };
 }
 
@@ -312,13 +347,9 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
 
 tilt_series::MaskedImage read_aligned(const tilt_series::TiltSeries& recorded, std::size_t view,
                                       const geometry::ViewCorrection& correction) {
-  tilt_series::MaskedImage raw(recorded.width(), recorded.height());
-  recorded.read_view(view, raw.values, raw.valid);
-  const geometry::ViewCorrection binned = correction.binned(recorded.bin_factor());
-  const geometry::RawFromAligned transform =
-      geometry::corrected(recorded.raw_from_aligned(view), binned);
-  return tilt_series::align_image(raw, transform, recorded.aligned_width(),
-                                  recorded.aligned_height(), binned.local);
+  const RecordedView read(recorded, view, correction);
+  return tilt_series::align_image(read.raw, read.transform, recorded.aligned_width(),
+                                  recorded.aligned_height(), read.local);
 }
 
 Measurement prepare_realigned(const tilt_series::TiltSeries& recorded,
@@ -334,18 +365,21 @@ Measurement prepare_realigned(const tilt_series::TiltSeries& recorded,
   set_unit(brightness_of_views(recorded, read_view, shape, processes), recorded.background(),
            prepared);
   set_noise(recorded, prepared);
-  realign(recorded, corrections, scratch_dir, band_rows, processes, prepared);
+  realign(recorded, corrections, 1, scratch_dir, band_rows, processes, prepared);
   return prepared;
 }
 
 void realign(const tilt_series::TiltSeries& recorded,
-             std::span<const geometry::ViewCorrection> corrections,
+             std::span<const geometry::ViewCorrection> corrections, int bin,
              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
              const distributed::Communicator& processes, Measurement& measurement) {
   measurement.rays.reset();  // its successor needs the memory
+  const SlabViews::Shape shape = measurement.rays_shape();
   measurement.rays =
-      read_rays(recorded, {measurement.rays_shape(), measurement.unit, band_rows, scratch_dir},
-                aligning(recorded, corrections), processes);
+      read_rays(recorded, {shape, measurement.unit, band_rows, scratch_dir},
+                bin == 1 ? aligning(recorded, corrections)
+                         : aligning_means(recorded, corrections, bin, shape.first_row),
+                processes);
   measurement.geometry.tilt_deg = corrected_tilts(recorded, corrections);
 }
 

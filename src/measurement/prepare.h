@@ -68,9 +68,11 @@ Measurement prepare_realigned(const tilt_series::TiltSeries& recorded,
                               const std::filesystem::path& scratch_dir, std::int64_t band_rows,
                               const distributed::Communicator& processes);
 
-/// Reads the rays of such a measurement anew with other corrections. The density unit stays.
+/// Reads the rays of such a measurement anew with other corrections. The density unit stays. With
+/// `bin` above 1, all rays of a square of bin × bin pixels have nearly the mean of the square: that
+/// is much less work, and all that binned() with this bin needs.
 void realign(const tilt_series::TiltSeries& recorded,
-             std::span<const geometry::ViewCorrection> corrections,
+             std::span<const geometry::ViewCorrection> corrections, int bin,
              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
              const distributed::Communicator& processes, Measurement& measurement);
 

@@ -306,12 +306,42 @@ TEST_F(RecordedSeries, LocalMotionIsUndoneAsInAResampledSeries) {
 TEST_F(RecordedSeries, RealigningGivesTheSameRaysAsPreparingSo) {
   Measurement found = realigned(std::vector<ViewCorrection>(kNumViews));
   const double unit = found.unit;
-  realign(series(maps_, false), corrections_, scratch(), kHeight,
+  realign(series(maps_, false), corrections_, 1, scratch(), kHeight,
           distributed::Communicator::alone(), found);
   EXPECT_EQ(found.unit, unit);
   const Measurement expected = realigned(corrections_);
   expect_same_rays(found, expected);
   EXPECT_EQ(found.geometry.tilt_deg, expected.geometry.tilt_deg);
+}
+
+TEST_F(RecordedSeries, RealigningForWidePixelsGivesNearlyTheirMeans) {
+  Measurement found = realigned(std::vector<ViewCorrection>(kNumViews));
+  const Measurement exact = realigned(corrections_);
+  for (const int bin : {2, 4}) {
+    const Measurement expected = binned(exact, bin);
+    realign(series(maps_, false), corrections_, bin, scratch(), kHeight,
+            distributed::Communicator::alone(), found);
+    EXPECT_EQ(found.rays->ray(2, 4 * 3, 4 * 3), found.rays->ray(2, 4 * 3 + bin - 1, 4 * 3 + 1));
+    const Measurement coarse = binned(found, bin);
+    double difference = 0, squares = 0, sum = 0;
+    int num_valid = 0, num_different_masks = 0;
+    for (int view = 0; view < kNumViews; ++view)
+      for (std::int64_t y = 0; y < expected.rays->shape().num_rows; ++y)
+        for (std::int64_t x = 0; x < expected.rays->shape().width; ++x) {
+          const bool counts = expected.rays->counts(view, x, y);
+          num_different_masks += counts != coarse.rays->counts(view, x, y) ? 1 : 0;
+          if (!counts || !coarse.rays->counts(view, x, y)) continue;
+          const double value = static_cast<double>(expected.rays->ray(view, x, y));
+          ++num_valid;
+          difference += std::pow(static_cast<double>(coarse.rays->ray(view, x, y)) - value, 2);
+          squares += value * value;
+          sum += value;
+        }
+    const double variance = squares - sum * sum / num_valid;
+    EXPECT_GT(num_valid, 0.5 * kNumViews * kWidth * kHeight / (bin * bin)) << bin;
+    EXPECT_LT(num_different_masks, 0.04 * num_valid) << bin;
+    EXPECT_LT(difference, 0.01 * variance) << bin;
+  }
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -175,16 +176,20 @@ void log_pose(const json& pose) {
 void log_alignment(const json& record) {
   double squares = 0.0;
   std::vector<std::string> left_out;
+  double num_aligned = 0.0;
   for (const json& view : record["views"]) {
+    if (view["left_out"].get<bool>()) {
+      left_out.push_back(fmt::format("{}", view["section"].get<int>()));
+      continue;
+    }
+    num_aligned += 1.0;
     squares += std::pow(view["shift_px"][0].get<double>(), 2) +
                std::pow(view["shift_px"][1].get<double>(), 2);
-    if (view["left_out"].get<bool>())
-      left_out.push_back(fmt::format("{}", view["section"].get<int>()));
   }
   const std::string errors = describe_errors(record);
   if (record["accepted"].get<bool>()) {
     base::log_info(fmt::format("aligned: shifts of {:.2f} pixels (root mean square){}{}{}; {}",
-                               std::sqrt(squares / 2 / static_cast<double>(record["views"].size())),
+                               std::sqrt(squares / 2 / std::max(num_aligned, 1.0)),
                                record["rotation"].get<bool>() ? ", rotations" : "",
                                record["magnification"].get<bool>() ? ", magnifications" : "",
                                record["tilt"].get<bool>() ? ", tilt angles" : "", errors));
@@ -196,6 +201,35 @@ void log_alignment(const json& record) {
   if (!left_out.empty())
     base::log_warning(fmt::format("left out, since they do not resemble the specimen: sections {}",
                                   fmt::join(left_out, ", ")));
+}
+
+// Aligns the views of a series that is not resampled.
+align::Alignment align_views(const tilt_series::TiltSeries& series,
+                             const ReconstructOptions& options, const ReconstructHooks& hooks,
+                             const distributed::Communicator& processes) {
+  std::vector<microscope::ViewTransfer> transfers;
+  processes.run_collectively([&] {
+    transfers = measurement::view_transfers(options.files, options.resolved, options.input, series);
+  });
+  const align::JointProblem problem{.recorded = series,
+                                    .specimen = options.specimen,
+                                    .field = options.field,
+                                    .transfers = std::move(transfers),
+                                    .seed = options.fit.seed,
+                                    .scratch_dir = options.input.scratch_dir,
+                                    .progress = hooks.tune_progress,
+                                    .stop_requested = hooks.stop_requested};
+  std::vector<geometry::ViewCorrection> start(series.views().size());
+  if (options.resolved.align == Alignment::kFull)
+    start = align::with_best_axis(problem, align::correlated_start(problem), processes);
+  return align::refine_alignment(problem, std::move(start), processes);
+}
+
+// Adds views that are left out to the record of the others.
+void add_left_out(const json& views, json& record) {
+  for (const json& view : views) record["views"].push_back(view);
+  std::ranges::stable_sort(record["views"].get_ref<json::array_t&>(), {},
+                           [](const json& view) { return view["section"].get<std::int64_t>(); });
 }
 
 // Aligns the series. Returns nothing if a stop was requested.
@@ -212,24 +246,29 @@ std::optional<json> make_record(const ReconstructOptions& options, const Reconst
         fmt::format("--align needs at least {} views, since it judges the alignment by "
                     "views that it holds out; '{}' has {}",
                     kFewestViews, recorded.stack.string(), series.views().size()));
-  std::vector<microscope::ViewTransfer> transfers;
-  processes.run_collectively([&] {
-    transfers = measurement::view_transfers(options.files, options.resolved, options.input, series);
-  });
-  const align::JointProblem problem{.recorded = series,
-                                    .specimen = options.specimen,
-                                    .field = options.field,
-                                    .transfers = std::move(transfers),
-                                    .seed = options.fit.seed,
-                                    .scratch_dir = recorded.scratch_dir,
-                                    .progress = hooks.tune_progress,
-                                    .stop_requested = hooks.stop_requested};
-  std::vector<geometry::ViewCorrection> start(series.views().size());
-  if (options.resolved.align == Alignment::kFull)
-    start = align::with_best_axis(problem, align::correlated_start(problem), processes);
-  const align::Alignment found = align::refine_alignment(problem, std::move(start), processes);
+  const align::Alignment found = align_views(series, options, hooks, processes);
   if (found.joint.was_stopped) return std::nullopt;
-  return record_of(series, found, options, running.seconds());
+  const bool is_clean = found.unaligned.empty();
+  if (is_clean || options.resolved.align != Alignment::kFull ||
+      series.views().size() - found.unaligned.size() < kFewestViews)
+    return record_of(series, found, options, running.seconds());
+
+  // Views at wrong places mislead the search for the tilt axis, so the others are aligned anew.
+  json left_out = json::array();
+  for (const int view : found.unaligned) {
+    const auto at = static_cast<std::size_t>(view);
+    left_out.push_back(view_json(series.views()[at], {}, found.joint.agreement[at], true));
+    recorded.left_out.push_back(series.views()[at].section);
+  }
+  std::ranges::sort(recorded.left_out);
+  base::log_info(fmt::format("{} views do not resemble the specimen: the others are aligned again",
+                             found.unaligned.size()));
+  const tilt_series::TiltSeries others(recorded, processes);
+  const align::Alignment again = align_views(others, options, hooks, processes);
+  if (again.joint.was_stopped) return std::nullopt;
+  json record = record_of(others, again, options, running.seconds());
+  add_left_out(left_out, record);
+  return record;
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "output/alignment_files.h"
+#include "reconstruct/relion_alignment.h"
 #include "report/alignment_plot.h"
 #include "tilt_series/open_views.h"
 
@@ -53,6 +54,7 @@ std::vector<std::filesystem::path> alignment_results(const ReconstructOptions& o
   if (options.resolved.align == Alignment::kOff) return {};
   std::vector<std::filesystem::path> files = output::alignment_files(prefix_of(options)).all();
   files.push_back(picture_of(options));
+  if (const auto star = relion_alignment(options)) files.push_back(*star);
   return files;
 }
 
@@ -64,6 +66,7 @@ void write_alignment_results(const tilt_series::TiltSeries& series,
   output::write_alignment_files(series, {header.nx, header.ny, header.nz},
                                 output::alignment_files(prefix_of(options)));
   report::write_alignment_picture(curves_of(options.alignment), picture_of(options));
+  write_relion_alignment(series, options);
 }
 
 std::vector<report::CurvePlot> alignment_plots(const nlohmann::json& record) {

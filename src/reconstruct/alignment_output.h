@@ -11,7 +11,7 @@
 namespace tomofield::reconstruction {
 
 /// Returns the files of an alignment that a run with --align writes beside its volume:
-/// NAME_align.xf, .tlt, .xtilt, .aln and .png. None without --align.
+/// NAME_align.xf, .tlt, .xtilt, .aln and .png, and .star for views of RELION. None without --align.
 std::vector<std::filesystem::path> alignment_results(const ReconstructOptions& options);
 
 /// Writes them for an aligned series (aligned_series.h).

@@ -13,6 +13,7 @@
 #include "io/output_set.h"
 #include "io/relion_star.h"
 #include "io/view_images.h"
+#include "reconstruct/relion_alignment.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
@@ -112,6 +113,7 @@ void write_relion_output(const ReconstructOptions& options, const fs::path& volu
   table.set(0, "rlnTomoSizeX", unbinned(header.nx));
   table.set(0, "rlnTomoSizeY", unbinned(header.ny));
   table.set(0, "rlnTomoSizeZ", unbinned(header.nz));
+  if (const auto aligned = relion_alignment(options)) table.set(0, kEntry, aligned->string());
   table.set(0, kTomogram, path.string());
   set_halves(path, table);
   // Programs know the denoised tomogram by either name; RELION 5 by the second.

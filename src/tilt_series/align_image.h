@@ -20,4 +20,12 @@ using geometry::RawFromAligned;
 MaskedImage align_image(const MaskedImage& raw, const RawFromAligned& transform, std::int64_t width,
                         std::int64_t height, const std::optional<geometry::ViewWarp>& local = {});
 
+/// Returns nearly the means over bin × bin pixels of align_image(), from its first column and its
+/// row `first_row` on, with a fraction of the work: the means over the squares of the raw image are
+/// resampled at the centres of the wide pixels. A mean counts if at least half of its pixels do.
+/// `bin` must be even.
+MaskedImage align_means(const MaskedImage& raw, const RawFromAligned& transform, std::int64_t width,
+                        std::int64_t height, std::int64_t first_row, int bin,
+                        const std::optional<geometry::ViewWarp>& local = {});
+
 }  // namespace tomofield::tilt_series

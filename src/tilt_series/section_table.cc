@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -36,12 +37,13 @@ AlignedSection section_of(const io::AreTomoRow& row) {
           RawFromAligned{cosine, -sine, sine, cosine, row.shift_x_px, row.shift_y_px}, row.line};
 }
 
-/// Converts one view. The other program counts from its centres: with d and e from this program's
-/// centres to those of the image and of the specimen, its p = R P + shift becomes
-/// p = R P + (shift + d − R e), where R = Rz(rotation) Ry(tilt) Rx(x tilt). The specimen has an
-/// even number of pixels, which makes e (1/2, 1/2, 1/2).
-AlignedSection section_of(const io::ListedView& view, io::CentreRule centre,
-                          const io::MrcHeader& images, double pixel_size_A) {
+/// Returns what this program adds to the shift of another program's view, in pixels. The other
+/// program counts from its centres: with d and e from this program's centres to those of the image
+/// and of the specimen, its p = R P + shift becomes p = R P + (shift + d − R e), where
+/// R = Rz(rotation) Ry(tilt) Rx(x tilt). The specimen has an even number of pixels, which makes e
+/// (1/2, 1/2, 1/2).
+std::array<double, 2> shift_between_centres(const io::ListedView& view, io::CentreRule centre,
+                                            const io::MrcHeader& images) {
   const double cosine = std::cos(radians(view.rotation_deg));
   const double sine = std::sin(radians(view.rotation_deg));
   const double tilt = radians(view.tilt_deg), x_tilt = radians(view.x_tilt_deg);
@@ -49,11 +51,21 @@ AlignedSection section_of(const io::ListedView& view, io::CentreRule centre,
   const double turned_y = e * std::cos(x_tilt) - e * std::sin(x_tilt);
   const double turned_z = e * std::sin(x_tilt) + e * std::cos(x_tilt);
   const double turned_x = e * std::cos(tilt) + turned_z * std::sin(tilt);
-  RawFromAligned map{cosine, -sine, sine, cosine, 0.0, 0.0};
-  map.shift_x_px = view.shift_x_A / pixel_size_A + io::distance_from_middle_px(centre, images.nx) -
-                   (cosine * turned_x - sine * turned_y);
-  map.shift_y_px = view.shift_y_A / pixel_size_A + io::distance_from_middle_px(centre, images.ny) -
-                   (sine * turned_x + cosine * turned_y);
+  return {io::distance_from_middle_px(centre, images.nx) - (cosine * turned_x - sine * turned_y),
+          io::distance_from_middle_px(centre, images.ny) - (sine * turned_x + cosine * turned_y)};
+}
+
+AlignedSection section_of(const io::ListedView& view, io::CentreRule centre,
+                          const io::MrcHeader& images, double pixel_size_A) {
+  const double cosine = std::cos(radians(view.rotation_deg));
+  const double sine = std::sin(radians(view.rotation_deg));
+  const auto [x, y] = shift_between_centres(view, centre, images);
+  const RawFromAligned map{cosine,
+                           -sine,
+                           sine,
+                           cosine,
+                           view.shift_x_A / pixel_size_A + x,
+                           view.shift_y_A / pixel_size_A + y};
   return {view.tilt_deg, view.x_tilt_deg, view.rotation_deg, map, 0};
 }
 
@@ -95,6 +107,16 @@ SectionTable sections_of_views(const io::ViewTable& table, const io::ImageStack&
   for (const std::string& what : table.not_applied)
     base::log_warning(fmt::format("'{}': {}", table.file.string(), what));
   return sections;
+}
+
+void set_alignment(const AlignedSection& section, io::CentreRule centre,
+                   const io::MrcHeader& images, double pixel_size_A, io::ListedView& view) {
+  view.tilt_deg = section.tilt_deg;
+  view.x_tilt_deg = section.x_tilt_deg;
+  view.rotation_deg = section.rotation_deg;
+  const auto [x, y] = shift_between_centres(view, centre, images);
+  view.shift_x_A = (section.raw_from_aligned.shift_x_px - x) * pixel_size_A;
+  view.shift_y_A = (section.raw_from_aligned.shift_y_px - y) * pixel_size_A;
 }
 
 }  // namespace tomofield::tilt_series

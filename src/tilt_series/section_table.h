@@ -36,4 +36,9 @@ SectionTable sections_of_aretomo(const std::filesystem::path& path, const io::Im
 SectionTable sections_of_views(const io::ViewTable& table, const io::ImageStack& stack,
                                double pixel_size_A);
 
+/// Gives a view of a table the angles and the shift of an aligned section: the inverse of
+/// sections_of_views(). A magnification is lost, since tables have none.
+void set_alignment(const AlignedSection& section, io::CentreRule centre,
+                   const io::MrcHeader& images, double pixel_size_A, io::ListedView& view);
+
 }  // namespace tomofield::tilt_series

@@ -101,6 +101,19 @@ TEST(SectionTable, ProjectsAsRelionDoes) {
   }
 }
 
+TEST(SectionTable, SetsTheAlignmentOfAListedView) {
+  const SizedStack stack(51, 40, 1);
+  for (const auto centre : {io::CentreRule::kWholePixel, io::CentreRule::kHalfSize}) {
+    io::ListedView view;
+    set_alignment(convert(centre, stack), centre, stack.header(), kPixel_A, view);
+    EXPECT_EQ(view.tilt_deg, some_view().tilt_deg);
+    EXPECT_EQ(view.x_tilt_deg, some_view().x_tilt_deg);
+    EXPECT_EQ(view.rotation_deg, some_view().rotation_deg);
+    EXPECT_NEAR(view.shift_x_A, some_view().shift_x_A, 1e-9);
+    EXPECT_NEAR(view.shift_y_A, some_view().shift_y_A, 1e-9);
+  }
+}
+
 // Warp's TiltSeries.GetPositionInAllTilts: centres at half of the sizes, the offset added. The
 // table has the tilt with the sign turned: Euler(0, angle, −axis) is Rz(axis) Ry(−angle).
 TEST(SectionTable, ProjectsAsWarpDoes) {

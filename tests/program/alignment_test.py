@@ -4,6 +4,7 @@ import json
 import os
 import sys
 
+import mrcfile
 import numpy as np
 import pytest
 
@@ -64,12 +65,32 @@ def test_align_finds_shifts_and_writes_them_for_other_programs(shifted):
 
 def test_full_finds_large_shifts_and_the_axis():
     size = 128
-    folder = simulate("alignment_raw", "--misalign", 5, "--misalign-axis", 2, size=size)
+    folder = simulate("alignment_raw", "--misalign", 10, "--misalign-axis", 2, size=size)
     harness.succeed("align", *series_of(folder, size), "--align", "full", "-o",
                     os.path.join(folder, "found.mrc"))
     found = errors(folder, os.path.join(folder, "found_align"), size)
     assert found["x_px"] < 0.3 and found["y_px"] < 0.3, found
     assert abs(found["axis_error_deg"]) < 0.5, found
+
+
+def test_views_of_something_else_are_named_and_left_out():
+    folder = simulate("alignment_strange", "--misalign", 3)
+    with mrcfile.open(os.path.join(folder, "tilt_series.mrc"), mode="r+") as file:
+        for view in (30, 52):  # they show another part of the specimen
+            file.data[view] = np.roll(file.data[view][::-1, ::-1], 20, axis=0)
+    log = harness.succeed("align", *series_of(folder), "--align", "full", "-o",
+                          os.path.join(folder, "found.mrc")).stderr
+    assert "2 views do not resemble the specimen: the others are aligned again" in log
+    assert "sections 31, 53" in log
+    prefix = os.path.join(folder, "found_align")
+    made = record(prefix)
+    assert [view["section"] for view in made["views"]] == list(range(1, len(made["views"]) + 1))
+    kept = [number for number, view in enumerate(made["views"]) if not view["left_out"]]
+    assert len(kept) == len(made["views"]) - 2
+    truth, _ = alignment_score.read_truth(folder)
+    estimate = alignment_score.Alignment(np.loadtxt(prefix + ".xf"), np.loadtxt(prefix + ".tlt"))
+    found = alignment_score.score(truth.of_views(kept), estimate.of_views(kept), SIZE)
+    assert found["x_px"] < 0.3 and found["y_px"] < 0.2, found
 
 
 def test_a_good_alignment_is_hardly_changed():

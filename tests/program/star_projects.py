@@ -54,10 +54,11 @@ def write_image(path, image):
         file.voxel_size = PIXEL_SIZE
 
 
-def write_relion_views(folder, series, names):
-    """Writes the table of one tilt series, whose images have these names."""
+def write_relion_views(folder, series, names, wrong_A=0):
+    """Writes the table of one tilt series, whose images have these names. `wrong_A` is added to the
+    shifts."""
     rows = [[name, 0, tilt, 0, *shift, 3 * i, 30000, 29000, 45]
-            for i, (name, tilt, shift) in enumerate(zip(names, TILTS, LISTED_A))]
+            for i, (name, tilt, shift) in enumerate(zip(names, TILTS, LISTED_A + wrong_A))]
     write_star(os.path.join(folder, f"Tomograms/job009/tilt_series/{series}.star"), series,
                TILT_COLUMNS, rows)
 

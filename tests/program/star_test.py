@@ -111,6 +111,49 @@ def test_sizes_for_relion_are_unbinned(relion, finished):
     assert "no STAR file" in result.stderr, result.stderr
 
 
+def test_a_new_alignment_goes_back_to_relion(relion):
+    wrong_px = np.random.default_rng(5).normal(0, 1, SHIFTS_PX.shape)
+    names = [f"{i + 1:06d}@stacks/TS_02.mrcs" for i in range(len(TILTS))]
+    star_projects.write_relion_views(relion.folder, "TS_02", names, wrong_px * PIXEL_SIZE)
+    _, output = relion.run("--series", "TS_02", "--align", "refine", "--exclude", 3,
+                           "--alignment-json")
+    aligned = output[:-4] + "_align.star"
+    rows = star_projects.read_rows(aligned)
+    kept = np.delete(np.arange(len(TILTS)), 2)
+    assert [row["rlnMicrographName"] for row in rows] == [names[i] for i in kept]
+    assert {row["rlnDefocusV"] for row in rows} == {"29000"}
+    angles = np.array([[float(row[f"rlnTomo{name}"]) for name in ("XTilt", "YTilt", "ZRot")]
+                       for row in rows])
+    np.testing.assert_allclose(angles[:, :2], np.stack([0 * kept, TILTS[kept]], axis=1), atol=1e-6)
+    assert np.abs(angles[:, 2]).max() < 2
+    shifts_px = np.array([[float(row["rlnTomoXShiftAngst"]), float(row["rlnTomoYShiftAngst"])]
+                          for row in rows]) / PIXEL_SIZE
+    left = rms_error(shifts_px - star_projects.LISTED_A[kept] / PIXEL_SIZE, TILTS[kept])
+    assert left < 0.4 * rms_error(wrong_px[kept], TILTS[kept]), left
+    with open(output[:-4] + "_alignment.json", encoding="utf-8") as file:
+        sections = json.load(file)["per_section_alignment_parameters"]
+    turned = [np.array(section["in_plane_rotation"]) @ (section["x_offset"], section["y_offset"])
+              for section in sections]
+    np.testing.assert_allclose(turned, shifts_px + star_projects.HALF_PX[kept, None] * [1, 0],
+                               atol=0.05)
+    # The row of the tomogram names the new alignment, which gives the same tomogram.
+    (row,) = star_projects.read_rows(output[:-4] + ".star")
+    assert row["rlnTomoTiltSeriesStarFile"] == aligned
+    again = relion.path("again.mrc")
+    harness.succeed("reconstruct", aligned, "-o", again, "--thickness", THICKNESS, "--pixel-size",
+                    PIXEL_SIZE, *QUICK, cwd=relion.folder)
+    assert agreement(harness.read_volume(again), harness.read_volume(output)) > 0.99
+    star_projects.write_relion_views(relion.folder, "TS_02", names)
+
+
+def rms_error(shifts_px, tilts_deg):
+    """Returns what is left of shifts when a shift of the specimen is removed."""
+    tilts = np.radians(tilts_deg)
+    specimen = np.stack([np.cos(tilts), np.sin(tilts)], axis=1)
+    x = shifts_px[:, 0] - specimen @ np.linalg.lstsq(specimen, shifts_px[:, 0], rcond=None)[0]
+    return np.sqrt(np.mean(x**2 + (shifts_px[:, 1] - shifts_px[:, 1].mean())**2))
+
+
 def check_portal_alignment(alignment):
     """Checks the JSON against the definition of the portal: offsets in unbinned pixels, after the
     rotation, about the middle of the views."""
