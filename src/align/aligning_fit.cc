@@ -61,6 +61,15 @@ base::ProgressReport report(const fit::Fit& fit, double seconds,
           .detail = steps_px.empty() ? "" : fmt::format("last step {:.3f} px", steps_px.back())};
 }
 
+// Lets a fit go on with views that are resampled anew, if it is not done.
+void resample(const FitInProgress& run, const distributed::Communicator& processes) {
+  if (run.fit.is_done()) return;
+  measurement::realign(run.problem.recorded, run.corrections, run.fit.stage().bin,
+                       run.problem.scratch_dir, fit::band_rows(run.field), processes,
+                       run.measurement);
+  run.fit.reread_measurement();
+}
+
 }  // namespace
 
 fit::FieldOptions aligning_field(fit::FieldOptions field) {
@@ -145,31 +154,22 @@ void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& me
   }
 }
 
-bool run_with_updates(const JointProblem& problem, fit::Fit& fit, std::int64_t num_epochs,
-                      const std::vector<double>& steps_px, const UpdateSteps& steps,
+bool run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
+                      const std::function<bool(const fit::Stage&)>& update,
                       const distributed::Communicator& processes) {
   const base::Stopwatch running;
+  fit::Fit& fit = run.fit;
   while (epochs_done(fit) < num_epochs) {
     const fit::Stage stage = fit.stage();
     fit.run([](const fit::Fit& f) { return f.progress().step % f.steps_per_epoch() != 0; });
-    if (problem.progress && num_epochs == fit.num_epochs())
-      problem.progress(report(fit, running.seconds(), steps_px));
-    const bool is_stopped = is_to_stop(problem, processes);
-    const bool is_updated =
-        is_update_due(stage, epochs_done(fit), fit.is_done()) && steps.update(stage);
-    if (is_updated || fit.stage().bin != stage.bin) steps.resample();
+    if (run.problem.progress && num_epochs == fit.num_epochs())
+      run.problem.progress(report(fit, running.seconds(), run.steps_px));
+    const bool is_stopped = is_to_stop(run.problem, processes);
+    const bool is_updated = is_update_due(stage, epochs_done(fit), fit.is_done()) && update(stage);
+    if (is_updated || fit.stage().bin != stage.bin) resample(run, processes);
     if (is_stopped) return true;
   }
   return false;
-}
-
-void go_on_with(const JointProblem& problem, std::span<const geometry::ViewCorrection> corrections,
-                const fit::FieldOptions& field, const distributed::Communicator& processes,
-                measurement::Measurement& measurement, fit::Fit& fit) {
-  if (fit.is_done()) return;
-  measurement::realign(problem.recorded, corrections, fit.stage().bin, problem.scratch_dir,
-                       fit::band_rows(field), processes, measurement);
-  fit.reread_measurement();
 }
 
 }  // namespace tomofield::align

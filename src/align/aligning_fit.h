@@ -51,27 +51,23 @@ void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& me
                          const fit::Stage& stage,
                          const std::function<void(std::size_t, const ImagePair&)>& visit);
 
-/// Says what run_with_updates() does with a fit.
-struct UpdateSteps {
-  /// Updates the alignment after an epoch of a stage. Returns false if it leaves it as it is.
-  std::function<bool(const fit::Stage&)> update;
-  /// Lets the fit go on with the views of the present alignment.
-  std::function<void()> resample;
+/// Names a fit and the alignment of the views that it is made with.
+struct FitInProgress {
+  const JointProblem& problem;
+  const fit::FieldOptions& field;
+  const std::vector<geometry::ViewCorrection>& corrections;
+  const std::vector<double>& steps_px;  ///< root mean square of each update so far
+  measurement::Measurement& measurement;
+  fit::Fit& fit;
 };
 
-/// Takes the first `num_epochs` epochs of a fit. Updates the alignment after those that show enough
-/// for it, and resamples the views after an update and for each new stage. Progress, with the last
-/// of `steps_px`, is reported if these are all epochs. Returns true if a stop was requested
-/// meanwhile. Every process calls it.
-bool run_with_updates(const JointProblem& problem, fit::Fit& fit, std::int64_t num_epochs,
-                      const std::vector<double>& steps_px, const UpdateSteps& steps,
+/// Takes the first `num_epochs` epochs of a fit. After those that show enough for it, calls
+/// update(stage), which changes the corrections or returns false. After an update and for each new
+/// stage, resamples the recorded views to the pixels of the stage, and the fit goes on with them.
+/// Progress is reported if these are all epochs. Returns true if a stop was requested meanwhile.
+/// Every process calls it.
+bool run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
+                      const std::function<bool(const fit::Stage&)>& update,
                       const distributed::Communicator& processes);
-
-/// Resamples the views of a fit with other corrections, from the recorded ones to the pixels of the
-/// fit's stage, and lets the fit go on with them; does nothing if the fit is done. Every process
-/// calls it.
-void go_on_with(const JointProblem& problem, std::span<const geometry::ViewCorrection> corrections,
-                const fit::FieldOptions& field, const distributed::Communicator& processes,
-                measurement::Measurement& measurement, fit::Fit& fit);
 
 }  // namespace tomofield::align

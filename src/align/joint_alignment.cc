@@ -53,14 +53,11 @@ class AligningFit {
 
   // Aligns in the first `num_epochs` epochs of the fit.
   JointAlignment run(std::int64_t num_epochs) {
-    const UpdateSteps steps{.update = [this](const fit::Stage& stage) { return update(stage); },
-                            .resample =
-                                [this] {
-                                  go_on_with(problem_, found_.corrections, field_, processes_,
-                                             measurement_, fit_);
-                                }};
-    found_.was_stopped =
-        run_with_updates(problem_, fit_, num_epochs, found_.steps_px, steps, processes_);
+    const FitInProgress in_progress{problem_,        field_,       found_.corrections,
+                                    found_.steps_px, measurement_, fit_};
+    found_.was_stopped = run_with_updates(
+        in_progress, num_epochs, [this](const fit::Stage& stage) { return update(stage); },
+        processes_);
     return std::move(found_);
   }
 
