@@ -35,9 +35,10 @@ std::optional<Defocus> defocus_of(const StarRow& row) {
   return defocus;
 }
 
-StatedOptics optics_of(const StarRow& row) {
-  return {row.find_number("rlnVoltage"), row.find_number("rlnSphericalAberration"),
-          row.find_number("rlnAmplitudeContrast")};
+// Returns what find(column) finds in the columns of the microscope.
+template <typename Find>
+StatedOptics optics_by(const Find& find) {
+  return {find("rlnVoltage"), find("rlnSphericalAberration"), find("rlnAmplitudeContrast")};
 }
 
 // Returns the number in the first row of whichever table has the column.
@@ -58,9 +59,7 @@ const StarTable& rows_of_views(const std::filesystem::path& path,
 }
 
 StatedOptics optics_of(const std::filesystem::path& path, const std::vector<StarTable>& tables) {
-  return {first_number(path, tables, "rlnVoltage"),
-          first_number(path, tables, "rlnSphericalAberration"),
-          first_number(path, tables, "rlnAmplitudeContrast")};
+  return optics_by([&](const char* column) { return first_number(path, tables, column); });
 }
 
 ListedView view_of(const StarRow& row) {
@@ -101,7 +100,7 @@ RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
     tomogram.tilt_series_star = row.text("rlnTomoTiltSeriesStarFile");
     tomogram.pixel_size_A = row.find_number("rlnTomoTiltSeriesPixelSize");
     tomogram.hand = row.find_number("rlnTomoHand");
-    tomogram.optics = optics_of(row);
+    tomogram.optics = optics_by([&](const char* column) { return row.find_number(column); });
     tomogram.size_px = size_of(row);
     all.tomograms.push_back(std::move(tomogram));
   }

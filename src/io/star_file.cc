@@ -44,10 +44,12 @@ std::optional<std::string> StarTable::find(std::size_t row, std::string_view col
   return cells_[row * columns_.size() + *index];
 }
 
-StarTable StarTable::only(std::size_t row) const {
+StarTable StarTable::only(const std::vector<std::size_t>& rows) const {
   StarTable table(name_, columns_);
-  const auto first = cells_.begin() + static_cast<std::ptrdiff_t>(row * columns_.size());
-  table.cells_.assign(first, first + std::ssize(columns_));
+  for (const std::size_t row : rows) {
+    const auto first = cells_.begin() + static_cast<std::ptrdiff_t>(row * columns_.size());
+    table.add_row({first, first + std::ssize(columns_)});
+  }
   return table;
 }
 

@@ -24,8 +24,8 @@ class StarTable {
   /// Returns a value as it stands in the file, without quotes; nothing without such a column.
   std::optional<std::string> find(std::size_t row, std::string_view column) const;
 
-  /// Returns a table of the same columns with one of the rows.
-  StarTable only(std::size_t row) const;
+  /// Returns a table of the same columns with some of the rows.
+  StarTable only(const std::vector<std::size_t>& rows) const;
   /// Adds a row, with one value a column.
   void add_row(std::vector<std::string> cells);
   /// Sets one value. A column that is new is added at the end, with "None" in the other rows.

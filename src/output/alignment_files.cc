@@ -26,11 +26,6 @@ RawFromAligned unbinned_map(const TiltSeries& series, std::size_t view) {
   return series.raw_from_aligned(view).binned(1.0 / series.bin_factor());
 }
 
-// Returns the angle of the rotation that is nearest to the matrix of a map in least squares.
-double rotation_rad(const RawFromAligned& map) {
-  return std::atan2(map.m21 - map.m12, map.m11 + map.m22);
-}
-
 RawFromAligned rotation(double angle_rad) {
   const double cosine = std::cos(angle_rad), sine = std::sin(angle_rad);
   return {cosine, -sine, sine, cosine, 0.0, 0.0};
@@ -40,7 +35,7 @@ RawFromAligned rotation(double angle_rad) {
 double mean_rotation_rad(const TiltSeries& series) {
   double sum_cos = 0.0, sum_sin = 0.0;
   for (std::size_t view = 0; view < series.views().size(); ++view) {
-    const double angle_rad = rotation_rad(series.raw_from_aligned(view));
+    const double angle_rad = series.raw_from_aligned(view).rotation_rad();
     sum_cos += std::cos(angle_rad);
     sum_sin += std::sin(angle_rad);
   }
@@ -64,7 +59,7 @@ double angle_at(const std::vector<View>& views, std::int64_t section, double Vie
 
 // Returns how far the nearest rotation moves the corners of an image at most, in its pixels.
 double largest_change(const RawFromAligned& map, double width, double height) {
-  const RawFromAligned nearest = rotation(rotation_rad(map));
+  const RawFromAligned nearest = rotation(map.rotation_rad());
   double largest = 0.0;
   for (const double y : {-height / 2, height / 2}) {
     const double dx = (map.m11 - nearest.m11) * width / 2 + (map.m12 - nearest.m12) * y;
@@ -137,7 +132,7 @@ io::AreTomoAlignment aretomo_alignment(const std::vector<View>& views,
     }
     io::AreTomoRow row;
     row.section = number + 1;
-    row.rotation_deg = rotation_rad(maps[section]) * 180.0 / std::numbers::pi;
+    row.rotation_deg = maps[section].rotation_rad() * 180.0 / std::numbers::pi;
     row.shift_x_px = maps[section].shift_x_px;
     row.shift_y_px = maps[section].shift_y_px;
     row.tilt_deg = tilt_deg;

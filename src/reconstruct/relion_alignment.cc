@@ -1,9 +1,7 @@
 #include "reconstruct/relion_alignment.h"
 
-#include <cmath>
 #include <cstddef>
 #include <numbers>
-#include <string>
 #include <vector>
 
 #include "io/atomic_file.h"
@@ -23,17 +21,7 @@ tilt_series::AlignedSection aligned_section(const tilt_series::TiltSeries& serie
   const tilt_series::View& seen = series.views()[view];
   const geometry::RawFromAligned map =
       series.raw_from_aligned(view).binned(1.0 / series.bin_factor());
-  const double rotation_rad = std::atan2(map.m21 - map.m12, map.m11 + map.m22);
-  return {seen.tilt_deg, seen.x_tilt_deg, rotation_rad * 180.0 / std::numbers::pi, map, 0};
-}
-
-// Returns a table of the same columns without rows.
-io::StarTable without_rows(const io::StarTable& table) { return {table.name(), table.columns()}; }
-
-std::vector<std::string> cells_of(const io::StarTable& table, std::size_t row) {
-  std::vector<std::string> cells;
-  for (const std::string& column : table.columns()) cells.push_back(*table.find(row, column));
-  return cells;
+  return {seen.tilt_deg, seen.x_tilt_deg, map.rotation_rad() * 180.0 / std::numbers::pi, map, 0};
 }
 
 }  // namespace
@@ -49,17 +37,17 @@ void write_relion_alignment(const tilt_series::TiltSeries& series,
                             const ReconstructOptions& options) {
   const std::optional<fs::path> path = relion_alignment(options);
   if (!path) return;
-  const io::StarTable rows = io::read_relion_rows(options.input.stack);
   const io::ViewTable listed = io::read_relion_views(options.input.stack);
   const auto stack = tilt_series::open_views(options.input);
   const double pixel_size_A = series.pixel_size_A() / series.bin_factor();
-  io::StarTable table = without_rows(rows);
-  for (std::size_t view = 0; view < series.views().size(); ++view) {
-    const auto section = static_cast<std::size_t>(series.views()[view].section);
-    io::ListedView aligned = listed.views.at(section);
+  std::vector<std::size_t> sections;
+  for (const tilt_series::View& view : series.views())
+    sections.push_back(static_cast<std::size_t>(view.section));
+  io::StarTable table = io::read_relion_rows(options.input.stack).only(sections);
+  for (std::size_t view = 0; view < sections.size(); ++view) {
+    io::ListedView aligned = listed.views.at(sections[view]);
     tilt_series::set_alignment(aligned_section(series, view), listed.centre, stack->header(),
                                pixel_size_A, aligned);
-    table.add_row(cells_of(rows, section));
     io::set_relion_alignment(aligned, view, table);
   }
   io::write_text_file(*path, io::star_file_text(table));

@@ -105,7 +105,7 @@ void write_relion_output(const ReconstructOptions& options, const fs::path& volu
   const io::MrcHeader header = io::MrcReader(volume).header();
   const double voxel_A = header.voxel_size_A[0];
   const double binning = voxel_A / all.tomograms[row].pixel_size_A.value_or(voxel_A);
-  io::StarTable table = all.table.only(row);
+  io::StarTable table = all.table.only({row});
   table.set(0, "rlnTomoTomogramBinning", fmt::format("{:.6f}", binning));
   const auto unbinned = [&](std::int64_t voxels) {
     return std::to_string(std::llround(static_cast<double>(voxels) * binning));

@@ -301,8 +301,7 @@ Json view_json(const SimulatedView& view, const Misalignment& misalignment) {
             {"gain", view.gain}};
   if (misalignment.tilt_spread_deg > 0.0) json["tilt_error_deg"] = view.tilt_error_deg;
   if (misalignment.turns_or_scales()) {
-    json["rotation_deg"] =
-        std::atan2(map.m21 - map.m12, map.m11 + map.m22) * 180.0 / std::numbers::pi;
+    json["rotation_deg"] = map.rotation_rad() * 180.0 / std::numbers::pi;
     json["magnification"] = std::sqrt(map.m11 * map.m22 - map.m12 * map.m21);
   }
   if (view.defocus) {
