@@ -178,16 +178,6 @@ void StoredGroup::read_floats(const std::string& name, const FloatSink& sink) co
   require_checksum(name, found, checksum.value());
 }
 
-void StoredGroup::read_bytes(const std::string& name, std::size_t first,
-                             std::span<std::uint8_t> bytes) const {
-  const Hdf5Object& found = array_of(name, Type::kByte);
-  const std::size_t size = array_size(name);
-  if (first > size || bytes.size() > size - first) fail(name, "it is shorter than its index says");
-  if (!bytes.empty())
-    file_->file.read_at(found.address + static_cast<std::int64_t>(first), bytes.data(),
-                        bytes.size());
-}
-
 template <typename T>
 void StoredGroup::read_array(const std::string& name, std::span<T> values) const {
   const std::size_t size = array_size(name);

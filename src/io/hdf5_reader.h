@@ -39,9 +39,6 @@ class StoredGroup {
   /// wrong checksum only after the last piece.
   using FloatSink = std::function<void(std::span<const float>)>;
   void read_floats(const std::string& name, const FloatSink& sink) const;
-  /// Fills `bytes` with those of an array from number `first` on. The array must have them. Its
-  /// checksum, which covers all of it, is not checked.
-  void read_bytes(const std::string& name, std::size_t first, std::span<std::uint8_t> bytes) const;
   /// Fills `values`, which must have as many elements as the array.
   template <typename T>
   void read_array(const std::string& name, std::span<T> values) const;
