@@ -20,8 +20,8 @@ MtfTable read_mtf(const std::filesystem::path& path) {
   if (table == nullptr) {
     throw Error(
         fmt::format("'{}' has no column _rlnMtfValue: give the detector's transfer function as "
-                    "RELION takes it, "
-                    "with the columns _rlnResolutionInversePixel and _rlnMtfValue",
+                    "RELION takes it, with the columns _rlnResolutionInversePixel and "
+                    "_rlnMtfValue",
                     path.string()));
   }
   MtfTable mtf;

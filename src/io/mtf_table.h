@@ -7,8 +7,8 @@ namespace tomofield::io {
 
 /// Holds how much of the signal a detector passes at rising frequencies.
 struct MtfTable {
-  std::vector<double> frequencies;  ///< cycles per pixel of the detector, 0 to ½
-  std::vector<double> values;       ///< 0 to 1, at each frequency
+  std::vector<double> frequencies;  ///< cycles per pixel of the detector, rising
+  std::vector<double> values;       ///< at each frequency; 1: all of the signal
 };
 
 /// Reads a STAR file as RELION takes it (rlnMtfFileName), with the columns

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "base/log.h"
 #include "io/alignment_files.h"
@@ -143,11 +144,11 @@ std::optional<Exposures> find_exposures(const SeriesFiles& files, const Options&
 std::shared_ptr<const microscope::Detector> find_detector(const SeriesFiles& files,
                                                           const tilt_series::TiltSeries& series) {
   if (!files.mtf) return nullptr;
-  const io::MtfTable table = io::read_mtf(*files.mtf);
+  io::MtfTable mtf = io::read_mtf(*files.mtf);
   base::log_info(
       fmt::format("mtf: what the detector passes of the signal, from '{}'", files.mtf->string()));
-  return std::make_shared<microscope::Detector>(microscope::Detector{
-      table.frequencies, table.values, series.pixel_size_A() / series.bin_factor()});
+  return std::make_shared<microscope::Detector>(
+      microscope::Detector{std::move(mtf), series.pixel_size_A() / series.bin_factor()});
 }
 
 // Sets the defocus of a view, turned to the aligned image, and its slope over that image.

@@ -24,10 +24,9 @@ std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const Opti
 /// The result is empty if the options name neither a contrast transfer nor a dose nor a detector,
 /// so that the views are plain projections. The defocus is that on the tilt axis, and its slope is
 /// that of the middle plane of the specimen, on the side that --defocus-hand says, else --hand.
-/// Doses come from
-/// --dose-per-tilt, else from
-/// --mdoc, else from the table of views that is the stack. Logs what it took. Throws Error if the
-/// pixel size is not known, and for a file that is not of this stack or has no defocus of a view.
+/// Doses come from --dose-per-tilt, else from --mdoc, else from the table of views that is the
+/// stack. Logs what it took. Throws Error if the pixel size is not known, and for a file that is
+/// not of this stack or has no defocus of a view.
 std::vector<microscope::ViewTransfer> view_transfers(const SeriesFiles& files,
                                                      const Options& options,
                                                      const tilt_series::TiltSeriesOptions& input,

@@ -6,6 +6,7 @@
 namespace tomofield::microscope {
 
 double Detector::transfer(double k) const {
+  const auto& [frequencies, values] = mtf;
   const double frequency = k * pixel_size_A;
   const auto after = std::ranges::upper_bound(frequencies, frequency);
   if (after == frequencies.begin()) return values.front();

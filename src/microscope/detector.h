@@ -1,14 +1,13 @@
 #pragma once
 
-#include <vector>
+#include "io/mtf_table.h"
 
 namespace tomofield::microscope {
 
 /// Holds the modulation transfer function (MTF) of a detector: how much of the signal it passes.
 struct Detector {
-  std::vector<double> frequencies;  ///< cycles per pixel of the detector, rising
-  std::vector<double> values;       ///< at each frequency
-  double pixel_size_A = 1.0;        ///< of a pixel of the detector, on the specimen
+  io::MtfTable mtf;
+  double pixel_size_A = 1.0;  ///< of a pixel of the detector, on the specimen
 
   /// Returns the transfer at a frequency in cycles per Å, by linear interpolation. Beyond the first
   /// and the last frequency it stays what it is there.

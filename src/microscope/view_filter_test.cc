@@ -226,7 +226,7 @@ TEST(ViewFilter, PassesWhatTheDetectorPasses) {
   view.optics = without_phase_contrast({});
   view.pixel_size_A = 10;
   // The detector's pixels are half as large, so that ¼ of theirs is Nyquist here.
-  view.detector = std::make_shared<Detector>(Detector{{0.0, 0.25, 0.5}, {1.0, 0.6, 0.0}, 5.0});
+  view.detector = std::make_shared<Detector>(Detector{{{0.0, 0.25, 0.5}, {1.0, 0.6, 0.0}}, 5.0});
   EXPECT_NEAR(view.detector->transfer(0.025), 0.8, 1e-12);
   EXPECT_NEAR(view.detector->transfer(0.2), 0.0, 1e-12);
   const ViewFilter filter(kWidth, kHeight, view);

@@ -257,7 +257,8 @@ nlohmann::json transfers_json(const std::vector<microscope::ViewTransfer>& trans
                     t.defocus.angle_deg, t.defocus.phase_shift_deg, t.slope.at_centre_A,
                     t.slope.x_A, t.slope.y_A, t.exposure, t.pixel_size_A, t.is_flipped});
   if (!transfers.empty() && transfers.front().detector)  // that of all views
-    json.push_back(transfers.front().detector->values);
+    json.push_back(
+        {transfers.front().detector->mtf.frequencies, transfers.front().detector->mtf.values});
   return json;
 }
 
