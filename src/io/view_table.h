@@ -57,6 +57,9 @@ struct ViewTable {
   std::optional<double> thickness_A;     ///< of the volume that the other program makes
   std::vector<std::string> not_applied;  ///< what the file has and a rigid alignment cannot honour
   StatedOptics optics{};
+  /// 1 or −1: the right or the left side of an aligned view at a positive tilt_deg is farther from
+  /// focus. None if the file does not say.
+  std::optional<int> defocus_hand{};
 };
 
 /// Says whether every view of a table that is used has a defocus.

@@ -136,6 +136,20 @@ TEST(ViewTable, ReadsTheXmlOfWarp) {
   EXPECT_TRUE(table.views[0].is_used);
   EXPECT_FALSE(table.views[1].is_used);
   EXPECT_TRUE(table.not_applied.empty());
+  EXPECT_EQ(table.defocus_hand, 1);
+}
+
+TEST(ViewTable, KnowsTheHandOfTheDefocusOfWarp) {
+  const ScratchDirectory scratch;
+  const auto hand = [&](const std::string& attribute) {
+    return read_view_table(scratch.write("TS.xml", "<TiltSeries" + attribute +
+                                                       "><Angles>-60</Angles>\n<MoviePath>a.tif"
+                                                       "</MoviePath></TiltSeries>"))
+        .defocus_hand;
+  };
+  EXPECT_EQ(hand(" AreAnglesInverted=\"True\""), 1);
+  EXPECT_EQ(hand(" AreAnglesInverted=\"False\""), -1);
+  EXPECT_EQ(hand(""), std::nullopt);
 }
 
 TEST(ViewTable, ReadsXmlInUtf16) {

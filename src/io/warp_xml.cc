@@ -10,6 +10,8 @@
 namespace tomofield::io {
 namespace {
 
+bool parse_flag(std::string_view text) { return text != "False" && text != "false"; }
+
 // Warp's XML file of a tilt series. Elements hold one value a line, one line a view.
 class WarpXml {
  public:
@@ -62,6 +64,15 @@ class WarpXml {
   double attribute(const char* name) const {
     const char* const text = root_.attribute(name).value();
     return *text == '\0' ? 0.0 : parse(name, text, base::kLargestAngle_deg);
+  }
+
+  // Returns the hand of the defocus. Warp adds the height z = X sin(angle) of a point to the defocus,
+  // or −X sin(angle) if AreAnglesInverted is set (TiltSeries.cs, GetPositionInAllTilts). Its angles
+  // are minus those of a view table.
+  std::optional<int> defocus_hand() const {
+    const std::string_view inverted = root_.attribute("AreAnglesInverted").value();
+    if (inverted.empty()) return std::nullopt;
+    return parse_flag(inverted) ? 1 : -1;
   }
 
   // Returns the last of "x, y, z", the size of the volume, which older versions do not write.
@@ -129,8 +140,6 @@ class WarpXml {
   pugi::xml_node root_;
 };
 
-bool parse_flag(const std::string& text) { return text != "False" && text != "false"; }
-
 // Subtracts the shifts that Warp refined beside the offsets of the axis, as Warp does.
 void apply_movements(const WarpXml& xml, ViewTable& table) {
   const auto shifts_x = xml.shifts_of_grid("GridMovementX", table.views.size());
@@ -168,7 +177,7 @@ void set_defocus(const WarpXml& xml, ViewTable& table) {
 }  // namespace
 
 // The geometry is that of read_warp_tomostar(). LevelAngleX turns the specimen about x before it is
-// tilted, LevelAngleY adds to the angles. AreAnglesInverted concerns the defocus alone.
+// tilted, LevelAngleY adds to the angles.
 ViewTable read_warp_xml(const std::filesystem::path& path) {
   const WarpXml xml(path);
   const std::size_t num_views = xml.lines("Angles").size();
@@ -202,6 +211,7 @@ ViewTable read_warp_xml(const std::filesystem::path& path) {
   set_defocus(xml, table);
   table.optics = {xml.ctf_parameter("Voltage"), xml.ctf_parameter("Cs"),
                   xml.ctf_parameter("Amplitude")};
+  table.defocus_hand = xml.defocus_hand();
   for (const char* grid : {"GridVolumeWarpX", "GridVolumeWarpY", "GridVolumeWarpZ"})
     if (!xml.is_zero(grid))
       table.not_applied.emplace_back(fmt::format("{}, a deformation of the specimen", grid));

@@ -12,7 +12,13 @@ void read_warp_project(Project& project) {
   for (const io::ImageInFile& image : io::find_view_images(table)) project.add_file(image.file);
   const bool is_xml = path.extension() != ".tomostar";
   project.set("stack", path.string(), path, is_xml ? "MoviePath" : "wrpMovieName");
-  if (io::has_defocus(table)) project.set("--ctf", path.string(), path, "GridCTF");
+  if (io::has_defocus(table)) {
+    project.set("--ctf", path.string(), path, "GridCTF");
+    if (table.defocus_hand) {
+      project.set("--defocus-hand", fmt::format("{}", *table.defocus_hand), path,
+                  "AreAnglesInverted");
+    }
+  }
   if (!table.thickness_A) return;
   const double pixel_A = io::open_image_stack(path)->header().voxel_size_A[0];
   if (pixel_A > 0) {

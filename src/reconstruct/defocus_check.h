@@ -16,6 +16,14 @@ struct DefocusCheck {
   double error = 0.0, standard_error = 0.0;
   /// Part of the residuals' squares that such a change explains, in the median view.
   double rings = 0.0;
+
+  /// What the residuals say of the change of the defocus across tilted views.
+  struct Slope {
+    double error = 0.0, standard_error = 0.0;
+  };
+  /// True slope over the given one, less 1: about 0 for the right hand, and towards −2 for the
+  /// wrong one. None if few views are tilted.
+  std::optional<Slope> slope;
 };
 
 /// Checks up to 16 views, evenly spaced in order of tilt. Returns nothing if the views have no

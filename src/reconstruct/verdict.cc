@@ -39,7 +39,13 @@ nlohmann::json views_json(const ViewAgreement& agreement) {
 }
 
 nlohmann::json defocus_json(const DefocusCheck& check) {
-  return {{"error", check.error}, {"standard_error", check.standard_error}, {"rings", check.rings}};
+  nlohmann::json json{
+      {"error", check.error}, {"standard_error", check.standard_error}, {"rings", check.rings}};
+  json["slope"] = nullptr;
+  if (check.slope)
+    json["slope"] = {{"error", check.slope->error},
+                     {"standard_error", check.slope->standard_error}};
+  return json;
 }
 
 nlohmann::json sections_json(const SectionProfile& sections) {

@@ -50,6 +50,9 @@ constexpr double kMostCorrelated = 0.6;
 
 // Error of the defocus, as a part of it and in standard errors: docs/results/ctf.md.
 constexpr double kLeastDefocusError = 0.01, kDefocusErrors = 4.0;
+// The error of the defocus's slope is 0 for the right hand and −2 for the wrong one, which the
+// density follows in part.
+constexpr double kHandError = -0.6;
 
 // Beside the sections that are not empty, the suggested thickness has this part of them.
 constexpr double kRoom = 0.2;
@@ -187,6 +190,17 @@ std::optional<Warning> wrong_defocus(const DefocusCheck& check) {
                              100 * check.rings)};
 }
 
+std::optional<Warning> wrong_defocus_hand(const DefocusCheck& check) {
+  if (!check.slope || check.slope->error > kHandError ||
+      -check.slope->error < kDefocusErrors * check.slope->standard_error)
+    return std::nullopt;
+  return Warning{"defocus-hand",
+                 fmt::format("the defocus across tilted views changes as if the other side were "
+                             "farther from focus ({:.1f} ± {:.1f} times as given): give "
+                             "--defocus-hand with the other sign",
+                             1 + check.slope->error, check.slope->standard_error)};
+}
+
 }  // namespace
 
 std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& input) {
@@ -202,6 +216,7 @@ std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& inp
   }
   if (warnings.empty()) {
     if (verdict.defocus) add(wrong_defocus(*verdict.defocus));
+    if (verdict.defocus) add(wrong_defocus_hand(*verdict.defocus));
     add(thickness_warning(verdict, input));
     if (verdict.views) add(correlated_noise(verdict, input.bin_factor));
   }

@@ -98,6 +98,18 @@ TEST(Warnings, ThicknessIsJudgedByTheSections) {
   EXPECT_NE(thick.front().message.find("--thickness 120"), std::string::npos);
 }
 
+TEST(Warnings, TheHandOfTheDefocusIsDoubtedIfViewsSayTheOther) {
+  Verdict verdict = good_verdict();
+  verdict.defocus = DefocusCheck{.slope = DefocusCheck::Slope{-0.2, 0.02}};
+  EXPECT_EQ(codes(verdict), "");
+  verdict.defocus->slope = {-1.8, 0.6};  // unsure
+  EXPECT_EQ(codes(verdict), "");
+  verdict.defocus->slope = {-1.8, 0.2};
+  EXPECT_EQ(codes(verdict), "defocus-hand ");
+  verdict.defocus->slope = std::nullopt;
+  EXPECT_EQ(codes(verdict), "");
+}
+
 TEST(Warnings, NoiseIsCorrelatedIfNeighboursAreAlikeOnBothAxes) {
   Verdict verdict = good_verdict();
   verdict.views->residual_correlation = {0.9, 0.5};
