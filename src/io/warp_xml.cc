@@ -66,9 +66,9 @@ class WarpXml {
     return *text == '\0' ? 0.0 : parse(name, text, base::kLargestAngle_deg);
   }
 
-  // Returns the hand of the defocus. Warp adds the height z = X sin(angle) of a point to the defocus,
-  // or −X sin(angle) if AreAnglesInverted is set (TiltSeries.cs, GetPositionInAllTilts). Its angles
-  // are minus those of a view table.
+  // Returns the hand of the defocus. Warp adds the height z = X sin(angle) of a point to the
+  // defocus, or −X sin(angle) if AreAnglesInverted is set (TiltSeries.cs, GetPositionInAllTilts).
+  // Its angles are minus those of a view table.
   std::optional<int> defocus_hand() const {
     const std::string_view inverted = root_.attribute("AreAnglesInverted").value();
     if (inverted.empty()) return std::nullopt;

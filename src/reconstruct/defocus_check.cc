@@ -98,7 +98,8 @@ OfView check_view(const measurement::PredictedView& projected,
                   const microscope::ViewTransfer& transfer, const measurement::ViewModel& model) {
   const Columns columns = columns_of(projected, transfer);
   // A view without a tilt has no slope.
-  const int num_columns = transfer.slope.x_A == 0.0 && transfer.slope.y_A == 0.0 ? kSlope : kColumns;
+  const int num_columns =
+      transfer.slope.x_A == 0.0 && transfer.slope.y_A == 0.0 ? kSlope : kColumns;
   Eigen::MatrixXd products = Eigen::MatrixXd::Zero(num_columns, num_columns);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(num_columns), row(num_columns);
   double squares = 0.0;
@@ -114,8 +115,7 @@ OfView check_view(const measurement::PredictedView& projected,
     squares += residual * residual;
   }
   const Eigen::LDLT<Eigen::MatrixXd> solver(products.selfadjointView<Eigen::Lower>());
-  const Eigen::MatrixXd inverse =
-      solver.solve(Eigen::MatrixXd::Identity(num_columns, num_columns));
+  const Eigen::MatrixXd inverse = solver.solve(Eigen::MatrixXd::Identity(num_columns, num_columns));
   const Eigen::VectorXd solution = inverse * right;
   if (!(squares > 0.0) || !solution.allFinite()) return {};
   OfView found;
