@@ -52,7 +52,7 @@ constexpr double kMostCorrelated = 0.6;
 constexpr double kLeastDefocusError = 0.01, kDefocusErrors = 4.0;
 // The error of the defocus's slope is 0 for the right hand and −2 for the wrong one, which the
 // density follows in part.
-constexpr double kHandError = -0.6;
+constexpr double kHandError = -0.5;
 
 // Beside the sections that are not empty, the suggested thickness has this part of them.
 constexpr double kRoom = 0.2;

@@ -15,10 +15,10 @@ FIT = ["--epochs", 6, "--coarse-epochs", 60, "--tv-penalty", "smooth", "--tv", 5
 class Filtered:
     """A series with a contrast transfer and radiation damage, and runs on it."""
 
-    def __init__(self, name):
+    def __init__(self, name, *imaging):
         self.folder = os.path.join(harness.fresh_directory(name), "cell")
         harness.succeed("simulate", self.folder, "--size", SIZE, "--yardstick", "a", "--noise", 0.02,
-                        "--seed", 31, "--voxel-size", 8, "--defocus", "3:5", "--dose-per-tilt", 1)
+                        "--seed", 31, *imaging)
         self.truth = harness.read_volume(self.path("truth.mrc"))
         self.transfer = ["--ctf", self.path("tilt_series_ctf.txt"), "--mdoc", self.path("tilt_series.mdoc")]
 
@@ -47,7 +47,7 @@ class Filtered:
 
 @pytest.fixture(scope="module", name="series")
 def make_series():
-    return Filtered("ctf")
+    return Filtered("ctf", "--voxel-size", 8, "--defocus", "3:5", "--dose-per-tilt", 1)
 
 
 @pytest.fixture(scope="module", name="modelled")
@@ -109,6 +109,16 @@ def test_the_verdict_tells_a_wrong_defocus(series):
     wrong = metrics(series, "scaled.mrc")["verdict"]["defocus"]
     assert wrong["error"] < right["error"] - 0.03, (right, wrong)
     assert wrong["rings"] > right["rings"], (right, wrong)
+
+
+def test_the_verdict_tells_the_wrong_hand_of_the_defocus():
+    # Its slope tells most with small pixels and little defocus, whose fringes stay in the view.
+    series = Filtered("hand", "--voxel-size", 1.2, "--defocus", "0.2:0.4")
+    transfer = ["--ctf", series.path("tilt_series_ctf.txt"), "--defocus-hand"]
+    assert "warning: the defocus across" not in series.run("right.mrc", *transfer, 1).stderr
+    assert abs(metrics(series, "right.mrc")["verdict"]["defocus"]["slope"]["error"]) < 0.5
+    assert "give --defocus-hand with the other sign" in series.run("left.mrc", *transfer, -1).stderr
+    assert metrics(series, "left.mrc")["verdict"]["defocus"]["slope"]["error"] < -0.5
 
 
 def test_coloured_noise_gains_and_resumes_to_the_bit():
