@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <utility>
 
 #include "base/parallel.h"
@@ -56,19 +57,23 @@ std::vector<double> weigh_frequencies(const NoiseColour& noise, const PredictedV
   return weights;
 }
 
-// Returns a bound of max |H|² W. Without weights, W is 1.
+// Returns a bound of max |H|² W. Without weights, W is 1. Between the middles of two shells, W is
+// between theirs.
 double bound_of(const ViewFilter* transfer, std::span<const double> weights) {
+  constexpr double kHighest = std::numbers::sqrt2 / 2;  // cycles a pixel, in a corner
+  const auto largest = [&](double from, double to, double weight) {
+    return transfer ? weight * std::pow(transfer->largest_transfer(from, to), 2) : weight;
+  };
   const double repetition = transfer ? kRepetition : 1.0;
-  if (weights.empty()) return repetition;
-  double bound = 0.0;
+  if (weights.empty()) return repetition * largest(0.0, kHighest, 1.0);
+  double bound = 0.0, from = 0.0, weight = weights.front();
   for (std::size_t s = 0; s < weights.size(); ++s) {
-    // The signal only falls with the frequency. Between two shells, W is between theirs.
-    const double signal = transfer && s > 0
-                              ? transfer->signal(NoiseColour::frequency_of(static_cast<int>(s) - 1))
-                              : 1.0;
-    bound = std::max(bound, weights[s] * signal * signal);
+    const double to = NoiseColour::frequency_of(static_cast<std::int64_t>(s));
+    bound = std::max(bound, largest(from, to, std::max(weight, weights[s])));
+    from = to;
+    weight = weights[s];
   }
-  return repetition * bound;
+  return repetition * std::max(bound, largest(from, kHighest, weight));
 }
 
 Surrogate surrogate_of(const PredictedView& view, const ViewFilter* transfer,

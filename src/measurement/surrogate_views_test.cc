@@ -147,7 +147,18 @@ TEST(SurrogateViews, FollowTheModelOfTheView) {
   const SurrogateViews surrogates = scene.surrogates();
   EXPECT_EQ(surrogates.models()[0].scale, 1.0);
   EXPECT_EQ(surrogates.models()[0].offset, 0.0);
-  EXPECT_NEAR(surrogates.models()[0].weight, 4.0 * 1.2 * 1.2 * 1.1, 1e-9);
+  const double largest = scene.filters.transfers[0].largest_transfer(0.0, 0.7071);
+  EXPECT_NEAR(surrogates.models()[0].weight, 4.0 * 1.2 * 1.2 * 1.1 * largest * largest, 1e-3);
+}
+
+TEST(SurrogateViews, TakeLongerStepsForViewsThatTransferLess) {
+  Scene scene;
+  microscope::ViewTransfer late = transfer_of(20000.0);
+  late.exposure = 150.0;
+  scene.filters.transfers[1] = microscope::ViewFilter(kWidth, kHeight, late);
+  scene.models[1] = scene.models[0];
+  const SurrogateViews surrogates = scene.surrogates();
+  EXPECT_LT(surrogates.models()[1].weight, 0.5 * surrogates.models()[0].weight);
 }
 
 // The step to a surrogate is (a / L) Hᵀ W r, and the weight of the view is w L.

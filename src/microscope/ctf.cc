@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace tomofield::microscope {
@@ -50,6 +51,24 @@ double Ctf::turns(double kx, double ky, double more_defocus_A) const {
   const double defocus_k2 =
       (mean_defocus_A_ + more_defocus_A) * k2 + half_difference_A_ * k2_cosine;
   return wavelength_A_ / 2 * (defocus_k2 - aberration_A3_ * k2 * k2) + phase_turns_;
+}
+
+double Ctf::largest(double from, double to, double low_A, double high_A) const {
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  for (const double k : {from, to}) {
+    for (const double defocus_A : {mean_defocus_A_ - std::abs(half_difference_A_) + low_A,
+                                   mean_defocus_A_ + std::abs(half_difference_A_) + high_A}) {
+      const double k2 = k * k;
+      const double turns =
+          wavelength_A_ / 2 * (defocus_A - aberration_A3_ * k2) * k2 + phase_turns_;
+      least = std::min(least, turns);
+      most = std::max(most, turns);
+    }
+  }
+  const double next_extremum = std::ceil(2 * least - 0.5) / 2 + 0.25;  // of the sine
+  if (next_extremum <= most) return 1.0;
+  return std::max(std::abs(std::sin(2 * std::numbers::pi * least)),
+                  std::abs(std::sin(2 * std::numbers::pi * most)));
 }
 
 double Ctf::reach_A(double k, double more_defocus_A) const {

@@ -41,6 +41,10 @@ class Ctf {
   /// Returns its envelope, where `k2` is the square of the frequency.
   double envelope(double k2) const;
 
+  /// Returns the largest |CTF| / envelope between two frequencies that are close to each other,
+  /// where the underfocus is that of any direction and greater by `low_A` to `high_A`.
+  double largest(double from, double to, double low_A, double high_A) const;
+
   /// Returns how far the function displaces what has frequencies up to `k`, in cycles per Å: a
   /// wave of frequency k moves by |dχ/dk| / 2π. The underfocus is that of the view, greater or
   /// smaller by up to `more_defocus_A`.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -62,6 +63,23 @@ TEST(Ctf, HasItsFirstDefocusAlongTheAngle) {
 TEST(Ctf, OfAPartOfATiltedViewHasMoreDefocus) {
   const Ctf ctf({}, {32000, 28000, 35, 0}), deeper({}, {33500, 29500, 35, 0});
   EXPECT_NEAR(ctf.value(0.02, -0.03, 1500), deeper.value(0.02, -0.03), 1e-9);
+}
+
+TEST(Ctf, IsNowhereAboveItsLargestValue) {
+  const Ctf ctf(Optics{}, {32000, 28000, 35, 20});
+  for (double from = 0.0; from < 0.1; from += 0.002) {
+    double largest = 0.0;
+    for (int i = 0; i <= 20; ++i) {
+      const double k = from + 0.0001 * i;
+      for (double angle = 0.0; angle < 3.1; angle += 0.1)
+        for (double more_A = -500; more_A <= 1500; more_A += 250)
+          largest = std::max(largest,
+                             std::abs(ctf.value(k * std::cos(angle), k * std::sin(angle), more_A)));
+    }
+    const double bound = ctf.largest(from, from + 0.002, -500, 1500);
+    EXPECT_GE(bound, largest - 1e-9) << from;
+    EXPECT_LE(bound, largest + 0.05) << from;
+  }
 }
 
 TEST(Ctf, ReachesAsFarAsItsPhaseChanges) {

@@ -29,6 +29,9 @@ std::pair<double, double> range_of(const DefocusSlope& slope, std::int64_t width
 // A filter keeps at most so many transfers: 1 MiB.
 constexpr std::size_t kMostKept = std::size_t{1} << 18;
 
+// The largest transfer is looked for in steps of so many cycles a pixel.
+constexpr double kStepOfBound = 1.0 / 512;
+
 constexpr float kWienerConstant = 0.1f;
 
 // The sine is interpolated to 3·10⁻⁷.
@@ -145,9 +148,17 @@ void ViewFilter::for_transfers(std::int64_t s, const Visit& visit) const {
   }
 }
 
-double ViewFilter::signal(double cycles_per_pixel) const {
-  const double k = cycles_per_pixel / view_.pixel_size_A;
-  return static_cast<double>(signal_(k * k));
+double ViewFilter::largest_transfer(double from, double to) const {
+  const double count = std::ceil((to - from) / kStepOfBound);
+  const double first = from / view_.pixel_size_A, step = (to - from) / count / view_.pixel_size_A;
+  double largest = 0.0;
+  for (double i = 0; i < count; ++i) {
+    const double k = first + i * step;
+    const double signal = static_cast<double>(signal_(k * k));  // falls with the frequency
+    largest = std::max(
+        largest, signal * ctf_.largest(k, k + step, defocus_of(0), defocus_of(num_defoci_ - 1)));
+  }
+  return largest;
 }
 
 // Computes w_s on a row of the image.

@@ -49,9 +49,8 @@ class ViewFilter {
   /// Returns the number of defoci, one for each hat function.
   std::int64_t num_defoci() const { return num_defoci_; }
 
-  /// Returns the share of the signal that is left at a frequency in cycles a pixel, up to 1 / √2:
-  /// a bound of |CTF| times the damage.
-  double signal(double cycles_per_pixel) const;
+  /// Returns a bound of |H_s| at frequencies from one to another, in cycles a pixel, up to 1 / √2.
+  double largest_transfer(double from, double to) const;
 
  private:
   using Image = fourier::RealTransform::Image;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -120,6 +121,29 @@ TEST(ViewFilter, HardlyAmplifiesAnyImage) {
   }
   EXPECT_LT(square, 1.1);
   EXPECT_GT(square, 0.9);
+}
+
+TEST(ViewFilter, TransfersNoFrequencyByMoreThanItsBound) {
+  ViewTransfer view = astigmatic_view();
+  view.slope.x_A = 100;
+  const ViewFilter filter(64, 48, view);
+  const Ctf ctf(view.optics, view.defocus);
+  double before = 0.0;
+  for (double k = 0.0; k < 0.7; k += 0.02) {  // cycles a pixel
+    double largest = 0.0;
+    for (int i = 0; i <= 10; ++i) {
+      const double frequency = (k + 0.002 * i) / view.pixel_size_A;
+      for (double angle = 0.0; angle < 3.1; angle += 0.1)
+        for (const double x_px : {-31.5, 0.0, 31.5})
+          largest = std::max(
+              largest, std::abs(ctf.value(frequency * std::cos(angle), frequency * std::sin(angle),
+                                          view.slope.at(x_px, 0))) *
+                           signal_after(view.exposure, frequency, 300));
+    }
+    EXPECT_GE(filter.largest_transfer(k, k + 0.02), largest - 1e-4) << k;
+    before = std::max(before, largest);
+    EXPECT_LE(filter.largest_transfer(0.0, k + 0.02), before + 0.06) << k;
+  }
 }
 
 TEST(ViewFilter, OfPureAbsorptionInFocusChangesNothing) {

@@ -10,6 +10,7 @@
 
 #include "base/enum_names.h"
 #include "base/log.h"
+#include "microscope/view_filter.h"
 #include "objective/options.h"
 #include "reconstruct/trial_fits.h"
 
@@ -37,6 +38,15 @@ fit::FitOptions short_trial_options(const fit::FieldOptions& plain, const fit::F
   shorter.vertex_epochs = 0;
   shorter.learning_rate = usual.learning_rate;
   return shorter;
+}
+
+// Returns how far the transfers of a series move what is in a view at most. 0 without a microscope.
+std::int64_t largest_reach_px(const measurement::Measurement& series) {
+  const measurement::SlabViews::Shape& shape = series.rays->shape();
+  std::int64_t reach = 0;
+  for (const microscope::ViewTransfer& transfer : series.transfers)
+    reach = std::max(reach, microscope::reach_px(transfer, shape.width, shape.num_rows));
+  return reach;
 }
 
 // Searches on every process, with the same trials and so with the same result. Returns nothing if a
@@ -77,10 +87,12 @@ TrialShape trial_of_tune(const fit::FieldOptions& field, const fit::FitOptions& 
   return {selection::kTrialRows, field, fit};
 }
 
-TrialShape short_trial(const fit::FieldOptions& field, const fit::FitOptions& fit) {
+TrialShape short_trial(const fit::FieldOptions& field, const fit::FitOptions& fit,
+                       std::int64_t reach_px) {
   fit::FieldOptions plain = field;
   plain.kind = FieldKind::kGrid;
-  return {kShortRows, plain, short_trial_options(plain, field, fit)};
+  return {kShortRows + 2 * std::min(reach_px, kShortRows / 2), plain,
+          short_trial_options(plain, field, fit)};
 }
 
 OpenSettings open_settings(OpenSettings wanted, const measurement::Measurement& measurement) {
@@ -149,7 +161,7 @@ std::optional<TunedFit> choose_by_short_trials(const measurement::Measurement& m
                                                const fit::FitOptions& fit, const OpenSettings& open,
                                                const TuneHooks& hooks,
                                                const distributed::Communicator& processes) {
-  const TrialShape shape = short_trial(field, fit);
+  const TrialShape shape = short_trial(field, fit, largest_reach_px(measurement));
   TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
                  open.view_scale || fit.fit_view_scale, hooks, usual_trials(open), processes);
   const TrialSettings start = with_safe_corrections({.penalty = fit.penalty,

@@ -47,8 +47,11 @@ struct TrialShape {
 };
 /// Returns the trials that tune() makes of a run.
 TrialShape trial_of_tune(const fit::FieldOptions& field, const fit::FitOptions& fit);
-/// Returns the trials that choose_by_short_trials() makes of a run.
-TrialShape short_trial(const fit::FieldOptions& field, const fit::FitOptions& fit);
+/// Returns the trials that choose_by_short_trials() makes of a run whose transfers move what is in
+/// a view by up to `reach_px`. Rows so near to the ends of a strip depend on rows outside, so the
+/// strip is higher by that at both ends.
+TrialShape short_trial(const fit::FieldOptions& field, const fit::FitOptions& fit,
+                       std::int64_t reach_px = 0);
 
 /// Returns what trials can choose of `wanted`: there must be a background or undecided beads.
 OpenSettings open_settings(OpenSettings wanted, const measurement::Measurement& measurement);
