@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "base/stopwatch.h"
+#include "measurement/prepare.h"
 
 namespace tomofield::align {
 namespace {
@@ -97,12 +98,11 @@ fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t s
 
 measurement::Measurement aligning_measurement(const JointProblem& problem,
                                               std::span<const geometry::ViewCorrection> corrections,
-                                              const fit::FieldOptions& field,
+                                              int bin, const fit::FieldOptions& field,
                                               const distributed::Communicator& processes) {
-  measurement::Measurement prepared =
-      measurement::prepare_realigned(problem.recorded, corrections, problem.specimen,
-                                     problem.scratch_dir, fit::band_rows(field), processes);
-  prepared.transfers = problem.transfers;
+  measurement::Measurement prepared = problem.plan;
+  measurement::realign(problem.recorded, corrections, bin, problem.scratch_dir,
+                       fit::band_rows(field), processes, prepared);
   return prepared;
 }
 

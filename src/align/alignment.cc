@@ -1,9 +1,7 @@
 #include "align/alignment.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "align/aligning_fit.h"
 #include "align/axis_search.h"
@@ -14,6 +12,7 @@
 #include "align/unalike.h"
 #include "base/parallel.h"
 #include "base/trace.h"
+#include "measurement/prepare.h"
 #include "tilt_series/binning.h"
 
 namespace tomofield::align {
@@ -21,10 +20,6 @@ namespace {
 
 // Views are correlated in images of at most about this width and height.
 constexpr double kCorrelatedSize = 96;
-
-double mean_of(const std::vector<double>& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
 
 // Returns the views that do not resemble their projections.
 std::vector<int> unalike_views(const tilt_series::TiltSeries& series,
@@ -35,24 +30,16 @@ std::vector<int> unalike_views(const tilt_series::TiltSeries& series,
   return unalike(tilts, correlations);
 }
 
-Comparison compare(const std::vector<double>& before, const std::vector<double>& after) {
-  std::vector<double> gains;
-  for (std::size_t i = 0; i < before.size(); ++i) gains.push_back(before[i] - after[i]);
-  return {mean_of(before), mean_of(after), mean_gain(gains)};
-}
-
-// Looks for local motion beyond the corrections of an alignment, whose held-out views have
-// `errors`.
-void add_motion(const JointProblem& problem, const std::vector<double>& errors,
+// Looks for local motion beyond the corrections of an alignment, whose trial is `rigid`.
+void add_motion(const JointProblem& problem, AlignmentTrial& rigid,
                 const distributed::Communicator& processes, Alignment& alignment) {
   constexpr double kSure = 2.0;  // standard errors
   LocalAlignment found = align_locally(problem, alignment.joint.freedoms, alignment.corrections,
                                        alignment.joint.motion, processes);
   alignment.joint.was_stopped = found.was_stopped;
   if (found.was_stopped) return;
-  LocalTrial trial{
-      .held_out = compare(errors, errors_of_held_out_views(problem, found.corrections, processes)),
-      .steps_px = std::move(found.steps_px)};
+  AlignmentTrial with_motion(problem, found.corrections, processes);
+  LocalTrial trial{.held_out = compare(rigid, with_motion), .steps_px = std::move(found.steps_px)};
   trial.is_accepted = trial.held_out.gain.exceeds(kSure);
   if (trial.is_accepted) {
     alignment.corrections = std::move(found.corrections);
@@ -93,11 +80,11 @@ std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& probl
   });
   const double pixel = reduction * series.bin_factor();
   const CorrelationStart found =
-      correlate_views(views, {.thickness_px = problem.specimen.thickness / pixel});
+      correlate_views(views, {.thickness_px = problem.plan.geometry.thickness / reduction});
   std::vector<geometry::ViewCorrection> corrections;
   for (const auto& [x, y] : found.shift_px)
     corrections.push_back({.shift_x_px = x * pixel, .shift_y_px = y * pixel});
-  remove_gauge(measurement::plan_measurement(series, problem.specimen).geometry, corrections);
+  remove_gauge(problem.plan.geometry, corrections);
   return corrections;
 }
 
@@ -108,9 +95,8 @@ Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::Vi
   alignment.joint = align_jointly(problem, std::move(start), processes);
   if (alignment.joint.was_stopped) return alignment;
   alignment.unaligned = unalike_views(problem.recorded, alignment.joint.agreement);
-  const std::vector<double> before = errors_of_held_out_views(problem, none, processes);
-  const std::vector<double> after =
-      errors_of_held_out_views(problem, alignment.joint.corrections, processes);
+  AlignmentTrial before(problem, none, processes);
+  AlignmentTrial after(problem, alignment.joint.corrections, processes);
   alignment.held_out = compare(before, after);
   alignment.is_accepted = alignment.held_out.gain.exceeds(1.0);
   alignment.corrections = alignment.is_accepted ? alignment.joint.corrections : none;

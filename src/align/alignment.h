@@ -6,18 +6,12 @@
 #include <vector>
 
 #include "align/joint_alignment.h"
-#include "align/mean_gain.h"
+#include "align/trial.h"
 #include "distributed/communicator.h"
 #include "geometry/view_correction.h"
 #include "measurement/measurement.h"
 
 namespace tomofield::align {
-
-/// Compares the errors of held-out views (trial.h) with two alignments.
-struct Comparison {
-  double before = 0.0, after = 0.0;  ///< mean errors
-  MeanGain gain;                     ///< of the differences over the views
-};
 
 /// Holds the local motion of a series and what speaks for it.
 struct LocalTrial {

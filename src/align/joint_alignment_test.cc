@@ -11,6 +11,7 @@
 #include "base/random.h"
 #include "gaussian_scene.h"
 #include "io/image_stack.h"
+#include "measurement/prepare.h"
 #include "scratch_directory.h"
 
 namespace tomofield::align {
@@ -40,13 +41,14 @@ class ShiftedSeries {
     options.bead_diameter_nm = 0;
     options.resample = false;
     const tilt_series::TiltSeries series(options);
+    const auto& processes = distributed::Communicator::alone();
     return align_jointly({.recorded = series,
-                          .specimen = specimen_,
+                          .plan = measurement::plan_realigned(series, specimen_, processes),
                           .field = {},
                           .scratch_dir = scratch_.path(),
                           .progress = {},
                           .stop_requested = {}},
-                         std::move(start), distributed::Communicator::alone());
+                         std::move(start), processes);
   }
 
   // Returns the root mean square of the errors of the shifts, without what views cannot tell.

@@ -352,20 +352,16 @@ tilt_series::MaskedImage read_aligned(const tilt_series::TiltSeries& recorded, s
                                   recorded.aligned_height(), read.local);
 }
 
-Measurement prepare_realigned(const tilt_series::TiltSeries& recorded,
-                              std::span<const geometry::ViewCorrection> corrections,
-                              const SpecimenOptions& specimen,
-                              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
-                              const distributed::Communicator& processes) {
+Measurement plan_realigned(const tilt_series::TiltSeries& recorded, const SpecimenOptions& specimen,
+                           const distributed::Communicator& processes) {
+  const std::vector<geometry::ViewCorrection> none(recorded.views().size());
   Measurement prepared = plan_measurement(recorded, specimen);
   prepared.x_tilt_deg = common_x_tilt(recorded.views(), prepared.geometry.thickness);
   prepared.ray_geometry.reset();
-  const ReadView read_view = aligning(recorded, corrections);
-  const SlabViews::Shape shape = prepared.rays_shape();
-  set_unit(brightness_of_views(recorded, read_view, shape, processes), recorded.background(),
-           prepared);
+  set_unit(
+      brightness_of_views(recorded, aligning(recorded, none), prepared.rays_shape(), processes),
+      recorded.background(), prepared);
   set_noise(recorded, prepared);
-  realign(recorded, corrections, 1, scratch_dir, band_rows, processes, prepared);
   return prepared;
 }
 

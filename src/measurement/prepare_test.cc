@@ -229,8 +229,11 @@ class RecordedSeries : public ::testing::Test {
     return maps;
   }
   Measurement realigned(std::span<const ViewCorrection> corrections) {
-    return prepare_realigned(series(maps_, false), corrections, specimen(), scratch(), kHeight,
-                             distributed::Communicator::alone());
+    const auto& processes = distributed::Communicator::alone();
+    const tilt_series::TiltSeries recorded = series(maps_, false);
+    Measurement prepared = plan_realigned(recorded, specimen(), processes);
+    realign(recorded, corrections, 1, scratch(), kHeight, processes, prepared);
+    return prepared;
   }
   Measurement resampled(std::span<const RawFromAligned> maps) {
     return prepare_measurement(series(maps, true), specimen(), scratch());
