@@ -8,11 +8,14 @@
 #include "align/correlation_start.h"
 #include "align/gauge.h"
 #include "align/local_alignment.h"
+#include "align/registration.h"
 #include "align/trial.h"
 #include "align/unalike.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "base/trace.h"
 #include "measurement/prepare.h"
+#include "tilt_series/align_image.h"
 #include "tilt_series/binning.h"
 
 namespace tomofield::align {
@@ -56,12 +59,32 @@ std::size_t memory_beside_fit(const measurement::Measurement& plan) {
   return prediction_memory(plan);
 }
 
+double seconds_of_update(std::span<const float> image, std::int64_t width) {
+  const std::int64_t height = std::ssize(image) / width;
+  tilt_series::MaskedImage view(width, height);
+  std::ranges::copy(image, view.values.begin());
+  std::ranges::fill(view.valid, std::uint8_t{1});
+  geometry::RawFromAligned half_a_pixel;
+  half_a_pixel.shift_x_px = half_a_pixel.shift_y_px = 0.5;
+  const base::ProcessorStopwatch running;
+  const tilt_series::MaskedImage moved =
+      tilt_series::align_image(view, half_a_pixel, width, height, std::nullopt);
+  const Registration registration({.width = width,
+                                   .height = height,
+                                   .centre_x = static_cast<double>(width) / 2,
+                                   .centre_y = static_cast<double>(height) / 2,
+                                   .measured = moved.values,
+                                   .predicted = view.values},
+                                  {});
+  return running.seconds();
+}
+
 std::vector<PlannedFits> planned_fits(bool from_raw, std::uint64_t seed) {
   constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
-  // The held-out views judge the old and the new alignment.
-  std::vector<PlannedFits> fits{{joint_fit(seed), kAll, 1, 2.0},
-                                {held_out_fit(seed), kAll, 2, 2.0}};
-  if (from_raw) fits.push_back({joint_fit(seed), kResidualEpochs, kMostAxisFits, 6.0});
+  // The held-out views judge the old and the new alignment, mostly with wide pixels alone.
+  std::vector<PlannedFits> fits{{joint_fit(seed), kAll, 1, 24.0},
+                                {held_out_fit(seed), kHeldOutCoarseEpochs, 2, 1.0}};
+  if (from_raw) fits.push_back({joint_fit(seed), kResidualEpochs, kMostAxisFits, 2.5});
   return fits;
 }
 

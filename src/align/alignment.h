@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "align/joint_alignment.h"
@@ -35,9 +36,9 @@ struct PlannedFits {
   fit::FitOptions options;
   std::int64_t epochs;
   int times;
-  /// Time of the fits with the resampling and the registration of the views, over that of the fits
-  /// alone. It was measured on phantoms of 256 pixels.
-  double cost;
+  /// Time of resampling and registering a view in all updates of a fit, most of which have wide
+  /// pixels, over seconds_of_update(). It was measured on phantoms of 128 and 256 pixels.
+  double updates;
 };
 
 /// Returns the field of the fits of an alignment, for a field that the reconstruction asks for.
@@ -45,6 +46,9 @@ fit::FieldOptions planned_field(const fit::FieldOptions& field);
 /// Returns the fits that an alignment makes, without that for local motion. `from_raw`: with the
 /// search for the tilt axis.
 std::vector<PlannedFits> planned_fits(bool from_raw, std::uint64_t seed);
+
+/// Resamples an aligned view of this width and registers it once. Returns the processor time.
+double seconds_of_update(std::span<const float> image, std::int64_t width);
 
 /// Returns the bytes that an alignment takes beside a fit.
 std::size_t memory_beside_fit(const measurement::Measurement& plan);

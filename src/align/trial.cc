@@ -15,7 +15,7 @@ namespace tomofield::align {
 namespace {
 
 constexpr int kEvery = 8;
-constexpr int kCoarseEpochs = 24, kFineEpochs = 1;
+constexpr int kFineEpochs = 1;
 constexpr int kCoarseBin = 2;  // of the last coarse stage
 
 double mean_of(const std::vector<double>& values) {
@@ -31,7 +31,7 @@ Comparison compare_errors(const std::vector<double>& before, const std::vector<d
 }  // namespace
 
 fit::FitOptions held_out_fit(std::uint64_t seed) {
-  return aligning_fit(kCoarseEpochs, kFineEpochs, seed);
+  return aligning_fit(kHeldOutCoarseEpochs, kFineEpochs, seed);
 }
 
 AlignmentTrial::AlignmentTrial(const JointProblem& problem,
@@ -60,7 +60,7 @@ void AlignmentTrial::begin() {
   measurement_.held_out = measurement::held_out_views(measurement_.geometry.tilt_deg, kEvery);
   fit_ = std::make_unique<fit::Fit>(measurement_, field_, held_out_fit(problem_.seed), processes_);
   fit_->run([](const fit::Fit& fit) {
-    return fit.progress().step + 1 < kCoarseEpochs * fit.steps_per_epoch();
+    return fit.progress().step + 1 < kHeldOutCoarseEpochs * fit.steps_per_epoch();
   });
   coarse_errors_ = errors();
   measurement_.rays.reset();  // the next fit needs the memory

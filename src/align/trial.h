@@ -17,6 +17,9 @@ namespace tomofield::align {
 /// Returns the options of the fit of an AlignmentTrial.
 fit::FitOptions held_out_fit(std::uint64_t seed);
 
+/// Number of epochs of that fit with wide pixels.
+inline constexpr int kHeldOutCoarseEpochs = 24;
+
 /// Fits a field to the views of an alignment without every eighth one in order of tilt, and says
 /// how badly it predicts those: the mean squared difference of each, over the variance of the
 /// measured pixels. Scale and trend are the best for the view itself, since no other view tells
