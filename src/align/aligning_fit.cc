@@ -21,9 +21,6 @@ constexpr std::int64_t kEpochsBefore = 2;
 // With pixels this many times as wide, an update costs as much as an epoch, so every second epoch
 // has one.
 constexpr int kSlowBin = 2;
-// With wider pixels, every third epoch has an update once the last one was below so many of them.
-constexpr double kSettled = 0.01;
-constexpr int kEverySettled = 3;
 
 // Returns the bytes of a view and its prediction.
 std::size_t prediction_bytes(const measurement::Measurement& measurement, int bin) {
@@ -42,19 +39,12 @@ std::int64_t epochs_done(const fit::Fit& fit) {
   return fit.progress().step / fit.steps_per_epoch();
 }
 
-// Says whether the last update changed little in the wide pixels of a stage.
-bool is_settled(const FitInProgress& run, const fit::Stage& stage) {
-  const double pixel = stage.bin * run.measurement.bin_factor;
-  return stage.bin > kSlowBin && !run.steps_px.empty() && run.steps_px.back() < kSettled * pixel;
-}
-
 // Says whether an update is due after an epoch of a stage. At the end of a stage the fit is already
 // in the next one, unless it is done.
-bool is_update_due(const FitInProgress& run, const fit::Stage& stage) {
-  const std::int64_t done = epochs_done(run.fit);
-  const bool is_last = done == stage.first_epoch + stage.epochs;
-  const int every = is_settled(run, stage) ? kEverySettled : stage.bin == kSlowBin ? 2 : 1;
-  return done > kEpochsBefore && done % every == 0 && (!is_last || run.fit.is_done());
+bool is_update_due(const fit::Stage& stage, std::int64_t epochs_done, bool is_done) {
+  const bool is_last = epochs_done == stage.first_epoch + stage.epochs;
+  const bool is_turn = stage.bin != kSlowBin || epochs_done % 2 == 0;
+  return epochs_done > kEpochsBefore && is_turn && (!is_last || is_done);
 }
 
 // Any process can stop all of them.
@@ -175,7 +165,7 @@ bool run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
     if (run.problem.progress && num_epochs == fit.num_epochs())
       run.problem.progress(report(fit, running.seconds(), run.steps_px));
     const bool is_stopped = is_to_stop(run.problem, processes);
-    const bool is_updated = is_update_due(run, stage) && update(stage);
+    const bool is_updated = is_update_due(stage, epochs_done(fit), fit.is_done()) && update(stage);
     if (is_updated || fit.stage().bin != stage.bin) resample(run, processes);
     if (is_stopped) return true;
   }
