@@ -227,11 +227,12 @@ ReadView aligning_means(const tilt_series::TiltSeries& recorded,
     const tilt_series::MaskedImage means = tilt_series::align_means(
         read.raw, read.transform, width, height, first_row, bin, read.local);
     for (std::int64_t y = first_row; y < height; ++y)
-      for (std::int64_t x = 0; x < width; ++x) {
-        const std::size_t from = means.index(x / bin, (y - first_row) / bin);
-        const auto to = static_cast<std::size_t>(y * width + x);
-        image[to] = means.values[from];
-        valid[to] = means.valid[from];
+      for (std::int64_t x = 0; x < means.width; ++x) {
+        const std::size_t from = means.index(x, (y - first_row) / bin);
+        const auto to = static_cast<std::size_t>(y * width + x * bin);
+        const auto pixels = static_cast<std::size_t>(std::min<std::int64_t>(bin, width - x * bin));
+        std::ranges::fill(image.subspan(to, pixels), means.values[from]);
+        std::ranges::fill(valid.subspan(to, pixels), means.valid[from]);
       }
   };
 }
