@@ -67,8 +67,8 @@ Measurement plan_realigned(const tilt_series::TiltSeries& recorded, const Specim
 
 /// Reads the rays of such a measurement, or reads them anew, each view with a correction of its
 /// alignment. The density unit stays, and so do the stored pixels of the views. With
-/// `bin` above 1, all rays of a square of bin × bin pixels have nearly the mean of the square: that
-/// is much less work, and all that binned() with this bin needs.
+/// `bin` above 1, the rays are nearly the means over squares of bin × bin pixels
+/// (Measurement::rays_bin): that is much less work, and all that binned() with this bin needs.
 void realign(const tilt_series::TiltSeries& recorded,
              std::span<const geometry::ViewCorrection> corrections, int bin,
              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
