@@ -23,6 +23,8 @@ namespace {
 
 // Views are correlated in images of at most about this width and height.
 constexpr double kCorrelatedSize = 96;
+// A new alignment must predict held-out views better by so many standard errors.
+constexpr double kSure = 2.0;
 
 // Returns the views that do not resemble their projections.
 std::vector<int> unalike_views(const tilt_series::TiltSeries& series,
@@ -36,7 +38,6 @@ std::vector<int> unalike_views(const tilt_series::TiltSeries& series,
 // Looks for local motion beyond the corrections of an alignment, whose trial is `rigid`.
 void add_motion(const JointProblem& problem, AlignmentTrial& rigid,
                 const distributed::Communicator& processes, Alignment& alignment) {
-  constexpr double kSure = 2.0;  // standard errors
   LocalAlignment found = align_locally(problem, alignment.joint.freedoms, alignment.corrections,
                                        alignment.joint.motion, processes);
   alignment.joint.was_stopped = found.was_stopped;
@@ -121,7 +122,7 @@ Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::Vi
   AlignmentTrial before(problem, none, processes);
   AlignmentTrial after(problem, alignment.joint.corrections, processes);
   alignment.held_out = compare(before, after);
-  alignment.is_accepted = alignment.held_out.gain.exceeds(1.0);
+  alignment.is_accepted = alignment.held_out.gain.exceeds(kSure);
   alignment.corrections = alignment.is_accepted ? alignment.joint.corrections : none;
   if (!alignment.joint.motion.empty())
     add_motion(problem, alignment.is_accepted ? after : before, processes, alignment);

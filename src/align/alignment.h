@@ -58,10 +58,9 @@ std::size_t memory_beside_fit(const measurement::Measurement& plan);
 std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& problem);
 
 /// Aligns a series further, from `start`. The new alignment is accepted if a field that is
-/// fitted with it predicts held-out views better, by more than the standard error over the views.
-/// If the views then show local motion (JointAlignment::motion), it is looked for, and it is
-/// accepted if held-out views are predicted better by more than two standard errors. Every process
-/// calls it and gets the same.
+/// fitted with it predicts held-out views better, by more than two standard errors over the
+/// views. If the views then show local motion (JointAlignment::motion), it is looked for, and it is
+/// accepted in the same way. Every process calls it and gets the same.
 Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::ViewCorrection> start,
                            const distributed::Communicator& processes);
 
