@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "base/stopwatch.h"
+#include "measurement/prepare.h"
 
 namespace tomofield::align {
 namespace {
@@ -61,10 +62,19 @@ base::ProgressReport report(const fit::Fit& fit, double seconds,
           .detail = steps_px.empty() ? "" : fmt::format("last step {:.3f} px", steps_px.back())};
 }
 
-// Lets a fit go on with views that are resampled anew, if it is not done.
+// Returns how wide the pixels of the next epoch are. At the end of a stage, the fit enters the next
+// one, which needs its own.
+int bin_of_next_epoch(const fit::Fit& fit) {
+  const fit::Stage& stage = fit.stage();
+  const std::int64_t end = stage.first_epoch + stage.epochs;
+  if (epochs_done(fit) + 1 < end) return stage.bin;
+  const auto next = std::ranges::find(fit.stages(), end, &fit::Stage::first_epoch);
+  return next == fit.stages().end() ? stage.bin : next->bin;
+}
+
+// Lets a fit go on with views that are resampled anew.
 void resample(const FitInProgress& run, const distributed::Communicator& processes) {
-  if (run.fit.is_done()) return;
-  measurement::realign(run.problem.recorded, run.corrections, run.fit.stage().bin,
+  measurement::realign(run.problem.recorded, run.corrections, bin_of_next_epoch(run.fit),
                        run.problem.scratch_dir, fit::band_rows(run.field), processes,
                        run.measurement);
   run.fit.reread_measurement();
@@ -97,12 +107,11 @@ fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t s
 
 measurement::Measurement aligning_measurement(const JointProblem& problem,
                                               std::span<const geometry::ViewCorrection> corrections,
-                                              const fit::FieldOptions& field,
+                                              int bin, const fit::FieldOptions& field,
                                               const distributed::Communicator& processes) {
-  measurement::Measurement prepared =
-      measurement::prepare_realigned(problem.recorded, corrections, problem.specimen,
-                                     problem.scratch_dir, fit::band_rows(field), processes);
-  prepared.transfers = problem.transfers;
+  measurement::Measurement prepared = problem.plan;
+  measurement::realign(problem.recorded, corrections, bin, problem.scratch_dir,
+                       fit::band_rows(field), processes, prepared);
   return prepared;
 }
 
@@ -159,14 +168,15 @@ bool run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
                       const distributed::Communicator& processes) {
   const base::Stopwatch running;
   fit::Fit& fit = run.fit;
+  bool is_updated = false;
   while (epochs_done(fit) < num_epochs) {
+    if (is_updated || run.measurement.rays_bin != bin_of_next_epoch(fit)) resample(run, processes);
     const fit::Stage stage = fit.stage();
     fit.run([](const fit::Fit& f) { return f.progress().step % f.steps_per_epoch() != 0; });
     if (run.problem.progress && num_epochs == fit.num_epochs())
       run.problem.progress(report(fit, running.seconds(), run.steps_px));
     const bool is_stopped = is_to_stop(run.problem, processes);
-    const bool is_updated = is_update_due(stage, epochs_done(fit), fit.is_done()) && update(stage);
-    if (is_updated || fit.stage().bin != stage.bin) resample(run, processes);
+    is_updated = is_update_due(stage, epochs_done(fit), fit.is_done()) && update(stage);
     if (is_stopped) return true;
   }
   return false;

@@ -26,10 +26,11 @@ fit::FieldOptions aligning_field(fit::FieldOptions field);
 /// blurs until it explains wrong shifts.
 fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t seed);
 
-/// Prepares the views of a problem, each aligned with a correction.
+/// Prepares the views of a problem, each aligned with a correction, for the stages of a fit whose
+/// pixels are at least `bin` times as wide.
 measurement::Measurement aligning_measurement(const JointProblem& problem,
                                               std::span<const geometry::ViewCorrection> corrections,
-                                              const fit::FieldOptions& field,
+                                              int bin, const fit::FieldOptions& field,
                                               const distributed::Communicator& processes);
 
 /// Returns a view and its prediction by a fit in one of its stages, with their place in the aligned

@@ -1,19 +1,21 @@
 #include "align/alignment.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "align/aligning_fit.h"
 #include "align/axis_search.h"
 #include "align/correlation_start.h"
 #include "align/gauge.h"
 #include "align/local_alignment.h"
+#include "align/registration.h"
 #include "align/trial.h"
 #include "align/unalike.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "base/trace.h"
+#include "measurement/prepare.h"
+#include "tilt_series/align_image.h"
 #include "tilt_series/binning.h"
 
 namespace tomofield::align {
@@ -21,10 +23,8 @@ namespace {
 
 // Views are correlated in images of at most about this width and height.
 constexpr double kCorrelatedSize = 96;
-
-double mean_of(const std::vector<double>& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
+// A new alignment must predict held-out views better by so many standard errors.
+constexpr double kSure = 2.0;
 
 // Returns the views that do not resemble their projections.
 std::vector<int> unalike_views(const tilt_series::TiltSeries& series,
@@ -35,24 +35,15 @@ std::vector<int> unalike_views(const tilt_series::TiltSeries& series,
   return unalike(tilts, correlations);
 }
 
-Comparison compare(const std::vector<double>& before, const std::vector<double>& after) {
-  std::vector<double> gains;
-  for (std::size_t i = 0; i < before.size(); ++i) gains.push_back(before[i] - after[i]);
-  return {mean_of(before), mean_of(after), mean_gain(gains)};
-}
-
-// Looks for local motion beyond the corrections of an alignment, whose held-out views have
-// `errors`.
-void add_motion(const JointProblem& problem, const std::vector<double>& errors,
+// Looks for local motion beyond the corrections of an alignment, whose trial is `rigid`.
+void add_motion(const JointProblem& problem, AlignmentTrial& rigid,
                 const distributed::Communicator& processes, Alignment& alignment) {
-  constexpr double kSure = 2.0;  // standard errors
   LocalAlignment found = align_locally(problem, alignment.joint.freedoms, alignment.corrections,
                                        alignment.joint.motion, processes);
   alignment.joint.was_stopped = found.was_stopped;
   if (found.was_stopped) return;
-  LocalTrial trial{
-      .held_out = compare(errors, errors_of_held_out_views(problem, found.corrections, processes)),
-      .steps_px = std::move(found.steps_px)};
+  AlignmentTrial with_motion(problem, found.corrections, processes);
+  LocalTrial trial{.held_out = compare(rigid, with_motion), .steps_px = std::move(found.steps_px)};
   trial.is_accepted = trial.held_out.gain.exceeds(kSure);
   if (trial.is_accepted) {
     alignment.corrections = std::move(found.corrections);
@@ -69,12 +60,32 @@ std::size_t memory_beside_fit(const measurement::Measurement& plan) {
   return prediction_memory(plan);
 }
 
+double seconds_of_update(std::span<const float> image, std::int64_t width) {
+  const std::int64_t height = std::ssize(image) / width;
+  tilt_series::MaskedImage view(width, height);
+  std::ranges::copy(image, view.values.begin());
+  std::ranges::fill(view.valid, std::uint8_t{1});
+  geometry::RawFromAligned half_a_pixel;
+  half_a_pixel.shift_x_px = half_a_pixel.shift_y_px = 0.5;
+  const base::ProcessorStopwatch running;
+  const tilt_series::MaskedImage moved =
+      tilt_series::align_image(view, half_a_pixel, width, height, std::nullopt);
+  const Registration registration({.width = width,
+                                   .height = height,
+                                   .centre_x = static_cast<double>(width) / 2,
+                                   .centre_y = static_cast<double>(height) / 2,
+                                   .measured = moved.values,
+                                   .predicted = view.values},
+                                  {});
+  return running.seconds();
+}
+
 std::vector<PlannedFits> planned_fits(bool from_raw, std::uint64_t seed) {
   constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
-  // The held-out views judge the old and the new alignment.
-  std::vector<PlannedFits> fits{{joint_fit(seed), kAll, 1, 2.0},
-                                {held_out_fit(seed), kAll, 2, 2.0}};
-  if (from_raw) fits.push_back({joint_fit(seed), kResidualEpochs, kMostAxisFits, 6.0});
+  // The held-out views judge the old and the new alignment, mostly with wide pixels alone.
+  std::vector<PlannedFits> fits{{joint_fit(seed), kAll, 1, 24.0},
+                                {held_out_fit(seed), kHeldOutCoarseEpochs, 2, 1.0}};
+  if (from_raw) fits.push_back({joint_fit(seed), kResidualEpochs, kMostAxisFits, 2.5});
   return fits;
 }
 
@@ -93,11 +104,11 @@ std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& probl
   });
   const double pixel = reduction * series.bin_factor();
   const CorrelationStart found =
-      correlate_views(views, {.thickness_px = problem.specimen.thickness / pixel});
+      correlate_views(views, {.thickness_px = problem.plan.geometry.thickness / reduction});
   std::vector<geometry::ViewCorrection> corrections;
   for (const auto& [x, y] : found.shift_px)
     corrections.push_back({.shift_x_px = x * pixel, .shift_y_px = y * pixel});
-  remove_gauge(measurement::plan_measurement(series, problem.specimen).geometry, corrections);
+  remove_gauge(problem.plan.geometry, corrections);
   return corrections;
 }
 
@@ -108,11 +119,10 @@ Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::Vi
   alignment.joint = align_jointly(problem, std::move(start), processes);
   if (alignment.joint.was_stopped) return alignment;
   alignment.unaligned = unalike_views(problem.recorded, alignment.joint.agreement);
-  const std::vector<double> before = errors_of_held_out_views(problem, none, processes);
-  const std::vector<double> after =
-      errors_of_held_out_views(problem, alignment.joint.corrections, processes);
+  AlignmentTrial before(problem, none, processes);
+  AlignmentTrial after(problem, alignment.joint.corrections, processes);
   alignment.held_out = compare(before, after);
-  alignment.is_accepted = alignment.held_out.gain.exceeds(1.0);
+  alignment.is_accepted = alignment.held_out.gain.exceeds(kSure);
   alignment.corrections = alignment.is_accepted ? alignment.joint.corrections : none;
   if (!alignment.joint.motion.empty())
     add_motion(problem, alignment.is_accepted ? after : before, processes, alignment);

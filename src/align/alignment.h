@@ -3,21 +3,16 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "align/joint_alignment.h"
-#include "align/mean_gain.h"
+#include "align/trial.h"
 #include "distributed/communicator.h"
 #include "geometry/view_correction.h"
 #include "measurement/measurement.h"
 
 namespace tomofield::align {
-
-/// Compares the errors of held-out views (trial.h) with two alignments.
-struct Comparison {
-  double before = 0.0, after = 0.0;  ///< mean errors
-  MeanGain gain;                     ///< of the differences over the views
-};
 
 /// Holds the local motion of a series and what speaks for it.
 struct LocalTrial {
@@ -41,9 +36,9 @@ struct PlannedFits {
   fit::FitOptions options;
   std::int64_t epochs;
   int times;
-  /// Time of the fits with the resampling and the registration of the views, over that of the fits
-  /// alone. It was measured on phantoms of 256 pixels.
-  double cost;
+  /// Time of resampling and registering a view in all updates of a fit, most of which have wide
+  /// pixels, over seconds_of_update(). It was measured on phantoms of 128 and 256 pixels.
+  double updates;
 };
 
 /// Returns the field of the fits of an alignment, for a field that the reconstruction asks for.
@@ -51,6 +46,9 @@ fit::FieldOptions planned_field(const fit::FieldOptions& field);
 /// Returns the fits that an alignment makes, without that for local motion. `from_raw`: with the
 /// search for the tilt axis.
 std::vector<PlannedFits> planned_fits(bool from_raw, std::uint64_t seed);
+
+/// Resamples an aligned view of this width and registers it once. Returns the processor time.
+double seconds_of_update(std::span<const float> image, std::int64_t width);
 
 /// Returns the bytes that an alignment takes beside a fit.
 std::size_t memory_beside_fit(const measurement::Measurement& plan);
@@ -60,10 +58,9 @@ std::size_t memory_beside_fit(const measurement::Measurement& plan);
 std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& problem);
 
 /// Aligns a series further, from `start`. The new alignment is accepted if a field that is
-/// fitted with it predicts held-out views better, by more than the standard error over the views.
-/// If the views then show local motion (JointAlignment::motion), it is looked for, and it is
-/// accepted if held-out views are predicted better by more than two standard errors. Every process
-/// calls it and gets the same.
+/// fitted with it predicts held-out views better, by more than two standard errors over the
+/// views. If the views then show local motion (JointAlignment::motion), it is looked for, and it is
+/// accepted in the same way. Every process calls it and gets the same.
 Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::ViewCorrection> start,
                            const distributed::Communicator& processes);
 

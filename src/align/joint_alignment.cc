@@ -16,6 +16,7 @@
 #include "align/slow_modes.h"
 #include "base/trace.h"
 #include "fit/fit.h"
+#include "fit/stages.h"
 
 namespace tomofield::align {
 namespace {
@@ -42,7 +43,9 @@ class AligningFit {
       : problem_(problem),
         processes_(processes),
         field_(aligning_field(problem.field)),
-        measurement_(aligning_measurement(problem, start, field_, processes)),
+        measurement_(aligning_measurement(
+            problem, start, fit::make_stages(field_, joint_fit(problem.seed)).front().bin, field_,
+            processes)),
         fit_(measurement_, field_, joint_fit(problem.seed), processes) {
     found_.agreement.resize(start.size());
     // A start with rotations has errors of rotations.

@@ -13,8 +13,7 @@
 #include "distributed/communicator.h"
 #include "fit/options.h"
 #include "geometry/view_correction.h"
-#include "measurement/prepare.h"
-#include "microscope/view_transfer.h"
+#include "measurement/measurement.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::align {
@@ -45,11 +44,9 @@ struct JointAlignment {
 /// Describes the specimen and the field of a joint alignment.
 struct JointProblem {
   const tilt_series::TiltSeries& recorded;  ///< views that are not resampled, and keep their pixels
-  const measurement::SpecimenOptions& specimen;
+  /// Everything of the measurement but its rays (measurement::plan_realigned).
+  measurement::Measurement plan;
   fit::FieldOptions field;  ///< its kind is replaced by plain vertices
-  /// [view]: what the microscope does to the projections that views are registered to; empty:
-  /// nothing.
-  std::vector<microscope::ViewTransfer> transfers = {};
   std::uint64_t seed = 1;
   const std::filesystem::path& scratch_dir;
   base::ProgressSink progress;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "align/slow_modes.h"
 #include "base/trace.h"
 #include "fit/fit.h"
+#include "fit/stages.h"
 
 namespace tomofield::align {
 namespace {
@@ -44,6 +46,10 @@ ViewCorrection with_motion(ViewCorrection correction, const ViewWarp& motion,
                           .local = motion.without(rigid)});
 }
 
+fit::FitOptions local_fit(std::uint64_t seed) {
+  return aligning_fit(kCoarseEpochs, kFineEpochs, seed);
+}
+
 double rms_change(const std::vector<ViewCorrection>& from, const std::vector<ViewCorrection>& to) {
   double squares = 0.0;
   for (std::size_t v = 0; v < from.size(); ++v) {
@@ -63,9 +69,10 @@ class LocalFit {
         freedoms_(freedoms),
         processes_(processes),
         field_(aligning_field(problem.field)),
-        measurement_(aligning_measurement(problem, start, field_, processes)),
-        fit_(measurement_, field_, aligning_fit(kCoarseEpochs, kFineEpochs, problem.seed),
-             processes),
+        measurement_(aligning_measurement(
+            problem, start, fit::make_stages(field_, local_fit(problem.seed)).front().bin, field_,
+            processes)),
+        fit_(measurement_, field_, local_fit(problem.seed), processes),
         by_tilt_(start.size()) {
     std::iota(by_tilt_.begin(), by_tilt_.end(), std::size_t{0});
     std::ranges::stable_sort(

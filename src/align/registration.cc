@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kRadian_deg = 180.0 / std::numbers::pi;
 constexpr std::int64_t kBlock = 16;  // side of a block of the chessboard, in pixels of the stage
+// The first solution only says which residuals are large, so every third row is enough for it.
+constexpr std::int64_t kRowsOfFirst = 3;
 
 // Returns scale and offset of the line measured = scale · predicted + offset.
 std::array<double, 2> fit_line(std::span<const float> predicted, std::span<const float> measured) {
@@ -165,7 +167,7 @@ void Registration::add_up(const Prepared& images, const Solution* last, LocalReg
   for (Sums& sums : sums_) sums.setZero();
   num_pixels_ = {};
   std::array<RowBatch, 2> batches;  // of each set
-  for (std::int64_t y = 0; y < images.height; ++y) {
+  for (std::int64_t y = 0; y < images.height; y += last == nullptr ? kRowsOfFirst : 1) {
     for (std::int64_t x = 0; x < images.width; ++x) {
       if (images.counts[static_cast<std::size_t>(y * images.width + x)] == 0) continue;
       const Row row = row_of(images, x, y);

@@ -1,43 +1,99 @@
 #include "align/trial.h"
 
+#include <cmath>
+#include <numeric>
+#include <utility>
+
 #include "align/aligning_fit.h"
 #include "align/registration.h"
 #include "base/parallel.h"
 #include "base/trace.h"
-#include "fit/fit.h"
 #include "measurement/held_out.h"
+#include "measurement/prepare.h"
 
 namespace tomofield::align {
 namespace {
 
 constexpr int kEvery = 8;
+constexpr int kFineEpochs = 1;
+constexpr int kCoarseBin = 2;  // of the last coarse stage
+
+double mean_of(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+Comparison compare_errors(const std::vector<double>& before, const std::vector<double>& after) {
+  std::vector<double> gains;
+  for (std::size_t i = 0; i < before.size(); ++i) gains.push_back(before[i] - after[i]);
+  return {mean_of(before), mean_of(after), mean_gain(gains)};
+}
 
 }  // namespace
 
 fit::FitOptions held_out_fit(std::uint64_t seed) {
-  constexpr int kCoarseEpochs = 24, kFineEpochs = 1;
-  return aligning_fit(kCoarseEpochs, kFineEpochs, seed);
+  return aligning_fit(kHeldOutCoarseEpochs, kFineEpochs, seed);
 }
 
-std::vector<double> errors_of_held_out_views(const JointProblem& problem,
-                                             std::span<const geometry::ViewCorrection> corrections,
-                                             const distributed::Communicator& processes) {
+AlignmentTrial::AlignmentTrial(const JointProblem& problem,
+                               std::vector<geometry::ViewCorrection> corrections,
+                               const distributed::Communicator& processes)
+    : problem_(problem),
+      processes_(processes),
+      corrections_(std::move(corrections)),
+      field_(aligning_field(problem.field)) {}
+
+const std::vector<double>& AlignmentTrial::coarse_errors() {
+  if (coarse_errors_.empty()) begin();
+  return coarse_errors_;
+}
+
+const std::vector<double>& AlignmentTrial::fine_errors() {
+  if (coarse_errors_.empty()) begin();
+  if (fine_errors_.empty()) go_on();
+  return fine_errors_;
+}
+
+// Takes all coarse steps but the last one, after which the pixels are fine.
+void AlignmentTrial::begin() {
   const base::TraceSpan span("try alignment");
-  const fit::FieldOptions field = aligning_field(problem.field);
-  measurement::Measurement measurement =
-      aligning_measurement(problem, corrections, field, processes);
-  measurement.held_out = measurement::held_out_views(measurement.geometry.tilt_deg, kEvery);
-  fit::Fit fit(measurement, field, held_out_fit(problem.seed), processes);
-  fit.run([](const fit::Fit&) { return true; });
-  const std::vector<measurement::ViewModel> models(measurement.held_out.size());
-  const auto predicted = fit.predict(measurement.held_out, models);
+  measurement_ = aligning_measurement(problem_, corrections_, kCoarseBin, field_, processes_);
+  measurement_.held_out = measurement::held_out_views(measurement_.geometry.tilt_deg, kEvery);
+  fit_ = std::make_unique<fit::Fit>(measurement_, field_, held_out_fit(problem_.seed), processes_);
+  fit_->run([](const fit::Fit& fit) {
+    return fit.progress().step + 1 < kHeldOutCoarseEpochs * fit.steps_per_epoch();
+  });
+  coarse_errors_ = errors();
+  measurement_.rays.reset();  // the next fit needs the memory
+}
+
+void AlignmentTrial::go_on() {
+  const base::TraceSpan span("try alignment with fine pixels");
+  measurement::realign(problem_.recorded, corrections_, 1, problem_.scratch_dir,
+                       fit::band_rows(field_), processes_, measurement_);
+  fit_->reread_measurement();
+  fit_->run([](const fit::Fit&) { return true; });
+  fine_errors_ = errors();
+  fit_.reset();
+  measurement_.rays.reset();
+}
+
+std::vector<double> AlignmentTrial::errors() const {
+  const std::vector<measurement::ViewModel> models(measurement_.held_out.size());
+  const auto predicted = fit_->predict(measurement_.held_out, models);
   std::vector<double> errors(predicted.size());
   base::parallel_for("score held-out views", std::ssize(errors), [&](std::int64_t i) {
     const auto at = static_cast<std::size_t>(i);
-    const Registration registration(image_pair(predicted[at], measurement, fit.stage()), {});
+    const Registration registration(image_pair(predicted[at], measurement_, fit_->stage()), {});
     errors[at] = registration.predicted_error({.shift = false}) / registration.measured_variance();
   });
   return errors;
+}
+
+Comparison compare(AlignmentTrial& before, AlignmentTrial& after) {
+  constexpr double kSure = 3.0;  // standard errors
+  const Comparison coarse = compare_errors(before.coarse_errors(), after.coarse_errors());
+  if (std::abs(coarse.gain.mean) > kSure * coarse.gain.error) return coarse;
+  return compare_errors(before.fine_errors(), after.fine_errors());
 }
 
 }  // namespace tomofield::align

@@ -15,7 +15,7 @@ Measurement half_of_frames(const tilt_series::TiltSeries& series, Half half,
   Measurement measured = whole;
   for (double& sigma : measured.noise_sigma) sigma *= kNoiseOfHalfFrames;
   const std::shared_ptr<SlabViews> rays = read_rays(
-      series, {whole.rays_shape(), whole.unit, band_rows, scratch_dir},
+      series, {whole.rays_shape(), 1, whole.unit, band_rows, scratch_dir},
       [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
         series.read_half(half, view, image, valid);
       },

@@ -43,10 +43,12 @@ SlabViews::Shape Measurement::rays_shape() const {
 
 // A mean over bin² pixels has a bin-th of their noise, and rays are a bin-th as long.
 Measurement binned(const Measurement& fine, int bin) {
+  TOMOFIELD_CHECK(bin % fine.rays_bin == 0, "the rays have wider pixels");
   Measurement coarse = fine;
   if (bin == 1) return coarse;
   const base::TraceSpan span("bin views");
-  coarse.rays = fine.rays->binned(bin);
+  if (bin != fine.rays_bin) coarse.rays = fine.rays->binned(bin / fine.rays_bin);
+  coarse.rays_bin = 1;
   coarse.geometry.width = coarse.rays->shape().width;
   coarse.geometry.height = coarse.rays->shape().height;
   coarse.geometry.thickness /= bin;

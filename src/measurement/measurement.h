@@ -29,7 +29,10 @@ struct Measurement {
   geometry::TiltGeometry geometry;
   Rectangle roi;
   std::shared_ptr<const SlabViews> rays = nullptr;  ///< divided by the unit; null in a plan
-  std::vector<double> noise_sigma = {};             ///< [view]
+  /// The rays are means over so many pixels on each axis, like those of binned(), and serve its
+  /// multiples alone. All else is in the pixels of the views.
+  int rays_bin = 1;
+  std::vector<double> noise_sigma = {};  ///< [view]
   double mean_density = 0.0;
   std::optional<geometry::RayGeometry> ray_geometry = std::nullopt;
   /// [view]: what the microscope makes of the projections, in the pixels of the rays. Empty: the

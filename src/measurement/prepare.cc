@@ -217,22 +217,18 @@ ReadView aligning(const tilt_series::TiltSeries& recorded,
 }
 
 // Returns a function that reads views as recorded and resamples them to means over bin × bin pixels
-// of the aligned ones, from `first_row` on. All pixels of a square get its mean.
+// of the aligned ones, from `first_row` on.
 ReadView aligning_means(const tilt_series::TiltSeries& recorded,
                         std::span<const geometry::ViewCorrection> corrections, int bin,
                         std::int64_t first_row) {
   return [=, &recorded](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
     const RecordedView read(recorded, view, corrections[view]);
-    const std::int64_t width = recorded.aligned_width(), height = recorded.aligned_height();
-    const tilt_series::MaskedImage means = tilt_series::align_means(
-        read.raw, read.transform, width, height, first_row, bin, read.local);
-    for (std::int64_t y = first_row; y < height; ++y)
-      for (std::int64_t x = 0; x < width; ++x) {
-        const std::size_t from = means.index(x / bin, (y - first_row) / bin);
-        const auto to = static_cast<std::size_t>(y * width + x);
-        image[to] = means.values[from];
-        valid[to] = means.valid[from];
-      }
+    const tilt_series::MaskedImage means =
+        tilt_series::align_means(read.raw, read.transform, recorded.aligned_width(),
+                                 recorded.aligned_height(), first_row, bin, read.local);
+    // There may be more rows than those that are fitted.
+    std::ranges::copy_n(means.values.begin(), std::ssize(image), image.begin());
+    std::ranges::copy_n(means.valid.begin(), std::ssize(valid), valid.begin());
   };
 }
 
@@ -332,7 +328,7 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
   set_unit(brightness_of_views(series, read_view, shape, processes), series.background(), prepared);
   set_noise(series, prepared);
   prepared.rays = read_rays(
-      series, {shape, prepared.unit, band_rows, scratch_dir},
+      series, {shape, 1, prepared.unit, band_rows, scratch_dir},
       [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
         series.read_view(view, image, valid);
         series.forget_view(view);
@@ -352,20 +348,16 @@ tilt_series::MaskedImage read_aligned(const tilt_series::TiltSeries& recorded, s
                                   recorded.aligned_height(), read.local);
 }
 
-Measurement prepare_realigned(const tilt_series::TiltSeries& recorded,
-                              std::span<const geometry::ViewCorrection> corrections,
-                              const SpecimenOptions& specimen,
-                              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
-                              const distributed::Communicator& processes) {
+Measurement plan_realigned(const tilt_series::TiltSeries& recorded, const SpecimenOptions& specimen,
+                           const distributed::Communicator& processes) {
+  const std::vector<geometry::ViewCorrection> none(recorded.views().size());
   Measurement prepared = plan_measurement(recorded, specimen);
   prepared.x_tilt_deg = common_x_tilt(recorded.views(), prepared.geometry.thickness);
   prepared.ray_geometry.reset();
-  const ReadView read_view = aligning(recorded, corrections);
-  const SlabViews::Shape shape = prepared.rays_shape();
-  set_unit(brightness_of_views(recorded, read_view, shape, processes), recorded.background(),
-           prepared);
+  set_unit(
+      brightness_of_views(recorded, aligning(recorded, none), prepared.rays_shape(), processes),
+      recorded.background(), prepared);
   set_noise(recorded, prepared);
-  realign(recorded, corrections, 1, scratch_dir, band_rows, processes, prepared);
   return prepared;
 }
 
@@ -376,10 +368,11 @@ void realign(const tilt_series::TiltSeries& recorded,
   measurement.rays.reset();  // its successor needs the memory
   const SlabViews::Shape shape = measurement.rays_shape();
   measurement.rays =
-      read_rays(recorded, {shape, measurement.unit, band_rows, scratch_dir},
+      read_rays(recorded, {shape, bin, measurement.unit, band_rows, scratch_dir},
                 bin == 1 ? aligning(recorded, corrections)
                          : aligning_means(recorded, corrections, bin, shape.first_row),
                 processes);
+  measurement.rays_bin = bin;
   measurement.geometry.tilt_deg = corrected_tilts(recorded, corrections);
 }
 

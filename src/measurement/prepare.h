@@ -60,17 +60,15 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
 tilt_series::MaskedImage read_aligned(const tilt_series::TiltSeries& recorded, std::size_t view,
                                       const geometry::ViewCorrection& correction);
 
-/// Prepares a series that is not resampled as if its views were aligned, each with a correction of
-/// its alignment. The stored pixels of the views stay.
-Measurement prepare_realigned(const tilt_series::TiltSeries& recorded,
-                              std::span<const geometry::ViewCorrection> corrections,
-                              const SpecimenOptions& specimen,
-                              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
-                              const distributed::Communicator& processes);
+/// Returns everything but the rays of a series that is not resampled, as if its views were
+/// resampled as its files align them. realign() reads the rays.
+Measurement plan_realigned(const tilt_series::TiltSeries& recorded, const SpecimenOptions& specimen,
+                           const distributed::Communicator& processes);
 
-/// Reads the rays of such a measurement anew with other corrections. The density unit stays. With
-/// `bin` above 1, all rays of a square of bin × bin pixels have nearly the mean of the square: that
-/// is much less work, and all that binned() with this bin needs.
+/// Reads the rays of such a measurement, or reads them anew, each view with a correction of its
+/// alignment. The density unit stays, and so do the stored pixels of the views. With
+/// `bin` above 1, the rays are nearly the means over squares of bin × bin pixels
+/// (Measurement::rays_bin): that is much less work, and all that binned() with this bin needs.
 void realign(const tilt_series::TiltSeries& recorded,
              std::span<const geometry::ViewCorrection> corrections, int bin,
              const std::filesystem::path& scratch_dir, std::int64_t band_rows,

@@ -229,8 +229,11 @@ class RecordedSeries : public ::testing::Test {
     return maps;
   }
   Measurement realigned(std::span<const ViewCorrection> corrections) {
-    return prepare_realigned(series(maps_, false), corrections, specimen(), scratch(), kHeight,
-                             distributed::Communicator::alone());
+    const auto& processes = distributed::Communicator::alone();
+    const tilt_series::TiltSeries recorded = series(maps_, false);
+    Measurement prepared = plan_realigned(recorded, specimen(), processes);
+    realign(recorded, corrections, 1, scratch(), kHeight, processes, prepared);
+    return prepared;
   }
   Measurement resampled(std::span<const RawFromAligned> maps) {
     return prepare_measurement(series(maps, true), specimen(), scratch());
@@ -321,8 +324,12 @@ TEST_F(RecordedSeries, RealigningForWidePixelsGivesNearlyTheirMeans) {
     const Measurement expected = binned(exact, bin);
     realign(series(maps_, false), corrections_, bin, scratch(), kHeight,
             distributed::Communicator::alone(), found);
-    EXPECT_EQ(found.rays->ray(2, 4 * 3, 4 * 3), found.rays->ray(2, 4 * 3 + bin - 1, 4 * 3 + 1));
+    EXPECT_EQ(found.rays->shape().width, (kWidth + bin - 1) / bin);
+    EXPECT_EQ(found.geometry.width, kWidth);
     const Measurement coarse = binned(found, bin);
+    EXPECT_EQ(coarse.rays, found.rays);
+    EXPECT_EQ(coarse.geometry.width, expected.geometry.width);
+    ASSERT_EQ(binned(found, 4).rays->shape().num_rows, (kHeight + 3) / 4);
     double difference = 0, squares = 0, sum = 0;
     int num_valid = 0, num_different_masks = 0;
     for (int view = 0; view < kNumViews; ++view)

@@ -38,13 +38,18 @@ std::shared_ptr<SlabViews> read_rays(const tilt_series::TiltSeries& series, cons
                                      const distributed::Communicator& processes) {
   const base::TraceSpan span("fill slabs");
   const RowShare share = row_share(spec.shape.num_rows, spec.band_rows, processes);
-  const SlabViews::Holding slabs{slabs_of_bands(share.bands, spec.band_rows, spec.shape.num_rows),
-                                 static_cast<int>(share.rows_for_next / kernels::kLanes)};
+  const base::Range fine = slabs_of_bands(share.bands, spec.band_rows, spec.shape.num_rows);
+  const bool is_fine = spec.bin == 1;
+  const SlabViews::Holding slabs{
+      {fine.begin / spec.bin, (fine.end + spec.bin - 1) / spec.bin},
+      is_fine ? static_cast<int>(share.rows_for_next / kernels::kLanes) : 0};
+  const SlabViews::Shape shape =
+      is_fine ? spec.shape : SlabViews::binned_shape(spec.shape, spec.bin);
   const auto take = [&](base::Range views, std::span<ViewBuffer> buffers) {
     const std::size_t at_once = tilt_series::views_at_once(series.decoding_memory(), processes);
     take_views(read_view, at_once, views, processes, buffers);
   };
-  return std::make_shared<SlabViews>(spec.shape, slabs, spec.unit, take, spec.scratch_dir);
+  return std::make_shared<SlabViews>(shape, slabs, spec.unit * spec.bin, take, spec.scratch_dir);
 }
 
 }  // namespace tomofield::measurement

@@ -12,14 +12,17 @@ namespace tomofield::measurement {
 
 /// Says how views become rays.
 struct RaySpec {
-  SlabViews::Shape shape;
-  double unit = 1.0;           ///< the rays are divided by it
+  SlabViews::Shape shape;      ///< of the views
+  int bin = 1;                 ///< the views are read in pixels so many times as wide
+  double unit = 1.0;           ///< the rays are divided by it, and by `bin`, as they count pixels
   std::int64_t band_rows = 0;  ///< of the bands that processes share (row_share.h)
   const std::filesystem::path& scratch_dir;
 };
 
-/// Reads all views of a series as rays: each process reads the views that it owns, on all threads,
-/// and keeps the slabs of its share. Every process calls it.
+/// Reads all views of a series as rays. With `bin` above 1, read_view() gets images of the shape of
+/// binned views (SlabViews::binned_shape), and the rays are like those of SlabViews::binned(). Each
+/// process reads the views that it owns, on all threads, and keeps the slabs of its share. Every
+/// process calls it.
 std::shared_ptr<SlabViews> read_rays(const tilt_series::TiltSeries& series, const RaySpec& spec,
                                      const ReadView& read_view,
                                      const distributed::Communicator& processes);

@@ -19,6 +19,7 @@
 #include "base/stopwatch.h"
 #include "base/trace.h"
 #include "io/json.h"
+#include "measurement/prepare.h"
 #include "measurement/view_transfers.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
@@ -207,14 +208,14 @@ void log_alignment(const json& record) {
 align::Alignment align_views(const tilt_series::TiltSeries& series,
                              const ReconstructOptions& options, const ReconstructHooks& hooks,
                              const distributed::Communicator& processes) {
-  std::vector<microscope::ViewTransfer> transfers;
+  measurement::Measurement plan = measurement::plan_realigned(series, options.specimen, processes);
   processes.run_collectively([&] {
-    transfers = measurement::view_transfers(options.files, options.resolved, options.input, series);
+    plan.transfers =
+        measurement::view_transfers(options.files, options.resolved, options.input, series);
   });
   const align::JointProblem problem{.recorded = series,
-                                    .specimen = options.specimen,
+                                    .plan = std::move(plan),
                                     .field = options.field,
-                                    .transfers = std::move(transfers),
                                     .seed = options.fit.seed,
                                     .scratch_dir = options.input.scratch_dir,
                                     .progress = hooks.tune_progress,

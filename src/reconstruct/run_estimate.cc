@@ -34,6 +34,7 @@ constexpr std::size_t kSmallFiles = std::size_t{2} << 20;  // metrics and pictur
 struct Work {
   double steps_of_vertices = 0, samples_of_vertices = 0;
   double steps_of_factors = 0, samples_of_factors = 0;
+  double updates_of_views = 0;  // in times of align::seconds_of_update()
 
   // Adds the first epochs of a fit of at most so many rows, `times` times.
   void add_fit(const measurement::Measurement& plan, const fit::FieldOptions& field,
@@ -64,9 +65,10 @@ void add_alignment(const measurement::Measurement& plan, const ReconstructOption
   constexpr double kAllRows = std::numeric_limits<double>::infinity();
   const fit::FieldOptions field = align::planned_field(options.field);
   const bool from_raw = options.resolved.align == Alignment::kFull;
-  for (const align::PlannedFits& fits : align::planned_fits(from_raw, options.fit.seed))
-    work.add_fit(plan, field, fits.options, run.steps_an_epoch, kAllRows, fits.cost * fits.times,
-                 fits.epochs);
+  for (const align::PlannedFits& fits : align::planned_fits(from_raw, options.fit.seed)) {
+    work.add_fit(plan, field, fits.options, run.steps_an_epoch, kAllRows, fits.times, fits.epochs);
+    work.updates_of_views += fits.updates * fits.times * plan.geometry.num_views();
+  }
 }
 
 // Returns the work of the alignment, of the fit and of the trials that choose its settings.
@@ -84,14 +86,22 @@ Work work_of(const measurement::Measurement& plan, const ReconstructOptions& opt
   return work;
 }
 
-// Decodes a view in the middle of the series and returns its processor time.
-double seconds_of_a_view(const tilt_series::TiltSeries& series) {
+// Holds the processor times of decoding a view and of aligning it once.
+struct ViewTimes {
+  double decoding = 0, update = 0;
+};
+
+// Measures them on a view in the middle of the series.
+ViewTimes measure_view(const tilt_series::TiltSeries& series) {
   const auto pixels = static_cast<std::size_t>(series.width() * series.height());
   std::vector<float> image(pixels);
   std::vector<std::uint8_t> valid(pixels);
+  ViewTimes times;
   const base::ProcessorStopwatch decoding;
   series.read_view(series.views().size() / 2, image, valid);
-  return decoding.seconds();
+  times.decoding = decoding.seconds();
+  times.update = align::seconds_of_update(image, series.width());
+  return times;
 }
 
 double num_voxels(const RunPlan& run) {
@@ -129,9 +139,13 @@ RunEstimate estimate_run(const tilt_series::TiltSeries& series, const Reconstruc
   estimate.sample_steps = work.samples();
   if (options.field.leaf_size > kLargestLeaf) return estimate;
   const StepTimes times = measure_steps(plan, options.field, options.fit);
+  const ViewTimes of_view = measure_view(series);
+  // An alignment reads the series once more, as it was recorded.
+  const double readings = options.resolved.align == Alignment::kOff ? 1.0 : 2.0;
   estimate.core_seconds =
       kStart + work.seconds(times) + kSecondsAVoxel * num_voxels(run) +
-      kReadingsOfAView * seconds_of_a_view(series) * static_cast<double>(series.views().size());
+      work.updates_of_views * of_view.update +
+      readings * kReadingsOfAView * of_view.decoding * static_cast<double>(series.views().size());
   return estimate;
 }
 
