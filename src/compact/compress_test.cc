@@ -95,8 +95,8 @@ TEST(Compress, EmptyRegionsAreLargeLeavesWithoutParameters) {
   const CompactField made = compress(*vertices, {Budget::Kind::kDecibels, 0.1});
   const field::Quadtree& tree = made.field->tree();
   const int textured = tree.find_leaf(40, 10), empty = tree.find_leaf(500, 10);
-  EXPECT_GT(made.codes.code(textured).size(), 100u);
-  EXPECT_TRUE(made.codes.code(empty).empty());
+  EXPECT_GT(made.coded.codes.code(textured).size(), 100u);
+  EXPECT_TRUE(made.coded.codes.code(empty).empty());
   EXPECT_LE(tree.leaf(textured).square.size, 32);
   EXPECT_EQ(made.field->density(500.2, 10.1, 12.3), 0.0);
 }
