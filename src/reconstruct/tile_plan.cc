@@ -138,7 +138,8 @@ TilePlan plan_tiles(const PlannedFit& planned) {
   const std::int64_t band = planned.domain.tree.roots().cell_size;
   std::int64_t rows = planned.plan.roi.height() / band * band;
   TilePlan tiles = tiles_of_rows(planned, rows);
-  while (rows > band && static_cast<double>(tiles.memory_bytes) > kUsablePart * static_cast<double>(free))
+  while (rows > band &&
+         static_cast<double>(tiles.memory_bytes) > kUsablePart * static_cast<double>(free))
     tiles = tiles_of_rows(planned, rows -= band);
   return tiles;
 }
