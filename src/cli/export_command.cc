@@ -180,7 +180,9 @@ void add_box_options(CLI::App& command, ExportArguments& arguments) {
 void add_export_command(CLI::App& program) {
   auto arguments = std::make_shared<ExportArguments>();
   CLI::App* command = program.add_subcommand(
-      "export", "Write any box of a model, at any voxel size and orientation, as an MRC volume");
+      "export",
+      "Write any box of a model, at any voxel size and orientation, as an MRC volume; or make a "
+      "model compact");
   command->add_option("model", arguments->model, "Model file (.h5) of reconstruct")->required();
   CLI::Option* volume =
       command->add_option("-o,--output", arguments->output, "The MRC volume to write");
