@@ -59,6 +59,19 @@ def test_a_budget_in_decibels_is_the_change_that_the_documents_state(folder, tmp
     assert os.path.getsize(model) < os.path.getsize(os.path.join(folder, "fit.h5")) / 4
 
 
+def test_a_budget_in_decibels_holds_against_the_truth(folder, tmp_path):
+    truth = read(os.path.join(folder, "series", "truth.mrc"))
+    best = harness.psnr(read(os.path.join(folder, "fit.mrc")), truth)
+    half_float = 2 * truth.size  # bytes of a volume of mode 12
+    for budget, times_smaller in ((0.1, 6), (1, 10)):
+        model, volume = tmp_path / f"{budget}.h5", tmp_path / f"{budget}.mrc"
+        harness.succeed("export", os.path.join(folder, "fit.h5"), "--compact", model, "--budget",
+                        f"{budget}dB")
+        harness.succeed("export", model, "-o", volume)
+        assert 0 < best - harness.psnr(read(volume), truth) <= budget
+        assert os.path.getsize(model) < half_float / times_smaller
+
+
 def test_a_budget_in_bytes_is_kept(folder, tmp_path):
     changes = []
     for kilobytes in (10, 40):
