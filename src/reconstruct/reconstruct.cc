@@ -140,7 +140,8 @@ RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOp
                       const ReconstructHooks& hooks, const distributed::Communicator& processes) {
   RunRecord record{.origin = {}, .alignment = alignment_of(series)};
   base::log_info(base::describe_threads());
-  const TilePlan tiles = plan_run(series, options, processes).tiles;
+  TilePlan tiles;
+  if (!options.resolved.budget.empty()) tiles = plan_run(series, options, processes).tiles;
   Run run{.hooks = hooks,
           .processes = processes,
           .options = options,

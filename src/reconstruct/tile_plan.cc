@@ -57,13 +57,13 @@ double code_bytes(const PlannedFit& planned) {
   return budget.amount;
 }
 
-// Returns the peak memory of the fit of the coarse stages, and of the fits of the tiles beside the
-// vertices of the coarse ones.
-std::size_t memory_of_tiles(const PlannedFit& planned, const TilePlan& tiles) {
+// Returns the peak memory: that of the fit of the coarse stages, or of the fit of a tile beside the
+// vertices of the coarse stages.
+std::size_t memory_of_tiles(const PlannedFit& planned, const fit::Domain& coarse,
+                            const TilePlan& tiles) {
   const auto& [series, plan, domain, options, processes] = planned;
   const std::vector<fit::Stage> stages = fit::make_stages(options.field, options.fit);
   const auto split = stages.begin() + tiles.num_whole_stages;
-  const fit::Domain coarse = coarse_domain(domain, std::prev(split)->bin);
   const std::size_t of_coarse =
       estimate_memory({series, plan, coarse, options, processes}, {stages.begin(), split});
   measurement::Measurement strip = plan;
@@ -103,12 +103,15 @@ const char* fault_of_tiles(const PlannedFit& planned) {
 TilePlan tiles_of_rows(const PlannedFit& planned, std::int64_t rows) {
   const std::int64_t band = planned.domain.tree.roots().cell_size;
   TilePlan tiles;
-  tiles.num_whole_stages = num_whole_stages(
-      planned.domain, fit::make_stages(planned.options.field, planned.options.fit));
+  const auto stages = fit::make_stages(planned.options.field, planned.options.fit);
+  tiles.num_whole_stages = num_whole_stages(planned.domain, stages);
   tiles.num_rows = static_cast<int>(planned.plan.roi.height());
   tiles.rows = static_cast<int>((rows + band - 1) / band * band);
   tiles.overlap = static_cast<int>(band);
-  tiles.memory_bytes = memory_of_tiles(planned, tiles);
+  const fit::Domain coarse = coarse_domain(
+      planned.domain, stages[static_cast<std::size_t>(tiles.num_whole_stages) - 1].bin);
+  tiles.coarse_parameters = field::count_parameters(FieldKind::kGrid, coarse.shapes);
+  tiles.memory_bytes = memory_of_tiles(planned, coarse, tiles);
   return tiles;
 }
 
@@ -122,6 +125,12 @@ std::vector<Tile> TilePlan::tiles_from(int first_row) const {
         {{first, end}, {std::max(first - overlap, 0), std::min(end + overlap, num_rows)}});
   }
   return tiles;
+}
+
+double TilePlan::repeats() const {
+  double fitted = 0;
+  for (const Tile& tile : tiles_from(0)) fitted += tile.fitted.size();
+  return fitted / num_rows;
 }
 
 TilePlan plan_tiles(const PlannedFit& planned) {

@@ -15,6 +15,7 @@ TEST(TilePlan, TilesCoverTheRegionWithRowsBesideThem) {
   EXPECT_EQ(tiles[2].own, (base::Range{256, 300}));
   EXPECT_EQ(tiles[2].fitted, (base::Range{192, 300}));
   EXPECT_EQ(plan.tiles_from(128).size(), 2u);
+  EXPECT_DOUBLE_EQ(plan.repeats(), (192 + 236 + 108) / 300.0);
   EXPECT_FALSE(TilePlan{}.is_used());
 }
 
