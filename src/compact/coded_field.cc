@@ -19,6 +19,11 @@ field::LeafShape with_upper_faces(const field::LeafShape& shape) {
   return {.nx = shape.nx + 1, .ny = shape.ny + 1, .nz = shape.nz};
 }
 
+std::size_t decoded_numbers(const field::LeafShape& shape) {
+  return field::count_parameters(FieldKind::kVm, {shape}) +
+         field::count_parameters(FieldKind::kGrid, {with_upper_faces(shape)});
+}
+
 void append(CodedField& lower, const CodedField& upper) {
   TOMOFIELD_CHECK(lower.thickness == upper.thickness, "bands of one field");
   lower.tree = field::joined(lower.tree, upper.tree);

@@ -34,6 +34,9 @@ inline constexpr field::LeafShape kNoLeaf{.nx = 1, .ny = 1, .nz = 2};
 /// Returns the shape of a leaf with its upper faces.
 field::LeafShape with_upper_faces(const field::LeafShape& shape);
 
+/// Returns how many numbers a leaf has in memory while it is decoded: its factors and its vertices.
+std::size_t decoded_numbers(const field::LeafShape& shape);
+
 /// A field as codes, which take little memory (decode_field).
 struct CodedField {
   field::Quadtree tree;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "base/memory.h"
 #include "compact/decoded_field.h"
 #include "kernels/lanes.h"
 
@@ -26,7 +27,15 @@ base::Range bands_for(const field::RootGrid& roots, double low, double high) {
 }
 
 std::unique_ptr<field::Field> decode_bands(const CodedField& coded, double low, double high) {
-  return decode_field(some_bands(coded, bands_for(coded.tree.roots(), low, high)));
+  const CodedField bands = some_bands(coded, bands_for(coded.tree.roots(), low, high));
+  std::size_t bytes = 0;
+  for (const field::LeafShape& shape : bands.codes.shapes)
+    bytes += sizeof(float) * decoded_numbers(shape);
+  constexpr std::size_t kSmall = std::size_t{1} << 24;
+  if (bytes > kSmall)
+    base::require_memory(bytes, "this part of a compact model",
+                         "use a machine with more, or a smaller --box");
+  return decode_field(bands);
 }
 
 // Returns how many rows of a box, a multiple of those of a slab, some bands have.

@@ -298,8 +298,12 @@ class ModelReader {
       compact::CodedField coded{read_tree(group.group("tree")), read_thickness(group), {}};
       if (choose) kept = choose(coded.tree);
       coded.codes = read_codes(group, coded.tree);
+      const std::size_t bytes = bytes_of_decoded(coded.codes.shapes);
       if (decodes) {
-        require_room_for_decoded(coded.codes.shapes);
+        constexpr std::size_t kSmall = std::size_t{1} << 24;
+        if (bytes > kSmall)
+          base::require_memory(bytes, fmt::format("'{}'", path_).c_str(),
+                               "use a machine with more, or another copy");
         model.field = compact::decode_field(coded);
       }
       model.coded = std::move(coded);
@@ -333,22 +337,17 @@ class ModelReader {
     return codes;
   }
 
-  // Counts leaf by leaf, since the sum of all leaves could wrap.
-  void require_room_for_decoded(const std::vector<field::LeafShape>& shapes) const {
+  // Returns the bytes of the factors and of the vertices of all leaves. Counts leaf by leaf, since
+  // the sum could wrap.
+  std::size_t bytes_of_decoded(const std::vector<field::LeafShape>& shapes) const {
     constexpr std::size_t kMost = std::size_t{1} << 40;
     std::size_t count = 0;
     for (const field::LeafShape& shape : shapes) {
-      const std::size_t more =
-          field::count_parameters(FieldKind::kVm, {shape}) +
-          field::count_parameters(FieldKind::kGrid, {compact::with_upper_faces(shape)});
+      const std::size_t more = compact::decoded_numbers(shape);
       require(more <= kMost - count, "its leaves need more numbers than any file holds");
       count += more;
     }
-    constexpr std::size_t kSmall = std::size_t{1} << 22;
-    if (count > kSmall) {
-      base::require_memory(count * sizeof(float), fmt::format("'{}'", path_).c_str(),
-                           "use a machine with more, or another copy");
-    }
+    return count * sizeof(float);
   }
 
   template <typename T>
