@@ -110,6 +110,8 @@ def measure(options, arguments, kind, noise, seed, scratch):
     with open(os.path.splitext(volume)[0] + ".json") as file:
         figures = json.load(file)["metrics"]
     row.update({key: figures[key] for key in ("parameters", "leaves") if key in figures})
+    if "compact" in figures:
+        row["parameters"] = figures["compact"]["parameters"]
     model = os.path.splitext(volume)[0] + ".h5"
     if os.path.exists(model):
         if arguments.startswith("reconstruct") and row["leaves"] > 1:  # else there are no faces

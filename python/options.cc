@@ -136,6 +136,7 @@ void add_field_and_fit(Class& options) {
       .def_readwrite("rank", &Options::rank)
       .def_readwrite("margin_spacing", &Options::margin_spacing)
       .def_readwrite("budget", &Options::budget)
+      .def_readwrite("tile_rows", &Options::tile_rows)
       .def_readwrite("epochs", &Options::epochs)
       .def_readwrite("vertex_epochs", &Options::vertex_epochs)
       .def_readwrite("coarse_epochs", &Options::coarse_epochs)

@@ -104,8 +104,9 @@ struct Options {
   double vertex_spacing = 1.0;  ///< binned pixels between vertices
   int rank = 24;                ///< components of each mode (vm)
   std::optional<Activation> activation;
-  double margin_spacing = 2.0;  ///< binned pixels between samples of the margin
-  std::string budget;           ///< makes the finished model compact: "0.1dB", "2M", "5MB"
+  double margin_spacing = 2.0;   ///< binned pixels between samples of the margin
+  std::string budget;            ///< makes the finished model compact: "0.1dB", "2M", "5MB"
+  std::optional<int> tile_rows;  ///< binned rows that are fitted and made compact at a time; 0: all
 
   // Fit
   std::optional<int> epochs;         ///< passes over all views at full resolution

@@ -57,6 +57,7 @@ class Options(TypedDict, total=False):
     activation: Optional[Literal["softplus", "identity"]]
     margin_spacing: float
     budget: str
+    tile_rows: Optional[int]
 
     # Fit
     epochs: Optional[int]

@@ -30,9 +30,9 @@ Solution reconstruct_with(const IngpOptions& options, VoxelProblem& problem, dou
   return reconstruct_ingp(problem, options, mean_density, after_iteration);
 }
 
-Solution reconstruct_with(const ImplicitOptions& options, VoxelProblem& problem,
+Solution reconstruct_with(const FourierNetOptions& options, VoxelProblem& problem,
                           double mean_density, const AfterIteration& after_iteration) {
-  return reconstruct_implicit(problem, options, mean_density, after_iteration);
+  return reconstruct_fourier_net(problem, options, mean_density, after_iteration);
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace tomofield::baseline {
 /// The options of one of the methods. Each has facts() and json(), and an overload of
 /// reconstruct_with() in method.cc. A new method needs these and a line here.
 using Method =
-    std::variant<WbpOptions, SirtOptions, SartTvOptions, TvOptions, IngpOptions, ImplicitOptions>;
+    std::variant<WbpOptions, SirtOptions, SartTvOptions, TvOptions, IngpOptions, FourierNetOptions>;
 
 MethodFacts facts_of(const Method& method);
 /// Returns the size of a method. Every voxel is a parameter unless its options have a size().

@@ -300,10 +300,10 @@ void add_ingp(CLI::App& baseline, const Origins& origins) {
       ->group(group);
 }
 
-void add_implicit(CLI::App& baseline, const Origins& origins) {
+void add_fourier_net(CLI::App& baseline, const Origins& origins) {
   CLI::App& command = *baseline.add_subcommand(
-      "implicit", "A network of coordinates, which learns the noise of each view");
-  const auto arguments = add_method<baseline::ImplicitOptions>(command, origins);
+      "fourier-net", "A network of plane waves, which learns the noise of each view");
+  const auto arguments = add_method<baseline::FourierNetOptions>(command, origins);
   add_network_options(command, arguments->method);
   command
       .add_option("--features", arguments->method.features,
@@ -331,7 +331,7 @@ void add_baseline_command(CLI::App& program, const Origins& origins) {
   add_tv(command, origins);
   add_tensorf(command, origins);
   add_ingp(command, origins);
-  add_implicit(command, origins);
+  add_fourier_net(command, origins);
 }
 
 }  // namespace tomofield::cli

@@ -82,14 +82,14 @@ OrientedBox unrotated_box(const ExportArguments& arguments, const Model& model) 
 void write_compact(const ExportArguments& arguments) {
   const compact::Budget budget = compact::parse_budget(arguments.budget);
   Model model = output::load_model(arguments.model);
-  if (model.codes || model.field->kind() != FieldKind::kGrid) {
+  if (model.coded || model.field->kind() != FieldKind::kGrid) {
     throw Error(fmt::format(
         "'{}' is a model of factors, and --compact is for models of vertices (--field grid)",
         arguments.model.string()));
   }
   compact::CompactField made = compact::compress(*model.field, budget);
   model.field = std::move(made.field);
-  model.codes = std::move(made.codes);
+  model.coded = std::move(made.coded);
   io::OutputSet results;
   output::save_model(arguments.compact, model);
   results.commit();
@@ -106,7 +106,7 @@ void run_export(ExportArguments& arguments) {
     throw Error("nothing to write: give -o VOLUME.mrc, or --compact MODEL.h5");
   const std::vector<io::OutputLock> locks = claim_output(arguments);
   if (!arguments.compact.empty()) return write_compact(arguments);
-  const Model model = output::load_model(arguments.model);
+  const Model model = output::load_undecoded(arguments.model);
   OrientedBox box = unrotated_box(arguments, model);
   const auto& angles = arguments.rotation;
   if (!angles.empty())
@@ -180,7 +180,9 @@ void add_box_options(CLI::App& command, ExportArguments& arguments) {
 void add_export_command(CLI::App& program) {
   auto arguments = std::make_shared<ExportArguments>();
   CLI::App* command = program.add_subcommand(
-      "export", "Write any box of a model, at any voxel size and orientation, as an MRC volume");
+      "export",
+      "Write any box of a model, at any voxel size and orientation, as an MRC volume; or make a "
+      "model compact");
   command->add_option("model", arguments->model, "Model file (.h5) of reconstruct")->required();
   CLI::Option* volume =
       command->add_option("-o,--output", arguments->output, "The MRC volume to write");

@@ -161,21 +161,22 @@ void print_leaves(const field::Quadtree& tree, const std::vector<LeafShape>& sha
 }
 
 void print_field(const output::Model& model) {
-  const Field& field = *model.field;
-  const field::RootGrid& roots = field.tree().roots();
-  const std::string activation =
-      field.activation.beta > 0 ? fmt::format("softplus of sharpness {:.6g}", field.activation.beta)
-                                : "no activation";
-  if (model.codes) {
-    print("  field            compact, {} parameters in {} bytes\n", model.codes->num_parameters(),
-          model.codes->bytes.size());
+  const field::RootGrid& roots = model.tree().roots();
+  if (model.coded) {
+    print("  field            compact, {} parameters in {} bytes\n",
+          model.coded->codes.num_parameters(), model.coded->codes.bytes.size());
   } else {
+    const Field& field = *model.field;
+    const std::string activation =
+        field.activation.beta > 0
+            ? fmt::format("softplus of sharpness {:.6g}", field.activation.beta)
+            : "no activation";
     print("  field            {}, {} parameters, bias {:.6g}, {}\n", base::name_of(field.kind()),
           field.num_parameters(), field.bias, activation);
   }
   print("  quadtree         {} × {} root cells of {} px from {},{}; {} leaves\n", roots.columns,
-        roots.rows, roots.cell_size, roots.x0, roots.y0, field.tree().num_leaves());
-  print_leaves(field.tree(), model.codes ? model.codes->shapes : field.shapes());
+        roots.rows, roots.cell_size, roots.x0, roots.y0, model.tree().num_leaves());
+  print_leaves(model.tree(), model.coded ? model.coded->codes.shapes : model.field->shapes());
 }
 
 void print_training(const output::TrainingState& state) {
@@ -193,7 +194,7 @@ void print_training(const output::TrainingState& state) {
 // Prints the contents of a model file.
 void print_model(const std::filesystem::path& path) {
   output::TrainingState training;
-  const output::Model model = output::load_model(path, &training);
+  const output::Model model = output::load_undecoded(path, &training);
   print("{}: model, written by {}\n", path.string(), model.written_by);
   print_geometry(model);
   print_field(model);

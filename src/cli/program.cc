@@ -190,7 +190,8 @@ int run_program(int argc, char** argv, const distributed::Session& session) {
     if (processes.is_root()) say("tomofield: {}\n", message);
   };
   CLI::App program{
-      "tomofield: clean tomograms from aligned tilt series by continuous density fields",
+      "tomofield: clean tomograms and compact models from aligned tilt series by continuous "
+      "density fields",
       "tomofield"};
   add_version_flag(program);
   program.formatter(std::make_shared<HelpFormatter>());

@@ -80,6 +80,12 @@ void print_plan(const reconstruction::ReconstructOptions& options,
         base::thread_count(), processes, static_cast<double>(plan.memory_bytes) / (1 << 30),
         num_processes == 1 ? "" : " each");
   print("epochs: {}\n", epochs_text(plan.stages));
+  if (plan.tiles.is_used()) {
+    print(
+        "tiles: {} of {} rows, which are made compact one after the other; {} of the stages for "
+        "the whole region before them\n",
+        plan.tiles.tiles_from(0).size(), plan.tiles.rows, plan.tiles.num_whole_stages);
+  }
   if (plan.num_fits == 2)
     print(
         "halves: two such fits, one after the other, which share the scales of views of a short "

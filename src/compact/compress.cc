@@ -11,6 +11,8 @@
 
 #include "base/parallel.h"
 #include "base/trace.h"
+#include "compact/decoded_field.h"
+#include "compact/leaf_code.h"
 #include "compact/place_tree.h"
 #include "compact/quantise.h"
 #include "compact/structure.h"
@@ -44,10 +46,46 @@ struct Limit {
   double value(const Choice& choice) const { return of_error ? choice.error : choice.cost; }
 };
 
+// A part of the region of interest.
+struct MeasuredRegion {
+  double volume = 0.0, variance = 0.0;
+};
+
+bool is_in(const field::Square& square, base::Range rows) {
+  return square.y0 < rows.end && square.y1() > rows.begin;
+}
+
+// Measures some rows of the region of interest.
+MeasuredRegion measure(const VertexDensities& vertices, base::Range rows) {
+  const field::Quadtree& tree = vertices.field().tree();
+  std::vector<std::array<double, 3>> sums(static_cast<std::size_t>(tree.num_leaves()));
+  base::parallel_for("measure densities", tree.num_leaves(), [&](std::int64_t i) {
+    const field::QuadtreeNode& leaf = tree.leaf(static_cast<int>(i));
+    if (leaf.region != field::Region::kInterest || !is_in(leaf.square, rows)) return;
+    const PlaceDensities place = vertices.read(leaf.square);
+    sums[static_cast<std::size_t>(i)] = {
+        place.volume, place.values.cast<double>().sum() * place.volume_of_vertex(),
+        place.values.cast<double>().squaredNorm() * place.volume_of_vertex()};
+  });
+  std::array<double, 3> all{};
+  for (const auto& sum : sums) {
+    for (std::size_t k = 0; k < all.size(); ++k) all[k] += sum[k];
+  }
+  constexpr double kSmallest = 1e-12;  // for a field without any contrast
+  const double mean = all[1] / all[0];
+  return {all[0], std::max(kSmallest, all[2] / all[0] - mean * mean)};
+}
+
 class Compression {
  public:
-  explicit Compression(const field::Field& vertices)
-      : vertices_(vertices), squares_(place_squares(vertices_, kLargestSide)) {
+  // A change in decibels counts against `variance`, or that of the rows if it is 0.
+  Compression(const field::Field& vertices, base::Range rows, std::int64_t largest_side,
+              double variance)
+      : vertices_(vertices),
+        rows_(rows),
+        squares_(place_squares(vertices_, largest_side, rows)),
+        region_(measure(vertices_, rows)) {
+    if (variance > 0) region_.variance = variance;
     places_.resize(squares_.nodes.size());
     prices_.resize(places_.size());
     is_tried_.assign(places_.size(), 1);
@@ -58,11 +96,10 @@ class Compression {
         prices_[i].push_back(std::numeric_limits<double>::infinity());
       }
     }
-    measure();
   }
 
-  double variance() const { return variance_; }
-  double volume() const { return volume_; }  // of the region of interest
+  double variance() const { return region_.variance; }
+  double volume() const { return region_.volume; }  // of the region of interest
 
   // Finds ranks at prices around the one that meets the limit, and chooses among them.
   void choose(const Limit& limit) {
@@ -92,18 +129,39 @@ class Compression {
 
   const Choice& choice() const { return choice_; }
 
+  // Returns the squared error of what was chosen with its factors rounded as build() rounds them,
+  // before faces are softened. It takes a fraction of the time of build(), which codes the factors.
+  double rounded_error(double rounding_error) const {
+    const double step = step_of(rounding_error);
+    std::vector<double> errors(leaves_.size());
+    base::parallel_for("round leaves", std::ssize(leaves_), [&](std::int64_t i) {
+      const auto at = static_cast<std::size_t>(i);
+      if (squares_.leaf_like[place_of_leaf_[at]] < 0) return;
+      const PlaceDensities place = vertices_.read(tree_.leaf(static_cast<int>(i)).square);
+      const QuantisedLeaf rounded = quantise(leaves_[at], place.nx, place.ny, place.nz, step);
+      const FloatMatrix values =
+          values_of(dequantised_modes(rounded, step), place.nx, place.ny, place.nz);
+      errors[at] = (values - place.values).cast<double>().squaredNorm() * place.volume_of_vertex();
+    });
+    return std::accumulate(errors.begin(), errors.end(), 0.0);
+  }
+
   // Rounds the factors of what was chosen, so that rounding alone adds this error.
   CompactField build(double rounding_error) const {
     CompactField made;
-    LeafCodes& codes = made.codes;
-    codes.step = std::sqrt(rounding_error / std::max(error_of_step_, 1e-300));
+    made.coded = {.tree = tree_, .thickness = vertices_.field().thickness(), .codes = {}};
+    LeafCodes& codes = made.coded.codes;
+    const double step = step_of(rounding_error);
+    const auto num_bands = static_cast<std::size_t>(tree_.roots().rows);
+    codes.step.assign(num_bands, step);
+    codes.face_weight.assign(num_bands, 0.0);
     codes.shapes.assign(leaves_.size(), kNoLeaf);
     std::vector<std::vector<std::uint8_t>> code(leaves_.size());
     base::parallel_for("code leaves", std::ssize(leaves_), [&](std::int64_t i) {
       const auto at = static_cast<std::size_t>(i);
       if (squares_.leaf_like[place_of_leaf_[at]] < 0) return;
       const PlaceDensities place = vertices_.read(tree_.leaf(static_cast<int>(i)).square);
-      const QuantisedLeaf rounded = quantise(leaves_[at], place.nx, place.ny, place.nz, codes.step);
+      const QuantisedLeaf rounded = quantise(leaves_[at], place.nx, place.ny, place.nz, step);
       codes.shapes[at] = rounded.shape;
       code[at] = encode(rounded);
     });
@@ -112,54 +170,34 @@ class Compression {
       codes.bytes.insert(codes.bytes.end(), of_leaf.begin(), of_leaf.end());
       codes.offset.push_back(std::ssize(codes.bytes));
     }
-    const double thickness = vertices_.field().thickness();
-    codes.face_weight =
-        matching_face_weight(*decode_field(tree_, thickness, codes), codes, vertices_.field());
-    made.field = decode_field(tree_, thickness, codes);
+    codes.face_weight.assign(
+        num_bands, matching_face_weight(*decode_field(made.coded), codes, vertices_.field()));
+    made.field = decode_field(made.coded);
     made.report = {.parameters = codes.num_parameters(),
                    .bytes = codes.bytes.size(),
-                   .mean_square_change = square_change(*made.field) / volume_,
-                   .variance = variance_};
-    made.report.decibels = decibels_of(made.report.mean_square_change / variance_);
+                   .mean_square_change = square_change(*made.field) / volume(),
+                   .variance = variance(),
+                   .volume = volume()};
+    made.report.decibels = decibels_of(made.report.mean_square_change / variance());
     return made;
   }
 
  private:
-  // Measures the region of interest: its volume, and the variance of its densities.
-  void measure() {
-    const field::Field& field = vertices_.field();
-    const int num_leaves = field.tree().num_leaves();
-    std::vector<std::array<double, 3>> sums(static_cast<std::size_t>(num_leaves));
-    base::parallel_for("measure densities", num_leaves, [&](std::int64_t i) {
-      const int leaf = static_cast<int>(i);
-      if (field.tree().leaf(leaf).region != field::Region::kInterest) return;
-      const PlaceDensities place = vertices_.read(field.tree().leaf(leaf).square);
-      sums[static_cast<std::size_t>(i)] = {
-          place.volume, place.values.cast<double>().sum() * place.volume_of_vertex(),
-          place.values.cast<double>().squaredNorm() * place.volume_of_vertex()};
-    });
-    std::array<double, 3> all{};
-    for (const auto& sum : sums) {
-      for (std::size_t k = 0; k < all.size(); ++k) all[k] += sum[k];
-    }
-    volume_ = all[0];
-    constexpr double kSmallest = 1e-12;  // for a field without any contrast
-    variance_ = std::max(kSmallest, all[2] / all[0] - std::pow(all[1] / all[0], 2));
-  }
-
   // Estimates the price at which the z mode alone would meet a limit, from some leaves.
   double surveyed_price(const Limit& limit) const {
     constexpr int kMostLeaves = 48;
     const field::Quadtree& tree = vertices_.field().tree();
-    const int stride = std::max(1, tree.num_leaves() / kMostLeaves);
+    std::vector<field::Square> leaves;
+    for (int leaf = 0; leaf < tree.num_leaves(); ++leaf)
+      if (is_in(tree.leaf(leaf).square, rows_)) leaves.push_back(tree.leaf(leaf).square);
+    const std::size_t stride = std::max<std::size_t>(1, leaves.size() / kMostLeaves);
     struct Component {
       double energy, cost;
     };
-    std::vector<std::vector<Component>> found(
-        static_cast<std::size_t>((tree.num_leaves() + stride - 1) / stride));
+    std::vector<std::vector<Component>> found((leaves.size() + stride - 1) / stride);
     std::vector<double> volumes(found.size());
     base::parallel_for("survey leaves", std::ssize(found), [&](std::int64_t i) {
-      const PlaceDensities place = vertices_.read(tree.leaf(static_cast<int>(i) * stride).square);
+      const PlaceDensities place = vertices_.read(leaves[static_cast<std::size_t>(i) * stride]);
       volumes[static_cast<std::size_t>(i)] = place.volume;
       const double cost = static_cast<double>(place.nz) + static_cast<double>(place.nx) * place.ny;
       for (const float energy : energies_of_sections(place))
@@ -176,7 +214,7 @@ class Compression {
     std::ranges::sort(all, [](const Component& a, const Component& b) {
       return a.energy * b.cost > b.energy * a.cost;
     });
-    const double most = limit.most * volume / volume_of_field();
+    const double most = limit.most * volume / volume_of_rows();
     double price = 1e-30;
     for (const Component& component : all) {
       if (limit.of_error ? error <= most : cost >= most) break;
@@ -209,6 +247,10 @@ class Compression {
     return std::accumulate(errors.begin(), errors.end(), 0.0);
   }
 
+  double step_of(double rounding_error) const {
+    return std::sqrt(rounding_error / std::max(error_of_step_, 1e-300));
+  }
+
   // Finds the factors of the places that are chosen.
   void truncate_chosen() {
     tree_ = chosen_tree(squares_, choice_, place_of_leaf_);
@@ -228,10 +270,10 @@ class Compression {
     error_of_step_ = std::accumulate(errors.begin(), errors.end(), 0.0);
   }
 
-  double volume_of_field() const {
+  double volume_of_rows() const {
     const field::RootGrid& roots = vertices_.field().tree().roots();
-    const auto side = static_cast<double>(roots.cell_size);
-    return side * side * roots.columns * roots.rows * vertices_.field().thickness();
+    return static_cast<double>(roots.cell_size * roots.columns * rows_.size()) *
+           vertices_.field().thickness();
   }
 
   // Restricts further rounds to the places of a choice, their parents and their children.
@@ -260,7 +302,9 @@ class Compression {
   }
 
   VertexDensities vertices_;
+  base::Range rows_;
   PlaceSquares squares_;
+  MeasuredRegion region_;
   PlaceTree places_;
   std::vector<std::vector<double>> prices_;  // of each candidate
   std::vector<char> is_tried_;               // whether the next round adds a candidate to a place
@@ -269,30 +313,30 @@ class Compression {
   std::vector<std::size_t> place_of_leaf_;  // of this tree
   std::vector<Truncation> leaves_;          // of this tree
   double error_of_step_ = 0.0;              // of rounding these leaves to steps of 1
-  double volume_ = 0.0, variance_ = 0.0;
   double last_price_ = 0.0;
 };
 
 // Rounding adds less than uniform errors would where components vanish, and more where vectors are
 // short, so the step is corrected once it was tried.
 CompactField within_decibels(Compression& compression, double decibels) {
-  constexpr int kTries = 5;
+  constexpr int kTries = 5, kBuilds = 3;
   constexpr double kClose = 0.98;
   const double change = allowed_change(decibels) * compression.variance() * compression.volume();
   compression.choose({.of_error = true, .most = (1 - kRoundingForBytes) * change});
   const double left = std::max(change - compression.choice().error, 0.01 * change);
   double rounding = left;
-  CompactField best;
   for (int i = 0; i < kTries; ++i) {
-    CompactField made = compression.build(rounding);
-    const double added =
-        made.report.mean_square_change * compression.volume() - compression.choice().error;
-    const bool is_within = made.report.decibels <= decibels;
-    if (is_within || best.field == nullptr) best = std::move(made);
-    if (is_within && added > kClose * left) break;
+    const double added = compression.rounded_error(rounding) - compression.choice().error;
+    if (added <= left && added > kClose * left) break;
     rounding *= (1 + kClose) / 2 * left / std::max(added, 0.1 * left);
   }
-  return best;
+  CompactField made = compression.build(rounding);
+  // Softened faces may have a larger error.
+  for (int i = 1; i < kBuilds && made.report.decibels > decibels; ++i) {
+    rounding *= std::pow(kClose, 2);
+    made = compression.build(rounding);
+  }
+  return made;
 }
 
 CompactField within_parameters(Compression& compression, double parameters,
@@ -320,6 +364,18 @@ CompactField within_bytes(Compression& compression, double bytes) {
   return best;
 }
 
+CompactField within(const Budget& budget, Compression& compression) {
+  switch (budget.kind) {
+    case Budget::Kind::kDecibels:
+      return within_decibels(compression, budget.amount);
+    case Budget::Kind::kParameters:
+      return within_parameters(compression, budget.amount, kRoundingForParameters);
+    case Budget::Kind::kBytes:
+      break;
+  }
+  return within_bytes(compression, budget.amount);
+}
+
 }  // namespace
 
 nlohmann::json report_json(const CompressionReport& report, double seconds) {
@@ -330,18 +386,34 @@ nlohmann::json report_json(const CompressionReport& report, double seconds) {
           {"seconds", seconds}};
 }
 
+CompressionReport joined(const CompressionReport& a, const CompressionReport& b) {
+  CompressionReport both{
+      .parameters = a.parameters + b.parameters,
+      .bytes = a.bytes + b.bytes,
+      .mean_square_change = a.mean_square_change * a.volume + b.mean_square_change * b.volume,
+      .variance = a.variance * a.volume + b.variance * b.volume,
+      .volume = a.volume + b.volume};
+  both.mean_square_change /= both.volume;
+  both.variance /= both.volume;
+  both.decibels = decibels_of(both.mean_square_change / both.variance);
+  return both;
+}
+
+double variance_of(const field::Field& vertices) {
+  return measure(VertexDensities(vertices), rows_of(vertices)).variance;
+}
+
 CompactField compress(const field::Field& vertices, const Budget& budget) {
   const base::TraceSpan span("compress");
-  Compression compression(vertices);
-  switch (budget.kind) {
-    case Budget::Kind::kDecibels:
-      return within_decibels(compression, budget.amount);
-    case Budget::Kind::kParameters:
-      return within_parameters(compression, budget.amount, kRoundingForParameters);
-    case Budget::Kind::kBytes:
-      break;
-  }
-  return within_bytes(compression, budget.amount);
+  Compression compression(vertices, rows_of(vertices), kLargestSide, 0.0);
+  return within(budget, compression);
+}
+
+CompactField compress(const field::Field& vertices, const Budget& budget, base::Range rows,
+                      double variance) {
+  const base::TraceSpan span("compress");
+  Compression compression(vertices, rows, vertices.tree().roots().cell_size, variance);
+  return within(budget, compression);
 }
 
 }  // namespace tomofield::compact

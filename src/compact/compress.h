@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/range.h"
 #include "compact/budget.h"
-#include "compact/decoded_field.h"
+#include "compact/coded_field.h"
 #include "field/field.h"
 
 namespace tomofield::compact {
@@ -19,14 +21,18 @@ struct CompressionReport {
   double mean_square_change = 0.0;
   double variance = 0.0;  ///< of the densities in the region of interest
   double decibels = 0.0;  ///< that the PSNR falls by, at most, on phantoms
+  double volume = 0.0;    ///< of the region, in cubic pixels
 };
 
 /// Returns the report for the metrics of a run; `seconds` is what the compression took.
 nlohmann::json report_json(const CompressionReport& report, double seconds);
 
+/// Returns the report of two parts of a field together.
+CompressionReport joined(const CompressionReport& a, const CompressionReport& b);
+
 /// A field as factors that are few and have short codes.
 struct CompactField {
-  LeafCodes codes;
+  CodedField coded;
   std::unique_ptr<field::Field> field;  ///< what the codes stand for (decode_field)
   CompressionReport report;
 };
@@ -37,9 +43,18 @@ struct CompactField {
 /// within the budget, or the smallest within the error (structure.h). Then the factors are rounded
 /// (leaf_code.h) so that they keep within the budget.
 ///
+/// Codes of several parts of a field can be joined (append()): `rows` are those of whole bands, no
+/// leaf becomes larger than a root cell, and a change in decibels counts against `variance`, which
+/// is that of all parts.
+///
 /// `vertices` is of kind "grid", and all leaves must be kept. A place is worked on alone, so memory
 /// is that of the vertices, of a place for each thread, and of the result. Throws Error if a budget
 /// in bytes or parameters cannot be met.
 CompactField compress(const field::Field& vertices, const Budget& budget);
+CompactField compress(const field::Field& vertices, const Budget& budget, base::Range rows,
+                      double variance);
+
+/// Returns the variance of the densities in the region of interest of a field of plain vertices.
+double variance_of(const field::Field& vertices);
 
 }  // namespace tomofield::compact

@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
+#include <vector>
 
 #include "base/random.h"
+#include "compact/decoded_field.h"
+#include "compact/sample_coded.h"
 #include "compact/vertex_densities.h"
 #include "field/sampling/sample_box.h"
 #include "tomofield/error.h"
@@ -95,10 +99,51 @@ TEST(Compress, EmptyRegionsAreLargeLeavesWithoutParameters) {
   const CompactField made = compress(*vertices, {Budget::Kind::kDecibels, 0.1});
   const field::Quadtree& tree = made.field->tree();
   const int textured = tree.find_leaf(40, 10), empty = tree.find_leaf(500, 10);
-  EXPECT_GT(made.codes.code(textured).size(), 100u);
-  EXPECT_TRUE(made.codes.code(empty).empty());
+  EXPECT_GT(made.coded.codes.code(textured).size(), 100u);
+  EXPECT_TRUE(made.coded.codes.code(empty).empty());
   EXPECT_LE(tree.leaf(textured).square.size, 32);
   EXPECT_EQ(made.field->density(500.2, 10.1, 12.3), 0.0);
+}
+
+// Two bands are made compact one after the other, as tiles of a run are.
+TEST(Compress, PartsJoinToTheWholeField) {
+  const field::RootGrid roots{.x0 = 0, .y0 = 0, .cell_size = 32, .columns = 1, .rows = 2};
+  const field::LeafShape shape{.nx = 33, .ny = 33, .nz = 24};
+  const auto field = field::make_field(
+      FieldKind::kGrid, field::Quadtree(roots, {Region::kInterest, Region::kInterest}), kThickness,
+      {shape, shape});
+  base::Random random(3);
+  for (float& value : field->parameters()) value = static_cast<float>(random.uniform(0, 1));
+  const double variance = variance_of(*field);
+  EXPECT_NEAR(variance, 1.0 / 12, 0.01);
+  const Budget budget{Budget::Kind::kDecibels, 1};
+  CompactField both = compress(*field, budget, {0, 32}, variance);
+  const CompactField upper = compress(*field, budget, {32, 64}, variance);
+  append(both.coded, upper.coded);
+  const CompressionReport report = joined(both.report, upper.report);
+  EXPECT_EQ(report.parameters, both.coded.codes.num_parameters());
+  EXPECT_EQ(report.bytes, both.coded.codes.bytes.size());
+  EXPECT_DOUBLE_EQ(report.volume, 32 * 64 * kThickness);
+  const auto made = decode_field(both.coded);
+  const field::OrientedBox box = field::box_between({0, 0, 0}, {32, 64, kThickness}, 1.0);
+  const std::vector<float> before = field::sample_box(*field, box);
+  std::vector<float> after = field::sample_box(*made, box);
+  double square = 0;
+  for (std::size_t i = 0; i < before.size(); ++i)
+    square += std::pow(static_cast<double>(before[i] - after[i]), 2);
+  // The leaves of this field have other values where they share a face, and codes have their mean.
+  EXPECT_NEAR(square / static_cast<double>(before.size()) / report.mean_square_change, 1, 0.35);
+
+  // Few bands are decoded at a time.
+  std::vector<float> by_bands(after.size());
+  sample_box(both.coded, box, [&](const field::BoxPart& part) {
+    const auto rows = static_cast<std::ptrdiff_t>(part.num_rows * box.size[0]);
+    for (std::int64_t s = 0; s < part.num_sections; ++s)
+      std::copy_n(part.values.begin() + s * rows, rows,
+                  by_bands.begin() +
+                      ((part.first_section + s) * box.size[1] + part.first_row) * box.size[0]);
+  });
+  EXPECT_EQ(by_bands, after);
 }
 
 // Where leaves meet at a face, the square that begins there reads the mean of their values.

@@ -7,6 +7,7 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "compact/leaf_code.h"
 #include "compact/quantise.h"
 
 namespace tomofield::compact {
@@ -81,12 +82,15 @@ void for_each_neighbours(const Field& field, const std::vector<LeafShape>& shape
 // Moves the vertices on both sides of faces towards each other. A leaf changes its own last columns
 // and the first ones of its neighbours, which no other leaf changes along the same axis.
 void soften_faces(Field& field, const LeafCodes& codes) {
-  const auto weight = static_cast<float>(codes.face_weight);
-  if (weight == 0) return;
+  if (std::ranges::all_of(codes.face_weight, [](double weight) { return weight == 0; })) return;
+  const auto weight_of = [&](int leaf) {
+    return codes.face_weight[static_cast<std::size_t>(field.tree().band_of_leaf(leaf))];
+  };
   for (const bool along_x : {true, false}) {
     base::parallel_for("soften faces", std::ssize(codes.shapes), [&](std::int64_t leaf) {
       for_each_neighbours(
           field, codes.shapes, static_cast<int>(leaf), along_x, [&](const Neighbours& at) {
+            const auto weight = static_cast<float>((weight_of(at.leaf) + weight_of(at.other)) / 2);
             for (int k = 0; k < field.shape(at.leaf).nz; ++k) {
               float& a = field.parameters()[vertex(field, at.leaf, at.i, k, at.j)];
               float& b = field.parameters()[vertex(field, at.other, at.other_i, k, at.other_j)];
@@ -160,8 +164,9 @@ double distance(const std::vector<float>& a, const std::vector<float>& b) {
 // Writes the densities of a leaf but those of its upper faces.
 void decode_leaf(const LeafCodes& codes, int leaf, Field& field) {
   const LeafShape& own = codes.shapes[static_cast<std::size_t>(leaf)];
-  const FloatMatrix values = values_of(dequantised_modes(decode(codes.code(leaf), own), codes.step),
-                                       own.nx, own.ny, own.nz);
+  const double step = codes.step[static_cast<std::size_t>(field.tree().band_of_leaf(leaf))];
+  const FloatMatrix values =
+      values_of(dequantised_modes(decode(codes.code(leaf), own), step), own.nx, own.ny, own.nz);
   const LeafShape& s = field.shape(leaf);
   float* to = field.parameters().data() + field.offset(leaf);
   for (int i = 0; i < own.nx; ++i) {
@@ -209,27 +214,13 @@ double face_jump(const Field& field, const Field& decoded, const std::vector<Lea
 
 }  // namespace
 
-std::size_t LeafCodes::num_parameters() const {
-  return field::count_parameters(FieldKind::kVm, shapes);
-}
-
-std::span<const std::uint8_t> LeafCodes::code(int leaf) const {
-  const auto at = static_cast<std::size_t>(leaf);
-  const auto first = static_cast<std::size_t>(offset[at]);
-  return std::span(bytes).subspan(first, static_cast<std::size_t>(offset[at + 1]) - first);
-}
-
-LeafShape with_upper_faces(const LeafShape& shape) {
-  return {.nx = shape.nx + 1, .ny = shape.ny + 1, .nz = shape.nz};
-}
-
-std::unique_ptr<Field> decode_field(field::Quadtree tree, double thickness,
-                                    const LeafCodes& codes) {
-  const int num_leaves = tree.num_leaves();
+std::unique_ptr<Field> decode_field(const CodedField& coded) {
+  const LeafCodes& codes = coded.codes;
+  const int num_leaves = coded.tree.num_leaves();
   TOMOFIELD_CHECK(std::ssize(codes.shapes) == num_leaves, "one shape a leaf");
   std::vector<LeafShape> shapes;
   std::ranges::transform(codes.shapes, std::back_inserter(shapes), with_upper_faces);
-  auto field = field::make_field(FieldKind::kGrid, std::move(tree), thickness, std::move(shapes));
+  auto field = field::make_field(FieldKind::kGrid, coded.tree, coded.thickness, std::move(shapes));
   base::parallel_for("decode leaves", num_leaves,
                      [&](std::int64_t i) { decode_leaf(codes, static_cast<int>(i), *field); });
   soften_faces(*field, codes);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
 
 #include "compact/quantise.h"
@@ -30,7 +31,9 @@ void append(LeafCodes& codes, const LeafShape& shape, const FloatMatrix& values)
 // apart. The densities are random, and the last square has fewer vertices along z.
 struct Leaves {
   Leaves() {
-    codes.step = kStep;
+    LeafCodes& codes = coded.codes;
+    codes.step = {kStep, kStep};
+    codes.face_weight = {0, 0};
     codes.offset = {0};
     for (int row = 0; row < 2; ++row) {
       codes.shapes.push_back(kNoLeaf);
@@ -46,12 +49,13 @@ struct Leaves {
       }
     }
     const field::RootGrid roots{.x0 = 0, .y0 = 0, .cell_size = 16, .columns = 3, .rows = 2};
-    made = decode_field(field::Quadtree(roots, std::vector<Region>(6, Region::kInterest)),
-                        kThickness, codes);
+    coded.tree = field::Quadtree(roots, std::vector<Region>(6, Region::kInterest));
+    coded.thickness = kThickness;
+    made = decode_field(coded);
   }
 
   double value(int leaf, int i, int j, int k) const {
-    const LeafShape& s = codes.shapes[static_cast<std::size_t>(leaf)];
+    const LeafShape& s = coded.codes.shapes[static_cast<std::size_t>(leaf)];
     return static_cast<double>(
         values[static_cast<std::size_t>(leaf)](i, Eigen::Index{k} * s.ny + j));
   }
@@ -60,7 +64,7 @@ struct Leaves {
     return made->density(x + field::kPixelCentre, y + field::kPixelCentre, z + field::kPixelCentre);
   }
 
-  LeafCodes codes;
+  CodedField coded;
   std::vector<FloatMatrix> values;  // of each leaf
   std::unique_ptr<field::Field> made;
 };
@@ -111,9 +115,9 @@ TEST(DecodedField, StaysTheSameUpToItsEnd) {
 TEST(DecodedField, FacesAreSoftened) {
   constexpr double kWeight = 0.2;
   const Leaves leaves;
-  LeafCodes codes = leaves.codes;
-  codes.face_weight = kWeight;
-  const auto soft = decode_field(leaves.made->tree(), kThickness, codes);
+  CodedField coded = leaves.coded;
+  coded.codes.face_weight = {kWeight, kWeight};
+  const auto soft = decode_field(coded);
   const auto density = [&](double x, double y, double z) {
     return soft->density(x + field::kPixelCentre, y + field::kPixelCentre, z + field::kPixelCentre);
   };
@@ -123,16 +127,48 @@ TEST(DecodedField, FacesAreSoftened) {
               leaves.density(24, 16, 3) + leaves.density(24, 14, 3), 1e-5);
   EXPECT_EQ(density(24, 12, 3), leaves.density(24, 12, 3));
   EXPECT_EQ(density(30, 8, 3), leaves.density(30, 8, 3)) << "the next leaf has another spacing";
-  EXPECT_NEAR(matching_face_weight(*leaves.made, leaves.codes, *soft), kWeight, 1e-4);
-  EXPECT_EQ(matching_face_weight(*leaves.made, leaves.codes, *leaves.made), 0.0);
+  EXPECT_NEAR(matching_face_weight(*leaves.made, leaves.coded.codes, *soft), kWeight, 1e-4);
+  EXPECT_EQ(matching_face_weight(*leaves.made, leaves.coded.codes, *leaves.made), 0.0);
+}
+
+// Where two bands with other weights meet, their mean counts.
+TEST(DecodedField, BandsHaveTheirOwnWeights) {
+  const Leaves leaves;
+  CodedField coded = leaves.coded;
+  coded.codes.face_weight = {0.4, 0.0};
+  const auto soft = decode_field(coded);
+  const auto density = [&](double y) {
+    return soft->density(24 + field::kPixelCentre, y + field::kPixelCentre,
+                         3 + field::kPixelCentre);
+  };
+  EXPECT_NEAR(density(16) - density(14),
+              0.6 * (leaves.density(24, 16, 3) - leaves.density(24, 14, 3)), 1e-5);
+}
+
+TEST(CodedField, BandsAreTakenOutAndJoinedAgain) {
+  const Leaves leaves;
+  const CodedField lower = some_bands(leaves.coded, {0, 1}),
+                   upper = some_bands(leaves.coded, {1, 2});
+  EXPECT_EQ(upper.tree.roots().y0, 16);
+  EXPECT_EQ(upper.codes.num_parameters() + lower.codes.num_parameters(),
+            leaves.coded.codes.num_parameters());
+  const auto alone = decode_field(upper);
+  EXPECT_EQ(alone->density(20, 25, 4), leaves.made->density(20, 25, 4));
+  CodedField both = lower;
+  append(both, upper);
+  EXPECT_EQ(both.tree.leaves(), leaves.coded.tree.leaves());
+  EXPECT_EQ(both.codes.offset, leaves.coded.codes.offset);
+  EXPECT_EQ(both.codes.bytes, leaves.coded.codes.bytes);
+  const auto again = decode_field(both);
+  EXPECT_TRUE(std::ranges::equal(again->parameters(), leaves.made->parameters()));
 }
 
 TEST(DecodedField, CountsWhatTheCodesStandFor) {
   const Leaves leaves;
   std::size_t count = 0;
-  for (const LeafShape& shape : leaves.codes.shapes)
+  for (const LeafShape& shape : leaves.coded.codes.shapes)
     count += field::count_parameters(FieldKind::kVm, {shape});
-  EXPECT_EQ(leaves.codes.num_parameters(), count);
+  EXPECT_EQ(leaves.coded.codes.num_parameters(), count);
   EXPECT_GT(count, 1000u);
 }
 

@@ -9,23 +9,30 @@ namespace {
 using field::QuadtreeNode;
 using field::Region;
 
-field::RootGrid covering_roots(const field::RootGrid& of_field, std::int64_t largest_side) {
+field::RootGrid covering_roots(const field::RootGrid& of_field, std::int64_t largest_side,
+                               base::Range rows) {
   std::int64_t side = of_field.cell_size;
   while (side * 2 <= largest_side) side *= 2;
-  const auto cells = [&](int count) {
-    return static_cast<int>((count * of_field.cell_size + side - 1) / side);
+  const auto cells = [&](std::int64_t length) {
+    return static_cast<int>((length + side - 1) / side);
   };
   return {.x0 = of_field.x0,
-          .y0 = of_field.y0,
+          .y0 = rows.begin,
           .cell_size = side,
-          .columns = cells(of_field.columns),
-          .rows = cells(of_field.rows)};
+          .columns = cells(of_field.columns * of_field.cell_size),
+          .rows = cells(rows.size())};
 }
 
 }  // namespace
 
-PlaceSquares place_squares(const VertexDensities& vertices, std::int64_t largest_side) {
-  PlaceSquares squares{.roots = covering_roots(vertices.field().tree().roots(), largest_side),
+base::Range rows_of(const field::Field& field) {
+  const field::RootGrid& roots = field.tree().roots();
+  return {static_cast<int>(roots.y0), static_cast<int>(roots.y0 + roots.rows * roots.cell_size)};
+}
+
+PlaceSquares place_squares(const VertexDensities& vertices, std::int64_t largest_side,
+                           base::Range rows) {
+  PlaceSquares squares{.roots = covering_roots(vertices.field().tree().roots(), largest_side, rows),
                        .nodes = {},
                        .leaf_like = {}};
   const field::RootGrid& roots = squares.roots;

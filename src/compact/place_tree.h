@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "base/range.h"
 #include "compact/structure.h"
 #include "compact/vertex_densities.h"
 #include "field/tree/quadtree.h"
@@ -20,9 +21,15 @@ struct PlaceSquares {
   static constexpr int kNone = -1, kOutside = -2;
 };
 
-/// Returns the squares with sides from the smallest one (VertexDensities::smallest_side) to
-/// `largest_side`, or to the field's root cells if these are larger.
-PlaceSquares place_squares(const VertexDensities& vertices, std::int64_t largest_side);
+/// Returns the rows of the plane that a field covers.
+base::Range rows_of(const field::Field& field);
+
+/// Returns the squares of some rows of the plane, with sides from the smallest one
+/// (VertexDensities::smallest_side) to `largest_side`, or to the field's root cells if these are
+/// larger. The rows must begin where a band does, and hold whole squares of the largest side,
+/// unless they end with the field.
+PlaceSquares place_squares(const VertexDensities& vertices, std::int64_t largest_side,
+                           base::Range rows);
 
 /// Returns the tree of a field whose leaves are the places that are chosen. `place_of_leaf` becomes
 /// the place of each leaf.

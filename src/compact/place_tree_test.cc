@@ -33,15 +33,16 @@ int find(const PlaceSquares& squares, const Square& square) {
 TEST(PlaceTree, RootsAreAsLargeAsTheLargestSideAndCoverTheField) {
   const auto field = small_field();
   const VertexDensities vertices(*field);
-  const PlaceSquares of_64 = place_squares(vertices, 64);
+  const PlaceSquares of_64 = place_squares(vertices, 64, rows_of(*field));
   EXPECT_EQ(of_64.roots,
             (field::RootGrid{.x0 = -32, .y0 = 0, .cell_size = 64, .columns = 2, .rows = 1}));
-  EXPECT_EQ(place_squares(vertices, 16).roots, field->tree().roots()) << "root cells are not cut";
+  EXPECT_EQ(place_squares(vertices, 16, rows_of(*field)).roots, field->tree().roots())
+      << "root cells are not cut";
 }
 
 TEST(PlaceTree, SquaresBecomeLeavesWhereTheirVerticesAreAlike) {
   const auto field = small_field();
-  const PlaceSquares squares = place_squares(VertexDensities(*field), 64);
+  const PlaceSquares squares = place_squares(VertexDensities(*field), 64, rows_of(*field));
   const auto like = [&](const Square& square) {
     const int node = find(squares, square);
     EXPECT_GE(node, 0);
@@ -67,7 +68,7 @@ TEST(PlaceTree, SquaresBecomeLeavesWhereTheirVerticesAreAlike) {
 
 TEST(PlaceTree, LeavesAreTheSquaresThatAreChosen) {
   const auto field = small_field();
-  const PlaceSquares squares = place_squares(VertexDensities(*field), 64);
+  const PlaceSquares squares = place_squares(VertexDensities(*field), 64, rows_of(*field));
   const auto at = [&](const Square& square) {
     return static_cast<std::size_t>(find(squares, square));
   };

@@ -107,9 +107,9 @@ const std::vector<Method>& known_methods() {
        .arguments = {"baseline", "tensorf", "--ifp", "0.1"},
        .resumes = true},
       {.name = "ingp", .title = "hash grid and network", .arguments = {"baseline", "ingp"}},
-      {.name = "implicit",
-       .title = "network of coordinates",
-       .arguments = {"baseline", "implicit"}}};
+      {.name = "fourier-net",
+       .title = "network of plane waves",
+       .arguments = {"baseline", "fourier-net"}}};
   return methods;
 }
 

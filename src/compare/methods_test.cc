@@ -15,8 +15,8 @@ TEST(Methods, EveryBaselineHasAName) {
   for (const Method& method : known_methods()) {
     if (method.arguments.front() == "baseline") baselines.insert(method.arguments.at(1));
   }
-  EXPECT_EQ(baselines,
-            (std::set<std::string>{"wbp", "sirt", "sart-tv", "tv", "tensorf", "ingp", "implicit"}));
+  EXPECT_EQ(baselines, (std::set<std::string>{"wbp", "sirt", "sart-tv", "tv", "tensorf", "ingp",
+                                              "fourier-net"}));
 }
 
 TEST(Methods, ThoseWithACheckpointAreResumed) {

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "base/check.h"
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/random.h"
@@ -48,6 +49,17 @@ Domain domain_of(const measurement::Measurement& measurement, const FieldOptions
                                   : make_domain(measurement.geometry, measurement.roi, options);
 }
 
+// Returns the domain with the vertices that the first field is made with: those of full resolution,
+// or those of the first stage if the fit never comes to full resolution.
+Domain with_shapes_for(const FitOptions& options, const Stage& first, Domain domain) {
+  if (options.num_stages == 0) return domain;
+  std::vector<field::LeafShape> shapes;
+  for (int leaf = 0; leaf < domain.tree.num_leaves(); ++leaf)
+    shapes.push_back(domain.shape_in(domain.tree.leaf(leaf).region, first.bin));
+  domain.shapes = std::move(shapes);
+  return domain;
+}
+
 int steps_per_epoch_of(const measurement::Measurement& measurement, const FitOptions& options) {
   return measurement.ray_geometry
              ? objective::ray_steps_per_epoch(options, measurement.rays->shape())
@@ -84,7 +96,8 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
       stages_(make_stages(field_options, options_)),
       domain_(domain_of(measurement, field_options)),
       share_(measurement::row_share(domain_.num_rows, domain_.tree.roots().cell_size, processes)),
-      field_(make_initial_field(domain_, measurement.geometry.thickness, measurement.mean_density,
+      field_(make_initial_field(with_shapes_for(options, stages_.front(), domain_),
+                                measurement.geometry.thickness, measurement.mean_density,
                                 of_kind(field_options, stages_.front().field_kind), options.seed,
                                 leaves_to_keep(processes, domain_.tree, share_))),
       optimizer_(*field_, AdamOptions{}),
@@ -126,12 +139,18 @@ void Fit::enter_stage() {
       binned_->geometry, sample_grid(domain_, measurement_.geometry.thickness, stage().bin));
 }
 
-// Resamples the field to the vertices of the stage, or factorises it. The optimiser starts anew.
-void Fit::resample_field() {
+// Returns the vertices of all leaves in a stage.
+std::vector<field::LeafShape> Fit::shapes_in(const Stage& stage) const {
   std::vector<field::LeafShape> shapes;
   const field::Quadtree& tree = field_->tree();
   for (int leaf = 0; leaf < tree.num_leaves(); ++leaf)
-    shapes.push_back(domain_.shape_in(tree.leaf(leaf).region, stage().bin));
+    shapes.push_back(domain_.shape_in(tree.leaf(leaf).region, stage.bin));
+  return shapes;
+}
+
+// Resamples the field to the vertices of the stage, or factorises it. The optimiser starts anew.
+void Fit::resample_field() {
+  std::vector<field::LeafShape> shapes = shapes_in(stage());
   // The gradient and the moments go before the other field needs memory.
   gradient_.reset(0);
   optimizer_.state() = {};
@@ -195,6 +214,28 @@ void Fit::go_on_from(Progress progress, std::unique_ptr<field::Field> field) {
   field_ = std::move(field);
   optimizer_ = Adam(*field_, AdamOptions{});
   follow_tree();
+}
+
+void Fit::go_on_from_stages(const Progress& progress, const field::Field& field) {
+  progress_ = progress;
+  field_ = field_->resampled(shapes_in(*std::prev(&stage())));
+  const field::Quadtree& tree = field_->tree();
+  base::parallel_for("take over leaves", tree.num_leaves(), [&](std::int64_t i) {
+    const int leaf = static_cast<int>(i);
+    const field::Square& square = tree.leaf(leaf).square;
+    const auto middle = [&](std::int64_t first) {
+      return static_cast<double>(first) + static_cast<double>(square.size) / 2;
+    };
+    const int from = field.tree().find_leaf(middle(square.x0), middle(square.y0));
+    TOMOFIELD_CHECK(from >= 0 && field.tree().leaf(from).square == square &&
+                        field.shape(from) == field_->shape(leaf),
+                    "leaves that both fits have");
+    std::ranges::copy(
+        field.parameters().subspan(field.offset(from), field.offset(from + 1) - field.offset(from)),
+        field_->parameters().begin() + std::ptrdiff_t(field_->offset(leaf)));
+  });
+  field_->bias = field.bias;
+  refine();
 }
 
 void Fit::reread_measurement() {

@@ -79,6 +79,11 @@ class Fit {
   /// fault. The optimiser starts anew; the caller can restore its state.
   void go_on_from(Progress progress, std::unique_ptr<field::Field> field);
 
+  /// Goes on where another fit has ended, which has the first stages of this one
+  /// (FitOptions::num_stages) and its rows among others: takes over its models of the views, and
+  /// the vertices of those of its leaves that this fit has as well. Call it before the first step.
+  void go_on_from_stages(const Progress& progress, const field::Field& field);
+
   /// Takes over rays and tilt angles of the measurement that the caller has replaced between two
   /// steps. Field, optimiser and models of the views stay.
   void reread_measurement();
@@ -126,7 +131,7 @@ class Fit {
   /// Returns the rows that all processes work on.
   std::int64_t num_rows() const { return domain_.num_rows; }
   /// Returns the leaves of its bands.
-  base::Range own_leaves() const { return leaves_of_bands(field_->tree(), share_.bands); }
+  base::Range own_leaves() const { return field::leaves_of_bands(field_->tree(), share_.bands); }
   /// Returns the leaves of a tree whose parameters this process keeps; an empty list means all.
   std::vector<int> kept_leaves(const field::Quadtree& tree) const;
   /// Counts the steps that run() has taken and their messages to other processes.
@@ -152,6 +157,7 @@ class Fit {
   const Stage& stage_at(std::int64_t step) const;
   measurement::RowShare share_of_stage() const;
   void enter_stage();
+  std::vector<field::LeafShape> shapes_in(const Stage& stage) const;
   void resample_field();
   void refine();
   void follow_tree();

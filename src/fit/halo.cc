@@ -24,15 +24,6 @@ void for_each_run(const std::vector<field::ParameterRuns>& all, const Body& body
 
 }  // namespace
 
-Range leaves_of_bands(const field::Quadtree& tree, Range bands) {
-  const auto first_of = [&](int band) {
-    int leaf = 0;
-    while (leaf < tree.num_leaves() && tree.band_of_leaf(leaf) < band) ++leaf;
-    return leaf;
-  };
-  return {first_of(bands.begin), first_of(bands.end)};
-}
-
 HaloLeaves halo_leaves(const field::Quadtree& tree, const measurement::RowShare& share) {
   const field::RootGrid& roots = tree.roots();
   const std::int64_t first = roots.y0 + share.bands.begin * roots.cell_size;
@@ -50,7 +41,7 @@ HaloLeaves halo_leaves(const field::Quadtree& tree, const measurement::RowShare&
 }
 
 std::vector<int> needed_leaves(const field::Quadtree& tree, const measurement::RowShare& share) {
-  const Range own = leaves_of_bands(tree, share.bands);
+  const Range own = field::leaves_of_bands(tree, share.bands);
   const HaloLeaves halo = halo_leaves(tree, share);
   std::vector<int> leaves = halo.before;
   for (int leaf = own.begin; leaf < own.end; ++leaf) leaves.push_back(leaf);

@@ -7,12 +7,10 @@
 #include "base/range.h"
 #include "distributed/communicator.h"
 #include "field/field.h"
+#include "field/tree/quadtree_bands.h"
 #include "measurement/row_share.h"
 
 namespace tomofield::fit {
-
-/// Returns the leaves of some bands; their numbers are consecutive.
-base::Range leaves_of_bands(const field::Quadtree& tree, base::Range bands);
 
 /// Lists the leaves on both sides of the boundaries between a process's bands and those of its
 /// neighbours. Terms of the loss that cross a boundary read both sides: boundary consistency, and

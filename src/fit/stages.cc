@@ -82,6 +82,8 @@ std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit)
   }
   stages.push_back(
       {field.kind, 1, first_epoch, fit.epochs, first_rate, fit.learning_rate * fit.final_rate});
+  if (fit.num_stages > 0)
+    stages.resize(std::min(stages.size(), static_cast<std::size_t>(fit.num_stages)));
   return stages;
 }
 

@@ -55,7 +55,8 @@ Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit);
 ///   2. A stage at full resolution has plain vertices, if FitOptions::vertex_epochs is above 0.
 ///   3. The last stage has the field that was asked for.
 ///
-/// The ray engine has the last stage alone.
+/// The ray engine has the last stage alone. With FitOptions::num_stages the later ones are left
+/// out.
 std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit);
 
 }  // namespace tomofield::fit

@@ -65,17 +65,14 @@ Measurement binned(const Measurement& fine, int bin) {
   return coarse;
 }
 
-Measurement middle_rows(const Measurement& whole, std::int64_t max_rows, std::span<const int> views,
-                        const distributed::Communicator& processes) {
+Measurement some_rows(const Measurement& whole, base::Range rows, std::span<const int> views,
+                      const distributed::Communicator& processes) {
   TOMOFIELD_CHECK(!whole.ray_geometry, "rays of views as recorded do not stay in their row");
   const base::TraceSpan span("copy rows");
   Measurement part = whole;
-  part.rays = whole.rays->middle_rows(max_rows, views, processes);
-  const std::int64_t all_rows = whole.rays->shape().num_rows;
-  const std::int64_t rows = part.rays->shape().num_rows;
-  const std::int64_t first_row = (all_rows - rows) / 2;
-  part.roi.y0 += first_row;
-  part.roi.y1 = part.roi.y0 + rows;
+  part.rays = whole.rays->rows(rows, views, processes);
+  part.roi.y0 += rows.begin;
+  part.roi.y1 = part.roi.y0 + rows.size();
   part.geometry.tilt_deg = chosen(whole.geometry.tilt_deg, views);
   part.noise_sigma = chosen(whole.noise_sigma, views);
   part.transfers = chosen(whole.transfers, views);
@@ -84,13 +81,21 @@ Measurement middle_rows(const Measurement& whole, std::int64_t max_rows, std::sp
   part.masked_part = chosen(whole.masked_part, views);
   part.undecided_beads = chosen(whole.undecided_beads, views);
   for (auto& discs : part.undecided_beads)
-    for (tilt_series::MaskDisc& disc : discs) disc.y_px -= static_cast<double>(first_row);
+    for (tilt_series::MaskDisc& disc : discs) disc.y_px -= rows.begin;
   part.held_out.clear();
   for (int v = 0; v < static_cast<int>(views.size()); ++v) {
     if (std::ranges::binary_search(whole.held_out, views[static_cast<std::size_t>(v)]))
       part.held_out.push_back(v);
   }
   return part;
+}
+
+Measurement middle_rows(const Measurement& whole, std::int64_t max_rows, std::span<const int> views,
+                        const distributed::Communicator& processes) {
+  const std::int64_t all_rows = whole.rays->shape().num_rows;
+  const std::int64_t rows = std::min(max_rows, all_rows);
+  const auto first = static_cast<int>((all_rows - rows) / 2);
+  return some_rows(whole, {first, first + static_cast<int>(rows)}, views, processes);
 }
 
 }  // namespace tomofield::measurement

@@ -78,10 +78,15 @@ struct Measurement {
 /// to mask a pixel by its fine pixels, decide before.
 Measurement binned(const Measurement& fine, int bin);
 
-/// Returns the measurement of these views alone (ascending), on at most `max_rows` rows in the
-/// middle, on every process. Views are counted anew, from 0; of the views held out, those that are
-/// left stay held out. Undecided beads stay undecided. It must be of resampled views, whose rays
-/// stay in their row.
+/// Returns the measurement of these views alone (ascending), on some rows of the region of
+/// interest, counted from its first one, on every process. Views are counted anew, from 0; of the
+/// views held out, those that are left stay held out. Undecided beads stay undecided. It must be of
+/// resampled views, whose rays stay in their row.
+Measurement some_rows(
+    const Measurement& whole, base::Range rows, std::span<const int> views,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
+
+/// Returns the same of at most `max_rows` rows in the middle.
 Measurement middle_rows(
     const Measurement& whole, std::int64_t max_rows, std::span<const int> views,
     const distributed::Communicator& processes = distributed::Communicator::alone());

@@ -18,7 +18,8 @@ Measurement with_own_rays(const Measurement& measurement) {
   std::vector<int> views(static_cast<std::size_t>(measurement.geometry.num_views()));
   std::iota(views.begin(), views.end(), 0);
   Measurement copy = measurement;
-  copy.rays = measurement.rays->middle_rows(measurement.rays->shape().num_rows, views);
+  copy.rays =
+      measurement.rays->rows({0, static_cast<int>(measurement.rays->shape().num_rows)}, views);
   return copy;
 }
 

@@ -216,22 +216,19 @@ void SlabViews::set_view(int view, std::span<const float> image) {
   });
 }
 
-std::unique_ptr<SlabViews> SlabViews::middle_rows(
-    std::int64_t max_rows, std::span<const int> views,
-    const distributed::Communicator& processes) const {
-  const std::int64_t rows = std::min(max_rows, shape_.num_rows);
-  const std::int64_t first = (shape_.num_rows - rows) / 2;
-  const Shape shape{views.size(), shape_.width, rows, 0, rows};
-  std::unique_ptr<SlabViews> middle(
+std::unique_ptr<SlabViews> SlabViews::rows(base::Range rows, std::span<const int> views,
+                                           const distributed::Communicator& processes) const {
+  const Shape shape{views.size(), shape_.width, rows.size(), 0, rows.size()};
+  std::unique_ptr<SlabViews> part(
       new SlabViews(shape, {all_slabs(shape)}, scratch_dir_, io::ScratchMemory::kInMemoryBytes));
   base::parallel_for("copy rows", std::ssize(views), [&](std::int64_t view) {
-    for (int slab = 0; slab < middle->num_slabs(); ++slab)
-      middle->copy_rows(slab, static_cast<int>(view), *this, views[static_cast<std::size_t>(view)],
-                        first);
+    for (int slab = 0; slab < part->num_slabs(); ++slab)
+      part->copy_rows(slab, static_cast<int>(view), *this, views[static_cast<std::size_t>(view)],
+                      rows.begin);
   });
-  middle->share(processes);
+  part->share(processes);
   memory_.release(0, memory_.size());
-  return middle;
+  return part;
 }
 
 // Copies the own rows of `from`; the first row of all is `first_row` of `from`.

@@ -80,10 +80,10 @@ class SlabViews {
   /// as large, as rays count pixels. A coarse pixel counts if at least half of its pixels do.
   /// Columns and rows of fewer than `bin` pixels are coarse ones too.
   std::unique_ptr<SlabViews> binned(int bin) const;
-  /// Returns a copy of at most `max_rows` rows in the middle, of these views, on every process.
+  /// Returns a copy of some rows, counted from the first one, of these views, on every process.
   /// Each process contributes its own slabs.
-  std::unique_ptr<SlabViews> middle_rows(
-      std::int64_t max_rows, std::span<const int> views,
+  std::unique_ptr<SlabViews> rows(
+      base::Range rows, std::span<const int> views,
       const distributed::Communicator& processes = distributed::Communicator::alone()) const;
   /// Returns zeros in the place of so many views, none of which counts, in the same slabs.
   std::unique_ptr<SlabViews> blank(std::size_t num_views) const;

@@ -70,10 +70,10 @@ TEST(SlabViews, SomeSlabsAreThoseOfTheWhole) {
   EXPECT_EQ(num_valid, all->num_valid(1));
 }
 
-TEST(SlabViews, MiddleRowsAreCopied) {
+TEST(SlabViews, RowsAreCopied) {
   const auto all = make_views();
   const std::vector<int> every = {0, 1, 2}, some = {2, 0};
-  const auto middle = all->middle_rows(20, some);
+  const auto middle = all->rows({9, 29}, some);
   ASSERT_EQ(middle->shape().num_rows, 20);
   ASSERT_EQ(middle->shape().num_views, 2u);
   for (int v = 0; v < 2; ++v) {
@@ -85,7 +85,7 @@ TEST(SlabViews, MiddleRowsAreCopied) {
       }
     }
   }
-  EXPECT_EQ(all->middle_rows(100, every)->checksum(), all->checksum());
+  EXPECT_EQ(all->rows({0, static_cast<int>(kShape.num_rows)}, every)->checksum(), all->checksum());
 }
 
 // A disc in the middle of two slabs, one that reaches over an edge, and one far outside.
@@ -142,7 +142,7 @@ TEST(SlabViews, AreTheSameOnAnyNumberOfThreads) {
     const auto all = make_views();
     const std::array<std::uint64_t, 4> found = {all->checksum(), all->binned(2)->checksum(),
                                                 all->binned(4)->checksum(),
-                                                all->middle_rows(20, some)->checksum()};
+                                                all->rows({9, 29}, some)->checksum()};
     base::set_thread_count(0);
     return found;
   };

@@ -197,6 +197,11 @@ constexpr Row kRows[] = {
      .label = "AMOUNT",
      .help = "Replace the finished fit by a compact model: within decibels of PSNR (0.1dB), "
              "parameters (500k, 2M) or bytes (800kB, 5MB)"},
+    {.key = "field.tile_rows", .flag = "--tile-rows", MEMBER(Options, tile_rows),
+     .group = Group::kField, .unit = kBinned, .range = Range::between(0, kMaxCount),
+     .automatic = "all rows, or with --budget as many as there is memory for",
+     .help = "Fit so many rows of the region at a time, and make each such tile compact before the "
+             "next one (with --budget). 0: all rows"},
 
     // Fit
     {.key = "fit.align", .flag = "--align", MEMBER(Options, align), .group = Group::kFit,

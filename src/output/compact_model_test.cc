@@ -6,6 +6,7 @@
 
 #include "base/random.h"
 #include "compact/compress.h"
+#include "compact/decoded_field.h"
 #include "output/model_file.h"
 #include "python_script.h"
 #include "scratch_directory.h"
@@ -27,7 +28,7 @@ Model compact_model() {
   Model model = testing::uneven_model(FieldKind::kGrid);
   compact::CompactField made = compact::compress(*model.field, kBudget);
   model.field = std::move(made.field);
-  model.codes = std::move(made.codes);
+  model.coded = std::move(made.coded);
   return model;
 }
 
@@ -41,8 +42,8 @@ TEST(CompactModel, ComesBackBitForBit) {
   EXPECT_EQ(loaded.options_json, model.options_json);
   EXPECT_EQ(loaded.field->shapes(), model.field->shapes());
   EXPECT_TRUE(std::ranges::equal(loaded.field->parameters(), model.field->parameters()));
-  ASSERT_TRUE(loaded.codes);
-  EXPECT_EQ(loaded.codes->shapes, model.codes->shapes);
+  ASSERT_TRUE(loaded.coded);
+  EXPECT_EQ(loaded.coded->codes.shapes, model.coded->codes.shapes);
   EXPECT_EQ(load_outline(scratch / "model.h5").tree.leaves(), model.field->tree().leaves());
   save_model(scratch / "again.h5", loaded);
   EXPECT_TRUE(read_whole_file(scratch / "model.h5") == read_whole_file(scratch / "again.h5"));
@@ -87,8 +88,8 @@ TEST(CompactModel, IsWhatTheDocumentsSay) {
   if (!python_has("h5py,numpy")) GTEST_SKIP() << "python3-h5py is not installed";
   const ScratchDirectory scratch;
   Model model = compact_model();
-  model.codes->face_weight = 0;  // decoded_field_test.cc tests how faces are softened
-  model.field = compact::decode_field(model.field->tree(), model.field->thickness(), *model.codes);
+  std::ranges::fill(model.coded->codes.face_weight, 0);  // decoded_field_test.cc tests them
+  model.field = compact::decode_field(*model.coded);
   save_model(scratch / "model.h5", model);
   std::string expected;  // sums of squares over the vertices of leaves but for their upper faces
   for (int leaf = 0; leaf < model.field->tree().num_leaves(); ++leaf) {
@@ -105,7 +106,8 @@ TEST(CompactModel, IsWhatTheDocumentsSay) {
 import h5py, lzma, numpy as np, zlib
 f = h5py.File('model.h5', 'r')
 code, leaves = f['field/code'], f['field/leaves']
-offset, data, step = code['offset'][:], code['bytes'][:].tobytes(), code.attrs['step']
+offset, data, step = code['offset'][:], code['bytes'][:].tobytes(), code['step'][0]
+assert (code['step'][:] == step).all()
 expected = ')" + expected + R"('.split()
 lzma2 = [{'id': lzma.FILTER_LZMA2, 'dict_size': 1 << 16}]
 for i, square in enumerate(expected):

@@ -12,6 +12,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/plausible.h"
+#include "compact/decoded_field.h"
 #include "io/hdf5_reader.h"
 #include "output/model_format.h"
 #include "tomofield/error.h"
@@ -54,13 +55,13 @@ class ModelReader {
   explicit ModelReader(const std::filesystem::path& path) : path_(path.string()), file_(path) {}
 
   // Keeps all leaves if `choose` is empty.
-  Model read(TrainingState* training, const ChooseLeaves& choose) const {
+  Model read(TrainingState* training, const ChooseLeaves& choose, bool decodes = true) const {
     const StoredGroup root = file_.root();
     Model model;
     read_info(root, model);
     const StoredGroup group = root.group("field");
     if (group.has("code"))
-      read_compact_field(group, choose, model);
+      read_compact_field(group, choose, decodes, model);
     else
       model.field = read_field(group, choose);
     if (training != nullptr) *training = read_training(/*with_floats=*/true);
@@ -290,55 +291,63 @@ class ModelReader {
     return field;
   }
 
-  void read_compact_field(const StoredGroup& group, const ChooseLeaves& choose,
+  void read_compact_field(const StoredGroup& group, const ChooseLeaves& choose, bool decodes,
                           Model& model) const {
     std::vector<int> kept;
-    const double thickness = read_thickness(group);
     make_room([&] {
-      field::Quadtree tree = read_tree(group.group("tree"));
-      if (choose) kept = choose(tree);
-      model.codes = read_codes(group, tree.num_leaves());
-      model.field = compact::decode_field(std::move(tree), thickness, *model.codes);
+      compact::CodedField coded{read_tree(group.group("tree")), read_thickness(group), {}};
+      if (choose) kept = choose(coded.tree);
+      coded.codes = read_codes(group, coded.tree);
+      const std::size_t bytes = bytes_of_decoded(coded.codes.shapes);
+      if (decodes) {
+        constexpr std::size_t kSmall = std::size_t{1} << 24;
+        if (bytes > kSmall)
+          base::require_memory(bytes, fmt::format("'{}'", path_).c_str(),
+                               "use a machine with more, or another copy");
+        model.field = compact::decode_field(coded);
+      }
+      model.coded = std::move(coded);
     });
+    if (!decodes) return;
     read_decoder(group, *model.field);
     if (choose) model.field->keep_only(kept);
     require_finite_parameters(*model.field, fmt::format("'{}' is a damaged model", path_));
   }
 
-  compact::LeafCodes read_codes(const StoredGroup& field, int num_leaves) const {
+  compact::LeafCodes read_codes(const StoredGroup& field, const field::Quadtree& tree) const {
     const StoredGroup group = field.group("code");
-    compact::LeafCodes codes{.step = group.number("step"),
-                             .face_weight = group.number("face_weight"),
+    const int num_leaves = tree.num_leaves();
+    compact::LeafCodes codes{.step = group.read_array<double>("step"),
+                             .face_weight = group.read_array<double>("face_weight"),
                              .shapes = read_shapes(field.group("leaves"), num_leaves, 1),
                              .offset = group.read_array<std::int64_t>("offset"),
                              .bytes = group.read_array<std::uint8_t>("bytes")};
-    require(codes.step >= 0 && std::isfinite(codes.step), "its step is no usable number");
-    require(codes.face_weight >= 0 && codes.face_weight <= 0.5,
-            "the weight of its faces is no usable number");
+    const auto num_bands = tree.roots().rows;
+    require(
+        std::ssize(codes.step) == num_bands &&
+            std::ranges::all_of(codes.step, [](double s) { return s >= 0 && std::isfinite(s); }),
+        "its steps are no usable numbers");
+    require(std::ssize(codes.face_weight) == num_bands &&
+                std::ranges::all_of(codes.face_weight, [](double w) { return w >= 0 && w <= 0.5; }),
+            "the weights of its faces are no usable numbers");
     require(std::ssize(codes.offset) == num_leaves + 1 && codes.offset.front() == 0 &&
                 std::ranges::is_sorted(codes.offset) &&
                 codes.offset.back() == std::ssize(codes.bytes),
             "the index of its codes is wrong");
-    require_room_for_decoded(codes.shapes);
     return codes;
   }
 
-  // Counts leaf by leaf, since the sum of all leaves could wrap.
-  void require_room_for_decoded(const std::vector<field::LeafShape>& shapes) const {
+  // Returns the bytes of the factors and of the vertices of all leaves. Counts leaf by leaf, since
+  // the sum could wrap.
+  std::size_t bytes_of_decoded(const std::vector<field::LeafShape>& shapes) const {
     constexpr std::size_t kMost = std::size_t{1} << 40;
     std::size_t count = 0;
     for (const field::LeafShape& shape : shapes) {
-      const std::size_t more =
-          field::count_parameters(FieldKind::kVm, {shape}) +
-          field::count_parameters(FieldKind::kGrid, {compact::with_upper_faces(shape)});
+      const std::size_t more = compact::decoded_numbers(shape);
       require(more <= kMost - count, "its leaves need more numbers than any file holds");
       count += more;
     }
-    constexpr std::size_t kSmall = std::size_t{1} << 22;
-    if (count > kSmall) {
-      base::require_memory(count * sizeof(float), fmt::format("'{}'", path_).c_str(),
-                           "use a machine with more, or another copy");
-    }
+    return count * sizeof(float);
   }
 
   template <typename T>
@@ -356,6 +365,10 @@ class ModelReader {
 
 Model load_model(const std::filesystem::path& path, TrainingState* training) {
   return ModelReader(path).read(training, {});
+}
+
+Model load_undecoded(const std::filesystem::path& path, TrainingState* training) {
+  return ModelReader(path).read(training, {}, /*decodes=*/false);
 }
 
 ModelOutline load_outline(const std::filesystem::path& path) {

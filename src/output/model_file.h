@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "compact/decoded_field.h"
+#include "compact/coded_field.h"
 #include "field/field.h"
 #include "geometry/tilt_geometry.h"
 #include "tomofield/options.h"
@@ -35,9 +35,11 @@ struct ModelInfo {
 
 /// A fitted field with all that is needed to use it.
 struct Model : ModelInfo {
-  std::unique_ptr<field::Field> field;
-  std::optional<compact::LeafCodes>
-      codes;  ///< of a compact model, whose `field` is decoded from them
+  std::unique_ptr<field::Field> field;       ///< may be null if there is `coded`
+  std::optional<compact::CodedField> coded;  ///< of a compact model, which stands for `field`
+
+  const field::Quadtree& tree() const { return coded ? coded->tree : field->tree(); }
+  double thickness() const { return coded ? coded->thickness : field->thickness(); }
 };
 
 /// The place and the tree of a model, without its parameters.
@@ -88,11 +90,17 @@ void require_finite(const field::Field& field, const std::filesystem::path& path
 /// Writes a model; of a compact one the codes, and no training state.
 void save_model(const std::filesystem::path& path, const Model& model,
                 const TrainingState* training = nullptr);
+/// Writes a compact model with a training state that has no floats.
+void save_coded(const std::filesystem::path& path, const compact::CodedField& coded,
+                const ModelInfo& info, const TrainingState* training = nullptr);
 
 /// Reads a model, and its training state into `training` unless that is null. The state is empty if
 /// the model was saved without one. Throws Error, with the file and the reason, for anything but a
 /// whole model of a known version.
 Model load_model(const std::filesystem::path& path, TrainingState* training = nullptr);
+
+/// Does the same, but does not decode a compact model: it has no `field`.
+Model load_undecoded(const std::filesystem::path& path, TrainingState* training = nullptr);
 
 /// Reads the outline of a model, without its parameters. Throws Error as load_model() does.
 ModelOutline load_outline(const std::filesystem::path& path);

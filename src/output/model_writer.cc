@@ -74,12 +74,13 @@ void write_leaves(Hdf5Group& group, const field::Quadtree& tree,
 }
 
 // Writes what all fields have but their leaves.
-void write_structure(Hdf5Group& group, const field::Field& field, FieldKind kind) {
+void write_structure(Hdf5Group& group, FieldKind kind, const field::Quadtree& tree,
+                     double thickness, double bias, double softplus_beta) {
   group.write_text("kind", base::name_of(kind));
-  group.write_number("thickness", field.thickness());
-  group.write_number("bias", static_cast<double>(field.bias));
-  group.write_number("softplus_beta", static_cast<double>(field.activation.beta));
-  write_tree(group.create_group("tree"), field.tree());
+  group.write_number("thickness", thickness);
+  group.write_number("bias", bias);
+  group.write_number("softplus_beta", softplus_beta);
+  write_tree(group.create_group("tree"), tree);
 }
 
 void write_offsets(Hdf5Group& group, const field::Field& field) {
@@ -90,8 +91,8 @@ void write_offsets(Hdf5Group& group, const field::Field& field) {
 }
 
 void write_codes(Hdf5Group group, const compact::LeafCodes& codes) {
-  group.write_number("step", codes.step);
-  group.write_number("face_weight", codes.face_weight);
+  group.write_array<double>("step", codes.step);
+  group.write_array<double>("face_weight", codes.face_weight);
   group.write_array<std::int64_t>("offset", codes.offset);
   group.write_array<std::uint8_t>("bytes", codes.bytes);
 }
@@ -172,7 +173,8 @@ void save_model(const std::filesystem::path& path, const field::Field& field,
                 const FloatArrays& more_floats) {
   write_model(path, info, kFormatVersion, [&](Hdf5Group& root) {
     Hdf5Group group = root.create_group("field");
-    write_structure(group, field, field.kind());
+    write_structure(group, field.kind(), field.tree(), field.thickness(),
+                    static_cast<double>(field.bias), static_cast<double>(field.activation.beta));
     {
       Hdf5Group leaves = group.create_group("leaves");
       write_leaves(leaves, field.tree(), field.shapes());
@@ -183,18 +185,24 @@ void save_model(const std::filesystem::path& path, const field::Field& field,
   });
 }
 
-void save_model(const std::filesystem::path& path, const Model& model,
-                const TrainingState* training) {
-  if (!model.codes) return save_model(path, *model.field, model, training);
-  write_model(path, model, kCompactVersion, [&](Hdf5Group& root) {
+void save_coded(const std::filesystem::path& path, const compact::CodedField& coded,
+                const ModelInfo& info, const TrainingState* training) {
+  write_model(path, info, kCompactVersion, [&](Hdf5Group& root) {
     Hdf5Group group = root.create_group("field");
-    write_structure(group, *model.field, FieldKind::kVm);
+    write_structure(group, FieldKind::kVm, coded.tree, coded.thickness, 0.0, 0.0);
     {
       Hdf5Group leaves = group.create_group("leaves");
-      write_leaves(leaves, model.field->tree(), model.codes->shapes);
+      write_leaves(leaves, coded.tree, coded.codes.shapes);
     }
-    write_codes(group.create_group("code"), *model.codes);
+    write_codes(group.create_group("code"), coded.codes);
+    if (training != nullptr) write_training(root.create_group("training"), *training, {});
   });
+}
+
+void save_model(const std::filesystem::path& path, const Model& model,
+                const TrainingState* training) {
+  if (model.coded) return save_coded(path, *model.coded, model);
+  save_model(path, *model.field, model, training);
 }
 
 }  // namespace tomofield::output

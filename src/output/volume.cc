@@ -13,6 +13,7 @@
 
 #include "base/log.h"
 #include "base/trace.h"
+#include "compact/sample_coded.h"
 #include "distributed/gathered_arrays.h"
 #include "io/atomic_folder.h"
 #include "io/ome_zarr.h"
@@ -63,11 +64,11 @@ struct Bounds {
 };
 
 // Refuses a box that does not meet the field, because all its voxels would be zero.
-void require_inside(const field::Field& field, const Bounds& box) {
-  const field::RootGrid& roots = field.tree().roots();
+void require_inside(const Model& model, const Bounds& box) {
+  const field::RootGrid& roots = model.tree().roots();
   const Point first{static_cast<double>(roots.x0), static_cast<double>(roots.y0), 0.0};
   const Point last{first[0] + static_cast<double>(roots.columns * roots.cell_size),
-                   first[1] + static_cast<double>(roots.rows * roots.cell_size), field.thickness()};
+                   first[1] + static_cast<double>(roots.rows * roots.cell_size), model.thickness()};
   for (std::size_t a = 0; a < 3; ++a) {
     if (box.low[a] < last[a] && box.high[a] > first[a]) continue;
     throw Error(
@@ -156,6 +157,14 @@ class PartWriter {
   float scale_;
 };
 
+// Computes the densities of a box. A compact model that is not decoded is decoded band by band.
+void sample(const Model& model, const OrientedBox& box, const field::BoxSink& sink) {
+  if (model.field)
+    field::sample_box(*model.field, box, sink);
+  else
+    compact::sample_box(*model.coded, box, sink);
+}
+
 // Turns a box of the specimen into the frame of the field. The fit sees the specimen after its
 // x-axis tilt, p = Ry(tilt) Rx(alpha) (P − C) (docs/geometry.md), so the box is turned by Rx(alpha)
 // about C. A mirrored Z turns the other way.
@@ -203,7 +212,7 @@ OrientedBox region_box(const ModelInfo& model, double voxel_px) {
 
 float largest_density(const Model& model) {
   const OrientedBox box = region_box(model, 1.0);
-  return largest_density([&](const field::BoxSink& sink) { sample_box(*model.field, box, sink); },
+  return largest_density([&](const field::BoxSink& sink) { sample(model, box, sink); },
                          distributed::Communicator::alone());
 }
 
@@ -211,10 +220,10 @@ void write_volume(const Model& model, const VolumeOptions& options,
                   const std::filesystem::path& path) {
   const OrientedBox box = options.box.value_or(region_box(model, 1.0));
   const Bounds bounds(box);
-  require_inside(*model.field, bounds);
+  require_inside(model, bounds);
   if (options.box) warn_of_margin(model, bounds, 0.5 * box.voxel_px);
-  write_voxels([&](const field::BoxSink& sink) { sample_box(*model.field, box, sink); }, box, model,
-               kMadeBy, options, path);
+  write_voxels([&](const field::BoxSink& sink) { sample(model, box, sink); }, box, model, kMadeBy,
+               options, path);
 }
 
 void write_volume(Model& model, const VolumeOptions& options, const std::filesystem::path& path,

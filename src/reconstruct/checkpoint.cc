@@ -102,13 +102,6 @@ std::optional<fit::TreeProgress> unflatten_tree(std::span<const std::int64_t> nu
   return errors.empty() ? std::optional(std::move(tree)) : std::nullopt;
 }
 
-std::vector<std::int64_t> as_numbers(const std::string& text) { return {text.begin(), text.end()}; }
-std::string as_text(const std::vector<std::int64_t>& numbers) {
-  std::string text;
-  for (const std::int64_t number : numbers) text.push_back(static_cast<char>(number));
-  return text;
-}
-
 // Writes the trials without their times, so that a fit gives the same bytes whenever it is made.
 nlohmann::json without_times(const TunedFit& tuned) {
   nlohmann::json json = tuning_json(tuned);
@@ -264,13 +257,21 @@ nlohmann::json transfers_json(const std::vector<microscope::ViewTransfer>& trans
 
 }  // namespace
 
+std::vector<std::int64_t> as_numbers(const std::string& text) { return {text.begin(), text.end()}; }
+std::string as_text(const std::vector<std::int64_t>& numbers) {
+  std::string text;
+  for (const std::int64_t number : numbers) text.push_back(static_cast<char>(number));
+  return text;
+}
+
 std::string fingerprint_of(const ReconstructOptions& options,
                            const measurement::Measurement& series,
                            const distributed::Communicator& processes) {
   nlohmann::json json = options_json(options);
   json.erase("input");
   json.erase("volume");
-  json["field"].erase("budget");  // it changes what is made from the fit, not the fit
+  for (const char* of_results : {"budget", "tile_rows"})  // they change no stage of the fit
+    json["field"].erase(of_results);
   json["tilt_deg"] = series.geometry.tilt_deg;
   if (series.ray_geometry) json["alignment"] = alignment_json(*series.ray_geometry);
   json["bin_factor"] = series.bin_factor;

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "distributed/communicator.h"
 #include "fit/fit.h"
@@ -19,6 +21,10 @@ namespace tomofield::reconstruction {
 std::string fingerprint_of(const ReconstructOptions& options,
                            const measurement::Measurement& series,
                            const distributed::Communicator& processes);
+
+/// Return a text as the numbers that a training state holds, and the reverse.
+std::vector<std::int64_t> as_numbers(const std::string& text);
+std::string as_text(const std::vector<std::int64_t>& numbers);
 
 /// Says what a fit was made from.
 struct FitOrigin {

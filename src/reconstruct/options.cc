@@ -156,6 +156,7 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
           .choice_picture = with("_choice.png"),
           .trials = with("_tune.json"),
           .alignment = with("_align.json"),
+          .tiles = with("_tiles.h5"),
           .halves = {of_half("EVN"), of_half("ODD")},
           .fsc_picture = with("_fsc.png"),
           .local_resolution = with("_local_resolution.mrc"),
@@ -208,6 +209,8 @@ std::vector<std::string> ReconstructOptions::faults() const {
               "--budget makes plain vertices compact: give --field grid");
     refuse_if(makes_halves(), "--budget is for one fit, and halves are two: leave it out");
   }
+  refuse_if(resolved.tile_rows.value_or(0) > 0 && resolved.budget.empty(),
+            "--tile-rows fits tiles that are made compact: give --budget as well");
   for (const char* sentence : faults_of_halves()) all.emplace_back(sentence);
   for (const char* sentence : faults_of_transfer()) all.emplace_back(sentence);
   return all;

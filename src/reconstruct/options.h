@@ -33,6 +33,7 @@ struct OutputPaths {
   std::filesystem::path choice_picture;    ///< of the trials, if there are any
   std::filesystem::path trials;            ///< trials of --tune (JSON)
   std::filesystem::path alignment;         ///< of --align, from which a run resumes (JSON)
+  std::filesystem::path tiles;  ///< finished tiles, from which a run resumes (a compact model)
   /// Files of one of two halves.
   struct OfHalf {
     std::filesystem::path volume, model;

@@ -20,6 +20,7 @@
 #include "reconstruct/results.h"
 #include "reconstruct/run.h"
 #include "reconstruct/run_fit.h"
+#include "reconstruct/tiled_run.h"
 #include "reconstruct/tuning.h"
 
 namespace tomofield::reconstruction {
@@ -117,8 +118,10 @@ std::vector<geometry::RawFromAligned> alignment_of(const tilt_series::TiltSeries
 }
 
 // Fits all views and writes the results.
-RunResult fit_all_views(const Run& run, RunRecord& record, std::optional<TunedFit> tuned) {
+RunResult fit_all_views(const Run& run, const TilePlan& tiles, RunRecord& record,
+                        std::optional<TunedFit> tuned) {
   record.origin = origin_of(run, std::move(tuned));
+  if (tiles.is_used()) return fit_by_tiles(run, tiles, record);
   const FitRun made = run_fit(run, {.measurement = run.measurement,
                                     .model = run.paths.model,
                                     .origin = record.origin,
@@ -137,6 +140,8 @@ RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOp
                       const ReconstructHooks& hooks, const distributed::Communicator& processes) {
   RunRecord record{.origin = {}, .alignment = alignment_of(series)};
   base::log_info(base::describe_threads());
+  TilePlan tiles;
+  if (!options.resolved.budget.empty()) tiles = plan_run(series, options, processes).tiles;
   Run run{.hooks = hooks,
           .processes = processes,
           .options = options,
@@ -145,7 +150,7 @@ RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOp
   std::optional<TunedFit> tuned;
   if (!choose_settings(run, tuned)) return {.outcome = Outcome::kStoppedTuning};
   if (options.makes_halves()) return reconstruct_halves(series, run, record, tuned);
-  return fit_all_views(run, record, std::move(tuned));
+  return fit_all_views(run, tiles, record, std::move(tuned));
 }
 
 }  // namespace tomofield::reconstruction

@@ -12,6 +12,7 @@
 #include "fit/stages.h"
 #include "reconstruct/options.h"
 #include "reconstruct/results.h"
+#include "reconstruct/tiles.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/options.h"
 
@@ -69,6 +70,7 @@ struct RunPlan {
   int steps_an_epoch = 0;
   std::int64_t num_steps = 0;    ///< of all stages of a fit
   int num_fits = 1;              ///< 2 for halves, one after the other
+  TilePlan tiles;                ///< by which the region is fitted, if they are used
   std::size_t memory_bytes = 0;  ///< estimated peak of each process
 };
 

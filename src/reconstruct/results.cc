@@ -36,8 +36,9 @@ namespace tomofield::reconstruction {
 namespace {
 
 // Returns the held-out view nearest to zero tilt.
-measurement::PredictedView central_view(const fit::Fit& fit, const measurement::Measurement& series,
-                                        const measurement::ViewErrors& error) {
+measurement::PredictedView view_near_zero(const fit::Fit& fit,
+                                          const measurement::Measurement& series,
+                                          const measurement::ViewErrors& error) {
   const auto nearest = std::ranges::min_element(error.views, {}, [&](int view) {
     return std::abs(series.geometry.tilt_deg[static_cast<std::size_t>(view)]);
   });
@@ -93,10 +94,9 @@ void write_all(const Writers& writers, const distributed::Communicator& processe
 }
 
 // Writes the results of a fit into files.
-void write_results(Results& results, const ReconstructOptions& options,
-                   const std::optional<TunedFit>& tuned, const output::TrainingState& state,
-                   const output::VolumeShare& share,
-                   const std::optional<measurement::PredictedView>& held_out_view) {
+void write_results(Results& results, const ResultFiles& files) {
+  const auto& [options, origin, state, share, held_out_view, write_more] = files;
+  const std::optional<TunedFit>& tuned = origin.tuned;
   const OutputPaths paths = output_paths(options.resolved.output);
   const distributed::Communicator& processes = share.processes;
   Writers writers;
@@ -176,7 +176,7 @@ void make_compact(const compact::Budget& budget, Results& results) {
   const base::Stopwatch running;
   compact::CompactField made = compact::compress(*results.model->field, budget);
   results.model->field = std::move(made.field);
-  results.model->codes = std::move(made.codes);
+  results.model->coded = std::move(made.coded);
   results.metrics["metrics"]["compact"] = compact::report_json(made.report, running.seconds());
 }
 
@@ -210,6 +210,19 @@ Findings examine(const fit::Fit& fit, const measurement::Measurement& series,
   return found;
 }
 
+std::optional<measurement::PredictedView> central_held_out_view(
+    const fit::Fit& fit, const measurement::Measurement& series, const Findings& found) {
+  if (!found.held_out) return std::nullopt;
+  return view_near_zero(fit, series, *found.held_out);
+}
+
+nlohmann::json run_json(const ReconstructOptions& options, nlohmann::json metrics) {
+  return {{"tomofield", TOMOFIELD_VERSION},
+          {"options", options_json(options)},
+          {"origins", option_table::to_json(options.origins)},
+          {"metrics", std::move(metrics)}};
+}
+
 Results finish(fit::Fit& fit, const measurement::Measurement& series,
                const ReconstructOptions& options, const RunRecord& record,
                const WriteMore& write_more) {
@@ -217,7 +230,7 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   const bool writes_files = !options.resolved.output.empty();
   Findings found = examine(fit, series, options, record);
   std::optional<measurement::PredictedView> view;
-  if (found.held_out && writes_files) view = central_view(fit, series, *found.held_out);
+  if (writes_files) view = central_held_out_view(fit, series, found);
   const output::VolumeShare share = volume_share(fit, series);
   const output::ModelInfo info = model_info(series, options);
   const OutputPaths paths = output_paths(options.resolved.output);
@@ -227,30 +240,33 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
   if (writes_files) outputs.emplace();
   if (writes_files && processes.size() > 1) save_fit(paths.model, fit, info, state);
   Results results{.model = output::Model{info, fit.take_field(), std::nullopt},
-                  .metrics = {{"tomofield", TOMOFIELD_VERSION},
-                              {"options", options_json(options)},
-                              {"origins", option_table::to_json(options.origins)},
-                              {"metrics", std::move(found.metrics)}},
+                  .metrics = run_json(options, std::move(found.metrics)),
                   .verdict = std::move(found.verdict),
                   .bead_masking = series.masks.bead_masking};
   if (!options.resolved.budget.empty())
     make_compact(compact::parse_budget(options.resolved.budget), results);
-  if (!writes_files) return results;
+  if (writes_files)
+    write_together({options, origin, state, share, view, write_more}, *outputs, results);
+  return results;
+}
+
+void write_together(const ResultFiles& files, io::OutputSet& outputs, Results& results) {
+  const distributed::Communicator& processes = files.share.processes;
+  const OutputPaths paths = output_paths(files.options.resolved.output);
   try {
-    write_results(results, options, origin.tuned, state, share, view);
+    write_results(results, files);
     processes.run_collectively([&] {
       if (!processes.is_root()) return;
-      if (write_more) write_more(results, outputs->location_of(paths.volume));
-      outputs->commit();
+      if (files.write_more) files.write_more(results, outputs.location_of(paths.volume));
+      outputs.commit();
     });
   } catch (...) {
-    if (results.model->codes) keep_compact_model(paths.model, *outputs);
+    if (results.model->coded) keep_compact_model(paths.model, outputs);
     std::function<void()> save_again;  // several processes have saved theirs together
     if (processes.size() == 1)
-      save_again = [&] { output::save_model(paths.model, *results.model, &state); };
-    keep_model(paths.model, *outputs, save_again);
+      save_again = [&] { output::save_model(paths.model, *results.model, &files.state); };
+    keep_model(paths.model, outputs, save_again);
   }
-  return results;
 }
 
 }  // namespace tomofield::reconstruction

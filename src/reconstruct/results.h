@@ -6,8 +6,11 @@
 #include <optional>
 
 #include "fit/fit.h"
+#include "io/output_set.h"
 #include "measurement/prepare.h"
 #include "output/model_file.h"
+#include "output/volume.h"
+#include "reconstruct/checkpoint.h"
 #include "reconstruct/options.h"
 #include "reconstruct/run_record.h"
 #include "reconstruct/verdict.h"
@@ -42,11 +45,31 @@ struct Results {
 /// Writes more results of a run, whose volume is in the file `volume`.
 using WriteMore = std::function<void(const Results& results, const std::filesystem::path& volume)>;
 
+/// Predicts the held-out view nearest to zero tilt, if views are held out.
+std::optional<measurement::PredictedView> central_held_out_view(
+    const fit::Fit& fit, const measurement::Measurement& series, const Findings& found);
+
+/// Returns the content of the JSON file of a run.
+nlohmann::json run_json(const ReconstructOptions& options, nlohmann::json metrics);
+
+/// What the files of a run are written from beside its results.
+struct ResultFiles {
+  const ReconstructOptions& options;
+  const FitOrigin& origin;
+  const output::TrainingState& state;  ///< of the fit, for a model that can be continued
+  const output::VolumeShare& share;
+  const std::optional<measurement::PredictedView>& held_out_view;
+  const WriteMore& write_more;
+};
+
+/// Writes the volume, the model, the metrics and pictures of a run; then the root calls
+/// `write_more`, if there is one. All files appear together. If one cannot be written, the model
+/// alone appears, and Error is thrown. Every process calls it.
+void write_together(const ResultFiles& files, io::OutputSet& outputs, Results& results);
+
 /// Takes the results out of a finished fit, which loses its field. If options.resolved.output names
-/// the volume, it writes the volume, the model, the metrics, and a picture of a held-out view if
-/// there is one; then the root calls `write_more`, if there is one. All these files appear together
-/// (io::OutputSet). If one cannot be written, the model alone appears, because it is the checkpoint
-/// of the finished fit, and Error is thrown. Every process calls it.
+/// the volume, it writes the files (write_together()); the model is the checkpoint of the finished
+/// fit. Every process calls it.
 Results finish(fit::Fit& fit, const measurement::Measurement& series,
                const ReconstructOptions& options, const RunRecord& record,
                const WriteMore& write_more);

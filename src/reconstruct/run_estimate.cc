@@ -50,6 +50,13 @@ struct Work {
           steps * samples_of(stage, plan, field, max_rows);
     }
   }
+  // Adds other work, so many times.
+  void add(const Work& other, double times) {
+    steps_of_vertices += times * other.steps_of_vertices;
+    samples_of_vertices += times * other.samples_of_vertices;
+    steps_of_factors += times * other.steps_of_factors;
+    samples_of_factors += times * other.samples_of_factors;
+  }
   double samples() const { return samples_of_vertices + samples_of_factors; }
   double seconds(const StepTimes& times) const {
     return times.vertices.fixed_seconds * steps_of_vertices +
@@ -71,12 +78,27 @@ void add_alignment(const measurement::Measurement& plan, const ReconstructOption
   }
 }
 
+// Adds the rows that are fitted beside those of tiles, in the stages that tiles have.
+void add_rows_beside_tiles(const measurement::Measurement& plan, const ReconstructOptions& options,
+                           const RunPlan& run, Work& work) {
+  constexpr double kAllRows = std::numeric_limits<double>::infinity();
+  const fit::Stage& first = run.stages[static_cast<std::size_t>(run.tiles.num_whole_stages)];
+  Work coarse, all;
+  coarse.add_fit(plan, options.field, options.fit, run.steps_an_epoch, kAllRows, 1,
+                 first.first_epoch);
+  all.add_fit(plan, options.field, options.fit, run.steps_an_epoch, kAllRows, 1);
+  const double beside = run.tiles.repeats() - 1;
+  work.add(all, beside);
+  work.add(coarse, -beside);
+}
+
 // Returns the work of the alignment, of the fit and of the trials that choose its settings.
 Work work_of(const measurement::Measurement& plan, const ReconstructOptions& options,
              const RunPlan& run) {
   constexpr double kAllRows = std::numeric_limits<double>::infinity();
   Work work;
   work.add_fit(plan, options.field, options.fit, run.steps_an_epoch, kAllRows, run.num_fits);
+  if (run.tiles.is_used()) add_rows_beside_tiles(plan, options, run, work);
   if (options.resolved.align != Alignment::kOff) add_alignment(plan, options, run, work);
   if (run.num_trials == 0) return work;
   const TrialShape trial = options.resolved.tune ? trial_of_tune(options.field, options.fit)
@@ -131,9 +153,13 @@ RunEstimate estimate_run(const tilt_series::TiltSeries& series, const Reconstruc
   // Halves are two volumes; their mean, the uncertainty and the local resolution are three more.
   const std::size_t num_volumes = run.num_fits == 1 ? 1 : 5;
   estimate.result_bytes = num_volumes * volume + parameters + kSmallFiles;
-  // A checkpoint has the parameters and two moments, and is there twice while it is replaced.
+  // A checkpoint has the parameters and two moments, and is there twice while it is replaced. With
+  // tiles it is that of the coarse stages.
+  const std::size_t in_checkpoint =
+      run.tiles.is_used() ? sizeof(float) * run.tiles.coarse_parameters : parameters;
+  if (run.tiles.is_used()) estimate.result_bytes -= parameters;  // codes are small
   estimate.disk_bytes = scratch_bytes(series, plan) +
-                        std::max(6 * parameters, estimate.result_bytes + 3 * parameters);
+                        std::max(6 * in_checkpoint, estimate.result_bytes + 3 * in_checkpoint);
   if (plan.ray_geometry) return estimate;
   const Work work = work_of(plan, options, run);
   estimate.sample_steps = work.samples();

@@ -346,7 +346,7 @@ def test_memory_is_estimated_first(out, path, text_file):
                                            "--roi", "0,0,4096,16")
     assert status == 2 and (mebibytes < 1024 or is_sanitized()), (status, text, mebibytes)
     assert re.search(r"tomofield: .*needs about \d{3,}\.\d GiB .* \d+\.\d GiB .*--bin", text), text
-    for method, own in (("ingp", "--table-bits"), ("implicit", "--width"), ("sirt", "--threads")):
+    for method, own in (("ingp", "--table-bits"), ("fourier-net", "--width"), ("sirt", "--threads")):
         status, text, _ = run_measured("baseline", method, large, *options, "--thickness", 100000,
                                        "--roi", "0,0,4096,16")
         assert status == 2 and re.search(r"GiB.*--bin.*" + own, text), text

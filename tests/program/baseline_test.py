@@ -21,10 +21,10 @@ METHODS = {
     "sart-tv": ["--iterations", 8],
     "tv": ["--iterations", 40, "--weight", 2],
     "ingp": ["--iterations", 8, "--width", 16, "--levels", 4],
-    "implicit": ["--iterations", 12, "--width", 16, "--features", 32],
+    "fourier-net": ["--iterations", 12, "--width", 16, "--features", 32],
 }
 ITERATIVE = {method: options for method, options in METHODS.items() if options}
-NETWORKS = ["ingp", "implicit"]
+NETWORKS = ["ingp", "fourier-net"]
 TUNED = ["wbp", "sirt", "sart-tv", "tv"]
 # For tests that do not depend on how well the networks fit.
 ONE_PASS = {method: ["--iterations", 1] for method in NETWORKS}
@@ -86,7 +86,7 @@ def test_specimen_is_found_and_tv_is_the_better_one(plain, series):
     print({method: f"{value:.2f} dB" for method, value in gain.items()}, "above a flat volume")
     assert gain["wbp"] > 1 and gain["sirt"] > 2 and gain["sart-tv"] > gain["sirt"], gain
     assert gain["tv"] > gain["sirt"] + 0.5, gain
-    assert gain["ingp"] > 1.8, gain  # implicit: see network_fit_test.cc
+    assert gain["ingp"] > 1.8, gain  # fourier-net: see network_fit_test.cc
 
 
 def test_densities_are_not_negative_unless_allowed(baseline, plain):
@@ -121,7 +121,7 @@ def test_json_has_metrics_and_every_option(plain, series):
     assert plain["tv"].record["options"]["method"]["weight"] == 2
     assert plain["sirt"].record["options"]["method"]["relaxation"] == 1
     assert plain["ingp"].record["options"]["method"]["levels"] == 4
-    assert plain["implicit"].record["options"]["method"]["shortest"] == 20
+    assert plain["fourier-net"].record["options"]["method"]["shortest"] == 20
 
 
 def test_parameters_are_those_that_are_fitted(baseline, plain):
@@ -130,16 +130,16 @@ def test_parameters_are_those_that_are_fitted(baseline, plain):
     for method in set(METHODS) - set(NETWORKS):
         assert counts[method] == WIDTH * HEIGHT * THICKNESS
     # The network has 32 plane waves, two layers of 16 and one output.
-    assert counts["implicit"] == 33 * 16 + 17 * 16 + 17
+    assert counts["fourier-net"] == 33 * 16 + 17 * 16 + 17
     more, _ = baseline("ingp", "wider", "--width", 17, "--iterations", 1)
     # The inputs are two features of each of four levels.
     assert more.record["metrics"]["parameters"] - counts["ingp"] == 9 + 17 + 16 + 1 + 1
 
 
-def test_implicit_learns_the_noise_of_each_view(baseline, plain, series):
+def test_fourier_net_learns_the_noise_of_each_view(baseline, plain, series):
     noisy = series.views.copy()
     noisy[5] += np.random.default_rng(1).normal(0, 3 * series.views.std(), noisy[5].shape)
-    results, _ = baseline("implicit", "noisy", source=series.with_views("noisy", noisy))
+    results, _ = baseline("fourier-net", "noisy", source=series.with_views("noisy", noisy))
     learned = [view["learned_noise_sigma"] for view in results.record["metrics"]["views"]]
     others = learned[:5] + learned[6:]
     assert learned[5] > 1.5 * max(others) and min(others) > 0, learned
@@ -342,8 +342,8 @@ def test_bad_input_gets_a_sentence_and_nothing_is_written(baseline, series):
         (["--shortest", 0], series, "shortest"),
     ]
     method_of = {"window": "wbp", "cutoff": "wbp", "falloff": "wbp", "subsets": "sart-tv",
-                 "tv-steps": "sart-tv", "relaxation": "sirt", "width": "ingp", "seed": "implicit",
-                 "learning-rate": "ingp", "finest": "ingp", "shortest": "implicit"}
+                 "tv-steps": "sart-tv", "relaxation": "sirt", "width": "ingp", "seed": "fourier-net",
+                 "learning-rate": "ingp", "finest": "ingp", "shortest": "fourier-net"}
     for options, source, expected in cases:
         method = method_of.get(expected, "tv")
         results, run = baseline(method, "bad", *options, source=source, run=harness.tomofield)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 
 import h5py
 import mrcfile
@@ -58,6 +59,19 @@ def test_a_budget_in_decibels_is_the_change_that_the_documents_state(folder, tmp
     assert os.path.getsize(model) < os.path.getsize(os.path.join(folder, "fit.h5")) / 4
 
 
+def test_a_budget_in_decibels_holds_against_the_truth(folder, tmp_path):
+    truth = read(os.path.join(folder, "series", "truth.mrc"))
+    best = harness.psnr(read(os.path.join(folder, "fit.mrc")), truth)
+    half_float = 2 * truth.size  # bytes of a volume of mode 12
+    for budget, times_smaller in ((0.1, 6), (1, 10)):
+        model, volume = tmp_path / f"{budget}.h5", tmp_path / f"{budget}.mrc"
+        harness.succeed("export", os.path.join(folder, "fit.h5"), "--compact", model, "--budget",
+                        f"{budget}dB")
+        harness.succeed("export", model, "-o", volume)
+        assert 0 < best - harness.psnr(read(volume), truth) <= budget
+        assert os.path.getsize(model) < half_float / times_smaller
+
+
 def test_a_budget_in_bytes_is_kept(folder, tmp_path):
     changes = []
     for kilobytes in (10, 40):
@@ -82,6 +96,63 @@ def test_a_run_ends_with_a_compact_model(folder, tmp_path):
     harness.succeed("export", os.path.join(folder, "fit.h5"), "--compact", same)
     harness.succeed("export", same, "-o", again, "--overwrite")
     assert np.array_equal(read(volume), read(again))
+
+
+@pytest.fixture(scope="module")
+def tall():
+    """Returns the command of a short fit to a thin series of 128 rows, two bands of leaves."""
+    folder = harness.fresh_directory("compact_tiles")
+    series = os.path.join(folder, "series")
+    harness.succeed("simulate", series, "--size", 128, "--thickness", 12, "--tilts", "-60:60:10")
+    series = os.path.join(series, "tilt_series")
+    return ("reconstruct", series + ".mrc", "--tlt", series + ".tlt", "--thickness", 12, "--contrast",
+            "bright", "--no-margin", "--tv-penalty", "concave", "--epochs", 2, "--hold-out", 6,
+            "--budget", "0.1dB")
+
+
+def test_tiles_are_much_the_same_as_the_whole_region(tall, tmp_path):
+    whole, tiles = tmp_path / "whole.mrc", tmp_path / "tiles.mrc"
+    harness.succeed(*tall, "--tile-rows", 0, "-o", whole)
+    harness.succeed(*tall, "--tile-rows", 64, "-o", tiles)
+    change = np.sqrt(np.mean((read(whole) - read(tiles)) ** 2)) / read(whole).std()
+    assert change < 0.15
+    with open(tmp_path / "tiles.json") as file:
+        metrics = json.load(file)["metrics"]
+    assert [tile["rows"] for tile in metrics["tiles"]] == [[0, 64], [64, 128]]
+    assert metrics["compact"]["bytes"] == sum(tile["bytes"] for tile in metrics["tiles"])
+    assert all(tile["held_out_error"] > 0 for tile in metrics["tiles"])
+    assert metrics["size_px"] == [128, 128, 12]
+    again = tmp_path / "again.mrc"
+    harness.succeed("export", tmp_path / "tiles.h5", "-o", again)
+    assert np.array_equal(read(tiles), read(again))
+    assert not (tmp_path / "tiles_tiles.h5").exists()
+
+
+def test_tiles_go_on_after_a_stop(tall, tmp_path):
+    tiles, stopped = tmp_path / "tiles.mrc", tmp_path / "stopped.mrc"
+    harness.succeed(*tall, "--tile-rows", 64, "-o", tiles)
+    run = harness.start(*tall, "--tile-rows", 64, "-o", stopped)
+    for line in run.stderr:
+        if line.startswith("rows 0 to 64:"):
+            break
+    run.send_signal(signal.SIGTERM)
+    run.communicate()
+    if run.returncode != 0:  # it was stopped in the second tile
+        assert run.returncode == 143
+        refuse(*tall[:-1], "1dB", "--tile-rows", 64, "-o", stopped, "--resume",
+               says="give the same")
+        said = harness.succeed(*tall, "--tile-rows", 64, "-o", stopped, "--resume").stderr
+        assert "after row 64" in said
+    assert np.array_equal(read(tiles), read(stopped))
+
+
+def test_requests_that_tiles_cannot_meet_get_a_sentence(tall, tmp_path):
+    volume = tmp_path / "volume.mrc"
+    refuse(*tall[:-2], "--tile-rows", 64, "-o", volume, says="give --budget as well")
+    refuse(*tall, "--tile-rows", 64, "--coarse-epochs", 0, "-o", volume, says="coarse stages")
+    refuse(*tall, "--tile-rows", 64, "--defocus", 3, "-o", volume, says="across tiles")
+    said = harness.succeed(*tall, "--tile-rows", 64, "-o", volume, "--dry-run").stdout
+    assert "tiles: 2 of 64 rows" in said
 
 
 def test_wrong_requests_get_a_sentence(folder, tmp_path):

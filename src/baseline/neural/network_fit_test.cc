@@ -92,8 +92,8 @@ IngpOptions ingp_options(int iterations) {
   return options;
 }
 
-ImplicitOptions implicit_options(int iterations) {
-  ImplicitOptions options;
+FourierNetOptions fourier_net_options(int iterations) {
+  FourierNetOptions options;
   options.iterations = iterations;
   options.hidden_layers = 2;
   options.width = 24;
@@ -107,9 +107,9 @@ Solution solve(const SphereSeries& series, const IngpOptions& options) {
   return reconstruct_ingp(problem, options, kMeanDensity, kNothing);
 }
 
-Solution solve(const SphereSeries& series, const ImplicitOptions& options) {
+Solution solve(const SphereSeries& series, const FourierNetOptions& options) {
   VoxelProblem problem = testing::voxel_problem(series);
-  return reconstruct_implicit(problem, options, kMeanDensity, kNothing);
+  return reconstruct_fourier_net(problem, options, kMeanDensity, kNothing);
 }
 
 TEST_F(NetworkFit, HashGridFindsTheSpheres) {
@@ -122,7 +122,7 @@ TEST_F(NetworkFit, HashGridFindsTheSpheres) {
 
 TEST_F(NetworkFit, CoordinateNetworkFindsTheSpheresAndLearnsTheNoise) {
   const SphereSeries series;
-  const Solution solution = solve(series, implicit_options(60));
+  const Solution solution = solve(series, fourier_net_options(60));
   EXPECT_LT(testing::rms_error(solution.densities), 0.6 * testing::rms_truth());
   ASSERT_EQ(solution.noise_sigma.size(), series.noise_sigma.size());
   // Each level is the root mean square residual of its view, so together they give the data loss.
@@ -158,12 +158,12 @@ TEST_F(NetworkFit, PixelsThatAreNoMeasurementsDoNotCount) {
 
 TEST_F(NetworkFit, ThreadsDoNotChangeABitAndTheSeedDoes) {
   base::set_thread_count(1);
-  const Solution one = solve(SphereSeries(), implicit_options(2));
+  const Solution one = solve(SphereSeries(), fourier_net_options(2));
   base::set_thread_count(3);
-  const Solution three = solve(SphereSeries(), implicit_options(2));
+  const Solution three = solve(SphereSeries(), fourier_net_options(2));
   EXPECT_TRUE(testing::same_bits(one.densities, three.densities));
   EXPECT_EQ(one.noise_sigma, three.noise_sigma);
-  ImplicitOptions other = implicit_options(2);
+  FourierNetOptions other = fourier_net_options(2);
   other.seed = 2;
   EXPECT_FALSE(testing::same_bits(one.densities, solve(SphereSeries(), other).densities));
 }

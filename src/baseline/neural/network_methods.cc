@@ -15,7 +15,7 @@ std::unique_ptr<PointEncoding> encoding_of(const IngpOptions& options,
   return std::make_unique<HashGrid>(box_of(samples, num_rows), options.grid);
 }
 
-std::unique_ptr<PointEncoding> encoding_of(const ImplicitOptions& options) {
+std::unique_ptr<PointEncoding> encoding_of(const FourierNetOptions& options) {
   // This seed keeps the random numbers of the encoding apart from the network's.
   constexpr std::uint64_t kSeedStep = 1000003;
   return std::make_unique<FourierEncoding>(options.features, options.shortest,
@@ -43,20 +43,20 @@ Solution reconstruct_ingp(VoxelProblem& problem, const IngpOptions& options, dou
                      mean_density, /*learns_noise=*/false, after_iteration);
 }
 
-nlohmann::json ImplicitOptions::json() const {
+nlohmann::json FourierNetOptions::json() const {
   nlohmann::json json = NetworkOptions::json();
   json["features"] = features;
   json["shortest"] = shortest;
   return json;
 }
 
-MethodSize ImplicitOptions::size(const projection::SampleGrid& samples,
-                                 std::int64_t num_rows) const {
+MethodSize FourierNetOptions::size(const projection::SampleGrid& samples,
+                                   std::int64_t num_rows) const {
   return network_size(samples, num_rows, *encoding_of(*this), *this);
 }
 
-Solution reconstruct_implicit(VoxelProblem& problem, const ImplicitOptions& options,
-                              double mean_density, const AfterIteration& after_iteration) {
+Solution reconstruct_fourier_net(VoxelProblem& problem, const FourierNetOptions& options,
+                                 double mean_density, const AfterIteration& after_iteration) {
   return fit_network(problem, options, encoding_of(options), mean_density, /*learns_noise=*/true,
                      after_iteration);
 }

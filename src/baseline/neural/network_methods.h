@@ -24,10 +24,10 @@ struct IngpOptions : NetworkOptions {
 Solution reconstruct_ingp(VoxelProblem& problem, const IngpOptions& options, double mean_density,
                           const AfterIteration& after_iteration);
 
-/// A network of coordinates alone, with sines as activations (Sitzmann et al. 2020). The noise of
-/// each view is learned with it (after Kniesel et al. 2022).
-struct ImplicitOptions : NetworkOptions {
-  ImplicitOptions()
+/// A network of plane waves alone, with sines as activations (Sitzmann et al. 2020). A noise level
+/// of each view is learned with it. Kniesel et al. (2022) learn noise that depends on the signal.
+struct FourierNetOptions : NetworkOptions {
+  FourierNetOptions()
       : NetworkOptions{.hidden_layers = 2,
                        .width = 64,
                        .learning_rate = 0.006,
@@ -36,7 +36,7 @@ struct ImplicitOptions : NetworkOptions {
   double shortest = 20.0;  ///< shortest wavelength of the plane waves, pixels
 
   MethodFacts facts() const {
-    return {.name = "implicit",
+    return {.name = "fourier-net",
             .iterations = iterations,
             .volumes = 1,
             .detectors = 1,
@@ -47,7 +47,7 @@ struct ImplicitOptions : NetworkOptions {
 };
 
 /// Reconstructs with fit_network().
-Solution reconstruct_implicit(VoxelProblem& problem, const ImplicitOptions& options,
-                              double mean_density, const AfterIteration& after_iteration);
+Solution reconstruct_fourier_net(VoxelProblem& problem, const FourierNetOptions& options,
+                                 double mean_density, const AfterIteration& after_iteration);
 
 }  // namespace tomofield::baseline

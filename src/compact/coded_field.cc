@@ -1,0 +1,60 @@
+#include "compact/coded_field.h"
+
+#include "base/check.h"
+#include "field/tree/quadtree_bands.h"
+
+namespace tomofield::compact {
+
+std::size_t LeafCodes::num_parameters() const {
+  return field::count_parameters(FieldKind::kVm, shapes);
+}
+
+std::span<const std::uint8_t> LeafCodes::code(int leaf) const {
+  const auto at = static_cast<std::size_t>(leaf);
+  const auto first = static_cast<std::size_t>(offset[at]);
+  return std::span(bytes).subspan(first, static_cast<std::size_t>(offset[at + 1]) - first);
+}
+
+field::LeafShape with_upper_faces(const field::LeafShape& shape) {
+  return {.nx = shape.nx + 1, .ny = shape.ny + 1, .nz = shape.nz};
+}
+
+std::size_t decoded_numbers(const field::LeafShape& shape) {
+  return field::count_parameters(FieldKind::kVm, {shape}) +
+         field::count_parameters(FieldKind::kGrid, {with_upper_faces(shape)});
+}
+
+void append(CodedField& lower, const CodedField& upper) {
+  TOMOFIELD_CHECK(lower.thickness == upper.thickness, "bands of one field");
+  lower.tree = field::joined(lower.tree, upper.tree);
+  LeafCodes& to = lower.codes;
+  const LeafCodes& from = upper.codes;
+  const std::int64_t first = std::ssize(to.bytes);
+  to.step.insert(to.step.end(), from.step.begin(), from.step.end());
+  to.face_weight.insert(to.face_weight.end(), from.face_weight.begin(), from.face_weight.end());
+  to.shapes.insert(to.shapes.end(), from.shapes.begin(), from.shapes.end());
+  for (std::size_t i = 1; i < from.offset.size(); ++i) to.offset.push_back(first + from.offset[i]);
+  to.bytes.insert(to.bytes.end(), from.bytes.begin(), from.bytes.end());
+}
+
+CodedField some_bands(const CodedField& field, base::Range bands) {
+  const auto part = [](const auto& all, base::Range range) {
+    return std::vector(all.begin() + range.begin, all.begin() + range.end);
+  };
+  const base::Range leaves = field::leaves_of_bands(field.tree, bands);
+  const LeafCodes& all = field.codes;
+  CodedField some{.tree = field::some_bands(field.tree, bands),
+                  .thickness = field.thickness,
+                  .codes = {.step = part(all.step, bands),
+                            .face_weight = part(all.face_weight, bands),
+                            .shapes = part(all.shapes, leaves),
+                            .offset = part(all.offset, {leaves.begin, leaves.end + 1}),
+                            .bytes = {}}};
+  std::vector<std::int64_t>& offset = some.codes.offset;
+  some.codes.bytes.assign(all.bytes.begin() + offset.front(), all.bytes.begin() + offset.back());
+  const std::int64_t first = offset.front();
+  for (std::int64_t& at : offset) at -= first;
+  return some;
+}
+
+}  // namespace tomofield::compact

@@ -1,0 +1,77 @@
+#include "compact/sample_coded.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "base/memory.h"
+#include "compact/decoded_field.h"
+#include "kernels/lanes.h"
+
+namespace tomofield::compact {
+namespace {
+
+using field::OrientedBox;
+
+constexpr std::int64_t kBandsAtOnce = 2;  // that rows of a box come from; two more are decoded
+
+// Returns the bands that densities from y = low to high depend on. Leaves take vertices of their
+// upper faces from the next band, and faces are softened on both sides.
+base::Range bands_for(const field::RootGrid& roots, double low, double high) {
+  const auto band_of = [&](double y) {
+    const double band = std::floor((y - field::kPixelCentre - static_cast<double>(roots.y0)) /
+                                   static_cast<double>(roots.cell_size));
+    return static_cast<int>(std::clamp(band, 0.0, static_cast<double>(roots.rows - 1)));
+  };
+  return {std::max(band_of(low) - 1, 0), std::min(band_of(high) + 2, roots.rows)};
+}
+
+std::unique_ptr<field::Field> decode_bands(const CodedField& coded, double low, double high) {
+  const CodedField bands = some_bands(coded, bands_for(coded.tree.roots(), low, high));
+  std::size_t bytes = 0;
+  for (const field::LeafShape& shape : bands.codes.shapes)
+    bytes += sizeof(float) * decoded_numbers(shape);
+  constexpr std::size_t kSmall = std::size_t{1} << 24;
+  if (bytes > kSmall)
+    base::require_memory(bytes, "this part of a compact model",
+                         "use a machine with more, or a smaller --box");
+  return decode_field(bands);
+}
+
+// Returns how many rows of a box, a multiple of those of a slab, some bands have.
+std::int64_t rows_at_once(const CodedField& coded, const OrientedBox& box) {
+  const auto rows = static_cast<double>(kBandsAtOnce * coded.tree.roots().cell_size) / box.voxel_px;
+  return std::max<std::int64_t>(static_cast<std::int64_t>(rows) / kernels::kLanes, 1) *
+         kernels::kLanes;
+}
+
+void sample_rotated_box(const CodedField& coded, const OrientedBox& box,
+                        const field::BoxSink& sink) {
+  double low = box.centre_px[1], high = low;
+  for (int corner = 0; corner < 8; ++corner) {
+    field::Point voxel{};
+    for (std::size_t a = 0; a < 3; ++a)
+      voxel[a] = (corner >> a & 1) ? static_cast<double>(box.size[a]) : 0.0;
+    const double y = box.position(voxel)[1];
+    low = std::min(low, y);
+    high = std::max(high, y);
+  }
+  field::sample_box(*decode_bands(coded, low, high), box, sink);
+}
+
+}  // namespace
+
+void sample_box(const CodedField& coded, const OrientedBox& box, const field::BoxSink& sink) {
+  if (!box.is_aligned()) return sample_rotated_box(coded, box, sink);
+  const std::int64_t step = rows_at_once(coded, box);
+  for (std::int64_t first = 0; first < box.size[1]; first += step) {
+    const std::int64_t end = std::min(first + step, box.size[1]);
+    const auto y_of = [&](std::int64_t row) {
+      return box.position({0.0, static_cast<double>(row), 0.0})[1];
+    };
+    field::sample_box(*decode_bands(coded, y_of(first), y_of(end)), box,
+                      {static_cast<int>(first), static_cast<int>(end)}, sink);
+  }
+}
+
+}  // namespace tomofield::compact

@@ -1,0 +1,122 @@
+#include "reconstruct/finished_tiles.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <string>
+#include <utility>
+
+#include "base/log.h"
+#include "base/trace.h"
+#include "io/json_numbers.h"
+#include "output/model_file.h"
+#include "reconstruct/results.h"
+#include "reconstruct/run_fit.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+double rows_of(const nlohmann::json& tile) {
+  return tile.at("rows").at(1).get<double>() - tile.at("rows").at(0).get<double>();
+}
+
+compact::CompressionReport report_of(const nlohmann::json& tile) {
+  return {.parameters = tile.at("parameters").get<std::size_t>(),
+          .bytes = tile.at("bytes").get<std::size_t>(),
+          .mean_square_change = tile.at("mean_square_change").get<double>(),
+          .variance = tile.at("variance").get<double>(),
+          .decibels = tile.at("decibels").get<double>(),
+          .volume = tile.at("volume").get<double>()};
+}
+
+}  // namespace
+
+FinishedTiles::FinishedTiles(const Run& run, const FitOrigin& origin) : run_(run), origin_(origin) {
+  if (!run.writes_files() || !run.options.resolved.resume ||
+      !std::filesystem::exists(run.paths.tiles))
+    return;
+  read_checkpoint([&] { read(origin); });
+  base::log_info(fmt::format("resuming {} after row {}", run.paths.tiles.string(), num_rows()));
+}
+
+void FinishedTiles::read(const FitOrigin& origin) {
+  const std::string path = run_.paths.tiles.string();
+  output::TrainingState state;
+  output::Model model = output::load_undecoded(path, &state);
+  const auto text = [&](const char* name) { return as_text(state.integers[name]); };
+  if (!model.coded || text("fingerprint") != origin.fingerprint)
+    throw Error(fmt::format("'{}' was made from another series or with other options", path));
+  if (text("budget") != run_.options.resolved.budget)
+    throw Error(fmt::format("'{}' was made with --budget {}: give the same", path, text("budget")));
+  try {
+    tiles_ = io::parse_json(text("tiles"));
+    for (const nlohmann::json& tile : tiles_) report_of(tile);
+    if (num_rows() <= 0) throw Error("it has no tiles");
+  } catch (const std::exception& error) {
+    throw Error(fmt::format("'{}' is damaged: {}", path, error.what()));
+  }
+  coded_ = std::move(model.coded);
+}
+
+void FinishedTiles::add(const Tile& tile, TileCodes codes, nlohmann::json json) {
+  const compact::CompressionReport& report = codes.report;
+  json.update({{"seconds_compressing", codes.seconds},
+               {"parameters", report.parameters},
+               {"bytes", report.bytes},
+               {"mean_square_change", report.mean_square_change},
+               {"variance", report.variance},
+               {"decibels", report.decibels},
+               {"volume", report.volume}});
+  base::log_info(fmt::format("rows {} to {}: {} parameters in {} bytes", tile.own.begin,
+                             tile.own.end, report.parameters, report.bytes));
+  tiles_.push_back(std::move(json));
+  if (coded_)
+    append(*coded_, codes.coded);
+  else
+    coded_ = std::move(codes.coded);
+}
+
+void FinishedTiles::save() const {
+  if (!run_.writes_files()) return;
+  const base::TraceSpan span("write tiles");
+  const output::TrainingState state{
+      .floats = {},
+      .doubles = {},
+      .integers = {{"fingerprint", as_numbers(origin_.fingerprint)},
+                   {"budget", as_numbers(run_.options.resolved.budget)},
+                   {"tiles", as_numbers(tiles_.dump())}}};
+  output::save_coded(run_.paths.tiles, *coded_, model_info(run_.measurement, run_.options), &state);
+}
+
+void FinishedTiles::remove_file() const {
+  std::error_code ignored;
+  std::filesystem::remove(run_.paths.tiles, ignored);
+}
+
+int FinishedTiles::num_rows() const {
+  return tiles_.empty() ? 0 : tiles_.back().at("rows").at(1).get<int>();
+}
+
+compact::CompressionReport FinishedTiles::report() const {
+  compact::CompressionReport all = report_of(tiles_.front());
+  for (std::size_t i = 1; i < tiles_.size(); ++i) all = compact::joined(all, report_of(tiles_[i]));
+  return all;
+}
+
+double FinishedTiles::sum_of(const char* key) const {
+  double sum = 0;
+  for (const nlohmann::json& tile : tiles_) sum += tile.at(key).get<double>();
+  return sum;
+}
+
+double FinishedTiles::mean_of(const char* key) const {
+  double sum = 0, rows = 0;
+  for (const nlohmann::json& tile : tiles_) {
+    sum += rows_of(tile) * tile.at(key).get<double>();
+    rows += rows_of(tile);
+  }
+  return sum / rows;
+}
+
+}  // namespace tomofield::reconstruction

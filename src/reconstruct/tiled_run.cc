@@ -1,0 +1,253 @@
+#include "reconstruct/tiled_run.h"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "base/log.h"
+#include "base/memory.h"
+#include "base/stopwatch.h"
+#include "base/trace.h"
+#include "compact/budget.h"
+#include "compact/compress.h"
+#include "compact/decoded_field.h"
+#include "fit/fit.h"
+#include "reconstruct/finished_tiles.h"
+#include "reconstruct/run_fit.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+// Where the coarse stages have ended.
+struct CoarseStart {
+  fit::Progress progress;
+  std::unique_ptr<field::Field> field;
+  double variance = 0.0;  // of its densities
+  double seconds = 0.0;
+  double part_of_work = 0.0;  // of the coarse stages in that of the whole run
+};
+
+// What is kept of the fit of a tile near the middle, which speaks for all of them.
+struct Example {
+  Findings found;
+  std::optional<measurement::PredictedView> held_out_view;
+  Tile tile;
+};
+
+// Passes on the progress of a part of the run.
+base::ProgressSink part_of(const base::ProgressSink& whole, double done, double part,
+                           std::string name) {
+  if (!whole) return {};
+  return [=, name = std::move(name)](const base::ProgressReport& report) {
+    const double all = done + part * report.fraction_done;
+    base::ProgressReport of_run = report;
+    of_run.fraction_done = all;
+    of_run.seconds_left =
+        report.seconds_elapsed / std::max(part * report.fraction_done, 1e-9) * (1 - all);
+    of_run.detail = fmt::format("{}  {}", name, report.detail);
+    whole(of_run);
+  };
+}
+
+// Fits the coarse stages of the whole region. Returns nothing if the run was stopped.
+std::optional<CoarseStart> fit_coarse_stages(const Run& run, const TilePlan& plan,
+                                             const RunRecord& record) {
+  Run coarse = run;
+  coarse.options.fit.num_stages = plan.num_whole_stages;
+  const auto stages = fit::make_stages(run.options.field, run.options.fit);
+  double work = 0, of_coarse = 0;
+  for (const fit::Stage& stage : stages) {
+    work += stage.epochs * stage.step_cost;
+    if (&stage - stages.data() < plan.num_whole_stages) of_coarse += stage.epochs * stage.step_cost;
+  }
+  const base::ProgressSink progress =
+      part_of(run.hooks.progress, 0.0, of_coarse / work, "whole region");
+  const FitJob job{.measurement = run.measurement,
+                   .model = run.paths.model,
+                   .origin = record.origin,
+                   .resumes = run.options.resolved.resume,
+                   .progress = progress};
+  const FitRun made = run_fit(coarse, job);
+  if (made.was_stopped) return std::nullopt;
+  if (made.took_steps && run.writes_files())
+    save_checkpoint(run.paths.model, *made.fit, model_info(run.measurement, run.options),
+                    record.origin);
+  const double variance = compact::variance_of(made.fit->field());
+  return CoarseStart{.progress = made.fit->progress(),
+                     .field = made.fit->take_field(),
+                     .variance = variance,
+                     .seconds = made.seconds,
+                     .part_of_work = of_coarse / work};
+}
+
+// Fits one tile after the other.
+class TileFits {
+ public:
+  TileFits(const Run& run, const RunRecord& record, const CoarseStart& start, int num_rows,
+           FinishedTiles& finished)
+      : run_(run), record_(record), start_(start), num_rows_(num_rows), finished_(finished) {
+    fit_options_.fit_view_scale = false;  // the coarse stages have found scales for all tiles
+  }
+
+  // Returns false if the run was stopped.
+  bool fit(const Tile& tile, std::optional<Example>* example) {
+    const base::TraceSpan span("tile");
+    const base::Stopwatch running;
+    std::vector<int> views(static_cast<std::size_t>(run_.measurement.geometry.num_views()));
+    std::iota(views.begin(), views.end(), 0);
+    const measurement::Measurement rays = some_rows(run_.measurement, tile.fitted, views);
+    auto fit = std::make_unique<fit::Fit>(rays, run_.options.field, fit_options_);
+    fit->go_on_from_stages(start_.progress, *start_.field);
+    if (!take_steps(tile, *fit)) return false;
+    const double seconds_fitting = running.seconds();
+    nlohmann::json tile_json{{"rows", {tile.own.begin, tile.own.end}},
+                             {"fitted_rows", {tile.fitted.begin, tile.fitted.end}},
+                             {"residual", fit->progress().data_loss.back()},
+                             {"held_out_error", nullptr},
+                             {"seconds_fitting", seconds_fitting}};
+    if (!rays.held_out.empty())
+      tile_json["held_out_error"] = fit->held_out_error(run_.options.fit.fit_view_scale).total;
+    if (example != nullptr) {
+      Findings found = examine(*fit, rays, run_.options, record_);
+      auto view = central_held_out_view(*fit, rays, found);
+      example->emplace(Example{std::move(found), std::move(view), tile});
+    }
+    std::unique_ptr<field::Field> vertices = fit->take_field();
+    fit.reset();  // compression needs the memory
+    finished_.add(tile, compressed(tile, std::move(vertices)), std::move(tile_json));
+    return true;
+  }
+
+ private:
+  // Takes the steps of a tile. Returns false if the run was stopped.
+  bool take_steps(const Tile& tile, fit::Fit& fit) const {
+    const double of_tiles = 1 - start_.part_of_work;
+    const auto rows = static_cast<double>(num_rows_);
+    const base::ProgressSink progress =
+        part_of(run_.hooks.progress, start_.part_of_work + of_tiles * tile.own.begin / rows,
+                of_tiles * tile.own.size() / rows,
+                fmt::format("rows {} to {} of {}", tile.own.begin, tile.own.end, num_rows_));
+    const base::Stopwatch running;
+    const double first = fit.work(fit.progress().step), all = fit.work(fit.num_steps()) - first;
+    bool stopped = false;
+    fit.run([&](const fit::Fit&) {
+      const double done = (fit.work(fit.progress().step) - first) / all;
+      if (progress) {
+        const auto& loss = fit.progress().data_loss;
+        progress(
+            base::progress_at(done, running.seconds(), fmt::format("loss {:.4f}", loss.back())));
+      }
+      stopped = run_.hooks.stop_requested && run_.hooks.stop_requested();
+      return !stopped;
+    });
+    return !stopped;
+  }
+
+  // Replaces the own rows of a tile by codes, with the budget's share of these rows.
+  TileCodes compressed(const Tile& tile, std::unique_ptr<field::Field> vertices) const {
+    const base::Stopwatch running;
+    compact::Budget budget = compact::parse_budget(run_.options.resolved.budget);
+    if (budget.kind != compact::Budget::Kind::kDecibels)
+      budget.amount *= static_cast<double>(tile.own.size()) / num_rows_;
+    const auto first = static_cast<int>(run_.measurement.roi.y0);
+    base::Range rows{first + tile.own.begin, first + tile.own.end};
+    if (tile.own.end == num_rows_) {  // the last band may reach beyond the region
+      const field::RootGrid& roots = vertices->tree().roots();
+      rows.end = static_cast<int>(roots.y0 + roots.rows * roots.cell_size);
+    }
+    compact::CompactField made = compact::compress(*vertices, budget, rows, start_.variance);
+    return {std::move(made.coded), made.report, running.seconds()};
+  }
+
+  const Run& run_;
+  const RunRecord& record_;
+  const CoarseStart& start_;
+  int num_rows_;
+  FinishedTiles& finished_;
+  fit::FitOptions fit_options_ = run_.options.fit;
+};
+
+// Returns the tile that is nearest to the middle of the region.
+std::size_t middle_tile(const std::vector<Tile>& tiles, int num_rows) {
+  const auto distance = [&](const Tile& tile) {
+    return std::abs(tile.own.begin + tile.own.end - num_rows);
+  };
+  return static_cast<std::size_t>(std::ranges::min_element(tiles, {}, distance) - tiles.begin());
+}
+
+// Returns the metrics of the run: those of the example where they are of one fit, and those of all
+// tiles.
+nlohmann::json metrics_of(const Run& run, const Example& example, const FinishedTiles& finished,
+                          const Verdict& verdict, double seconds) {
+  nlohmann::json metrics = example.found.metrics;
+  const measurement::Measurement& series = run.measurement;
+  metrics["size_px"] = {series.roi.width(), series.roi.height(), series.geometry.thickness};
+  metrics["seconds"] = seconds;
+  metrics["leaves"] = finished.coded().tree.num_leaves();
+  metrics["verdict"] = verdict_json(verdict);
+  metrics["example_tile"] = {example.tile.own.begin, example.tile.own.end};
+  metrics["tiles"] = finished.tiles_json();
+  metrics["compact"] =
+      compact::report_json(finished.report(), finished.sum_of("seconds_compressing"));
+  return metrics;
+}
+
+// Writes the results of a run whose tiles are all finished.
+RunResult finish_tiles(const Run& run, RunRecord& record, FinishedTiles& finished, Example example,
+                       double seconds_of_coarse) {
+  record.fit_seconds = seconds_of_coarse + finished.sum_of("seconds_fitting");
+  Verdict& verdict = example.found.verdict;
+  verdict.residual = finished.mean_of("residual");
+  verdict.seconds = record.since_start.seconds();
+  verdict.peak_GiB = static_cast<double>(base::peak_memory()) / (1 << 30);
+  Results results{
+      .model = output::Model{model_info(run.measurement, run.options), nullptr, std::nullopt},
+      .metrics =
+          run_json(run.options, metrics_of(run, example, finished, verdict, record.fit_seconds)),
+      .verdict = std::move(verdict),
+      .bead_masking = run.measurement.masks.bead_masking};
+  results.model->coded = finished.take();
+  if (!run.writes_files()) {
+    results.model->field = compact::decode_field(*results.model->coded);
+    return {.outcome = Outcome::kFinished, .results = std::move(results)};
+  }
+  io::OutputSet outputs;
+  const output::TrainingState no_state;
+  const output::VolumeShare share{
+      run.processes, {0, static_cast<int>(run.measurement.roi.height())}, 0, 0};
+  write_together(
+      {run.options, record.origin, no_state, share, example.held_out_view, run.hooks.write_more},
+      outputs, results);
+  finished.remove_file();
+  return {.outcome = Outcome::kFinished, .results = std::move(results)};
+}
+
+}  // namespace
+
+RunResult fit_by_tiles(const Run& run, const TilePlan& plan, RunRecord& record) {
+  const base::TraceSpan span("fit by tiles");
+  const auto stopped = [&] {
+    return RunResult{.outcome = Outcome::kStopped, .results = {}, .checkpoint = run.paths.model};
+  };
+  const std::optional<CoarseStart> start = fit_coarse_stages(run, plan, record);
+  if (!start) return stopped();
+  FinishedTiles finished(run, record.origin);
+  const std::vector<Tile> tiles = plan.tiles_from(finished.num_rows());
+  const std::size_t middle = middle_tile(tiles, plan.num_rows);
+  TileFits fits(run, record, *start, plan.num_rows, finished);
+  std::optional<Example> example;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    if (!fits.fit(tiles[i], i == middle ? &example : nullptr)) return stopped();
+    // A run that resumes has at least one tile to fit, which speaks for all.
+    if (i + 1 < tiles.size()) finished.save();
+  }
+  return finish_tiles(run, record, finished, std::move(*example), start->seconds);
+}
+
+}  // namespace tomofield::reconstruction
