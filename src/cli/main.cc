@@ -13,7 +13,7 @@ namespace {
 // of times in an alignment, and it costs a tenth of the time to get them from the system each time.
 void keep_freed_memory() {
 #if defined(__GLIBC__)
-  constexpr int kLargestKept = 4 << 20, kMostKept = 64 << 20;  // bytes: of a block, of all
+  constexpr int kLargestKept = 1 << 20, kMostKept = 16 << 20;  // bytes: of a block, of all
   mallopt(M_MMAP_THRESHOLD, kLargestKept);
   mallopt(M_TRIM_THRESHOLD, kMostKept);
 #endif
