@@ -63,11 +63,8 @@ base::ProgressReport report(const fit::Fit& fit, double seconds,
 }
 
 // Returns how wide the pixels of the next epoch are. At the end of a stage, the fit enters the next
-// one, which needs its own. Views with a transfer keep all pixels: their fit may stop at another
-// step.
-int bin_of_next_epoch(const FitInProgress& run) {
-  if (!run.measurement.transfers.empty()) return 1;
-  const fit::Fit& fit = run.fit;
+// one, which needs its own.
+int bin_of_next_epoch(const fit::Fit& fit) {
   const fit::Stage& stage = fit.stage();
   const std::int64_t end = stage.first_epoch + stage.epochs;
   if (epochs_done(fit) + 1 < end) return stage.bin;
@@ -77,7 +74,7 @@ int bin_of_next_epoch(const FitInProgress& run) {
 
 // Lets a fit go on with views that are resampled anew.
 void resample(const FitInProgress& run, const distributed::Communicator& processes) {
-  measurement::realign(run.problem.recorded, run.corrections, bin_of_next_epoch(run),
+  measurement::realign(run.problem.recorded, run.corrections, bin_of_next_epoch(run.fit),
                        run.problem.scratch_dir, fit::band_rows(run.field), processes,
                        run.measurement);
   run.fit.reread_measurement();
@@ -173,7 +170,7 @@ bool run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
   fit::Fit& fit = run.fit;
   bool is_updated = false;
   while (epochs_done(fit) < num_epochs) {
-    if (is_updated || run.measurement.rays_bin != bin_of_next_epoch(run)) resample(run, processes);
+    if (is_updated || run.measurement.rays_bin != bin_of_next_epoch(fit)) resample(run, processes);
     const fit::Stage stage = fit.stage();
     fit.run([](const fit::Fit& f) { return f.progress().step % f.steps_per_epoch() != 0; });
     if (run.problem.progress && num_epochs == fit.num_epochs())

@@ -53,15 +53,15 @@ const std::vector<double>& AlignmentTrial::fine_errors() {
   return fine_errors_;
 }
 
-// Takes all coarse steps but the last one, after which the pixels are fine.
+// Takes all coarse steps but the last ones, after which the pixels are fine.
 void AlignmentTrial::begin() {
   const base::TraceSpan span("try alignment");
   measurement_ = aligning_measurement(problem_, corrections_, kCoarseBin, field_, processes_);
   measurement_.held_out = measurement::held_out_views(measurement_.geometry.tilt_deg, kEvery);
   fit_ = std::make_unique<fit::Fit>(measurement_, field_, held_out_fit(problem_.seed), processes_);
-  fit_->run([](const fit::Fit& fit) {
-    return fit.progress().step + 1 < kHeldOutCoarseEpochs * fit.steps_per_epoch();
-  });
+  const std::int64_t last =
+      fit_->last_stop_before(std::int64_t{kHeldOutCoarseEpochs} * fit_->steps_per_epoch());
+  fit_->run([&](const fit::Fit& fit) { return fit.progress().step < last; });
   coarse_errors_ = errors();
   measurement_.rays.reset();  // the next fit needs the memory
 }

@@ -129,6 +129,13 @@ double Domain::coarsening(field::Region region, int bin) const {
   return std::max(1.0, bin * std::min(1.0, usual_over_own));
 }
 
+std::vector<field::LeafShape> Domain::shapes_in(const field::Quadtree& of_tree, int bin) const {
+  std::vector<field::LeafShape> all;
+  for (int leaf = 0; leaf < of_tree.num_leaves(); ++leaf)
+    all.push_back(shape_in(of_tree.leaf(leaf).region, bin));
+  return all;
+}
+
 field::LeafShape Domain::shape_in(field::Region region, int bin) const {
   int leaf = 0;
   while (tree.leaf(leaf).region != region) ++leaf;

@@ -39,6 +39,8 @@ struct Domain {
   /// a region have the same number of them, also after the tree has changed. The tree must have a
   /// leaf in `region`.
   field::LeafShape shape_in(field::Region region, int bin) const;
+  /// Returns the vertices of all leaves of a tree in a stage.
+  std::vector<field::LeafShape> shapes_in(const field::Quadtree& of_tree, int bin) const;
 };
 
 /// Returns the number of rows of a band, which is the side of a root cell.

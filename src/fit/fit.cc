@@ -52,11 +52,7 @@ Domain domain_of(const measurement::Measurement& measurement, const FieldOptions
 // Returns the domain with the vertices that the first field is made with: those of full resolution,
 // or those of the first stage if the fit never comes to full resolution.
 Domain with_shapes_for(const FitOptions& options, const Stage& first, Domain domain) {
-  if (options.num_stages == 0) return domain;
-  std::vector<field::LeafShape> shapes;
-  for (int leaf = 0; leaf < domain.tree.num_leaves(); ++leaf)
-    shapes.push_back(domain.shape_in(domain.tree.leaf(leaf).region, first.bin));
-  domain.shapes = std::move(shapes);
+  if (options.num_stages > 0) domain.shapes = domain.shapes_in(domain.tree, first.bin);
   return domain;
 }
 
@@ -139,18 +135,9 @@ void Fit::enter_stage() {
       binned_->geometry, sample_grid(domain_, measurement_.geometry.thickness, stage().bin));
 }
 
-// Returns the vertices of all leaves in a stage.
-std::vector<field::LeafShape> Fit::shapes_in(const Stage& stage) const {
-  std::vector<field::LeafShape> shapes;
-  const field::Quadtree& tree = field_->tree();
-  for (int leaf = 0; leaf < tree.num_leaves(); ++leaf)
-    shapes.push_back(domain_.shape_in(tree.leaf(leaf).region, stage.bin));
-  return shapes;
-}
-
 // Resamples the field to the vertices of the stage, or factorises it. The optimiser starts anew.
 void Fit::resample_field() {
-  std::vector<field::LeafShape> shapes = shapes_in(stage());
+  std::vector<field::LeafShape> shapes = domain_.shapes_in(field_->tree(), stage().bin);
   // The gradient and the moments go before the other field needs memory.
   gradient_.reset(0);
   optimizer_.state() = {};
@@ -218,7 +205,7 @@ void Fit::go_on_from(Progress progress, std::unique_ptr<field::Field> field) {
 
 void Fit::go_on_from_stages(const Progress& progress, const field::Field& field) {
   progress_ = progress;
-  field_ = field_->resampled(shapes_in(*std::prev(&stage())));
+  field_ = field_->resampled(domain_.shapes_in(field_->tree(), std::prev(&stage())->bin));
   const field::Quadtree& tree = field_->tree();
   base::parallel_for("take over leaves", tree.num_leaves(), [&](std::int64_t i) {
     const int leaf = static_cast<int>(i);
@@ -309,6 +296,11 @@ void Fit::run(const AfterStep& after_step) {
     const bool may_stop = filters_.empty() || needs_surrogates() || is_done();
     if (may_stop && !after_step(*this)) return;
   }
+}
+
+std::int64_t Fit::last_stop_before(std::int64_t step) const {
+  const std::int64_t last = step - 1;
+  return filters_.empty() ? last : last - last % steps_per_epoch() % steps_of_surrogates();
 }
 
 // Returns the views of a step: a subset of interleaved views, which covers the tilt range evenly.

@@ -71,6 +71,8 @@ class Fit {
   using AfterStep = std::function<bool(const Fit&)>;
   /// Takes steps until the fit is done or `after_step` stops it.
   void run(const AfterStep& after_step);
+  /// Returns the last number of steps below `step` after which run() can stop.
+  std::int64_t last_stop_before(std::int64_t step) const;
   /// Says why a tree, or a progress and a field, that were read from a file are no state of this
   /// fit. Returns an empty text if they are one.
   std::string fault_of(const field::Quadtree& tree) const;
@@ -157,7 +159,6 @@ class Fit {
   const Stage& stage_at(std::int64_t step) const;
   measurement::RowShare share_of_stage() const;
   void enter_stage();
-  std::vector<field::LeafShape> shapes_in(const Stage& stage) const;
   void resample_field();
   void refine();
   void follow_tree();

@@ -365,8 +365,7 @@ void realign(const tilt_series::TiltSeries& recorded,
              std::span<const geometry::ViewCorrection> corrections, int bin,
              const std::filesystem::path& scratch_dir, std::int64_t band_rows,
              const distributed::Communicator& processes, Measurement& measurement) {
-  if (!measurement.transfers.empty()) bin = 1;  // a transfer filters all pixels
-  measurement.rays.reset();                     // its successor needs the memory
+  measurement.rays.reset();  // its successor needs the memory
   const SlabViews::Shape shape = measurement.rays_shape();
   measurement.rays =
       read_rays(recorded, {shape, bin, measurement.unit, band_rows, scratch_dir},

@@ -30,9 +30,7 @@ double vertices_of(const std::vector<field::LeafShape>& shapes) {
 // Returns the domain with the vertices of a coarse stage.
 fit::Domain coarse_domain(const fit::Domain& domain, int bin) {
   fit::Domain coarse = domain;
-  for (int leaf = 0; leaf < domain.tree.num_leaves(); ++leaf)
-    coarse.shapes[static_cast<std::size_t>(leaf)] =
-        domain.shape_in(domain.tree.leaf(leaf).region, bin);
+  coarse.shapes = domain.shapes_in(domain.tree, bin);
   return coarse;
 }
 
@@ -43,7 +41,7 @@ int num_whole_stages(const fit::Domain& domain, const std::vector<fit::Stage>& s
   int count = 0;
   for (const fit::Stage& stage : stages) {
     if (stage.bin == 1) break;
-    if (count > 0 && vertices_of(coarse_domain(domain, stage.bin).shapes) > most) break;
+    if (count > 0 && vertices_of(domain.shapes_in(domain.tree, stage.bin)) > most) break;
     ++count;
   }
   return count;
