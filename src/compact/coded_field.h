@@ -37,7 +37,7 @@ field::LeafShape with_upper_faces(const field::LeafShape& shape);
 /// Returns how many numbers a leaf has in memory while it is decoded: its factors and its vertices.
 std::size_t decoded_numbers(const field::LeafShape& shape);
 
-/// A field as codes, which take little memory (decode_field).
+/// Holds a field as codes, which take little memory (decode_field).
 struct CodedField {
   field::Quadtree tree;
   double thickness = 0.0;

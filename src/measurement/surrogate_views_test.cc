@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include "base/random.h"
@@ -147,8 +148,8 @@ TEST(SurrogateViews, FollowTheModelOfTheView) {
   const SurrogateViews surrogates = scene.surrogates();
   EXPECT_EQ(surrogates.models()[0].scale, 1.0);
   EXPECT_EQ(surrogates.models()[0].offset, 0.0);
-  const double largest = scene.filters.transfers[0].largest_transfer(0.0, 0.7071);
-  EXPECT_NEAR(surrogates.models()[0].weight, 4.0 * 1.2 * 1.2 * 1.1 * largest * largest, 1e-3);
+  const double largest = scene.filters.transfers[0].largest_transfer(0.0, std::numbers::sqrt2 / 2);
+  EXPECT_NEAR(surrogates.models()[0].weight, 4.0 * 1.2 * 1.2 * 1.1 * largest * largest, 1e-9);
 }
 
 TEST(SurrogateViews, TakeLongerStepsForViewsThatTransferLess) {

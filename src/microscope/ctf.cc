@@ -48,9 +48,12 @@ double Ctf::turns(double kx, double ky, double more_defocus_A) const {
   const double k2 = kx * kx + ky * ky;
   // k² cos(2 (α − angle))
   const double k2_cosine = (kx * kx - ky * ky) * cos_2angle_ + 2 * kx * ky * sin_2angle_;
-  const double defocus_k2 =
-      (mean_defocus_A_ + more_defocus_A) * k2 + half_difference_A_ * k2_cosine;
-  return wavelength_A_ / 2 * (defocus_k2 - aberration_A3_ * k2 * k2) + phase_turns_;
+  return turns_of((mean_defocus_A_ + more_defocus_A) * k2 + half_difference_A_ * k2_cosine, k2);
+}
+
+// Returns the argument of the sine over 2π, where the first number is the defocus times k².
+double Ctf::turns_of(double defocus_A_k2, double k2) const {
+  return wavelength_A_ / 2 * (defocus_A_k2 - aberration_A3_ * k2 * k2) + phase_turns_;
 }
 
 double Ctf::largest(double from, double to, double low_A, double high_A) const {
@@ -58,9 +61,7 @@ double Ctf::largest(double from, double to, double low_A, double high_A) const {
   for (const double k : {from, to}) {
     for (const double defocus_A : {mean_defocus_A_ - std::abs(half_difference_A_) + low_A,
                                    mean_defocus_A_ + std::abs(half_difference_A_) + high_A}) {
-      const double k2 = k * k;
-      const double turns =
-          wavelength_A_ / 2 * (defocus_A - aberration_A3_ * k2) * k2 + phase_turns_;
+      const double turns = turns_of(defocus_A * k * k, k * k);
       least = std::min(least, turns);
       most = std::max(most, turns);
     }

@@ -41,7 +41,7 @@ class Ctf {
   /// Returns its envelope, where `k2` is the square of the frequency.
   double envelope(double k2) const;
 
-  /// Returns the largest |CTF| / envelope between two frequencies that are close to each other,
+  /// Returns a bound of |CTF| / envelope between two frequencies that are close to each other,
   /// where the underfocus is that of any direction and greater by `low_A` to `high_A`.
   double largest(double from, double to, double low_A, double high_A) const;
 
@@ -53,6 +53,8 @@ class Ctf {
   double wavelength_A() const { return wavelength_A_; }
 
  private:
+  double turns_of(double defocus_A_k2, double k2) const;
+
   double wavelength_A_;
   double mean_defocus_A_, half_difference_A_;  // (u + v) / 2 and (u − v) / 2
   double cos_2angle_, sin_2angle_;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "base/parallel.h"
@@ -145,7 +144,7 @@ std::vector<OfView> check_views(const fit::Fit& fit, const measurement::Measurem
 
 // Returns the weighted mean of what the views say of the slope, and its standard error by their
 // scatter. Nothing if few views say something.
-std::optional<std::pair<double, double>> mean_slope(const std::vector<OfView>& found) {
+std::optional<DefocusCheck::Slope> mean_slope(const std::vector<OfView>& found) {
   double weights = 0.0, sum = 0.0, scatter = 0.0;
   int count = 0;
   for (const OfView& view : found) {
@@ -157,7 +156,7 @@ std::optional<std::pair<double, double>> mean_slope(const std::vector<OfView>& f
   const double mean = sum / weights;
   for (const OfView& view : found)
     scatter += std::pow(view.slope.weight * (view.slope.value - mean), 2);
-  return std::pair(mean, std::sqrt(scatter) / weights);
+  return DefocusCheck::Slope{mean, std::sqrt(scatter) / weights};
 }
 
 }  // namespace
@@ -185,7 +184,7 @@ std::optional<DefocusCheck> check_defocus(const fit::Fit& fit,
   // scatters by 1.25 times as much as their mean.
   check.standard_error =
       1.25 * 1.48 * base::percentile(errors, 50) / std::sqrt(static_cast<double>(errors.size()));
-  if (const auto slope = mean_slope(found)) check.slope = {slope->first, slope->second};
+  check.slope = mean_slope(found);
   return check;
 }
 

@@ -17,7 +17,7 @@ struct DefocusCheck {
   /// Part of the residuals' squares that such a change explains, in the median view.
   double rings = 0.0;
 
-  /// What the residuals say of the change of the defocus across tilted views.
+  /// Holds what the residuals say of the change of the defocus across tilted views.
   struct Slope {
     double error = 0.0, standard_error = 0.0;
   };

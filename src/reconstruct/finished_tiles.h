@@ -11,15 +11,15 @@
 
 namespace tomofield::reconstruction {
 
-/// The codes of the own rows of a tile.
+/// Holds the codes of the own rows of a tile.
 struct TileCodes {
   compact::CodedField coded;
   compact::CompressionReport report;
   double seconds = 0.0;  ///< of the compression
 };
 
-/// The codes of the tiles that a run has finished, from the first row of the region on. They are
-/// kept in a file, from which a run resumes.
+/// Holds the codes of the tiles that a run has finished, from the first row of the region on. They
+/// are kept in a file, from which a run resumes.
 class FinishedTiles {
  public:
   /// Reads what an earlier run has finished, if the run resumes. Throws Error if the file is of

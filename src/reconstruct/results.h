@@ -52,7 +52,7 @@ std::optional<measurement::PredictedView> central_held_out_view(
 /// Returns the content of the JSON file of a run.
 nlohmann::json run_json(const ReconstructOptions& options, nlohmann::json metrics);
 
-/// What the files of a run are written from beside its results.
+/// Holds what the files of a run are written from, beside its results.
 struct ResultFiles {
   const ReconstructOptions& options;
   const FitOrigin& origin;

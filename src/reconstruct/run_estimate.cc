@@ -108,13 +108,13 @@ Work work_of(const measurement::Measurement& plan, const ReconstructOptions& opt
   return work;
 }
 
-// Holds the processor times of decoding a view and of aligning it once.
+// Holds the processor times of decoding a view and, with an alignment, of aligning it once.
 struct ViewTimes {
   double decoding = 0, update = 0;
 };
 
 // Measures them on a view in the middle of the series.
-ViewTimes measure_view(const tilt_series::TiltSeries& series) {
+ViewTimes measure_view(const tilt_series::TiltSeries& series, bool aligns) {
   const auto pixels = static_cast<std::size_t>(series.width() * series.height());
   std::vector<float> image(pixels);
   std::vector<std::uint8_t> valid(pixels);
@@ -122,7 +122,7 @@ ViewTimes measure_view(const tilt_series::TiltSeries& series) {
   const base::ProcessorStopwatch decoding;
   series.read_view(series.views().size() / 2, image, valid);
   times.decoding = decoding.seconds();
-  times.update = align::seconds_of_update(image, series.width());
+  if (aligns) times.update = align::seconds_of_update(image, series.width());
   return times;
 }
 
@@ -165,9 +165,10 @@ RunEstimate estimate_run(const tilt_series::TiltSeries& series, const Reconstruc
   estimate.sample_steps = work.samples();
   if (options.field.leaf_size > kLargestLeaf) return estimate;
   const StepTimes times = measure_steps(plan, options.field, options.fit);
-  const ViewTimes of_view = measure_view(series);
+  const bool aligns = options.resolved.align != Alignment::kOff;
+  const ViewTimes of_view = measure_view(series, aligns);
   // An alignment reads the series once more, as it was recorded.
-  const double readings = options.resolved.align == Alignment::kOff ? 1.0 : 2.0;
+  const double readings = aligns ? 2.0 : 1.0;
   estimate.core_seconds =
       kStart + work.seconds(times) + kSecondsAVoxel * num_voxels(run) +
       work.updates_of_views * of_view.update +

@@ -24,7 +24,7 @@
 namespace tomofield::reconstruction {
 namespace {
 
-// Where the coarse stages have ended.
+// Holds the state in which the coarse stages have ended.
 struct CoarseStart {
   fit::Progress progress;
   std::unique_ptr<field::Field> field;
@@ -33,7 +33,7 @@ struct CoarseStart {
   double part_of_work = 0.0;  // of the coarse stages in that of the whole run
 };
 
-// What is kept of the fit of a tile near the middle, which speaks for all of them.
+// Holds what is kept of the fit of a tile near the middle, which speaks for all of them.
 struct Example {
   Findings found;
   std::optional<measurement::PredictedView> held_out_view;

@@ -7,7 +7,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Rows of the region of interest that are fitted together, counted from its first one.
+/// Names the rows of the region of interest that are fitted together, counted from its first one.
 struct Tile {
   base::Range own;     ///< rows that the tile contributes
   base::Range fitted;  ///< these and the rows beside them, whose vertices are thrown away
