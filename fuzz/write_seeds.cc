@@ -188,7 +188,7 @@ void write_models(const fs::path& folder) {
   output::Model small = testing::uneven_model(FieldKind::kGrid);
   compact::CompactField made = compact::compress(*small.field, {});
   small.field = std::move(made.field);
-  small.codes = std::move(made.codes);
+  small.coded = std::move(made.coded);
   output::save_model(folder / "model" / "compact", small);
   const testing::SmallFit series;
   for (const int steps : {1, 7, 12}) {

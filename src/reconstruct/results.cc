@@ -95,21 +95,21 @@ void write_all(const Writers& writers, const distributed::Communicator& processe
 
 // Writes the results of a fit into files.
 void write_results(Results& results, const ResultFiles& files) {
-  const auto& [options, origin, state, share, held_out_view, write_more] = files;
-  const std::optional<TunedFit>& tuned = origin.tuned;
-  const OutputPaths paths = output_paths(options.resolved.output);
-  const distributed::Communicator& processes = share.processes;
+  const std::optional<TunedFit>& tuned = files.origin.tuned;
+  const OutputPaths paths = output_paths(files.options.resolved.output);
+  const distributed::Communicator& processes = files.share.processes;
   Writers writers;
   if (processes.size() == 1) {
-    writers.push_back([&] { output::save_model(paths.model, *results.model, &state); });
+    writers.push_back([&] { output::save_model(paths.model, *results.model, &files.state); });
   }
-  writers.push_back(
-      [&] { output::write_volume(*results.model, options.volume, paths.volume, share); });
-  if (held_out_view) {
+  writers.push_back([&] {
+    output::write_volume(*results.model, files.options.volume, paths.volume, files.share);
+  });
+  if (files.held_out_view) {
     writers.push_back([&] {
       processes.run_collectively([&] {
         if (processes.is_root())
-          report::write_held_out_picture(*held_out_view, paths.held_out_picture);
+          report::write_held_out_picture(*files.held_out_view, paths.held_out_picture);
       });
     });
   }
