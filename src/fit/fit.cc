@@ -34,6 +34,11 @@ constexpr int kSurrogatesInEpoch = 2;
 // Predictions of views that surrogates are made from are at most so large at a time, or one view.
 constexpr std::size_t kPredictionBytes = std::size_t{256} << 20;
 
+// Returns the bytes of a predicted view and of what was measured of it.
+std::size_t bytes_of_prediction(const measurement::SlabViews::Shape& views) {
+  return 2 * sizeof(float) * static_cast<std::size_t>(views.width * views.num_rows);
+}
+
 FitOptions with_at_most_one_subset_a_view(FitOptions options, int num_views) {
   if (options.engine == Engine::kSlab) options.subsets = std::min(options.subsets, num_views);
   return options;
@@ -360,10 +365,8 @@ void Fit::make_surrogates() {
     std::ranges::copy(views_of_step(progress_.step + s), std::back_inserter(views));
   surrogates_.reset();  // its successor needs the memory
   surrogates_.emplace(*binned_->rays, views, progress_.views);
-  const auto& shape = binned_->rays->shape();
-  const auto at_once = std::max<std::size_t>(
-      1, kPredictionBytes /
-             (2 * sizeof(float) * static_cast<std::size_t>(shape.width * shape.num_rows)));
+  const auto at_once =
+      std::max<std::size_t>(1, kPredictionBytes / bytes_of_prediction(binned_->rays->shape()));
   for (std::size_t first = 0; first < views.size(); first += at_once) {
     const auto some = std::span(views).subspan(first, std::min(at_once, views.size() - first));
     surrogates_->set(filters_, some, project(some), processes());
@@ -453,6 +456,15 @@ void Fit::end_epoch() {
   if (tree_updates_.update(epochs_done, *field_, optimizer_.state(), progress_.tree)) follow_tree();
   if (epochs_done > 0 && epochs_done == stage().first_epoch) refine();
   follow_noise();
+}
+
+std::size_t surrogate_memory(const measurement::SlabViews::Shape& views, int slabs_in_use) {
+  measurement::SlabViews::Shape at_once = views;
+  at_once.num_views = (views.num_views + kSurrogatesInEpoch - 1) / kSurrogatesInEpoch;
+  const std::size_t predicted = bytes_of_prediction(views);
+  return measurement::SlabViews::resident_memory(at_once, slabs_in_use) +
+         std::max(predicted, std::min(kPredictionBytes, at_once.num_views * predicted)) +
+         views.num_views * microscope::ViewFilter::kMostKept;
 }
 
 }  // namespace tomofield::fit

@@ -190,4 +190,9 @@ class Fit {
   Traffic traffic_;
 };
 
+/// Returns an upper bound of the memory that a fit to filtered views of this shape takes for their
+/// surrogates (measurement/surrogate_views.h): rays of half the views, the projections that they
+/// are made from, and the filters.
+std::size_t surrogate_memory(const measurement::SlabViews::Shape& views, int slabs_in_use);
+
 }  // namespace tomofield::fit

@@ -55,11 +55,7 @@ Measurement binned(const Measurement& fine, int bin) {
   coarse.geometry.axis_x /= bin;
   coarse.geometry.axis_z /= bin;
   for (double& sigma : coarse.noise_sigma) sigma /= bin * bin;
-  for (microscope::ViewTransfer& transfer : coarse.transfers) {
-    transfer.pixel_size_A *= bin;
-    transfer.slope.x_A *= bin;
-    transfer.slope.y_A *= bin;
-  }
+  for (microscope::ViewTransfer& transfer : coarse.transfers) transfer = transfer.binned(bin);
   for (auto& discs : coarse.undecided_beads)
     for (auto& [x, y, radius] : discs) x /= bin, y /= bin, radius /= bin;
   return coarse;

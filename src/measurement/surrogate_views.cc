@@ -101,6 +101,14 @@ std::vector<ViewFilter> view_filters(const Measurement& measurement) {
   return filters;
 }
 
+std::int64_t largest_reach_px(const Measurement& measurement) {
+  const SlabViews::Shape shape = measurement.rays_shape();
+  std::int64_t reach = 0;
+  for (const microscope::ViewTransfer& transfer : measurement.transfers)
+    reach = std::max(reach, microscope::reach_px(transfer, shape.width, shape.num_rows));
+  return reach;
+}
+
 void filter_predictions(std::span<const ViewFilter> filters, std::span<const int> views,
                         std::span<PredictedView> predicted,
                         const distributed::Communicator& processes) {

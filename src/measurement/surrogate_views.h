@@ -17,6 +17,10 @@ namespace tomofield::measurement {
 /// Returns the filter H of each view of a measurement that has transfers, on the rows of its rays.
 std::vector<microscope::ViewFilter> view_filters(const Measurement& measurement);
 
+/// Returns how far the transfers of a measurement move what is in a view at most, in pixels.
+/// Returns 0 if it has none.
+std::int64_t largest_reach_px(const Measurement& measurement);
+
 /// Replaces the predictions of some views by what the microscope makes of them: p by H p. `filters`
 /// are those of all views. Every process calls it and gets the same.
 void filter_predictions(std::span<const microscope::ViewFilter> filters, std::span<const int> views,

@@ -193,12 +193,11 @@ std::vector<microscope::ViewTransfer> view_transfers(const SeriesFiles& files,
                                                      const Options& options,
                                                      const tilt_series::TiltSeriesOptions& input,
                                                      const tilt_series::TiltSeries& series) {
-  const bool has_dose = options.dose_per_tilt.value_or(0.0) > 0.0;
   if (!has_ctf(files, options) && !files.ctf && options.contrast == Contrast::kDark)
     base::log_info(
         "ctf: none is given (--ctf or --defocus), so the views count as plain projections: "
         "the tomogram lacks contrast at low resolution and keeps the fringes of defocus");
-  if (!has_ctf(files, options) && !has_dose && !files.mtf) return {};
+  if (!wants_transfers(files, options)) return {};
   const auto stack = tilt_series::open_views(input);
   const std::int64_t num_sections = stack->header().nz;
   require_pixel_size(input, series, stack->name());

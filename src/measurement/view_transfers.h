@@ -16,6 +16,11 @@ inline bool has_ctf(const SeriesFiles& files, const Options& options) {
   return has_ctf_file(files) || options.defocus_um;
 }
 
+/// Says whether the options ask for transfers of the views.
+inline bool wants_transfers(const SeriesFiles& files, const Options& options) {
+  return has_ctf(files, options) || options.dose_per_tilt.value_or(0.0) > 0.0 || files.mtf;
+}
+
 /// Returns a sentence for each option of contrast transfer and dose that does not go with others.
 std::vector<const char*> faults_of_transfer(const SeriesFiles& files, const Options& options);
 

@@ -26,9 +26,6 @@ std::pair<double, double> range_of(const DefocusSlope& slope, std::int64_t width
   return {slope.at_centre_A - half_A, slope.at_centre_A + half_A};
 }
 
-// A filter keeps at most so many transfers: 1 MiB.
-constexpr std::size_t kMostKept = std::size_t{1} << 18;
-
 // The largest transfer is looked for in steps of so many cycles a pixel.
 constexpr double kStepOfBound = 1.0 / 512;
 
@@ -120,7 +117,7 @@ void ViewFilter::compute_row(std::int64_t ky, std::int64_t s, std::span<float> r
 void ViewFilter::keep_transfers() {
   const auto width = static_cast<std::size_t>(transform_.half_width());
   const std::size_t of_a_defocus = transform_.spectrum_size();
-  if (of_a_defocus * static_cast<std::size_t>(num_defoci_) > kMostKept) return;
+  if (of_a_defocus * static_cast<std::size_t>(num_defoci_) > kMostKept / sizeof(float)) return;
   std::vector<float> transfers(of_a_defocus * static_cast<std::size_t>(num_defoci_));
   for (std::int64_t s = 0; s < num_defoci_; ++s)
     for (std::int64_t ky = 0; ky < transform_.height(); ++ky)

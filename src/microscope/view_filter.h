@@ -36,6 +36,9 @@ enum class CtfCorrection { kFlip, kMultiply, kWiener };
 /// not at most 1, as |CTF| is, but up to 1.1.
 class ViewFilter {
  public:
+  /// A filter keeps computed transfers if they take no more bytes than this.
+  static constexpr std::size_t kMostKept = std::size_t{1} << 20;
+
   ViewFilter(std::int64_t width, std::int64_t height, const ViewTransfer& transfer);
 
   /// Returns H image.

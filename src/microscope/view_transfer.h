@@ -18,6 +18,15 @@ struct ViewTransfer {
   double pixel_size_A = 1.0;  ///< of that image
   bool is_flipped = false;    ///< the view's phases were flipped: |CTF| instead of −CTF
   std::shared_ptr<const Detector> detector = {};  ///< none: it passes all of the signal
+
+  /// Returns the transfer of the image whose pixels are means over `bin`² of these.
+  ViewTransfer binned(int bin) const {
+    ViewTransfer coarse = *this;
+    coarse.pixel_size_A *= bin;
+    coarse.slope.x_A *= bin;
+    coarse.slope.y_A *= bin;
+    return coarse;
+  }
 };
 
 }  // namespace tomofield::microscope

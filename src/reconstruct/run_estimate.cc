@@ -13,6 +13,9 @@
 #include "io/scratch_memory.h"
 #include "measurement/prepare.h"
 #include "measurement/slab_views.h"
+#include "measurement/surrogate_views.h"
+#include "measurement/view_transfers.h"
+#include "microscope/view_filter.h"
 #include "reconstruct/step_times.h"
 #include "reconstruct/tuning.h"
 
@@ -30,24 +33,47 @@ constexpr int kLargestLeaf = 256;  // larger ones do not fit in the volume that 
 
 constexpr std::size_t kSmallFiles = std::size_t{2} << 20;  // metrics and pictures
 
+// Projecting all views for their surrogates takes this part of an epoch's steps.
+constexpr double kProjection = 0.25;
+
+// Returns the processor time of filtering a view of a stage there and back, on so many rows at
+// most.
+double seconds_of_filter(const measurement::Measurement& plan, int bin, double max_rows) {
+  const auto height = static_cast<std::int64_t>(
+      std::min(static_cast<double>(plan.geometry.height), max_rows) / bin);
+  const std::int64_t width = plan.geometry.width / bin;
+  const std::size_t tilted = plan.transfers.size() / 4;  // its number of defoci is near the mean
+  const microscope::ViewFilter filter(width, height, plan.transfers[tilted].binned(bin));
+  const std::vector<float> image(static_cast<std::size_t>(width * height), 1.0F);
+  const base::ProcessorStopwatch running;
+  filter.apply_transpose(filter.apply(image));
+  return running.seconds();
+}
+
 // Counts steps and samples, in each kind of field.
 struct Work {
   double steps_of_vertices = 0, samples_of_vertices = 0;
   double steps_of_factors = 0, samples_of_factors = 0;
   double updates_of_views = 0;  // in times of align::seconds_of_update()
+  double filter_seconds = 0;    // of filtering views for surrogates
 
   // Adds the first epochs of a fit of at most so many rows, `times` times.
   void add_fit(const measurement::Measurement& plan, const fit::FieldOptions& field,
                const fit::FitOptions& fit, int steps_an_epoch, double max_rows, double times,
                std::int64_t epochs = std::numeric_limits<std::int64_t>::max()) {
+    const bool has_filters = !plan.transfers.empty();
     for (const fit::Stage& stage : fit::make_stages(field, fit)) {
       const bool is_grid = stage.field_kind == FieldKind::kGrid;
       const std::int64_t made =
           std::clamp<std::int64_t>(epochs - stage.first_epoch, 0, stage.epochs);
-      const double steps = times * static_cast<double>(made) * steps_an_epoch;
+      const double epochs_of_all = times * static_cast<double>(made);
+      const double steps = epochs_of_all * steps_an_epoch * (has_filters ? 1 + kProjection : 1);
       (is_grid ? steps_of_vertices : steps_of_factors) += steps;
       (is_grid ? samples_of_vertices : samples_of_factors) +=
           steps * samples_of(stage, plan, field, max_rows);
+      if (has_filters && epochs_of_all > 0)
+        filter_seconds += epochs_of_all * plan.geometry.num_views() *
+                          seconds_of_filter(plan, stage.bin, max_rows);
     }
   }
   // Adds other work, so many times.
@@ -56,13 +82,14 @@ struct Work {
     samples_of_vertices += times * other.samples_of_vertices;
     steps_of_factors += times * other.steps_of_factors;
     samples_of_factors += times * other.samples_of_factors;
+    filter_seconds += times * other.filter_seconds;
   }
   double samples() const { return samples_of_vertices + samples_of_factors; }
   double seconds(const StepTimes& times) const {
     return times.vertices.fixed_seconds * steps_of_vertices +
            times.vertices.seconds_a_sample * samples_of_vertices +
            times.factors.fixed_seconds * steps_of_factors +
-           times.factors.seconds_a_sample * samples_of_factors;
+           times.factors.seconds_a_sample * samples_of_factors + filter_seconds;
   }
 };
 
@@ -102,7 +129,8 @@ Work work_of(const measurement::Measurement& plan, const ReconstructOptions& opt
   if (options.resolved.align != Alignment::kOff) add_alignment(plan, options, run, work);
   if (run.num_trials == 0) return work;
   const TrialShape trial = options.resolved.tune ? trial_of_tune(options.field, options.fit)
-                                                 : short_trial(options.field, options.fit);
+                                                 : short_trial(options.field, options.fit,
+                                                               measurement::largest_reach_px(plan));
   work.add_fit(plan, trial.field, trial.fit, run.steps_an_epoch, static_cast<double>(trial.rows),
                run.num_trials);
   return work;
@@ -144,7 +172,9 @@ std::size_t scratch_bytes(const tilt_series::TiltSeries& series,
 
 RunEstimate estimate_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
                          const RunPlan& run) {
-  const measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
+  measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
+  plan.transfers =
+      measurement::view_transfers(options.files, options.resolved, options.input, series);
   RunEstimate estimate;
   const auto num_fits = static_cast<std::size_t>(run.num_fits);
   const std::size_t parameters = sizeof(float) * run.num_parameters * num_fits;

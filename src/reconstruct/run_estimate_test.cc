@@ -36,6 +36,10 @@ class Estimate : public ::testing::Test {
     options_.output = scratch_ / "out.mrc";
   }
 
+  RunPlan plan() const {
+    const ReconstructOptions run = run_options(files_, options_);
+    return plan_run(tilt_series::TiltSeries(run.input), run);
+  }
   RunEstimate estimate() const {
     const ReconstructOptions run = run_options(files_, options_);
     const tilt_series::TiltSeries series(run.input);
@@ -76,6 +80,15 @@ TEST_F(Estimate, AnAlignmentIsMoreWork) {
   EXPECT_GT(refined, alone);
   options_.align = Alignment::kFull;
   EXPECT_GT(estimate().sample_steps, refined);
+}
+
+TEST_F(Estimate, FilteredViewsAreMoreWorkAndMemory) {
+  options_.pixel_size_A = 10;
+  const double alone = estimate().sample_steps;
+  const std::size_t memory = plan().memory_bytes;
+  options_.defocus_um = 4;
+  EXPECT_GT(estimate().sample_steps, alone);
+  EXPECT_GT(plan().memory_bytes, memory);
 }
 
 TEST_F(Estimate, DiskHoldsTheResultsAndTwoCheckpoints) {

@@ -10,7 +10,7 @@
 
 #include "base/enum_names.h"
 #include "base/log.h"
-#include "microscope/view_filter.h"
+#include "measurement/surrogate_views.h"
 #include "objective/options.h"
 #include "reconstruct/trial_fits.h"
 
@@ -38,15 +38,6 @@ fit::FitOptions short_trial_options(const fit::FieldOptions& plain, const fit::F
   shorter.vertex_epochs = 0;
   shorter.learning_rate = usual.learning_rate;
   return shorter;
-}
-
-// Returns how far the transfers of a series move what is in a view at most. 0 without a microscope.
-std::int64_t largest_reach_px(const measurement::Measurement& series) {
-  const measurement::SlabViews::Shape& shape = series.rays->shape();
-  std::int64_t reach = 0;
-  for (const microscope::ViewTransfer& transfer : series.transfers)
-    reach = std::max(reach, microscope::reach_px(transfer, shape.width, shape.num_rows));
-  return reach;
 }
 
 // Searches on every process, with the same trials and so with the same result. Returns nothing if a
@@ -161,7 +152,7 @@ std::optional<TunedFit> choose_by_short_trials(const measurement::Measurement& m
                                                const fit::FitOptions& fit, const OpenSettings& open,
                                                const TuneHooks& hooks,
                                                const distributed::Communicator& processes) {
-  const TrialShape shape = short_trial(field, fit, largest_reach_px(measurement));
+  const TrialShape shape = short_trial(field, fit, measurement::largest_reach_px(measurement));
   TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
                  open.view_scale || fit.fit_view_scale, hooks, usual_trials(open), processes);
   const TrialSettings start = with_safe_corrections({.penalty = fit.penalty,
