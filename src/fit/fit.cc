@@ -451,7 +451,7 @@ void Fit::end_epoch() {
   fit_views(noise_weights);
   progress_.epoch_sums.assign(progress_.views.size(), {});
   limit_spikes();
-  if (!measurement_.held_out.empty()) score_held_out();
+  if (options_.scores_epochs && !measurement_.held_out.empty()) score_held_out();
   const std::int64_t epochs_done = progress_.step / steps_per_epoch();
   if (tree_updates_.update(epochs_done, *field_, optimizer_.state(), progress_.tree)) follow_tree();
   if (epochs_done > 0 && epochs_done == stage().first_epoch) refine();

@@ -35,6 +35,7 @@ class TrialFits::Running {
     options.spike_rank = settings_.spike_rank;
     options.fit_view_scale = settings_.fits_view_scale;
     options.patience = 0;
+    options.scores_epochs = false;
     scores_with_view_scale_ = trials.scores_with_view_scale_;
     measurement_ = &trials.measurement_for(settings_);
     fit_ = std::make_unique<fit::Fit>(*measurement_, field, options);
@@ -49,11 +50,8 @@ class TrialFits::Running {
     fit_->run([](const fit::Fit&) { return false; });
     const bool is_last = fit_->is_done();
     part_done_ = is_last ? 1.0 : fit_->work(fit_->progress().step) / fit_->work(fit_->num_steps());
-    const auto& errors = fit_->progress().held_out_error;
-    detail_ =
-        fmt::format("{} tv {:.3g}  rank {}  epochs {}  held out {}",
-                    base::name_of(settings_.penalty), settings_.variation, settings_.rank,
-                    settings_.epochs, errors.empty() ? "-" : fmt::format("{:.4f}", errors.back()));
+    detail_ = fmt::format("{} tv {:.3g}  rank {}  epochs {}", base::name_of(settings_.penalty),
+                          settings_.variation, settings_.rank, settings_.epochs);
     if (is_last) finished_ = FitTrial{settings_, score(), 0.0};
     seconds_ += stopwatch.seconds();
     if (!is_last) return;

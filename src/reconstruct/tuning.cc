@@ -19,6 +19,7 @@ namespace {
 
 // Short trials: with these rows and parts of the usual epochs, weights rank as after whole fits.
 constexpr std::int64_t kShortRows = 32;
+constexpr std::int64_t kMostRowsBeside = kShortRows / 4;  // docs/results/ctf.md
 constexpr double kShortPart = 0.2, kShortCoarsePart = 0.25;
 
 // Returns the options of a short trial with plain vertices. If `fit` is shorter than usual for
@@ -82,7 +83,7 @@ TrialShape short_trial(const fit::FieldOptions& field, const fit::FitOptions& fi
                        std::int64_t reach_px) {
   fit::FieldOptions plain = field;
   plain.kind = FieldKind::kGrid;
-  return {kShortRows + 2 * std::min(reach_px, kShortRows / 2), plain,
+  return {kShortRows + 2 * std::min(reach_px, kMostRowsBeside), plain,
           short_trial_options(plain, field, fit)};
 }
 
