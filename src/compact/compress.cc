@@ -61,11 +61,11 @@ MeasuredRegion measure(const VertexDensities& vertices, base::Range rows) {
   std::vector<std::array<double, 3>> sums(static_cast<std::size_t>(tree.num_leaves()));
   base::parallel_for("measure densities", tree.num_leaves(), [&](std::int64_t i) {
     const field::QuadtreeNode& leaf = tree.leaf(static_cast<int>(i));
-    if (leaf.region != field::Region::kInterest || !is_in(leaf.square, rows)) return;
+    if (vertices.is_outside(leaf.square) || !is_in(leaf.square, rows)) return;
     const PlaceDensities place = vertices.read(leaf.square);
     sums[static_cast<std::size_t>(i)] = {
-        place.volume, place.values.cast<double>().sum() * place.volume_of_vertex(),
-        place.values.cast<double>().squaredNorm() * place.volume_of_vertex()};
+        place.volume(), place.values.cast<double>().sum() * place.volume_of_vertex,
+        place.values.cast<double>().squaredNorm() * place.volume_of_vertex};
   });
   std::array<double, 3> all{};
   for (const auto& sum : sums) {
@@ -79,9 +79,9 @@ MeasuredRegion measure(const VertexDensities& vertices, base::Range rows) {
 class Compression {
  public:
   // A change in decibels counts against `variance`, or that of the rows if it is 0.
-  Compression(const field::Field& vertices, base::Range rows, std::int64_t largest_side,
-              double variance)
-      : vertices_(vertices),
+  Compression(const field::Field& vertices, const Rectangle& roi, base::Range rows,
+              std::int64_t largest_side, double variance)
+      : vertices_(vertices, roi),
         rows_(rows),
         squares_(place_squares(vertices_, largest_side, rows)),
         region_(measure(vertices_, rows)) {
@@ -141,7 +141,7 @@ class Compression {
       const QuantisedLeaf rounded = quantise(leaves_[at], place.nx, place.ny, place.nz, step);
       const FloatMatrix values =
           values_of(dequantised_modes(rounded, step), place.nx, place.ny, place.nz);
-      errors[at] = (values - place.values).cast<double>().squaredNorm() * place.volume_of_vertex();
+      errors[at] = (values - place.values).cast<double>().squaredNorm() * place.volume_of_vertex;
     });
     return std::accumulate(errors.begin(), errors.end(), 0.0);
   }
@@ -188,8 +188,10 @@ class Compression {
     constexpr int kMostLeaves = 48;
     const field::Quadtree& tree = vertices_.field().tree();
     std::vector<field::Square> leaves;
-    for (int leaf = 0; leaf < tree.num_leaves(); ++leaf)
-      if (is_in(tree.leaf(leaf).square, rows_)) leaves.push_back(tree.leaf(leaf).square);
+    for (int leaf = 0; leaf < tree.num_leaves(); ++leaf) {
+      const field::Square& square = tree.leaf(leaf).square;
+      if (is_in(square, rows_) && !vertices_.is_outside(square)) leaves.push_back(square);
+    }
     const std::size_t stride = std::max<std::size_t>(1, leaves.size() / kMostLeaves);
     struct Component {
       double energy, cost;
@@ -198,11 +200,11 @@ class Compression {
     std::vector<double> volumes(found.size());
     base::parallel_for("survey leaves", std::ssize(found), [&](std::int64_t i) {
       const PlaceDensities place = vertices_.read(leaves[static_cast<std::size_t>(i) * stride]);
-      volumes[static_cast<std::size_t>(i)] = place.volume;
+      volumes[static_cast<std::size_t>(i)] = place.volume();
       const double cost = static_cast<double>(place.nz) + static_cast<double>(place.nx) * place.ny;
       for (const float energy : energies_of_sections(place))
         found[static_cast<std::size_t>(i)].push_back(
-            {static_cast<double>(energy) * place.volume_of_vertex(), cost});
+            {static_cast<double>(energy) * place.volume_of_vertex, cost});
     });
     std::vector<Component> all;
     double volume = 0, error = 0, cost = 0;
@@ -214,7 +216,7 @@ class Compression {
     std::ranges::sort(all, [](const Component& a, const Component& b) {
       return a.energy * b.cost > b.energy * a.cost;
     });
-    const double most = limit.most * volume / volume_of_rows();
+    const double most = limit.most * volume / region_.volume;
     double price = 1e-30;
     for (const Component& component : all) {
       if (limit.of_error ? error <= most : cost >= most) break;
@@ -242,7 +244,7 @@ class Compression {
                 static_cast<double>(value[y] - place.values(x, Eigen::Index{z} * place.ny + y)), 2);
         }
       }
-      errors[static_cast<std::size_t>(i)] = sum * place.volume_of_vertex();
+      errors[static_cast<std::size_t>(i)] = sum * place.volume_of_vertex;
     });
     return std::accumulate(errors.begin(), errors.end(), 0.0);
   }
@@ -262,18 +264,12 @@ class Compression {
       if (squares_.leaf_like[place] < 0) return;
       const PlaceDensities densities = vertices_.read(squares_.nodes[place].square);
       const double price = prices_[place][static_cast<std::size_t>(choice_.candidate[place])];
-      leaves_[at] = truncate(densities, price / densities.volume_of_vertex());
+      leaves_[at] = truncate(densities, price / densities.volume_of_vertex);
       // Rounding errors are uniform: their mean square is a twelfth of the step's.
       errors[at] =
-          densities.volume_of_vertex() / 12 * static_cast<double>(leaves_[at].num_parameters());
+          densities.volume_of_vertex / 12 * static_cast<double>(leaves_[at].num_parameters());
     });
     error_of_step_ = std::accumulate(errors.begin(), errors.end(), 0.0);
-  }
-
-  double volume_of_rows() const {
-    const field::RootGrid& roots = vertices_.field().tree().roots();
-    return static_cast<double>(roots.cell_size * roots.columns * rows_.size()) *
-           vertices_.field().thickness();
   }
 
   // Restricts further rounds to the places of a choice, their parents and their children.
@@ -294,9 +290,9 @@ class Compression {
       const auto at = static_cast<std::size_t>(i);
       if (squares_.leaf_like[at] < 0 || !is_tried_[at]) return;
       const PlaceDensities place = vertices_.read(squares_.nodes[at].square);
-      const Truncation modes = truncate(place, price / place.volume_of_vertex());
+      const Truncation modes = truncate(place, price / place.volume_of_vertex);
       places_[at].candidates.push_back({.cost = static_cast<double>(modes.num_parameters()),
-                                        .error = modes.square_error * place.volume_of_vertex()});
+                                        .error = modes.square_error * place.volume_of_vertex});
       prices_[at].push_back(price);
     });
   }
@@ -399,20 +395,20 @@ CompressionReport joined(const CompressionReport& a, const CompressionReport& b)
   return both;
 }
 
-double variance_of(const field::Field& vertices) {
-  return measure(VertexDensities(vertices), rows_of(vertices)).variance;
+double variance_of(const field::Field& vertices, const Rectangle& roi) {
+  return measure(VertexDensities(vertices, roi), rows_of(vertices)).variance;
 }
 
-CompactField compress(const field::Field& vertices, const Budget& budget) {
+CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget) {
   const base::TraceSpan span("compress");
-  Compression compression(vertices, rows_of(vertices), kLargestSide, 0.0);
+  Compression compression(vertices, roi, rows_of(vertices), kLargestSide, 0.0);
   return within(budget, compression);
 }
 
-CompactField compress(const field::Field& vertices, const Budget& budget, base::Range rows,
-                      double variance) {
+CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget,
+                      base::Range rows, double variance) {
   const base::TraceSpan span("compress");
-  Compression compression(vertices, rows, vertices.tree().roots().cell_size, variance);
+  Compression compression(vertices, roi, rows, vertices.tree().roots().cell_size, variance);
   return within(budget, compression);
 }
 
