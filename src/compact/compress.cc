@@ -76,6 +76,38 @@ MeasuredRegion measure(const VertexDensities& vertices, base::Range rows) {
   return {all[0], std::max(kSmallest, all[2] / all[0] - mean * mean)};
 }
 
+// Looks for the price at which a sum meets its limit. An error grows with the price, and a cost
+// falls, about as a power of it does, which the last two prices tell.
+class PriceSearch {
+ public:
+  PriceSearch(double first, bool grows)
+      : price_(first), grows_(grows), power_(grows ? 0.8 : -0.6) {}
+
+  double price() const { return price_; }
+
+  // Chooses the next price after one whose sum is `ratio` times its limit.
+  void go_on(double ratio) {
+    constexpr double kLeast = 0.2, kMost = 3.0;
+    if (last_price_ > 0) {
+      const double found = std::log(ratio / last_ratio_) / std::log(price_ / last_price_);
+      power_ = grows_ ? std::clamp(found, kLeast, kMost) : std::clamp(found, -kMost, -kLeast);
+    }
+    last_price_ = price_;
+    last_ratio_ = ratio;
+    (grows_ == (ratio > 1) ? high_ : low_) = price_;
+    price_ *= std::pow(ratio, -1 / power_);
+    const bool is_bounded = low_ > 0 && high_ > 0;
+    if (is_bounded && (price_ <= low_ || price_ >= high_)) price_ = std::sqrt(low_ * high_);
+  }
+
+ private:
+  double price_;
+  bool grows_;
+  double power_;
+  double last_price_ = 0.0, last_ratio_ = 0.0;
+  double low_ = 0.0, high_ = 0.0;  // prices below and above the wanted one, or 0
+};
+
 class Compression {
  public:
   // A change in decibels counts against `variance`, or that of the rows if it is 0.
@@ -105,22 +137,15 @@ class Compression {
   void choose(const Limit& limit) {
     constexpr int kRounds = 8;
     constexpr double kClose = 0.005, kFar = 1e-3;
-    double price = last_price_ > 0 ? last_price_ : surveyed_price(limit);
-    double low = 0, high = 0;  // prices below and above the wanted one
+    PriceSearch search(last_price_ > 0 ? last_price_ : surveyed_price(limit), limit.of_error);
     for (int round = 0; round < kRounds; ++round) {
-      add_candidates(price);
-      last_price_ = price;
-      const Choice cheapest = cheapest_choice(places_, price);
+      last_price_ = search.price();
+      add_candidates(last_price_);
+      const Choice cheapest = cheapest_choice(places_, last_price_);
       const double ratio = std::clamp(limit.value(cheapest) / limit.most, kFar, 1 / kFar);
-      keep_near(cheapest);
+      keep_near(cheapest, last_price_);
       if (std::abs(ratio - 1) < kClose) break;
-      const bool is_too_high = limit.of_error == (ratio > 1);
-      (is_too_high ? high : low) = price;
-      // Error grows and cost falls with about this power of the price.
-      const double power = limit.of_error ? 0.6 : -0.6;
-      double next = price * std::pow(ratio, -1 / power);
-      if (low > 0 && high > 0 && (next <= low || next >= high)) next = std::sqrt(low * high);
-      price = next;
+      search.go_on(ratio);
     }
     choice_ = limit.of_error ? choose_within_error(places_, limit.most)
                              : choose_within_cost(places_, limit.most);
@@ -272,23 +297,62 @@ class Compression {
     error_of_step_ = std::accumulate(errors.begin(), errors.end(), 0.0);
   }
 
-  // Restricts further rounds to the places of a choice, their parents and their children.
-  void keep_near(const Choice& choice) {
+  // Restricts further rounds to the places of a choice, their children, and those of their parents
+  // that are nearly as good.
+  void keep_near(const Choice& choice, double price) {
     is_tried_.assign(places_.size(), 0);
     for (std::size_t i = 0; i < places_.size(); ++i) {
       if (choice.candidate[i] < 0) continue;
       is_tried_[i] = 1;
       const field::QuadtreeNode& node = squares_.nodes[i];
-      if (node.parent >= 0) is_tried_[static_cast<std::size_t>(node.parent)] = 1;
+      if (node.parent >= 0 && is_nearly_as_good(node.parent, price))
+        is_tried_[static_cast<std::size_t>(node.parent)] = 1;
       for (int child = 0; child < 4 && node.first_child >= 0; ++child)
         is_tried_[static_cast<std::size_t>(node.first_child + child)] = 1;
     }
   }
 
+  // Returns whether a place costs little more than its quarters do.
+  bool is_nearly_as_good(int place, double price) const {
+    constexpr double kLittle = 1.1;
+    const auto least = [&](int i) {
+      double value = std::numeric_limits<double>::infinity();
+      for (const Candidate& candidate : places_[static_cast<std::size_t>(i)].candidates)
+        value = std::min(value, candidate.error + price * candidate.cost);
+      return value;
+    };
+    const int first = places_[static_cast<std::size_t>(place)].first_child;
+    const double of_quarters =
+        least(first) + least(first + 1) + least(first + 2) + least(first + 3);
+    return least(place) <= kLittle * of_quarters;
+  }
+
+  // Adds candidates from the smallest places up. A place whose quarters are all split is not tried:
+  // a larger one is hardly ever better then.
   void add_candidates(double price) {
-    base::parallel_for("truncate places", std::ssize(places_), [&](std::int64_t i) {
-      const auto at = static_cast<std::size_t>(i);
-      if (squares_.leaf_like[at] < 0 || !is_tried_[at]) return;
+    const int deepest = squares_.nodes.back().level;
+    for (int level = deepest; level >= 0; --level) {
+      const std::vector<int> below =
+          level < deepest ? cheapest_choice(places_, price).candidate : std::vector<int>{};
+      const auto is_worthwhile = [&](std::size_t place) {
+        const int first = places_[place].first_child;
+        if (first < 0 || places_[static_cast<std::size_t>(first)].first_child < 0) return true;
+        return std::any_of(below.begin() + first, below.begin() + first + 4,
+                           [](int chosen) { return chosen != kSplit; });
+      };
+      std::vector<std::size_t> tried;
+      for (std::size_t i = 0; i < places_.size(); ++i) {
+        if (squares_.nodes[i].level == level && squares_.leaf_like[i] >= 0 && is_tried_[i] &&
+            is_worthwhile(i))
+          tried.push_back(i);
+      }
+      add_candidates_of(tried, price);
+    }
+  }
+
+  void add_candidates_of(const std::vector<std::size_t>& tried, double price) {
+    base::parallel_for("truncate places", std::ssize(tried), [&](std::int64_t i) {
+      const std::size_t at = tried[static_cast<std::size_t>(i)];
       const PlaceDensities place = vertices_.read(squares_.nodes[at].square);
       const Truncation modes = truncate(place, price / place.volume_of_vertex);
       places_[at].candidates.push_back({.cost = static_cast<double>(modes.num_parameters()),
@@ -316,20 +380,19 @@ class Compression {
 // short, so the step is corrected once it was tried.
 CompactField within_decibels(Compression& compression, double decibels) {
   constexpr int kTries = 5, kBuilds = 3;
-  constexpr double kClose = 0.98;
+  constexpr double kMost = 0.98, kLeast = 0.96;  // softened faces have a slightly larger error
   const double change = allowed_change(decibels) * compression.variance() * compression.volume();
   compression.choose({.of_error = true, .most = (1 - kRoundingForBytes) * change});
   const double left = std::max(change - compression.choice().error, 0.01 * change);
   double rounding = left;
   for (int i = 0; i < kTries; ++i) {
     const double added = compression.rounded_error(rounding) - compression.choice().error;
-    if (added <= left && added > kClose * left) break;
-    rounding *= (1 + kClose) / 2 * left / std::max(added, 0.1 * left);
+    if (added <= kMost * left && added > kLeast * left) break;
+    rounding *= (kLeast + kMost) / 2 * left / std::max(added, 0.1 * left);
   }
   CompactField made = compression.build(rounding);
-  // Softened faces may have a larger error.
   for (int i = 1; i < kBuilds && made.report.decibels > decibels; ++i) {
-    rounding *= std::pow(kClose, 2);
+    rounding *= kLeast;
     made = compression.build(rounding);
   }
   return made;
