@@ -106,6 +106,7 @@ class TileFits {
     fit->go_on_from_stages(start_.progress, *start_.field);
     if (!take_steps(tile, *fit)) return false;
     const double seconds_fitting = running.seconds();
+    fit->free_optimizer();  // the verdict needs the memory
     nlohmann::json tile_json{{"rows", {tile.own.begin, tile.own.end}},
                              {"fitted_rows", {tile.fitted.begin, tile.fitted.end}},
                              {"residual", fit->progress().data_loss.back()},
