@@ -87,7 +87,7 @@ void write_compact(const ExportArguments& arguments) {
         "'{}' is a model of factors, and --compact is for models of vertices (--field grid)",
         arguments.model.string()));
   }
-  compact::CompactField made = compact::compress(*model.field, budget);
+  compact::CompactField made = compact::compress(*model.field, model.roi, budget);
   model.field = std::move(made.field);
   model.coded = std::move(made.coded);
   io::OutputSet results;

@@ -61,11 +61,11 @@ MeasuredRegion measure(const VertexDensities& vertices, base::Range rows) {
   std::vector<std::array<double, 3>> sums(static_cast<std::size_t>(tree.num_leaves()));
   base::parallel_for("measure densities", tree.num_leaves(), [&](std::int64_t i) {
     const field::QuadtreeNode& leaf = tree.leaf(static_cast<int>(i));
-    if (leaf.region != field::Region::kInterest || !is_in(leaf.square, rows)) return;
+    if (vertices.is_outside(leaf.square) || !is_in(leaf.square, rows)) return;
     const PlaceDensities place = vertices.read(leaf.square);
     sums[static_cast<std::size_t>(i)] = {
-        place.volume, place.values.cast<double>().sum() * place.volume_of_vertex(),
-        place.values.cast<double>().squaredNorm() * place.volume_of_vertex()};
+        place.volume(), place.values.cast<double>().sum() * place.volume_of_vertex,
+        place.values.cast<double>().squaredNorm() * place.volume_of_vertex};
   });
   std::array<double, 3> all{};
   for (const auto& sum : sums) {
@@ -76,12 +76,44 @@ MeasuredRegion measure(const VertexDensities& vertices, base::Range rows) {
   return {all[0], std::max(kSmallest, all[2] / all[0] - mean * mean)};
 }
 
+// Looks for the price at which a sum meets its limit. An error grows with the price, and a cost
+// falls, about as a power of it does, which the last two prices tell.
+class PriceSearch {
+ public:
+  PriceSearch(double first, bool grows)
+      : price_(first), grows_(grows), power_(grows ? 0.8 : -0.6) {}
+
+  double price() const { return price_; }
+
+  // Chooses the next price after one whose sum is `ratio` times its limit.
+  void go_on(double ratio) {
+    constexpr double kLeast = 0.2, kMost = 3.0;
+    if (last_price_ > 0) {
+      const double found = std::log(ratio / last_ratio_) / std::log(price_ / last_price_);
+      power_ = grows_ ? std::clamp(found, kLeast, kMost) : std::clamp(found, -kMost, -kLeast);
+    }
+    last_price_ = price_;
+    last_ratio_ = ratio;
+    (grows_ == (ratio > 1) ? high_ : low_) = price_;
+    price_ *= std::pow(ratio, -1 / power_);
+    const bool is_bounded = low_ > 0 && high_ > 0;
+    if (is_bounded && (price_ <= low_ || price_ >= high_)) price_ = std::sqrt(low_ * high_);
+  }
+
+ private:
+  double price_;
+  bool grows_;
+  double power_;
+  double last_price_ = 0.0, last_ratio_ = 0.0;
+  double low_ = 0.0, high_ = 0.0;  // prices below and above the wanted one, or 0
+};
+
 class Compression {
  public:
   // A change in decibels counts against `variance`, or that of the rows if it is 0.
-  Compression(const field::Field& vertices, base::Range rows, std::int64_t largest_side,
-              double variance)
-      : vertices_(vertices),
+  Compression(const field::Field& vertices, const Rectangle& roi, base::Range rows,
+              std::int64_t largest_side, double variance)
+      : vertices_(vertices, roi),
         rows_(rows),
         squares_(place_squares(vertices_, largest_side, rows)),
         region_(measure(vertices_, rows)) {
@@ -105,22 +137,15 @@ class Compression {
   void choose(const Limit& limit) {
     constexpr int kRounds = 8;
     constexpr double kClose = 0.005, kFar = 1e-3;
-    double price = last_price_ > 0 ? last_price_ : surveyed_price(limit);
-    double low = 0, high = 0;  // prices below and above the wanted one
+    PriceSearch search(last_price_ > 0 ? last_price_ : surveyed_price(limit), limit.of_error);
     for (int round = 0; round < kRounds; ++round) {
-      add_candidates(price);
-      last_price_ = price;
-      const Choice cheapest = cheapest_choice(places_, price);
+      last_price_ = search.price();
+      add_candidates(last_price_);
+      const Choice cheapest = cheapest_choice(places_, last_price_);
       const double ratio = std::clamp(limit.value(cheapest) / limit.most, kFar, 1 / kFar);
-      keep_near(cheapest);
+      keep_near(cheapest, last_price_);
       if (std::abs(ratio - 1) < kClose) break;
-      const bool is_too_high = limit.of_error == (ratio > 1);
-      (is_too_high ? high : low) = price;
-      // Error grows and cost falls with about this power of the price.
-      const double power = limit.of_error ? 0.6 : -0.6;
-      double next = price * std::pow(ratio, -1 / power);
-      if (low > 0 && high > 0 && (next <= low || next >= high)) next = std::sqrt(low * high);
-      price = next;
+      search.go_on(ratio);
     }
     choice_ = limit.of_error ? choose_within_error(places_, limit.most)
                              : choose_within_cost(places_, limit.most);
@@ -141,7 +166,7 @@ class Compression {
       const QuantisedLeaf rounded = quantise(leaves_[at], place.nx, place.ny, place.nz, step);
       const FloatMatrix values =
           values_of(dequantised_modes(rounded, step), place.nx, place.ny, place.nz);
-      errors[at] = (values - place.values).cast<double>().squaredNorm() * place.volume_of_vertex();
+      errors[at] = (values - place.values).cast<double>().squaredNorm() * place.volume_of_vertex;
     });
     return std::accumulate(errors.begin(), errors.end(), 0.0);
   }
@@ -188,8 +213,10 @@ class Compression {
     constexpr int kMostLeaves = 48;
     const field::Quadtree& tree = vertices_.field().tree();
     std::vector<field::Square> leaves;
-    for (int leaf = 0; leaf < tree.num_leaves(); ++leaf)
-      if (is_in(tree.leaf(leaf).square, rows_)) leaves.push_back(tree.leaf(leaf).square);
+    for (int leaf = 0; leaf < tree.num_leaves(); ++leaf) {
+      const field::Square& square = tree.leaf(leaf).square;
+      if (is_in(square, rows_) && !vertices_.is_outside(square)) leaves.push_back(square);
+    }
     const std::size_t stride = std::max<std::size_t>(1, leaves.size() / kMostLeaves);
     struct Component {
       double energy, cost;
@@ -198,11 +225,11 @@ class Compression {
     std::vector<double> volumes(found.size());
     base::parallel_for("survey leaves", std::ssize(found), [&](std::int64_t i) {
       const PlaceDensities place = vertices_.read(leaves[static_cast<std::size_t>(i) * stride]);
-      volumes[static_cast<std::size_t>(i)] = place.volume;
+      volumes[static_cast<std::size_t>(i)] = place.volume();
       const double cost = static_cast<double>(place.nz) + static_cast<double>(place.nx) * place.ny;
       for (const float energy : energies_of_sections(place))
         found[static_cast<std::size_t>(i)].push_back(
-            {static_cast<double>(energy) * place.volume_of_vertex(), cost});
+            {static_cast<double>(energy) * place.volume_of_vertex, cost});
     });
     std::vector<Component> all;
     double volume = 0, error = 0, cost = 0;
@@ -214,7 +241,7 @@ class Compression {
     std::ranges::sort(all, [](const Component& a, const Component& b) {
       return a.energy * b.cost > b.energy * a.cost;
     });
-    const double most = limit.most * volume / volume_of_rows();
+    const double most = limit.most * volume / region_.volume;
     double price = 1e-30;
     for (const Component& component : all) {
       if (limit.of_error ? error <= most : cost >= most) break;
@@ -242,7 +269,7 @@ class Compression {
                 static_cast<double>(value[y] - place.values(x, Eigen::Index{z} * place.ny + y)), 2);
         }
       }
-      errors[static_cast<std::size_t>(i)] = sum * place.volume_of_vertex();
+      errors[static_cast<std::size_t>(i)] = sum * place.volume_of_vertex;
     });
     return std::accumulate(errors.begin(), errors.end(), 0.0);
   }
@@ -262,41 +289,74 @@ class Compression {
       if (squares_.leaf_like[place] < 0) return;
       const PlaceDensities densities = vertices_.read(squares_.nodes[place].square);
       const double price = prices_[place][static_cast<std::size_t>(choice_.candidate[place])];
-      leaves_[at] = truncate(densities, price / densities.volume_of_vertex());
+      leaves_[at] = truncate(densities, price / densities.volume_of_vertex);
       // Rounding errors are uniform: their mean square is a twelfth of the step's.
       errors[at] =
-          densities.volume_of_vertex() / 12 * static_cast<double>(leaves_[at].num_parameters());
+          densities.volume_of_vertex / 12 * static_cast<double>(leaves_[at].num_parameters());
     });
     error_of_step_ = std::accumulate(errors.begin(), errors.end(), 0.0);
   }
 
-  double volume_of_rows() const {
-    const field::RootGrid& roots = vertices_.field().tree().roots();
-    return static_cast<double>(roots.cell_size * roots.columns * rows_.size()) *
-           vertices_.field().thickness();
-  }
-
-  // Restricts further rounds to the places of a choice, their parents and their children.
-  void keep_near(const Choice& choice) {
+  // Restricts further rounds to the places of a choice, their children, and those of their parents
+  // that are nearly as good.
+  void keep_near(const Choice& choice, double price) {
     is_tried_.assign(places_.size(), 0);
     for (std::size_t i = 0; i < places_.size(); ++i) {
       if (choice.candidate[i] < 0) continue;
       is_tried_[i] = 1;
       const field::QuadtreeNode& node = squares_.nodes[i];
-      if (node.parent >= 0) is_tried_[static_cast<std::size_t>(node.parent)] = 1;
+      if (node.parent >= 0 && is_nearly_as_good(node.parent, price))
+        is_tried_[static_cast<std::size_t>(node.parent)] = 1;
       for (int child = 0; child < 4 && node.first_child >= 0; ++child)
         is_tried_[static_cast<std::size_t>(node.first_child + child)] = 1;
     }
   }
 
+  // Returns whether a place costs little more than its quarters do.
+  bool is_nearly_as_good(int place, double price) const {
+    constexpr double kLittle = 1.1;
+    const auto least = [&](int i) {
+      double value = std::numeric_limits<double>::infinity();
+      for (const Candidate& candidate : places_[static_cast<std::size_t>(i)].candidates)
+        value = std::min(value, candidate.error + price * candidate.cost);
+      return value;
+    };
+    const int first = places_[static_cast<std::size_t>(place)].first_child;
+    const double of_quarters =
+        least(first) + least(first + 1) + least(first + 2) + least(first + 3);
+    return least(place) <= kLittle * of_quarters;
+  }
+
+  // Adds candidates from the smallest places up. A place whose quarters are all split is not tried:
+  // a larger one is hardly ever better then.
   void add_candidates(double price) {
-    base::parallel_for("truncate places", std::ssize(places_), [&](std::int64_t i) {
-      const auto at = static_cast<std::size_t>(i);
-      if (squares_.leaf_like[at] < 0 || !is_tried_[at]) return;
+    const int deepest = squares_.nodes.back().level;
+    for (int level = deepest; level >= 0; --level) {
+      const std::vector<int> below =
+          level < deepest ? cheapest_choice(places_, price).candidate : std::vector<int>{};
+      const auto is_worthwhile = [&](std::size_t place) {
+        const int first = places_[place].first_child;
+        if (first < 0 || places_[static_cast<std::size_t>(first)].first_child < 0) return true;
+        return std::any_of(below.begin() + first, below.begin() + first + 4,
+                           [](int chosen) { return chosen != kSplit; });
+      };
+      std::vector<std::size_t> tried;
+      for (std::size_t i = 0; i < places_.size(); ++i) {
+        if (squares_.nodes[i].level == level && squares_.leaf_like[i] >= 0 && is_tried_[i] &&
+            is_worthwhile(i))
+          tried.push_back(i);
+      }
+      add_candidates_of(tried, price);
+    }
+  }
+
+  void add_candidates_of(const std::vector<std::size_t>& tried, double price) {
+    base::parallel_for("truncate places", std::ssize(tried), [&](std::int64_t i) {
+      const std::size_t at = tried[static_cast<std::size_t>(i)];
       const PlaceDensities place = vertices_.read(squares_.nodes[at].square);
-      const Truncation modes = truncate(place, price / place.volume_of_vertex());
+      const Truncation modes = truncate(place, price / place.volume_of_vertex);
       places_[at].candidates.push_back({.cost = static_cast<double>(modes.num_parameters()),
-                                        .error = modes.square_error * place.volume_of_vertex()});
+                                        .error = modes.square_error * place.volume_of_vertex});
       prices_[at].push_back(price);
     });
   }
@@ -320,20 +380,19 @@ class Compression {
 // short, so the step is corrected once it was tried.
 CompactField within_decibels(Compression& compression, double decibels) {
   constexpr int kTries = 5, kBuilds = 3;
-  constexpr double kClose = 0.98;
+  constexpr double kMost = 0.98, kLeast = 0.96;  // softened faces have a slightly larger error
   const double change = allowed_change(decibels) * compression.variance() * compression.volume();
   compression.choose({.of_error = true, .most = (1 - kRoundingForBytes) * change});
   const double left = std::max(change - compression.choice().error, 0.01 * change);
   double rounding = left;
   for (int i = 0; i < kTries; ++i) {
     const double added = compression.rounded_error(rounding) - compression.choice().error;
-    if (added <= left && added > kClose * left) break;
-    rounding *= (1 + kClose) / 2 * left / std::max(added, 0.1 * left);
+    if (added <= kMost * left && added > kLeast * left) break;
+    rounding *= (kLeast + kMost) / 2 * left / std::max(added, 0.1 * left);
   }
   CompactField made = compression.build(rounding);
-  // Softened faces may have a larger error.
   for (int i = 1; i < kBuilds && made.report.decibels > decibels; ++i) {
-    rounding *= std::pow(kClose, 2);
+    rounding *= kLeast;
     made = compression.build(rounding);
   }
   return made;
@@ -399,20 +458,20 @@ CompressionReport joined(const CompressionReport& a, const CompressionReport& b)
   return both;
 }
 
-double variance_of(const field::Field& vertices) {
-  return measure(VertexDensities(vertices), rows_of(vertices)).variance;
+double variance_of(const field::Field& vertices, const Rectangle& roi) {
+  return measure(VertexDensities(vertices, roi), rows_of(vertices)).variance;
 }
 
-CompactField compress(const field::Field& vertices, const Budget& budget) {
+CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget) {
   const base::TraceSpan span("compress");
-  Compression compression(vertices, rows_of(vertices), kLargestSide, 0.0);
+  Compression compression(vertices, roi, rows_of(vertices), kLargestSide, 0.0);
   return within(budget, compression);
 }
 
-CompactField compress(const field::Field& vertices, const Budget& budget, base::Range rows,
-                      double variance) {
+CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget,
+                      base::Range rows, double variance) {
   const base::TraceSpan span("compress");
-  Compression compression(vertices, rows, vertices.tree().roots().cell_size, variance);
+  Compression compression(vertices, roi, rows, vertices.tree().roots().cell_size, variance);
   return within(budget, compression);
 }
 

@@ -17,7 +17,7 @@ namespace tomofield::compact {
 struct CompressionReport {
   std::size_t parameters = 0;  ///< whole numbers that the file holds
   std::size_t bytes = 0;       ///< of their codes
-  /// Sum of squared changes at all vertices, the margin's as well, over the volume of the region.
+  /// Sum of squared changes at the vertices that count, over the volume of the region.
   double mean_square_change = 0.0;
   double variance = 0.0;  ///< of the densities in the region of interest
   double decibels = 0.0;  ///< that the PSNR falls by, at most, on phantoms
@@ -43,6 +43,9 @@ struct CompactField {
 /// within the budget, or the smallest within the error (structure.h). Then the factors are rounded
 /// (leaf_code.h) so that they keep within the budget.
 ///
+/// `roi` is the region of interest, which a tomogram shows. The compact field is empty beyond it:
+/// few views see what lies there, and the fit piles up in it what it cannot place.
+///
 /// Codes of several parts of a field can be joined (append()): `rows` are those of whole bands, no
 /// leaf becomes larger than a root cell, and a change in decibels counts against `variance`, which
 /// is that of all parts.
@@ -50,11 +53,11 @@ struct CompactField {
 /// `vertices` is of kind "grid", and all leaves must be kept. A place is worked on alone, so memory
 /// is that of the vertices, of a place for each thread, and of the result. Throws Error if a budget
 /// in bytes or parameters cannot be met.
-CompactField compress(const field::Field& vertices, const Budget& budget);
-CompactField compress(const field::Field& vertices, const Budget& budget, base::Range rows,
-                      double variance);
+CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget);
+CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget,
+                      base::Range rows, double variance);
 
 /// Returns the variance of the densities in the region of interest of a field of plain vertices.
-double variance_of(const field::Field& vertices);
+double variance_of(const field::Field& vertices, const Rectangle& roi);
 
 }  // namespace tomofield::compact

@@ -19,7 +19,7 @@ constexpr double kThickness = 9.0, kStep = 1e-3;
 
 void append(LeafCodes& codes, const LeafShape& shape, const FloatMatrix& values) {
   const PlaceDensities place{
-      .nx = shape.nx, .ny = shape.ny, .nz = shape.nz, .values = values, .volume = 1};
+      .nx = shape.nx, .ny = shape.ny, .nz = shape.nz, .values = values, .volume_of_vertex = 1};
   const QuantisedLeaf leaf = quantise(truncate(place, 0), shape.nx, shape.ny, shape.nz, kStep);
   const std::vector<std::uint8_t> code = encode(leaf);
   codes.shapes.push_back(leaf.shape);

@@ -22,7 +22,7 @@ PlaceDensities random_place() {
           .ny = kY,
           .nz = kZ,
           .values = Eigen::Map<const FloatMatrix>(values.data(), kX, kZ * kY),
-          .volume = 1.0};
+          .volume_of_vertex = 1.0};
 }
 
 QuantisedLeaf some_leaf(double step) {

@@ -46,9 +46,8 @@ PlaceSquares place_squares(const VertexDensities& vertices, std::int64_t largest
   }
   for (std::size_t i = 0; i < squares.nodes.size(); ++i) {
     const QuadtreeNode node = squares.nodes[i];
-    int like = vertices.leaf_like(node.square);
-    if (like < 0)
-      like = vertices.is_outside(node.square) ? PlaceSquares::kOutside : PlaceSquares::kNone;
+    const int like =
+        vertices.is_outside(node.square) ? PlaceSquares::kOutside : vertices.leaf_like(node.square);
     squares.leaf_like.push_back(like);
     squares.nodes[i].region =
         like >= 0 ? vertices.field().tree().leaf(like).region : Region::kMargin;

@@ -24,6 +24,8 @@ std::unique_ptr<field::Field> small_field() {
       {{.nx = 9, .ny = 9, .nz = 3}, fine, fine});
 }
 
+constexpr Rectangle kRegion{.x0 = 0, .y0 = 0, .x1 = 64, .y1 = 32};
+
 int find(const PlaceSquares& squares, const Square& square) {
   const auto found = std::ranges::find_if(
       squares.nodes, [&](const field::QuadtreeNode& node) { return node.square == square; });
@@ -32,7 +34,7 @@ int find(const PlaceSquares& squares, const Square& square) {
 
 TEST(PlaceTree, RootsAreAsLargeAsTheLargestSideAndCoverTheField) {
   const auto field = small_field();
-  const VertexDensities vertices(*field);
+  const VertexDensities vertices(*field, kRegion);
   const PlaceSquares of_64 = place_squares(vertices, 64, rows_of(*field));
   EXPECT_EQ(of_64.roots,
             (field::RootGrid{.x0 = -32, .y0 = 0, .cell_size = 64, .columns = 2, .rows = 1}));
@@ -42,14 +44,14 @@ TEST(PlaceTree, RootsAreAsLargeAsTheLargestSideAndCoverTheField) {
 
 TEST(PlaceTree, SquaresBecomeLeavesWhereTheirVerticesAreAlike) {
   const auto field = small_field();
-  const PlaceSquares squares = place_squares(VertexDensities(*field), 64, rows_of(*field));
+  const PlaceSquares squares = place_squares(VertexDensities(*field, kRegion), 64, rows_of(*field));
   const auto like = [&](const Square& square) {
     const int node = find(squares, square);
     EXPECT_GE(node, 0);
     return squares.leaf_like[static_cast<std::size_t>(node)];
   };
   EXPECT_EQ(like({-32, 0, 64}), PlaceSquares::kNone) << "margin and region";
-  EXPECT_EQ(like({-32, 0, 32}), 0);
+  EXPECT_EQ(like({-32, 0, 32}), PlaceSquares::kOutside) << "the margin";
   EXPECT_EQ(like({0, 0, 32}), 1);
   EXPECT_EQ(like({48, 16, 16}), 2);
   EXPECT_EQ(like({64, 0, 32}), PlaceSquares::kOutside);
@@ -68,7 +70,7 @@ TEST(PlaceTree, SquaresBecomeLeavesWhereTheirVerticesAreAlike) {
 
 TEST(PlaceTree, LeavesAreTheSquaresThatAreChosen) {
   const auto field = small_field();
-  const PlaceSquares squares = place_squares(VertexDensities(*field), 64, rows_of(*field));
+  const PlaceSquares squares = place_squares(VertexDensities(*field, kRegion), 64, rows_of(*field));
   const auto at = [&](const Square& square) {
     return static_cast<std::size_t>(find(squares, square));
   };

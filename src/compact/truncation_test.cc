@@ -19,7 +19,7 @@ FloatMatrix random_matrix(Eigen::Index rows, Eigen::Index columns, std::uint64_t
 }
 
 PlaceDensities place_of(FloatMatrix values) {
-  return {.nx = kX, .ny = kY, .nz = kZ, .values = std::move(values), .volume = 100.0};
+  return {.nx = kX, .ny = kY, .nz = kZ, .values = std::move(values), .volume_of_vertex = 100.0};
 }
 
 // Returns modes of these ranks; the vectors are not orthonormal.

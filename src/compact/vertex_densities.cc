@@ -5,6 +5,7 @@
 #include <set>
 
 #include "base/check.h"
+#include "base/range.h"
 #include "kernels/leaf_decoding.h"
 
 namespace tomofield::compact {
@@ -26,9 +27,25 @@ double spacing_of(const Square& square, int vertices) {
   return static_cast<double>(square.size) / (vertices - 1);
 }
 
+// Returns how many of n vertices along an axis, the first one at `begin`, are below `end`.
+int count_below(std::int64_t begin, double spacing, int n, std::int64_t end) {
+  const double count = std::ceil(static_cast<double>(end - begin) / spacing);
+  return static_cast<int>(std::clamp(count, 0.0, static_cast<double>(n)));
+}
+
+// Vertices along one axis of a square: those inside the region of interest, and with them their
+// neighbours, which its voxels depend on too.
+struct VerticesOfAxis {
+  base::Range inside, used;
+  VerticesOfAxis(std::int64_t begin, double spacing, int n, std::int64_t low, std::int64_t high)
+      : inside{count_below(begin, spacing, n, low), count_below(begin, spacing, n, high)},
+        used{std::max(inside.begin - 1, 0), std::min(inside.end + 1, n)} {}
+};
+
 }  // namespace
 
-VertexDensities::VertexDensities(const field::Field& vertices) : vertices_(vertices) {
+VertexDensities::VertexDensities(const field::Field& vertices, const Rectangle& roi)
+    : vertices_(vertices), roi_(roi) {
   TOMOFIELD_CHECK(vertices.kind() == FieldKind::kGrid,
                   "plain vertices, which are their own values");
   smallest_side_ = vertices.tree().roots().cell_size;
@@ -75,6 +92,9 @@ int VertexDensities::leaf_like(const Square& square) const {
 }
 
 bool VertexDensities::is_outside(const Square& square) const {
+  if (square.x0 >= roi_.x1 || square.x1() <= roi_.x0 || square.y0 >= roi_.y1 ||
+      square.y1() <= roi_.y0)
+    return true;
   const std::vector<int> leaves = leaves_near(square, 0);
   return leaves.size() == 1 && leaves.front() < 0;
 }
@@ -93,8 +113,12 @@ PlaceDensities VertexDensities::read(const Square& square) const {
   place.nx = steps(side, hx);
   place.ny = steps(side, hy);
   place.nz = shape.nz;
-  place.volume = side * side * vertices_.thickness();
   place.values.setZero(place.nx, Eigen::Index{place.nz} * place.ny);
+  place.volume_of_vertex =
+      side * side * vertices_.thickness() / static_cast<double>(place.values.size());
+  const VerticesOfAxis along_x(square.x0, hx, place.nx, roi_.x0, roi_.x1);
+  const VerticesOfAxis along_y(square.y0, hy, place.ny, roi_.y0, roi_.y1);
+  place.num_inside = Eigen::Index{along_x.inside.size()} * along_y.inside.size() * place.nz;
   Eigen::MatrixXi count = Eigen::MatrixXi::Zero(place.nx, place.ny);
   std::vector<float> line;
   for (const int leaf : leaves_near(square, 1)) {
@@ -103,8 +127,8 @@ PlaceDensities VertexDensities::read(const Square& square) const {
     const LeafShape& s = vertices_.shape(leaf);
     const int dx = steps(static_cast<double>(from.x0 - square.x0), hx);
     const int dy = steps(static_cast<double>(from.y0 - square.y0), hy);
-    const int x0 = std::max(0, dx), x1 = std::min(place.nx, dx + s.nx);
-    const int y0 = std::max(0, dy), y1 = std::min(place.ny, dy + s.ny);
+    const int x0 = std::max(along_x.used.begin, dx), x1 = std::min(along_x.used.end, dx + s.nx);
+    const int y0 = std::max(along_y.used.begin, dy), y1 = std::min(along_y.used.end, dy + s.ny);
     if (x0 >= x1 || y0 >= y1) continue;
     const float* values = vertices_.parameters().data() + vertices_.offset(leaf);
     line.resize(static_cast<std::size_t>(y1 - y0));

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "field/field.h"
+#include "tomofield/options.h"
 
 namespace tomofield::compact {
 
@@ -11,22 +12,23 @@ using FloatMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::
 
 /// Holds the densities of a finished field at the vertices of a square of the specimen's plane, but
 /// for those on its upper faces, which the next squares have. The vertices are as far apart as
-/// those of the field.
+/// those of the field. Vertices that no voxel of the region of interest depends on are 0.
 struct PlaceDensities {
   int nx = 0, ny = 0, nz = 0;
-  FloatMatrix values;   ///< [nx, nz·ny], y fastest
-  double volume = 0.0;  ///< of the square and the whole thickness, in cubic pixels
+  FloatMatrix values;             ///< [nx, nz·ny], y fastest
+  double volume_of_vertex = 0.0;  ///< that a vertex stands for, in cubic pixels
+  Eigen::Index num_inside = 0;    ///< vertices in the region of interest
 
-  /// Returns the volume that a vertex stands for.
-  double volume_of_vertex() const { return volume / static_cast<double>(values.size()); }
+  /// Returns the volume in the region of interest.
+  double volume() const { return volume_of_vertex * static_cast<double>(num_inside); }
 };
 
 /// Reads the densities of a field of plain vertices in squares that need not be its leaves. Where
 /// leaves share a face, a density is the mean of theirs, so that all squares agree on their faces.
 class VertexDensities {
  public:
-  /// `vertices` is of kind "grid" and must outlive the object.
-  explicit VertexDensities(const field::Field& vertices);
+  /// `vertices` is of kind "grid" and must outlive the object. `roi` is the region of interest.
+  VertexDensities(const field::Field& vertices, const Rectangle& roi);
 
   const field::Field& field() const { return vertices_; }
   /// Returns the smallest side of a square that can be read: half a leaf, and so on, as long as
@@ -35,7 +37,7 @@ class VertexDensities {
   /// Returns a leaf that holds a part of the square if every part of it belongs to leaves of one
   /// region whose vertices are equally far apart, and −1 otherwise.
   int leaf_like(const field::Square& square) const;
-  /// Returns true if no leaf of the field reaches into the square.
+  /// Returns true if no leaf of the field or no part of the region of interest is in the square.
   bool is_outside(const field::Square& square) const;
   /// Returns the densities of a square for which leaf_like() finds a leaf.
   PlaceDensities read(const field::Square& square) const;
@@ -45,6 +47,7 @@ class VertexDensities {
   bool are_alike(int leaf, int other) const;
 
   const field::Field& vertices_;
+  Rectangle roi_;
   std::int64_t smallest_side_ = 0;
 };
 

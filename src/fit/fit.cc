@@ -140,12 +140,15 @@ void Fit::enter_stage() {
       binned_->geometry, sample_grid(domain_, measurement_.geometry.thickness, stage().bin));
 }
 
+void Fit::free_optimizer() {
+  gradient_.reset(0);
+  optimizer_.state() = {};
+}
+
 // Resamples the field to the vertices of the stage, or factorises it. The optimiser starts anew.
 void Fit::resample_field() {
   std::vector<field::LeafShape> shapes = domain_.shapes_in(field_->tree(), stage().bin);
-  // The gradient and the moments go before the other field needs memory.
-  gradient_.reset(0);
-  optimizer_.state() = {};
+  free_optimizer();  // before the other field needs memory
   field_ = field_->kind() == stage().field_kind ? field_->resampled(std::move(shapes))
                                                 : field::factorised(*field_, std::move(shapes));
   optimizer_ = Adam(*field_, AdamOptions{});

@@ -124,6 +124,8 @@ class Fit {
   field::Field& field() { return *field_; }
   /// Hands over the fitted field; the fit cannot go on afterwards.
   std::unique_ptr<field::Field> take_field() { return std::move(field_); }
+  /// Frees the gradient and the state of the optimiser. The fit cannot take steps afterwards.
+  void free_optimizer();
   const Adam& optimizer() const { return optimizer_; }
   Adam& optimizer() { return optimizer_; }
 

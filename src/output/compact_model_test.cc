@@ -26,7 +26,7 @@ constexpr compact::Budget kBudget{compact::Budget::Kind::kDecibels, 0.1};
 
 Model compact_model() {
   Model model = testing::uneven_model(FieldKind::kGrid);
-  compact::CompactField made = compact::compress(*model.field, kBudget);
+  compact::CompactField made = compact::compress(*model.field, model.roi, kBudget);
   model.field = std::move(made.field);
   model.coded = std::move(made.coded);
   return model;

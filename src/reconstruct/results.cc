@@ -174,7 +174,7 @@ void write_results(Results& results, const ResultFiles& files) {
 // Replaces the model of the results by a compact one.
 void make_compact(const compact::Budget& budget, Results& results) {
   const base::Stopwatch running;
-  compact::CompactField made = compact::compress(*results.model->field, budget);
+  compact::CompactField made = compact::compress(*results.model->field, results.model->roi, budget);
   results.model->field = std::move(made.field);
   results.model->coded = std::move(made.coded);
   results.metrics["metrics"]["compact"] = compact::report_json(made.report, running.seconds());

@@ -78,7 +78,7 @@ std::optional<CoarseStart> fit_coarse_stages(const Run& run, const TilePlan& pla
   if (made.took_steps && run.writes_files())
     save_checkpoint(run.paths.model, *made.fit, model_info(run.measurement, run.options),
                     record.origin);
-  const double variance = compact::variance_of(made.fit->field());
+  const double variance = compact::variance_of(made.fit->field(), run.measurement.roi);
   return CoarseStart{.progress = made.fit->progress(),
                      .field = made.fit->take_field(),
                      .variance = variance,
@@ -106,6 +106,7 @@ class TileFits {
     fit->go_on_from_stages(start_.progress, *start_.field);
     if (!take_steps(tile, *fit)) return false;
     const double seconds_fitting = running.seconds();
+    fit->free_optimizer();  // the verdict needs the memory
     nlohmann::json tile_json{{"rows", {tile.own.begin, tile.own.end}},
                              {"fitted_rows", {tile.fitted.begin, tile.fitted.end}},
                              {"residual", fit->progress().data_loss.back()},
@@ -161,7 +162,8 @@ class TileFits {
       const field::RootGrid& roots = vertices->tree().roots();
       rows.end = static_cast<int>(roots.y0 + roots.rows * roots.cell_size);
     }
-    compact::CompactField made = compact::compress(*vertices, budget, rows, start_.variance);
+    compact::CompactField made =
+        compact::compress(*vertices, run_.measurement.roi, budget, rows, start_.variance);
     return {std::move(made.coded), made.report, running.seconds()};
   }
 
