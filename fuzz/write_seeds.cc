@@ -186,7 +186,7 @@ void write_models(const fs::path& folder) {
     output::save_model(folder / "model" / (kind == FieldKind::kVm ? "vm" : "grid"),
                        testing::uneven_model(kind));
   output::Model small = testing::uneven_model(FieldKind::kGrid);
-  compact::CompactField made = compact::compress(*small.field, {});
+  compact::CompactField made = compact::compress(*small.field, small.roi, {});
   small.field = std::move(made.field);
   small.coded = std::move(made.coded);
   output::save_model(folder / "model" / "compact", small);
