@@ -49,7 +49,8 @@ class NodeCopy {
 
 Quadtree some_bands(const Quadtree& tree, base::Range bands) {
   RootGrid roots = tree.roots();
-  TOMOFIELD_CHECK(base::Range{0, roots.rows}.contains(bands), "bands of the tree");
+  const base::Range all{0, roots.rows};
+  TOMOFIELD_CHECK(all.contains(bands), "bands of the tree");
   roots.y0 += bands.begin * roots.cell_size;
   roots.rows = bands.size();
   std::vector<QuadtreeNode> nodes;
