@@ -4,13 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <map>
 #include <numbers>
 #include <numeric>
-#include <utility>
 
 #include "align/aligning_fit.h"
+#include "align/axis_line.h"
 #include "base/log.h"
 #include "base/trace.h"
 #include "fit/fit.h"
@@ -72,50 +70,6 @@ double wide_residual(const JointProblem& problem,
   });
   return std::accumulate(squares.begin(), squares.end(), 0.0);
 }
-
-// Returns where the parabola through three values, one step apart, is lowest, in steps from the
-// middle one.
-double lowest_place(double left, double middle, double right) {
-  const double bend = left - 2 * middle + right;
-  return bend > 0 ? std::clamp(0.5 * (left - right) / bend, -1.0, 1.0) : 0.0;
-}
-
-// Holds residuals at rotations of all views, each of which is found once.
-class AxisLine {
- public:
-  explicit AxisLine(std::function<double(double)> residual) : residual_(std::move(residual)) {}
-
-  // Returns the one of two rotations that has the smaller residual.
-  double better(double axis_deg, double other_deg) {
-    return at(other_deg) < at(axis_deg) ? other_deg : axis_deg;
-  }
-
-  // Goes on from a rotation by steps as long as the residual becomes smaller, within ±range.
-  double descend(double axis_deg, double step_deg, double range_deg) {
-    double last = axis_deg;
-    do {
-      last = std::exchange(axis_deg,
-                           better(better(axis_deg, axis_deg - step_deg), axis_deg + step_deg));
-    } while (axis_deg != last && std::abs(axis_deg) < range_deg);
-    return axis_deg;
-  }
-
-  // Returns where the parabola through the residuals around a rotation is lowest.
-  double lowest(double axis_deg, double step_deg) {
-    return axis_deg +
-           step_deg * lowest_place(at(axis_deg - step_deg), at(axis_deg), at(axis_deg + step_deg));
-  }
-
- private:
-  double at(double axis_deg) {
-    const auto [place, is_new] = known_.try_emplace(axis_deg, 0.0);
-    if (is_new) place->second = residual_(axis_deg);
-    return place->second;
-  }
-
-  std::function<double(double)> residual_;
-  std::map<double, double> known_;
-};
 
 }  // namespace
 
