@@ -33,11 +33,12 @@ std::vector<geometry::ViewCorrection> turned(std::vector<geometry::ViewCorrectio
   return corrections;
 }
 
-// Returns the mean squared difference of a view and its prediction in the `inner` part of the width
-// and of the height.
-double inner_squares(const ImagePair& images, double inner) {
-  const auto is_inner = [&](double place, double centre) {
-    return std::abs(place + 0.5 - centre) <= inner * centre;
+// Returns the mean squared difference of a view and its prediction where the pixels are not near an
+// edge: there the residual depends more on what the fit knows of the specimen outside the views.
+double inner_squares(const ImagePair& images) {
+  constexpr double kInner = 0.8;  // part of the width and height
+  const auto is_inner = [](double place, double centre) {
+    return std::abs(place + 0.5 - centre) <= kInner * centre;
   };
   double squares = 0.0, count = 0.0;
   for (std::int64_t y = 0; y < images.height; ++y) {
@@ -62,11 +63,9 @@ double wide_residual(const JointProblem& problem,
       aligning_measurement(problem, corrections, kAxisBin, field, processes);
   fit::Fit fit(views, field, axis_fit(problem.seed), processes);
   run_with_wide_pixels(fit, kAxisEpochs);
-  // Near the edges, a prediction depends on the specimen outside the views, which few views show.
-  const double inner = field.with_margin ? 0.8 : 1.0;
   std::vector<double> squares(corrections.size());
   for_each_prediction(fit, views, fit.stage(), [&](std::size_t view, const ImagePair& images) {
-    squares[view] = inner_squares(images, inner);
+    squares[view] = inner_squares(images);
   });
   return std::accumulate(squares.begin(), squares.end(), 0.0);
 }
