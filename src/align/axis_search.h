@@ -28,9 +28,9 @@ inline constexpr int kAxisEpochs = 16, kAxisFits = 3;
 fit::FitOptions axis_fit(std::uint64_t seed);
 
 /// Returns the corrections of a joint alignment with the common rotation at which fields that are
-/// fitted to the views leave the smallest residual. If the specimen goes on outside the views,
-/// pixels near the edges do not count. Views that are too small to tell the direction of the axis
-/// so stay as they are. Every process calls it and gets the same.
+/// fitted to the views leave the smallest residual. Pixels near the edges do not count. Views that
+/// are too small to tell the direction of the axis so stay as they are. Every process calls it and
+/// gets the same.
 ///
 /// The registrations of a joint alignment see only a small part of an error of the axis: a fortieth
 /// in a specimen that ends in the views, and a hundred and fiftieth in one that fills them
