@@ -105,6 +105,12 @@ fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t s
   return options;
 }
 
+void run_with_wide_pixels(fit::Fit& fit, int coarse_epochs) {
+  const std::int64_t last =
+      fit.last_stop_before(std::int64_t{coarse_epochs} * fit.steps_per_epoch());
+  fit.run([&](const fit::Fit& f) { return f.progress().step < last; });
+}
+
 measurement::Measurement aligning_measurement(const JointProblem& problem,
                                               std::span<const geometry::ViewCorrection> corrections,
                                               int bin, const fit::FieldOptions& field,

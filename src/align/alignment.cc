@@ -83,8 +83,9 @@ double seconds_of_update(std::span<const float> image, std::int64_t width) {
 std::vector<PlannedFits> planned_fits(bool from_raw, std::uint64_t seed) {
   constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
   // The held-out views judge the old and the new alignment, mostly with wide pixels alone.
-  std::vector<PlannedFits> fits{{joint_fit(seed), kAll, 1, 24.0},
-                                {held_out_fit(seed), kHeldOutCoarseEpochs, 2, 1.0}};
+  std::vector<PlannedFits> fits{{joint_fit(seed), kAll, 1, 23.0},
+                                {held_out_fit(seed), kHeldOutCoarseEpochs, 2, 1.0},
+                                {axis_fit(seed), kAxisEpochs, kAxisFits, 0.5}};
   if (from_raw) fits.push_back({joint_fit(seed), kResidualEpochs, kMostAxisFits, 2.5});
   return fits;
 }
@@ -118,6 +119,9 @@ Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::Vi
   Alignment alignment;
   alignment.joint = align_jointly(problem, std::move(start), processes);
   if (alignment.joint.was_stopped) return alignment;
+  if (alignment.joint.freedoms.rotation)
+    alignment.joint.corrections =
+        with_refined_axis(problem, alignment.joint.corrections, processes);
   alignment.unaligned = unalike_views(problem.recorded, alignment.joint.agreement);
   AlignmentTrial before(problem, none, processes);
   AlignmentTrial after(problem, alignment.joint.corrections, processes);

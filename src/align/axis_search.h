@@ -21,4 +21,22 @@ std::vector<geometry::ViewCorrection> with_best_axis(
     const JointProblem& problem, const std::vector<geometry::ViewCorrection>& start,
     const distributed::Communicator& processes);
 
+/// Number of epochs of each fit of with_refined_axis(), and the usual number of these fits.
+inline constexpr int kAxisEpochs = 16, kAxisFits = 3;
+
+/// Returns the options of the fits of with_refined_axis().
+fit::FitOptions axis_fit(std::uint64_t seed);
+
+/// Returns the corrections of a joint alignment with the common rotation at which fields that are
+/// fitted to the views leave the smallest residual. Pixels near the edges do not count. Views that
+/// are too small to tell the direction of the axis so stay as they are. Every process calls it and
+/// gets the same.
+///
+/// The registrations of a joint alignment see only a small part of an error of the axis: a fortieth
+/// in a specimen that ends in the views, and a hundred and fiftieth in one that fills them
+/// (docs/results/alignment.md). The residual tells it better.
+std::vector<geometry::ViewCorrection> with_refined_axis(
+    const JointProblem& problem, const std::vector<geometry::ViewCorrection>& start,
+    const distributed::Communicator& processes);
+
 }  // namespace tomofield::align

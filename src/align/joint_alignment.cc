@@ -188,7 +188,7 @@ class AligningFit {
 }  // namespace
 
 fit::FitOptions joint_fit(std::uint64_t seed) {
-  constexpr int kCoarseEpochs = 80, kFineEpochs = 4;
+  constexpr int kCoarseEpochs = 80, kFineEpochs = 3;
   return aligning_fit(kCoarseEpochs, kFineEpochs, seed);
 }
 
