@@ -5,15 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <utility>
 
 #include "base/parallel.h"
 #include "base/trace.h"
+#include "compact/candidate_search.h"
 #include "compact/decoded_field.h"
 #include "compact/leaf_code.h"
 #include "compact/place_tree.h"
+#include "compact/price_search.h"
 #include "compact/quantise.h"
 #include "compact/structure.h"
 #include "compact/truncation.h"
@@ -76,38 +77,6 @@ MeasuredRegion measure(const VertexDensities& vertices, base::Range rows) {
   return {all[0], std::max(kSmallest, all[2] / all[0] - mean * mean)};
 }
 
-// Looks for the price at which a sum meets its limit. An error grows with the price, and a cost
-// falls, about as a power of it does, which the last two prices tell.
-class PriceSearch {
- public:
-  PriceSearch(double first, bool grows)
-      : price_(first), grows_(grows), power_(grows ? 0.8 : -0.6) {}
-
-  double price() const { return price_; }
-
-  // Chooses the next price after one whose sum is `ratio` times its limit.
-  void go_on(double ratio) {
-    constexpr double kLeast = 0.2, kMost = 3.0;
-    if (last_price_ > 0) {
-      const double found = std::log(ratio / last_ratio_) / std::log(price_ / last_price_);
-      power_ = grows_ ? std::clamp(found, kLeast, kMost) : std::clamp(found, -kMost, -kLeast);
-    }
-    last_price_ = price_;
-    last_ratio_ = ratio;
-    (grows_ == (ratio > 1) ? high_ : low_) = price_;
-    price_ *= std::pow(ratio, -1 / power_);
-    const bool is_bounded = low_ > 0 && high_ > 0;
-    if (is_bounded && (price_ <= low_ || price_ >= high_)) price_ = std::sqrt(low_ * high_);
-  }
-
- private:
-  double price_;
-  bool grows_;
-  double power_;
-  double last_price_ = 0.0, last_ratio_ = 0.0;
-  double low_ = 0.0, high_ = 0.0;  // prices below and above the wanted one, or 0
-};
-
 class Compression {
  public:
   // A change in decibels counts against `variance`, or that of the rows if it is 0.
@@ -116,19 +85,12 @@ class Compression {
       : vertices_(vertices, roi),
         rows_(rows),
         squares_(place_squares(vertices_, largest_side, rows)),
+        candidates_(vertices_, squares_),
         region_(measure(vertices_, rows)) {
     if (variance > 0) region_.variance = variance;
-    places_.resize(squares_.nodes.size());
-    prices_.resize(places_.size());
-    is_tried_.assign(places_.size(), 1);
-    for (std::size_t i = 0; i < places_.size(); ++i) {
-      places_[i].first_child = squares_.nodes[i].first_child;
-      if (squares_.leaf_like[i] == PlaceSquares::kOutside) {
-        places_[i].candidates.push_back({});
-        prices_[i].push_back(std::numeric_limits<double>::infinity());
-      }
-    }
   }
+  Compression(const Compression&) = delete;  // its members refer to each other
+  Compression& operator=(const Compression&) = delete;
 
   double variance() const { return region_.variance; }
   double volume() const { return region_.volume; }  // of the region of interest
@@ -140,15 +102,15 @@ class Compression {
     PriceSearch search(last_price_ > 0 ? last_price_ : surveyed_price(limit), limit.of_error);
     for (int round = 0; round < kRounds; ++round) {
       last_price_ = search.price();
-      add_candidates(last_price_);
-      const Choice cheapest = cheapest_choice(places_, last_price_);
+      candidates_.add(last_price_);
+      const Choice cheapest = cheapest_choice(candidates_.places(), last_price_);
       const double ratio = std::clamp(limit.value(cheapest) / limit.most, kFar, 1 / kFar);
-      keep_near(cheapest, last_price_);
+      candidates_.keep_near(cheapest, last_price_);
       if (std::abs(ratio - 1) < kClose) break;
       search.go_on(ratio);
     }
-    choice_ = limit.of_error ? choose_within_error(places_, limit.most)
-                             : choose_within_cost(places_, limit.most);
+    choice_ = limit.of_error ? choose_within_error(candidates_.places(), limit.most)
+                             : choose_within_cost(candidates_.places(), limit.most);
     truncate_chosen();
   }
 
@@ -288,7 +250,7 @@ class Compression {
       const std::size_t place = place_of_leaf_[at];
       if (squares_.leaf_like[place] < 0) return;
       const PlaceDensities densities = vertices_.read(squares_.nodes[place].square);
-      const double price = prices_[place][static_cast<std::size_t>(choice_.candidate[place])];
+      const double price = candidates_.price_of(place, choice_.candidate[place]);
       leaves_[at] = truncate(densities, price / densities.volume_of_vertex);
       // Rounding errors are uniform: their mean square is a twelfth of the step's.
       errors[at] =
@@ -297,77 +259,11 @@ class Compression {
     error_of_step_ = std::accumulate(errors.begin(), errors.end(), 0.0);
   }
 
-  // Restricts further rounds to the places of a choice, their children, and those of their parents
-  // that are nearly as good.
-  void keep_near(const Choice& choice, double price) {
-    is_tried_.assign(places_.size(), 0);
-    for (std::size_t i = 0; i < places_.size(); ++i) {
-      if (choice.candidate[i] < 0) continue;
-      is_tried_[i] = 1;
-      const field::QuadtreeNode& node = squares_.nodes[i];
-      if (node.parent >= 0 && is_nearly_as_good(node.parent, price))
-        is_tried_[static_cast<std::size_t>(node.parent)] = 1;
-      for (int child = 0; child < 4 && node.first_child >= 0; ++child)
-        is_tried_[static_cast<std::size_t>(node.first_child + child)] = 1;
-    }
-  }
-
-  // Returns whether a place costs little more than its quarters do.
-  bool is_nearly_as_good(int place, double price) const {
-    constexpr double kLittle = 1.1;
-    const auto least = [&](int i) {
-      double value = std::numeric_limits<double>::infinity();
-      for (const Candidate& candidate : places_[static_cast<std::size_t>(i)].candidates)
-        value = std::min(value, candidate.error + price * candidate.cost);
-      return value;
-    };
-    const int first = places_[static_cast<std::size_t>(place)].first_child;
-    const double of_quarters =
-        least(first) + least(first + 1) + least(first + 2) + least(first + 3);
-    return least(place) <= kLittle * of_quarters;
-  }
-
-  // Adds candidates from the smallest places up. A place whose quarters are all split is not tried:
-  // a larger one is hardly ever better then.
-  void add_candidates(double price) {
-    const int deepest = squares_.nodes.back().level;
-    for (int level = deepest; level >= 0; --level) {
-      const std::vector<int> below =
-          level < deepest ? cheapest_choice(places_, price).candidate : std::vector<int>{};
-      const auto is_worthwhile = [&](std::size_t place) {
-        const int first = places_[place].first_child;
-        if (first < 0 || places_[static_cast<std::size_t>(first)].first_child < 0) return true;
-        return std::any_of(below.begin() + first, below.begin() + first + 4,
-                           [](int chosen) { return chosen != kSplit; });
-      };
-      std::vector<std::size_t> tried;
-      for (std::size_t i = 0; i < places_.size(); ++i) {
-        if (squares_.nodes[i].level == level && squares_.leaf_like[i] >= 0 && is_tried_[i] &&
-            is_worthwhile(i))
-          tried.push_back(i);
-      }
-      add_candidates_of(tried, price);
-    }
-  }
-
-  void add_candidates_of(const std::vector<std::size_t>& tried, double price) {
-    base::parallel_for("truncate places", std::ssize(tried), [&](std::int64_t i) {
-      const std::size_t at = tried[static_cast<std::size_t>(i)];
-      const PlaceDensities place = vertices_.read(squares_.nodes[at].square);
-      const Truncation modes = truncate(place, price / place.volume_of_vertex);
-      places_[at].candidates.push_back({.cost = static_cast<double>(modes.num_parameters()),
-                                        .error = modes.square_error * place.volume_of_vertex});
-      prices_[at].push_back(price);
-    });
-  }
-
   VertexDensities vertices_;
   base::Range rows_;
   PlaceSquares squares_;
+  CandidateSearch candidates_;
   MeasuredRegion region_;
-  PlaceTree places_;
-  std::vector<std::vector<double>> prices_;  // of each candidate
-  std::vector<char> is_tried_;               // whether the next round adds a candidate to a place
   Choice choice_;
   field::Quadtree tree_;                    // of what was chosen
   std::vector<std::size_t> place_of_leaf_;  // of this tree
