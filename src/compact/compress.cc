@@ -64,9 +64,8 @@ MeasuredRegion measure(const VertexDensities& vertices, base::Range rows) {
     const field::QuadtreeNode& leaf = tree.leaf(static_cast<int>(i));
     if (vertices.is_outside(leaf.square) || !is_in(leaf.square, rows)) return;
     const PlaceDensities place = vertices.read(leaf.square);
-    sums[static_cast<std::size_t>(i)] = {
-        place.volume(), place.values.cast<double>().sum() * place.volume_of_vertex,
-        place.values.cast<double>().squaredNorm() * place.volume_of_vertex};
+    const auto [sum, square] = place.integrals();
+    sums[static_cast<std::size_t>(i)] = {place.volume(), sum, square};
   });
   std::array<double, 3> all{};
   for (const auto& sum : sums) {

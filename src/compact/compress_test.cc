@@ -123,6 +123,15 @@ TEST(Compress, TheFieldIsEmptyBeyondTheRegion) {
   EXPECT_LT(made.report.parameters, compress(*vertices, region_of(2), budget).report.parameters);
 }
 
+// A vertex next to the region is kept, but it does not count to the region's mean and variance.
+TEST(Compress, TheVarianceIsThatOfTheRegion) {
+  const auto field = half_empty_field(4);
+  base::Random random(11);
+  for (float& value : field->parameters()) value = static_cast<float>(5 + random.normal());
+  for (const Rectangle roi : {Rectangle{0, 0, 40, 32}, {3, 5, 41, 23}, {40, 8, 60, 20}})
+    EXPECT_NEAR(variance_of(*field, roi), 1, 0.07) << roi.x0;
+}
+
 // Two bands are made compact one after the other, as tiles of a run are.
 TEST(Compress, PartsJoinToTheWholeField) {
   const field::RootGrid roots{.x0 = 0, .y0 = 0, .cell_size = 32, .columns = 1, .rows = 2};
@@ -184,6 +193,12 @@ TEST(VertexDensities, AverageAtFaces) {
       EXPECT_FLOAT_EQ(right.values(0, k * right.ny + j), (vertex(1, 32) + vertex(2, 0)) / 2);
     }
   }
+  const PlaceDensities cut = VertexDensities(*field, {2, 3, 10, 7}).read({0, 0, 32});
+  EXPECT_EQ(cut.inside_x, (base::Range{2, 10}));
+  EXPECT_EQ(cut.inside_y, (base::Range{3, 7}));
+  EXPECT_EQ(cut.values(10, 7), left.values(10, 7)) << "the last voxel depends on it";
+  EXPECT_EQ(cut.values(11, 5), 0);
+  EXPECT_EQ(cut.volume(), 8 * 4 * kThickness);
   EXPECT_EQ(vertices.leaf_like({-32, 0, 64}), -1) << "margin and region";
   EXPECT_TRUE(vertices.is_outside({64, 0, 32}));
   EXPECT_FALSE(vertices.is_outside({32, 0, 64}));
