@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "base/parallel.h"
@@ -71,9 +72,10 @@ MeasuredRegion measure(const VertexDensities& vertices, base::Range rows) {
   for (const auto& sum : sums) {
     for (std::size_t k = 0; k < all.size(); ++k) all[k] += sum[k];
   }
-  constexpr double kSmallest = 1e-12;  // for a field without any contrast
-  const double mean = all[1] / all[0];
-  return {all[0], std::max(kSmallest, all[2] / all[0] - mean * mean)};
+  // A field without any contrast has a variance as well, which is above the errors of floats.
+  constexpr double kSmallest = 1e-12, kSmallestPart = 1e-9;
+  const double mean = all[1] / all[0], mean_square = all[2] / all[0];
+  return {all[0], std::max({kSmallest, kSmallestPart * mean_square, mean_square - mean * mean})};
 }
 
 class Compression {
@@ -115,8 +117,8 @@ class Compression {
 
   const Choice& choice() const { return choice_; }
 
-  // Returns the squared error of what was chosen with its factors rounded as build() rounds them,
-  // before faces are softened. It takes a fraction of the time of build(), which codes the factors.
+  // Returns the squared error of what was chosen with its factors rounded as code() rounds them,
+  // before faces are softened. It takes a fraction of the time of code() and finish().
   double rounded_error(double rounding_error) const {
     const double step = step_of(rounding_error);
     std::vector<double> errors(leaves_.size());
@@ -132,11 +134,11 @@ class Compression {
     return std::accumulate(errors.begin(), errors.end(), 0.0);
   }
 
-  // Rounds the factors of what was chosen, so that rounding alone adds this error.
-  CompactField build(double rounding_error) const {
-    CompactField made;
-    made.coded = {.tree = tree_, .thickness = vertices_.field().thickness(), .codes = {}};
-    LeafCodes& codes = made.coded.codes;
+  // Rounds the factors of what was chosen, so that rounding alone adds this error, and codes them.
+  // Faces are not softened yet.
+  CodedField code(double rounding_error) const {
+    CodedField coded{.tree = tree_, .thickness = vertices_.field().thickness(), .codes = {}};
+    LeafCodes& codes = coded.codes;
     const double step = step_of(rounding_error);
     const auto num_bands = static_cast<std::size_t>(tree_.roots().rows);
     codes.step.assign(num_bands, step);
@@ -156,8 +158,16 @@ class Compression {
       codes.bytes.insert(codes.bytes.end(), of_leaf.begin(), of_leaf.end());
       codes.offset.push_back(std::ssize(codes.bytes));
     }
-    codes.face_weight.assign(
-        num_bands, matching_face_weight(*decode_field(made.coded), codes, vertices_.field()));
+    return coded;
+  }
+
+  // Softens the faces of coded leaves, and measures what they stand for. One decoded field is in
+  // memory at a time.
+  CompactField finish(CodedField coded) const {
+    CompactField made{.coded = std::move(coded), .field = nullptr, .report = {}};
+    LeafCodes& codes = made.coded.codes;
+    const double weight = matching_face_weight(*decode_field(made.coded), codes, vertices_.field());
+    codes.face_weight.assign(codes.face_weight.size(), weight);
     made.field = decode_field(made.coded);
     made.report = {.parameters = codes.num_parameters(),
                    .bytes = codes.bytes.size(),
@@ -213,13 +223,14 @@ class Compression {
     return std::max(price, 1e-30);
   }
 
-  // Returns the squared difference of a field with the chosen tree from the vertices, times volume.
+  // Returns the squared difference of a compact field from the vertices, times volume.
   double square_change(const field::Field& made) const {
-    std::vector<double> errors(leaves_.size());
-    base::parallel_for("measure the change", std::ssize(leaves_), [&](std::int64_t i) {
+    std::vector<double> errors(static_cast<std::size_t>(made.tree().num_leaves()));
+    base::parallel_for("measure the change", std::ssize(errors), [&](std::int64_t i) {
       const int leaf = static_cast<int>(i);
-      if (squares_.leaf_like[place_of_leaf_[static_cast<std::size_t>(i)]] < 0) return;
-      const PlaceDensities place = vertices_.read(tree_.leaf(leaf).square);
+      const field::Square& square = made.tree().leaf(leaf).square;
+      if (vertices_.is_outside(square)) return;
+      const PlaceDensities place = vertices_.read(square);
       const field::LeafShape& s = made.shape(leaf);
       const float* value = made.parameters().data() + made.offset(leaf);
       double sum = 0;
@@ -274,7 +285,7 @@ class Compression {
 // Rounding adds less than uniform errors would where components vanish, and more where vectors are
 // short, so the step is corrected once it was tried.
 CompactField within_decibels(Compression& compression, double decibels) {
-  constexpr int kTries = 5, kBuilds = 3;
+  constexpr int kTries = 5, kModels = 8;
   constexpr double kMost = 0.98, kLeast = 0.96;  // softened faces have a slightly larger error
   const double change = allowed_change(decibels) * compression.variance() * compression.volume();
   compression.choose({.of_error = true, .most = (1 - kRoundingForBytes) * change});
@@ -285,37 +296,49 @@ CompactField within_decibels(Compression& compression, double decibels) {
     if (added <= kMost * left && added > kLeast * left) break;
     rounding *= (kLeast + kMost) / 2 * left / std::max(added, 0.1 * left);
   }
-  CompactField made = compression.build(rounding);
-  for (int i = 1; i < kBuilds && made.report.decibels > decibels; ++i) {
-    rounding *= kLeast;
-    made = compression.build(rounding);
+  CompactField made = compression.finish(compression.code(rounding));
+  for (int i = 1; i < kModels && made.report.decibels > decibels; ++i) {
+    const double excess = made.report.mean_square_change * compression.volume() - change;
+    rounding = std::clamp(rounding - excess, rounding / 2, kLeast * rounding);
+    made = {};  // memory is for one model
+    made = compression.finish(compression.code(rounding));
   }
   return made;
 }
 
-CompactField within_parameters(Compression& compression, double parameters,
-                               double part_of_rounding) {
+// Returns the codes of at most so many parameters, if there are any.
+CodedField coded_parameters(Compression& compression, double parameters, double part_of_rounding) {
   compression.choose({.of_error = false, .most = parameters});
-  return compression.build(compression.choice().error * part_of_rounding / (1 - part_of_rounding));
+  return compression.code(compression.choice().error * part_of_rounding / (1 - part_of_rounding));
 }
 
-// The bytes that a parameter takes are known once a model was made. Keeps the largest one that is
+CompactField within_parameters(Compression& compression, double parameters) {
+  CodedField coded = coded_parameters(compression, parameters, kRoundingForParameters);
+  if (static_cast<double>(coded.codes.num_parameters()) > parameters)
+    throw Error(
+        fmt::format("no model of {:.0f} parameters was found: give a larger budget", parameters));
+  return compression.finish(std::move(coded));
+}
+
+// The bytes that a parameter takes are known once a model was coded. Keeps the largest one that is
 // within the budget.
 CompactField within_bytes(Compression& compression, double bytes) {
   constexpr int kTries = 8;
   constexpr double kFirstBytesPerParameter = 0.45, kClose = 0.95;
   double parameters = bytes / kFirstBytesPerParameter;
-  CompactField best;
+  std::optional<CodedField> best;
   for (int i = 0; i < kTries; ++i) {
-    CompactField made = within_parameters(compression, parameters, kRoundingForBytes);
-    const double part = static_cast<double>(made.report.bytes) / bytes;
-    if (part <= 1 && made.report.bytes >= best.report.bytes) best = std::move(made);
+    CodedField coded = coded_parameters(compression, parameters, kRoundingForBytes);
+    const auto size = static_cast<double>(coded.codes.bytes.size());
+    const double part = size / bytes;
+    if (size <= bytes && (!best || coded.codes.bytes.size() >= best->codes.bytes.size()))
+      best = std::move(coded);
     if (part <= 1 && part > kClose) break;
     parameters *= (1 + kClose) / 2 / std::max(part, 0.1);
   }
-  if (best.field == nullptr)
+  if (!best)
     throw Error(fmt::format("no model of {:.0f} bytes was found: give a larger budget", bytes));
-  return best;
+  return compression.finish(std::move(*best));
 }
 
 CompactField within(const Budget& budget, Compression& compression) {
@@ -323,7 +346,7 @@ CompactField within(const Budget& budget, Compression& compression) {
     case Budget::Kind::kDecibels:
       return within_decibels(compression, budget.amount);
     case Budget::Kind::kParameters:
-      return within_parameters(compression, budget.amount, kRoundingForParameters);
+      return within_parameters(compression, budget.amount);
     case Budget::Kind::kBytes:
       break;
   }

@@ -84,6 +84,20 @@ TEST(Compress, DecibelsAreKept) {
   }
 }
 
+// The variance of a field without contrast is what floats can tell.
+TEST(Compress, AFieldOfOneDensityIsKept) {
+  const auto vertices = half_empty_field(1);
+  std::ranges::fill(vertices->parameters(), 5.0f);
+  for (const double decibels : {1.0, 0.02}) {
+    const CompactField made =
+        compress(*vertices, region_of(1), {Budget::Kind::kDecibels, decibels});
+    EXPECT_LE(made.report.decibels, decibels);
+    EXPECT_NEAR(made.field->density(10.3, 11.4, 12.5), 5, 1e-4);
+  }
+}
+
+// A model grows by whole components, so it fills small budgets less well: it is empty if the budget
+// is less than one component, and a budget of 4e3 bytes is filled to 0.6.
 TEST(Compress, ParametersAndBytesAreKept) {
   const auto vertices = half_empty_field(4);
   for (const double parameters : {4e3, 2e4}) {
@@ -97,6 +111,16 @@ TEST(Compress, ParametersAndBytesAreKept) {
     EXPECT_LE(static_cast<double>(made.report.bytes), bytes);
     EXPECT_GT(static_cast<double>(made.report.bytes), 0.8 * bytes);
   }
+}
+
+TEST(Compress, BudgetsThatCannotBeMetAreRefused) {
+  const auto vertices = half_empty_field(1);
+  const auto made = [&](Budget::Kind kind, double amount) {
+    return compress(*vertices, region_of(1), {kind, amount}).report;
+  };
+  EXPECT_EQ(made(Budget::Kind::kParameters, 1).parameters, 0u) << "an empty model is within it";
+  EXPECT_THROW(made(Budget::Kind::kParameters, -1), Error);
+  EXPECT_THROW(made(Budget::Kind::kBytes, -1), Error);
 }
 
 TEST(Compress, EmptyRegionsAreLargeLeavesWithoutParameters) {
