@@ -5,15 +5,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "base/parallel.h"
 #include "base/trace.h"
+#include "compact/candidate_search.h"
 #include "compact/decoded_field.h"
 #include "compact/leaf_code.h"
 #include "compact/place_tree.h"
+#include "compact/price_search.h"
 #include "compact/quantise.h"
 #include "compact/structure.h"
 #include "compact/truncation.h"
@@ -63,50 +65,18 @@ MeasuredRegion measure(const VertexDensities& vertices, base::Range rows) {
     const field::QuadtreeNode& leaf = tree.leaf(static_cast<int>(i));
     if (vertices.is_outside(leaf.square) || !is_in(leaf.square, rows)) return;
     const PlaceDensities place = vertices.read(leaf.square);
-    sums[static_cast<std::size_t>(i)] = {
-        place.volume(), place.values.cast<double>().sum() * place.volume_of_vertex,
-        place.values.cast<double>().squaredNorm() * place.volume_of_vertex};
+    const auto [sum, square] = place.integrals();
+    sums[static_cast<std::size_t>(i)] = {place.volume(), sum, square};
   });
   std::array<double, 3> all{};
   for (const auto& sum : sums) {
     for (std::size_t k = 0; k < all.size(); ++k) all[k] += sum[k];
   }
-  constexpr double kSmallest = 1e-12;  // for a field without any contrast
-  const double mean = all[1] / all[0];
-  return {all[0], std::max(kSmallest, all[2] / all[0] - mean * mean)};
+  // A field without any contrast has a variance as well, which is above the errors of floats.
+  constexpr double kSmallest = 1e-12, kSmallestPart = 1e-9;
+  const double mean = all[1] / all[0], mean_square = all[2] / all[0];
+  return {all[0], std::max({kSmallest, kSmallestPart * mean_square, mean_square - mean * mean})};
 }
-
-// Looks for the price at which a sum meets its limit. An error grows with the price, and a cost
-// falls, about as a power of it does, which the last two prices tell.
-class PriceSearch {
- public:
-  PriceSearch(double first, bool grows)
-      : price_(first), grows_(grows), power_(grows ? 0.8 : -0.6) {}
-
-  double price() const { return price_; }
-
-  // Chooses the next price after one whose sum is `ratio` times its limit.
-  void go_on(double ratio) {
-    constexpr double kLeast = 0.2, kMost = 3.0;
-    if (last_price_ > 0) {
-      const double found = std::log(ratio / last_ratio_) / std::log(price_ / last_price_);
-      power_ = grows_ ? std::clamp(found, kLeast, kMost) : std::clamp(found, -kMost, -kLeast);
-    }
-    last_price_ = price_;
-    last_ratio_ = ratio;
-    (grows_ == (ratio > 1) ? high_ : low_) = price_;
-    price_ *= std::pow(ratio, -1 / power_);
-    const bool is_bounded = low_ > 0 && high_ > 0;
-    if (is_bounded && (price_ <= low_ || price_ >= high_)) price_ = std::sqrt(low_ * high_);
-  }
-
- private:
-  double price_;
-  bool grows_;
-  double power_;
-  double last_price_ = 0.0, last_ratio_ = 0.0;
-  double low_ = 0.0, high_ = 0.0;  // prices below and above the wanted one, or 0
-};
 
 class Compression {
  public:
@@ -116,19 +86,12 @@ class Compression {
       : vertices_(vertices, roi),
         rows_(rows),
         squares_(place_squares(vertices_, largest_side, rows)),
+        candidates_(vertices_, squares_),
         region_(measure(vertices_, rows)) {
     if (variance > 0) region_.variance = variance;
-    places_.resize(squares_.nodes.size());
-    prices_.resize(places_.size());
-    is_tried_.assign(places_.size(), 1);
-    for (std::size_t i = 0; i < places_.size(); ++i) {
-      places_[i].first_child = squares_.nodes[i].first_child;
-      if (squares_.leaf_like[i] == PlaceSquares::kOutside) {
-        places_[i].candidates.push_back({});
-        prices_[i].push_back(std::numeric_limits<double>::infinity());
-      }
-    }
   }
+  Compression(const Compression&) = delete;  // its members refer to each other
+  Compression& operator=(const Compression&) = delete;
 
   double variance() const { return region_.variance; }
   double volume() const { return region_.volume; }  // of the region of interest
@@ -140,22 +103,22 @@ class Compression {
     PriceSearch search(last_price_ > 0 ? last_price_ : surveyed_price(limit), limit.of_error);
     for (int round = 0; round < kRounds; ++round) {
       last_price_ = search.price();
-      add_candidates(last_price_);
-      const Choice cheapest = cheapest_choice(places_, last_price_);
+      candidates_.add(last_price_);
+      const Choice cheapest = cheapest_choice(candidates_.places(), last_price_);
       const double ratio = std::clamp(limit.value(cheapest) / limit.most, kFar, 1 / kFar);
-      keep_near(cheapest, last_price_);
+      candidates_.keep_near(cheapest, last_price_);
       if (std::abs(ratio - 1) < kClose) break;
       search.go_on(ratio);
     }
-    choice_ = limit.of_error ? choose_within_error(places_, limit.most)
-                             : choose_within_cost(places_, limit.most);
+    choice_ = limit.of_error ? choose_within_error(candidates_.places(), limit.most)
+                             : choose_within_cost(candidates_.places(), limit.most);
     truncate_chosen();
   }
 
   const Choice& choice() const { return choice_; }
 
-  // Returns the squared error of what was chosen with its factors rounded as build() rounds them,
-  // before faces are softened. It takes a fraction of the time of build(), which codes the factors.
+  // Returns the squared error of what was chosen with its factors rounded as code() rounds them,
+  // before faces are softened. It takes a fraction of the time of code() and finish().
   double rounded_error(double rounding_error) const {
     const double step = step_of(rounding_error);
     std::vector<double> errors(leaves_.size());
@@ -171,11 +134,11 @@ class Compression {
     return std::accumulate(errors.begin(), errors.end(), 0.0);
   }
 
-  // Rounds the factors of what was chosen, so that rounding alone adds this error.
-  CompactField build(double rounding_error) const {
-    CompactField made;
-    made.coded = {.tree = tree_, .thickness = vertices_.field().thickness(), .codes = {}};
-    LeafCodes& codes = made.coded.codes;
+  // Rounds the factors of what was chosen, so that rounding alone adds this error, and codes them.
+  // Faces are not softened yet.
+  CodedField code(double rounding_error) const {
+    CodedField coded{.tree = tree_, .thickness = vertices_.field().thickness(), .codes = {}};
+    LeafCodes& codes = coded.codes;
     const double step = step_of(rounding_error);
     const auto num_bands = static_cast<std::size_t>(tree_.roots().rows);
     codes.step.assign(num_bands, step);
@@ -195,8 +158,16 @@ class Compression {
       codes.bytes.insert(codes.bytes.end(), of_leaf.begin(), of_leaf.end());
       codes.offset.push_back(std::ssize(codes.bytes));
     }
-    codes.face_weight.assign(
-        num_bands, matching_face_weight(*decode_field(made.coded), codes, vertices_.field()));
+    return coded;
+  }
+
+  // Softens the faces of coded leaves, and measures what they stand for. One decoded field is in
+  // memory at a time.
+  CompactField finish(CodedField coded) const {
+    CompactField made{.coded = std::move(coded), .field = nullptr, .report = {}};
+    LeafCodes& codes = made.coded.codes;
+    const double weight = matching_face_weight(*decode_field(made.coded), codes, vertices_.field());
+    codes.face_weight.assign(codes.face_weight.size(), weight);
     made.field = decode_field(made.coded);
     made.report = {.parameters = codes.num_parameters(),
                    .bytes = codes.bytes.size(),
@@ -252,13 +223,14 @@ class Compression {
     return std::max(price, 1e-30);
   }
 
-  // Returns the squared difference of a field with the chosen tree from the vertices, times volume.
+  // Returns the squared difference of a compact field from the vertices, times volume.
   double square_change(const field::Field& made) const {
-    std::vector<double> errors(leaves_.size());
-    base::parallel_for("measure the change", std::ssize(leaves_), [&](std::int64_t i) {
+    std::vector<double> errors(static_cast<std::size_t>(made.tree().num_leaves()));
+    base::parallel_for("measure the change", std::ssize(errors), [&](std::int64_t i) {
       const int leaf = static_cast<int>(i);
-      if (squares_.leaf_like[place_of_leaf_[static_cast<std::size_t>(i)]] < 0) return;
-      const PlaceDensities place = vertices_.read(tree_.leaf(leaf).square);
+      const field::Square& square = made.tree().leaf(leaf).square;
+      if (vertices_.is_outside(square)) return;
+      const PlaceDensities place = vertices_.read(square);
       const field::LeafShape& s = made.shape(leaf);
       const float* value = made.parameters().data() + made.offset(leaf);
       double sum = 0;
@@ -288,7 +260,7 @@ class Compression {
       const std::size_t place = place_of_leaf_[at];
       if (squares_.leaf_like[place] < 0) return;
       const PlaceDensities densities = vertices_.read(squares_.nodes[place].square);
-      const double price = prices_[place][static_cast<std::size_t>(choice_.candidate[place])];
+      const double price = candidates_.price_of(place, choice_.candidate[place]);
       leaves_[at] = truncate(densities, price / densities.volume_of_vertex);
       // Rounding errors are uniform: their mean square is a twelfth of the step's.
       errors[at] =
@@ -297,77 +269,11 @@ class Compression {
     error_of_step_ = std::accumulate(errors.begin(), errors.end(), 0.0);
   }
 
-  // Restricts further rounds to the places of a choice, their children, and those of their parents
-  // that are nearly as good.
-  void keep_near(const Choice& choice, double price) {
-    is_tried_.assign(places_.size(), 0);
-    for (std::size_t i = 0; i < places_.size(); ++i) {
-      if (choice.candidate[i] < 0) continue;
-      is_tried_[i] = 1;
-      const field::QuadtreeNode& node = squares_.nodes[i];
-      if (node.parent >= 0 && is_nearly_as_good(node.parent, price))
-        is_tried_[static_cast<std::size_t>(node.parent)] = 1;
-      for (int child = 0; child < 4 && node.first_child >= 0; ++child)
-        is_tried_[static_cast<std::size_t>(node.first_child + child)] = 1;
-    }
-  }
-
-  // Returns whether a place costs little more than its quarters do.
-  bool is_nearly_as_good(int place, double price) const {
-    constexpr double kLittle = 1.1;
-    const auto least = [&](int i) {
-      double value = std::numeric_limits<double>::infinity();
-      for (const Candidate& candidate : places_[static_cast<std::size_t>(i)].candidates)
-        value = std::min(value, candidate.error + price * candidate.cost);
-      return value;
-    };
-    const int first = places_[static_cast<std::size_t>(place)].first_child;
-    const double of_quarters =
-        least(first) + least(first + 1) + least(first + 2) + least(first + 3);
-    return least(place) <= kLittle * of_quarters;
-  }
-
-  // Adds candidates from the smallest places up. A place whose quarters are all split is not tried:
-  // a larger one is hardly ever better then.
-  void add_candidates(double price) {
-    const int deepest = squares_.nodes.back().level;
-    for (int level = deepest; level >= 0; --level) {
-      const std::vector<int> below =
-          level < deepest ? cheapest_choice(places_, price).candidate : std::vector<int>{};
-      const auto is_worthwhile = [&](std::size_t place) {
-        const int first = places_[place].first_child;
-        if (first < 0 || places_[static_cast<std::size_t>(first)].first_child < 0) return true;
-        return std::any_of(below.begin() + first, below.begin() + first + 4,
-                           [](int chosen) { return chosen != kSplit; });
-      };
-      std::vector<std::size_t> tried;
-      for (std::size_t i = 0; i < places_.size(); ++i) {
-        if (squares_.nodes[i].level == level && squares_.leaf_like[i] >= 0 && is_tried_[i] &&
-            is_worthwhile(i))
-          tried.push_back(i);
-      }
-      add_candidates_of(tried, price);
-    }
-  }
-
-  void add_candidates_of(const std::vector<std::size_t>& tried, double price) {
-    base::parallel_for("truncate places", std::ssize(tried), [&](std::int64_t i) {
-      const std::size_t at = tried[static_cast<std::size_t>(i)];
-      const PlaceDensities place = vertices_.read(squares_.nodes[at].square);
-      const Truncation modes = truncate(place, price / place.volume_of_vertex);
-      places_[at].candidates.push_back({.cost = static_cast<double>(modes.num_parameters()),
-                                        .error = modes.square_error * place.volume_of_vertex});
-      prices_[at].push_back(price);
-    });
-  }
-
   VertexDensities vertices_;
   base::Range rows_;
   PlaceSquares squares_;
+  CandidateSearch candidates_;
   MeasuredRegion region_;
-  PlaceTree places_;
-  std::vector<std::vector<double>> prices_;  // of each candidate
-  std::vector<char> is_tried_;               // whether the next round adds a candidate to a place
   Choice choice_;
   field::Quadtree tree_;                    // of what was chosen
   std::vector<std::size_t> place_of_leaf_;  // of this tree
@@ -379,7 +285,7 @@ class Compression {
 // Rounding adds less than uniform errors would where components vanish, and more where vectors are
 // short, so the step is corrected once it was tried.
 CompactField within_decibels(Compression& compression, double decibels) {
-  constexpr int kTries = 5, kBuilds = 3;
+  constexpr int kTries = 5, kModels = 8;
   constexpr double kMost = 0.98, kLeast = 0.96;  // softened faces have a slightly larger error
   const double change = allowed_change(decibels) * compression.variance() * compression.volume();
   compression.choose({.of_error = true, .most = (1 - kRoundingForBytes) * change});
@@ -390,37 +296,49 @@ CompactField within_decibels(Compression& compression, double decibels) {
     if (added <= kMost * left && added > kLeast * left) break;
     rounding *= (kLeast + kMost) / 2 * left / std::max(added, 0.1 * left);
   }
-  CompactField made = compression.build(rounding);
-  for (int i = 1; i < kBuilds && made.report.decibels > decibels; ++i) {
-    rounding *= kLeast;
-    made = compression.build(rounding);
+  CompactField made = compression.finish(compression.code(rounding));
+  for (int i = 1; i < kModels && made.report.decibels > decibels; ++i) {
+    const double excess = made.report.mean_square_change * compression.volume() - change;
+    rounding = std::clamp(rounding - excess, rounding / 2, kLeast * rounding);
+    made = {};  // memory is for one model
+    made = compression.finish(compression.code(rounding));
   }
   return made;
 }
 
-CompactField within_parameters(Compression& compression, double parameters,
-                               double part_of_rounding) {
+// Returns the codes of at most so many parameters, if there are any.
+CodedField coded_parameters(Compression& compression, double parameters, double part_of_rounding) {
   compression.choose({.of_error = false, .most = parameters});
-  return compression.build(compression.choice().error * part_of_rounding / (1 - part_of_rounding));
+  return compression.code(compression.choice().error * part_of_rounding / (1 - part_of_rounding));
 }
 
-// The bytes that a parameter takes are known once a model was made. Keeps the largest one that is
+CompactField within_parameters(Compression& compression, double parameters) {
+  CodedField coded = coded_parameters(compression, parameters, kRoundingForParameters);
+  if (static_cast<double>(coded.codes.num_parameters()) > parameters)
+    throw Error(
+        fmt::format("no model of {:.0f} parameters was found: give a larger budget", parameters));
+  return compression.finish(std::move(coded));
+}
+
+// The bytes that a parameter takes are known once a model was coded. Keeps the largest one that is
 // within the budget.
 CompactField within_bytes(Compression& compression, double bytes) {
   constexpr int kTries = 8;
   constexpr double kFirstBytesPerParameter = 0.45, kClose = 0.95;
   double parameters = bytes / kFirstBytesPerParameter;
-  CompactField best;
+  std::optional<CodedField> best;
   for (int i = 0; i < kTries; ++i) {
-    CompactField made = within_parameters(compression, parameters, kRoundingForBytes);
-    const double part = static_cast<double>(made.report.bytes) / bytes;
-    if (part <= 1 && made.report.bytes >= best.report.bytes) best = std::move(made);
+    CodedField coded = coded_parameters(compression, parameters, kRoundingForBytes);
+    const auto size = static_cast<double>(coded.codes.bytes.size());
+    const double part = size / bytes;
+    if (size <= bytes && (!best || coded.codes.bytes.size() >= best->codes.bytes.size()))
+      best = std::move(coded);
     if (part <= 1 && part > kClose) break;
     parameters *= (1 + kClose) / 2 / std::max(part, 0.1);
   }
-  if (best.field == nullptr)
+  if (!best)
     throw Error(fmt::format("no model of {:.0f} bytes was found: give a larger budget", bytes));
-  return best;
+  return compression.finish(std::move(*best));
 }
 
 CompactField within(const Budget& budget, Compression& compression) {
@@ -428,7 +346,7 @@ CompactField within(const Budget& budget, Compression& compression) {
     case Budget::Kind::kDecibels:
       return within_decibels(compression, budget.amount);
     case Budget::Kind::kParameters:
-      return within_parameters(compression, budget.amount, kRoundingForParameters);
+      return within_parameters(compression, budget.amount);
     case Budget::Kind::kBytes:
       break;
   }

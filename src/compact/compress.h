@@ -17,10 +17,12 @@ namespace tomofield::compact {
 struct CompressionReport {
   std::size_t parameters = 0;  ///< whole numbers that the file holds
   std::size_t bytes = 0;       ///< of their codes
-  /// Sum of squared changes at the vertices that count, over the volume of the region.
+  /// Sum of squared changes, times the volume of a vertex, over the volume of the region. The sum
+  /// is over the vertices that voxels of the region depend on: those inside it and those next to
+  /// it.
   double mean_square_change = 0.0;
   double variance = 0.0;  ///< of the densities in the region of interest
-  double decibels = 0.0;  ///< that the PSNR falls by, at most, on phantoms
+  double decibels = 0.0;  ///< that the PSNR falls by, at most, on phantoms (docs/compact.md)
   double volume = 0.0;    ///< of the region, in cubic pixels
 };
 
@@ -51,8 +53,11 @@ struct CompactField {
 /// is that of all parts.
 ///
 /// `vertices` is of kind "grid", and all leaves must be kept. A place is worked on alone, so memory
-/// is that of the vertices, of a place for each thread, and of the result. Throws Error if a budget
-/// in bytes or parameters cannot be met.
+/// is that of the vertices, of a place for each thread, and of the result.
+///
+/// The model is within the budget. Throws Error if none is found within a budget in bytes or in
+/// parameters. For a budget in decibels, up to eight models of finer and finer rounding are made;
+/// if none is within it, the last model is returned, and `report.decibels` is above the budget.
 CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget);
 CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget,
                       base::Range rows, double variance);

@@ -84,6 +84,20 @@ TEST(Compress, DecibelsAreKept) {
   }
 }
 
+// The variance of a field without contrast is what floats can tell.
+TEST(Compress, AFieldOfOneDensityIsKept) {
+  const auto vertices = half_empty_field(1);
+  std::ranges::fill(vertices->parameters(), 5.0f);
+  for (const double decibels : {1.0, 0.02}) {
+    const CompactField made =
+        compress(*vertices, region_of(1), {Budget::Kind::kDecibels, decibels});
+    EXPECT_LE(made.report.decibels, decibels);
+    EXPECT_NEAR(made.field->density(10.3, 11.4, 12.5), 5, 1e-4);
+  }
+}
+
+// A model grows by whole components, so it fills small budgets less well: it is empty if the budget
+// is less than one component, and a budget of 4e3 bytes is filled to 0.6.
 TEST(Compress, ParametersAndBytesAreKept) {
   const auto vertices = half_empty_field(4);
   for (const double parameters : {4e3, 2e4}) {
@@ -97,6 +111,16 @@ TEST(Compress, ParametersAndBytesAreKept) {
     EXPECT_LE(static_cast<double>(made.report.bytes), bytes);
     EXPECT_GT(static_cast<double>(made.report.bytes), 0.8 * bytes);
   }
+}
+
+TEST(Compress, BudgetsThatCannotBeMetAreRefused) {
+  const auto vertices = half_empty_field(1);
+  const auto made = [&](Budget::Kind kind, double amount) {
+    return compress(*vertices, region_of(1), {kind, amount}).report;
+  };
+  EXPECT_EQ(made(Budget::Kind::kParameters, 1).parameters, 0u) << "an empty model is within it";
+  EXPECT_THROW(made(Budget::Kind::kParameters, -1), Error);
+  EXPECT_THROW(made(Budget::Kind::kBytes, -1), Error);
 }
 
 TEST(Compress, EmptyRegionsAreLargeLeavesWithoutParameters) {
@@ -121,6 +145,15 @@ TEST(Compress, TheFieldIsEmptyBeyondTheRegion) {
   EXPECT_EQ(made.field->density(60, 10, 12), 0.0);
   EXPECT_NEAR(made.field->density(39.5, 10, 12), vertices->density(39.5, 10, 12), 0.3);
   EXPECT_LT(made.report.parameters, compress(*vertices, region_of(2), budget).report.parameters);
+}
+
+// A vertex next to the region is kept, but it does not count to the region's mean and variance.
+TEST(Compress, TheVarianceIsThatOfTheRegion) {
+  const auto field = half_empty_field(4);
+  base::Random random(11);
+  for (float& value : field->parameters()) value = static_cast<float>(5 + random.normal());
+  for (const Rectangle roi : {Rectangle{0, 0, 40, 32}, {3, 5, 41, 23}, {40, 8, 60, 20}})
+    EXPECT_NEAR(variance_of(*field, roi), 1, 0.07) << roi.x0;
 }
 
 // Two bands are made compact one after the other, as tiles of a run are.
@@ -184,6 +217,12 @@ TEST(VertexDensities, AverageAtFaces) {
       EXPECT_FLOAT_EQ(right.values(0, k * right.ny + j), (vertex(1, 32) + vertex(2, 0)) / 2);
     }
   }
+  const PlaceDensities cut = VertexDensities(*field, {2, 3, 10, 7}).read({0, 0, 32});
+  EXPECT_EQ(cut.inside_x, (base::Range{2, 10}));
+  EXPECT_EQ(cut.inside_y, (base::Range{3, 7}));
+  EXPECT_EQ(cut.values(10, 7), left.values(10, 7)) << "the last voxel depends on it";
+  EXPECT_EQ(cut.values(11, 5), 0);
+  EXPECT_EQ(cut.volume(), 8 * 4 * kThickness);
   EXPECT_EQ(vertices.leaf_like({-32, 0, 64}), -1) << "margin and region";
   EXPECT_TRUE(vertices.is_outside({64, 0, 32}));
   EXPECT_FALSE(vertices.is_outside({32, 0, 64}));

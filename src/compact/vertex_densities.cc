@@ -33,8 +33,8 @@ int count_below(std::int64_t begin, double spacing, int n, std::int64_t end) {
   return static_cast<int>(std::clamp(count, 0.0, static_cast<double>(n)));
 }
 
-// Vertices along one axis of a square: those inside the region of interest, and with them their
-// neighbours, which its voxels depend on too.
+// Holds the vertices along one axis of a square: those inside the region of interest, and those
+// that its voxels use, which are their neighbours as well.
 struct VerticesOfAxis {
   base::Range inside, used;
   VerticesOfAxis(std::int64_t begin, double spacing, int n, std::int64_t low, std::int64_t high)
@@ -43,6 +43,21 @@ struct VerticesOfAxis {
 };
 
 }  // namespace
+
+double PlaceDensities::volume() const {
+  return volume_of_vertex * static_cast<double>(inside_x.size()) * inside_y.size() * nz;
+}
+
+std::array<double, 2> PlaceDensities::integrals() const {
+  std::array<double, 2> sums{};
+  for (int z = 0; z < nz; ++z) {
+    const auto inside = values.block(inside_x.begin, Eigen::Index{z} * ny + inside_y.begin,
+                                     inside_x.size(), inside_y.size());
+    sums[0] += inside.cast<double>().sum();
+    sums[1] += inside.cast<double>().squaredNorm();
+  }
+  return {sums[0] * volume_of_vertex, sums[1] * volume_of_vertex};
+}
 
 VertexDensities::VertexDensities(const field::Field& vertices, const Rectangle& roi)
     : vertices_(vertices), roi_(roi) {
@@ -118,7 +133,8 @@ PlaceDensities VertexDensities::read(const Square& square) const {
       side * side * vertices_.thickness() / static_cast<double>(place.values.size());
   const VerticesOfAxis along_x(square.x0, hx, place.nx, roi_.x0, roi_.x1);
   const VerticesOfAxis along_y(square.y0, hy, place.ny, roi_.y0, roi_.y1);
-  place.num_inside = Eigen::Index{along_x.inside.size()} * along_y.inside.size() * place.nz;
+  place.inside_x = along_x.inside;
+  place.inside_y = along_y.inside;
   Eigen::MatrixXi count = Eigen::MatrixXi::Zero(place.nx, place.ny);
   std::vector<float> line;
   for (const int leaf : leaves_near(square, 1)) {

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <array>
 #include <vector>
 
+#include "base/range.h"
 #include "field/field.h"
 #include "tomofield/options.h"
 
@@ -12,15 +14,18 @@ using FloatMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::
 
 /// Holds the densities of a finished field at the vertices of a square of the specimen's plane, but
 /// for those on its upper faces, which the next squares have. The vertices are as far apart as
-/// those of the field. Vertices that no voxel of the region of interest depends on are 0.
+/// those of the field. The voxels of the region of interest depend on the vertices inside it and on
+/// those next to them. All others are 0.
 struct PlaceDensities {
   int nx = 0, ny = 0, nz = 0;
-  FloatMatrix values;             ///< [nx, nz·ny], y fastest
-  double volume_of_vertex = 0.0;  ///< that a vertex stands for, in cubic pixels
-  Eigen::Index num_inside = 0;    ///< vertices in the region of interest
+  FloatMatrix values;                        ///< [nx, nz·ny], y fastest
+  double volume_of_vertex = 0.0;             ///< that a vertex stands for, in cubic pixels
+  base::Range inside_x = {}, inside_y = {};  ///< of the vertices in the region of interest
 
   /// Returns the volume in the region of interest.
-  double volume() const { return volume_of_vertex * static_cast<double>(num_inside); }
+  double volume() const;
+  /// Returns the integrals of the density and of its square over the region of interest.
+  std::array<double, 2> integrals() const;
 };
 
 /// Reads the densities of a field of plain vertices in squares that need not be its leaves. Where
