@@ -22,11 +22,10 @@ constexpr std::int64_t kEpochsBefore = 2;
 // has one.
 constexpr int kSlowBin = 2;
 
-// Returns the bytes of a view and its prediction.
+// Returns the bytes of a predicted view with pixels so many times as wide.
 std::size_t prediction_bytes(const measurement::Measurement& measurement, int bin) {
-  const auto pixels =
-      static_cast<std::size_t>(measurement.geometry.width * measurement.rays_shape().num_rows);
-  return 2 * sizeof(float) * (pixels / static_cast<std::size_t>(bin * bin));
+  return measurement::bytes_of_prediction(
+      measurement::SlabViews::binned_shape(measurement.rays_shape(), bin));
 }
 
 int views_at_once(const measurement::Measurement& measurement, const fit::Stage& stage) {

@@ -26,8 +26,8 @@ fit::FieldOptions aligning_field(fit::FieldOptions field);
 /// blurs until it explains wrong shifts.
 fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t seed);
 
-/// Takes the steps of such a fit with wide pixels, of which there are so many epochs. It stops one
-/// step before the pixels are fine.
+/// Takes the steps of such a fit with wide pixels, of which there are so many epochs. It stops
+/// where the fit can stop last before the pixels are fine (Fit::last_stop_before()).
 void run_with_wide_pixels(fit::Fit& fit, int coarse_epochs);
 
 /// Prepares the views of a problem, each aligned with a correction, for the stages of a fit whose

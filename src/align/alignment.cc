@@ -80,12 +80,13 @@ double seconds_of_update(std::span<const float> image, std::int64_t width) {
   return running.seconds();
 }
 
-std::vector<PlannedFits> planned_fits(bool from_raw, std::uint64_t seed) {
+std::vector<PlannedFits> planned_fits(const measurement::Measurement& plan, bool from_raw,
+                                      std::uint64_t seed) {
   constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
   // The held-out views judge the old and the new alignment, mostly with wide pixels alone.
   std::vector<PlannedFits> fits{{joint_fit(seed), kAll, 1, 23.0},
-                                {held_out_fit(seed), kHeldOutCoarseEpochs, 2, 1.0},
-                                {axis_fit(seed), kAxisEpochs, kAxisFits, 0.5}};
+                                {held_out_fit(seed), kHeldOutCoarseEpochs, 2, 1.0}};
+  if (can_refine_axis(plan)) fits.push_back({axis_fit(seed), kAxisEpochs, kAxisFits, 0.5});
   if (from_raw) fits.push_back({joint_fit(seed), kResidualEpochs, kMostAxisFits, 2.5});
   return fits;
 }

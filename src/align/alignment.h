@@ -45,7 +45,8 @@ struct PlannedFits {
 fit::FieldOptions planned_field(const fit::FieldOptions& field);
 /// Returns the fits that an alignment makes, without that for local motion. `from_raw`: with the
 /// search for the tilt axis.
-std::vector<PlannedFits> planned_fits(bool from_raw, std::uint64_t seed);
+std::vector<PlannedFits> planned_fits(const measurement::Measurement& plan, bool from_raw,
+                                      std::uint64_t seed);
 
 /// Resamples an aligned view of this width and registers it once. Returns the processor time.
 double seconds_of_update(std::span<const float> image, std::int64_t width);

@@ -14,8 +14,8 @@ class AxisLine {
   /// Returns the one of two rotations that has the smaller residual; the first one if they are
   /// equal.
   double better(double axis_deg, double other_deg);
-  /// Goes on from a rotation by steps as long as the residual becomes smaller, until it leaves
-  /// ±range.
+  /// Goes on from a rotation by steps as long as the residual becomes smaller, until it
+  /// reaches ±range.
   double descend(double axis_deg, double step_deg, double range_deg);
   /// Returns where the parabola through the residuals at a rotation and a step to each side is
   /// lowest: at most a step away.

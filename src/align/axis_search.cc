@@ -20,8 +20,9 @@ constexpr double kRadian_deg = 180.0 / std::numbers::pi;
 constexpr double kRange_deg = 6.0, kFirstStep_deg = 2.0;
 // The last parabola has its points so far apart: closer ones differ by less than the fits do.
 constexpr double kLastStep_deg = 0.5;
-// A joint alignment leaves a smaller error of the axis. Its fits have pixels so many times as wide.
+// A joint alignment leaves a smaller error of the axis.
 constexpr double kRefinedStep_deg = 1.0, kRefinedRange_deg = 3.0;
+// The fits that refine it have pixels so many times as wide.
 constexpr int kAxisBin = 2;
 // In narrower views, other slow errors of an alignment move the lowest place by up to 0.4°.
 constexpr std::int64_t kNarrowest_px = 192;
@@ -37,16 +38,16 @@ std::vector<geometry::ViewCorrection> turned(std::vector<geometry::ViewCorrectio
 // edge: there the residual depends more on what the fit knows of the specimen outside the views.
 double inner_squares(const ImagePair& images) {
   constexpr double kInner = 0.8;  // part of the width and height
-  const auto is_inner = [](double place, double centre) {
-    return std::abs(place + 0.5 - centre) <= kInner * centre;
+  const auto is_inner = [](std::int64_t place, std::int64_t size) {
+    const double half = static_cast<double>(size) / 2;
+    return std::abs(static_cast<double>(place) + 0.5 - half) <= kInner * half;
   };
   double squares = 0.0, count = 0.0;
   for (std::int64_t y = 0; y < images.height; ++y) {
-    if (!is_inner(static_cast<double>(y), images.centre_y)) continue;
+    if (!is_inner(y, images.height)) continue;
     for (std::int64_t x = 0; x < images.width; ++x) {
       const auto at = static_cast<std::size_t>(y * images.width + x);
-      if (!is_inner(static_cast<double>(x), images.centre_x) || std::isnan(images.measured[at]))
-        continue;
+      if (!is_inner(x, images.width) || std::isnan(images.measured[at])) continue;
       squares += std::pow(static_cast<double>(images.measured[at] - images.predicted[at]), 2);
       count += 1.0;
     }
@@ -90,18 +91,23 @@ std::vector<geometry::ViewCorrection> with_best_axis(
   return turned(start, axis_deg);
 }
 
+bool can_refine_axis(const measurement::Measurement& plan) {
+  return std::min(plan.geometry.width, plan.rays_shape().num_rows) >= kNarrowest_px;
+}
+
 fit::FitOptions axis_fit(std::uint64_t seed) { return aligning_fit(kAxisEpochs, 1, seed); }
 
 std::vector<geometry::ViewCorrection> with_refined_axis(
     const JointProblem& problem, const std::vector<geometry::ViewCorrection>& start,
     const distributed::Communicator& processes) {
-  const geometry::TiltGeometry& g = problem.plan.geometry;
-  if (std::min(g.width, g.height) < kNarrowest_px) return start;
+  if (!can_refine_axis(problem.plan)) return start;
   const base::TraceSpan span("refine tilt axis");
   AxisLine line(
       [&](double axis_deg) { return wide_residual(problem, turned(start, axis_deg), processes); });
-  return turned(
-      start, line.lowest(line.descend(0.0, kRefinedStep_deg, kRefinedRange_deg), kRefinedStep_deg));
+  const double axis_deg =
+      line.lowest(line.descend(0.0, kRefinedStep_deg, kRefinedRange_deg), kRefinedStep_deg);
+  base::log_info(fmt::format("refined the tilt axis by {:.2f}°", axis_deg));
+  return turned(start, axis_deg);
 }
 
 }  // namespace tomofield::align

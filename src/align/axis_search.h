@@ -24,13 +24,17 @@ std::vector<geometry::ViewCorrection> with_best_axis(
 /// Number of epochs of each fit of with_refined_axis(), and the usual number of these fits.
 inline constexpr int kAxisEpochs = 16, kAxisFits = 3;
 
+/// Says whether the views of a series are large enough for with_refined_axis(). In smaller ones,
+/// other slow errors of an alignment hide the direction of the axis.
+bool can_refine_axis(const measurement::Measurement& plan);
+
 /// Returns the options of the fits of with_refined_axis().
 fit::FitOptions axis_fit(std::uint64_t seed);
 
 /// Returns the corrections of a joint alignment with the common rotation at which fields that are
-/// fitted to the views leave the smallest residual. Pixels near the edges do not count. Views that
-/// are too small to tell the direction of the axis so stay as they are. Every process calls it and
-/// gets the same.
+/// fitted to the views leave the smallest residual. Pixels near the edges do not count. Returns
+/// `start` if the views are too small (can_refine_axis()). Every process calls it and gets the
+/// same.
 ///
 /// The registrations of a joint alignment see only a small part of an error of the axis: a fortieth
 /// in a specimen that ends in the views, and a hundred and fiftieth in one that fills them

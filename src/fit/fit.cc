@@ -34,11 +34,6 @@ constexpr int kSurrogatesInEpoch = 2;
 // Predictions of views that surrogates are made from are at most so large at a time, or one view.
 constexpr std::size_t kPredictionBytes = std::size_t{256} << 20;
 
-// Returns the bytes of a predicted view and of what was measured of it.
-std::size_t bytes_of_prediction(const measurement::SlabViews::Shape& views) {
-  return 2 * sizeof(float) * static_cast<std::size_t>(views.width * views.num_rows);
-}
-
 FitOptions with_at_most_one_subset_a_view(FitOptions options, int num_views) {
   if (options.engine == Engine::kSlab) options.subsets = std::min(options.subsets, num_views);
   return options;
@@ -368,8 +363,8 @@ void Fit::make_surrogates() {
     std::ranges::copy(views_of_step(progress_.step + s), std::back_inserter(views));
   surrogates_.reset();  // its successor needs the memory
   surrogates_.emplace(*binned_->rays, views, progress_.views);
-  const auto at_once =
-      std::max<std::size_t>(1, kPredictionBytes / bytes_of_prediction(binned_->rays->shape()));
+  const auto at_once = std::max<std::size_t>(
+      1, kPredictionBytes / measurement::bytes_of_prediction(binned_->rays->shape()));
   for (std::size_t first = 0; first < views.size(); first += at_once) {
     const auto some = std::span(views).subspan(first, std::min(at_once, views.size() - first));
     surrogates_->set(filters_, some, project(some), processes());
@@ -461,13 +456,23 @@ void Fit::end_epoch() {
   follow_noise();
 }
 
-std::size_t surrogate_memory(const measurement::SlabViews::Shape& views, int slabs_in_use) {
-  measurement::SlabViews::Shape at_once = views;
-  at_once.num_views = (views.num_views + kSurrogatesInEpoch - 1) / kSurrogatesInEpoch;
-  const std::size_t predicted = bytes_of_prediction(views);
-  return measurement::SlabViews::resident_memory(at_once, slabs_in_use) +
-         std::max(predicted, std::min(kPredictionBytes, at_once.num_views * predicted)) +
-         views.num_views * microscope::ViewFilter::kMostKept;
+std::size_t surrogate_memory(const measurement::SlabViews::Shape& own,
+                             const measurement::SlabViews::Shape& all, int steps_an_epoch,
+                             int slabs_in_use) {
+  // A view that is filtered: its copy, its residual, the extended image and two spectra.
+  constexpr std::size_t kImagesOfFilter = 8;
+  const int steps = (steps_an_epoch + kSurrogatesInEpoch - 1) / kSurrogatesInEpoch;
+  measurement::SlabViews::Shape surrogates = own;
+  surrogates.num_views = (own.num_views * static_cast<std::size_t>(steps) +
+                          static_cast<std::size_t>(steps_an_epoch) - 1) /
+                         static_cast<std::size_t>(steps_an_epoch);
+  const std::size_t of_view = measurement::bytes_of_prediction(all);
+  const std::size_t predicted =
+      std::max(of_view, std::min(kPredictionBytes, surrogates.num_views * of_view));
+  const std::size_t filtering =
+      static_cast<std::size_t>(base::thread_count()) * (kImagesOfFilter / 2) * of_view;
+  return measurement::SlabViews::resident_memory(surrogates, slabs_in_use) + predicted + filtering +
+         all.num_views * microscope::ViewFilter::kMostKept;
 }
 
 }  // namespace tomofield::fit

@@ -192,9 +192,11 @@ class Fit {
   Traffic traffic_;
 };
 
-/// Returns an upper bound of the memory that a fit to filtered views of this shape takes for their
-/// surrogates (measurement/surrogate_views.h): rays of half the views, the projections that they
-/// are made from, and the filters.
-std::size_t surrogate_memory(const measurement::SlabViews::Shape& views, int slabs_in_use);
+/// Returns about the memory that a fit to filtered views takes for their surrogates
+/// (measurement/surrogate_views.h): the rays of the process's `own` rows, the projections of `all`
+/// rows that they are made from, the filters, and what each thread needs to filter a view.
+std::size_t surrogate_memory(const measurement::SlabViews::Shape& own,
+                             const measurement::SlabViews::Shape& all, int steps_an_epoch,
+                             int slabs_in_use);
 
 }  // namespace tomofield::fit

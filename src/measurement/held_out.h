@@ -39,6 +39,10 @@ struct PredictedView {
   std::int64_t width = 0, height = 0;
   std::vector<float> measured, predicted;
 };
+/// Returns the bytes of a predicted view.
+inline std::size_t bytes_of_prediction(const SlabViews::Shape& views) {
+  return 2 * sizeof(float) * static_cast<std::size_t>(views.width * views.num_rows);
+}
 /// Predicts some views, on every process, each with its model. All of them are in memory together.
 std::vector<PredictedView> predicted_views(
     const projection::SlabSampler& sampler, const projection::SlabProjector& projector,

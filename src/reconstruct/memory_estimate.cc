@@ -10,7 +10,6 @@
 #include "measurement/held_out.h"
 #include "measurement/row_share.h"
 #include "measurement/slab_views.h"
-#include "measurement/view_transfers.h"
 #include "objective/ray_data_term.h"
 #include "projection/slab_projector.h"
 
@@ -149,9 +148,10 @@ std::size_t estimate_memory(const PlannedFit& planned, const std::vector<fit::St
   }
   const int steps = steps_an_epoch(plan, options.fit);
   const int views_a_step = plan.ray_geometry ? 0 : (plan.geometry.num_views() + steps - 1) / steps;
-  const bool is_filtered = measurement::wants_transfers(options.files, options.resolved) ||
-                           options.fit.noise_model == NoiseModel::kColoured;
-  const std::size_t surrogates = is_filtered ? fit::surrogate_memory(own_shape, slabs_in_use) : 0;
+  const std::size_t surrogates =
+      options.filters_views()
+          ? fit::surrogate_memory(own_shape, plan.rays_shape(), steps, slabs_in_use)
+          : 0;
   const std::size_t fitting =
       parameters + surrogates +
       static_cast<std::size_t>(bands_in_use) * band_memory(plan, domain, views_a_step) +

@@ -243,9 +243,10 @@ std::vector<const char*> ReconstructOptions::faults_of_halves() const {
 std::vector<const char*> ReconstructOptions::faults_of_transfer() const {
   std::vector<const char*> all = measurement::faults_of_transfer(files, resolved);
   if (fit.engine != Engine::kRay) return all;
-  if (measurement::has_ctf(files, resolved) || resolved.dose_per_tilt.value_or(0.0) > 0.0)
+  if (measurement::wants_transfers(files, resolved))
     all.push_back(
-        "--ctf, --defocus and --dose-per-tilt filter aligned views: they need --engine slab");
+        "--ctf, --defocus, --dose-per-tilt and --mtf filter aligned views: they need --engine "
+        "slab");
   if (fit.noise_model == NoiseModel::kColoured)
     all.push_back(
         "--noise-model coloured weights the frequencies of aligned views: it needs --engine slab");

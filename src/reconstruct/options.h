@@ -9,6 +9,7 @@
 #include "fit/options.h"
 #include "io/output_lock.h"
 #include "measurement/prepare.h"
+#include "measurement/view_transfers.h"
 #include "option_table/setting.h"
 #include "output/volume.h"
 #include "reconstruct/automatic_choice.h"
@@ -65,6 +66,11 @@ struct ReconstructOptions {
 
   /// Says whether the run makes two fits, of one half of the data each.
   bool makes_halves() const { return (files.even && files.odd) || resolved.split_tilts; }
+  /// Says whether the fit filters views, which mixes their rows.
+  bool filters_views() const {
+    return measurement::wants_transfers(files, resolved) ||
+           fit.noise_model == NoiseModel::kColoured;
+  }
   /// Returns the model that the run writes first. Its checkpoint has the chosen settings.
   const std::filesystem::path& first_model(const OutputPaths& paths) const {
     return makes_halves() ? paths.halves.front().model : paths.model;

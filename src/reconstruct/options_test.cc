@@ -44,6 +44,19 @@ TEST(ReconstructOptions, EveryFaultIsNamedAtOnce) {
     EXPECT_NE(message.find(word), std::string::npos) << word << " in " << message;
 }
 
+TEST(ReconstructOptions, WhatFiltersViewsNeedsTheSlabEngine) {
+  Options options = good_options();
+  options.engine = Engine::kRay;
+  const std::size_t alone = faults_of(options).size();
+  SeriesFiles files;
+  files.mtf = "detector.star";
+  const ReconstructOptions with_mtf = run_options(files, options);
+  EXPECT_TRUE(with_mtf.filters_views());
+  EXPECT_EQ(with_mtf.faults().size(), alone + 1);
+  options.noise_model = NoiseModel::kColoured;
+  EXPECT_EQ(run_options(files, options).faults().size(), alone + 2);
+}
+
 TEST(ReconstructOptions, LargeLeavesOfAUniformTreeAreRootCells) {
   fit::FieldOptions field;
   EXPECT_EQ(fit::usual_leaf_size(field), field.leaf_size);

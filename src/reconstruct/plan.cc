@@ -32,7 +32,7 @@ std::size_t memory_of_alignment(const tilt_series::TiltSeries& series,
                                 const distributed::Communicator& processes) {
   const bool from_raw = options.resolved.align == Alignment::kFull;
   options.field = align::planned_field(options.field);
-  options.fit = align::planned_fits(from_raw, options.fit.seed).front().options;
+  options.fit = align::planned_fits(plan, from_raw, options.fit.seed).front().options;
   run.stages = fit::make_stages(options.field, options.fit);
   const fit::Domain domain = fit::make_domain(plan.geometry, plan.roi, options.field);
   return estimate_memory({series, plan, domain, options, processes}, run.stages) +

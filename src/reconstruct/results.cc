@@ -228,6 +228,7 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
                const WriteMore& write_more) {
   const FitOrigin& origin = record.origin;
   const bool writes_files = !options.resolved.output.empty();
+  fit.free_optimizer();  // the verdict and a compact model need the memory
   Findings found = examine(fit, series, options, record);
   std::optional<measurement::PredictedView> view;
   if (writes_files) view = central_held_out_view(fit, series, found);

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "align/alignment.h"
@@ -33,25 +35,42 @@ constexpr int kLargestLeaf = 256;  // larger ones do not fit in the volume that 
 
 constexpr std::size_t kSmallFiles = std::size_t{2} << 20;  // metrics and pictures
 
-// Projecting all views for their surrogates takes this part of an epoch's steps.
+// Projecting all views for their surrogates takes this part of an epoch's steps: a profile of
+// yardstick A at 256 pixels has a quarter.
 constexpr double kProjection = 0.25;
 
-// Returns the processor time of filtering a view of a stage there and back, on so many rows at
-// most.
-double seconds_of_filter(const measurement::Measurement& plan, int bin, double max_rows) {
-  const auto height = static_cast<std::int64_t>(
-      std::min(static_cast<double>(plan.geometry.height), max_rows) / bin);
-  const std::int64_t width = plan.geometry.width / bin;
-  const std::size_t tilted = plan.transfers.size() / 4;  // its number of defoci is near the mean
-  const microscope::ViewFilter filter(width, height, plan.transfers[tilted].binned(bin));
-  const std::vector<float> image(static_cast<std::size_t>(width * height), 1.0F);
-  const base::ProcessorStopwatch running;
-  filter.apply_transpose(filter.apply(image));
-  return running.seconds();
-}
+// Measures the processor time of filtering a view there and back, once for each size.
+class FilterTimes {
+ public:
+  explicit FilterTimes(const measurement::Measurement& plan) : plan_(plan) {}
+
+  // Returns the time for pixels so many times as wide, on so many rows at most.
+  double seconds(int bin, double max_rows) {
+    const measurement::SlabViews::Shape shape = plan_.rays_shape();
+    const auto height =
+        static_cast<std::int64_t>(std::min(static_cast<double>(shape.num_rows), max_rows) / bin);
+    const auto [place, is_new] = known_.try_emplace({bin, height}, 0.0);
+    if (is_new) place->second = measured(bin, shape.width / bin, height);
+    return place->second;
+  }
+
+ private:
+  double measured(int bin, std::int64_t width, std::int64_t height) const {
+    const std::size_t tilted = plan_.transfers.size() / 4;  // its number of defoci is near the mean
+    const microscope::ViewFilter filter(width, height, plan_.transfers[tilted].binned(bin));
+    const std::vector<float> image(static_cast<std::size_t>(width * height), 1.0F);
+    const base::ProcessorStopwatch running;
+    filter.apply_transpose(filter.apply(image));
+    return running.seconds();
+  }
+
+  const measurement::Measurement& plan_;
+  std::map<std::pair<int, std::int64_t>, double> known_;
+};
 
 // Counts steps and samples, in each kind of field.
 struct Work {
+  FilterTimes& filters;
   double steps_of_vertices = 0, samples_of_vertices = 0;
   double steps_of_factors = 0, samples_of_factors = 0;
   double updates_of_views = 0;  // in times of align::seconds_of_update()
@@ -72,8 +91,8 @@ struct Work {
       (is_grid ? samples_of_vertices : samples_of_factors) +=
           steps * samples_of(stage, plan, field, max_rows);
       if (has_filters && epochs_of_all > 0)
-        filter_seconds += epochs_of_all * plan.geometry.num_views() *
-                          seconds_of_filter(plan, stage.bin, max_rows);
+        filter_seconds +=
+            epochs_of_all * plan.geometry.num_views() * filters.seconds(stage.bin, max_rows);
     }
   }
   // Adds other work, so many times.
@@ -99,7 +118,7 @@ void add_alignment(const measurement::Measurement& plan, const ReconstructOption
   constexpr double kAllRows = std::numeric_limits<double>::infinity();
   const fit::FieldOptions field = align::planned_field(options.field);
   const bool from_raw = options.resolved.align == Alignment::kFull;
-  for (const align::PlannedFits& fits : align::planned_fits(from_raw, options.fit.seed)) {
+  for (const align::PlannedFits& fits : align::planned_fits(plan, from_raw, options.fit.seed)) {
     work.add_fit(plan, field, fits.options, run.steps_an_epoch, kAllRows, fits.times, fits.epochs);
     work.updates_of_views += fits.updates * fits.times * plan.geometry.num_views();
   }
@@ -110,7 +129,7 @@ void add_rows_beside_tiles(const measurement::Measurement& plan, const Reconstru
                            const RunPlan& run, Work& work) {
   constexpr double kAllRows = std::numeric_limits<double>::infinity();
   const fit::Stage& first = run.stages[static_cast<std::size_t>(run.tiles.num_whole_stages)];
-  Work coarse, all;
+  Work coarse{work.filters}, all{work.filters};
   coarse.add_fit(plan, options.field, options.fit, run.steps_an_epoch, kAllRows, 1,
                  first.first_epoch);
   all.add_fit(plan, options.field, options.fit, run.steps_an_epoch, kAllRows, 1);
@@ -121,9 +140,9 @@ void add_rows_beside_tiles(const measurement::Measurement& plan, const Reconstru
 
 // Returns the work of the alignment, of the fit and of the trials that choose its settings.
 Work work_of(const measurement::Measurement& plan, const ReconstructOptions& options,
-             const RunPlan& run) {
+             const RunPlan& run, FilterTimes& filters) {
   constexpr double kAllRows = std::numeric_limits<double>::infinity();
-  Work work;
+  Work work{filters};
   work.add_fit(plan, options.field, options.fit, run.steps_an_epoch, kAllRows, run.num_fits);
   if (run.tiles.is_used()) add_rows_beside_tiles(plan, options, run, work);
   if (options.resolved.align != Alignment::kOff) add_alignment(plan, options, run, work);
@@ -191,7 +210,8 @@ RunEstimate estimate_run(const tilt_series::TiltSeries& series, const Reconstruc
   estimate.disk_bytes = scratch_bytes(series, plan) +
                         std::max(6 * in_checkpoint, estimate.result_bytes + 3 * in_checkpoint);
   if (plan.ray_geometry) return estimate;
-  const Work work = work_of(plan, options, run);
+  FilterTimes filters(plan);
+  const Work work = work_of(plan, options, run, filters);
   estimate.sample_steps = work.samples();
   if (options.field.leaf_size > kLargestLeaf) return estimate;
   const StepTimes times = measure_steps(plan, options.field, options.fit);

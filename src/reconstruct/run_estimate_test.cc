@@ -89,6 +89,10 @@ TEST_F(Estimate, FilteredViewsAreMoreWorkAndMemory) {
   options_.defocus_um = 4;
   EXPECT_GT(estimate().sample_steps, alone);
   EXPECT_GT(plan().memory_bytes, memory);
+  // A dose filters the views as well.
+  options_.defocus_um.reset();
+  options_.dose_per_tilt = 3;
+  EXPECT_GT(estimate().sample_steps, alone);
 }
 
 TEST_F(Estimate, DiskHoldsTheResultsAndTwoCheckpoints) {

@@ -8,7 +8,6 @@
 #include "base/memory.h"
 #include "compact/budget.h"
 #include "measurement/slab_views.h"
-#include "measurement/view_transfers.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
@@ -81,11 +80,9 @@ const char* fault_of_tiles(const PlannedFit& planned) {
   const ReconstructOptions& options = planned.options;
   if (options.fit.engine == Engine::kRay || planned.plan.ray_geometry)
     return "--tile-rows needs --engine slab, whose rays stay in their row";
-  if (options.fit.noise_model == NoiseModel::kColoured ||
-      measurement::has_ctf(options.files, options.resolved) ||
-      options.resolved.dose_per_tilt.value_or(0.0) > 0.0)
+  if (options.filters_views())
     return "--tile-rows cannot filter views across tiles: leave out --ctf, --defocus, "
-           "--dose-per-tilt and --noise-model coloured";
+           "--dose-per-tilt, --mtf and --noise-model coloured";
   if (options.field.tree == TreeKind::kAdaptive)
     return "--tile-rows needs --tree uniform: one tree cannot be chosen tile by tile";
   if (options.fit.patience > 0)

@@ -19,7 +19,8 @@ namespace {
 
 // Short trials: with these rows and parts of the usual epochs, weights rank as after whole fits.
 constexpr std::int64_t kShortRows = 32;
-constexpr std::int64_t kMostRowsBeside = kShortRows / 4;  // docs/results/ctf.md
+// More rows at the ends choose no better weights (docs/results/ctf.md, "Trials").
+constexpr std::int64_t kMostRowsBeside = 8;
 constexpr double kShortPart = 0.2, kShortCoarsePart = 0.25;
 
 // Returns the options of a short trial with plain vertices. If `fit` is shorter than usual for

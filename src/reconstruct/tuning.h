@@ -49,7 +49,7 @@ struct TrialShape {
 TrialShape trial_of_tune(const fit::FieldOptions& field, const fit::FitOptions& fit);
 /// Returns the trials that choose_by_short_trials() makes of a run whose transfers move what is in
 /// a view by up to `reach_px`. Rows so near to the ends of a strip depend on rows outside, so the
-/// strip is higher by that at both ends, up to a quarter of its rows.
+/// strip is higher by that at both ends, up to 8 rows.
 TrialShape short_trial(const fit::FieldOptions& field, const fit::FitOptions& fit,
                        std::int64_t reach_px = 0);
 
