@@ -166,7 +166,8 @@ class Compression {
   CompactField finish(CodedField coded) const {
     CompactField made{.coded = std::move(coded), .field = nullptr, .report = {}};
     LeafCodes& codes = made.coded.codes;
-    const double weight = matching_face_weight(*decode_field(made.coded), codes, vertices_.field());
+    const double weight =
+        matching_face_weight(*decode_field(made.coded), codes, vertices_.field(), vertices_.roi());
     codes.face_weight.assign(codes.face_weight.size(), weight);
     made.field = decode_field(made.coded);
     made.report = {.parameters = codes.num_parameters(),

@@ -161,6 +161,15 @@ double distance(const std::vector<float>& a, const std::vector<float>& b) {
   return sum;
 }
 
+// Returns whether a point of the plane, which is a vertex, is in a region.
+bool is_inside(const std::array<double, 2>& at, const Rectangle& region) {
+  const auto is_between = [](double position, std::int64_t low, std::int64_t high) {
+    const double corner = position - field::kPixelCentre;
+    return corner >= static_cast<double>(low) && corner < static_cast<double>(high);
+  };
+  return is_between(at[0], region.x0, region.x1) && is_between(at[1], region.y0, region.y1);
+}
+
 // Writes the densities of a leaf but those of its upper faces.
 void decode_leaf(const LeafCodes& codes, int leaf, Field& field) {
   const LeafShape& own = codes.shapes[static_cast<std::size_t>(leaf)];
@@ -177,8 +186,10 @@ void decode_leaf(const LeafCodes& codes, int leaf, Field& field) {
 
 // Returns the mean absolute difference of the neighbouring columns of different leaves over that of
 // neighbours in the middle of a leaf, or 0 if the latter do not differ. The places are those of the
-// leaves of `decoded`; the densities are those of `field`.
-double face_jump(const Field& field, const Field& decoded, const std::vector<LeafShape>& shapes) {
+// leaves of `decoded`; the densities are those of `field`. Pairs that are not wholly in the region
+// of interest are left out, because only `decoded` is empty beyond it.
+double face_jump(const Field& field, const Field& decoded, const std::vector<LeafShape>& shapes,
+                 const Rectangle& roi) {
   struct Sums {
     double across = 0, inside = 0;
   };
@@ -190,17 +201,21 @@ double face_jump(const Field& field, const Field& decoded, const std::vector<Lea
     for (int k = 0; k < own.nz; ++k)
       z.push_back(field::kPixelCentre +
                   field::vertex_height(decoded.thickness()) * k / (own.nz - 1));
-    const auto densities = [&](int of, int x, int y) {
-      return column(field, position(decoded, shapes, of, x, y), z);
-    };
     for (const bool along_x : {true, false}) {
       for_each_neighbours(decoded, shapes, leaf, along_x, [&](const Neighbours& at) {
         const int x = along_x ? own.nx / 2 : at.i, y = along_x ? at.j : own.ny / 2;
+        const std::array<std::array<double, 2>, 4> places = {
+            position(decoded, shapes, leaf, at.i, at.j),
+            position(decoded, shapes, at.other, at.other_i, at.other_j),
+            position(decoded, shapes, leaf, x, y),
+            position(decoded, shapes, leaf, along_x ? x - 1 : x, along_x ? y : y - 1)};
+        if (!std::ranges::all_of(places, [&](const auto& p) { return is_inside(p, roi); })) return;
+        const auto difference = [&](std::size_t a, std::size_t b) {
+          return distance(column(field, places[a], z), column(field, places[b], z));
+        };
         Sums& sum = sums[static_cast<std::size_t>(i)];
-        sum.across +=
-            distance(densities(leaf, at.i, at.j), densities(at.other, at.other_i, at.other_j));
-        sum.inside += distance(densities(leaf, x, y),
-                               densities(leaf, along_x ? x - 1 : x, along_x ? y : y - 1));
+        sum.across += difference(0, 1);
+        sum.inside += difference(2, 3);
       });
     }
   });
@@ -230,9 +245,10 @@ std::unique_ptr<Field> decode_field(const CodedField& coded) {
   return field;
 }
 
-double matching_face_weight(const Field& decoded, const LeafCodes& codes, const Field& original) {
-  const double of_decoded = face_jump(decoded, decoded, codes.shapes);
-  const double of_original = face_jump(original, decoded, codes.shapes);
+double matching_face_weight(const Field& decoded, const LeafCodes& codes, const Field& original,
+                            const Rectangle& roi) {
+  const double of_decoded = face_jump(decoded, decoded, codes.shapes, roi);
+  const double of_original = face_jump(original, decoded, codes.shapes, roi);
   // A weight w leaves the part 1 - 2 w of a difference across a face.
   return of_decoded > of_original ? (1 - of_original / of_decoded) / 2 : 0;
 }

@@ -4,6 +4,7 @@
 
 #include "compact/coded_field.h"
 #include "field/field.h"
+#include "tomofield/options.h"
 
 namespace tomofield::compact {
 
@@ -15,8 +16,8 @@ std::unique_ptr<field::Field> decode_field(const CodedField& coded);
 
 /// Returns the weight with which neighbouring vertices across the faces of leaves differ as much,
 /// against neighbours in the middle of leaves, as they do in `original`. `decoded` is what the
-/// codes stand for with weights of 0.
+/// codes stand for with weights of 0. Vertices outside the region of interest do not count.
 double matching_face_weight(const field::Field& decoded, const LeafCodes& codes,
-                            const field::Field& original);
+                            const field::Field& original, const Rectangle& roi);
 
 }  // namespace tomofield::compact

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "compact/quantise.h"
@@ -69,6 +70,7 @@ struct Leaves {
   std::unique_ptr<field::Field> made;
 };
 
+constexpr Rectangle kRegion{.x0 = 0, .y0 = 0, .x1 = 48, .y1 = 32};
 constexpr double kNear = 0.02;  // many roundings
 
 TEST(DecodedField, HasTheDensitiesOfTheLeaves) {
@@ -127,8 +129,29 @@ TEST(DecodedField, FacesAreSoftened) {
               leaves.density(24, 16, 3) + leaves.density(24, 14, 3), 1e-5);
   EXPECT_EQ(density(24, 12, 3), leaves.density(24, 12, 3));
   EXPECT_EQ(density(30, 8, 3), leaves.density(30, 8, 3)) << "the next leaf has another spacing";
-  EXPECT_NEAR(matching_face_weight(*leaves.made, leaves.coded.codes, *soft), kWeight, 1e-4);
-  EXPECT_EQ(matching_face_weight(*leaves.made, leaves.coded.codes, *leaves.made), 0.0);
+  EXPECT_NEAR(matching_face_weight(*leaves.made, leaves.coded.codes, *soft, kRegion), kWeight,
+              1e-4);
+  EXPECT_EQ(matching_face_weight(*leaves.made, leaves.coded.codes, *leaves.made, kRegion), 0.0);
+}
+
+// A fit goes on beyond the region, where a compact field is empty.
+TEST(DecodedField, VerticesOutsideTheRegionDoNotChangeTheWeight) {
+  constexpr double kWeight = 0.2;
+  const Leaves leaves;
+  CodedField coded = leaves.coded;
+  coded.codes.face_weight = {kWeight, kWeight};
+  const auto original = decode_field(coded);
+  for (const int leaf : {2, 5}) {
+    const std::size_t begin = original->offset(leaf);
+    const std::size_t end = leaf == 5 ? original->parameters().size() : original->offset(leaf + 1);
+    for (float& value : original->parameters().subspan(begin, end - begin)) value *= 3;
+  }
+  const auto weight = [&](const Rectangle& region) {
+    return matching_face_weight(*leaves.made, leaves.coded.codes, *original, region);
+  };
+  EXPECT_NEAR(weight({.x0 = 0, .y0 = 0, .x1 = 32, .y1 = 32}), kWeight, 1e-4);
+  EXPECT_GT(std::abs(weight(kRegion) - kWeight), 1e-3);
+  EXPECT_EQ(weight({.x0 = 0, .y0 = 0, .x1 = 48, .y1 = 16}), 0.0) << "no face is in the region";
 }
 
 // Where two bands with other weights meet, their mean counts.

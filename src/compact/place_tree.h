@@ -15,9 +15,9 @@ struct PlaceSquares {
   field::RootGrid roots;
   /// The nodes, as in a tree of a field: root cells first, and children after their parent.
   std::vector<field::QuadtreeNode> nodes;
-  /// A leaf of the field with the vertices of this square. −1: the square cannot be a leaf, because
-  /// its parts have different vertices; kOutside: it is out of the field or of the region
-  /// of interest (VertexDensities::is_outside).
+  /// A leaf of the field with the vertices of this square. kNone: the square cannot be a leaf,
+  /// because its parts have different vertices. kOutside: it is out of the field, or out of the
+  /// region of interest (VertexDensities::is_outside).
   std::vector<int> leaf_like;
   static constexpr int kNone = -1, kOutside = -2;
 };

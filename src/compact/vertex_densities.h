@@ -36,6 +36,7 @@ class VertexDensities {
   VertexDensities(const field::Field& vertices, const Rectangle& roi);
 
   const field::Field& field() const { return vertices_; }
+  const Rectangle& roi() const { return roi_; }
   /// Returns the smallest side of a square that can be read: half a leaf, and so on, as long as
   /// sides stay multiples of a slab's rows and vertices fall on vertices.
   std::int64_t smallest_side() const { return smallest_side_; }
