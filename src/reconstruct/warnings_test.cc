@@ -104,6 +104,8 @@ TEST(Warnings, TheHandOfTheDefocusIsDoubtedIfViewsSayTheOther) {
   EXPECT_EQ(codes(verdict), "");
   verdict.defocus->slope = {-1.8, 0.6};  // unsure
   EXPECT_EQ(codes(verdict), "");
+  verdict.defocus->slope = {-2.1, 0.38};  // a small view of a yardstick, with the right hand
+  EXPECT_EQ(codes(verdict), "");
   verdict.defocus->slope = {-1.8, 0.2};
   EXPECT_EQ(codes(verdict), "defocus-hand ");
   verdict.defocus->slope = std::nullopt;
