@@ -26,6 +26,10 @@ struct CompressionReport {
   double volume = 0.0;    ///< of the region, in cubic pixels
 };
 
+/// Reads and writes a report as JSON whose keys are the names of its members.
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CompressionReport, parameters, bytes, mean_square_change,
+                                   variance, decibels, volume)
+
 /// Returns the report for the metrics of a run; `seconds` is what the compression took.
 nlohmann::json report_json(const CompressionReport& report, double seconds);
 

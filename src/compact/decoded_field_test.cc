@@ -65,6 +65,13 @@ struct Leaves {
     return made->density(x + field::kPixelCentre, y + field::kPixelCentre, z + field::kPixelCentre);
   }
 
+  // Returns the field with a weight for the faces of each of its two bands.
+  std::unique_ptr<field::Field> softened(double lower_weight, double upper_weight) const {
+    CodedField soft = coded;
+    soft.codes.face_weight = {lower_weight, upper_weight};
+    return decode_field(soft);
+  }
+
   CodedField coded;
   std::vector<FloatMatrix> values;  // of each leaf
   std::unique_ptr<field::Field> made;
@@ -117,9 +124,7 @@ TEST(DecodedField, StaysTheSameUpToItsEnd) {
 TEST(DecodedField, FacesAreSoftened) {
   constexpr double kWeight = 0.2;
   const Leaves leaves;
-  CodedField coded = leaves.coded;
-  coded.codes.face_weight = {kWeight, kWeight};
-  const auto soft = decode_field(coded);
+  const auto soft = leaves.softened(kWeight, kWeight);
   const auto density = [&](double x, double y, double z) {
     return soft->density(x + field::kPixelCentre, y + field::kPixelCentre, z + field::kPixelCentre);
   };
@@ -138,9 +143,7 @@ TEST(DecodedField, FacesAreSoftened) {
 TEST(DecodedField, VerticesOutsideTheRegionDoNotChangeTheWeight) {
   constexpr double kWeight = 0.2;
   const Leaves leaves;
-  CodedField coded = leaves.coded;
-  coded.codes.face_weight = {kWeight, kWeight};
-  const auto original = decode_field(coded);
+  const auto original = leaves.softened(kWeight, kWeight);
   for (const int leaf : {2, 5}) {
     const std::size_t begin = original->offset(leaf);
     const std::size_t end = leaf == 5 ? original->parameters().size() : original->offset(leaf + 1);
@@ -157,9 +160,7 @@ TEST(DecodedField, VerticesOutsideTheRegionDoNotChangeTheWeight) {
 // Where two bands with other weights meet, their mean counts.
 TEST(DecodedField, BandsHaveTheirOwnWeights) {
   const Leaves leaves;
-  CodedField coded = leaves.coded;
-  coded.codes.face_weight = {0.4, 0.0};
-  const auto soft = decode_field(coded);
+  const auto soft = leaves.softened(0.4, 0.0);
   const auto density = [&](double y) {
     return soft->density(24 + field::kPixelCentre, y + field::kPixelCentre,
                          3 + field::kPixelCentre);

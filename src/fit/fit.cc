@@ -34,6 +34,11 @@ constexpr int kSurrogatesInEpoch = 2;
 // Predictions of views that surrogates are made from are at most so large at a time, or one view.
 constexpr std::size_t kPredictionBytes = std::size_t{256} << 20;
 
+// Returns after how many steps surrogates are made anew in an epoch of so many.
+int steps_of_surrogates_in(int steps_an_epoch) {
+  return (steps_an_epoch + kSurrogatesInEpoch - 1) / kSurrogatesInEpoch;
+}
+
 FitOptions with_at_most_one_subset_a_view(FitOptions options, int num_views) {
   if (options.engine == Engine::kSlab) options.subsets = std::min(options.subsets, num_views);
   return options;
@@ -345,9 +350,7 @@ void Fit::follow_noise() {
 }
 
 // Returns after how many steps surrogates are made anew, and in any case after an epoch.
-int Fit::steps_of_surrogates() const {
-  return (steps_per_epoch() + kSurrogatesInEpoch - 1) / kSurrogatesInEpoch;
-}
+int Fit::steps_of_surrogates() const { return steps_of_surrogates_in(steps_per_epoch()); }
 
 bool Fit::needs_surrogates() const {
   const std::int64_t in_epoch = progress_.step % steps_per_epoch();
@@ -461,7 +464,7 @@ std::size_t surrogate_memory(const measurement::SlabViews::Shape& own,
                              int slabs_in_use) {
   // A view that is filtered: its copy, its residual, the extended image and two spectra.
   constexpr std::size_t kImagesOfFilter = 8;
-  const int steps = (steps_an_epoch + kSurrogatesInEpoch - 1) / kSurrogatesInEpoch;
+  const int steps = steps_of_surrogates_in(steps_an_epoch);
   measurement::SlabViews::Shape surrogates = own;
   surrogates.num_views = (own.num_views * static_cast<std::size_t>(steps) +
                           static_cast<std::size_t>(steps_an_epoch) - 1) /

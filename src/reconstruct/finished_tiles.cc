@@ -22,12 +22,7 @@ double rows_of(const nlohmann::json& tile) {
 }
 
 compact::CompressionReport report_of(const nlohmann::json& tile) {
-  return {.parameters = tile.at("parameters").get<std::size_t>(),
-          .bytes = tile.at("bytes").get<std::size_t>(),
-          .mean_square_change = tile.at("mean_square_change").get<double>(),
-          .variance = tile.at("variance").get<double>(),
-          .decibels = tile.at("decibels").get<double>(),
-          .volume = tile.at("volume").get<double>()};
+  return tile.get<compact::CompressionReport>();
 }
 
 }  // namespace
@@ -61,13 +56,8 @@ void FinishedTiles::read(const FitOrigin& origin) {
 
 void FinishedTiles::add(const Tile& tile, TileCodes codes, nlohmann::json json) {
   const compact::CompressionReport& report = codes.report;
-  json.update({{"seconds_compressing", codes.seconds},
-               {"parameters", report.parameters},
-               {"bytes", report.bytes},
-               {"mean_square_change", report.mean_square_change},
-               {"variance", report.variance},
-               {"decibels", report.decibels},
-               {"volume", report.volume}});
+  json["seconds_compressing"] = codes.seconds;
+  json.update(report);
   base::log_info(fmt::format("rows {} to {}: {} parameters in {} bytes", tile.own.begin,
                              tile.own.end, report.parameters, report.bytes));
   tiles_.push_back(std::move(json));

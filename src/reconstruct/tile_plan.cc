@@ -90,8 +90,7 @@ const char* fault_of_tiles(const PlannedFit& planned) {
   if (options.fit.fourier > 0) return "--ifp needs the whole region: leave --tile-rows out";
   if (num_whole_stages(planned.domain, fit::make_stages(options.field, options.fit)) == 0)
     return "--tile-rows needs coarse stages, which all tiles start from: take --coarse-epochs "
-           "above "
-           "0 and a --leaf-size of 64 or a multiple";
+           "above 0 and a --leaf-size of 64 or a multiple";
   return nullptr;
 }
 
