@@ -31,7 +31,8 @@ class GaussianScene {
     for (const Blob& blob : blobs_) {
       const double at = blob.x * std::cos(tilt) + blob.z * std::sin(tilt);
       const double square = std::pow(x - at, 2) + std::pow(y - blob.y, 2);
-      sum += blob.peak * std::exp(-0.5 * square / (blob.sigma * blob.sigma));
+      const double exponent = -0.5 * square / (blob.sigma * blob.sigma);
+      if (exponent > -25) sum += blob.peak * std::exp(exponent);  // the rest is below 2e-11
     }
     return sum;
   }

@@ -18,23 +18,23 @@ namespace tomofield::testing {
 class ShiftedSeries {
  public:
   using ViewCorrection = geometry::ViewCorrection;
-  static constexpr std::int64_t kSize = 48;
 
-  ShiftedSeries() {
+  /// Makes views of `size` pixels across, a multiple of 48. The thickness is a third of it.
+  explicit ShiftedSeries(std::int64_t size = 48) : size_(size), scene_(scene_of(size)) {
     for (double tilt = -60; tilt <= 60; tilt += 6) tilt_deg_.push_back(tilt);
     base::Random random(4);
     for (std::size_t view = 0; view < tilt_deg_.size(); ++view) {
       right_.push_back({.shift_x_px = random.normal(), .shift_y_px = random.normal()});
       add_view(view, random);
     }
-    specimen_.thickness = 16;
+    specimen_.thickness = static_cast<double>(size / 3);
   }
 
   /// Calls use(problem) with the problem of aligning the series.
   template <typename Use>
   auto with_problem(const Use& use) const {
     tilt_series::TiltSeriesOptions options;
-    options.images = io::image_stack_in_memory(pixels_, kSize, kSize, tilt_deg_, 10.0);
+    options.images = io::image_stack_in_memory(pixels_, size_, size_, tilt_deg_, 10.0);
     options.contrast = Contrast::kBright;
     options.bead_diameter_nm = 0;
     options.resample = false;
@@ -56,7 +56,7 @@ class ShiftedSeries {
       found[view].shift_x_px -= right_[view].shift_x_px;
       found[view].shift_y_px -= right_[view].shift_y_px;
     }
-    align::remove_gauge(geometry::centred_geometry(kSize, kSize, specimen_.thickness, tilt_deg_),
+    align::remove_gauge(geometry::centred_geometry(size_, size_, specimen_.thickness, tilt_deg_),
                         found);
     double squares = 0.0;
     for (const ViewCorrection& c : found)
@@ -67,17 +67,25 @@ class ShiftedSeries {
   std::vector<ViewCorrection> none() const { return std::vector<ViewCorrection>(right_.size()); }
 
  private:
+  // Returns Gaussians beyond the borders as well.
+  static GaussianScene scene_of(std::int64_t size) {
+    const double scale = static_cast<double>(size) / 48;
+    return {static_cast<int>(150 * scale), {40 * scale, 26 * scale, 6 * scale}};
+  }
   void add_view(std::size_t view, base::Random& random) {
-    for (std::int64_t i = 0; i < kSize * kSize; ++i) {
-      const double x = static_cast<double>(i % kSize) + 0.5 - kSize / 2.0 - right_[view].shift_x_px;
-      const double y = static_cast<double>(i / kSize) + 0.5 - kSize / 2.0 - right_[view].shift_y_px;
+    for (std::int64_t i = 0; i < size_ * size_; ++i) {
+      const double x = static_cast<double>(i % size_) + 0.5 - static_cast<double>(size_) / 2 -
+                       right_[view].shift_x_px;
+      const double y = static_cast<double>(i / size_) + 0.5 - static_cast<double>(size_) / 2 -
+                       right_[view].shift_y_px;
       pixels_.push_back(
           static_cast<float>(scene_.projection(x, y, tilt_deg_[view]) + 0.1 * random.normal()));
     }
   }
 
   ScratchDirectory scratch_;
-  GaussianScene scene_{150, {40, 26, 6}};  // beyond the borders as well
+  std::int64_t size_;
+  GaussianScene scene_;
   measurement::SpecimenOptions specimen_;
   std::vector<double> tilt_deg_;
   std::vector<ViewCorrection> right_;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "base/stop_requested.h"
 #include "base/stopwatch.h"
 #include "measurement/prepare.h"
 
@@ -44,12 +45,6 @@ bool is_update_due(const fit::Stage& stage, std::int64_t epochs_done, bool is_do
   const bool is_last = epochs_done == stage.first_epoch + stage.epochs;
   const bool is_turn = stage.bin != kSlowBin || epochs_done % 2 == 0;
   return epochs_done > kEpochsBefore && is_turn && (!is_last || is_done);
-}
-
-// Any process can stop all of them.
-bool is_to_stop(const JointProblem& problem, const distributed::Communicator& processes) {
-  const bool asked = problem.stop_requested && problem.stop_requested();
-  return processes.allreduce_max(asked ? 1.0 : 0.0) > 0.0;
 }
 
 base::ProgressReport report(const fit::Fit& fit, double seconds,
@@ -104,10 +99,19 @@ fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t s
   return options;
 }
 
-void run_with_wide_pixels(fit::Fit& fit, int coarse_epochs) {
+void check_stop(const JointProblem& problem, const distributed::Communicator& processes) {
+  const bool asked = problem.stop_requested && problem.stop_requested();
+  if (processes.allreduce_max(asked ? 1.0 : 0.0) > 0.0) throw base::StopRequested();
+}
+
+void run_with_wide_pixels(fit::Fit& fit, int coarse_epochs, const JointProblem& problem,
+                          const distributed::Communicator& processes) {
   const std::int64_t last =
       fit.last_stop_before(std::int64_t{coarse_epochs} * fit.steps_per_epoch());
-  fit.run([&](const fit::Fit& f) { return f.progress().step < last; });
+  fit.run([&](const fit::Fit& f) {
+    if (f.progress().step % f.steps_per_epoch() == 0) check_stop(problem, processes);
+    return f.progress().step < last;
+  });
 }
 
 measurement::Measurement aligning_measurement(const JointProblem& problem,
@@ -168,7 +172,7 @@ void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& me
   }
 }
 
-bool run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
+void run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
                       const std::function<bool(const fit::Stage&)>& update,
                       const distributed::Communicator& processes) {
   const base::Stopwatch running;
@@ -180,11 +184,9 @@ bool run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
     fit.run([](const fit::Fit& f) { return f.progress().step % f.steps_per_epoch() != 0; });
     if (run.problem.progress && num_epochs == fit.num_epochs())
       run.problem.progress(report(fit, running.seconds(), run.steps_px));
-    const bool is_stopped = is_to_stop(run.problem, processes);
+    check_stop(run.problem, processes);
     is_updated = is_update_due(stage, epochs_done(fit), fit.is_done()) && update(stage);
-    if (is_stopped) return true;
   }
-  return false;
 }
 
 }  // namespace tomofield::align

@@ -26,9 +26,14 @@ fit::FieldOptions aligning_field(fit::FieldOptions field);
 /// blurs until it explains wrong shifts.
 fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t seed);
 
-/// Takes the steps of such a fit with wide pixels, of which there are so many epochs. It stops
-/// where the fit can stop last before the pixels are fine (Fit::last_stop_before()).
-void run_with_wide_pixels(fit::Fit& fit, int coarse_epochs);
+/// Throws base::StopRequested in every process if any of them was asked to stop.
+void check_stop(const JointProblem& problem, const distributed::Communicator& processes);
+
+/// Takes the steps of such a fit with wide pixels, of which there are so many epochs. It ends
+/// where the fit can stop last before the pixels are fine (Fit::last_stop_before()). Throws
+/// base::StopRequested after an epoch if a stop was requested. Every process calls it.
+void run_with_wide_pixels(fit::Fit& fit, int coarse_epochs, const JointProblem& problem,
+                          const distributed::Communicator& processes);
 
 /// Prepares the views of a problem, each aligned with a correction, for the stages of a fit whose
 /// pixels are at least `bin` times as wide.
@@ -69,9 +74,9 @@ struct FitInProgress {
 /// Takes the first `num_epochs` epochs of a fit. After those that show enough for it, calls
 /// update(stage), which changes the corrections or returns false. After an update and for each new
 /// stage, resamples the recorded views to the pixels of the stage, and the fit goes on with them.
-/// Progress is reported if these are all epochs. Returns true if a stop was requested meanwhile.
-/// Every process calls it.
-bool run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
+/// Progress is reported if these are all epochs. Throws base::StopRequested after an epoch if a
+/// stop was requested. Every process calls it.
+void run_with_updates(const FitInProgress& run, std::int64_t num_epochs,
                       const std::function<bool(const fit::Stage&)>& update,
                       const distributed::Communicator& processes);
 

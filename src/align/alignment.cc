@@ -40,8 +40,6 @@ void add_motion(const JointProblem& problem, AlignmentTrial& rigid,
                 const distributed::Communicator& processes, Alignment& alignment) {
   LocalAlignment found = align_locally(problem, alignment.joint.freedoms, alignment.corrections,
                                        alignment.joint.motion, processes);
-  alignment.joint.was_stopped = found.was_stopped;
-  if (found.was_stopped) return;
   AlignmentTrial with_motion(problem, found.corrections, processes);
   LocalTrial trial{.held_out = compare(rigid, with_motion), .steps_px = std::move(found.steps_px)};
   trial.is_accepted = trial.held_out.gain.exceeds(kSure);
@@ -119,7 +117,7 @@ Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::Vi
   const std::vector<geometry::ViewCorrection> none(problem.recorded.views().size());
   Alignment alignment;
   alignment.joint = align_jointly(problem, std::move(start), processes);
-  if (alignment.joint.was_stopped) return alignment;
+  // Local motion that was found keeps its direction, since it is no more than a start.
   if (alignment.joint.freedoms.rotation)
     alignment.joint.corrections =
         with_refined_axis(problem, alignment.joint.corrections, processes);

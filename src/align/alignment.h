@@ -61,7 +61,8 @@ std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& probl
 /// Aligns a series further, from `start`. The new alignment is accepted if a field that is
 /// fitted with it predicts held-out views better, by more than two standard errors over the
 /// views. If the views then show local motion (JointAlignment::motion), it is looked for, and it is
-/// accepted in the same way. Every process calls it and gets the same.
+/// accepted in the same way. Throws base::StopRequested if a stop was requested. Every process
+/// calls it and gets the same.
 Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::ViewCorrection> start,
                            const distributed::Communicator& processes);
 

@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <numeric>
 
 #include "align/aligning_fit.h"
 #include "align/axis_line.h"
 #include "base/log.h"
+#include "base/progress.h"
+#include "base/stopwatch.h"
 #include "base/trace.h"
 #include "fit/fit.h"
 
@@ -63,12 +66,32 @@ double wide_residual(const JointProblem& problem,
   const measurement::Measurement views =
       aligning_measurement(problem, corrections, kAxisBin, field, processes);
   fit::Fit fit(views, field, axis_fit(problem.seed), processes);
-  run_with_wide_pixels(fit, kAxisEpochs);
+  run_with_wide_pixels(fit, kAxisEpochs, problem, processes);
   std::vector<double> squares(corrections.size());
   for_each_prediction(fit, views, fit.stage(), [&](std::size_t view, const ImagePair& images) {
     squares[view] = inner_squares(images);
   });
   return std::accumulate(squares.begin(), squares.end(), 0.0);
+}
+
+// Returns the residual of views that are turned by an axis, as a function that reports the progress
+// of a search of about `num_fits` fits and asks whether to stop it.
+template <typename Residual>
+std::function<double(double)> of_axis(const JointProblem& problem,
+                                      const std::vector<geometry::ViewCorrection>& start,
+                                      int num_fits, const Residual& residual,
+                                      const distributed::Communicator& processes) {
+  return
+      [&, residual, num_fits, num_done = 0, running = base::Stopwatch()](double axis_deg) mutable {
+        check_stop(problem, processes);
+        const double found = residual(problem, turned(start, axis_deg), processes);
+        ++num_done;
+        if (problem.progress)
+          problem.progress(
+              base::progress_at(std::min(1.0, static_cast<double>(num_done) / num_fits),
+                                running.seconds(), fmt::format("tilt axis, fit {}", num_done)));
+        return found;
+      };
 }
 
 }  // namespace
@@ -77,12 +100,8 @@ std::vector<geometry::ViewCorrection> with_best_axis(
     const JointProblem& problem, const std::vector<geometry::ViewCorrection>& start,
     const distributed::Communicator& processes) {
   const base::TraceSpan span("find tilt axis");
-  AxisLine line([&](double axis_deg) {
-    return coarse_residual(problem, turned(start, axis_deg), processes);
-  });
-  double best = 0.0;
-  for (double axis = -kRange_deg; axis <= kRange_deg; axis += kFirstStep_deg)
-    best = line.better(best, axis);
+  AxisLine line(of_axis(problem, start, kMostAxisFits, coarse_residual, processes));
+  double best = line.descend(0.0, kFirstStep_deg, kRange_deg);
   for (double step = kFirstStep_deg / 2; step >= kLastStep_deg; step /= 2)
     best = line.better(line.better(best, best - step), best + step);
   const double axis_deg = line.lowest(best, kLastStep_deg);
@@ -102,8 +121,7 @@ std::vector<geometry::ViewCorrection> with_refined_axis(
     const distributed::Communicator& processes) {
   if (!can_refine_axis(problem.plan)) return start;
   const base::TraceSpan span("refine tilt axis");
-  AxisLine line(
-      [&](double axis_deg) { return wide_residual(problem, turned(start, axis_deg), processes); });
+  AxisLine line(of_axis(problem, start, kAxisFits, wide_residual, processes));
   const double axis_deg =
       line.lowest(line.descend(0.0, kRefinedStep_deg, kRefinedRange_deg), kRefinedStep_deg);
   base::log_info(fmt::format("refined the tilt axis by {:.2f}°", axis_deg));

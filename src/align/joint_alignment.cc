@@ -58,11 +58,14 @@ class AligningFit {
   JointAlignment run(std::int64_t num_epochs) {
     const FitInProgress in_progress{problem_,        field_,       found_.corrections,
                                     found_.steps_px, measurement_, fit_};
-    found_.was_stopped = run_with_updates(
+    run_with_updates(
         in_progress, num_epochs, [this](const fit::Stage& stage) { return update(stage); },
         processes_);
     return std::move(found_);
   }
+
+  // Lets the views turn from the start on.
+  void free_rotations() { found_.freedoms.rotation = true; }
 
   std::int64_t num_epochs() const { return fit_.num_epochs(); }
   // Returns the residual of the last epoch, in units of the noise's variance.
@@ -201,6 +204,7 @@ JointAlignment align_jointly(const JointProblem& problem, std::vector<ViewCorrec
 double coarse_residual(const JointProblem& problem, std::vector<ViewCorrection> start,
                        const distributed::Communicator& processes) {
   AligningFit fit(problem, std::move(start), processes);
+  fit.free_rotations();
   fit.run(kResidualEpochs);
   return fit.residual();
 }

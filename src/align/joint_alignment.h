@@ -36,7 +36,6 @@ struct JointAlignment {
   std::vector<geometry::ViewWarp> motion;
   /// Thickness and pitch of the specimen, in pixels before binning; none if the views do not tell.
   std::optional<FoundPose> pose;
-  bool was_stopped = false;
   /// Root mean square of the change of the shifts in each update, in pixels before binning.
   std::vector<double> steps_px;
 };
@@ -63,13 +62,15 @@ inline constexpr std::int64_t kResidualEpochs = 15;
 /// them, from coarse to fine. After each epoch the field predicts all views. Each view is
 /// registered to its prediction (registration.h) and resampled anew from the recorded one. The part
 /// that the views cannot tell is removed (gauge.h), and the fit goes on. `start` are the
-/// corrections to begin with. Every process calls it and gets the same.
+/// corrections to begin with. Throws base::StopRequested if a stop was requested. Every process
+/// calls it and gets the same.
 JointAlignment align_jointly(const JointProblem& problem,
                              std::vector<geometry::ViewCorrection> start,
                              const distributed::Communicator& processes);
 
 /// Does the same for the first epochs with coarse pixels alone, and returns what residual is left:
-/// its mean square over the noise's variance.
+/// its mean square over the noise's variance. Rotations are free whatever `start` is, so that the
+/// residuals of different starts compare.
 double coarse_residual(const JointProblem& problem, std::vector<geometry::ViewCorrection> start,
                        const distributed::Communicator& processes);
 

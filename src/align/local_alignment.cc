@@ -84,7 +84,7 @@ class LocalFit {
   LocalAlignment run() {
     const FitInProgress in_progress{problem_,        field_,       found_.corrections,
                                     found_.steps_px, measurement_, fit_};
-    found_.was_stopped = run_with_updates(
+    run_with_updates(
         in_progress, fit_.num_epochs(), [this](const fit::Stage& stage) { return update(stage); },
         processes_);
     return std::move(found_);

@@ -13,7 +13,6 @@ namespace tomofield::align {
 struct LocalAlignment {
   std::vector<geometry::ViewCorrection> corrections;  ///< [view]; each has local motion
   std::vector<ViewAgreement> agreement;               ///< [view]
-  bool was_stopped = false;
   /// Root mean square of the change of the local motion in each update, in pixels before binning.
   std::vector<double> steps_px;
 };
@@ -22,7 +21,8 @@ struct LocalAlignment {
 /// from coarse to fine, and the motion that each view shows against its prediction
 /// (local_registration.h) is undone while the fit goes on. What is rigid of it goes to the shifts,
 /// and to rotations and magnifications if `freedoms` has them. Every correction of `start` must
-/// have local motion to begin with. Every process calls it and gets the same.
+/// have local motion to begin with. Throws base::StopRequested if a stop was requested. Every
+/// process calls it and gets the same.
 LocalAlignment align_locally(const JointProblem& problem, const Freedoms& freedoms,
                              std::vector<geometry::ViewCorrection> start,
                              std::span<const geometry::ViewWarp> motion,

@@ -59,7 +59,7 @@ void AlignmentTrial::begin() {
   measurement_ = aligning_measurement(problem_, corrections_, kCoarseBin, field_, processes_);
   measurement_.held_out = measurement::held_out_views(measurement_.geometry.tilt_deg, kEvery);
   fit_ = std::make_unique<fit::Fit>(measurement_, field_, held_out_fit(problem_.seed), processes_);
-  run_with_wide_pixels(*fit_, kHeldOutCoarseEpochs);
+  run_with_wide_pixels(*fit_, kHeldOutCoarseEpochs, problem_, processes_);
   coarse_errors_ = errors();
   measurement_.rays.reset();  // the next fit needs the memory
 }

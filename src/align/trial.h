@@ -23,7 +23,8 @@ inline constexpr int kHeldOutCoarseEpochs = 24;
 /// Fits a field to the views of an alignment without every eighth one in order of tilt, and says
 /// how badly it predicts those: the mean squared difference of each, over the variance of the
 /// measured pixels. Scale and trend are the best for the view itself, since no other view tells
-/// them; they come from other pixels than the error. Every process makes it and gets the same.
+/// them; they come from other pixels than the error. Throws base::StopRequested while it fits if a
+/// stop was requested. Every process makes it and gets the same.
 class AlignmentTrial {
  public:
   /// `problem` and `processes` must outlive the trial.

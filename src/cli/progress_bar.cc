@@ -44,10 +44,12 @@ std::string terminal_line(const std::string& title, double fraction, const std::
   return line;
 }
 
-// The time of the last report and whether the cursor is still behind it on a terminal. If so, the
-// destructor ends the line, so that later output of a run that stopped or failed begins on its own.
+// The time of the last report, whether it said that everything is done, and whether the cursor is
+// still behind it on a terminal. If so, the destructor ends the line, so that later output of a run
+// that stopped or failed begins on its own. Trials that nobody expected come after the end.
 struct Display {
   double last_shown = -1e9;
+  bool was_whole = false;
   bool line_is_open = false;
   Display() = default;
   Display(const Display&) = delete;
@@ -63,16 +65,18 @@ base::ProgressSink make_progress_bar(const std::string& title) {
   const bool terminal = isatty(STDERR_FILENO) == 1;
   auto display = std::make_shared<Display>();
   return [=](const base::ProgressReport& report) {
-    const bool finished = report.fraction_done >= 1.0;
+    const bool is_whole = report.fraction_done >= 1.0;
+    const bool has_just_ended = is_whole && !display->was_whole;
     const double pause = terminal ? kSecondsBetweenDraws : kSecondsBetweenLines;
-    if (!finished && report.seconds_elapsed - display->last_shown < pause) return;
+    if (!has_just_ended && report.seconds_elapsed - display->last_shown < pause) return;
     display->last_shown = report.seconds_elapsed;
+    display->was_whole = is_whole;
     const std::string state = fmt::format("{:3.0f} %  {}  {} left", 100 * report.fraction_done,
                                           report.detail, base::time_text(report.seconds_left));
     if (terminal) {
       say("\r\033[K{}", terminal_line(title, report.fraction_done, state));
-      if (finished) say("\n");
-      display->line_is_open = !finished;
+      if (has_just_ended) say("\n");
+      display->line_is_open = !has_just_ended;
     } else {
       say("{} {}\n", title, state);
     }

@@ -8,7 +8,6 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +15,7 @@
 #include "align/alignment.h"
 #include "align/axis_search.h"
 #include "base/log.h"
+#include "base/stop_requested.h"
 #include "base/stopwatch.h"
 #include "base/trace.h"
 #include "io/json.h"
@@ -233,9 +233,9 @@ void add_left_out(const json& views, json& record) {
                            [](const json& view) { return view["section"].get<std::int64_t>(); });
 }
 
-// Aligns the series. Returns nothing if a stop was requested.
-std::optional<json> make_record(const ReconstructOptions& options, const ReconstructHooks& hooks,
-                                const distributed::Communicator& processes) {
+// Aligns the series.
+json make_record(const ReconstructOptions& options, const ReconstructHooks& hooks,
+                 const distributed::Communicator& processes) {
   const base::TraceSpan span("align series");
   const base::Stopwatch running;
   tilt_series::TiltSeriesOptions recorded = options.input;
@@ -248,7 +248,6 @@ std::optional<json> make_record(const ReconstructOptions& options, const Reconst
                     "views that it holds out; '{}' has {}",
                     kFewestViews, recorded.stack.string(), series.views().size()));
   const align::Alignment found = align_views(series, options, hooks, processes);
-  if (found.joint.was_stopped) return std::nullopt;
   const bool is_clean = found.unaligned.empty();
   if (is_clean || options.resolved.align != Alignment::kFull ||
       series.views().size() - found.unaligned.size() < kFewestViews)
@@ -266,7 +265,6 @@ std::optional<json> make_record(const ReconstructOptions& options, const Reconst
                              found.unaligned.size()));
   const tilt_series::TiltSeries others(recorded, processes);
   const align::Alignment again = align_views(others, options, hooks, processes);
-  if (again.joint.was_stopped) return std::nullopt;
   json record = record_of(others, again, options, running.seconds());
   add_left_out(left_out, record);
   return record;
@@ -278,18 +276,21 @@ bool align_series(ReconstructOptions& options, const ReconstructHooks& hooks,
                   const distributed::Communicator& processes) {
   if (options.resolved.align == Alignment::kOff) return true;
   const std::filesystem::path path = output_paths(options.resolved.output).alignment;
-  std::optional<json> record;
+  json record;
   if (options.resolved.resume && std::filesystem::exists(path)) {
     processes.run_collectively([&] { record = read_record(path, options); });
   } else {
-    record = make_record(options, hooks, processes);
-    if (!record) return false;
+    try {
+      record = make_record(options, hooks, processes);
+    } catch (const base::StopRequested&) {
+      return false;
+    }
     processes.run_collectively([&] {
-      if (processes.is_root() && !options.resolved.output.empty()) io::write_json(path, *record);
+      if (processes.is_root() && !options.resolved.output.empty()) io::write_json(path, record);
     });
   }
-  apply_record(*record, options);
-  log_alignment(*record);
+  apply_record(record, options);
+  log_alignment(record);
   return true;
 }
 

@@ -119,7 +119,7 @@ std::vector<FitTrial> TrialFits::run(const std::vector<TrialSettings>& batch,
           selection::trial_json(settings_json(batch[i]), trials[i]->score, trials[i]->seconds));
     }
   });
-  if (was_stopped) throw StopRequested();
+  if (was_stopped) throw base::StopRequested();
   num_done_ += static_cast<int>(batch.size());
   std::vector<FitTrial> all;
   for (const auto& trial : trials) all.push_back(trial.value());

@@ -7,14 +7,12 @@
 #include <utility>
 #include <vector>
 
+#include "base/stop_requested.h"
 #include "base/stopwatch.h"
 #include "reconstruct/tuning.h"
 #include "selection/trial_measurement.h"
 
 namespace tomofield::reconstruction {
-
-/// Is thrown by every process of a search after a stop was requested of one of them.
-struct StopRequested {};
 
 /// Makes the trials of a search, with its progress. The trials of a batch take their steps side by
 /// side. Several processes share the trials of a batch: each makes some of them alone.
@@ -29,7 +27,7 @@ class TrialFits {
 
   /// Makes a trial with each of these settings. Takes those that `file` has from it, and adds the
   /// others to it; the root alone uses it, and it may be null. After every step it calls the hooks,
-  /// in the calling thread. Throws StopRequested if a stop was requested; `file` then has the
+  /// in the calling thread. Throws base::StopRequested if a stop was requested; `file` then has the
   /// trials that were finished. Every process calls it and gets the same trials.
   std::vector<FitTrial> run(const std::vector<TrialSettings>& batch, selection::TrialFile* file);
 

@@ -51,7 +51,7 @@ std::optional<TunedFit> searched(TrialFits& fits, selection::TrialFile* file,
   try {
     const TrialSettings found = search(trials);
     return TunedFit{found, trials.made(), fits.predicted_views()};
-  } catch (const StopRequested&) {
+  } catch (const base::StopRequested&) {
     return std::nullopt;
   }
 }

@@ -49,25 +49,63 @@ struct Disc {
   }
 };
 
-/// Returns means of the disc around every pixel [y, x]; kUnknown where little was measured.
+/// Describes the pixels of a row whose neighbour at an offset lies in the image.
+struct Overlap {
+  std::size_t first, count;  // x of the first pixel, and how many there are
+  std::size_t neighbour;     // index of the neighbour of the first one
+};
+
+Overlap overlap(const MaskedImage& image, std::int64_t y, std::int64_t dx, std::int64_t dy) {
+  const std::int64_t first = std::max<std::int64_t>(0, -dx);
+  const std::int64_t end = std::min(image.width, image.width - dx);
+  if (y + dy < 0 || y + dy >= image.height || first >= end) return {};
+  return {static_cast<std::size_t>(first), static_cast<std::size_t>(end - first),
+          image.index(first + dx, y + dy)};
+}
+
+/// Returns means of the disc around every pixel [y, x]; kUnknown where little was measured. Goes
+/// through rows, so that the compiler makes vectors of pixels.
 std::vector<float> disc_means(const MaskedImage& image, const Disc& disc) {
   std::vector<float> means(image.values.size(), kUnknown);
   base::parallel_for("disc means", image.height, [&](std::int64_t y) {
-    for (std::int64_t x = 0; x < image.width; ++x) {
-      float sum = 0.0f, weight = 0.0f;
-      for (const Disc::Pixel& pixel : disc.pixels) {
-        const std::int64_t px = x + pixel.x, py = y + pixel.y;
-        if (px < 0 || px >= image.width || py < 0 || py >= image.height) continue;
-        const std::size_t at = image.index(px, py);
-        if (!image.valid[at]) continue;
-        sum += pixel.weight * image.values[at];
-        weight += pixel.weight;
+    const auto width = static_cast<std::size_t>(image.width);
+    std::vector<float> sum(width), weight(width);
+    for (const Disc::Pixel& pixel : disc.pixels) {
+      const Overlap row = overlap(image, y, pixel.x, pixel.y);
+      for (std::size_t i = 0; i < row.count; ++i) {
+        const bool is_valid = image.valid[row.neighbour + i];
+        sum[row.first + i] += is_valid ? pixel.weight * image.values[row.neighbour + i] : 0.0f;
+        weight[row.first + i] += is_valid ? pixel.weight : 0.0f;
       }
-      if (weight >= kMinMeasured * disc.total) means[image.index(x, y)] = sum / weight;
     }
+    float* mean = means.data() + image.index(0, y);
+    for (std::size_t x = 0; x < width; ++x)
+      if (weight[x] >= kMinMeasured * disc.total) mean[x] = sum[x] / weight[x];
   });
   return means;
 }
+
+/// Holds the largest values that were added for each pixel of a row, and how many there were.
+struct Largest {
+  explicit Largest(std::int64_t width) : count(static_cast<std::size_t>(width)) {
+    for (auto& values : sorted) values.assign(count.size(), kUnknown);
+  }
+  std::array<std::vector<float>, kIgnoredDirections + 1> sorted;  // the largest one first
+  std::vector<int> count;
+
+  void add(const Overlap& row, const std::vector<float>& values) {
+    for (std::size_t i = 0; i < row.count; ++i) {
+      const std::size_t x = row.first + i;
+      float value = values[row.neighbour + i];
+      count[x] += value != kUnknown;
+      for (std::vector<float>& larger : sorted) {
+        const float smaller = std::min(larger[x], value);
+        larger[x] = std::max(larger[x], value);
+        value = smaller;
+      }
+    }
+  }
+};
 
 /// Returns the contrast of every pixel [y, x], or kUnknown.
 std::vector<float> contrasts(const MaskedImage& image, double diameter) {
@@ -80,22 +118,14 @@ std::vector<float> contrasts(const MaskedImage& image, double diameter) {
   }
   std::vector<float> contrast(means.size(), kUnknown);
   base::parallel_for("contrasts", image.height, [&](std::int64_t y) {
-    for (std::int64_t x = 0; x < image.width; ++x) {
-      const float centre = means[image.index(x, y)];
-      if (centre == kUnknown) continue;
-      std::array<float, kDirections> differences;
-      std::size_t count = 0;
-      for (std::size_t i = 0; i < kDirections; ++i) {
-        const std::int64_t px = x + dx[i], py = y + dy[i];
-        if (px < 0 || px >= image.width || py < 0 || py >= image.height) continue;
-        const float mean = means[image.index(px, py)];
-        if (mean != kUnknown) differences[count++] = centre - mean;
-      }
-      if (count < kMinDirections) continue;
-      const auto third = differences.begin() + kIgnoredDirections;
-      std::nth_element(differences.begin(), third,
-                       differences.begin() + static_cast<std::ptrdiff_t>(count));
-      contrast[image.index(x, y)] = *third;
+    Largest around(image.width);
+    for (std::size_t i = 0; i < kDirections; ++i)
+      around.add(overlap(image, y, dx[i], dy[i]), means);
+    const std::size_t first = image.index(0, y);
+    for (std::size_t x = 0; x < around.count.size(); ++x) {
+      const float centre = means[first + x];
+      if (centre == kUnknown || around.count[x] < kMinDirections) continue;
+      contrast[first + x] = centre - around.sorted.back()[x];
     }
   });
   return contrast;
