@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <map>
+#include <vector>
 
 namespace tomofield::align {
 
@@ -9,23 +10,32 @@ namespace tomofield::align {
 /// found once.
 class AxisLine {
  public:
-  explicit AxisLine(std::function<double(double)> residual);
+  /// Returns the residual of each view at a rotation in degrees; or the one of all views, if
+  /// differences count whatever their standard error.
+  using Residuals = std::function<std::vector<double>(double)>;
 
-  /// Returns the one of two rotations that has the smaller residual; the first one if they are
-  /// equal.
+  /// Two residuals differ if their mean difference over the views is above so many standard errors.
+  /// With 0, their sums decide.
+  AxisLine(Residuals residuals, double standard_errors);
+
+  /// Returns the one of two rotations that has the smaller residual; the first one if they do not
+  /// differ.
   double better(double axis_deg, double other_deg);
   /// Goes on from a rotation by steps as long as the residual becomes smaller, until it
   /// reaches ±range.
   double descend(double axis_deg, double step_deg, double range_deg);
   /// Returns where the parabola through the residuals at a rotation and a step to each side is
-  /// lowest: at most a step away.
+  /// lowest: at most a step away. Returns the rotation itself if both sides do not differ.
   double lowest(double axis_deg, double step_deg);
 
  private:
-  double at(double axis_deg);
+  const std::vector<double>& at(double axis_deg);
+  double sum_at(double axis_deg);
+  bool is_lower(double axis_deg, double other_deg);
 
-  std::function<double(double)> residual_;
-  std::map<double, double> known_;
+  Residuals residuals_;
+  double standard_errors_;
+  std::map<double, std::vector<double>> known_;
 };
 
 }  // namespace tomofield::align

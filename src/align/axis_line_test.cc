@@ -3,16 +3,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 namespace tomofield::align {
 namespace {
 
 TEST(AxisLine, FindsTheLowestPlaceOfAParabolaFarAway) {
   int count = 0;
-  AxisLine line([&](double axis_deg) {
-    ++count;
-    return std::pow(axis_deg - 2.3, 2) + 5.0;
-  });
+  AxisLine line(
+      [&](double axis_deg) {
+        ++count;
+        return std::vector{std::pow(axis_deg - 2.3, 2) + 5.0};
+      },
+      0.0);
   const double place = line.descend(0.0, 1.0, 3.0);
   EXPECT_EQ(place, 2.0);
   EXPECT_NEAR(line.lowest(place, 1.0), 2.3, 1e-12);
@@ -20,14 +23,36 @@ TEST(AxisLine, FindsTheLowestPlaceOfAParabolaFarAway) {
 }
 
 TEST(AxisLine, StaysWithinItsRange) {
-  AxisLine line([](double axis_deg) { return axis_deg; });
+  AxisLine line([](double axis_deg) { return std::vector{axis_deg}; }, 0.0);
   EXPECT_EQ(line.descend(0.0, 1.0, 3.0), -3.0);
 }
 
 TEST(AxisLine, StaysWhereTheResidualDoesNotChange) {
-  AxisLine line([](double) { return 1.0; });
+  AxisLine line([](double) { return std::vector{1.0}; }, 0.0);
   EXPECT_EQ(line.descend(0.0, 1.0, 3.0), 0.0);
   EXPECT_EQ(line.lowest(0.0, 1.0), 0.0);
+}
+
+// Returns residuals of four views with a parabola, whose slopes differ by so much.
+AxisLine::Residuals unequal_views(double spread) {
+  return [=](double axis_deg) {
+    std::vector<double> residuals;
+    for (const double part : {-1.0, 1.0, -0.5, 0.5})
+      residuals.push_back(std::pow(axis_deg - 1.2, 2) + part * spread * axis_deg);
+    return residuals;
+  };
+}
+
+TEST(AxisLine, MovesIfTheViewsAreSure) {
+  AxisLine line(unequal_views(0.2), 2.0);
+  EXPECT_EQ(line.descend(0.0, 1.0, 3.0), 1.0);
+  EXPECT_NEAR(line.lowest(1.0, 1.0), 1.2, 1e-12);
+}
+
+TEST(AxisLine, StaysIfTheViewsDisagree) {
+  AxisLine line(unequal_views(4.0), 2.0);
+  EXPECT_EQ(line.descend(0.0, 1.0, 3.0), 0.0);
+  EXPECT_EQ(line.lowest(1.0, 1.0), 1.0);
 }
 
 }  // namespace

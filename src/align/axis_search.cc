@@ -6,7 +6,6 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
-#include <numeric>
 
 #include "align/aligning_fit.h"
 #include "align/axis_line.h"
@@ -25,6 +24,8 @@ constexpr double kRange_deg = 6.0, kFirstStep_deg = 2.0;
 constexpr double kLastStep_deg = 0.5;
 // A joint alignment leaves a smaller error of the axis.
 constexpr double kRefinedStep_deg = 1.0, kRefinedRange_deg = 3.0;
+// Noise makes residuals of fits differ as well.
+constexpr double kSure = 2.0;  // standard errors over the views
 // The fits that refine it have pixels so many times as wide.
 constexpr int kAxisBin = 2;
 // In narrower views, other slow errors of an alignment move the lowest place by up to 0.4°.
@@ -58,10 +59,10 @@ double inner_squares(const ImagePair& images) {
   return count > 0.0 ? squares / count : 0.0;
 }
 
-// Returns the sum over the views of their residual after a fit with wide pixels.
-double wide_residual(const JointProblem& problem,
-                     const std::vector<geometry::ViewCorrection>& corrections,
-                     const distributed::Communicator& processes) {
+// Returns the residual of each view after a fit with wide pixels.
+std::vector<double> wide_residuals(const JointProblem& problem,
+                                   const std::vector<geometry::ViewCorrection>& corrections,
+                                   const distributed::Communicator& processes) {
   const fit::FieldOptions field = aligning_field(problem.field);
   const measurement::Measurement views =
       aligning_measurement(problem, corrections, kAxisBin, field, processes);
@@ -71,20 +72,27 @@ double wide_residual(const JointProblem& problem,
   for_each_prediction(fit, views, fit.stage(), [&](std::size_t view, const ImagePair& images) {
     squares[view] = inner_squares(images);
   });
-  return std::accumulate(squares.begin(), squares.end(), 0.0);
+  return squares;
 }
 
-// Returns the residual of views that are turned by an axis, as a function that reports the progress
-// of a search of about `num_fits` fits and asks whether to stop it.
-template <typename Residual>
-std::function<double(double)> of_axis(const JointProblem& problem,
-                                      const std::vector<geometry::ViewCorrection>& start,
-                                      int num_fits, const Residual& residual,
-                                      const distributed::Communicator& processes) {
+// Returns the residual of all views after a fit and an alignment with coarse pixels.
+std::vector<double> coarse_residuals(const JointProblem& problem,
+                                     const std::vector<geometry::ViewCorrection>& corrections,
+                                     const distributed::Communicator& processes) {
+  return {coarse_residual(problem, corrections, processes)};
+}
+
+// Returns the residuals of views that are turned by an axis, as a function that reports the
+// progress of a search of about `num_fits` fits and asks whether to stop it.
+template <typename Residuals>
+AxisLine::Residuals of_axis(const JointProblem& problem,
+                            const std::vector<geometry::ViewCorrection>& start, int num_fits,
+                            const Residuals& residuals,
+                            const distributed::Communicator& processes) {
   return
-      [&, residual, num_fits, num_done = 0, running = base::Stopwatch()](double axis_deg) mutable {
+      [&, residuals, num_fits, num_done = 0, running = base::Stopwatch()](double axis_deg) mutable {
         check_stop(problem, processes);
-        const double found = residual(problem, turned(start, axis_deg), processes);
+        std::vector<double> found = residuals(problem, turned(start, axis_deg), processes);
         ++num_done;
         if (problem.progress)
           problem.progress(
@@ -100,7 +108,7 @@ std::vector<geometry::ViewCorrection> with_best_axis(
     const JointProblem& problem, const std::vector<geometry::ViewCorrection>& start,
     const distributed::Communicator& processes) {
   const base::TraceSpan span("find tilt axis");
-  AxisLine line(of_axis(problem, start, kMostAxisFits, coarse_residual, processes));
+  AxisLine line(of_axis(problem, start, kMostAxisFits, coarse_residuals, processes), 0.0);
   double best = line.descend(0.0, kFirstStep_deg, kRange_deg);
   for (double step = kFirstStep_deg / 2; step >= kLastStep_deg; step /= 2)
     best = line.better(line.better(best, best - step), best + step);
@@ -121,7 +129,7 @@ std::vector<geometry::ViewCorrection> with_refined_axis(
     const distributed::Communicator& processes) {
   if (!can_refine_axis(problem.plan)) return start;
   const base::TraceSpan span("refine tilt axis");
-  AxisLine line(of_axis(problem, start, kAxisFits, wide_residual, processes));
+  AxisLine line(of_axis(problem, start, kAxisFits, wide_residuals, processes), kSure);
   const double axis_deg =
       line.lowest(line.descend(0.0, kRefinedStep_deg, kRefinedRange_deg), kRefinedStep_deg);
   base::log_info(fmt::format("refined the tilt axis by {:.2f}°", axis_deg));

@@ -33,8 +33,8 @@ bool can_refine_axis(const measurement::Measurement& plan);
 fit::FitOptions axis_fit(std::uint64_t seed);
 
 /// Returns the corrections of a joint alignment with the common rotation at which fields that are
-/// fitted to the views leave the smallest residual. Pixels near the edges do not count. Returns
-/// `start` if the views are too small (can_refine_axis()). Reports its progress. Throws
+/// fitted to the views leave the smallest residual. Pixels near the edges do not count, and neither
+/// do differences of residuals below two standard errors over the views. Returns `start` if the views are too small (can_refine_axis()). Reports its progress. Throws
 /// base::StopRequested if a stop was requested. Every process calls it and gets the same.
 ///
 /// The registrations of a joint alignment see only a small part of an error of the axis: a fortieth
