@@ -64,6 +64,9 @@ void limit_row(const float* const* rows, int ny, float* out) {
   const int lanes = static_cast<int>(hn::Lanes(d));
   int y = 0;
   for (; y + lanes <= ny; y += lanes) limit_vector<kRank>(d, rows, y, out);
+  if (y == ny) return;
+  // The last vector overlaps the one before it: vertices one by one would take as long each.
+  if (ny >= lanes) return limit_vector<kRank>(d, rows, ny - lanes, out);
   for (; y < ny; ++y) limit_vector<kRank>(hn::CappedTag<float, 1>(), rows, y, out);
 }
 
