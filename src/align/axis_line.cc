@@ -19,16 +19,16 @@ const std::vector<double>& AxisLine::at(double axis_deg) {
   return place->second;
 }
 
-double AxisLine::sum_at(double axis_deg) {
-  const std::vector<double>& residuals = at(axis_deg);
-  return std::accumulate(residuals.begin(), residuals.end(), 0.0);
+bool AxisLine::is_positive(const std::vector<double>& differences) const {
+  if (standard_errors_ == 0.0)
+    return std::accumulate(differences.begin(), differences.end(), 0.0) > 0.0;
+  return mean_gain(differences).exceeds(standard_errors_);
 }
 
 bool AxisLine::is_lower(double axis_deg, double other_deg) {
-  if (standard_errors_ == 0.0) return sum_at(axis_deg) < sum_at(other_deg);
   std::vector<double> gains = at(other_deg);
   std::ranges::transform(gains, at(axis_deg), gains.begin(), std::minus<>());
-  return mean_gain(gains).exceeds(standard_errors_);
+  return is_positive(gains);
 }
 
 double AxisLine::better(double axis_deg, double other_deg) {
@@ -45,12 +45,17 @@ double AxisLine::descend(double axis_deg, double step_deg, double range_deg) {
 }
 
 double AxisLine::lowest(double axis_deg, double step_deg) {
-  const double below = axis_deg - step_deg, above = axis_deg + step_deg;
-  if (!is_lower(below, above) && !is_lower(above, below)) return axis_deg;
-  const double left = sum_at(below), right = sum_at(above);
-  const double bend = left - 2 * sum_at(axis_deg) + right;
-  if (!(bend > 0.0)) return axis_deg;
-  return axis_deg + step_deg * std::clamp(0.5 * (left - right) / bend, -1.0, 1.0);
+  const std::vector<double>&left = at(axis_deg - step_deg), &middle = at(axis_deg),
+        &right = at(axis_deg + step_deg);
+  std::vector<double> bends;
+  double slope = 0.0, bend = 0.0;
+  for (std::size_t i = 0; i < middle.size(); ++i) {
+    bends.push_back(left[i] - 2 * middle[i] + right[i]);
+    bend += bends.back();
+    slope += left[i] - right[i];
+  }
+  if (!is_positive(bends)) return axis_deg;
+  return axis_deg + step_deg * std::clamp(0.5 * slope / bend, -1.0, 1.0);
 }
 
 }  // namespace tomofield::align

@@ -14,8 +14,8 @@ class AxisLine {
   /// differences count whatever their standard error.
   using Residuals = std::function<std::vector<double>(double)>;
 
-  /// Two residuals differ if their mean difference over the views is above so many standard errors.
-  /// With 0, their sums decide.
+  /// A difference of residuals counts if its mean over the views is above so many standard errors.
+  /// With 0, its sum counts.
   AxisLine(Residuals residuals, double standard_errors);
 
   /// Returns the one of two rotations that has the smaller residual; the first one if they do not
@@ -25,13 +25,14 @@ class AxisLine {
   /// reaches ±range.
   double descend(double axis_deg, double step_deg, double range_deg);
   /// Returns where the parabola through the residuals at a rotation and a step to each side is
-  /// lowest: at most a step away. Returns the rotation itself if both sides do not differ.
+  /// lowest: at most a step away. Returns the rotation itself if its bend does not count, or is
+  /// not upwards.
   double lowest(double axis_deg, double step_deg);
 
  private:
   const std::vector<double>& at(double axis_deg);
-  double sum_at(double axis_deg);
   bool is_lower(double axis_deg, double other_deg);
+  bool is_positive(const std::vector<double>& differences) const;
 
   Residuals residuals_;
   double standard_errors_;

@@ -52,7 +52,19 @@ TEST(AxisLine, MovesIfTheViewsAreSure) {
 TEST(AxisLine, StaysIfTheViewsDisagree) {
   AxisLine line(unequal_views(4.0), 2.0);
   EXPECT_EQ(line.descend(0.0, 1.0, 3.0), 0.0);
-  EXPECT_EQ(line.lowest(1.0, 1.0), 1.0);
+}
+
+TEST(AxisLine, HasNoLowestPlaceIfTheViewsDisagreeAboutTheBend) {
+  const auto bent = [](double spread) {
+    return [=](double axis_deg) {
+      std::vector<double> residuals;
+      for (const double part : {-1.0, 1.0, -0.5, 0.5})
+        residuals.push_back((1.0 + spread * part) * std::pow(axis_deg - 0.2, 2));
+      return residuals;
+    };
+  };
+  EXPECT_NEAR(AxisLine(bent(0.5), 2.0).lowest(0.0, 1.0), 0.2, 1e-12);
+  EXPECT_EQ(AxisLine(bent(2.0), 2.0).lowest(0.0, 1.0), 0.0);
 }
 
 }  // namespace

@@ -13,8 +13,8 @@ inline constexpr int kMostAxisFits = 10;
 
 /// Returns the corrections with the common rotation about the centres of the views at which the
 /// views agree best with a field that is fitted and aligned with coarse pixels. It goes from 0 to
-/// where they agree better, at most 8° away, and reports its progress. Throws base::StopRequested if
-/// a stop was requested. Every process calls it and gets the same.
+/// where they agree better, at most 8° away, and reports its progress. Throws base::StopRequested
+/// if a stop was requested. Every process calls it and gets the same.
 ///
 /// The joint alignment finds the direction of the tilt axis as well, but slowly, because a field
 /// that was fitted with a wrong axis agrees with it.
@@ -34,8 +34,9 @@ fit::FitOptions axis_fit(std::uint64_t seed);
 
 /// Returns the corrections of a joint alignment with the common rotation at which fields that are
 /// fitted to the views leave the smallest residual. Pixels near the edges do not count, and neither
-/// do differences of residuals below two standard errors over the views. Returns `start` if the views are too small (can_refine_axis()). Reports its progress. Throws
-/// base::StopRequested if a stop was requested. Every process calls it and gets the same.
+/// do steps and bends of residuals below two standard errors over the views. Returns `start` if the
+/// views are too small (can_refine_axis()). Reports its progress. Throws base::StopRequested if a
+/// stop was requested. Every process calls it and gets the same.
 ///
 /// The registrations of a joint alignment see only a small part of an error of the axis: a fortieth
 /// in a specimen that ends in the views, and a hundred and fiftieth in one that fills them
