@@ -73,11 +73,10 @@ class ShiftedSeries {
     return {static_cast<int>(150 * scale), {40 * scale, 26 * scale, 6 * scale}};
   }
   void add_view(std::size_t view, base::Random& random) {
+    const double half = static_cast<double>(size_) / 2;
     for (std::int64_t i = 0; i < size_ * size_; ++i) {
-      const double x = static_cast<double>(i % size_) + 0.5 - static_cast<double>(size_) / 2 -
-                       right_[view].shift_x_px;
-      const double y = static_cast<double>(i / size_) + 0.5 - static_cast<double>(size_) / 2 -
-                       right_[view].shift_y_px;
+      const double x = static_cast<double>(i % size_) + 0.5 - half - right_[view].shift_x_px;
+      const double y = static_cast<double>(i / size_) + 0.5 - half - right_[view].shift_y_px;
       pixels_.push_back(
           static_cast<float>(scene_.projection(x, y, tilt_deg_[view]) + 0.1 * random.normal()));
     }

@@ -82,13 +82,16 @@ std::vector<double> coarse_residuals(const JointProblem& problem,
   return {coarse_residual(problem, corrections, processes)};
 }
 
+// Returns residuals of the views of an alignment.
+using Residuals = std::vector<double>(const JointProblem&,
+                                      const std::vector<geometry::ViewCorrection>&,
+                                      const distributed::Communicator&);
+
 // Returns the residuals of views that are turned by an axis, as a function that reports the
 // progress of a search of about `num_fits` fits and asks whether to stop it.
-template <typename Residuals>
 AxisLine::Residuals of_axis(const JointProblem& problem,
                             const std::vector<geometry::ViewCorrection>& start, int num_fits,
-                            const Residuals& residuals,
-                            const distributed::Communicator& processes) {
+                            Residuals* residuals, const distributed::Communicator& processes) {
   return
       [&, residuals, num_fits, num_done = 0, running = base::Stopwatch()](double axis_deg) mutable {
         check_stop(problem, processes);
