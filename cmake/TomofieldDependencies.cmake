@@ -27,6 +27,7 @@ set(TOMOFIELD_COMMON_LIBRARIES
 set(TOMOFIELD_fourier_LIBRARIES kissfft::kissfft-float)
 set(TOMOFIELD_io_LIBRARIES HDF5::HDF5 PNG::PNG PkgConfig::TURBOJPEG TIFF::TIFF pugixml::pugixml)
 set(TOMOFIELD_kernels_LIBRARIES hwy::hwy)
+set(TOMOFIELD_tilt_series_LIBRARIES $<BUILD_INTERFACE:Eigen3::Eigen>)
 set(TOMOFIELD_field_LIBRARIES $<BUILD_INTERFACE:Eigen3::Eigen>)
 set(TOMOFIELD_objective_LIBRARIES kissfft::kissfft-float)
 set(TOMOFIELD_align_LIBRARIES $<BUILD_INTERFACE:Eigen3::Eigen>)

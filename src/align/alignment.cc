@@ -50,6 +50,22 @@ void add_motion(const JointProblem& problem, AlignmentTrial& rigid,
   alignment.local = std::move(trial);
 }
 
+// Makes the part of a joint alignment finer that changes slowly over the tilts: with gold beads, if
+// they tell more, or else the direction of the tilt axis alone.
+void refine_slow_part(const JointProblem& problem, const distributed::Communicator& processes,
+                      Alignment& alignment) {
+  JointAlignment& joint = alignment.joint;
+  alignment.beads = align_by_beads(problem, joint.corrections, joint.freedoms, processes);
+  if (alignment.beads && alignment.beads->is_accepted) {
+    for (std::size_t view = 0; view < joint.corrections.size(); ++view)
+      joint.corrections[view] = joint.corrections[view].then(alignment.beads->steps[view]);
+    remove_gauge(problem.plan.geometry, joint.corrections);
+    joint.freedoms.rotation = true;
+  } else if (joint.freedoms.rotation) {
+    joint.corrections = with_refined_axis(problem, joint.corrections, processes);
+  }
+}
+
 }  // namespace
 
 fit::FieldOptions planned_field(const fit::FieldOptions& field) { return aligning_field(field); }
@@ -118,9 +134,7 @@ Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::Vi
   Alignment alignment;
   alignment.joint = align_jointly(problem, std::move(start), processes);
   // Local motion that was found keeps its direction, since it is no more than a start.
-  if (alignment.joint.freedoms.rotation)
-    alignment.joint.corrections =
-        with_refined_axis(problem, alignment.joint.corrections, processes);
+  refine_slow_part(problem, processes, alignment);
   alignment.unaligned = unalike_views(problem.recorded, alignment.joint.agreement);
   AlignmentTrial before(problem, none, processes);
   AlignmentTrial after(problem, alignment.joint.corrections, processes);

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "align/bead_alignment.h"
 #include "align/joint_alignment.h"
 #include "align/trial.h"
 #include "distributed/communicator.h"
@@ -27,8 +28,9 @@ struct Alignment {
   JointAlignment joint;
   Comparison held_out;  ///< with the alignment that the files give and with the new one
   bool is_accepted = false;
-  std::optional<LocalTrial> local;  ///< none if the views show no local motion
-  std::vector<int> unaligned;       ///< views that do not resemble their projections, ascending
+  std::optional<BeadAlignment> beads;  ///< none if there are no gold beads
+  std::optional<LocalTrial> local;     ///< none if the views show no local motion
+  std::vector<int> unaligned;          ///< views that do not resemble their projections, ascending
 };
 
 /// Describes fits of an alignment: so many times the first epochs of a fit.
@@ -58,7 +60,9 @@ std::size_t memory_beside_fit(const measurement::Measurement& plan);
 /// (correlation_start.h), for a series that is not aligned but for the direction of its tilt axis.
 std::vector<geometry::ViewCorrection> correlated_start(const JointProblem& problem);
 
-/// Aligns a series further, from `start`. The new alignment is accepted if a field that is
+/// Aligns a series further, from `start`: with a field (joint_alignment.h), and then with gold
+/// beads if there are some that tell more (bead_alignment.h). Without them, the direction of the
+/// tilt axis is made finer (with_refined_axis()). The new alignment is accepted if a field that is
 /// fitted with it predicts held-out views better, by more than two standard errors over the
 /// views. If the views then show local motion (JointAlignment::motion), it is looked for, and it is
 /// accepted in the same way. Throws base::StopRequested if a stop was requested. Every process

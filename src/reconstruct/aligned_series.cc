@@ -64,6 +64,14 @@ json pose_json(const align::FoundPose& found) {
           {"thickness_error_px", found.error.thickness_px}};
 }
 
+json beads_json(const align::BeadAlignment& beads) {
+  return {{"beads", beads.num_beads},
+          {"distance_px",
+           {{"files", beads.files_px}, {"before", beads.before_px}, {"after", beads.after_px}}},
+          {"gain", {{"mean", beads.gain.mean}, {"standard_error", beads.gain.error}}},
+          {"accepted", beads.is_accepted}};
+}
+
 json view_json(const tilt_series::View& view, const geometry::ViewCorrection& correction,
                const align::ViewAgreement& agreement, bool is_unaligned) {
   json result = {{"section", view.section + 1},
@@ -96,6 +104,7 @@ json record_of(const tilt_series::TiltSeries& series, const align::Alignment& fo
                  {"views", std::move(views)}};
   record.update(held_out_json(found.held_out));
   if (found.joint.pose) record["pose"] = pose_json(*found.joint.pose);
+  if (found.beads) record["beads"] = beads_json(*found.beads);
   if (found.local) record["local"] = local_trial_json(found);
   return record;
 }
@@ -164,6 +173,21 @@ void log_local_motion(const json& local) {
   }
 }
 
+// Says how well gold beads keep their places.
+void log_beads(const json& beads) {
+  const json& distance_px = beads["distance_px"];
+  const bool is_used = beads["accepted"].get<bool>();
+  base::log_info(fmt::format(
+      "{} gold beads lie {:.2f} pixels (root mean square in x and y) from their places with the "
+      "new "
+      "alignment, {:.2f} with that of the files; {}",
+      beads["beads"].get<int>(), distance_px[is_used ? "after" : "before"].get<double>(),
+      distance_px["files"].get<double>(),
+      is_used ? fmt::format("they made the new one finer, before {:.2f}",
+                            distance_px["before"].get<double>())
+              : "they tell no more than the field"));
+}
+
 // Says what the views tell about the specimen's pose. Nothing of it is applied.
 void log_pose(const json& pose) {
   base::log_info(
@@ -197,6 +221,7 @@ void log_alignment(const json& record) {
   } else {
     base::log_info("the alignment stays as it was, since a new one is no better: " + errors);
   }
+  if (record.contains("beads")) log_beads(record["beads"]);
   if (record.contains("pose")) log_pose(record["pose"]);
   if (record.contains("local")) log_local_motion(record["local"]);
   if (!left_out.empty())

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <span>
 #include <string>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "io/image_stack.h"
 #include "io/mrc.h"
 #include "io/scratch_memory.h"
+#include "tilt_series/align_image.h"
 #include "tilt_series/decode_view.h"
 #include "tilt_series/fixed_pattern/fixed_pattern.h"
 #include "tilt_series/fixed_pattern/pattern_search.h"
@@ -246,19 +248,26 @@ struct TiltSeries::Impl {
         intensity.empty_beam));
   }
 
+  /// Returns views for a search for beads.
+  BeadViews bead_views(const distributed::Communicator& processes,
+                       std::function<MaskedImage(std::size_t)> read) const {
+    BeadViews result;
+    for (const View& view : views) result.tilt_deg.push_back(view.tilt_deg);
+    result.read = std::move(read);
+    result.at_once = views_at_once(decoder.memory(), processes);
+    return result;
+  }
+
   /// Finds beads and fiducials in aligned images.
   void find_beads(const distributed::Communicator& processes) {
     const base::TraceSpan span("find beads");
     const ViewStore* store = options.resample ? measured.get() : aligned.get();
-    BeadViews bead_views;
-    for (const View& view : views) bead_views.tilt_deg.push_back(view.tilt_deg);
-    bead_views.read = [&](std::size_t view) {
+    const auto read = [&](std::size_t view) {
       MaskedImage image = store->read(view);
       intensity.convert(&image);
       return image;
     };
-    bead_views.at_once = views_at_once(decoder.memory(), processes);
-    beads = find_bead_masks(options, plan, *stack, bead_views, processes);
+    beads = find_bead_masks(options, plan, *stack, bead_views(processes, read), processes);
     beads.metrics.num_bad_pixels = num_bad_pixels;
     beads.metrics.fixed_pattern = fixed_pattern;
     aligned.reset();
@@ -301,20 +310,33 @@ struct TiltSeries::Impl {
 
   /// Returns a view as line integrals, without what masked beads and fiducials hide.
   MaskedImage line_integrals(std::size_t view) const {
-    if (measured && measured->holds(view)) return line_integrals(measured->read(view), view);
-    return line_integrals(decoder.decode(view, wanted_frame()), view);
+    return line_integrals(stored_or_decoded(view), view);
+  }
+
+  /// Returns a view as line integrals in which no beads are masked.
+  MaskedImage line_integrals_with_beads(std::size_t view) const {
+    MaskedImage image = stored_or_decoded(view);
+    intensity.convert(&image);
+    return image;
+  }
+
+  /// Returns a view in the frame that the options ask for, as stored intensities.
+  MaskedImage stored_or_decoded(std::size_t view) const {
+    if (measured && measured->holds(view)) return measured->read(view);
+    return in_wanted_frame(decoder.decode(view, wanted_frame()));
   }
 
   MaskedImage line_integrals_of_half(Half half, std::size_t view) const {
-    return line_integrals(decoder.decode_half(half, *halves, view, wanted_frame()), view);
+    return line_integrals(in_wanted_frame(decoder.decode_half(half, *halves, view, wanted_frame())),
+                          view);
   }
 
   Frames wanted_frame() const {
     return {.recorded = !options.resample, .aligned = options.resample};
   }
 
-  MaskedImage line_integrals(DecodedView decoded, std::size_t view) const {
-    return line_integrals(std::move(options.resample ? decoded.aligned : decoded.recorded), view);
+  MaskedImage in_wanted_frame(DecodedView decoded) const {
+    return std::move(options.resample ? decoded.aligned : decoded.recorded);
   }
 
   MaskedImage line_integrals(MaskedImage image, std::size_t view) const {
@@ -356,6 +378,22 @@ double TiltSeries::background() const { return impl_->background; }
 const MaskMetrics& TiltSeries::mask_metrics() const { return impl_->beads.metrics; }
 const std::vector<std::vector<MaskDisc>>& TiltSeries::undecided_beads() const {
   return impl_->beads.undecided;
+}
+
+std::vector<std::vector<BeadSpot>> TiltSeries::find_bead_spots(
+    std::span<const geometry::ViewCorrection> corrections,
+    const distributed::Communicator& processes) const {
+  TOMOFIELD_CHECK(!is_resampled() && corrections.size() == views().size(),
+                  "beads are looked for in views as recorded, each with a correction");
+  if (!searches_beads(impl_->options)) return {};
+  const auto read = [&](std::size_t view) {
+    const RawFromAligned transform =
+        geometry::corrected(raw_from_aligned(view), corrections[view].binned(bin_factor()));
+    return align_image(impl_->line_integrals_with_beads(view), transform, aligned_width(),
+                       aligned_height());
+  };
+  return search_beads(impl_->options, impl_->plan, impl_->bead_views(processes, read), processes)
+      .spots;
 }
 
 void TiltSeries::read_view(std::size_t view, std::span<float> image,

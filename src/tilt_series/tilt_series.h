@@ -15,6 +15,7 @@
 #include "io/image_stack.h"
 #include "tilt_series/fixed_pattern/fixed_pattern.h"
 #include "tilt_series/half.h"
+#include "tilt_series/masks/bead_spot.h"
 #include "tilt_series/masks/mask_disc.h"
 #include "tomofield/options.h"
 
@@ -160,6 +161,14 @@ class TiltSeries {
 
   /// Returns the discs of undecided beads in each view, in the pixels of read_view().
   const std::vector<std::vector<MaskDisc>>& undecided_beads() const;
+
+  /// Looks for gold beads in the views of a series that is not resampled, each aligned with a
+  /// correction, whether they are masked or not. Returns the spots [bead] in the pixels of the
+  /// aligned, binned views: none if the options ask for no beads, or if there clearly are none.
+  /// Every process calls it and gets the same.
+  std::vector<std::vector<BeadSpot>> find_bead_spots(
+      std::span<const geometry::ViewCorrection> corrections,
+      const distributed::Communicator& processes) const;
 
  private:
   struct Impl;

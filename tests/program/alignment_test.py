@@ -28,10 +28,11 @@ def simulate(name, *options, size=SIZE, noise=0.05):
     return folder
 
 
-def series_of(folder, size=SIZE):
+def series_of(folder, size=SIZE, bead_diameter_nm=0):
     """Returns the arguments that name a raw series."""
     return [os.path.join(folder, "tilt_series.mrc"), "--tlt", os.path.join(folder, "tilt_series.tlt"),
-            "--thickness", size * 75 // 128, "--contrast", "bright", "--bead-diameter", 0, "--no-margin"]
+            "--thickness", size * 75 // 128, "--contrast", "bright", "--bead-diameter", bead_diameter_nm,
+            "--no-margin"]
 
 
 def errors(folder, prefix, size=SIZE):
@@ -71,6 +72,28 @@ def test_full_finds_large_shifts_and_the_axis():
     found = errors(folder, os.path.join(folder, "found_align"), size)
     assert found["x_px"] < 0.3 and found["y_px"] < 0.3, found
     assert abs(found["axis_error_deg"]) < 0.5, found
+
+
+def test_gold_beads_make_the_direction_of_the_axis_finer():
+    size = 96
+    folder = simulate("alignment_beads", "--misalign", 1, "--misalign-axis", 0.7, "--gold", 8,
+                      "--gold-diameter", 50, size=size, noise=0.02)
+
+    def align(name, bead_diameter_nm):
+        harness.succeed("align", *series_of(folder, size, bead_diameter_nm), "-o",
+                        os.path.join(folder, f"{name}.mrc"))
+        prefix = os.path.join(folder, f"{name}_align")
+        return errors(folder, prefix, size), record(prefix)
+
+    without, made_without = align("without", 0)
+    found, made = align("with", 4.2)
+    assert "beads" not in made_without
+    beads = made["beads"]
+    assert beads["accepted"] and beads["beads"] >= 3, beads
+    assert beads["distance_px"]["after"] < beads["distance_px"]["before"] < 0.7, beads
+    assert beads["distance_px"]["before"] < beads["distance_px"]["files"], beads
+    assert abs(found["axis_error_deg"]) < 0.1 < abs(without["axis_error_deg"]), (found, without)
+    assert found["x_px"] < 0.05 and found["y_px"] < 0.05, found
 
 
 def test_views_of_something_else_are_named_and_left_out():

@@ -291,6 +291,26 @@ std::vector<MaskDisc> predict_discs(const std::vector<BeadTrack>& tracks,
   return discs;
 }
 
+/// Returns the spots of each track, where a view has one that belongs to no other track.
+std::vector<std::vector<BeadSpot>> spots_of_tracks(const std::vector<BeadTrack>& tracks,
+                                                   const SearchedViews& searched,
+                                                   const std::vector<double>& tilt_deg,
+                                                   double tolerance) {
+  std::vector<std::vector<BeadSpot>> spots_of(tracks.size());
+  for (std::size_t view = 0; view < tilt_deg.size(); ++view) {
+    const std::vector<Spot>& spots = searched.spots[view];
+    std::vector<MaskDisc> places;
+    for (const BeadTrack& track : tracks)
+      places.push_back(
+          {track_x(track, static_cast<double>(searched.width) / 2, tilt_deg[view]), track.y_px});
+    const std::vector<std::size_t> match = match_spots(places, spots, tolerance);
+    for (std::size_t i = 0; i < tracks.size(); ++i)
+      if (match[i] < spots.size())
+        spots_of[i].push_back({view, spots[match[i]].x_px, spots[match[i]].y_px});
+  }
+  return spots_of;
+}
+
 }  // namespace
 
 BeadSearch find_beads(const BeadViews& views, const BeadSearchOptions& options,
@@ -309,6 +329,7 @@ BeadSearch find_beads(const BeadViews& views, const BeadSearchOptions& options,
   if (tracks.empty() && !options.diameter_px) return result;
   result.diameter_px = *diameter;
   result.num_beads = tracks.size();
+  result.spots = spots_of_tracks(tracks, searched, views.tilt_deg, tolerance_px);
   const double radius = mask_radius_px(*diameter);
   for (std::size_t view = 0; view < num_views; ++view) {
     result.discs[view] = predict_discs(tracks, searched, views.tilt_deg[view], radius);

@@ -8,6 +8,7 @@
 
 #include "distributed/communicator.h"
 #include "tilt_series/image.h"
+#include "tilt_series/masks/bead_spot.h"
 #include "tilt_series/masks/mask_disc.h"
 
 namespace tomofield::tilt_series {
@@ -32,6 +33,7 @@ struct BeadSearch {
   std::size_t num_beads = 0;                 ///< with one position in the specimen
   std::vector<std::size_t> num_found;        ///< of each view: beads with a spot of their own
   std::vector<std::vector<MaskDisc>> discs;  ///< of each view: every bead that reaches into it
+  std::vector<std::vector<BeadSpot>> spots;  ///< of each bead: where views have a spot of its own
 };
 
 /// Looks for fiducial beads: strong round spots (spots.h) that keep one place

@@ -107,9 +107,7 @@ std::vector<std::vector<MaskDisc>> place_fiducials(const std::filesystem::path& 
 /// Searches the views and keeps what is found as masks or as undecided.
 void add_beads(const TiltSeriesOptions& options, const SeriesPlan& plan, const BeadViews& views,
                const distributed::Communicator& processes, BeadMasks* masks) {
-  BeadSearchOptions how;
-  processes.run_collectively([&] { how = search_options(options, plan); });
-  BeadSearch search = find_beads(views, how, processes);
+  BeadSearch search = search_beads(options, plan, views, processes);
   MaskMetrics& metrics = masks->metrics;
   metrics.beads_found = std::move(search.num_found);
   metrics.num_beads = search.num_beads;
@@ -163,6 +161,13 @@ void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* im
 }
 
 bool searches_beads(const TiltSeriesOptions& options) { return options.bead_diameter_nm != 0.0; }
+
+BeadSearch search_beads(const TiltSeriesOptions& options, const SeriesPlan& plan,
+                        const BeadViews& views, const distributed::Communicator& processes) {
+  BeadSearchOptions how;
+  processes.run_collectively([&] { how = search_options(options, plan); });
+  return find_beads(views, how, processes);
+}
 
 BeadMasks find_bead_masks(const TiltSeriesOptions& options, const SeriesPlan& plan,
                           const io::ImageStack& stack, const BeadViews& views,

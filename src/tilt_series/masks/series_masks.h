@@ -28,6 +28,11 @@ void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* im
 /// Tells whether the options ask for a search for beads.
 bool searches_beads(const TiltSeriesOptions& options);
 
+/// Looks for the beads that the options ask for in aligned `views`.
+/// Throws Error for a diameter that cannot be.
+BeadSearch search_beads(const TiltSeriesOptions& options, const SeriesPlan& plan,
+                        const BeadViews& views, const distributed::Communicator& processes);
+
 /// Finds the beads that the options ask for in the aligned `views`, and adds the user's fiducials.
 /// Beads that a bright series turns out to have, without a diameter from the user, stay undecided:
 /// bright particles may be the specimen itself.

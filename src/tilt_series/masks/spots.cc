@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "tilt_series/binning.h"
+#include "tilt_series/masks/spot_place.h"
 
 namespace tomofield::tilt_series {
 namespace {
@@ -173,14 +174,6 @@ bool is_peak(const MaskedImage& image, const std::vector<float>& contrast, std::
   return true;
 }
 
-/// Returns the peak of the parabola through three neighbouring values: −1/2…1/2.
-double peak_shift(float before, float here, float after) {
-  const double curvature =
-      static_cast<double>(before) - 2 * static_cast<double>(here) + static_cast<double>(after);
-  if (!std::isfinite(curvature) || curvature >= 0.0) return 0.0;
-  return std::clamp(static_cast<double>(before - after) / curvature / 2, -0.5, 0.5);
-}
-
 }  // namespace
 
 std::vector<Spot> find_spots(const MaskedImage& image, double diameter_px, double min_strength) {
@@ -199,11 +192,9 @@ std::vector<Spot> find_spots(const MaskedImage& image, double diameter_px, doubl
     for (std::int64_t x = 1; x + 1 < reduced.width; ++x) {
       const std::size_t at = reduced.index(x, y);
       if (!(contrast[at] >= threshold) || !is_peak(reduced, contrast, x, y, radius)) continue;
-      const auto row = static_cast<std::size_t>(reduced.width);
-      const double px = static_cast<double>(x) + 0.5 +
-                        peak_shift(contrast[at - 1], contrast[at], contrast[at + 1]);
-      const double py = static_cast<double>(y) + 0.5 +
-                        peak_shift(contrast[at - row], contrast[at], contrast[at + row]);
+      const double middle_x = static_cast<double>(x) + 0.5, middle_y = static_cast<double>(y) + 0.5;
+      const auto [px, py] = spot_place(reduced, middle_x, middle_y, diameter)
+                                .value_or(std::array{middle_x, middle_y});
       const auto height = static_cast<double>(contrast[at]);
       spots.push_back({(px - centre_x) * factor + static_cast<double>(image.width) / 2,
                        (py - centre_y) * factor + static_cast<double>(image.height) / 2, height,

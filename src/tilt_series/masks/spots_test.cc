@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -42,6 +43,20 @@ TEST(Spots, AreFoundAtTheirPlacesWhateverTheirSize) {
     EXPECT_NEAR(spots[1].x_px, 30.3, 0.15 * diameter);
     EXPECT_NEAR(spots[1].y_px, 41.8, 0.15 * diameter);
     EXPECT_NEAR(spots[1].contrast, 12.0, 4.0);
+  }
+}
+
+TEST(Spots, HaveTheirPlacesWithinATenthOfAPixelOnASlope) {
+  for (const double at : {40.0, 40.3, 40.8}) {
+    // The projection of a solid ball of 8 pixels.
+    const auto ball = [at](double x, double y) {
+      return 10 * std::sqrt(std::max(16 - std::pow(x - at, 2) - std::pow(y - 33.4, 2), 0.0));
+    };
+    const auto spots = find_spots(
+        noisy([&](double x, double y) { return ball(x, y) + 0.8 * x - 0.5 * y; }), 7, kStrength);
+    ASSERT_EQ(spots.size(), 1u) << at;
+    EXPECT_NEAR(spots[0].x_px, at, 0.1);
+    EXPECT_NEAR(spots[0].y_px, 33.4, 0.1);
   }
 }
 

@@ -1,0 +1,360 @@
+#include "align/bead_alignment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/QR>
+
+#include "base/trace.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::align {
+namespace {
+
+using geometry::ViewCorrection;
+
+constexpr double kRadian_deg = 180.0 / std::numbers::pi;
+constexpr std::size_t kFewestBeads = 3;
+constexpr int kModes = 6;   // cosines over the views, from the constant one on
+constexpr int kRounds = 8;  // of least squares
+// Beads are left out in so many turns at most, to see whether the others predict them.
+constexpr std::size_t kMostTurns = 8;
+constexpr double kOutlier = 3.0;  // standard deviations beyond which a distance counts less
+
+constexpr double kSure = 1.0;  // standard errors by which the steps must pay
+
+// What may change in a view, each with the same cosines.
+enum Quantity { kX, kY, kRotation, kMagnification, kQuantities };
+
+// What a joint alignment leaves of them on phantoms, as standard deviations of a coefficient
+// (docs/results/alignment.md). It sees the direction of the tilt axis least of all.
+constexpr double kLeft[kQuantities] = {0.05, 0.03, 0.05 / kRadian_deg, 5e-4};  // pixels, radians
+constexpr double kLeftOfAxis = 0.15 / kRadian_deg;
+
+// One of the unknowns: how much of a cosine a quantity has.
+struct Unknown {
+  Quantity quantity;
+  Eigen::Index mode;
+
+  double expected() const {
+    return quantity == kRotation && mode == 0 ? kLeftOfAxis : kLeft[quantity];
+  }
+};
+
+std::vector<Unknown> unknowns_of(const Freedoms& freedoms) {
+  std::vector<Unknown> unknowns;
+  for (const Quantity quantity : {kX, kY, kRotation, kMagnification})
+    for (Eigen::Index mode = 0; mode < kModes; ++mode)
+      if (quantity != kMagnification || freedoms.magnification)
+        unknowns.push_back({quantity, mode});
+  return unknowns;
+}
+
+// Returns the values [view, mode] of the cosines.
+Eigen::MatrixXd cosines(std::span<const double> tilt_deg) {
+  std::vector<std::size_t> by_tilt(tilt_deg.size());
+  std::iota(by_tilt.begin(), by_tilt.end(), std::size_t{0});
+  std::ranges::stable_sort(by_tilt, {}, [&](std::size_t view) { return tilt_deg[view]; });
+  const auto n = std::ssize(tilt_deg);
+  Eigen::MatrixXd values(n, std::min<Eigen::Index>(kModes, n));
+  for (Eigen::Index rank = 0; rank < n; ++rank)
+    for (Eigen::Index mode = 0; mode < values.cols(); ++mode)
+      values(static_cast<Eigen::Index>(by_tilt[static_cast<std::size_t>(rank)]), mode) =
+          std::cos(std::numbers::pi * static_cast<double>(mode) *
+                   (static_cast<double>(rank) + 0.5) / static_cast<double>(n));
+  return values;
+}
+
+// Returns where a spot is after its view was corrected by a step.
+BeadPoint moved(const BeadPoint& spot, const ViewCorrection& step) {
+  const double x = spot.x_px - step.shift_x_px, y = spot.y_px - step.shift_y_px;
+  const double scale = std::exp(-step.log_magnification);
+  const double cosine = scale * std::cos(step.rotation_rad),
+               sine = scale * std::sin(step.rotation_rad);
+  return {spot.view, cosine * x + sine * y, cosine * y - sine * x};
+}
+
+// The spots of a bead as least squares: distances in x of all spots, then those in y.
+class BeadEquations {
+ public:
+  BeadEquations(const std::vector<BeadPoint>& spots, const BeadGeometry& geometry)
+      : spots_(spots),
+        axis_px_(geometry.axis_px),
+        place_(2 * std::ssize(spots), 3),
+        weights_(2 * std::ssize(spots)) {
+    const auto n = std::ssize(spots);
+    place_.setZero();
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double tilt = geometry.tilt_deg[spots[static_cast<std::size_t>(i)].view] / kRadian_deg;
+      place_.row(i) << std::cos(tilt), std::sin(tilt), 0.0;
+      place_(n + i, 2) = 1.0;
+    }
+    weights_.setOnes();
+  }
+
+  // Returns the distances of the spots from the bead at its best place, after steps.
+  Eigen::VectorXd distances(std::span<const ViewCorrection> steps) const {
+    const auto n = std::ssize(spots_);
+    Eigen::VectorXd measured(2 * n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const BeadPoint& spot = spots_[static_cast<std::size_t>(i)];
+      const BeadPoint at = moved(spot, steps[spot.view]);
+      measured[i] = at.x_px - axis_px_;
+      measured[n + i] = at.y_px;
+    }
+    return measured - place_ * best_place(measured);
+  }
+
+  // Lets distances beyond some standard deviations count less (Huber 1964).
+  void weigh(const Eigen::VectorXd& distances, double deviation) {
+    for (Eigen::Index i = 0; i < distances.size(); ++i)
+      weights_[i] = std::min(1.0, kOutlier * deviation / std::max(std::abs(distances[i]), 1e-12));
+  }
+
+  // Returns the mean squared distance with these weights.
+  double mean_square(const Eigen::VectorXd& distances) const {
+    return weights_.dot(distances.cwiseAbs2()) / static_cast<double>(distances.size());
+  }
+
+  // Adds the normal equations for the unknowns of the next step, in which the place of the bead is
+  // free, too.
+  void add_to(const std::vector<Unknown>& unknowns, const Eigen::MatrixXd& modes,
+              std::span<const ViewCorrection> steps, Eigen::MatrixXd& normal,
+              Eigen::VectorXd& right) const {
+    const Eigen::VectorXd roots = weights_.cwiseSqrt();
+    const Eigen::MatrixXd columns =
+        beyond_place(roots.asDiagonal() * by_unknowns(unknowns, modes, steps));
+    const Eigen::VectorXd off = roots.cwiseProduct(distances(steps));
+    normal += columns.transpose() * columns;
+    right += columns.transpose() * off;
+  }
+
+  // Returns the square of the part of the distances that the cosines explain beyond the place of
+  // the bead, and its number of dimensions.
+  std::pair<double, double> slow_part(const Eigen::MatrixXd& modes,
+                                      std::span<const ViewCorrection> steps) const {
+    std::vector<Unknown> shifts;
+    for (const Quantity quantity : {kX, kY})
+      for (Eigen::Index mode = 0; mode < modes.cols(); ++mode) shifts.push_back({quantity, mode});
+    const Eigen::VectorXd roots = weights_.cwiseSqrt();
+    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> basis;
+    basis.setThreshold(0.01);  // a place explains nearly all of some cosines
+    basis.compute(beyond_place(roots.asDiagonal() * by_unknowns(shifts, modes, steps)));
+    const Eigen::VectorXd off =
+        basis.householderQ().adjoint() * roots.cwiseProduct(distances(steps));
+    return {off.head(basis.rank()).squaredNorm(), static_cast<double>(basis.rank())};
+  }
+
+ private:
+  // Returns columns, weighted, without what another place of the bead explains.
+  Eigen::MatrixXd beyond_place(const Eigen::MatrixXd& columns) const {
+    const Eigen::MatrixXd place = weights_.cwiseSqrt().asDiagonal() * place_;
+    return columns - place * place.colPivHouseholderQr().solve(columns);
+  }
+
+  Eigen::Vector3d best_place(const Eigen::VectorXd& measured) const {
+    const Eigen::VectorXd roots = weights_.cwiseSqrt();
+    const Eigen::MatrixXd place = roots.asDiagonal() * place_;
+    return place.colPivHouseholderQr().solve(roots.cwiseProduct(measured));
+  }
+
+  // Returns the derivatives of the places of all spots by the unknowns.
+  Eigen::MatrixXd by_unknowns(const std::vector<Unknown>& unknowns, const Eigen::MatrixXd& modes,
+                              std::span<const ViewCorrection> steps) const {
+    const auto n = std::ssize(spots_);
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(2 * n, std::ssize(unknowns));
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const BeadPoint& spot = spots_[static_cast<std::size_t>(i)];
+      const BeadPoint at = moved(spot, steps[spot.view]);
+      const double by_x[] = {1.0, 0.0, -at.y_px, at.x_px}, by_y[] = {0.0, 1.0, at.x_px, at.y_px};
+      for (Eigen::Index u = 0; u < columns.cols(); ++u) {
+        const auto [quantity, mode] = unknowns[static_cast<std::size_t>(u)];
+        const double cosine = modes(static_cast<Eigen::Index>(spot.view), mode);
+        columns(i, u) = by_x[quantity] * cosine;
+        columns(n + i, u) = by_y[quantity] * cosine;
+      }
+    }
+    return columns;
+  }
+
+  const std::vector<BeadPoint>& spots_;
+  double axis_px_;
+  Eigen::MatrixX3d place_;   // derivatives by X, Z and Y
+  Eigen::VectorXd weights_;  // of the squared distances
+};
+
+// The spots of several beads and the steps that fit them.
+class BeadSet {
+ public:
+  BeadSet(std::span<const std::vector<BeadPoint>> beads, const BeadGeometry& geometry,
+          const Freedoms& freedoms)
+      : modes_(cosines(geometry.tilt_deg)), unknowns_(unknowns_of(freedoms)) {
+    for (const std::vector<BeadPoint>& spots : beads) beads_.emplace_back(spots, geometry);
+  }
+
+  // Returns the steps after which the beads agree best with their places.
+  std::vector<ViewCorrection> fit() {
+    std::vector<ViewCorrection> steps(static_cast<std::size_t>(modes_.rows()));
+    Eigen::VectorXd values = Eigen::VectorXd::Zero(std::ssize(unknowns_));  // in all steps
+    for (int round = 0; round < kRounds; ++round) {
+      weigh(steps);
+      const double variance = slow_variance(steps);
+      if (!(variance > 0.0)) break;
+      const auto n = std::ssize(unknowns_);
+      Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
+      Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
+      for (const BeadEquations& bead : beads_) bead.add_to(unknowns_, modes_, steps, normal, right);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const double ridge =
+            variance / std::pow(unknowns_[static_cast<std::size_t>(i)].expected(), 2);
+        normal(i, i) += ridge;
+        right[i] -= ridge * values[i];
+      }
+      const Eigen::VectorXd change = normal.ldlt().solve(right);
+      take_step(change, steps);
+      values += change;
+    }
+    return steps;
+  }
+
+  // Weighs the distances anew, by their median size.
+  void weigh(std::span<const ViewCorrection> steps) {
+    std::vector<double> sizes;
+    for (const BeadEquations& bead : beads_)
+      for (const double distance : bead.distances(steps)) sizes.push_back(std::abs(distance));
+    constexpr double kSigmaOfMedian = 1.4826;  // for a normal distribution
+    const auto middle = sizes.begin() + std::ssize(sizes) / 2;
+    std::ranges::nth_element(sizes, middle);
+    for (BeadEquations& bead : beads_) bead.weigh(bead.distances(steps), kSigmaOfMedian * *middle);
+  }
+
+  // Returns the mean squared distance of each bead after steps.
+  std::vector<double> mean_squares(std::span<const ViewCorrection> steps) const {
+    std::vector<double> squares;
+    for (const BeadEquations& bead : beads_)
+      squares.push_back(bead.mean_square(bead.distances(steps)));
+    return squares;
+  }
+
+ private:
+  // Returns the variance of the part of the distances that changes slowly over the tilts. It is
+  // larger than that of the rest, because what lies above and below a bead moves its spots, and
+  // changes slowly.
+  double slow_variance(std::span<const ViewCorrection> steps) const {
+    double squares = 0.0, count = 0.0;
+    for (const BeadEquations& bead : beads_) {
+      const auto [of_bead, rank] = bead.slow_part(modes_, steps);
+      squares += of_bead;
+      count += rank;
+    }
+    return squares / std::max(count, 1.0);
+  }
+
+  void take_step(const Eigen::VectorXd& values, std::vector<ViewCorrection>& steps) const {
+    for (std::size_t view = 0; view < steps.size(); ++view) {
+      double changes[kQuantities] = {};
+      for (Eigen::Index i = 0; i < values.size(); ++i) {
+        const auto [quantity, mode] = unknowns_[static_cast<std::size_t>(i)];
+        changes[quantity] += values[i] * modes_(static_cast<Eigen::Index>(view), mode);
+      }
+      steps[view] = steps[view].then({.shift_x_px = changes[kX],
+                                      .shift_y_px = changes[kY],
+                                      .rotation_rad = changes[kRotation],
+                                      .log_magnification = changes[kMagnification]});
+    }
+  }
+
+  Eigen::MatrixXd modes_;
+  std::vector<Unknown> unknowns_;
+  std::vector<BeadEquations> beads_;
+};
+
+// Returns by which part the squared distances of each bead fall if the others decide.
+MeanGain gain_of_others(std::span<const std::vector<BeadPoint>> beads, const BeadGeometry& geometry,
+                        const Freedoms& freedoms) {
+  const std::size_t turns = std::min(beads.size(), kMostTurns);
+  const std::vector<ViewCorrection> none(geometry.tilt_deg.size());
+  std::vector<double> gains;
+  for (std::size_t turn = 0; turn < turns; ++turn) {
+    std::vector<std::vector<BeadPoint>> deciding, judging;
+    for (std::size_t i = 0; i < beads.size(); ++i)
+      (i % turns == turn ? judging : deciding).push_back(beads[i]);
+    const std::vector<ViewCorrection> steps = BeadSet(deciding, geometry, freedoms).fit();
+    BeadSet judges(judging, geometry, freedoms);
+    judges.weigh(none);
+    const std::vector<double> before = judges.mean_squares(none),
+                              after = judges.mean_squares(steps);
+    for (std::size_t i = 0; i < before.size(); ++i)
+      if (before[i] > 0.0) gains.push_back(1.0 - after[i] / before[i]);
+  }
+  return mean_gain(gains);
+}
+
+// Returns where the spots are in views that are not corrected.
+std::vector<std::vector<BeadPoint>> uncorrected(std::span<const std::vector<BeadPoint>> beads,
+                                                std::span<const ViewCorrection> corrections) {
+  std::vector<std::vector<BeadPoint>> moved_back(beads.begin(), beads.end());
+  for (std::vector<BeadPoint>& spots : moved_back) {
+    for (BeadPoint& spot : spots) {
+      const ViewCorrection at =
+          corrections[spot.view].then({.shift_x_px = spot.x_px, .shift_y_px = spot.y_px});
+      spot = {spot.view, at.shift_x_px, at.shift_y_px};
+    }
+  }
+  return moved_back;
+}
+
+double root_mean(const std::vector<double>& squares) {
+  const double sum = std::accumulate(squares.begin(), squares.end(), 0.0);
+  return std::sqrt(sum / static_cast<double>(squares.size()));
+}
+
+}  // namespace
+
+std::optional<BeadAlignment> fit_beads(std::span<const std::vector<BeadPoint>> beads,
+                                       std::span<const ViewCorrection> corrections,
+                                       const BeadGeometry& geometry, const Freedoms& freedoms) {
+  if (beads.size() < kFewestBeads) return std::nullopt;
+  BeadSet all(beads, geometry, freedoms);
+  const std::vector<ViewCorrection> none(corrections.size());
+  BeadAlignment found;
+  found.steps = all.fit();
+  found.num_beads = beads.size();
+  const auto in_files = uncorrected(beads, corrections);
+  found.files_px = root_mean(BeadSet(in_files, geometry, freedoms).mean_squares(none));
+  found.before_px = root_mean(all.mean_squares(none));
+  found.after_px = root_mean(all.mean_squares(found.steps));
+  found.gain = gain_of_others(beads, geometry, freedoms);
+  found.is_accepted = found.gain.exceeds(kSure);
+  return found;
+}
+
+std::optional<BeadAlignment> align_by_beads(const JointProblem& problem,
+                                            const std::vector<ViewCorrection>& corrections,
+                                            const Freedoms& freedoms,
+                                            const distributed::Communicator& processes) {
+  const base::TraceSpan span("align by beads");
+  const tilt_series::TiltSeries& series = problem.recorded;
+  const double bin = series.bin_factor();
+  const double centre_x = static_cast<double>(series.aligned_width()) / 2,
+               centre_y = static_cast<double>(series.aligned_height()) / 2;
+  BeadGeometry geometry;
+  geometry.axis_px = bin * (problem.plan.geometry.axis_x - centre_x);
+  for (std::size_t view = 0; view < corrections.size(); ++view)
+    geometry.tilt_deg.push_back(series.views()[view].tilt_deg + corrections[view].tilt_deg);
+  std::vector<std::vector<BeadPoint>> beads;
+  for (const auto& spots : series.find_bead_spots(corrections, processes)) {
+    beads.emplace_back();
+    for (const tilt_series::BeadSpot& spot : spots)
+      beads.back().push_back(
+          {spot.view, bin * (spot.x_px - centre_x), bin * (spot.y_px - centre_y)});
+  }
+  return fit_beads(beads, corrections, geometry, freedoms);
+}
+
+}  // namespace tomofield::align
