@@ -12,6 +12,16 @@ namespace {
 // time that is left.
 constexpr double kVertexCost = 0.4;
 
+// Returns the cost of a step with pixels so many times as wide, in steps at full resolution. A part
+// of it is for samples of rays, the rest for vertices: with 61 views and a vertex a pixel, vertices
+// take so many times as long (docs/results/speed.md).
+double cost_of_bin(int bin, double vertex_spacing) {
+  constexpr double kVerticesOverSamples = 7.0;
+  const double vertices = kVerticesOverSamples / std::pow(vertex_spacing, 3);
+  const double fewer = std::pow(std::max(1.0, bin / vertex_spacing), 3);
+  return (1.0 / (bin * bin * bin) + vertices / fewer) / (1.0 + vertices);
+}
+
 // Returns the bins of the coarse stages, ascending: powers of two up to coarse_bin at which no slab
 // straddles two leaves, at most one for each coarse epoch. An adaptive tree has bin 2 alone: its
 // leaves may change in the first stage alone, which should resolve the structure well.
@@ -68,7 +78,8 @@ std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit)
   double first_rate = rate;
   const auto add_before_last = [&](int bin, int epochs) {
     stages.push_back({first_kind, bin, first_epoch, epochs, first_rate,
-                      rate * fit.coarse_final_rate, cost / (bin * bin * bin)});
+                      rate * fit.coarse_final_rate,
+                      cost * cost_of_bin(bin, field.finest_spacing())});
     first_epoch += epochs;
     first_rate = rate * fit.refined_rate;
   };

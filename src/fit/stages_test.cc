@@ -122,6 +122,21 @@ TEST(Stages, FactorsMayBeginAsPlainVertices) {
     EXPECT_EQ(stage.field_kind, FieldKind::kVm);
 }
 
+TEST(Stages, FarVerticesMakeCoarseStagesDearer) {
+  FieldOptions field;
+  field.kind = FieldKind::kGrid;
+  field.vertex_spacing = 3.0;
+  field.leaf_size = 64;
+  FitOptions fit;
+  fit.coarse_epochs = 6;
+  const std::vector<Stage> stages = make_stages(field, fit);
+  ASSERT_EQ(stages.size(), 3u);
+  // Pixels of 2 × 2 have as many vertices as those of full resolution; they were measured to cost a
+  // fifth to a third, and pixels of 4 × 4 a third of that.
+  EXPECT_NEAR(stages[1].step_cost, 0.3, 0.05);
+  EXPECT_NEAR(stages[0].step_cost / stages[1].step_cost, 0.33, 0.05);
+}
+
 TEST(Stages, FactorsBeginAsVerticesWhereTheseAreNoMore) {
   const FitOptions slabs;
   EXPECT_TRUE(begins_with_vertices(factors(32, 24), slabs));
