@@ -35,13 +35,15 @@ def cases(kind):
     moved_3 = "--misalign 3 --misalign-rotation 0.3 --misalign-magnification 0.2"
     moved_10 = moved_3.replace("--misalign 3", "--misalign 10")
     nearest_px = 0.05 if kind == "A" else 0.12
+    nearest = {"x_px": nearest_px, "y_px": nearest_px, "rotation_deg": 0.02, "loss_dB": 0.15}
     roughly = {"x_px": 0.3, "y_px": 0.3}
     return (
-        Case("3 px", "refine", moved_3, {"x_px": nearest_px, "y_px": nearest_px,
-                                         "rotation_deg": 0.02, "loss_dB": 0.15}),
+        Case("3 px", "refine", moved_3, nearest),
         Case("3 px, noise 0.12", "refine", moved_3, roughly, noise=0.12),
         Case("10 px", "full", moved_10, roughly),
         Case("3 px, axis 3°", "full", f"{moved_3} --misalign-axis 3", {"axis_error_deg": 0.05}),
+        # Noise is a part of the range, which gold makes five times as large.
+        Case("3 px, 12 beads", "refine", f"{moved_3} --gold 12", nearest, noise=0.01),
         Case("3 px, tilt offset 2°", "refine", moved_3, {"tilt_offset_deg": 0.2}, tilt_offset_deg=2),
         Case("3 px, tilts 0.3°", "refine", moved_3, {}, tilt_spread_deg=0.3),
         Case("3 px", "xcorr", moved_3, {}),
