@@ -24,6 +24,12 @@ std::size_t decoded_numbers(const field::LeafShape& shape) {
          field::count_parameters(FieldKind::kGrid, {with_upper_faces(shape)});
 }
 
+std::size_t decoded_bytes(const std::vector<field::LeafShape>& shapes) {
+  std::size_t numbers = 0;
+  for (const field::LeafShape& shape : shapes) numbers += decoded_numbers(shape);
+  return numbers * sizeof(float);
+}
+
 void append(CodedField& lower, const CodedField& upper) {
   TOMOFIELD_CHECK(lower.thickness == upper.thickness, "bands of one field");
   lower.tree = field::joined(lower.tree, upper.tree);

@@ -37,6 +37,9 @@ field::LeafShape with_upper_faces(const field::LeafShape& shape);
 /// Returns how many numbers a leaf has in memory while it is decoded: its factors and its vertices.
 std::size_t decoded_numbers(const field::LeafShape& shape);
 
+/// Returns the bytes that leaves take in memory while they are decoded.
+std::size_t decoded_bytes(const std::vector<field::LeafShape>& shapes);
+
 /// Holds a field as codes, which take little memory (decode_field).
 struct CodedField {
   field::Quadtree tree;

@@ -15,22 +15,22 @@ using field::OrientedBox;
 
 constexpr std::int64_t kBandsAtOnce = 2;  // that rows of a box come from; two more are decoded
 
+// Returns the band that has the density at y, or the nearest one.
+int band_of(const field::RootGrid& roots, double y) {
+  const double band = std::floor((y - field::kPixelCentre - static_cast<double>(roots.y0)) /
+                                 static_cast<double>(roots.cell_size));
+  return static_cast<int>(std::clamp(band, 0.0, static_cast<double>(roots.rows - 1)));
+}
+
 // Returns the bands that densities from y = low to high depend on. Leaves take vertices of their
 // upper faces from the next band, and faces are softened on both sides.
 base::Range bands_for(const field::RootGrid& roots, double low, double high) {
-  const auto band_of = [&](double y) {
-    const double band = std::floor((y - field::kPixelCentre - static_cast<double>(roots.y0)) /
-                                   static_cast<double>(roots.cell_size));
-    return static_cast<int>(std::clamp(band, 0.0, static_cast<double>(roots.rows - 1)));
-  };
-  return {std::max(band_of(low) - 1, 0), std::min(band_of(high) + 2, roots.rows)};
+  return {std::max(band_of(roots, low) - 1, 0), std::min(band_of(roots, high) + 2, roots.rows)};
 }
 
 std::unique_ptr<field::Field> decode_bands(const CodedField& coded, double low, double high) {
   const CodedField bands = some_bands(coded, bands_for(coded.tree.roots(), low, high));
-  std::size_t bytes = 0;
-  for (const field::LeafShape& shape : bands.codes.shapes)
-    bytes += sizeof(float) * decoded_numbers(shape);
+  const std::size_t bytes = decoded_bytes(bands.codes.shapes);
   constexpr std::size_t kSmall = std::size_t{1} << 24;
   if (bytes > kSmall)
     base::require_memory(bytes, "this part of a compact model",
@@ -72,6 +72,29 @@ void sample_box(const CodedField& coded, const OrientedBox& box, const field::Bo
     field::sample_box(*decode_bands(coded, y_of(first), y_of(end)), box,
                       {static_cast<int>(first), static_cast<int>(end)}, sink);
   }
+}
+
+std::vector<float> sample_box(const CodedField& coded, const OrientedBox& box) {
+  return field::gather_box(box, [&](const field::BoxSink& sink) { sample_box(coded, box, sink); });
+}
+
+std::vector<float> sample_points(const CodedField& coded, std::span<const field::Point> points) {
+  const field::RootGrid& roots = coded.tree.roots();
+  std::vector<std::vector<std::size_t>> of_band(static_cast<std::size_t>(roots.rows));
+  for (std::size_t i = 0; i < points.size(); ++i)
+    of_band[static_cast<std::size_t>(band_of(roots, points[i][1]))].push_back(i);
+  std::vector<float> values(points.size());
+  for (const std::vector<std::size_t>& chosen : of_band) {
+    if (chosen.empty()) continue;
+    std::vector<field::Point> own;
+    for (const std::size_t i : chosen) own.push_back(points[i]);
+    const auto [low, high] =
+        std::ranges::minmax(own, {}, [](const auto& point) { return point[1]; });
+    const std::vector<float> densities =
+        field::sample_points(*decode_bands(coded, low[1], high[1]), own);
+    for (std::size_t i = 0; i < chosen.size(); ++i) values[chosen[i]] = densities[i];
+  }
+  return values;
 }
 
 }  // namespace tomofield::compact

@@ -8,6 +8,8 @@
 #include "compact/compress.h"
 #include "compact/decoded_field.h"
 #include "output/model_file.h"
+#include "output/sample_model.h"
+#include "output/volume.h"
 #include "python_script.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -47,6 +49,25 @@ TEST(CompactModel, ComesBackBitForBit) {
   EXPECT_EQ(load_outline(scratch / "model.h5").tree.leaves(), model.field->tree().leaves());
   save_model(scratch / "again.h5", loaded);
   EXPECT_TRUE(read_whole_file(scratch / "model.h5") == read_whole_file(scratch / "again.h5"));
+}
+
+TEST(CompactModel, IsSampledWithoutBeingDecoded) {
+  const ScratchDirectory scratch;
+  save_model(scratch / "model.h5", compact_model());
+  const Model decoded = load_to_sample(scratch / "model.h5");
+  const Model undecoded = load_to_sample(scratch / "model.h5", 1000);
+  ASSERT_TRUE(decoded.field);
+  ASSERT_FALSE(undecoded.field);
+  field::OrientedBox box = region_box(decoded, 1.0);
+  EXPECT_EQ(sample_box(decoded, box), sample_box(undecoded, box));
+  box.field_from_box = field::rotation_from_euler(10, 20, 30);
+  EXPECT_EQ(sample_box(decoded, box), sample_box(undecoded, box));
+  base::Random random(3);
+  std::vector<field::Point> points;
+  for (int i = 0; i < 2000; ++i)
+    points.push_back({random.uniform(-50, 150), random.uniform(-50, 150), random.uniform(-2, 25)});
+  EXPECT_EQ(sample_points(decoded, points), sample_points(undecoded, points));
+  EXPECT_TRUE(sample_points(undecoded, {}).empty());
 }
 
 TEST(CompactModel, APartHasTheLeavesThatAreChosen) {

@@ -13,11 +13,11 @@
 
 #include "base/log.h"
 #include "base/trace.h"
-#include "compact/sample_coded.h"
 #include "distributed/gathered_arrays.h"
 #include "io/atomic_folder.h"
 #include "io/ome_zarr.h"
 #include "io/output_set.h"
+#include "output/sample_model.h"
 #include "output/volume_labels.h"
 #include "tomofield/error.h"
 
@@ -157,14 +157,6 @@ class PartWriter {
   float scale_;
 };
 
-// Computes the densities of a box. A compact model that is not decoded is decoded band by band.
-void sample(const Model& model, const OrientedBox& box, const field::BoxSink& sink) {
-  if (model.field)
-    field::sample_box(*model.field, box, sink);
-  else
-    compact::sample_box(*model.coded, box, sink);
-}
-
 // Turns a box of the specimen into the frame of the field. The fit sees the specimen after its
 // x-axis tilt, p = Ry(tilt) Rx(alpha) (P − C) (docs/geometry.md), so the box is turned by Rx(alpha)
 // about C. A mirrored Z turns the other way.
@@ -212,7 +204,7 @@ OrientedBox region_box(const ModelInfo& model, double voxel_px) {
 
 float largest_density(const Model& model) {
   const OrientedBox box = region_box(model, 1.0);
-  return largest_density([&](const field::BoxSink& sink) { sample(model, box, sink); },
+  return largest_density([&](const field::BoxSink& sink) { sample_box(model, box, sink); },
                          distributed::Communicator::alone());
 }
 
@@ -222,8 +214,8 @@ void write_volume(const Model& model, const VolumeOptions& options,
   const Bounds bounds(box);
   require_inside(model, bounds);
   if (options.box) warn_of_margin(model, bounds, 0.5 * box.voxel_px);
-  write_voxels([&](const field::BoxSink& sink) { sample(model, box, sink); }, box, model, kMadeBy,
-               options, path);
+  write_voxels([&](const field::BoxSink& sink) { sample_box(model, box, sink); }, box, model,
+               kMadeBy, options, path);
 }
 
 void write_volume(Model& model, const VolumeOptions& options, const std::filesystem::path& path,

@@ -12,6 +12,7 @@
 #include "io/image_stack.h"
 #include "io/json.h"
 #include "output/model_file.h"
+#include "output/sample_model.h"
 #include "output/volume.h"
 #include "reconstruct/aligned_series.h"
 #include "reconstruct/exchange_files.h"
@@ -80,7 +81,7 @@ Tomogram sample_tomogram(const output::Model& model, bool invert) {
   const field::OrientedBox box = output::region_box(model, 1.0);
   Tomogram tomogram{.size = box.size,
                     .voxel_size_A = model.pixel_size_A,
-                    .values = field::sample_box(*model.field, box)};
+                    .values = output::sample_box(model, box)};
   to_output(model, tomogram.values, invert);
   return tomogram;
 }
@@ -138,7 +139,7 @@ class OneAtATime {
 Model::Model(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 
 Model::Model(const std::filesystem::path& path)
-    : impl_(std::make_shared<Impl>(Impl{output::load_model(path)})) {}
+    : impl_(std::make_shared<Impl>(Impl{output::load_to_sample(path)})) {}
 
 double Model::pixel_size_A() const { return impl_->model.pixel_size_A; }
 
@@ -154,11 +155,11 @@ SampleBox Model::region(double voxel_px) const {
 std::vector<float> Model::sample(const SampleBox& box) const {
   require_usable(box);
   const auto& [rot, tilt, psi] = box.euler_deg;
-  auto values = field::sample_box(*impl_->model.field,
-                                  {.centre_px = box.centre_px,
-                                   .size = box.size,
-                                   .voxel_px = box.voxel_px,
-                                   .field_from_box = field::rotation_from_euler(rot, tilt, psi)});
+  auto values = output::sample_box(impl_->model,
+                                   {.centre_px = box.centre_px,
+                                    .size = box.size,
+                                    .voxel_px = box.voxel_px,
+                                    .field_from_box = field::rotation_from_euler(rot, tilt, psi)});
   to_output(impl_->model, values);
   return values;
 }
@@ -170,15 +171,7 @@ std::vector<float> Model::sample_points(std::span<const Point> points) const {
           fmt::format("a point at {}, {}, {} cannot be sampled: its coordinates must be "
                       "finite",
                       point[0], point[1], point[2]));
-  std::vector<float> values(points.size());
-  constexpr std::int64_t kBatch = 1024;
-  const auto count = std::ssize(points);
-  base::parallel_for("sample points", (count + kBatch - 1) / kBatch, [&](std::int64_t batch) {
-    const std::int64_t end = std::min(count, (batch + 1) * kBatch);
-    for (auto i = static_cast<std::size_t>(batch * kBatch); i < static_cast<std::size_t>(end); ++i)
-      values[i] =
-          static_cast<float>(impl_->model.field->density(points[i][0], points[i][1], points[i][2]));
-  });
+  std::vector<float> values = output::sample_points(impl_->model, points);
   to_output(impl_->model, values);
   return values;
 }

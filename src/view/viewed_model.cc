@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/parallel.h"
 #include "field/sampling/sample_box.h"
 #include "output/model_file.h"
+#include "output/sample_model.h"
 #include "output/volume.h"
 #include "view/viewed_volume.h"
 
@@ -25,7 +25,7 @@ int axis_of(const Point& direction) {
 class ViewedModel : public ViewedVolume {
  public:
   explicit ViewedModel(const std::filesystem::path& path)
-      : model_(output::load_model(path)), region_(output::region_box(model_, 1.0)) {
+      : model_(output::load_to_sample(path)), region_(output::region_box(model_, 1.0)) {
     title_ = path.filename().string();
     note_ = "model: every zoom is evaluated from the fitted field";
     size_ = region_.size;
@@ -50,7 +50,7 @@ class ViewedModel : public ViewedVolume {
         .centre_px = region_.position(plane.centre), .size = {1, 1, 1}, .voxel_px = plane.step};
     box.size[static_cast<std::size_t>(across)] = plane.width;
     box.size[static_cast<std::size_t>(up)] = plane.height;
-    std::vector<float> values = field::sample_box(*model_.field, box);
+    std::vector<float> values = output::sample_box(model_, box);
     return across < up ? values : transposed(values, plane);
   }
 
@@ -67,21 +67,18 @@ class ViewedModel : public ViewedVolume {
   // Evaluates the field at the middle of every pixel, or at four points of one that is larger than
   // a pixel of the fit.
   std::vector<float> point_values(const Plane& plane) const {
-    const int points = plane.step > 1 ? 2 : 1;
+    const int side = plane.step > 1 ? 2 : 1, of_pixel = side * side;
+    std::vector<field::Point> points;
+    for (std::int64_t row = 0; row < plane.height; ++row)
+      for (std::int64_t column = 0; column < plane.width; ++column)
+        for (int i = 0; i < of_pixel; ++i)
+          points.push_back(
+              region_.position(plane.position(static_cast<double>(column) + (i % side + 0.5) / side,
+                                              static_cast<double>(row) + (i / side + 0.5) / side)));
+    const std::vector<float> densities = output::sample_points(model_, points);
     std::vector<float> values(static_cast<std::size_t>(plane.width * plane.height));
-    base::parallel_for("view plane", plane.height, [&](std::int64_t row) {
-      for (std::int64_t column = 0; column < plane.width; ++column) {
-        double sum = 0;
-        for (int point = 0; point < points * points; ++point) {
-          const field::Point at = region_.position(
-              plane.position(static_cast<double>(column) + (point % points + 0.5) / points,
-                             static_cast<double>(row) + (point / points + 0.5) / points));
-          sum += static_cast<double>(model_.field->density(at[0], at[1], at[2]));
-        }
-        values[static_cast<std::size_t>(row * plane.width + column)] =
-            static_cast<float>(sum / (points * points));
-      }
-    });
+    for (std::size_t i = 0; i < densities.size(); ++i)
+      values[i / static_cast<std::size_t>(of_pixel)] += densities[i] / static_cast<float>(of_pixel);
     return values;
   }
 
@@ -93,7 +90,7 @@ class ViewedModel : public ViewedVolume {
     box.voxel_px = std::max(1.0, longest / kSide);
     for (std::int64_t& size : box.size)
       size = std::max<std::int64_t>(1, std::lround(static_cast<double>(size) / box.voxel_px));
-    std::vector<float> values = field::sample_box(*model_.field, box);
+    std::vector<float> values = output::sample_box(model_, box);
     for (float& value : values) value *= static_cast<float>(model_.output_scale());
     return values;
   }

@@ -131,9 +131,13 @@ void sample_box(const Field& field, const OrientedBox& box, base::Range rows, co
 }
 
 std::vector<float> sample_box(const Field& field, const OrientedBox& box) {
+  return gather_box(box, [&](const BoxSink& sink) { sample_box(field, box, sink); });
+}
+
+std::vector<float> gather_box(const OrientedBox& box, const BoxSource& source) {
   const auto [nx, ny, nz] = box.size;
   std::vector<float> volume(static_cast<std::size_t>(nx * ny * nz));
-  sample_box(field, box, [&, nx = nx, ny = ny](const BoxPart& part) {
+  source([&, nx = nx, ny = ny](const BoxPart& part) {
     const auto rows = static_cast<std::ptrdiff_t>(part.num_rows * nx);
     for (std::int64_t s = 0; s < part.num_sections; ++s) {
       const std::int64_t at = ((part.first_section + s) * ny + part.first_row) * nx;
@@ -141,6 +145,18 @@ std::vector<float> sample_box(const Field& field, const OrientedBox& box) {
     }
   });
   return volume;
+}
+
+std::vector<float> sample_points(const Field& field, std::span<const Point> points) {
+  std::vector<float> values(points.size());
+  constexpr std::int64_t kBatch = 1024;
+  const auto count = std::ssize(points);
+  base::parallel_for("sample points", (count + kBatch - 1) / kBatch, [&](std::int64_t batch) {
+    const std::int64_t end = std::min(count, (batch + 1) * kBatch);
+    for (auto i = static_cast<std::size_t>(batch * kBatch); i < static_cast<std::size_t>(end); ++i)
+      values[i] = static_cast<float>(field.density(points[i][0], points[i][1], points[i][2]));
+  });
+  return values;
 }
 
 }  // namespace tomofield::field

@@ -69,4 +69,12 @@ void sample_box(const Field& field, const OrientedBox& box, base::Range rows, co
 /// Returns the densities of a whole box, [z, y, x].
 std::vector<float> sample_box(const Field& field, const OrientedBox& box);
 
+/// Passes every voxel of a box to a sink.
+using BoxSource = std::function<void(const BoxSink&)>;
+/// Returns the densities that a source passes of a box, [z, y, x].
+std::vector<float> gather_box(const OrientedBox& box, const BoxSource& source);
+
+/// Returns the densities at points, 0 outside the domain.
+std::vector<float> sample_points(const Field& field, std::span<const Point> points);
+
 }  // namespace tomofield::field
