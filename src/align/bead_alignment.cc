@@ -4,12 +4,11 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
-#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/QR>
 
+#include "align/bead_equations.h"
 #include "base/trace.h"
 #include "tilt_series/tilt_series.h"
 
@@ -18,36 +17,28 @@ namespace {
 
 using geometry::ViewCorrection;
 
-constexpr double kRadian_deg = 180.0 / std::numbers::pi;
 constexpr std::size_t kFewestBeads = 3;
-constexpr int kModes = 6;   // cosines over the views, from the constant one on
-constexpr int kRounds = 8;  // of least squares
+constexpr std::size_t kFewestSpots = 4;  // of a bead that counts
+constexpr int kModes = 6;                // cosines over the views, from the constant one on
+constexpr int kRounds = 8;               // of least squares
 // Beads are left out in so many turns at most, to see whether the others predict them.
 constexpr std::size_t kMostTurns = 8;
-constexpr double kOutlier = 3.0;  // standard deviations beyond which a distance counts less
-
 constexpr double kSure = 1.0;  // standard errors by which the steps must pay
 
-// What may change in a view, each with the same cosines.
-enum Quantity { kX, kY, kRotation, kMagnification, kQuantities };
+constexpr double kDegree = std::numbers::pi / 180.0;
+// What a joint alignment leaves of each quantity on phantoms, as standard deviations of a
+// coefficient, in pixels of the fit and radians (docs/results/alignment.md). It sees the direction
+// of the tilt axis least of all.
+constexpr double kLeft[kQuantities] = {0.05, 0.03, 0.05 * kDegree, 5e-4};
+constexpr double kLeftOfAxis = 0.15 * kDegree;
 
-// What a joint alignment leaves of them on phantoms, as standard deviations of a coefficient
-// (docs/results/alignment.md). It sees the direction of the tilt axis least of all.
-constexpr double kLeft[kQuantities] = {0.05, 0.03, 0.05 / kRadian_deg, 5e-4};  // pixels, radians
-constexpr double kLeftOfAxis = 0.15 / kRadian_deg;
+double expected(const BeadUnknown& unknown) {
+  const bool is_axis = unknown.quantity == kRotation && unknown.mode == 0;
+  return is_axis ? kLeftOfAxis : kLeft[unknown.quantity];
+}
 
-// One of the unknowns: how much of a cosine a quantity has.
-struct Unknown {
-  Quantity quantity;
-  Eigen::Index mode;
-
-  double expected() const {
-    return quantity == kRotation && mode == 0 ? kLeftOfAxis : kLeft[quantity];
-  }
-};
-
-std::vector<Unknown> unknowns_of(const Freedoms& freedoms) {
-  std::vector<Unknown> unknowns;
+std::vector<BeadUnknown> unknowns_of(const Freedoms& freedoms) {
+  std::vector<BeadUnknown> unknowns;
   for (const Quantity quantity : {kX, kY, kRotation, kMagnification})
     for (Eigen::Index mode = 0; mode < kModes; ++mode)
       if (quantity != kMagnification || freedoms.magnification)
@@ -61,7 +52,7 @@ Eigen::MatrixXd cosines(std::span<const double> tilt_deg) {
   std::iota(by_tilt.begin(), by_tilt.end(), std::size_t{0});
   std::ranges::stable_sort(by_tilt, {}, [&](std::size_t view) { return tilt_deg[view]; });
   const auto n = std::ssize(tilt_deg);
-  Eigen::MatrixXd values(n, std::min<Eigen::Index>(kModes, n));
+  Eigen::MatrixXd values(n, kModes);
   for (Eigen::Index rank = 0; rank < n; ++rank)
     for (Eigen::Index mode = 0; mode < values.cols(); ++mode)
       values(static_cast<Eigen::Index>(by_tilt[static_cast<std::size_t>(rank)]), mode) =
@@ -69,124 +60,6 @@ Eigen::MatrixXd cosines(std::span<const double> tilt_deg) {
                    (static_cast<double>(rank) + 0.5) / static_cast<double>(n));
   return values;
 }
-
-// Returns where a spot is after its view was corrected by a step.
-BeadPoint moved(const BeadPoint& spot, const ViewCorrection& step) {
-  const double x = spot.x_px - step.shift_x_px, y = spot.y_px - step.shift_y_px;
-  const double scale = std::exp(-step.log_magnification);
-  const double cosine = scale * std::cos(step.rotation_rad),
-               sine = scale * std::sin(step.rotation_rad);
-  return {spot.view, cosine * x + sine * y, cosine * y - sine * x};
-}
-
-// The spots of a bead as least squares: distances in x of all spots, then those in y.
-class BeadEquations {
- public:
-  BeadEquations(const std::vector<BeadPoint>& spots, const BeadGeometry& geometry)
-      : spots_(spots),
-        axis_px_(geometry.axis_px),
-        place_(2 * std::ssize(spots), 3),
-        weights_(2 * std::ssize(spots)) {
-    const auto n = std::ssize(spots);
-    place_.setZero();
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const double tilt = geometry.tilt_deg[spots[static_cast<std::size_t>(i)].view] / kRadian_deg;
-      place_.row(i) << std::cos(tilt), std::sin(tilt), 0.0;
-      place_(n + i, 2) = 1.0;
-    }
-    weights_.setOnes();
-  }
-
-  // Returns the distances of the spots from the bead at its best place, after steps.
-  Eigen::VectorXd distances(std::span<const ViewCorrection> steps) const {
-    const auto n = std::ssize(spots_);
-    Eigen::VectorXd measured(2 * n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const BeadPoint& spot = spots_[static_cast<std::size_t>(i)];
-      const BeadPoint at = moved(spot, steps[spot.view]);
-      measured[i] = at.x_px - axis_px_;
-      measured[n + i] = at.y_px;
-    }
-    return measured - place_ * best_place(measured);
-  }
-
-  // Lets distances beyond some standard deviations count less (Huber 1964).
-  void weigh(const Eigen::VectorXd& distances, double deviation) {
-    for (Eigen::Index i = 0; i < distances.size(); ++i)
-      weights_[i] = std::min(1.0, kOutlier * deviation / std::max(std::abs(distances[i]), 1e-12));
-  }
-
-  // Returns the mean squared distance with these weights.
-  double mean_square(const Eigen::VectorXd& distances) const {
-    return weights_.dot(distances.cwiseAbs2()) / static_cast<double>(distances.size());
-  }
-
-  // Adds the normal equations for the unknowns of the next step, in which the place of the bead is
-  // free, too.
-  void add_to(const std::vector<Unknown>& unknowns, const Eigen::MatrixXd& modes,
-              std::span<const ViewCorrection> steps, Eigen::MatrixXd& normal,
-              Eigen::VectorXd& right) const {
-    const Eigen::VectorXd roots = weights_.cwiseSqrt();
-    const Eigen::MatrixXd columns =
-        beyond_place(roots.asDiagonal() * by_unknowns(unknowns, modes, steps));
-    const Eigen::VectorXd off = roots.cwiseProduct(distances(steps));
-    normal += columns.transpose() * columns;
-    right += columns.transpose() * off;
-  }
-
-  // Returns the square of the part of the distances that the cosines explain beyond the place of
-  // the bead, and its number of dimensions.
-  std::pair<double, double> slow_part(const Eigen::MatrixXd& modes,
-                                      std::span<const ViewCorrection> steps) const {
-    std::vector<Unknown> shifts;
-    for (const Quantity quantity : {kX, kY})
-      for (Eigen::Index mode = 0; mode < modes.cols(); ++mode) shifts.push_back({quantity, mode});
-    const Eigen::VectorXd roots = weights_.cwiseSqrt();
-    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> basis;
-    basis.setThreshold(0.01);  // a place explains nearly all of some cosines
-    basis.compute(beyond_place(roots.asDiagonal() * by_unknowns(shifts, modes, steps)));
-    const Eigen::VectorXd off =
-        basis.householderQ().adjoint() * roots.cwiseProduct(distances(steps));
-    return {off.head(basis.rank()).squaredNorm(), static_cast<double>(basis.rank())};
-  }
-
- private:
-  // Returns columns, weighted, without what another place of the bead explains.
-  Eigen::MatrixXd beyond_place(const Eigen::MatrixXd& columns) const {
-    const Eigen::MatrixXd place = weights_.cwiseSqrt().asDiagonal() * place_;
-    return columns - place * place.colPivHouseholderQr().solve(columns);
-  }
-
-  Eigen::Vector3d best_place(const Eigen::VectorXd& measured) const {
-    const Eigen::VectorXd roots = weights_.cwiseSqrt();
-    const Eigen::MatrixXd place = roots.asDiagonal() * place_;
-    return place.colPivHouseholderQr().solve(roots.cwiseProduct(measured));
-  }
-
-  // Returns the derivatives of the places of all spots by the unknowns.
-  Eigen::MatrixXd by_unknowns(const std::vector<Unknown>& unknowns, const Eigen::MatrixXd& modes,
-                              std::span<const ViewCorrection> steps) const {
-    const auto n = std::ssize(spots_);
-    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(2 * n, std::ssize(unknowns));
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const BeadPoint& spot = spots_[static_cast<std::size_t>(i)];
-      const BeadPoint at = moved(spot, steps[spot.view]);
-      const double by_x[] = {1.0, 0.0, -at.y_px, at.x_px}, by_y[] = {0.0, 1.0, at.x_px, at.y_px};
-      for (Eigen::Index u = 0; u < columns.cols(); ++u) {
-        const auto [quantity, mode] = unknowns[static_cast<std::size_t>(u)];
-        const double cosine = modes(static_cast<Eigen::Index>(spot.view), mode);
-        columns(i, u) = by_x[quantity] * cosine;
-        columns(n + i, u) = by_y[quantity] * cosine;
-      }
-    }
-    return columns;
-  }
-
-  const std::vector<BeadPoint>& spots_;
-  double axis_px_;
-  Eigen::MatrixX3d place_;   // derivatives by X, Z and Y
-  Eigen::VectorXd weights_;  // of the squared distances
-};
 
 // The spots of several beads and the steps that fit them.
 class BeadSet {
@@ -211,7 +84,7 @@ class BeadSet {
       for (const BeadEquations& bead : beads_) bead.add_to(unknowns_, modes_, steps, normal, right);
       for (Eigen::Index i = 0; i < n; ++i) {
         const double ridge =
-            variance / std::pow(unknowns_[static_cast<std::size_t>(i)].expected(), 2);
+            variance / std::pow(expected(unknowns_[static_cast<std::size_t>(i)]), 2);
         normal(i, i) += ridge;
         right[i] -= ridge * values[i];
       }
@@ -270,7 +143,7 @@ class BeadSet {
   }
 
   Eigen::MatrixXd modes_;
-  std::vector<Unknown> unknowns_;
+  std::vector<BeadUnknown> unknowns_;
   std::vector<BeadEquations> beads_;
 };
 
@@ -309,6 +182,11 @@ std::vector<std::vector<BeadPoint>> uncorrected(std::span<const std::vector<Bead
   return moved_back;
 }
 
+std::vector<ViewCorrection> binned(std::vector<ViewCorrection> corrections, double factor) {
+  for (ViewCorrection& correction : corrections) correction = correction.binned(factor);
+  return corrections;
+}
+
 double root_mean(const std::vector<double>& squares) {
   const double sum = std::accumulate(squares.begin(), squares.end(), 0.0);
   return std::sqrt(sum / static_cast<double>(squares.size()));
@@ -340,21 +218,25 @@ std::optional<BeadAlignment> align_by_beads(const JointProblem& problem,
                                             const distributed::Communicator& processes) {
   const base::TraceSpan span("align by beads");
   const tilt_series::TiltSeries& series = problem.recorded;
-  const double bin = series.bin_factor();
   const double centre_x = static_cast<double>(series.aligned_width()) / 2,
                centre_y = static_cast<double>(series.aligned_height()) / 2;
   BeadGeometry geometry;
-  geometry.axis_px = bin * (problem.plan.geometry.axis_x - centre_x);
+  geometry.axis_px = problem.plan.geometry.axis_x - centre_x;
   for (std::size_t view = 0; view < corrections.size(); ++view)
     geometry.tilt_deg.push_back(series.views()[view].tilt_deg + corrections[view].tilt_deg);
   std::vector<std::vector<BeadPoint>> beads;
   for (const auto& spots : series.find_bead_spots(corrections, processes)) {
+    if (spots.size() < kFewestSpots) continue;
     beads.emplace_back();
     for (const tilt_series::BeadSpot& spot : spots)
-      beads.back().push_back(
-          {spot.view, bin * (spot.x_px - centre_x), bin * (spot.y_px - centre_y)});
+      beads.back().push_back({spot.view, spot.x_px - centre_x, spot.y_px - centre_y});
   }
-  return fit_beads(beads, corrections, geometry, freedoms);
+  const double bin = series.bin_factor();
+  auto found = fit_beads(beads, binned(corrections, bin), geometry, freedoms);
+  if (!found) return found;
+  found->steps = binned(found->steps, 1 / bin);
+  for (double* distance : {&found->files_px, &found->before_px, &found->after_px}) *distance *= bin;
+  return found;
 }
 
 }  // namespace tomofield::align
