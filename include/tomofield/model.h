@@ -32,7 +32,9 @@ struct SampleBox {
 class Model {
  public:
   /// Throws tomofield::Error, naming the file and the reason, for anything but
-  /// a whole model of a version that this library knows.
+  /// a whole model of a version that this library knows. A compact model whose vertices take more
+  /// than a quarter of the free memory is not decoded here: each call of sample() and
+  /// sample_points() decodes the parts that it needs, which takes some time.
   explicit Model(const std::filesystem::path& path);
 
   /// Returns the size in Å of the pixels that positions count.
@@ -43,10 +45,12 @@ class Model {
 
   /// Returns the values of a box, [z, y, x] with x fastest, as `tomofield export` writes them.
   /// Voxels larger than a pixel are means. Throws Error for sizes below 1 and for numbers that are
-  /// not finite.
+  /// not finite, and for a compact model that is not decoded if its codes are damaged or if the
+  /// memory is not enough.
   std::vector<float> sample(const SampleBox& box) const;
 
-  /// Returns the value at each point. Throws Error for numbers that are not finite.
+  /// Returns the value at each point. Throws Error for numbers that are not finite, and as sample()
+  /// does.
   std::vector<float> sample_points(std::span<const Point> points) const;
 
  private:

@@ -50,8 +50,9 @@ void add_motion(const JointProblem& problem, AlignmentTrial& rigid,
   alignment.local = std::move(trial);
 }
 
-// Makes the part of a joint alignment finer that changes slowly over the tilts: with gold beads, if
-// they tell more, or else the direction of the tilt axis alone.
+// Refines what changes slowly over the tilts in a joint alignment: with gold beads, if they help,
+// or else the direction of the tilt axis alone. Local motion that was found keeps its direction,
+// since it is no more than a start.
 void refine_slow_part(const JointProblem& problem, const distributed::Communicator& processes,
                       Alignment& alignment) {
   JointAlignment& joint = alignment.joint;
@@ -133,7 +134,6 @@ Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::Vi
   const std::vector<geometry::ViewCorrection> none(problem.recorded.views().size());
   Alignment alignment;
   alignment.joint = align_jointly(problem, std::move(start), processes);
-  // Local motion that was found keeps its direction, since it is no more than a start.
   refine_slow_part(problem, processes, alignment);
   alignment.unaligned = unalike_views(problem.recorded, alignment.joint.agreement);
   AlignmentTrial before(problem, none, processes);

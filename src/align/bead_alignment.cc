@@ -29,19 +29,20 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 // What a joint alignment leaves of each quantity on phantoms, as standard deviations of a
 // coefficient, in pixels of the fit and radians (docs/results/alignment.md). It sees the direction
 // of the tilt axis least of all.
-constexpr double kLeft[kQuantities] = {0.05, 0.03, 0.05 * kDegree, 5e-4};
+constexpr double kLeft[BeadUnknown::kQuantities] = {0.05, 0.03, 0.05 * kDegree, 5e-4};
 constexpr double kLeftOfAxis = 0.15 * kDegree;
 
 double expected(const BeadUnknown& unknown) {
-  const bool is_axis = unknown.quantity == kRotation && unknown.mode == 0;
+  const bool is_axis = unknown.quantity == BeadUnknown::kRotation && unknown.mode == 0;
   return is_axis ? kLeftOfAxis : kLeft[unknown.quantity];
 }
 
 std::vector<BeadUnknown> unknowns_of(const Freedoms& freedoms) {
   std::vector<BeadUnknown> unknowns;
-  for (const Quantity quantity : {kX, kY, kRotation, kMagnification})
+  for (const BeadUnknown::Quantity quantity :
+       {BeadUnknown::kX, BeadUnknown::kY, BeadUnknown::kRotation, BeadUnknown::kMagnification})
     for (Eigen::Index mode = 0; mode < kModes; ++mode)
-      if (quantity != kMagnification || freedoms.magnification)
+      if (quantity != BeadUnknown::kMagnification || freedoms.magnification)
         unknowns.push_back({quantity, mode});
   return unknowns;
 }
@@ -95,15 +96,14 @@ class BeadSet {
     return steps;
   }
 
-  // Weighs the distances anew, by their median size.
+  // Weighs the distances anew, by their median size. The places of the beads depend on the weights.
   void weigh(std::span<const ViewCorrection> steps) {
-    std::vector<double> sizes;
-    for (const BeadEquations& bead : beads_)
-      for (const double distance : bead.distances(steps)) sizes.push_back(std::abs(distance));
-    constexpr double kSigmaOfMedian = 1.4826;  // for a normal distribution
-    const auto middle = sizes.begin() + std::ssize(sizes) / 2;
-    std::ranges::nth_element(sizes, middle);
-    for (BeadEquations& bead : beads_) bead.weigh(bead.distances(steps), kSigmaOfMedian * *middle);
+    constexpr int kTurns = 3;
+    for (BeadEquations& bead : beads_) bead.weigh_equally();
+    for (int turn = 0; turn < kTurns; ++turn) {
+      const double deviation = standard_deviation(steps);
+      for (BeadEquations& bead : beads_) bead.weigh(bead.distances(steps), deviation);
+    }
   }
 
   // Returns the mean squared distance of each bead after steps.
@@ -114,7 +114,26 @@ class BeadSet {
     return squares;
   }
 
+  // Returns the root mean square of the distances after steps, which decide about the weights.
+  double root_mean_square(std::span<const ViewCorrection> steps) {
+    weigh(steps);
+    const std::vector<double> squares = mean_squares(steps);
+    return std::sqrt(std::accumulate(squares.begin(), squares.end(), 0.0) /
+                     static_cast<double>(squares.size()));
+  }
+
  private:
+  // Returns the standard deviation of all distances, by their median size.
+  double standard_deviation(std::span<const ViewCorrection> steps) const {
+    std::vector<double> sizes;
+    for (const BeadEquations& bead : beads_)
+      for (const double distance : bead.distances(steps)) sizes.push_back(std::abs(distance));
+    constexpr double kSigmaOfMedian = 1.4826;  // for a normal distribution
+    const auto middle = sizes.begin() + std::ssize(sizes) / 2;
+    std::ranges::nth_element(sizes, middle);
+    return kSigmaOfMedian * *middle;
+  }
+
   // Returns the variance of the part of the distances that changes slowly over the tilts. It is
   // larger than that of the rest, because what lies above and below a bead moves its spots, and
   // changes slowly.
@@ -130,15 +149,15 @@ class BeadSet {
 
   void take_step(const Eigen::VectorXd& values, std::vector<ViewCorrection>& steps) const {
     for (std::size_t view = 0; view < steps.size(); ++view) {
-      double changes[kQuantities] = {};
+      double changes[BeadUnknown::kQuantities] = {};
       for (Eigen::Index i = 0; i < values.size(); ++i) {
         const auto [quantity, mode] = unknowns_[static_cast<std::size_t>(i)];
         changes[quantity] += values[i] * modes_(static_cast<Eigen::Index>(view), mode);
       }
-      steps[view] = steps[view].then({.shift_x_px = changes[kX],
-                                      .shift_y_px = changes[kY],
-                                      .rotation_rad = changes[kRotation],
-                                      .log_magnification = changes[kMagnification]});
+      steps[view] = steps[view].then({.shift_x_px = changes[BeadUnknown::kX],
+                                      .shift_y_px = changes[BeadUnknown::kY],
+                                      .rotation_rad = changes[BeadUnknown::kRotation],
+                                      .log_magnification = changes[BeadUnknown::kMagnification]});
     }
   }
 
@@ -187,9 +206,15 @@ std::vector<ViewCorrection> binned(std::vector<ViewCorrection> corrections, doub
   return corrections;
 }
 
-double root_mean(const std::vector<double>& squares) {
-  const double sum = std::accumulate(squares.begin(), squares.end(), 0.0);
-  return std::sqrt(sum / static_cast<double>(squares.size()));
+// Returns the distance of the spots from their places with the alignment of the files.
+double distance_in_files(std::span<const std::vector<BeadPoint>> beads,
+                         std::span<const ViewCorrection> corrections, BeadGeometry geometry,
+                         const Freedoms& freedoms) {
+  for (std::size_t view = 0; view < corrections.size(); ++view)
+    geometry.tilt_deg[view] -= corrections[view].tilt_deg;
+  const auto in_files = uncorrected(beads, corrections);
+  return BeadSet(in_files, geometry, freedoms)
+      .root_mean_square(std::vector<ViewCorrection>(corrections.size()));
 }
 
 }  // namespace
@@ -203,10 +228,9 @@ std::optional<BeadAlignment> fit_beads(std::span<const std::vector<BeadPoint>> b
   BeadAlignment found;
   found.steps = all.fit();
   found.num_beads = beads.size();
-  const auto in_files = uncorrected(beads, corrections);
-  found.files_px = root_mean(BeadSet(in_files, geometry, freedoms).mean_squares(none));
-  found.before_px = root_mean(all.mean_squares(none));
-  found.after_px = root_mean(all.mean_squares(found.steps));
+  found.files_px = distance_in_files(beads, corrections, geometry, freedoms);
+  found.before_px = all.root_mean_square(none);
+  found.after_px = all.root_mean_square(found.steps);
   found.gain = gain_of_others(beads, geometry, freedoms);
   found.is_accepted = found.gain.exceeds(kSure);
   return found;
@@ -225,7 +249,8 @@ std::optional<BeadAlignment> align_by_beads(const JointProblem& problem,
   for (std::size_t view = 0; view < corrections.size(); ++view)
     geometry.tilt_deg.push_back(series.views()[view].tilt_deg + corrections[view].tilt_deg);
   std::vector<std::vector<BeadPoint>> beads;
-  for (const auto& spots : series.find_bead_spots(corrections, processes)) {
+  for (const auto& spots :
+       series.find_bead_spots(corrections, problem.plan.geometry.axis_x, processes)) {
     if (spots.size() < kFewestSpots) continue;
     beads.emplace_back();
     for (const tilt_series::BeadSpot& spot : spots)

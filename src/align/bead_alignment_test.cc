@@ -157,6 +157,30 @@ TEST(BeadAlignment, KnowsHowFarBeadsLieWithTheAlignmentOfTheFiles) {
   EXPECT_NEAR(found->files_px, in_files->before_px, 0.1 * in_files->before_px);
 }
 
+TEST(BeadAlignment, MeasuresEveryDistanceInTheSameWay) {
+  const BeadGeometry geometry = tilted_views();
+  const std::vector<ViewCorrection> none(geometry.tilt_deg.size());
+  auto beads = scattered_beads(10, geometry, none);
+  for (std::size_t i = 0; i < beads.size(); ++i) beads[i][5 * i % 41].y_px += 8.0;  // outliers
+  const auto found = fit(beads, geometry, kAll);
+  ASSERT_TRUE(found);
+  EXPECT_DOUBLE_EQ(found->files_px, found->before_px);
+}
+
+TEST(BeadAlignment, TheFilesHaveTheirOwnTiltAngles) {
+  BeadGeometry geometry = tilted_views();
+  std::vector<ViewCorrection> corrections(geometry.tilt_deg.size());
+  const auto beads = scattered_beads(10, geometry, corrections);
+  for (std::size_t view = 0; view < corrections.size(); ++view) {
+    corrections[view].tilt_deg = view % 2 == 0 ? 1.0 : -1.0;
+    geometry.tilt_deg[view] += corrections[view].tilt_deg;
+  }
+  const auto found = fit_beads(beads, corrections, geometry, kAll);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->files_px, kNoise_px, 0.1 * kNoise_px);
+  EXPECT_GT(found->before_px, 3 * kNoise_px);
+}
+
 TEST(BeadAlignment, NeedsThreeBeads) {
   const BeadGeometry geometry = tilted_views();
   const auto beads = scattered_beads(2, geometry, slow_errors(geometry));

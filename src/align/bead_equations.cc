@@ -37,7 +37,7 @@ BeadEquations::BeadEquations(const std::vector<BeadPoint>& spots, const BeadGeom
     place_.row(i) << std::cos(tilt), std::sin(tilt), 0.0;
     place_(n + i, 2) = 1.0;
   }
-  weights_.setOnes();
+  weigh_equally();
 }
 
 Eigen::VectorXd BeadEquations::distances(std::span<const ViewCorrection> steps) const {
@@ -75,7 +75,7 @@ void BeadEquations::add_to(const std::vector<BeadUnknown>& unknowns, const Eigen
 std::pair<double, double> BeadEquations::slow_part(const Eigen::MatrixXd& modes,
                                                    std::span<const ViewCorrection> steps) const {
   std::vector<BeadUnknown> shifts;
-  for (const Quantity quantity : {kX, kY})
+  for (const BeadUnknown::Quantity quantity : {BeadUnknown::kX, BeadUnknown::kY})
     for (Eigen::Index mode = 0; mode < modes.cols(); ++mode) shifts.push_back({quantity, mode});
   const Eigen::VectorXd roots = weights_.cwiseSqrt();
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> basis;

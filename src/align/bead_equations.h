@@ -11,11 +11,10 @@
 
 namespace tomofield::align {
 
-/// What may change in a view.
-enum Quantity { kX, kY, kRotation, kMagnification, kQuantities };
-
-/// How much a quantity has of one of the functions of the view that are called modes.
+/// Names an unknown: the coefficient of a mode, which is a function of the view, in a quantity that
+/// may change.
 struct BeadUnknown {
+  enum Quantity { kX, kY, kRotation, kMagnification, kQuantities };
   Quantity quantity;
   Eigen::Index mode;
 };
@@ -31,6 +30,8 @@ class BeadEquations {
   /// Returns the distances from the bead at its best place, after steps.
   Eigen::VectorXd distances(std::span<const geometry::ViewCorrection> steps) const;
 
+  /// Lets all distances count alike, as at first.
+  void weigh_equally() { weights_.setOnes(); }
   /// Lets distances beyond three standard deviations count less.
   void weigh(const Eigen::VectorXd& distances, double deviation);
 

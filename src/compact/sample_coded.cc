@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
+#include <utility>
 
 #include "base/memory.h"
 #include "compact/decoded_field.h"
@@ -34,7 +36,7 @@ std::unique_ptr<field::Field> decode_bands(const CodedField& coded, double low, 
   constexpr std::size_t kSmall = std::size_t{1} << 24;
   if (bytes > kSmall)
     base::require_memory(bytes, "this part of a compact model",
-                         "use a machine with more, or a smaller --box");
+                         "use a machine with more, or ask for a smaller part");
   return decode_field(bands);
 }
 
@@ -45,32 +47,38 @@ std::int64_t rows_at_once(const CodedField& coded, const OrientedBox& box) {
          kernels::kLanes;
 }
 
-void sample_rotated_box(const CodedField& coded, const OrientedBox& box,
-                        const field::BoxSink& sink) {
-  double low = box.centre_px[1], high = low;
+// Returns the smallest and the largest y of some rows of a box in the field.
+std::pair<double, double> extent_of(const OrientedBox& box, base::Range rows) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
   for (int corner = 0; corner < 8; ++corner) {
-    field::Point voxel{};
-    for (std::size_t a = 0; a < 3; ++a)
-      voxel[a] = (corner >> a & 1) ? static_cast<double>(box.size[a]) : 0.0;
-    const double y = box.position(voxel)[1];
+    const double y = box.position({(corner & 1) ? static_cast<double>(box.size[0]) : 0.0,
+                                   static_cast<double>((corner & 2) ? rows.end : rows.begin),
+                                   (corner & 4) ? static_cast<double>(box.size[2]) : 0.0})[1];
     low = std::min(low, y);
     high = std::max(high, y);
   }
-  field::sample_box(*decode_bands(coded, low, high), box, sink);
+  return {low, high};
+}
+
+// Says whether parts of a box reach nearly as far in y as the whole: then it is decoded at once.
+bool is_turned_across(const OrientedBox& box, std::int64_t rows) {
+  const auto reach = [&](std::int64_t end) {
+    const auto [low, high] = extent_of(box, {0, static_cast<int>(end)});
+    return high - low;
+  };
+  return 2 * reach(std::min(rows, box.size[1])) > reach(box.size[1]);
 }
 
 }  // namespace
 
 void sample_box(const CodedField& coded, const OrientedBox& box, const field::BoxSink& sink) {
-  if (!box.is_aligned()) return sample_rotated_box(coded, box, sink);
-  const std::int64_t step = rows_at_once(coded, box);
+  std::int64_t step = rows_at_once(coded, box);
+  if (is_turned_across(box, step)) step = box.size[1];
   for (std::int64_t first = 0; first < box.size[1]; first += step) {
-    const std::int64_t end = std::min(first + step, box.size[1]);
-    const auto y_of = [&](std::int64_t row) {
-      return box.position({0.0, static_cast<double>(row), 0.0})[1];
-    };
-    field::sample_box(*decode_bands(coded, y_of(first), y_of(end)), box,
-                      {static_cast<int>(first), static_cast<int>(end)}, sink);
+    const base::Range rows{static_cast<int>(first),
+                           static_cast<int>(std::min(first + step, box.size[1]))};
+    const auto [low, high] = extent_of(box, rows);
+    field::sample_box(*decode_bands(coded, low, high), box, rows, sink);
   }
 }
 

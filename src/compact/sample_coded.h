@@ -10,7 +10,8 @@ namespace tomofield::compact {
 
 /// Computes the densities of a box of a coded field, as field::sample_box() does for the field that
 /// decode_field() returns. Some bands are decoded at a time, so it takes the memory of few bands. A
-/// rotated box takes that of all bands which it reaches.
+/// box whose rows reach across the bands takes that of all bands which it reaches. Nothing that was
+/// decoded is kept.
 void sample_box(const CodedField& coded, const field::OrientedBox& box, const field::BoxSink& sink);
 /// Does the same and returns them in the order [z, y, x].
 std::vector<float> sample_box(const CodedField& coded, const field::OrientedBox& box);

@@ -18,7 +18,8 @@ constexpr double kVertexCost = 0.4;
 double cost_of_bin(int bin, double vertex_spacing) {
   constexpr double kVerticesOverSamples = 7.0;
   const double vertices = kVerticesOverSamples / std::pow(vertex_spacing, 3);
-  const double fewer = std::pow(std::max(1.0, bin / vertex_spacing), 3);
+  // The field has as many vertices as the pixels resolve (Domain::shape_in).
+  const double fewer = std::pow(std::max(1.0, bin * std::min(1.0, 1.0 / vertex_spacing)), 3);
   return (1.0 / (bin * bin * bin) + vertices / fewer) / (1.0 + vertices);
 }
 

@@ -122,6 +122,17 @@ TEST(Stages, FactorsMayBeginAsPlainVertices) {
     EXPECT_EQ(stage.field_kind, FieldKind::kVm);
 }
 
+TEST(Stages, CoarseStagesOfAnAdaptiveTreeCostAnEighth) {
+  FieldOptions field = factors(64, 40);
+  field.tree = TreeKind::kAdaptive;
+  FitOptions fit;
+  fit.coarse_epochs = 6;
+  const std::vector<Stage> stages = make_stages(field, fit);
+  ASSERT_EQ(stages.size(), 2u);
+  EXPECT_DOUBLE_EQ(stages[0].step_cost, 0.125);
+  EXPECT_DOUBLE_EQ(stages[1].step_cost, 1.0);
+}
+
 TEST(Stages, FarVerticesMakeCoarseStagesDearer) {
   FieldOptions field;
   field.kind = FieldKind::kGrid;
@@ -131,10 +142,10 @@ TEST(Stages, FarVerticesMakeCoarseStagesDearer) {
   fit.coarse_epochs = 6;
   const std::vector<Stage> stages = make_stages(field, fit);
   ASSERT_EQ(stages.size(), 3u);
-  // Pixels of 2 × 2 have as many vertices as those of full resolution; they were measured to cost a
-  // fifth to a third, and pixels of 4 × 4 a third of that.
-  EXPECT_NEAR(stages[1].step_cost, 0.3, 0.05);
-  EXPECT_NEAR(stages[0].step_cost / stages[1].step_cost, 0.33, 0.05);
+  // Pixels of 2 × 2 have as many vertices as those of full resolution, and pixels of 4 × 4 have
+  // (3 / 4)³ of them.
+  EXPECT_NEAR(stages[1].step_cost, 0.31, 0.01);
+  EXPECT_NEAR(stages[0].step_cost, 0.1, 0.01);
 }
 
 TEST(Stages, FactorsBeginAsVerticesWhereTheseAreNoMore) {

@@ -58,10 +58,20 @@ TEST(CompactModel, IsSampledWithoutBeingDecoded) {
   const Model undecoded = load_to_sample(scratch / "model.h5", 1000);
   ASSERT_TRUE(decoded.field);
   ASSERT_FALSE(undecoded.field);
+  const auto expect_same = [&](const field::OrientedBox& box) {
+    EXPECT_EQ(sample_box(decoded, box), sample_box(undecoded, box));
+  };
   field::OrientedBox box = region_box(decoded, 1.0);
-  EXPECT_EQ(sample_box(decoded, box), sample_box(undecoded, box));
+  expect_same(box);
+  expect_same(region_box(decoded, 3.7));
+  box.field_from_box = field::rotation_from_euler(90, 8, 270);  // a little about X
+  expect_same(box);
   box.field_from_box = field::rotation_from_euler(10, 20, 30);
-  EXPECT_EQ(sample_box(decoded, box), sample_box(undecoded, box));
+  expect_same(box);
+  box = {.centre_px = {50, 90, 10}, .size = {40, 1, 20}, .voxel_px = 0.7};
+  expect_same(box);
+  box = {.centre_px = {-20, -10, 10}, .size = {90, 90, 40}};  // beyond the model as well
+  expect_same(box);
   base::Random random(3);
   std::vector<field::Point> points;
   for (int i = 0; i < 2000; ++i)

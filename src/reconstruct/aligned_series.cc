@@ -180,12 +180,12 @@ void log_beads(const json& beads) {
   base::log_info(fmt::format(
       "{} gold beads lie {:.2f} pixels (root mean square in x and y) from their places with the "
       "new "
-      "alignment, {:.2f} with that of the files; {}",
+      "alignment, and {:.2f} with that of the files. {}",
       beads["beads"].get<int>(), distance_px[is_used ? "after" : "before"].get<double>(),
       distance_px["files"].get<double>(),
-      is_used ? fmt::format("they made the new one finer, before {:.2f}",
+      is_used ? fmt::format("It was {:.2f} before the beads were used",
                             distance_px["before"].get<double>())
-              : "they tell no more than the field"));
+              : "They do not improve it, so they were not used"));
 }
 
 // Says what the views tell about the specimen's pose. Nothing of it is applied.

@@ -381,7 +381,7 @@ const std::vector<std::vector<MaskDisc>>& TiltSeries::undecided_beads() const {
 }
 
 std::vector<std::vector<BeadSpot>> TiltSeries::find_bead_spots(
-    std::span<const geometry::ViewCorrection> corrections,
+    std::span<const geometry::ViewCorrection> corrections, double axis_x_px,
     const distributed::Communicator& processes) const {
   TOMOFIELD_CHECK(!is_resampled() && corrections.size() == views().size(),
                   "beads are looked for in views as recorded, each with a correction");
@@ -392,8 +392,11 @@ std::vector<std::vector<BeadSpot>> TiltSeries::find_bead_spots(
     return align_image(impl_->line_integrals_with_beads(view), transform, aligned_width(),
                        aligned_height());
   };
-  return search_beads(impl_->options, impl_->plan, impl_->bead_views(processes, read), processes)
-      .spots;
+  BeadViews bead_views = impl_->bead_views(processes, read);
+  bead_views.axis_x_px = axis_x_px;
+  for (std::size_t view = 0; view < corrections.size(); ++view)
+    bead_views.tilt_deg[view] += corrections[view].tilt_deg;
+  return search_beads(impl_->options, impl_->plan, bead_views, processes).spots;
 }
 
 void TiltSeries::read_view(std::size_t view, std::span<float> image,

@@ -163,11 +163,12 @@ class TiltSeries {
   const std::vector<std::vector<MaskDisc>>& undecided_beads() const;
 
   /// Looks for gold beads in the views of a series that is not resampled, each aligned with a
-  /// correction, whether they are masked or not. Returns the spots [bead] in the pixels of the
-  /// aligned, binned views: none if the options ask for no beads, or if there clearly are none.
-  /// Every process calls it and gets the same.
+  /// correction, whether they are masked or not. `axis_x_px` is the tilt axis. Places are in the
+  /// pixels of the aligned, binned views. Returns the spots [bead] whose places are precise: none if
+  /// the options ask for no beads, or if there are none. Without a diameter in the options, there
+  /// must clearly be some (find_beads()). Every process calls it and gets the same.
   std::vector<std::vector<BeadSpot>> find_bead_spots(
-      std::span<const geometry::ViewCorrection> corrections,
+      std::span<const geometry::ViewCorrection> corrections, double axis_x_px,
       const distributed::Communicator& processes) const;
 
  private:

@@ -67,18 +67,39 @@ class ViewedModel : public ViewedVolume {
   // Evaluates the field at the middle of every pixel, or at four points of one that is larger than
   // a pixel of the fit.
   std::vector<float> point_values(const Plane& plane) const {
-    const int side = plane.step > 1 ? 2 : 1, of_pixel = side * side;
+    constexpr std::int64_t kPointsAtOnce = 4 << 20;
+    const std::int64_t side = plane.step > 1 ? 2 : 1;
+    const std::int64_t rows_at_once =
+        std::max<std::int64_t>(1, kPointsAtOnce / (plane.width * side * side));
+    std::vector<float> values;
+    for (std::int64_t row = 0; row < plane.height; row += rows_at_once) {
+      const std::vector<float> rows =
+          values_of_rows(plane, row, std::min(row + rows_at_once, plane.height), side);
+      values.insert(values.end(), rows.begin(), rows.end());
+    }
+    return values;
+  }
+
+  // Returns the means of side × side points of each pixel of some rows of a plane.
+  std::vector<float> values_of_rows(const Plane& plane, std::int64_t first, std::int64_t end,
+                                    std::int64_t side) const {
+    const auto of_pixel = static_cast<std::size_t>(side * side);
+    const auto num_pixels = static_cast<std::size_t>((end - first) * plane.width);
     std::vector<field::Point> points;
-    for (std::int64_t row = 0; row < plane.height; ++row)
+    points.reserve(num_pixels * of_pixel);
+    const auto place = [side](std::int64_t pixel, std::int64_t i) {
+      return static_cast<double>(pixel) +
+             (static_cast<double>(i) + 0.5) / static_cast<double>(side);
+    };
+    for (std::int64_t row = first; row < end; ++row)
       for (std::int64_t column = 0; column < plane.width; ++column)
-        for (int i = 0; i < of_pixel; ++i)
+        for (std::int64_t i = 0; i < side * side; ++i)
           points.push_back(
-              region_.position(plane.position(static_cast<double>(column) + (i % side + 0.5) / side,
-                                              static_cast<double>(row) + (i / side + 0.5) / side)));
+              region_.position(plane.position(place(column, i % side), place(row, i / side))));
     const std::vector<float> densities = output::sample_points(model_, points);
-    std::vector<float> values(static_cast<std::size_t>(plane.width * plane.height));
+    std::vector<float> values(num_pixels);
     for (std::size_t i = 0; i < densities.size(); ++i)
-      values[i / static_cast<std::size_t>(of_pixel)] += densities[i] / static_cast<float>(of_pixel);
+      values[i / of_pixel] += densities[i] / static_cast<float>(of_pixel);
     return values;
   }
 

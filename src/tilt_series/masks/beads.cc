@@ -47,6 +47,7 @@ struct SearchedViews {
   std::vector<std::vector<Spot>> spots;
   std::vector<std::vector<bool>> is_valid;
   std::int64_t width = 0, height = 0;
+  double axis_x_px = 0.0;
 
   bool is_measured(std::size_t view, double x, double y) const {
     const auto px = static_cast<std::int64_t>(std::floor(x)),
@@ -106,11 +107,13 @@ SearchedViews search_views(const BeadViews& views, double diameter,
                            const distributed::Communicator& processes) {
   SearchedViews searched;
   processes.run_collectively([&] { searched = search_own_views(views, diameter, processes); });
-  if (processes.size() == 1) return searched;
-  // Only the owner of the first view has set them.
-  processes.allreduce_sum(std::span(&searched, 1), &SearchedViews::width, &SearchedViews::height);
-  for (std::size_t view = 0; view < views.tilt_deg.size(); ++view)
-    broadcast_view(view, processes, &searched);
+  if (processes.size() > 1) {
+    // Only the owner of the first view has set them.
+    processes.allreduce_sum(std::span(&searched, 1), &SearchedViews::width, &SearchedViews::height);
+    for (std::size_t view = 0; view < views.tilt_deg.size(); ++view)
+      broadcast_view(view, processes, &searched);
+  }
+  searched.axis_x_px = views.axis_x_px.value_or(static_cast<double>(searched.width) / 2);
   return searched;
 }
 
@@ -203,7 +206,7 @@ std::vector<BeadTrack> find_bead_tracks(const SearchedViews& searched,
   rules.max_z_px = static_cast<double>(searched.width) / 2;
   rules.seed_strength = kStrong;
   const TrackedViews tracked{
-      tilt_deg, static_cast<double>(searched.width) / 2,
+      tilt_deg, searched.axis_x_px,
       [&](std::size_t view, double x, double y) { return searched.is_measured(view, x, y); }};
   if (wants_evidence && !is_evident(find_tracks(searched.spots, tracked, rules), tilt_deg.size())) {
     return {};
@@ -284,14 +287,15 @@ std::vector<MaskDisc> predict_discs(const std::vector<BeadTrack>& tracks,
                                     const SearchedViews& searched, double tilt_deg, double radius) {
   std::vector<MaskDisc> discs;
   for (const BeadTrack& track : tracks) {
-    const double x = track_x(track, static_cast<double>(searched.width) / 2, tilt_deg);
+    const double x = track_x(track, searched.axis_x_px, tilt_deg);
     if (x < -radius || x > static_cast<double>(searched.width) + radius) continue;
     discs.push_back({x, track.y_px, radius});
   }
   return discs;
 }
 
-/// Returns the spots of each track, where a view has one that belongs to no other track.
+/// Returns the spots of each track, where a view has one whose place is
+/// precise and that belongs to no other track.
 std::vector<std::vector<BeadSpot>> spots_of_tracks(const std::vector<BeadTrack>& tracks,
                                                    const SearchedViews& searched,
                                                    const std::vector<double>& tilt_deg,
@@ -301,11 +305,10 @@ std::vector<std::vector<BeadSpot>> spots_of_tracks(const std::vector<BeadTrack>&
     const std::vector<Spot>& spots = searched.spots[view];
     std::vector<MaskDisc> places;
     for (const BeadTrack& track : tracks)
-      places.push_back(
-          {track_x(track, static_cast<double>(searched.width) / 2, tilt_deg[view]), track.y_px});
+      places.push_back({track_x(track, searched.axis_x_px, tilt_deg[view]), track.y_px});
     const std::vector<std::size_t> match = match_spots(places, spots, tolerance);
     for (std::size_t i = 0; i < tracks.size(); ++i)
-      if (match[i] < spots.size())
+      if (match[i] < spots.size() && spots[match[i]].is_precise)
         spots_of[i].push_back({view, spots[match[i]].x_px, spots[match[i]].y_px});
   }
   return spots_of;

@@ -193,12 +193,12 @@ std::vector<Spot> find_spots(const MaskedImage& image, double diameter_px, doubl
       const std::size_t at = reduced.index(x, y);
       if (!(contrast[at] >= threshold) || !is_peak(reduced, contrast, x, y, radius)) continue;
       const double middle_x = static_cast<double>(x) + 0.5, middle_y = static_cast<double>(y) + 0.5;
-      const auto [px, py] = spot_place(reduced, middle_x, middle_y, diameter)
-                                .value_or(std::array{middle_x, middle_y});
+      const auto place = spot_place(reduced, middle_x, middle_y, diameter);
+      const auto [px, py] = place.value_or(std::array{middle_x, middle_y});
       const auto height = static_cast<double>(contrast[at]);
       spots.push_back({(px - centre_x) * factor + static_cast<double>(image.width) / 2,
                        (py - centre_y) * factor + static_cast<double>(image.height) / 2, height,
-                       height / spread});
+                       height / spread, place.has_value()});
     }
   }
   return spots;

@@ -10,8 +10,9 @@ namespace tomofield::tilt_series {
 struct Spot {
   double x_px = 0.0;  ///< its centre; pixel i covers [i, i + 1)
   double y_px = 0.0;
-  double contrast = 0.0;  ///< by how much it is denser than its surroundings
-  double strength = 0.0;  ///< the same over the spread of all places of the image
+  double contrast = 0.0;    ///< by how much it is denser than its surroundings
+  double strength = 0.0;    ///< the same over the spread of all places of the image
+  bool is_precise = false;  ///< its place is that of spot_place.h
 };
 
 /// Finds round spots of about this diameter (pixels, >= 2) in an image whose dense
