@@ -16,7 +16,7 @@ constexpr double kVertexCost = 0.4;
 // of it is for samples of rays, the rest for vertices: with 61 views and a vertex a pixel, vertices
 // take so many times as long (docs/results/speed.md).
 double cost_of_bin(int bin, double vertex_spacing) {
-  constexpr double kVerticesOverSamples = 7.0;
+  constexpr double kVerticesOverSamples = 2.0;
   const double vertices = kVerticesOverSamples / std::pow(vertex_spacing, 3);
   // The field has as many vertices as the pixels resolve (Domain::shape_in).
   const double fewer = std::pow(std::max(1.0, bin * std::min(1.0, 1.0 / vertex_spacing)), 3);
