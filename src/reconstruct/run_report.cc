@@ -106,6 +106,21 @@ std::vector<HtmlFact> facts_of_size(const AllFits& fits, const report::EmbeddedV
   return facts;
 }
 
+// Adds how far gold beads lie from their places, if an alignment followed some.
+void add_beads(const json& alignment, std::vector<HtmlFact>& facts) {
+  if (!alignment.is_object() || !alignment.contains("beads")) return;
+  const json &beads = alignment.at("beads"), &distance_px = beads.at("distance_px");
+  const bool is_new = alignment.at("accepted").get<bool>();
+  const char* of_new = beads.at("accepted").get<bool>() ? "after" : "before";
+  facts.push_back(
+      {"Gold beads", fmt::format("{:.2f} px", number(distance_px.at(is_new ? of_new : "files"))),
+       fmt::format("{} beads lie so far from their places (root mean square in x and y). With the "
+                   "alignment {}: {:.2f} px.",
+                   beads.at("beads").get<int>(),
+                   is_new ? "of the files" : "that was tried and not taken",
+                   number(distance_px.at(is_new ? "files" : of_new)))});
+}
+
 std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics) {
   std::vector<HtmlFact> facts;
   facts.push_back({"Residual", fmt::format("{:.2f}", number(verdict.at("residual"))),
@@ -125,6 +140,7 @@ std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics) {
                      fmt::format("{:.2g} px", number(views.at("usual_displacement_px"))),
                      "9 of 10 views lie closer than this to where the tomogram predicts them."});
   }
+  add_beads(metrics.value("alignment", json()), facts);
   if (const double speckle = number(verdict.value("speckle", json())); std::isfinite(speckle))
     facts.push_back({"Speckle", fmt::format("{:.3f} %", 100 * speckle),
                      "Voxels that stick out from all their neighbours."});

@@ -87,6 +87,31 @@ TEST_F(RunReport, ShowsWarningsAndNumbers) {
   EXPECT_FALSE(page_has("even half"));
 }
 
+TEST_F(RunReport, ShowsHowFarGoldBeadsLieFromTheirPlaces) {
+  EXPECT_FALSE(page_has("Gold beads"));
+  json& alignment = record_["metrics"]["alignment"];
+  alignment = {{"accepted", true},
+               {"held_out_error", {{"before", 0.2}, {"after", 0.1}}},
+               {"beads",
+                {{"beads", 12},
+                 {"accepted", true},
+                 {"distance_px", {{"files", 1.25}, {"before", 0.5}, {"after", 0.25}}}}},
+               {"views", json::array()}};
+  for (const double tilt_deg : {10.0, 20.0})
+    alignment["views"].push_back({{"tilt_deg", tilt_deg},
+                                  {"shift_px", {1.0, 2.0}},
+                                  {"rotation_deg", 0.0},
+                                  {"log_magnification", 0.0},
+                                  {"tilt_change_deg", 0.0},
+                                  {"correlation", 0.9},
+                                  {"shift_error_px", {0.1, 0.1}}});
+  EXPECT_TRUE(page_has("0.25 px"));
+  EXPECT_TRUE(page_has("of the files: 1.25 px"));
+  alignment["accepted"] = false;
+  EXPECT_TRUE(page_has("1.25 px"));
+  EXPECT_TRUE(page_has("not taken: 0.25 px"));
+}
+
 TEST_F(RunReport, ShowsBothHalvesAndTheirCorrelation) {
   record_["halves"] = {
       {"fsc", {{"frequency_per_A", {0.01, 0.02}}, {"all", {{"correlation", {1.0, nullptr}}}}}},
