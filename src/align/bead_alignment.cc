@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "align/bead_equations.h"
+#include "align/slow_modes.h"
 #include "base/trace.h"
 #include "tilt_series/tilt_series.h"
 
@@ -26,9 +27,9 @@ constexpr std::size_t kMostTurns = 8;
 constexpr double kSure = 1.0;  // standard errors by which the steps must pay
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-// What a joint alignment leaves of each quantity on phantoms, as standard deviations of a
-// coefficient, in pixels of the fit and radians (docs/results/alignment.md). It sees the direction
-// of the tilt axis least of all.
+// A joint alignment leaves errors of these sizes on phantoms: standard deviations of a coefficient
+// of each quantity, in pixels of the fit and radians (docs/results/alignment.md). It sees the
+// direction of the tilt axis least of all.
 constexpr double kLeft[BeadUnknown::kQuantities] = {0.05, 0.03, 0.05 * kDegree, 5e-4};
 constexpr double kLeftOfAxis = 0.15 * kDegree;
 
@@ -49,9 +50,7 @@ std::vector<BeadUnknown> unknowns_of(const Freedoms& freedoms) {
 
 // Returns the values [view, mode] of the cosines.
 Eigen::MatrixXd cosines(std::span<const double> tilt_deg) {
-  std::vector<std::size_t> by_tilt(tilt_deg.size());
-  std::iota(by_tilt.begin(), by_tilt.end(), std::size_t{0});
-  std::ranges::stable_sort(by_tilt, {}, [&](std::size_t view) { return tilt_deg[view]; });
+  const std::vector<std::size_t> by_tilt = order_of_tilts(tilt_deg);
   const auto n = std::ssize(tilt_deg);
   Eigen::MatrixXd values(n, kModes);
   for (Eigen::Index rank = 0; rank < n; ++rank)

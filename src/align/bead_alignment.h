@@ -34,7 +34,7 @@ struct BeadAlignment {
   /// alignment of the files, with the corrections that were given, and after the steps. Outliers
   /// count less.
   double files_px = 0.0, before_px = 0.0, after_px = 0.0;
-  /// By which part the squared distances fall, over beads that do not decide about the steps.
+  /// Says by which part the squared distances fall, over beads that do not decide about the steps.
   MeanGain gain;
 };
 

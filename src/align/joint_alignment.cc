@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -95,10 +94,7 @@ class AligningFit {
 
   // Returns the steps that are taken for what the registrations found.
   std::vector<ViewCorrection> limited(std::vector<ViewCorrection> steps, const fit::Stage& stage) {
-    std::vector<std::size_t> by_tilt(steps.size());
-    std::iota(by_tilt.begin(), by_tilt.end(), std::size_t{0});
-    std::ranges::stable_sort(
-        by_tilt, {}, [&](std::size_t view) { return measurement_.geometry.tilt_deg[view]; });
+    const std::vector<std::size_t> by_tilt = order_of_tilts(measurement_.geometry.tilt_deg);
     std::vector<double> shifts;
     for (const std::size_t view : by_tilt) shifts.push_back(steps[view].shift_x_px);
     slow_modes_.amplify(shifts);

@@ -1,11 +1,9 @@
 #include "align/local_alignment.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <numeric>
 #include <span>
 #include <utility>
 
@@ -73,10 +71,7 @@ class LocalFit {
             problem, start, fit::make_stages(field_, local_fit(problem.seed)).front().bin, field_,
             processes)),
         fit_(measurement_, field_, local_fit(problem.seed), processes),
-        by_tilt_(start.size()) {
-    std::iota(by_tilt_.begin(), by_tilt_.end(), std::size_t{0});
-    std::ranges::stable_sort(
-        by_tilt_, {}, [&](std::size_t view) { return measurement_.geometry.tilt_deg[view]; });
+        by_tilt_(order_of_tilts(measurement_.geometry.tilt_deg)) {
     found_.agreement.resize(start.size());
     found_.corrections = std::move(start);
   }

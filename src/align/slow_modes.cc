@@ -16,6 +16,13 @@ constexpr double kTurned = -0.3;        // of the last step, from which on a ste
 
 }  // namespace
 
+std::vector<std::size_t> order_of_tilts(std::span<const double> tilt_deg) {
+  std::vector<std::size_t> order(tilt_deg.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t view) { return tilt_deg[view]; });
+  return order;
+}
+
 void amplify_slow_modes(std::span<double> values) {
   const auto n = static_cast<int>(values.size());
   std::vector<double> added(values.size());

@@ -18,7 +18,7 @@ std::vector<float> sample_box(const CodedField& coded, const field::OrientedBox&
 
 /// Returns the densities at points, as field::sample_points() does for the field that
 /// decode_field() returns. The bands around each row of root cells that has points are decoded
-/// once.
+/// for it.
 std::vector<float> sample_points(const CodedField& coded, std::span<const field::Point> points);
 
 }  // namespace tomofield::compact

@@ -13,9 +13,9 @@ namespace {
 constexpr double kVertexCost = 0.4;
 
 // Returns the cost of a step with pixels so many times as wide, in steps at full resolution. A part
-// of it is for samples of rays, the rest for vertices: with 61 views and a vertex a pixel, vertices
-// take so many times as long (docs/results/speed.md).
+// of it is for samples of rays, the rest for vertices (docs/results/speed.md).
 double cost_of_bin(int bin, double vertex_spacing) {
+  // The time of vertices over that of samples, with 61 views and a vertex a pixel.
   constexpr double kVerticesOverSamples = 2.0;
   const double vertices = kVerticesOverSamples / std::pow(vertex_spacing, 3);
   // The field has as many vertices as the pixels resolve (Domain::shape_in).

@@ -179,8 +179,7 @@ void log_beads(const json& beads) {
   const bool is_used = beads["accepted"].get<bool>();
   base::log_info(fmt::format(
       "{} gold beads lie {:.2f} pixels (root mean square in x and y) from their places with the "
-      "new "
-      "alignment, and {:.2f} with that of the files. {}",
+      "new alignment, and {:.2f} with that of the files. {}",
       beads["beads"].get<int>(), distance_px[is_used ? "after" : "before"].get<double>(),
       distance_px["files"].get<double>(),
       is_used ? fmt::format("It was {:.2f} before the beads were used",
