@@ -164,9 +164,9 @@ class TiltSeries {
 
   /// Looks for gold beads in the views of a series that is not resampled, each aligned with a
   /// correction, whether they are masked or not. `axis_x_px` is the tilt axis. Places are in the
-  /// pixels of the aligned, binned views. Returns the spots [bead] whose places are precise: none if
-  /// the options ask for no beads, or if there are none. Without a diameter in the options, there
-  /// must clearly be some (find_beads()). Every process calls it and gets the same.
+  /// pixels of the aligned, binned views. Returns the spots [bead] whose places are precise: none
+  /// if the options ask for no beads, or if there are none. Without a diameter in the options,
+  /// there must clearly be some (find_beads()). Every process calls it and gets the same.
   std::vector<std::vector<BeadSpot>> find_bead_spots(
       std::span<const geometry::ViewCorrection> corrections, double axis_x_px,
       const distributed::Communicator& processes) const;
