@@ -4,6 +4,15 @@
 #include "field/tree/quadtree_bands.h"
 
 namespace tomofield::compact {
+namespace {
+
+// Returns how many numbers a leaf has in memory while it is decoded: its factors and its vertices.
+std::size_t decoded_numbers(const field::LeafShape& shape) {
+  return field::count_parameters(FieldKind::kVm, {shape}) +
+         field::count_parameters(FieldKind::kGrid, {with_upper_faces(shape)});
+}
+
+}  // namespace
 
 std::size_t LeafCodes::num_parameters() const {
   return field::count_parameters(FieldKind::kVm, shapes);
@@ -19,14 +28,14 @@ field::LeafShape with_upper_faces(const field::LeafShape& shape) {
   return {.nx = shape.nx + 1, .ny = shape.ny + 1, .nz = shape.nz};
 }
 
-std::size_t decoded_numbers(const field::LeafShape& shape) {
-  return field::count_parameters(FieldKind::kVm, {shape}) +
-         field::count_parameters(FieldKind::kGrid, {with_upper_faces(shape)});
-}
-
 std::size_t decoded_bytes(const std::vector<field::LeafShape>& shapes) {
+  constexpr std::size_t kMost = std::size_t{1} << 40;
   std::size_t numbers = 0;
-  for (const field::LeafShape& shape : shapes) numbers += decoded_numbers(shape);
+  for (const field::LeafShape& shape : shapes) {
+    const std::size_t more = decoded_numbers(shape);
+    if (more > kMost - numbers) return kNoMemoryHolds;  // the sum could wrap
+    numbers += more;
+  }
   return numbers * sizeof(float);
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -34,10 +35,11 @@ inline constexpr field::LeafShape kNoLeaf{.nx = 1, .ny = 1, .nz = 2};
 /// Returns the shape of a leaf with its upper faces.
 field::LeafShape with_upper_faces(const field::LeafShape& shape);
 
-/// Returns how many numbers a leaf has in memory while it is decoded: its factors and its vertices.
-std::size_t decoded_numbers(const field::LeafShape& shape);
+/// Stands for more bytes than any memory has.
+inline constexpr std::size_t kNoMemoryHolds = std::numeric_limits<std::size_t>::max();
 
-/// Returns the bytes that leaves take in memory while they are decoded.
+/// Returns the bytes that the factors and the vertices of leaves take in memory while they are
+/// decoded, or kNoMemoryHolds if they are more than 2^40 numbers.
 std::size_t decoded_bytes(const std::vector<field::LeafShape>& shapes);
 
 /// Holds a field as codes, which take little memory (decode_field).

@@ -54,14 +54,16 @@ class ModelReader {
  public:
   explicit ModelReader(const std::filesystem::path& path) : path_(path.string()), file_(path) {}
 
-  // Keeps all leaves if `choose` is empty.
-  Model read(TrainingState* training, const ChooseLeaves& choose, bool decodes = true) const {
+  // Keeps all leaves if `choose` is empty. Decodes a compact model whose leaves take at most
+  // `most_decoded_bytes`.
+  Model read(TrainingState* training, const ChooseLeaves& choose,
+             std::size_t most_decoded_bytes = compact::kNoMemoryHolds) const {
     const StoredGroup root = file_.root();
     Model model;
     read_info(root, model);
     const StoredGroup group = root.group("field");
     if (group.has("code"))
-      read_compact_field(group, choose, decodes, model);
+      read_compact_field(group, choose, most_decoded_bytes, model);
     else
       model.field = read_field(group, choose);
     if (training != nullptr) *training = read_training(/*with_floats=*/true);
@@ -291,15 +293,16 @@ class ModelReader {
     return field;
   }
 
-  void read_compact_field(const StoredGroup& group, const ChooseLeaves& choose, bool decodes,
-                          Model& model) const {
+  void read_compact_field(const StoredGroup& group, const ChooseLeaves& choose,
+                          std::size_t most_decoded_bytes, Model& model) const {
     std::vector<int> kept;
     make_room([&] {
       compact::CodedField coded{read_tree(group.group("tree")), read_thickness(group), {}};
       if (choose) kept = choose(coded.tree);
       coded.codes = read_codes(group, coded.tree);
-      const std::size_t bytes = bytes_of_decoded(coded.codes.shapes);
-      if (decodes) {
+      const std::size_t bytes = compact::decoded_bytes(coded.codes.shapes);
+      require(bytes < compact::kNoMemoryHolds, "its leaves need more numbers than any file holds");
+      if (bytes <= most_decoded_bytes) {
         constexpr std::size_t kSmall = std::size_t{1} << 24;
         if (bytes > kSmall)
           base::require_memory(bytes, fmt::format("'{}'", path_).c_str(),
@@ -308,7 +311,7 @@ class ModelReader {
       }
       model.coded = std::move(coded);
     });
-    if (!decodes) return;
+    if (!model.field) return;
     read_decoder(group, *model.field);
     if (choose) model.field->keep_only(kept);
     require_finite_parameters(*model.field, fmt::format("'{}' is a damaged model", path_));
@@ -337,19 +340,6 @@ class ModelReader {
     return codes;
   }
 
-  // Returns the bytes of the factors and of the vertices of all leaves. Counts leaf by leaf, since
-  // the sum could wrap.
-  std::size_t bytes_of_decoded(const std::vector<field::LeafShape>& shapes) const {
-    constexpr std::size_t kMost = std::size_t{1} << 40;
-    std::size_t count = 0;
-    for (const field::LeafShape& shape : shapes) {
-      const std::size_t more = compact::decoded_numbers(shape);
-      require(more <= kMost - count, "its leaves need more numbers than any file holds");
-      count += more;
-    }
-    return count * sizeof(float);
-  }
-
   template <typename T>
   static std::map<std::string, std::vector<T>> read_arrays(const StoredGroup& group) {
     std::map<std::string, std::vector<T>> arrays;
@@ -368,7 +358,11 @@ Model load_model(const std::filesystem::path& path, TrainingState* training) {
 }
 
 Model load_undecoded(const std::filesystem::path& path, TrainingState* training) {
-  return ModelReader(path).read(training, {}, /*decodes=*/false);
+  return ModelReader(path).read(training, {}, /*most_decoded_bytes=*/0);
+}
+
+Model load_decoded_up_to(const std::filesystem::path& path, std::size_t most_bytes) {
+  return ModelReader(path).read(nullptr, {}, most_bytes);
 }
 
 ModelOutline load_outline(const std::filesystem::path& path) {

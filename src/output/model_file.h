@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -101,6 +102,9 @@ Model load_model(const std::filesystem::path& path, TrainingState* training = nu
 
 /// Does the same, but does not decode a compact model: it has no `field`.
 Model load_undecoded(const std::filesystem::path& path, TrainingState* training = nullptr);
+
+/// Reads a model. Decodes a compact one only if this takes at most `most_bytes`.
+Model load_decoded_up_to(const std::filesystem::path& path, std::size_t most_bytes);
 
 /// Reads the outline of a model, without its parameters. Throws Error as load_model() does.
 ModelOutline load_outline(const std::filesystem::path& path);

@@ -13,9 +13,7 @@ std::size_t usual_decoded_bytes() {
 }
 
 Model load_to_sample(const std::filesystem::path& path, std::size_t most_bytes) {
-  Model model = load_undecoded(path);
-  if (model.field || compact::decoded_bytes(model.coded->codes.shapes) > most_bytes) return model;
-  return load_model(path);
+  return load_decoded_up_to(path, most_bytes);
 }
 
 void sample_box(const Model& model, const field::OrientedBox& box, const field::BoxSink& sink) {
