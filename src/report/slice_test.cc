@@ -63,8 +63,7 @@ TEST_F(SlicePictures, ShowEachVoxelAtItsPlace) {
   EXPECT_EQ(xz.height, nz * zoom);
   EXPECT_EQ(yz.width, ny * zoom);
   EXPECT_EQ(yz.height, nz * zoom);
-  const auto pixel = [zoom](const testing::PngPicture& picture, std::int64_t right,
-                            std::int64_t up) {
+  const auto pixel = [](const testing::PngPicture& picture, std::int64_t right, std::int64_t up) {
     return picture.at(right * zoom + zoom / 2, picture.height - 1 - up * zoom - zoom / 2);
   };
   EXPECT_EQ(pixel(xy, 3, 4), 255);
