@@ -144,7 +144,8 @@ class TileFits {
         progress(
             base::progress_at(done, running.seconds(), fmt::format("loss {:.4f}", loss.back())));
       }
-      stopped = run_.hooks.stop_requested && run_.hooks.stop_requested();
+      // A tile that is done is kept: the run stops in the next one.
+      stopped = run_.hooks.stop_requested && run_.hooks.stop_requested() && !fit.is_done();
       return !stopped;
     });
     return !stopped;
