@@ -238,9 +238,9 @@ RunResult fit_by_tiles(const Run& run, const TilePlan& plan, RunRecord& record) 
   const auto stopped = [&] {
     return RunResult{.outcome = Outcome::kStopped, .results = {}, .checkpoint = run.paths.model};
   };
+  FinishedTiles finished(run, record.origin);  // refuses tiles of another run before any work
   const std::optional<CoarseStart> start = fit_coarse_stages(run, plan, record);
   if (!start) return stopped();
-  FinishedTiles finished(run, record.origin);
   const std::vector<Tile> tiles = plan.tiles_from(finished.num_rows());
   const std::size_t middle = middle_tile(tiles, plan.num_rows);
   TileFits fits(run, record, *start, plan.num_rows, finished);
