@@ -201,6 +201,7 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
   const auto locks = reconstruction::claim_outputs(internal);
   Listener listener(progress);
   reconstruction::ReconstructHooks hooks = listener.hooks();
+  reconstruction::check_before_alignment(internal);
   if (!reconstruction::align_series(internal, hooks, distributed::Communicator::alone())) return {};
   const tilt_series::TiltSeries views(internal.input);
   const reconstruction::RunPlan plan = reconstruction::plan_run(views, internal);
