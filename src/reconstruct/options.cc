@@ -316,6 +316,7 @@ std::vector<io::OutputLock> claim_outputs(const ReconstructOptions& options) {
   if (options.makes_halves())
     for (const OutputPaths::OfHalf& half : paths.halves) files.push_back(half.model);
   if (options.may_use_tiles()) files.push_back(paths.tiles);
+  if (options.resolved.align != Alignment::kOff) files.push_back(paths.alignment);
   if (options.resolved.output.empty()) files.clear();
   return io::claim_outputs(files, [&] { check_options(options); });
 }
