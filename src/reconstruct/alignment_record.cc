@@ -24,6 +24,7 @@
 #include "io/json_numbers.h"
 #include "io/text_lines.h"
 #include "io/view_table.h"
+#include "measurement/view_transfers.h"
 #include "tilt_series/open_views.h"
 #include "tomofield/error.h"
 
@@ -51,7 +52,7 @@ std::vector<std::pair<const char*, std::filesystem::path>> small_files(const Ser
   add("aln", files.aln);
   add("mdoc", files.mdoc);
   add("fiducials", files.fiducials);
-  add("ctf", files.ctf);
+  if (measurement::has_ctf_file(files)) add("ctf", files.ctf);
   add("mtf", files.mtf);
   if (!files.stack.empty() && io::is_view_table(files.stack)) add("stack", files.stack);
   return all;

@@ -135,6 +135,14 @@ TEST_F(AlignmentRecord, IsOfTheOptionsThatItDependsOn) {
   EXPECT_EQ(refusal_with([](Options& options) { options.vertex_spacing = 0.5; }), "");
 }
 
+TEST_F(AlignmentRecord, KnowsThatNoneIsNoFile) {
+  ReconstructOptions options = run();
+  options.files.ctf = "none";
+  EXPECT_FALSE(alignment_origin(options)["series"]["files"].contains("ctf"));
+  options.files.ctf = scratch_.write("series.defocus", "1 1 0 0 3000 2\n");
+  EXPECT_TRUE(alignment_origin(options)["series"]["files"].contains("ctf"));
+}
+
 TEST_F(AlignmentRecord, IsRefusedIfItIsDamaged) {
   const auto refuse = [&](const std::string& text, const std::string& word) {
     std::ofstream(file_) << text;
