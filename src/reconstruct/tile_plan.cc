@@ -132,7 +132,7 @@ std::optional<int> rows_of_resumed_run(const ReconstructOptions& options) {
   std::optional<int> rows;
   if (!options.resolved.resume) return rows;
   const OutputPaths paths = output_paths(options.resolved.output);
-  for (const std::filesystem::path& file : {paths.tiles, paths.model})
+  for (const std::filesystem::path& file : {paths.model, paths.tiles})
     if (!rows && std::filesystem::exists(file))
       read_checkpoint([&] { rows = stored_tile_rows(file); });
   return rows;

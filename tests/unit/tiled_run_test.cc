@@ -127,6 +127,22 @@ TEST(TiledRun, ThatStartsAnewForgetsOldTiles) {
   EXPECT_TRUE(reconstruct(series, options).is_finished);
 }
 
+TEST(TiledRun, ThatWasStoppedDoesNotKeepAWholeFitFromResuming) {
+  const ScratchDirectory scratch;
+  const TiltSeries series = two_bands();
+  stop_in_second_tile(series, tiled_options(scratch / "other.mrc"));
+  Options options = tiled_options(scratch / "volume.mrc");
+  options.seed = 5;
+  options.tile_rows.reset();  // the memory is enough for the whole region
+  const auto stop_at_once = [](const Progress&) { return false; };
+  EXPECT_FALSE(reconstruct(series, options, stop_at_once).is_finished);
+  fs::rename(scratch / "other_tiles.h5", scratch / "volume_tiles.h5");
+  options.resume = true;
+  const Reconstruction made = reconstruct(series, options);
+  EXPECT_TRUE(made.is_finished);
+  EXPECT_TRUE(tiles_of(made).is_null());
+}
+
 TEST(TiledRun, RefusesTilesOfAnotherRunBeforeAnyWork) {
   const ScratchDirectory scratch;
   const TiltSeries series = two_bands();
