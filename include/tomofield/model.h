@@ -40,7 +40,8 @@ class Model {
   /// Returns the size in Å of the pixels that positions count.
   double pixel_size_A() const;
   /// Returns the region of interest, in whole voxels of `voxel_px` pixels. Its angles are 0 unless
-  /// the views have an x-axis tilt, which turns the specimen in the model.
+  /// the views have an x-axis tilt, which turns the specimen in the model. Throws Error for a size
+  /// of voxels that is not finite or not above 0.
   SampleBox region(double voxel_px = 1.0) const;
 
   /// Returns the values of a box, [z, y, x] with x fastest, as `tomofield export` writes them.

@@ -11,6 +11,7 @@
 #include "io/output_set.h"
 #include "reconstruct/alignment_output.h"
 #include "reconstruct/options.h"
+#include "reconstruct/reconstruct.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::cli {
@@ -23,10 +24,11 @@ void run(option_table::Choices& choices, const std::vector<option_table::Setting
   reconstruction::ReconstructOptions options =
       reconstruction::run_options(choices.files, choices.options);
   options.origins = origins;
-  const std::vector<io::OutputLock> locks = claim_run(options, false);
+  const std::vector<io::OutputLock> locks = reconstruction::claim_alignment(options);
+  reconstruction::check_alignment_alone(options);
+  io::OutputSet results;  // the record of the alignment joins the other files
   const tilt_series::TiltSeries series =
-      open_series(options, false, distributed::Communicator::alone());
-  io::OutputSet results;
+      align_and_open(options, distributed::Communicator::alone());
   reconstruction::write_alignment_results(series, options);
   results.commit();
   print("alignment {}\n", reconstruction::output_paths(options.resolved.output).alignment.string());

@@ -163,6 +163,12 @@ tilt_series::TiltSeries open_series(reconstruction::ReconstructOptions& options,
                                     const distributed::Communicator& processes) {
   if (dry_run || options.resolved.align == Alignment::kOff)
     return tilt_series::TiltSeries(options.input, processes);
+  reconstruction::check_before_alignment(options, processes);
+  return align_and_open(options, processes);
+}
+
+tilt_series::TiltSeries align_and_open(reconstruction::ReconstructOptions& options,
+                                       const distributed::Communicator& processes) {
   stop_on_signals(processes.size() > 1);
   reconstruction::ReconstructHooks hooks{
       .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};

@@ -17,11 +17,15 @@ void add_run_options(CLI::App& command, option_table::Choices& choices, bool& dr
 std::vector<io::OutputLock> claim_run(const reconstruction::ReconstructOptions& options,
                                       bool check_alone);
 
-/// Opens the series of a run. Aligns it first with a progress bar, if the options ask for it and
-/// the run is not dry, and puts what it found into the options. Throws an ExitStatus if a signal
-/// stops it.
+/// Opens the series of a run. If the options ask for it and the run is not dry, checks first
+/// whether the whole run is possible, and aligns the series (align_and_open()).
 tilt_series::TiltSeries open_series(reconstruction::ReconstructOptions& options, bool dry_run,
                                     const distributed::Communicator& processes);
+
+/// Aligns a series with a progress bar, puts what it found into the options, and opens the series.
+/// Throws an ExitStatus if a signal stops it.
+tilt_series::TiltSeries align_and_open(reconstruction::ReconstructOptions& options,
+                                       const distributed::Communicator& processes);
 
 /// Prints the plan of a reconstruction, runs it with a progress bar, and writes its pictures. With
 /// `dry_run` it prints the plan alone. The caller has called claim_run() before. If a signal stops

@@ -33,7 +33,8 @@ void finish(const PlaceTree& places, Choice& choice) {
 }
 
 // Finds by bisection of the logarithm the multiplier at which `is_enough` becomes true; it is true
-// for large ones (or small ones if `from_above` is false). Returns the choice on the true side.
+// for large ones (or for small ones, if `large_is_enough` is false). Returns the choice on the true
+// side.
 template <typename IsEnough>
 Choice bisect(const PlaceTree& places, bool large_is_enough, const IsEnough& is_enough) {
   constexpr double kSmallest = 1e-30, kLargest = 1e30;
@@ -57,7 +58,7 @@ Choice bisect(const PlaceTree& places, bool large_is_enough, const IsEnough& is_
 }  // namespace
 
 Choice cheapest_choice(const PlaceTree& places, double multiplier) {
-  Choice choice{.candidate = std::vector<int>(places.size(), kSplit), .multiplier = multiplier};
+  Choice choice{.candidate = std::vector<int>(places.size(), kSplit)};
   std::vector<double> least(places.size());
   for (std::size_t i = places.size(); i-- > 0;) {
     const Place& place = places[i];

@@ -28,10 +28,10 @@ inline constexpr int kUnused = -2;  ///< a larger place stands for it
 struct Choice {
   std::vector<int> candidate;  ///< one for each place
   double cost = 0.0, error = 0.0;
-  double multiplier = 0.0;  ///< error that a unit of cost must save (choose_structure)
 };
 
-/// Returns the choice that minimises error + multiplier · cost. It goes up the tree once.
+/// Returns the choice that minimises error + multiplier · cost: the multiplier is the error that a
+/// unit of cost must save. It goes up the tree once.
 Choice cheapest_choice(const PlaceTree& places, double multiplier);
 
 /// Returns the choice with the smallest error whose cost is at most `budget`, among those that are

@@ -33,7 +33,7 @@ struct Candidates {
       if (leaf.square.size % (2 * kernels::kLanes) == 0 && leaf.square.size / 2 >= options.min_size)
         splits.push_back(i);
       // Siblings are four consecutive leaves with one parent.
-      if (leaf.level <= options.coarsest_level || !starts_siblings(tree, i)) continue;
+      if (!starts_siblings(tree, i)) continue;
       merges.push_back(leaf.parent);
       siblings.push_back({i, i + 1, i + 2, i + 3});
     }

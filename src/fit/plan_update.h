@@ -10,7 +10,6 @@ namespace tomofield::fit {
 struct PlanOptions {
   int budget = 0;              ///< max. number of leaves of the region of interest
   int min_size = 16;           ///< min. side of a leaf, px; sides stay multiples of a slab anyway
-  int coarsest_level = 0;      ///< min. level of a merged leaf
   double split_factor = 0.75;  ///< predicted error of four quarters over that of their leaf
   double merge_factor = 1.1;   ///< predicted error of a merged leaf over the sum of the four
 };

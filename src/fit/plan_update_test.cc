@@ -86,7 +86,7 @@ class BruteForce {
     if (leaf.square.size / 2 >= options_.min_size)
       visit(i + 1, leaves + 3,
             error - (1 - options_.split_factor) * errors_[static_cast<std::size_t>(i)]);
-    if (leaf.level <= options_.coarsest_level || i + 3 >= tree_.num_leaves()) return;
+    if (leaf.level == 0 || i + 3 >= tree_.num_leaves()) return;
     double sum = 0;
     for (int c = 0; c < 4; ++c) {
       if (tree_.leaf(i + c).parent != leaf.parent) return;
@@ -118,7 +118,6 @@ TEST_F(PlanUpdate, IsOptimalOnRandomTrees) {
     PlanOptions options;
     options.split_factor = random.uniform(0.2, 0.9);
     options.merge_factor = random.uniform(1.01, 2.0);
-    options.coarsest_level = static_cast<int>(random.below(2));
     options.min_size = random.below(2) == 0 ? 16 : 32;
     const BruteForce oracle(tree, errors, options);
     for (const int room : {-30, -6, -3, -1, 0, 1, 2, 3, 7, 1000}) {
@@ -175,7 +174,6 @@ TEST_F(PlanUpdate, ComesAsCloseToATightBudgetAsOneEditCan) {
   const Plan plan = plan_update(tree, errors, {.budget = 1});
   EXPECT_EQ(plan.edit.merge.size(), 4u);
   EXPECT_TRUE(plan.edit.split.empty());
-  EXPECT_TRUE(plan_update(tree, errors, {.budget = 1, .coarsest_level = 2}).edit.is_empty());
 }
 
 TEST_F(PlanUpdate, IsQuickForAThousandLeaves) {

@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,6 +19,7 @@
 #include "io/json.h"
 #include "measurement/prepare.h"
 #include "measurement/view_transfers.h"
+#include "reconstruct/alignment_record.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
 
@@ -28,126 +27,6 @@ namespace tomofield::reconstruction {
 namespace {
 
 using nlohmann::json;
-
-constexpr double kRadian_deg = 180.0 / std::numbers::pi;
-constexpr std::size_t kFewestViews = 12;
-
-// Returns the options that decide what the alignment finds.
-json relevant_options(const ReconstructOptions& options) {
-  const json all = options_json(options);
-  return {{"input", all["input"]}, {"specimen", all["specimen"]}, {"seed", options.fit.seed}};
-}
-
-json held_out_json(const align::Comparison& held_out) {
-  return {{"held_out_error", {{"before", held_out.before}, {"after", held_out.after}}},
-          {"gain", {{"mean", held_out.gain.mean}, {"standard_error", held_out.gain.error}}}};
-}
-
-json local_trial_json(const align::Alignment& found) {
-  json trial = held_out_json(found.local->held_out);
-  trial["accepted"] = found.local->is_accepted;
-  trial["steps_px"] = found.local->steps_px;
-  if (!found.local->is_accepted) return trial;
-  double squares = 0.0;
-  for (const geometry::ViewCorrection& view : found.corrections)
-    squares += view.local->mean_square();
-  const geometry::ViewWarp& motion = *found.corrections.front().local;
-  trial["size_px"] = {motion.width_px, motion.height_px};
-  trial["rms_px"] = std::sqrt(squares / static_cast<double>(found.corrections.size()));
-  return trial;
-}
-
-json pose_json(const align::FoundPose& found) {
-  return {{"pitch_deg", found.pose.pitch_deg},
-          {"pitch_error_deg", found.error.pitch_deg},
-          {"thickness_px", found.pose.thickness_px},
-          {"thickness_error_px", found.error.thickness_px}};
-}
-
-json beads_json(const align::BeadAlignment& beads) {
-  return {{"beads", beads.num_beads},
-          {"distance_px",
-           {{"files", beads.files_px}, {"before", beads.before_px}, {"after", beads.after_px}}},
-          {"gain", {{"mean", beads.gain.mean}, {"standard_error", beads.gain.error}}},
-          {"accepted", beads.is_accepted}};
-}
-
-json view_json(const tilt_series::View& view, const geometry::ViewCorrection& correction,
-               const align::ViewAgreement& agreement, bool is_unaligned) {
-  json result = {{"section", view.section + 1},
-                 {"tilt_deg", view.tilt_deg},
-                 {"shift_px", {correction.shift_x_px, correction.shift_y_px}},
-                 {"rotation_deg", correction.rotation_rad * kRadian_deg},
-                 {"log_magnification", correction.log_magnification},
-                 {"tilt_change_deg", correction.tilt_deg},
-                 {"correlation", agreement.correlation},
-                 {"shift_error_px", agreement.error_px},
-                 {"left_out", is_unaligned}};
-  if (correction.local) result["local_px"] = correction.local->rows();
-  return result;
-}
-
-json record_of(const tilt_series::TiltSeries& series, const align::Alignment& found,
-               const ReconstructOptions& options, double seconds) {
-  json views = json::array();
-  for (std::size_t v = 0; v < series.views().size(); ++v) {
-    views.push_back(view_json(series.views()[v], found.corrections[v], found.joint.agreement[v],
-                              std::ranges::binary_search(found.unaligned, static_cast<int>(v))));
-  }
-  json record = {{"made_with", relevant_options(options)},
-                 {"accepted", found.is_accepted},
-                 {"rotation", found.joint.freedoms.rotation},
-                 {"magnification", found.joint.freedoms.magnification},
-                 {"tilt", found.joint.freedoms.tilt},
-                 {"steps_px", found.joint.steps_px},
-                 {"seconds", seconds},
-                 {"views", std::move(views)}};
-  record.update(held_out_json(found.held_out));
-  if (found.joint.pose) record["pose"] = pose_json(*found.joint.pose);
-  if (found.beads) record["beads"] = beads_json(*found.beads);
-  if (found.local) record["local"] = local_trial_json(found);
-  return record;
-}
-
-// Reads the record of an earlier run of the same options.
-json read_record(const std::filesystem::path& path, const ReconstructOptions& options) {
-  const auto refuse = [&](const char* why) {
-    throw Error(
-        fmt::format("cannot resume: the alignment '{}' {}; to start over, give --overwrite "
-                    "instead of --resume",
-                    path.string(), why));
-  };
-  json record = json::parse(std::ifstream(path), nullptr, false);
-  if (!record.is_object() || !record.contains("made_with") || !record.contains("views"))
-    refuse("is damaged");
-  if (record["made_with"] != relevant_options(options)) refuse("was made with other options");
-  return record;
-}
-
-// Puts the corrections of a record into the options.
-void apply_record(const json& record, ReconstructOptions& options) {
-  std::int64_t num_sections = 0;
-  for (const json& view : record["views"])
-    num_sections = std::max(num_sections, view["section"].get<std::int64_t>());
-  auto& corrections = options.input.corrections;
-  corrections.assign(static_cast<std::size_t>(num_sections), {});
-  for (const json& view : record["views"]) {
-    const auto section = view["section"].get<std::int64_t>() - 1;
-    corrections[static_cast<std::size_t>(section)] = {
-        .shift_x_px = view["shift_px"][0],
-        .shift_y_px = view["shift_px"][1],
-        .rotation_rad = view["rotation_deg"].get<double>() / kRadian_deg,
-        .log_magnification = view["log_magnification"],
-        .tilt_deg = view["tilt_change_deg"]};
-    if (view.contains("local_px")) {
-      const json& size_px = record.at("local").at("size_px");
-      corrections[static_cast<std::size_t>(section)].local =
-          geometry::ViewWarp::from_rows(size_px.at(0), size_px.at(1), view["local_px"]);
-    }
-    if (view["left_out"].get<bool>()) options.input.left_out.push_back(section);
-  }
-  options.alignment = record;
-}
 
 std::string describe_errors(const json& compared) {
   return fmt::format(
@@ -250,13 +129,6 @@ align::Alignment align_views(const tilt_series::TiltSeries& series,
   return align::refine_alignment(problem, std::move(start), processes);
 }
 
-// Adds views that are left out to the record of the others.
-void add_left_out(const json& views, json& record) {
-  for (const json& view : views) record["views"].push_back(view);
-  std::ranges::stable_sort(record["views"].get_ref<json::array_t&>(), {},
-                           [](const json& view) { return view["section"].get<std::int64_t>(); });
-}
-
 // Aligns the series.
 json make_record(const ReconstructOptions& options, const ReconstructHooks& hooks,
                  const distributed::Communicator& processes) {
@@ -266,54 +138,56 @@ json make_record(const ReconstructOptions& options, const ReconstructHooks& hook
   recorded.resample = false;
   recorded.halves.reset();
   const tilt_series::TiltSeries series(recorded, processes);
-  if (series.views().size() < kFewestViews)
-    throw Error(
-        fmt::format("--align needs at least {} views, since it judges the alignment by "
-                    "views that it holds out; '{}' has {}",
-                    kFewestViews, recorded.stack.string(), series.views().size()));
+  require_views_to_align(series.views().size());
   const align::Alignment found = align_views(series, options, hooks, processes);
   const bool is_clean = found.unaligned.empty();
   if (is_clean || options.resolved.align != Alignment::kFull ||
-      series.views().size() - found.unaligned.size() < kFewestViews)
-    return record_of(series, found, options, running.seconds());
+      series.views().size() - found.unaligned.size() < kFewestViewsToAlign)
+    return alignment_record(series, found, running.seconds());
 
   // Views at wrong places mislead the search for the tilt axis, so the others are aligned anew.
-  json left_out = json::array();
-  for (const int view : found.unaligned) {
-    const auto at = static_cast<std::size_t>(view);
-    left_out.push_back(view_json(series.views()[at], {}, found.joint.agreement[at], true));
-    recorded.left_out.push_back(series.views()[at].section);
-  }
+  for (const int view : found.unaligned)
+    recorded.left_out.push_back(series.views()[static_cast<std::size_t>(view)].section);
   std::ranges::sort(recorded.left_out);
   base::log_info(fmt::format("{} views do not resemble the specimen: the others are aligned again",
                              found.unaligned.size()));
   const tilt_series::TiltSeries others(recorded, processes);
   const align::Alignment again = align_views(others, options, hooks, processes);
-  json record = record_of(others, again, options, running.seconds());
-  add_left_out(left_out, record);
+  json record = alignment_record(others, again, running.seconds());
+  add_left_out(series, found, record);
   return record;
 }
 
 }  // namespace
 
+void require_views_to_align(std::size_t num_views) {
+  if (num_views < kFewestViewsToAlign)
+    throw Error(
+        fmt::format("--align needs at least {} views, since it judges the alignment by "
+                    "views that it holds out, and there are {}",
+                    kFewestViewsToAlign, num_views));
+}
+
 bool align_series(ReconstructOptions& options, const ReconstructHooks& hooks,
                   const distributed::Communicator& processes) {
   if (options.resolved.align == Alignment::kOff) return true;
   const std::filesystem::path path = output_paths(options.resolved.output).alignment;
-  json record;
+  json origin, record;
+  processes.run_collectively([&] { origin = alignment_origin(options); });
   if (options.resolved.resume && std::filesystem::exists(path)) {
-    processes.run_collectively([&] { record = read_record(path, options); });
+    processes.run_collectively([&] { record = read_alignment_record(path, origin); });
   } else {
     try {
       record = make_record(options, hooks, processes);
     } catch (const base::StopRequested&) {
       return false;
     }
+    record.update(origin);
     processes.run_collectively([&] {
       if (processes.is_root() && !options.resolved.output.empty()) io::write_json(path, record);
     });
   }
-  apply_record(record, options);
+  apply_alignment(record, options);
   log_alignment(record);
   return true;
 }

@@ -2,10 +2,13 @@
 
 #include <cmath>
 
+#include "base/check.h"
+#include "io/output_files.h"
 #include "output/alignment_files.h"
 #include "reconstruct/relion_alignment.h"
 #include "report/alignment_plot.h"
 #include "tilt_series/open_views.h"
+#include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -56,6 +59,19 @@ std::vector<std::filesystem::path> alignment_results(const ReconstructOptions& o
   files.push_back(picture_of(options));
   if (const auto star = relion_alignment(options)) files.push_back(*star);
   return files;
+}
+
+std::vector<io::OutputLock> claim_alignment(const ReconstructOptions& options) {
+  if (options.resolved.output.empty())
+    throw Error("-o '' names no file: give the name that the files of the alignment begin with");
+  const std::filesystem::path record = output_paths(options.resolved.output).alignment;
+  std::vector<std::filesystem::path> files = alignment_results(options);
+  files.insert(files.begin(), record);
+  return io::claim_outputs({record}, [&] {
+    base::require_no_faults(options.faults());
+    io::check_output_files(files, io::input_files(options.files), options.resolved.overwrite,
+                           "give --overwrite to replace it, or another name with -o");
+  });
 }
 
 void write_alignment_results(const tilt_series::TiltSeries& series,

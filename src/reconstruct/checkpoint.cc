@@ -288,6 +288,7 @@ output::TrainingState progress_state(const fit::Fit& fit, const FitOrigin& origi
   const fit::Progress& progress = fit.progress();
   state.integers["fingerprint"] = as_numbers(origin.fingerprint);
   if (origin.tuned) state.integers["tuning"] = as_numbers(without_times(*origin.tuned).dump());
+  if (origin.tile_rows) state.integers["tile_rows"] = {*origin.tile_rows};
   state.integers["step"] = {progress.step};
   state.doubles["views"] = flatten(progress.views);
   state.doubles["epoch_sums"] = flatten(progress.epoch_sums);
@@ -332,6 +333,15 @@ std::optional<TunedFit> stored_choice(const std::filesystem::path& path) {
   } catch (const Error& error) {
     throw refuse(error.what());
   }
+}
+
+std::optional<int> stored_tile_rows(const std::filesystem::path& path) {
+  constexpr std::int64_t kMost = 1 << 30;
+  const output::TrainingState state = output::load_training(path);
+  if (!state.integers.contains("tile_rows")) return std::nullopt;
+  const std::int64_t rows = single(state, "tile_rows", path.string());
+  if (rows >= 0 && rows <= kMost) return static_cast<int>(rows);
+  throw Error(fmt::format("'{}' is damaged: its tiles have {} rows", path.string(), rows));
 }
 
 void restore_fit(const std::filesystem::path& file, const std::string& fingerprint, fit::Fit& fit) {

@@ -30,6 +30,8 @@ std::string as_text(const std::vector<std::int64_t>& numbers);
 struct FitOrigin {
   std::string fingerprint;        ///< fingerprint_of() its series and options
   std::optional<TunedFit> tuned;  ///< the trials that chose some of its options
+  /// Rows of the tiles that it is fitted by; 0: the whole region. None: without --budget.
+  std::optional<int> tile_rows = {};
 };
 
 /// Returns the progress of a fit in the form of the model file, without the optimiser. A finished
@@ -50,6 +52,10 @@ void save_checkpoint(const std::filesystem::path& path, const fit::Fit& fit,
 /// Returns the trials that chose options of the fit in a checkpoint or model, if any did. Throws
 /// Error if `path` is neither.
 std::optional<TunedFit> stored_choice(const std::filesystem::path& path);
+
+/// Returns FitOrigin::tile_rows of the fit in a checkpoint or in finished tiles. Throws Error if
+/// `path` is neither.
+std::optional<int> stored_tile_rows(const std::filesystem::path& path);
 
 /// Continues a stored fit: puts its field and its state into a new fit with the same options. Each
 /// process reads the parameters that it needs. Throws Error if `path` belongs to another series or

@@ -27,6 +27,12 @@ compact::CompressionReport report_of(const nlohmann::json& tile) {
 
 }  // namespace
 
+void forget_old_tiles(const Run& run) {
+  std::error_code ignored;
+  if (run.writes_files() && run.processes.is_root() && run.options.may_use_tiles())
+    std::filesystem::remove(run.paths.tiles, ignored);
+}
+
 FinishedTiles::FinishedTiles(const Run& run, const FitOrigin& origin) : run_(run), origin_(origin) {
   if (!run.writes_files() || !run.options.resolved.resume ||
       !std::filesystem::exists(run.paths.tiles))
@@ -75,6 +81,7 @@ void FinishedTiles::save() const {
       .doubles = {},
       .integers = {{"fingerprint", as_numbers(origin_.fingerprint)},
                    {"budget", as_numbers(run_.options.resolved.budget)},
+                   {"tile_rows", {origin_.tile_rows.value_or(0)}},
                    {"tiles", as_numbers(tiles_.dump())}}};
   output::save_coded(run_.paths.tiles, *coded_, model_info(run_.measurement, run_.options), &state);
 }

@@ -18,6 +18,10 @@ struct TileCodes {
   double seconds = 0.0;  ///< of the compression
 };
 
+/// Removes the tiles that an earlier run left: a run that starts anew replaces them, and a resumed
+/// one must not take them for its own.
+void forget_old_tiles(const Run& run);
+
 /// Holds the codes of the tiles that a run has finished, from the first row of the region on. They
 /// are kept in a file, from which a run resumes.
 class FinishedTiles {

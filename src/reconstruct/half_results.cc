@@ -14,7 +14,6 @@
 #include "evaluate/mean_and_uncertainty.h"
 #include "io/json.h"
 #include "io/output_set.h"
-#include "option_table/setting.h"
 #include "output/volume.h"
 #include "reconstruct/choice_plot.h"
 #include "reconstruct/half_measurement.h"
@@ -228,13 +227,12 @@ void write_all(const tilt_series::TiltSeries& series, const Run& run, const Fini
 
 Results write_half_results(const tilt_series::TiltSeries& series, const Run& run,
                            const FinishedHalves& halves, const std::optional<TunedFit>& tuned) {
+  Verdict verdict = verdict_on_both(halves.front().verdict, halves.back().verdict);
+  json metrics = run_json(run.options, metrics_of_both(halves, verdict));
   Results results{.model = {},
-                  .metrics = {{"tomofield", TOMOFIELD_VERSION},
-                              {"options", options_json(run.options)},
-                              {"origins", option_table::to_json(run.options.origins)}},
-                  .verdict = verdict_on_both(halves.front().verdict, halves.back().verdict),
+                  .metrics = std::move(metrics),
+                  .verdict = std::move(verdict),
                   .bead_masking = run.measurement.masks.bead_masking};
-  results.metrics["metrics"] = metrics_of_both(halves, results.verdict);
   run.processes.run_collectively([&] {
     if (!run.processes.is_root()) return;
     try {

@@ -99,6 +99,34 @@ void add_half_files(const OutputPaths& paths, bool with_linear_volumes,
   }
 }
 
+// Says whether the run resumes. Without a checkpoint there is nothing to resume: then the other
+// files are from another run.
+bool can_resume(const ReconstructOptions& options, const OutputPaths& paths) {
+  const Options& resolved = options.resolved;
+  const auto has = [](const std::filesystem::path& file) { return std::filesystem::exists(file); };
+  return resolved.resume &&
+         (has(options.first_model(paths)) || (resolved.tune && has(paths.trials)) ||
+          (resolved.align != Alignment::kOff && has(paths.alignment)) ||
+          (options.may_use_tiles() && has(paths.tiles)));
+}
+
+// Returns the files that the run writes, but for the pictures of slices.
+std::vector<std::filesystem::path> result_files(const ReconstructOptions& options,
+                                                const OutputPaths& paths) {
+  const Options& resolved = options.resolved;
+  std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json, paths.report};
+  if (options.field.tree == TreeKind::kAdaptive) results.push_back(paths.tree_picture);
+  if (options.may_use_tiles()) results.push_back(paths.tiles);
+  if (resolved.tune) results.push_back(paths.trials);
+  if (resolved.align != Alignment::kOff) results.push_back(paths.alignment);
+  if (options.fit.hold_out > 0 && !options.makes_halves())
+    results.push_back(paths.held_out_picture);
+  if (options.makes_halves()) add_half_files(paths, resolved.denoising_halves, results);
+  if (resolved.tune || options.open.any()) results.push_back(paths.choice_picture);
+  for (const auto& file : exchange_files(options)) results.push_back(file);
+  return results;
+}
+
 }  // namespace
 
 Options resolve(const Options& requested) {
@@ -271,29 +299,14 @@ void check_options(const ReconstructOptions& options) {
   if (options.resolved.output.empty()) return;
   const Options& resolved = options.resolved;
   const OutputPaths paths = output_paths(resolved.output);
-  // Without a checkpoint there is nothing to resume. The other files are from another run.
-  const bool resumes =
-      resolved.resume &&
-      (std::filesystem::exists(options.first_model(paths)) ||
-       (resolved.tune && std::filesystem::exists(paths.trials)) ||
-       (resolved.align != Alignment::kOff && std::filesystem::exists(paths.alignment)));
-  std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json, paths.report};
-  if (options.field.tree == TreeKind::kAdaptive) results.push_back(paths.tree_picture);
-  if (resolved.tune) results.push_back(paths.trials);
-  if (resolved.align != Alignment::kOff) results.push_back(paths.alignment);
-  if (options.fit.hold_out > 0 && !options.makes_halves())
-    results.push_back(paths.held_out_picture);
-  if (options.makes_halves()) add_half_files(paths, resolved.denoising_halves, results);
-  if (resolved.tune || options.open.any()) results.push_back(paths.choice_picture);
-  for (const auto& file : exchange_files(options)) results.push_back(file);
-  const bool may_replace = resolved.overwrite || resumes;
+  const bool may_replace = resolved.overwrite || can_resume(options, paths);
   const char* const advice =
       resolved.resume ? "there is no checkpoint to resume, so give --overwrite to start over and "
                         "replace it, or another name with -o"
                       : "give --overwrite to replace it, --resume to continue the run that made "
                         "it, or another name with -o";
-  io::check_result_files(std::move(results), paths.picture_prefix, options.files, may_replace,
-                         advice);
+  io::check_result_files(result_files(options, paths), paths.picture_prefix, options.files,
+                         may_replace, advice);
   if (resolved.zarr) output::check_zarr(paths.volume, may_replace, advice);
 }
 
@@ -302,6 +315,8 @@ std::vector<io::OutputLock> claim_outputs(const ReconstructOptions& options) {
   std::vector<std::filesystem::path> files{paths.volume, paths.model, paths.json};
   if (options.makes_halves())
     for (const OutputPaths::OfHalf& half : paths.halves) files.push_back(half.model);
+  if (options.may_use_tiles()) files.push_back(paths.tiles);
+  if (options.resolved.align != Alignment::kOff) files.push_back(paths.alignment);
   if (options.resolved.output.empty()) files.clear();
   return io::claim_outputs(files, [&] { check_options(options); });
 }

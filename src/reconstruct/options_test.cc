@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <string>
 
 #include "base/check.h"
@@ -200,6 +202,37 @@ TEST(ResolvedOptions, TrialsChooseWhatIsNotGiven) {
   EXPECT_TRUE(run_options({}, corrected).open.beads);
   corrected.bead_diameter_nm = 0;
   EXPECT_FALSE(run_options({}, corrected).open.beads);
+}
+
+TEST(OutputsOfTiles, ReplaceNoOtherModel) {
+  const testing::ScratchDirectory scratch;
+  const std::filesystem::path model = scratch / "TS_tiles.h5";  // of -o TS_tiles.mrc
+  std::ofstream(model) << "a model";
+  Options options = good_options();
+  options.output = scratch / "TS.mrc";
+  check_options(run_options({}, options));
+  options.budget = "0.1dB";
+  const auto message = [&](const SeriesFiles& files) {
+    return testing::message_of<Error>([&] { check_options(run_options(files, options)); });
+  };
+  EXPECT_NE(message({}).find(model.string() + "' exists"), std::string::npos);
+  SeriesFiles files;
+  files.stack = model;
+  options.overwrite = true;
+  EXPECT_NE(message(files).find("would replace the input"), std::string::npos);
+  check_options(run_options({}, options));
+  options.overwrite = false;
+  options.tile_rows = 0;
+  check_options(run_options({}, options));
+}
+
+TEST(OutputsOfTiles, AreLocked) {
+  const testing::ScratchDirectory scratch;
+  Options options = good_options();
+  options.output = scratch / "TS.mrc";
+  options.budget = "0.1dB";
+  const auto locks = claim_outputs(run_options({}, options));
+  EXPECT_TRUE(std::filesystem::exists(scratch / ".TS_tiles.h5.tomofield-lock"));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "align/alignment.h"
 #include "base/check.h"
+#include "base/log_pause.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "baseline/run_baseline.h"
@@ -16,6 +17,7 @@
 #include "fit/stages.h"
 #include "measurement/held_out.h"
 #include "measurement/slab_views.h"
+#include "reconstruct/aligned_series.h"
 #include "reconstruct/memory_estimate.h"
 #include "reconstruct/reconstruct.h"
 #include "reconstruct/tile_plan.h"
@@ -27,16 +29,25 @@ namespace {
 
 // Returns the peak memory of a process while it aligns the views.
 std::size_t memory_of_alignment(const tilt_series::TiltSeries& series,
-                                const measurement::Measurement& plan, RunPlan run,
-                                ReconstructOptions options,
+                                const measurement::Measurement& plan, ReconstructOptions options,
                                 const distributed::Communicator& processes) {
   const bool from_raw = options.resolved.align == Alignment::kFull;
   options.field = align::planned_field(options.field);
   options.fit = align::planned_fits(plan, from_raw, options.fit.seed).front().options;
-  run.stages = fit::make_stages(options.field, options.fit);
   const fit::Domain domain = fit::make_domain(plan.geometry, plan.roi, options.field);
-  return estimate_memory({series, plan, domain, options, processes}, run.stages) +
+  return estimate_memory({series, plan, domain, options, processes},
+                         fit::make_stages(options.field, options.fit)) +
          series.stored_memory(processes) + align::memory_beside_fit(plan);
+}
+
+// Opens the series as the files describe it, whose views are not read. What there is to say of it
+// is said when they are.
+tilt_series::TiltSeries planned_series(const ReconstructOptions& options,
+                                       const distributed::Communicator& processes) {
+  const base::LogPause pause;
+  tilt_series::TiltSeriesOptions input = options.input;
+  input.look_at_views = false;
+  return tilt_series::TiltSeries(input, processes);
 }
 
 // Returns the bytes that writing the results of halves takes: the rays, and a model that is
@@ -111,13 +122,16 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.steps_an_epoch = steps_an_epoch(plan, options.fit);
   run.num_steps = (last.first_epoch + last.epochs) * run.steps_an_epoch;
   run.tiles = plan_tiles({series, plan, domain, options, processes});
+  const bool aligns = options.resolved.align != Alignment::kOff;
+  if (aligns && options.alignment.is_null())
+    require_views_to_align(static_cast<std::size_t>(run.num_views));
   run.memory_bytes = run.tiles.is_used()
                          ? run.tiles.memory_bytes
                          : estimate_memory({series, plan, domain, options, processes}, run.stages);
   run.most_vertices = most_vertices(domain);
-  if (options.resolved.align != Alignment::kOff && !plan.ray_geometry)
+  if (aligns && !plan.ray_geometry)
     run.memory_bytes =
-        std::max(run.memory_bytes, memory_of_alignment(series, plan, run, options, processes));
+        std::max(run.memory_bytes, memory_of_alignment(series, plan, options, processes));
   if (options.makes_halves()) {
     require_views_for_halves(plan, options);
     run.num_fits = 2;
@@ -131,6 +145,26 @@ void require_memory(const RunPlan& plan, const distributed::Communicator& proces
                        "this reconstruction",
                        "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, "
                        "fewer --threads, or --budget, which fits tiles and makes them compact");
+}
+
+void check_before_alignment(const ReconstructOptions& options,
+                            const distributed::Communicator& processes) {
+  if (options.resolved.align == Alignment::kOff) return;
+  const tilt_series::TiltSeries series = planned_series(options, processes);
+  processes.run_collectively([&] {
+    const RunPlan plan = plan_run(series, options, processes);
+    require_memory(plan, processes);
+    require_few_vertices(plan);
+  });
+}
+
+void check_alignment_alone(const ReconstructOptions& options) {
+  const distributed::Communicator& alone = distributed::Communicator::alone();
+  const tilt_series::TiltSeries series = planned_series(options, alone);
+  const measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
+  require_views_to_align(series.views().size());
+  base::require_memory(memory_of_alignment(series, plan, options, alone), "this alignment",
+                       "use a larger --bin, a smaller --roi or --thickness, or fewer --threads");
 }
 
 void require_few_vertices(const RunPlan& plan) {

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "base/log.h"
 #include "pixel_stack.h"
 #include "reconstruct/reconstruct.h"
 #include "scratch_directory.h"
@@ -121,6 +122,50 @@ TEST_F(Plan, RefusesWhatTheMachineCannotHold) {
   const std::string message = testing::message_of<Error>([&] { require_memory(run); });
   EXPECT_NE(message.find("GiB"), std::string::npos) << message;
   EXPECT_NE(message.find("--bin"), std::string::npos) << message;
+}
+
+TEST_F(Plan, RefusesTooFewViewsForAnAlignmentBeforeIt) {
+  options_.resolved.align = Alignment::kRefine;
+  plan();
+  check_before_alignment(options_);
+  check_alignment_alone(options_);
+  options_.input.exclude = "1-4";
+  const auto refusal = [](const auto& check) {
+    const std::string message = testing::message_of<Error>(check);
+    EXPECT_NE(message.find("at least 12 views"), std::string::npos) << message;
+    EXPECT_NE(message.find("11"), std::string::npos) << message;
+  };
+  refusal([&] { plan(); });
+  refusal([&] { check_before_alignment(options_); });
+  refusal([&] { check_alignment_alone(options_); });
+  options_.alignment = {{"accepted", true}};  // it may have left views out
+  plan();
+}
+
+TEST_F(Plan, RefusesTooMuchMemoryBeforeAnAlignment) {
+  options_.resolved.align = Alignment::kRefine;
+  options_.input.stack =
+      testing::write_stack(scratch_ / "wide.mrc", 512, 512, kNumViews, testing::some_value, 2.5);
+  options_.specimen.thickness = 1e6;
+  const auto refusal = [](const auto& check) {
+    const std::string message = testing::message_of<Error>(check);
+    EXPECT_NE(message.find("GiB"), std::string::npos) << message;
+  };
+  refusal([&] { check_before_alignment(options_); });
+  refusal([&] { check_alignment_alone(options_); });
+}
+
+TEST_F(Plan, BeforeAnAlignmentIsSilent) {
+  options_.resolved.align = Alignment::kRefine;
+  options_.input.stack = testing::write_stack(scratch_ / "unscaled.mrc", kWidth, kHeight, kNumViews,
+                                              testing::some_value, 1.0);
+  int num_messages = 0;
+  base::set_log_sink([&](base::LogLevel, std::string_view) { ++num_messages; });
+  check_before_alignment(options_);
+  EXPECT_EQ(num_messages, 0);
+  base::log_info("the pause is over");
+  EXPECT_EQ(num_messages, 1);
+  base::set_log_sink({});
 }
 
 }  // namespace

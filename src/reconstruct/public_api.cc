@@ -48,8 +48,10 @@ struct TiltSeriesAccess {
 
 namespace {
 
+bool is_usable_voxel(double voxel_px) { return std::isfinite(voxel_px) && voxel_px > 0; }
+
 void require_usable(const SampleBox& box) {
-  bool is_usable = std::isfinite(box.voxel_px) && box.voxel_px > 0;
+  bool is_usable = is_usable_voxel(box.voxel_px);
   for (std::size_t a = 0; a < 3; ++a) {
     is_usable = is_usable && box.size[a] >= 1 && std::isfinite(box.centre_px[a]) &&
                 std::isfinite(box.euler_deg[a]);
@@ -144,6 +146,9 @@ Model::Model(const std::filesystem::path& path)
 double Model::pixel_size_A() const { return impl_->model.pixel_size_A; }
 
 SampleBox Model::region(double voxel_px) const {
+  if (!is_usable_voxel(voxel_px))
+    throw Error(
+        fmt::format("voxels of {} px cannot be sampled: give a finite size above 0", voxel_px));
   const field::OrientedBox box = output::region_box(impl_->model, voxel_px);
   SampleBox region{.centre_px = box.centre_px, .size = box.size, .voxel_px = box.voxel_px};
   // An x-axis tilt turns the box about X: these Euler angles have the same matrix.
@@ -196,6 +201,7 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
   const auto locks = reconstruction::claim_outputs(internal);
   Listener listener(progress);
   reconstruction::ReconstructHooks hooks = listener.hooks();
+  reconstruction::check_before_alignment(internal);
   if (!reconstruction::align_series(internal, hooks, distributed::Communicator::alone())) return {};
   const tilt_series::TiltSeries views(internal.input);
   const reconstruction::RunPlan plan = reconstruction::plan_run(views, internal);

@@ -89,6 +89,8 @@ TEST(PublicModel, RefusesBoxesThatCannotBeSampled) {
   EXPECT_THROW(model.sample({}), Error);
   EXPECT_THROW(model.sample({.centre_px = {0, std::nan(""), 0}, .size = {1, 1, 1}}), Error);
   EXPECT_THROW(model.sample({.centre_px = {}, .size = {1, 1, 1}, .voxel_px = 0}), Error);
+  for (const double voxel_px : {0.0, -1.0, std::nan(""), HUGE_VAL})
+    EXPECT_THROW(model.region(voxel_px), Error) << voxel_px;
   EXPECT_THROW(Model(scratch / "absent.h5"), Error);
 }
 

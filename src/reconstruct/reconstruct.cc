@@ -16,6 +16,7 @@
 #include "measurement/undecided_beads.h"
 #include "measurement/view_transfers.h"
 #include "reconstruct/checkpoint.h"
+#include "reconstruct/finished_tiles.h"
 #include "reconstruct/halves.h"
 #include "reconstruct/results.h"
 #include "reconstruct/run.h"
@@ -121,6 +122,8 @@ std::vector<geometry::RawFromAligned> alignment_of(const tilt_series::TiltSeries
 RunResult fit_all_views(const Run& run, const TilePlan& tiles, RunRecord& record,
                         std::optional<TunedFit> tuned) {
   record.origin = origin_of(run, std::move(tuned));
+  if (!run.options.resolved.budget.empty()) record.origin.tile_rows = tiles.rows;
+  if (!run.options.resolved.resume) forget_old_tiles(run);
   if (tiles.is_used()) return fit_by_tiles(run, tiles, record);
   const FitRun made = run_fit(run, {.measurement = run.measurement,
                                     .model = run.paths.model,

@@ -83,6 +83,17 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
 void require_memory(const RunPlan& plan, const distributed::Communicator& processes =
                                              distributed::Communicator::alone());
 
+/// Checks a run with --align before its views are aligned, which takes long: throws Error as
+/// plan_run(), require_memory() and require_few_vertices() do. Reads no view. Does nothing for a
+/// run without --align. Every process calls it.
+void check_before_alignment(
+    const ReconstructOptions& options,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
+
+/// Does the same for an alignment without a reconstruction: throws Error if there are too few views
+/// or too little memory.
+void check_alignment_alone(const ReconstructOptions& options);
+
 /// Throws Error if a leaf would have more vertices along an axis than one can have.
 void require_few_vertices(const RunPlan& plan);
 

@@ -32,7 +32,7 @@ std::optional<std::vector<measurement::ViewModel>> find_shared_views(const Run& 
       run.hooks.tune_progress(
           base::progress_at(fit.work(fit.progress().step) / fit.work(fit.num_steps()),
                             running.seconds(), "scales and weights of views"));
-    const bool stop = run.hooks.stop_requested && run.hooks.stop_requested();
+    const bool stop = run.hooks.stop_requested && run.hooks.stop_requested() && !fit.is_done();
     was_stopped = run.processes.allreduce_max(stop ? 1.0 : 0.0) > 0;
     return !was_stopped;
   });

@@ -4,10 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <optional>
 
 #include "base/memory.h"
 #include "compact/budget.h"
 #include "measurement/slab_views.h"
+#include "reconstruct/checkpoint.h"
+#include "reconstruct/run_fit.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
@@ -109,6 +113,31 @@ TilePlan tiles_of_rows(const PlannedFit& planned, std::int64_t rows) {
   return tiles;
 }
 
+// Returns the tiles that the memory which is free now is enough for.
+TilePlan tiles_for_memory(const PlannedFit& planned) {
+  const auto stages = fit::make_stages(planned.options.field, planned.options.fit);
+  const std::size_t free = base::available_memory();
+  if (free == 0 || estimate_memory(planned, stages) <= free) return {};
+  const std::int64_t band = planned.domain.tree.roots().cell_size;
+  std::int64_t rows = planned.plan.roi.height() / band * band;
+  TilePlan tiles = tiles_of_rows(planned, rows);
+  while (rows > band &&
+         static_cast<double>(tiles.memory_bytes) > kUsablePart * static_cast<double>(free))
+    tiles = tiles_of_rows(planned, rows -= band);
+  return tiles;
+}
+
+// Returns the rows of the tiles of the run that is resumed, if there is one (0: the whole region).
+std::optional<int> rows_of_resumed_run(const ReconstructOptions& options) {
+  std::optional<int> rows;
+  if (!options.resolved.resume) return rows;
+  const OutputPaths paths = output_paths(options.resolved.output);
+  for (const std::filesystem::path& file : {paths.model, paths.tiles})
+    if (!rows && std::filesystem::exists(file))
+      read_checkpoint([&] { rows = stored_tile_rows(file); });
+  return rows;
+}
+
 }  // namespace
 
 std::vector<Tile> TilePlan::tiles_from(int first_row) const {
@@ -128,23 +157,16 @@ double TilePlan::repeats() const {
 }
 
 TilePlan plan_tiles(const PlannedFit& planned) {
-  const std::optional<int>& given = planned.options.resolved.tile_rows;
-  if (given.value_or(-1) == 0 || (!given && planned.options.resolved.budget.empty())) return {};
-  const char* const fault = fault_of_tiles(planned);
-  if (given) {
-    if (fault != nullptr) throw Error(fault);
-    return tiles_of_rows(planned, *given);
+  const ReconstructOptions& options = planned.options;
+  std::optional<int> rows = options.resolved.tile_rows;
+  if (rows == 0 || (!rows && options.resolved.budget.empty())) return {};
+  if (const char* const fault = fault_of_tiles(planned)) {
+    if (rows) throw Error(fault);
+    return {};
   }
-  const auto stages = fit::make_stages(planned.options.field, planned.options.fit);
-  const std::size_t free = base::available_memory();
-  if (fault != nullptr || free == 0 || estimate_memory(planned, stages) <= free) return {};
-  const std::int64_t band = planned.domain.tree.roots().cell_size;
-  std::int64_t rows = planned.plan.roi.height() / band * band;
-  TilePlan tiles = tiles_of_rows(planned, rows);
-  while (rows > band &&
-         static_cast<double>(tiles.memory_bytes) > kUsablePart * static_cast<double>(free))
-    tiles = tiles_of_rows(planned, rows -= band);
-  return tiles;
+  if (!rows) rows = rows_of_resumed_run(options);
+  if (!rows) return tiles_for_memory(planned);
+  return *rows > 0 ? tiles_of_rows(planned, *rows) : TilePlan{};
 }
 
 }  // namespace tomofield::reconstruction

@@ -144,7 +144,8 @@ class TileFits {
         progress(
             base::progress_at(done, running.seconds(), fmt::format("loss {:.4f}", loss.back())));
       }
-      stopped = run_.hooks.stop_requested && run_.hooks.stop_requested();
+      // A tile that is done is kept: the run stops in the next one.
+      stopped = run_.hooks.stop_requested && run_.hooks.stop_requested() && !fit.is_done();
       return !stopped;
     });
     return !stopped;
@@ -237,9 +238,9 @@ RunResult fit_by_tiles(const Run& run, const TilePlan& plan, RunRecord& record) 
   const auto stopped = [&] {
     return RunResult{.outcome = Outcome::kStopped, .results = {}, .checkpoint = run.paths.model};
   };
+  FinishedTiles finished(run, record.origin);  // refuses tiles of another run before any work
   const std::optional<CoarseStart> start = fit_coarse_stages(run, plan, record);
   if (!start) return stopped();
-  FinishedTiles finished(run, record.origin);
   const std::vector<Tile> tiles = plan.tiles_from(finished.num_rows());
   const std::size_t middle = middle_tile(tiles, plan.num_rows);
   TileFits fits(run, record, *start, plan.num_rows, finished);

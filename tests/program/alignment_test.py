@@ -202,6 +202,73 @@ def test_too_few_views_are_refused(shifted):
     assert not os.path.exists(os.path.join(shifted, "few_align.json"))
 
 
+def test_too_few_views_are_refused_in_the_plan(shifted):
+    command = ["reconstruct", *series_of(shifted), *FIT[:-2], "--exclude", "1-84", "--align", "refine",
+               "-o", os.path.join(shifted, "few.mrc")]
+    for options in (["--dry-run"], ["--plan", os.path.join(shifted, "few_plan.json")]):
+        refused = harness.tomofield(*command, *options)
+        assert refused.returncode == 2 and "at least 12 views" in refused.stderr, refused
+
+
+def test_align_asks_for_its_own_results_alone(shifted):
+    stack, prefix = os.path.join(shifted, "tilt_series.mrc"), os.path.join(shifted, "tilt_series_align")
+    before = harness.read_bytes(stack)
+    align = ["align", *series_of(shifted), "-o", stack]  # as its own help says
+    harness.succeed(*align)
+    assert harness.read_bytes(stack) == before
+    made = {extension: harness.read_bytes(prefix + extension)
+            for extension in (".json", ".xf", ".tlt", ".aln", ".png")}
+    refused = harness.tomofield(*align)
+    assert refused.returncode == 2 and "--overwrite" in refused.stderr, refused
+    assert prefix in refused.stderr and "--resume" not in refused.stderr, refused
+    # A failure at the end leaves all old files: a folder takes the name of one of them meanwhile.
+    run = harness.start(*align, "--overwrite", "--seed", 3)
+    for line in run.stderr:
+        if line.startswith("align "):
+            break
+    os.remove(prefix + ".png")
+    os.mkdir(prefix + ".png")
+    _, errors = run.communicate()
+    assert run.returncode == 2 and ".png" in errors, errors
+    os.rmdir(prefix + ".png")
+    made.pop(".png")
+    assert {extension: harness.read_bytes(prefix + extension) for extension in made} == made
+
+
+def test_a_record_of_another_series_or_run_is_refused(shifted):
+    volume = os.path.join(shifted, "resumed.mrc")
+    stack = os.path.join(shifted, "tilt_series.mrc")
+    command = ["reconstruct", *series_of(shifted), *FIT[:-2], "--align", "refine", "-o", volume,
+               "--resume"]
+    path = os.path.join(shifted, "resumed_align.json")
+    harness.succeed(*command[:-1])
+    os.remove(os.path.join(shifted, "resumed.h5"))
+    good = harness.read_bytes(path)
+
+    def refuse(*changed, words=()):
+        refused = harness.tomofield(*changed)
+        assert refused.returncode == 2, refused
+        for word in (path, "--overwrite", *words):
+            assert word in refused.stderr, (word, refused.stderr)
+
+    refuse(*[word for word in command if word != "--no-margin"], words=["other options"])
+    refuse(*["full" if word == "refine" else word for word in command], words=["other options"])
+    refuse(*command, "--vertex-spacing", 2, words=["other options"])
+    for damage in (b"", b"{}", good[:1000], good.replace(b'"section": 1,', b'"section": 0,')):
+        with open(path, "wb") as file:
+            file.write(damage)
+        refuse(*command)
+    with open(path, "wb") as file:
+        file.write(good)
+    with mrcfile.open(stack, mode="r+") as file:
+        first = file.data[0].copy()
+        file.data[0] += 1
+    refuse(*command, words=["another series"])
+    with mrcfile.open(stack, mode="r+") as file:
+        file.data[0] = first
+    harness.succeed(*command)
+
+
 def test_a_dry_run_counts_the_alignment(shifted):
     def samples_and_memory(align):
         plan = os.path.join(shifted, f"plan_{align}.json")

@@ -137,12 +137,12 @@ def test_tiles_go_on_after_a_stop(tall, tmp_path):
             break
     run.send_signal(signal.SIGTERM)
     run.communicate()
-    if run.returncode != 0:  # it was stopped in the second tile
-        assert run.returncode == 143
-        refuse(*tall[:-1], "1dB", "--tile-rows", 64, "-o", stopped, "--resume",
-               says="give the same")
-        said = harness.succeed(*tall, "--tile-rows", 64, "-o", stopped, "--resume").stderr
-        assert "after row 64" in said
+    if run.returncode == 0:
+        pytest.skip("the run ended before its signal")
+    assert run.returncode == 143
+    refuse(*tall[:-1], "1dB", "--tile-rows", 64, "-o", stopped, "--resume", says="give the same")
+    said = harness.succeed(*tall, "--tile-rows", 64, "-o", stopped, "--resume").stderr
+    assert "after row 64" in said
     assert np.array_equal(read(tiles), read(stopped))
 
 
