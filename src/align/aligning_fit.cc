@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <vector>
 
@@ -74,6 +75,27 @@ void resample(const FitInProgress& run, const distributed::Communicator& process
   run.fit.reread_measurement();
 }
 
+// Returns the mean squared difference of a view and its prediction where the pixels are not near an
+// edge: there the residual depends more on what the fit knows of the specimen outside the views.
+double inner_squares(const ImagePair& images) {
+  constexpr double kInner = 0.8;  // part of the width and height
+  const auto is_inner = [](std::int64_t place, std::int64_t size) {
+    const double half = static_cast<double>(size) / 2;
+    return std::abs(static_cast<double>(place) + 0.5 - half) <= kInner * half;
+  };
+  double squares = 0.0, count = 0.0;
+  for (std::int64_t y = 0; y < images.height; ++y) {
+    if (!is_inner(y, images.height)) continue;
+    for (std::int64_t x = 0; x < images.width; ++x) {
+      const auto at = static_cast<std::size_t>(y * images.width + x);
+      if (!is_inner(x, images.width) || std::isnan(images.measured[at])) continue;
+      squares += std::pow(static_cast<double>(images.measured[at] - images.predicted[at]), 2);
+      count += 1.0;
+    }
+  }
+  return count > 0.0 ? squares / count : 0.0;
+}
+
 }  // namespace
 
 fit::FieldOptions aligning_field(fit::FieldOptions field) {
@@ -104,14 +126,18 @@ void check_stop(const JointProblem& problem, const distributed::Communicator& pr
   if (processes.allreduce_max(asked ? 1.0 : 0.0) > 0.0) throw base::StopRequested();
 }
 
-void run_with_wide_pixels(fit::Fit& fit, int coarse_epochs, const JointProblem& problem,
-                          const distributed::Communicator& processes) {
-  const std::int64_t last =
-      fit.last_stop_before(std::int64_t{coarse_epochs} * fit.steps_per_epoch());
+void run_until(fit::Fit& fit, std::int64_t last_step, const JointProblem& problem,
+               const distributed::Communicator& processes) {
   fit.run([&](const fit::Fit& f) {
     if (f.progress().step % f.steps_per_epoch() == 0) check_stop(problem, processes);
-    return f.progress().step < last;
+    return f.progress().step < last_step;
   });
+}
+
+void run_with_wide_pixels(fit::Fit& fit, int coarse_epochs, const JointProblem& problem,
+                          const distributed::Communicator& processes) {
+  run_until(fit, fit.last_stop_before(std::int64_t{coarse_epochs} * fit.steps_per_epoch()), problem,
+            processes);
 }
 
 measurement::Measurement aligning_measurement(const JointProblem& problem,
@@ -170,6 +196,16 @@ void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& me
       visit(static_cast<std::size_t>(views[at]), image_pair(predicted[at], measurement, stage));
     });
   }
+}
+
+std::vector<double> inner_residuals(const fit::Fit& fit,
+                                    const measurement::Measurement& measurement,
+                                    const fit::Stage& stage) {
+  std::vector<double> squares(static_cast<std::size_t>(measurement.geometry.num_views()));
+  for_each_prediction(fit, measurement, stage, [&](std::size_t view, const ImagePair& images) {
+    squares[view] = inner_squares(images);
+  });
+  return squares;
 }
 
 void run_with_updates(const FitInProgress& run, std::int64_t num_epochs,

@@ -29,9 +29,13 @@ fit::FitOptions aligning_fit(int coarse_epochs, int fine_epochs, std::uint64_t s
 /// Throws base::StopRequested in every process if any of them was asked to stop.
 void check_stop(const JointProblem& problem, const distributed::Communicator& processes);
 
-/// Takes the steps of such a fit with wide pixels, of which there are so many epochs. It ends
-/// where the fit can stop last before the pixels are fine (Fit::last_stop_before()). Throws
-/// base::StopRequested after an epoch if a stop was requested. Every process calls it.
+/// Takes the steps of a fit up to one of them. Throws base::StopRequested after an epoch if a stop
+/// was requested. Every process calls it.
+void run_until(fit::Fit& fit, std::int64_t last_step, const JointProblem& problem,
+               const distributed::Communicator& processes);
+
+/// Does the same up to where the fit can stop last before the pixels are fine
+/// (Fit::last_stop_before()). So many epochs of it have wide pixels.
 void run_with_wide_pixels(fit::Fit& fit, int coarse_epochs, const JointProblem& problem,
                           const distributed::Communicator& processes);
 
@@ -60,6 +64,12 @@ std::size_t prediction_memory(const measurement::Measurement& measurement);
 void for_each_prediction(const fit::Fit& fit, const measurement::Measurement& measurement,
                          const fit::Stage& stage,
                          const std::function<void(std::size_t, const ImagePair&)>& visit);
+
+/// Returns the mean squared difference of each view and its prediction by a fit in one of its
+/// stages, in the pixels that are not near an edge. Every process calls it and gets the same.
+std::vector<double> inner_residuals(const fit::Fit& fit,
+                                    const measurement::Measurement& measurement,
+                                    const fit::Stage& stage);
 
 /// Names a fit and the alignment of the views that it is made with.
 struct FitInProgress {

@@ -10,29 +10,25 @@ namespace tomofield::align {
 /// found once.
 class AxisLine {
  public:
-  /// Returns the residual of each view at a rotation in degrees; or the one of all views, if
-  /// differences count whatever their standard error.
+  /// Returns the residual of each view at a rotation in degrees.
   using Residuals = std::function<std::vector<double>(double)>;
 
-  /// A difference of residuals counts if its mean over the views is above so many standard errors.
-  /// With 0, its sum counts.
+  /// A slope or a bend of the residuals counts if its mean over the views is above so many standard
+  /// errors.
   AxisLine(Residuals residuals, double standard_errors);
 
-  /// Returns the one of two rotations that has the smaller residual; the first one if they do not
-  /// differ.
-  double better(double axis_deg, double other_deg);
-  /// Goes on from a rotation by steps as long as the residual becomes smaller, until it
-  /// reaches ±range.
+  /// Returns the rotation a step further downhill, if the residual is smaller there and the slope
+  /// between both sides counts; else the rotation itself.
+  double downhill(double axis_deg, double step_deg);
+  /// Goes downhill by steps until it stays or reaches ±range.
   double descend(double axis_deg, double step_deg, double range_deg);
   /// Returns where the parabola through the residuals at a rotation and a step to each side is
-  /// lowest: at most a step away. Returns the rotation itself if its bend does not count, or is
-  /// not upwards.
-  double lowest(double axis_deg, double step_deg);
+  /// lowest: at most a step away. The step is doubled up to `widest_step_deg` until the bend of the
+  /// parabola counts. Returns the rotation itself if none does.
+  double lowest(double axis_deg, double step_deg, double widest_step_deg);
 
  private:
   const std::vector<double>& at(double axis_deg);
-  bool is_lower(double axis_deg, double other_deg);
-  bool is_positive(const std::vector<double>& differences) const;
 
   Residuals residuals_;
   double standard_errors_;

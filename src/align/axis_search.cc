@@ -38,27 +38,6 @@ std::vector<geometry::ViewCorrection> turned(std::vector<geometry::ViewCorrectio
   return corrections;
 }
 
-// Returns the mean squared difference of a view and its prediction where the pixels are not near an
-// edge: there the residual depends more on what the fit knows of the specimen outside the views.
-double inner_squares(const ImagePair& images) {
-  constexpr double kInner = 0.8;  // part of the width and height
-  const auto is_inner = [](std::int64_t place, std::int64_t size) {
-    const double half = static_cast<double>(size) / 2;
-    return std::abs(static_cast<double>(place) + 0.5 - half) <= kInner * half;
-  };
-  double squares = 0.0, count = 0.0;
-  for (std::int64_t y = 0; y < images.height; ++y) {
-    if (!is_inner(y, images.height)) continue;
-    for (std::int64_t x = 0; x < images.width; ++x) {
-      const auto at = static_cast<std::size_t>(y * images.width + x);
-      if (!is_inner(x, images.width) || std::isnan(images.measured[at])) continue;
-      squares += std::pow(static_cast<double>(images.measured[at] - images.predicted[at]), 2);
-      count += 1.0;
-    }
-  }
-  return count > 0.0 ? squares / count : 0.0;
-}
-
 // Returns the residual of each view after a fit with wide pixels.
 std::vector<double> wide_residuals(const JointProblem& problem,
                                    const std::vector<geometry::ViewCorrection>& corrections,
@@ -68,18 +47,7 @@ std::vector<double> wide_residuals(const JointProblem& problem,
       aligning_measurement(problem, corrections, kAxisBin, field, processes);
   fit::Fit fit(views, field, axis_fit(problem.seed), processes);
   run_with_wide_pixels(fit, kAxisEpochs, problem, processes);
-  std::vector<double> squares(corrections.size());
-  for_each_prediction(fit, views, fit.stage(), [&](std::size_t view, const ImagePair& images) {
-    squares[view] = inner_squares(images);
-  });
-  return squares;
-}
-
-// Returns the residual of all views after a fit and an alignment with coarse pixels.
-std::vector<double> coarse_residuals(const JointProblem& problem,
-                                     const std::vector<geometry::ViewCorrection>& corrections,
-                                     const distributed::Communicator& processes) {
-  return {coarse_residual(problem, corrections, processes)};
+  return inner_residuals(fit, views, fit.stage());
 }
 
 // Returns residuals of the views of an alignment.
@@ -111,11 +79,11 @@ std::vector<geometry::ViewCorrection> with_best_axis(
     const JointProblem& problem, const std::vector<geometry::ViewCorrection>& start,
     const distributed::Communicator& processes) {
   const base::TraceSpan span("find tilt axis");
-  AxisLine line(of_axis(problem, start, kMostAxisFits, coarse_residuals, processes), 0.0);
+  AxisLine line(of_axis(problem, start, kMostAxisFits, coarse_residuals, processes), kSure);
   double best = line.descend(0.0, kFirstStep_deg, kRange_deg);
   for (double step = kFirstStep_deg / 2; step >= kLastStep_deg; step /= 2)
-    best = line.better(line.better(best, best - step), best + step);
-  const double axis_deg = line.lowest(best, kLastStep_deg);
+    best = line.downhill(best, step);
+  const double axis_deg = line.lowest(best, kLastStep_deg, kFirstStep_deg);
   base::log_info(
       fmt::format("the tilt axis is turned by {:.2f}° from where the files have it", axis_deg));
   return turned(start, axis_deg);
@@ -133,8 +101,8 @@ std::vector<geometry::ViewCorrection> with_refined_axis(
   if (!can_refine_axis(problem.plan)) return start;
   const base::TraceSpan span("refine tilt axis");
   AxisLine line(of_axis(problem, start, kAxisFits, wide_residuals, processes), kSure);
-  const double axis_deg =
-      line.lowest(line.descend(0.0, kRefinedStep_deg, kRefinedRange_deg), kRefinedStep_deg);
+  const double axis_deg = line.lowest(line.descend(0.0, kRefinedStep_deg, kRefinedRange_deg),
+                                      kRefinedStep_deg, kRefinedStep_deg);
   base::log_info(fmt::format("refined the tilt axis by {:.2f}°", axis_deg));
   return turned(start, axis_deg);
 }

@@ -9,8 +9,8 @@
 #include <Eigen/Core>
 
 #include "align/bead_equations.h"
-#include "align/slow_modes.h"
 #include "base/trace.h"
+#include "geometry/tilt_order.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::align {
@@ -50,7 +50,7 @@ std::vector<BeadUnknown> unknowns_of(const Freedoms& freedoms) {
 
 // Returns the values [view, mode] of the cosines.
 Eigen::MatrixXd cosines(std::span<const double> tilt_deg) {
-  const std::vector<std::size_t> by_tilt = order_of_tilts(tilt_deg);
+  const std::vector<std::size_t> by_tilt = geometry::order_of_tilts(tilt_deg);
   const auto n = std::ssize(tilt_deg);
   Eigen::MatrixXd values(n, kModes);
   for (Eigen::Index rank = 0; rank < n; ++rank)

@@ -11,19 +11,19 @@
 #include "align/mean_gain.h"
 #include "align/prediction_by_tilt.h"
 #include "align/registration.h"
+#include "align/relaxation.h"
 #include "align/slab_pose_search.h"
 #include "align/slow_modes.h"
 #include "base/trace.h"
 #include "fit/fit.h"
 #include "fit/stages.h"
+#include "geometry/tilt_order.h"
 
 namespace tomofield::align {
 namespace {
 
 using geometry::ViewCorrection;
 
-// A registration to a field that was fitted to the view itself finds a part of the displacement.
-constexpr double kRelaxation = 1.3;
 // A shift changes by at most so many pixels of the stage at once.
 constexpr double kLongestStep = 2.0;
 // Rotations, magnifications and tilts are looked for in pixels at most this many times as wide.
@@ -67,8 +67,9 @@ class AligningFit {
   void free_rotations() { found_.freedoms.rotation = true; }
 
   std::int64_t num_epochs() const { return fit_.num_epochs(); }
-  // Returns the residual of the last epoch, in units of the noise's variance.
-  double residual() const { return fit_.progress().data_loss.back(); }
+  std::vector<double> residuals() const {
+    return inner_residuals(fit_, measurement_, fit_.stage());
+  }
 
  private:
   // Registers every view.
@@ -94,20 +95,36 @@ class AligningFit {
 
   // Returns the steps that are taken for what the registrations found.
   std::vector<ViewCorrection> limited(std::vector<ViewCorrection> steps, const fit::Stage& stage) {
-    const std::vector<std::size_t> by_tilt = order_of_tilts(measurement_.geometry.tilt_deg);
-    std::vector<double> shifts;
-    for (const std::size_t view : by_tilt) shifts.push_back(steps[view].shift_x_px);
+    const std::vector<std::size_t> by_tilt =
+        geometry::order_of_tilts(measurement_.geometry.tilt_deg);
+    std::vector<double> shifts, found;
+    for (const std::size_t view : by_tilt) {
+      shifts.push_back(steps[view].shift_x_px);
+      found.insert(found.end(), {steps[view].shift_x_px, steps[view].shift_y_px});
+    }
+    const double factor = relaxation_.next(std::move(found));
     slow_modes_.amplify(shifts);
     for (std::size_t i = 0; i < by_tilt.size(); ++i) steps[by_tilt[i]].shift_x_px = shifts[i];
     const double most = kLongestStep * stage.bin * measurement_.bin_factor;
+    keep_axis(steps);
     for (ViewCorrection& step : steps) {
       for (double* shift : {&step.shift_x_px, &step.shift_y_px})
-        *shift = std::clamp(kRelaxation * *shift, -most, most);
-      step.rotation_rad *= kRelaxation;
-      step.log_magnification *= kRelaxation;
-      step.tilt_deg *= kRelaxation;
+        *shift = std::clamp(factor * *shift, -most, most);
+      step.rotation_rad *= factor;
+      step.log_magnification *= factor;
+      step.tilt_deg *= factor;
     }
     return steps;
+  }
+
+  // Takes the common rotation out of the steps unless the views agree on it. A field follows any
+  // axis, so noise would turn it a little further with each update.
+  static void keep_axis(std::vector<ViewCorrection>& steps) {
+    std::vector<double> rotations;
+    for (const ViewCorrection& step : steps) rotations.push_back(step.rotation_rad);
+    const MeanGain common = mean_gain(rotations);
+    if (std::abs(common.mean) > kSure * common.error) return;
+    for (ViewCorrection& step : steps) step.rotation_rad -= common.mean;
   }
 
   // Predicts all views, some at a time, and returns what the registration to the predictions finds.
@@ -179,6 +196,7 @@ class AligningFit {
   fit::FieldOptions field_;
   measurement::Measurement measurement_;
   fit::Fit fit_;
+  Relaxation relaxation_;
   SlowModeAmplifier slow_modes_;
   int num_updates_ = 0;  // with pixels of kFreedomBin
   JointAlignment found_;
@@ -197,12 +215,13 @@ JointAlignment align_jointly(const JointProblem& problem, std::vector<ViewCorrec
   return fit.run(fit.num_epochs());
 }
 
-double coarse_residual(const JointProblem& problem, std::vector<ViewCorrection> start,
-                       const distributed::Communicator& processes) {
-  AligningFit fit(problem, std::move(start), processes);
+std::vector<double> coarse_residuals(const JointProblem& problem,
+                                     const std::vector<ViewCorrection>& start,
+                                     const distributed::Communicator& processes) {
+  AligningFit fit(problem, start, processes);
   fit.free_rotations();
   fit.run(kResidualEpochs);
-  return fit.residual();
+  return fit.residuals();
 }
 
 }  // namespace tomofield::align

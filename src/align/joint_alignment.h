@@ -55,7 +55,7 @@ struct JointProblem {
 /// Returns the options of the fit of align_jointly().
 fit::FitOptions joint_fit(std::uint64_t seed);
 
-/// Number of epochs of the fit of coarse_residual(): the first ones of joint_fit().
+/// Number of epochs of the fit of coarse_residuals(): the first ones of joint_fit().
 inline constexpr std::int64_t kResidualEpochs = 15;
 
 /// Aligns the views of a series with the projections of a field while the field is being fitted to
@@ -68,10 +68,11 @@ JointAlignment align_jointly(const JointProblem& problem,
                              std::vector<geometry::ViewCorrection> start,
                              const distributed::Communicator& processes);
 
-/// Does the same for the first epochs with coarse pixels alone, and returns what residual is left:
-/// its mean square over the noise's variance. Rotations are free whatever `start` is, so that the
-/// residuals of different starts compare.
-double coarse_residual(const JointProblem& problem, std::vector<geometry::ViewCorrection> start,
-                       const distributed::Communicator& processes);
+/// Does the same for the first epochs with coarse pixels alone, and returns what residual each view
+/// has then: the mean square in the pixels that are not near an edge. Rotations are free whatever
+/// `start` is, so that the residuals of different starts compare.
+std::vector<double> coarse_residuals(const JointProblem& problem,
+                                     const std::vector<geometry::ViewCorrection>& start,
+                                     const distributed::Communicator& processes);
 
 }  // namespace tomofield::align

@@ -10,10 +10,12 @@
 #include "align/aligning_fit.h"
 #include "align/gauge.h"
 #include "align/local_registration.h"
+#include "align/relaxation.h"
 #include "align/slow_modes.h"
 #include "base/trace.h"
 #include "fit/fit.h"
 #include "fit/stages.h"
+#include "geometry/tilt_order.h"
 
 namespace tomofield::align {
 namespace {
@@ -21,8 +23,6 @@ namespace {
 using geometry::ViewCorrection;
 using geometry::ViewWarp;
 
-// A registration to a field that was fitted to the view itself finds a part of the motion.
-constexpr double kRelaxation = 1.3;
 // With wider pixels the field shows too little to find motion in it.
 constexpr int kCoarsestBin = 2;
 constexpr int kCoarseEpochs = 40, kFineEpochs = 8;
@@ -71,7 +71,7 @@ class LocalFit {
             problem, start, fit::make_stages(field_, local_fit(problem.seed)).front().bin, field_,
             processes)),
         fit_(measurement_, field_, local_fit(problem.seed), processes),
-        by_tilt_(order_of_tilts(measurement_.geometry.tilt_deg)) {
+        by_tilt_(geometry::order_of_tilts(measurement_.geometry.tilt_deg)) {
     found_.agreement.resize(start.size());
     found_.corrections = std::move(start);
   }
@@ -115,13 +115,17 @@ class LocalFit {
 
   // Returns the steps that are taken for the motion that the registrations found.
   std::vector<ViewWarp> amplified(std::vector<ViewWarp> motion) {
+    std::vector<double> found;
+    for (ViewWarp& of_view : motion)
+      for (std::size_t i = 0; i < kComponents; ++i) found.push_back(component(of_view, i));
+    const double factor = relaxation_.next(std::move(found));
     std::vector<double> values(motion.size());
     for (std::size_t i = 0; i < kComponents; ++i) {
       for (std::size_t at = 0; at < values.size(); ++at)
         values[at] = component(motion[by_tilt_[at]], i);
       slow_modes_[i].amplify(values);
       for (std::size_t at = 0; at < values.size(); ++at)
-        component(motion[by_tilt_[at]], i) = kRelaxation * values[at];
+        component(motion[by_tilt_[at]], i) = factor * values[at];
     }
     return motion;
   }
@@ -133,6 +137,7 @@ class LocalFit {
   measurement::Measurement measurement_;
   fit::Fit fit_;
   std::vector<std::size_t> by_tilt_;  // views in order of tilt
+  Relaxation relaxation_;
   std::array<SlowModeAmplifier, kComponents> slow_modes_;
   LocalAlignment found_;
 };

@@ -285,6 +285,7 @@ std::array<double, 2> Registration::shift_error(const Freedoms& freedoms) const 
   if (num_pixels() == 0) return {};
   const Solution solution = solve_on(all(), freedoms);
   const double scale = scale_of(solution);
+  if (!(scale > 0.0)) return {};
   const double variance = residual_variance(freedoms) * pixels_per_sample_ / (scale * scale);
   return {pixel_ * std::sqrt(variance * solution.covariance(0, 0)),
           pixel_ * std::sqrt(variance * solution.covariance(1, 1))};

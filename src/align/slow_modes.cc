@@ -6,22 +6,17 @@
 #include <numeric>
 #include <utility>
 
+#include "align/relaxation.h"
+
 namespace tomofield::align {
 namespace {
 
 constexpr double kAmplification = 2.0;  // is added to the factor of the slowest mode
 constexpr double kModes = 3.0;          // the addition falls with exp(−(mode / kModes)²)
 constexpr int kMostModes = 12;          // later ones have no addition
-constexpr double kTurned = -0.3;        // of the last step, from which on a step turns back
+constexpr double kTurned = 0.3;         // of the last step, from which on a step turns back
 
 }  // namespace
-
-std::vector<std::size_t> order_of_tilts(std::span<const double> tilt_deg) {
-  std::vector<std::size_t> order(tilt_deg.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(order, {}, [&](std::size_t view) { return tilt_deg[view]; });
-  return order;
-}
 
 void amplify_slow_modes(std::span<double> values) {
   const auto n = static_cast<int>(values.size());
@@ -44,10 +39,7 @@ void SlowModeAmplifier::amplify(std::span<double> steps) {
   amplify_slow_modes(added);
   for (std::size_t i = 0; i < added.size(); ++i) added[i] -= steps[i];
   if (last_added_.empty()) last_added_.resize(added.size());
-  const auto product = [](const std::vector<double>& a, const std::vector<double>& b) {
-    return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
-  };
-  if (product(added, last_added_) < kTurned * product(last_added_, last_added_)) part_ /= 2;
+  if (turns_back(added, last_added_, kTurned)) part_ /= 2;
   for (std::size_t i = 0; i < added.size(); ++i) steps[i] += part_ * added[i];
   last_added_ = std::move(added);
 }

@@ -6,9 +6,6 @@
 
 namespace tomofield::align {
 
-/// Returns the numbers of the views in order of tilt.
-std::vector<std::size_t> order_of_tilts(std::span<const double> tilt_deg);
-
 /// Amplifies the part of the values that varies slowly from one view to the next: the first
 /// cosines of the discrete cosine transform, up to three times. `values` are in order of tilt.
 ///

@@ -1,7 +1,8 @@
 #include "align/trial.h"
 
+#include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
 #include <utility>
 
 #include "align/aligning_fit.h"
@@ -18,14 +19,21 @@ constexpr int kEvery = 8;
 constexpr int kFineEpochs = 1;
 constexpr int kCoarseBin = 2;  // of the last coarse stage
 
-double mean_of(const std::vector<double>& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
+// Compares the errors of the views that have pixels to compare in both alignments.
 Comparison compare_errors(const std::vector<double>& before, const std::vector<double>& after) {
   std::vector<double> gains;
-  for (std::size_t i = 0; i < before.size(); ++i) gains.push_back(before[i] - after[i]);
-  return {mean_of(before), mean_of(after), mean_gain(gains)};
+  Comparison comparison;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (std::isnan(before[i]) || std::isnan(after[i])) continue;
+    gains.push_back(before[i] - after[i]);
+    comparison.before += before[i];
+    comparison.after += after[i];
+  }
+  const auto n = static_cast<double>(std::max<std::size_t>(gains.size(), 1));
+  comparison.before /= n;
+  comparison.after /= n;
+  comparison.gain = mean_gain(gains);
+  return comparison;
 }
 
 }  // namespace
@@ -69,7 +77,7 @@ void AlignmentTrial::go_on() {
   measurement::realign(problem_.recorded, corrections_, 1, problem_.scratch_dir,
                        fit::band_rows(field_), processes_, measurement_);
   fit_->reread_measurement();
-  fit_->run([](const fit::Fit&) { return true; });
+  run_until(*fit_, fit_->num_steps(), problem_, processes_);
   fine_errors_ = errors();
   fit_.reset();
   measurement_.rays.reset();
@@ -82,7 +90,9 @@ std::vector<double> AlignmentTrial::errors() const {
   base::parallel_for("score held-out views", std::ssize(errors), [&](std::int64_t i) {
     const auto at = static_cast<std::size_t>(i);
     const Registration registration(image_pair(predicted[at], measurement_, fit_->stage()), {});
-    errors[at] = registration.predicted_error({.shift = false}) / registration.measured_variance();
+    const double variance = registration.measured_variance();
+    errors[at] = variance > 0.0 ? registration.predicted_error({.shift = false}) / variance
+                                : std::numeric_limits<double>::quiet_NaN();
   });
   return errors;
 }

@@ -31,9 +31,10 @@ class AlignmentTrial {
   AlignmentTrial(const JointProblem& problem, std::vector<geometry::ViewCorrection> corrections,
                  const distributed::Communicator& processes);
 
-  /// Returns the errors in pixels twice as wide, after the coarse stages of the fit.
+  /// Returns the errors in pixels twice as wide, after the coarse stages of the fit. That of a view
+  /// without pixels to compare is not a number.
   const std::vector<double>& coarse_errors();
-  /// Returns the errors in the pixels of the views, after the whole fit.
+  /// Does the same in the pixels of the views, after the whole fit.
   const std::vector<double>& fine_errors();
 
  private:
@@ -52,7 +53,7 @@ class AlignmentTrial {
 
 /// Compares the errors of held-out views with two alignments.
 struct Comparison {
-  double before = 0.0, after = 0.0;  ///< mean errors
+  double before = 0.0, after = 0.0;  ///< mean errors of the views that have one
   MeanGain gain;                     ///< of the differences over the views
 };
 

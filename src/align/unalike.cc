@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numeric>
 
 #include "base/percentile.h"
+#include "geometry/tilt_order.h"
 
 namespace tomofield::align {
 namespace {
@@ -22,9 +22,7 @@ double stretched(double correlation) { return std::atanh(std::clamp(correlation,
 
 std::vector<int> unalike(std::span<const double> tilt_deg, std::span<const double> correlation) {
   const std::ptrdiff_t n = std::ssize(tilt_deg);
-  std::vector<std::size_t> by_tilt(tilt_deg.size());
-  std::iota(by_tilt.begin(), by_tilt.end(), std::size_t{0});
-  std::ranges::stable_sort(by_tilt, {}, [&](std::size_t view) { return tilt_deg[view]; });
+  const std::vector<std::size_t> by_tilt = geometry::order_of_tilts(tilt_deg);
   std::vector<double> expected(tilt_deg.size()), lacks(tilt_deg.size()), sizes;
   for (std::ptrdiff_t i = 0; i < n; ++i) {
     std::vector<double> neighbours;

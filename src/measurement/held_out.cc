@@ -6,12 +6,12 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <utility>
 
 #include "base/aligned_buffer.h"
 #include "base/log.h"
 #include "base/parallel.h"
+#include "geometry/tilt_order.h"
 #include "kernels/lanes.h"
 #include "tomofield/error.h"
 
@@ -97,14 +97,11 @@ void copy_slab(const SlabViews& measured, int slab, int view, const ViewModel& m
 
 std::vector<int> held_out_views(const std::vector<double>& tilt_deg, int every) {
   if (every == 0) return {};
-  std::vector<int> by_tilt(tilt_deg.size());
-  std::iota(by_tilt.begin(), by_tilt.end(), 0);
-  std::ranges::stable_sort(by_tilt, [&](int a, int b) {
-    return tilt_deg[static_cast<std::size_t>(a)] < tilt_deg[static_cast<std::size_t>(b)];
-  });
+  const std::vector<std::size_t> by_tilt = geometry::order_of_tilts(tilt_deg);
   const std::size_t step = static_cast<std::size_t>(every);
   std::vector<int> views;
-  for (std::size_t i = step / 2; i + 1 < by_tilt.size(); i += step) views.push_back(by_tilt[i]);
+  for (std::size_t i = step / 2; i + 1 < by_tilt.size(); i += step)
+    views.push_back(static_cast<int>(by_tilt[i]));
   if (views.empty()) {
     throw Error(
         fmt::format("--hold-out {} holds out none of {} views: the first and the last in order of "

@@ -18,7 +18,6 @@
 #include "base/trace.h"
 #include "io/json.h"
 #include "measurement/prepare.h"
-#include "measurement/view_transfers.h"
 #include "reconstruct/alignment_record.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
@@ -111,18 +110,16 @@ void log_alignment(const json& record) {
 align::Alignment align_views(const tilt_series::TiltSeries& series,
                              const ReconstructOptions& options, const ReconstructHooks& hooks,
                              const distributed::Communicator& processes) {
-  measurement::Measurement plan = measurement::plan_realigned(series, options.specimen, processes);
-  processes.run_collectively([&] {
-    plan.transfers =
-        measurement::view_transfers(options.files, options.resolved, options.input, series);
-  });
-  const align::JointProblem problem{.recorded = series,
-                                    .plan = std::move(plan),
-                                    .field = options.field,
-                                    .seed = options.fit.seed,
-                                    .scratch_dir = options.input.scratch_dir,
-                                    .progress = hooks.tune_progress,
-                                    .stop_requested = hooks.stop_requested};
+  // The views count as plain projections: fits with contrast transfer would need many more epochs
+  // to show the specimen (docs/alignment.md).
+  const align::JointProblem problem{
+      .recorded = series,
+      .plan = measurement::plan_realigned(series, options.specimen, processes),
+      .field = options.field,
+      .seed = options.fit.seed,
+      .scratch_dir = options.input.scratch_dir,
+      .progress = hooks.tune_progress,
+      .stop_requested = hooks.stop_requested};
   std::vector<geometry::ViewCorrection> start(series.views().size());
   if (options.resolved.align == Alignment::kFull)
     start = align::with_best_axis(problem, align::correlated_start(problem), processes);
@@ -153,6 +150,7 @@ json make_record(const ReconstructOptions& options, const ReconstructHooks& hook
                              found.unaligned.size()));
   const tilt_series::TiltSeries others(recorded, processes);
   const align::Alignment again = align_views(others, options, hooks, processes);
+  if (!again.is_accepted) return alignment_record(series, found, running.seconds());
   json record = alignment_record(others, again, running.seconds());
   add_left_out(series, found, record);
   return record;

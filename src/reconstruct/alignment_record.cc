@@ -305,8 +305,11 @@ json alignment_record(const tilt_series::TiltSeries& series, const align::Alignm
                       double seconds) {
   json views = json::array();
   for (std::size_t v = 0; v < series.views().size(); ++v) {
-    views.push_back(view_json(series.views()[v], found.corrections[v], found.joint.agreement[v],
-                              std::ranges::binary_search(found.unaligned, static_cast<int>(v))));
+    // An alignment that was not accepted says nothing against a view.
+    const bool is_left_out =
+        found.is_accepted && std::ranges::binary_search(found.unaligned, static_cast<int>(v));
+    views.push_back(
+        view_json(series.views()[v], found.corrections[v], found.joint.agreement[v], is_left_out));
   }
   json record = {{"accepted", found.is_accepted},
                  {"rotation", found.joint.freedoms.rotation},

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <span>
 #include <utility>
 
@@ -10,6 +9,7 @@
 #include "base/percentile.h"
 #include "base/trace.h"
 #include "evaluate/image_pair.h"
+#include "geometry/tilt_order.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -122,13 +122,12 @@ double usual(std::vector<float> values) {
 }  // namespace
 
 std::vector<int> views_to_compare(const std::vector<double>& tilt_deg) {
-  std::vector<int> all(tilt_deg.size());
-  std::iota(all.begin(), all.end(), 0);
-  std::ranges::stable_sort(all, {}, [&](int v) { return tilt_deg[static_cast<std::size_t>(v)]; });
+  const std::vector<std::size_t> all = geometry::order_of_tilts(tilt_deg);
   const int last = static_cast<int>(all.size()) - 1, count = std::min(kViews, last + 1);
   std::vector<int> chosen;
   for (int i = 0; i < count; ++i)
-    chosen.push_back(all[static_cast<std::size_t>(count == 1 ? 0 : i * last / (count - 1))]);
+    chosen.push_back(
+        static_cast<int>(all[static_cast<std::size_t>(count == 1 ? 0 : i * last / (count - 1))]));
   return chosen;
 }
 
