@@ -29,9 +29,7 @@ void run(option_table::Choices& choices, const std::vector<option_table::Setting
   io::OutputSet results;
   reconstruction::write_alignment_results(series, options);
   results.commit();
-  print("alignment {}\n", reconstruction::output_paths(options.resolved.output).alignment.string());
-  for (const auto& file : reconstruction::alignment_results(options))
-    if (std::filesystem::exists(file)) print("          {}\n", file.string());
+  print_alignment(options);
 }
 
 }  // namespace

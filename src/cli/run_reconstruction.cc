@@ -25,6 +25,7 @@
 #include "io/output_set.h"
 #include "output/volume.h"
 #include "reconstruct/aligned_series.h"
+#include "reconstruct/alignment_output.h"
 #include "reconstruct/exchange_files.h"
 #include "reconstruct/run_report.h"
 #include "report/pictures.h"
@@ -172,6 +173,13 @@ tilt_series::TiltSeries open_series(reconstruction::ReconstructOptions& options,
   return tilt_series::TiltSeries(options.input, processes);
 }
 
+void print_alignment(const reconstruction::ReconstructOptions& options) {
+  if (options.resolved.align == Alignment::kOff) return;
+  print("alignment {}\n", reconstruction::output_paths(options.resolved.output).alignment.string());
+  for (const auto& file : reconstruction::alignment_results(options))
+    if (std::filesystem::exists(file)) print("          {}\n", file.string());
+}
+
 void run_reconstruction(const tilt_series::TiltSeries& series,
                         const reconstruction::ReconstructOptions& options, bool dry_run,
                         const distributed::Communicator& processes) {
@@ -200,6 +208,8 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
       report::write_tree_picture(*results.model, paths.tree_picture);
     }
     write_report(results, options, volume, pictures.back());
+    for (const auto& picture : {paths.held_out_picture, paths.choice_picture})
+      if (io::OutputSet::active()->contains(picture)) pictures.push_back(picture);
   };
   if (processes.is_root()) {
     hooks.progress = make_progress_bar("reconstruct");
@@ -217,8 +227,9 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   }
   if (!processes.is_root()) return;
   print_files(options, paths);
-  for (const auto& file : reconstruction::exchange_files(options))
-    print("          {}\n", file.string());
+  for (const auto& file : reconstruction::volume_descriptions(options))
+    print("exchange  {}\n", file.string());
+  print_alignment(options);
   if (options.volume.zarr) print("OME-Zarr  {}\n", output::zarr_path(paths.volume).string());
   print_pictures(pictures);
   if (options.field.tree == TreeKind::kAdaptive)

@@ -1,5 +1,6 @@
 """Tests --align and the command align, from misaligned views to the files of the alignment."""
 
+import glob
 import json
 import os
 import sys
@@ -148,11 +149,14 @@ def test_local_motion_is_undone():
 def test_reconstruct_takes_the_alignment_and_resumes_from_it(shifted):
     volume = os.path.join(shifted, "made.mrc")
     command = ["reconstruct", *series_of(shifted), *FIT[:-2], "--align", "refine", "-o", volume]
-    harness.succeed(*command)
+    printed = harness.succeed(*command).stdout
+    listed = [word for word in printed.split() if word.startswith(shifted)]
+    assert sorted(listed) == sorted(glob.glob(os.path.join(shifted, "made*"))), printed
     first = harness.read_bytes(volume)
     with open(os.path.join(shifted, "made.json"), encoding="utf-8") as file:
         metrics = json.load(file)["metrics"]
     assert metrics["alignment"] == record(os.path.join(shifted, "made_align"))
+    assert metrics["verdict"]["seconds"] > metrics["alignment"]["seconds"] + metrics["seconds"]
     with open(os.path.join(shifted, "made_report.html"), encoding="utf-8") as file:
         assert "alignment before the fit" in file.read()
     # The written .xf gives the same tomogram to the rounding of its digits.
