@@ -48,7 +48,7 @@ Verdict judge(const FinishedFit& finished, const std::optional<measurement::View
   if (!series.ray_geometry)
     verdict.views = compare_views(fit, series, finished.options.specimen.with_margin);
   if (!series.ray_geometry) verdict.defocus = check_defocus(fit, series);
-  verdict.seconds = finished.record.since_start.seconds();
+  verdict.seconds = finished.options.since_start.seconds();
   verdict.peak_GiB = processes.allreduce_max(static_cast<double>(base::peak_memory())) / (1 << 30);
   verdict.warnings = find_warnings(verdict, {.contrast = finished.options.input.contrast,
                                              .alignment = finished.record.alignment,

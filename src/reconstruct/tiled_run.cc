@@ -206,7 +206,7 @@ RunResult finish_tiles(const Run& run, RunRecord& record, FinishedTiles& finishe
   record.fit_seconds = seconds_of_coarse + finished.sum_of("seconds_fitting");
   Verdict& verdict = example.found.verdict;
   verdict.residual = finished.mean_of("residual");
-  verdict.seconds = record.since_start.seconds();
+  verdict.seconds = run.options.since_start.seconds();
   verdict.peak_GiB = static_cast<double>(base::peak_memory()) / (1 << 30);
   Results results{
       .model = output::Model{model_info(run.measurement, run.options), nullptr, std::nullopt},
