@@ -199,6 +199,15 @@ def test_wrong_tilt_angles_are_found_and_reach_the_files_of_other_programs():
                            atol=0.01)
 
 
+def test_there_is_no_alignment_without_one(shifted):
+    output = os.path.join(shifted, "none.mrc")
+    refused = harness.tomofield("align", *series_of(shifted), "--align", "off", "-o", output)
+    assert refused.returncode == 2 and "nothing to do with --align off" in refused.stderr
+    assert glob.glob(output[:-4] + "*") == []
+    text = " ".join(harness.succeed("align", "--help").stdout.split())
+    assert "default: refine" in text and "model, metrics" not in text, text
+
+
 def test_too_few_views_are_refused(shifted):
     refused = harness.tomofield("align", *series_of(shifted), "--exclude", "1-84", "-o",
                                 os.path.join(shifted, "few.mrc"))
