@@ -26,8 +26,8 @@ std::optional<HeldOutSummary> held_out_summary(
   if (held_out) return summary_of(held_out->view_error, held_out->views, tilt_deg);
   const std::optional<TunedFit>& tuned = finished.record.origin.tuned;
   if (!tuned) return std::nullopt;
-  const auto chosen = std::ranges::find(tuned->trials, tuned->settings, &FitTrial::settings);
-  if (chosen == tuned->trials.end() || chosen->score.view_error.empty()) return std::nullopt;
+  const FitTrial* const chosen = chosen_trial(*tuned);
+  if (chosen == nullptr || chosen->score.view_error.empty()) return std::nullopt;
   HeldOutSummary summary = summary_of(chosen->score.view_error, tuned->predicted_views, tilt_deg);
   summary.is_of_trials = true;
   return summary;

@@ -36,16 +36,30 @@ TrialSettings settings_from(const json& entry) {
               static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank))};
 }
 
+// Says whether settings are equal. Weights may differ by rounding.
+bool are_equal(const TrialSettings& a, const TrialSettings& b) {
+  constexpr double kRounding = 1e-9;
+  TrialSettings same_weight = a;
+  same_weight.variation = b.variation;
+  return same_weight == b &&
+         std::abs(a.variation - b.variation) <= kRounding * std::abs(b.variation);
+}
+
 }  // namespace
 
-FitTrials make_trials(FitTrials::RunTrials run) {
-  constexpr double kRounding = 1e-9;
-  return {std::move(run), [](const TrialSettings& a, const TrialSettings& b) {
-            TrialSettings same_weight = a;
-            same_weight.variation = b.variation;
-            return same_weight == b &&
-                   std::abs(a.variation - b.variation) <= kRounding * std::abs(b.variation);
-          }};
+FitTrials make_trials(FitTrials::RunTrials run) { return {std::move(run), are_equal}; }
+
+const FitTrial* chosen_trial(const TunedFit& tuned) {
+  const auto find = [&](bool with_epochs) {
+    return std::ranges::find_if(tuned.trials, [&](const FitTrial& trial) {
+      TrialSettings settings = trial.settings;
+      if (!with_epochs) settings.epochs = tuned.settings.epochs;
+      return are_equal(settings, tuned.settings);
+    });
+  };
+  auto chosen = find(true);
+  if (chosen == tuned.trials.end()) chosen = find(false);
+  return chosen == tuned.trials.end() ? nullptr : &*chosen;
 }
 
 selection::Difference difference_to_best(const FitTrial& trial, const TunedFit& tuned) {

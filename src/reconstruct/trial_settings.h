@@ -30,6 +30,10 @@ using TunedFit = selection::Tuned<TrialSettings>;
 /// rounding count as equal.
 FitTrials make_trials(FitTrials::RunTrials run);
 
+/// Returns the trial that has the chosen settings, or null if there is none. Short trials have
+/// fewer epochs than the fit, so epochs count only if a trial has those that were chosen.
+const FitTrial* chosen_trial(const TunedFit& tuned);
+
 /// Compares a trial with the one of a search that predicts best.
 selection::Difference difference_to_best(const FitTrial& trial, const TunedFit& tuned);
 

@@ -152,6 +152,18 @@ def test_views_that_score_the_result_have_no_say_in_its_settings(series):
         harness.assert_scored_views_have_no_say(metrics, scored)
 
 
+def test_the_verdict_has_the_held_out_views_of_the_chosen_short_trial(series):
+    results = series.reconstruct("short_trials", "--tv-penalty", "auto")
+    metrics = record(results)["metrics"]
+    chosen = metrics["tuning"]["chosen"]
+    trial, = (t for t in metrics["tuning"]["trials"]
+              if all(t[key] == chosen[key] for key in chosen if key != "epochs"))
+    assert trial["epochs"] < chosen["epochs"]
+    assert metrics["verdict"]["held_out"]["of_trials"]
+    assert metrics["verdict"]["held_out"]["worst"] == max(trial["held_out_error_by_view"])
+    assert "held out in trials" in metrics["verdict"]["line"]
+
+
 TUNE = harness.merge(harness.QUICK, ["--epochs", 4, "--tune"])
 
 
