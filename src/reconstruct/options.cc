@@ -12,7 +12,9 @@
 #include "measurement/view_transfers.h"
 #include "option_table/values.h"
 #include "output/shared_options.h"
+#include "reconstruct/checkpoint.h"
 #include "reconstruct/exchange_files.h"
+#include "reconstruct/run_fit.h"
 #include "reconstruct/tuning.h"
 
 namespace tomofield::reconstruction {
@@ -303,7 +305,12 @@ std::vector<io::OutputLock> claim_outputs(const ReconstructOptions& options) {
   if (options.makes_halves())
     for (const OutputPaths::OfHalf& half : paths.halves) files.push_back(half.model);
   if (options.resolved.output.empty()) files.clear();
-  return io::claim_outputs(files, [&] { check_options(options); });
+  return io::claim_outputs(files, [&] {
+    check_options(options);
+    const std::filesystem::path& model = options.first_model(paths);
+    if (options.resolved.resume && std::filesystem::exists(model))
+      read_checkpoint([&] { require_state_of_fit(model); });
+  });
 }
 
 nlohmann::json options_json(const ReconstructOptions& options) {

@@ -102,7 +102,8 @@ void check_options(const ReconstructOptions& options);
 
 /// Checks the options and locks the files of a run against other runs. The run holds the locks to
 /// its end. Returns none if the options name no output. Throws Error as check_options() does, or if
-/// another run writes these files.
+/// another run writes these files, or if
+/// the run would continue a model that has no state of a fit.
 std::vector<io::OutputLock> claim_outputs(const ReconstructOptions& options);
 
 /// Writes the resolved options and the constants of the method for the metrics and the model file.

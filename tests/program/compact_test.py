@@ -168,6 +168,10 @@ def test_wrong_requests_get_a_sentence(folder, tmp_path):
     harness.succeed(*fit_arguments(folder), "--budget", "1dB", "-o", volume)
     refuse(*fit_arguments(folder), "--budget", "1dB", "-o", volume, "--resume",
            says="is no checkpoint")
+    # It is refused before the alignment, which takes long.
+    refuse(*fit_arguments(folder), "--align", "refine", "-o", volume, "--resume",
+           says="it has no state of a fit, as no compact model has one")
+    assert not (tmp_path / "volume_align.json").exists()
 
 
 def test_a_damaged_code_gets_a_sentence(folder, tmp_path):
