@@ -162,8 +162,10 @@ class TileFits {
       const field::RootGrid& roots = vertices->tree().roots();
       rows.end = static_cast<int>(roots.y0 + roots.rows * roots.cell_size);
     }
-    compact::CompactField made =
-        compact::compress(*vertices, run_.measurement.roi, budget, rows, start_.variance);
+    const output::ModelInfo info = model_info(run_.measurement, run_.options);
+    compact::CompactField made = compact::compress(
+        *vertices, run_.measurement.roi, budget, rows, start_.variance,
+        [&](const compact::CodedField& coded) { return output::coded_file_size(coded, info); });
     return {std::move(made.coded), made.report, running.seconds()};
   }
 
