@@ -369,3 +369,12 @@ def test_a_stack_of_nothing_is_answered_in_little_memory(out, path, stack, text_
     assert status == 2 and "section 1" in text and "constant" in text, text
     assert (mebibytes < 1024 or is_sanitized()), mebibytes
     os.remove(empty)
+
+
+def test_unknown_options_are_named_with_those_that_are_like_them():
+    for arguments, says in ((["--thicknes", "160"], "no option --thicknes (did you mean --thickness?);"),
+                            (["--algn", "refine"], "no option --algn (did you mean --aln or --align?);"),
+                            (["--zzzzzz=3", "-q", "-3"], "no option --zzzzzz; there is no option -q;"),
+                            (["a", "b", "--thickness", 3, "-o", "c.mrc"], "'a', 'b' belong to no option")):
+        result = harness.tomofield("reconstruct", "series.mrc", *arguments)
+        assert result.returncode == 2 and says in result.stderr, result.stderr
