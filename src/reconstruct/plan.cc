@@ -104,9 +104,10 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.stages = fit::make_stages(options.field, options.fit);
   const fit::Stage& last = run.stages.back();
   // Only the views tell whether there is a background or an undecided bead.
-  run.num_trials = options.num_trials(
-      num_fitted_views(plan, options.fit),
-      {.variation = options.open.variation, .view_scale = options.open.view_scale});
+  run.num_trials = options.num_trials(num_fitted_views(plan, options.fit),
+                                      {.variation = options.open.variation,
+                                       .spikes = options.open.spikes,
+                                       .view_scale = options.open.view_scale});
   if (run.num_trials > 0) require_views_for_trials(plan, options.fit);
   run.steps_an_epoch = steps_an_epoch(plan, options.fit);
   run.num_steps = (last.first_epoch + last.epochs) * run.steps_an_epoch;

@@ -62,7 +62,9 @@ const FitTrial* chosen_trial(const TunedFit& tuned) {
   return chosen == tuned.trials.end() ? nullptr : &*chosen;
 }
 
-selection::Difference difference_to_best(const FitTrial& trial, const TunedFit& tuned) {
+selection::Difference difference_to_chosen(const FitTrial& trial, const TunedFit& tuned) {
+  if (const FitTrial* const chosen = chosen_trial(tuned))
+    return selection::difference(trial.score, chosen->score);
   const FitTrial& best = *std::ranges::min_element(tuned.trials, {}, [&](const FitTrial& t) {
     return selection::difference(t.score, tuned.trials.front().score).log_ratio;
   });
@@ -106,8 +108,9 @@ FitTrial trial_from(const json& entry) {
 json tuning_json(const TunedFit& tuned) {
   json tuning = selection::tuned_json(tuned, settings_json);
   for (std::size_t i = 0; i < tuned.trials.size(); ++i) {
-    const selection::Difference d = difference_to_best(tuned.trials[i], tuned);
-    tuning["trials"][i].update({{"above_best", d.log_ratio}, {"standard_error", d.standard_error}});
+    const selection::Difference d = difference_to_chosen(tuned.trials[i], tuned);
+    tuning["trials"][i].update(
+        {{"above_chosen", d.log_ratio}, {"standard_error", d.standard_error}});
   }
   return tuning;
 }

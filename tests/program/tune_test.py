@@ -186,7 +186,7 @@ def test_tune_chooses_what_predicts_best_then_fits_all_views(series):
     # A run that was interrupted after some trials does not repeat them and ends alike.
     path = stem(results, "_tune.json")
     stored = json.load(open(path))
-    derived = ("above_best", "standard_error")
+    derived = ("above_chosen", "standard_error")
     assert stored["trials"] == [{key: value for key, value in trial.items() if key not in derived}
                                 for trial in trials]
     stored["trials"] = stored["trials"][:5]
