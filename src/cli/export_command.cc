@@ -51,6 +51,7 @@ std::vector<io::OutputLock> claim_output(const ExportArguments& arguments) {
   return io::claim_outputs({written}, [&] {
     constexpr const char* kAdvice = "give another name, or --overwrite to replace it";
     io::check_output_files({written}, {arguments.model}, arguments.overwrite, kAdvice);
+    if (arguments.compact.empty()) io::require_volume_name(arguments.output);
     if (arguments.compact.empty() && arguments.choices.options.zarr)
       output::check_zarr(arguments.output, arguments.overwrite, kAdvice);
   });

@@ -272,6 +272,7 @@ void check_options(const ReconstructOptions& options) {
   base::require_no_faults(options.faults());
   if (options.resolved.output.empty()) return;
   const Options& resolved = options.resolved;
+  io::require_volume_name(resolved.output);
   const OutputPaths paths = output_paths(resolved.output);
   // Without a checkpoint there is nothing to resume. The other files are from another run.
   const bool resumes =

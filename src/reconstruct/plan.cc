@@ -83,6 +83,16 @@ int most_vertices(const fit::Domain& domain) {
   return most;
 }
 
+// Refuses views in which nothing can be seen.
+void require_pixels(std::int64_t width, std::int64_t height) {
+  constexpr std::int64_t kFewest = 8;
+  if (std::min(width, height) < kFewest)
+    throw Error(
+        fmt::format("views of {} × {} pixels show nothing: give a smaller --bin or a larger "
+                    "--roi, so that they have at least {} along both sides",
+                    width, height, kFewest));
+}
+
 }  // namespace
 
 RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
@@ -96,6 +106,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.num_views = plan.geometry.num_views();
   run.view_width = plan.geometry.width;
   run.view_height = plan.geometry.height;
+  require_pixels(run.view_width, run.view_height);
   run.pixel_size_A = plan.pixel_size_A;
   run.roi = plan.roi;
   run.thickness = plan.geometry.thickness;

@@ -378,3 +378,11 @@ def test_unknown_options_are_named_with_those_that_are_like_them():
                             (["a", "b", "--thickness", 3, "-o", "c.mrc"], "'a', 'b' belong to no option")):
         result = harness.tomofield("reconstruct", "series.mrc", *arguments)
         assert result.returncode == 2 and says in result.stderr, result.stderr
+
+
+def test_volumes_have_no_name_of_another_format(tmp_path):
+    stack = tmp_path / "series.mrc"
+    write_stack(stack, np.zeros((3, 8, 8), np.float32))
+    for name in ("x.tif", "x.H5"):
+        result = harness.tomofield("reconstruct", stack, "--thickness", 4, "-o", tmp_path / name)
+        assert result.returncode == 2 and "the volume is an MRC file" in result.stderr, result.stderr
