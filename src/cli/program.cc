@@ -126,7 +126,7 @@ std::string materials() {
 void add_version_flag(CLI::App& program) {
   CLI::Option* verbose =
       program.add_flag("--verbose")
-          ->description("With --version: list the packages of the program and their licences, too");
+          ->description("List the packages of the program and their licences, too");
   const auto version = [verbose] {
     const std::string name =
         fmt::format("tomofield " TOMOFIELD_VERSION " ({})", base::source_commit());

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/enum_names.h"
+#include "base/log.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
 #include "base/trace.h"
@@ -75,11 +76,11 @@ void print_plan(const reconstruction::ReconstructOptions& options,
     print("about {} short trials first, that choose settings by held-out views\n", plan.num_trials);
   const std::string processes =
       num_processes == 1 ? "" : fmt::format(" of each of {} processes", num_processes);
-  print("{} field, {} {}, {} parameters; {} steps on {} threads{}; about {:.2f} GiB of memory{}\n",
+  print("{} field, {} {}, {} parameters; {} steps on {}{}; about {:.2f} GiB of memory{}\n",
         base::name_of(options.field.kind), plan.num_leaves,
         plan.num_leaves == 1 ? "leaf" : "leaves", plan.num_parameters, plan.num_steps,
-        base::thread_count(), processes, static_cast<double>(plan.memory_bytes) / (1 << 30),
-        num_processes == 1 ? "" : " each");
+        count_of(base::thread_count(), "thread"), processes,
+        static_cast<double>(plan.memory_bytes) / (1 << 30), num_processes == 1 ? "" : " each");
   print("epochs: {}\n", epochs_text(plan.stages));
   if (plan.tiles.is_used()) {
     print(
@@ -187,6 +188,10 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
     const reconstruction::RunPlan plan = plan_run(series, options, processes);
     require_memory(plan, processes);
     require_few_vertices(plan);
+    if (options.field.kind == FieldKind::kGrid && options.requested.rank != Options().rank)
+      base::log_warning(
+          "--rank changes nothing: it is for factors (--field vm), and this field has plain "
+          "vertices");
     print_plan(options, plan, processes.size());
     if (dry_run && processes.is_root())
       print_estimate(estimate_run(series, options, plan), processes.size());
