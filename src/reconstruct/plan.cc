@@ -88,8 +88,8 @@ void require_pixels(std::int64_t width, std::int64_t height) {
   constexpr std::int64_t kFewest = 8;
   if (std::min(width, height) < kFewest)
     throw Error(
-        fmt::format("views of {} × {} pixels show nothing: give a smaller --bin or a larger "
-                    "--roi, so that they have at least {} along both sides",
+        fmt::format("views of {} × {} pixels show nothing: give a smaller --bin, so that they "
+                    "have at least {} along both sides",
                     width, height, kFewest));
 }
 

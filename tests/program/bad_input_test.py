@@ -386,3 +386,13 @@ def test_volumes_have_no_name_of_another_format(tmp_path):
     for name in ("x.tif", "x.H5"):
         result = harness.tomofield("reconstruct", stack, "--thickness", 4, "-o", tmp_path / name)
         assert result.returncode == 2 and "the volume is an MRC file" in result.stderr, result.stderr
+
+
+def test_views_of_few_pixels_are_refused(tmp_path):
+    stack = tmp_path / "series.mrc"
+    write_stack(stack, np.random.default_rng(1).normal(100, 1, (14, 32, 32)).astype(np.float32))
+    angles = tmp_path / "series.tlt"
+    np.savetxt(angles, np.linspace(-50, 50, 14))
+    result = harness.tomofield("reconstruct", stack, "--tlt", angles, "--thickness", 16, "--bin", 8,
+                               "--dry-run", "-o", tmp_path / "x.mrc")
+    assert result.returncode == 2 and "views of 4 × 4 pixels show nothing" in result.stderr, result.stderr

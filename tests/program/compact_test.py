@@ -186,6 +186,17 @@ def test_wrong_requests_get_a_sentence(folder, tmp_path):
     assert not (tmp_path / "volume_align.json").exists()
 
 
+def test_plain_vertices_have_no_ranks(folder, tmp_path):
+    assert "ranks" not in harness.succeed("info", os.path.join(folder, "fit.h5")).stdout
+    compact = tmp_path / "compact.h5"
+    harness.succeed("export", os.path.join(folder, "fit.h5"), "--compact", compact)
+    assert "ranks" in harness.succeed("info", compact).stdout
+    plan = (*fit_arguments(folder), "--dry-run", "-o", tmp_path / "plan.mrc")
+    assert "--rank changes nothing" in harness.succeed(*plan, "--rank", 8).stderr
+    assert "--rank" not in harness.succeed(*plan).stderr
+    assert "--rank" not in harness.succeed(*plan, "--rank", 8, "--field", "vm").stderr
+
+
 def test_a_damaged_code_gets_a_sentence(folder, tmp_path):
     compact = tmp_path / "compact.h5"
     harness.succeed("export", os.path.join(folder, "fit.h5"), "--compact", compact)
