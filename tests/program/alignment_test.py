@@ -97,6 +97,15 @@ def test_gold_beads_make_the_direction_of_the_axis_finer():
     assert found["x_px"] < 0.05 and found["y_px"] < 0.05, found
 
 
+def test_beads_that_are_too_few_to_follow_are_named():
+    folder = simulate("alignment_few_beads", "--misalign", 1, "--gold", 2, "--gold-diameter", 50,
+                      noise=0.02)
+    log = harness.succeed("align", *series_of(folder, SIZE, 4.2), "-o",
+                          os.path.join(folder, "found.mrc")).stderr
+    assert "2 beads were found, and the alignment uses none of them" in log, log
+    assert "beads" not in record(os.path.join(folder, "found_align"))
+
+
 def test_views_of_something_else_are_named_and_left_out():
     folder = simulate("alignment_strange", "--misalign", 3)
     with mrcfile.open(os.path.join(folder, "tilt_series.mrc"), mode="r+") as file:
