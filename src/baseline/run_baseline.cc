@@ -213,6 +213,7 @@ void check_options(const BaselineOptions& options) {
   base::require_no_faults(option_table::range_faults(options.shared));
   const auto faults = measurement::faults_of_transfer(options.files, options.shared);
   base::require_no_faults({faults.begin(), faults.end()});
+  io::require_volume_name(options.shared.output);
   const BaselinePaths paths = baseline_paths(options.shared.output);
   io::check_result_files({paths.volume, paths.json}, paths.picture_prefix, options.files,
                          options.shared.overwrite, kAdvice);

@@ -13,14 +13,16 @@
 #include "reconstruct/options.h"
 #include "reconstruct/reconstruct.h"
 #include "tilt_series/tilt_series.h"
+#include "tomofield/error.h"
 
 namespace tomofield::cli {
 namespace {
 
 using option_table::Group;
 
-void run(option_table::Choices& choices, const std::vector<option_table::Setting>& origins) {
-  if (choices.options.align == Alignment::kOff) choices.options.align = Alignment::kRefine;
+void run(const option_table::Choices& choices, const std::vector<option_table::Setting>& origins) {
+  if (choices.options.align == Alignment::kOff)
+    throw Error("there is nothing to do with --align off: give refine or full");
   reconstruction::ReconstructOptions options =
       reconstruction::run_options(choices.files, choices.options);
   options.origins = origins;
@@ -31,9 +33,7 @@ void run(option_table::Choices& choices, const std::vector<option_table::Setting
       align_and_open(options, distributed::Communicator::alone());
   reconstruction::write_alignment_results(series, options);
   results.commit();
-  print("alignment {}\n", reconstruction::output_paths(options.resolved.output).alignment.string());
-  for (const auto& file : reconstruction::alignment_results(options))
-    if (std::filesystem::exists(file)) print("          {}\n", file.string());
+  print_alignment(options);
 }
 
 }  // namespace
@@ -44,8 +44,18 @@ void add_align_command(CLI::App& program, const std::vector<option_table::Settin
   auto choices = std::make_shared<option_table::Choices>();
   add_input_options(command, *choices);
   add_groups(command, *choices, {Group::kSpecimen});
+  choices->options.align = Alignment::kRefine;
   for (const char* key : {"fit.align", "fit.seed", "running.output", "running.overwrite"})
     add_row(command, key, *choices);
+  command.get_option("--output")
+      ->description(
+          "The alignment's files are called after it, and it is not written itself: "
+          "NAME_align.xf for NAME.mrc");
+  command.get_option("--align")
+      ->description(
+          "refine: begin with the alignment of the files; full: begin with views as they were "
+          "recorded")
+      ->type_name("refine|full");
   add_common_options(command);
   add_help_all(command);
   command.footer(

@@ -45,11 +45,10 @@ void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts&
                 VolumeAxes axes) {
   print_sizes({plan.num_views, plan.geometry.width, plan.geometry.height, plan.pixel_size_A,
                plan.roi, plan.geometry.thickness, axes});
-  print(
-      "{} voxels with the margins, {} parameters; {} iteration{} on {} threads; about {:.2f} GiB "
-      "of memory\n",
-      plan.num_voxels, plan.num_parameters, method.iterations, method.iterations == 1 ? "" : "s",
-      base::thread_count(), static_cast<double>(plan.memory_bytes) / (1 << 30));
+  print("{} voxels with the margins, {} parameters; {} on {}; about {:.2f} GiB of memory\n",
+        plan.num_voxels, plan.num_parameters, count_of(method.iterations, "iteration"),
+        count_of(base::thread_count(), "thread"),
+        static_cast<double>(plan.memory_bytes) / (1 << 30));
 }
 
 void print_summary(const baseline::BaselineSummary& summary) {

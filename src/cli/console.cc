@@ -32,6 +32,10 @@ void print_text(std::string_view text) {
   remember_failure(std::fwrite(text.data(), 1, text.size(), stdout) != text.size());
 }
 
+std::string count_of(int number, std::string_view what) {
+  return fmt::format("{} {}{}", number, what, number == 1 ? "" : "s");
+}
+
 void flush_output() { remember_failure(std::fflush(stdout) != 0); }
 
 std::string output_fault() {

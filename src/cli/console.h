@@ -32,6 +32,8 @@ template <typename... Args>
 void print(fmt::format_string<Args...> format, Args&&... args) {
   print_text(fmt::vformat(format, fmt::make_format_args(shown(args)...)));
 }
+/// Returns a number with what it counts: "1 thread", "2 threads".
+std::string count_of(int number, std::string_view what);
 /// Hands to the system what has been printed, so that it comes before other output.
 void flush_output();
 /// Flushes standard output. Returns why something that was printed is lost, or an empty text.

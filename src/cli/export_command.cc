@@ -51,6 +51,7 @@ std::vector<io::OutputLock> claim_output(const ExportArguments& arguments) {
   return io::claim_outputs({written}, [&] {
     constexpr const char* kAdvice = "give another name, or --overwrite to replace it";
     io::check_output_files({written}, {arguments.model}, arguments.overwrite, kAdvice);
+    if (arguments.compact.empty()) io::require_volume_name(arguments.output);
     if (arguments.compact.empty() && arguments.choices.options.zarr)
       output::check_zarr(arguments.output, arguments.overwrite, kAdvice);
   });
@@ -81,13 +82,18 @@ OrientedBox unrotated_box(const ExportArguments& arguments, const Model& model) 
 // Writes the model again with factors in place of its vertices.
 void write_compact(const ExportArguments& arguments) {
   const compact::Budget budget = compact::parse_budget(arguments.budget);
-  Model model = output::load_model(arguments.model);
-  if (model.coded || model.field->kind() != FieldKind::kGrid) {
+  Model model = output::load_undecoded(arguments.model);
+  if (model.coded)
+    throw Error(fmt::format("'{}' is compact already: make another one from the model of the fit",
+                            arguments.model.string()));
+  if (model.field->kind() != FieldKind::kGrid) {
     throw Error(fmt::format(
         "'{}' is a model of factors, and --compact is for models of vertices (--field grid)",
         arguments.model.string()));
   }
-  compact::CompactField made = compact::compress(*model.field, model.roi, budget);
+  compact::CompactField made = compact::compress(
+      *model.field, model.roi, budget,
+      [&](const compact::CodedField& coded) { return output::coded_file_size(coded, model); });
   model.field = std::move(made.field);
   model.coded = std::move(made.coded);
   io::OutputSet results;
@@ -195,6 +201,7 @@ void add_export_command(CLI::App& program) {
                    "How close or how small the compact model is: decibels (0.1dB), parameters "
                    "(500k, 2M) or bytes (800kB, 5MB)")
       ->type_name("AMOUNT")
+      ->default_str(arguments->budget)
       ->needs(compact);
   command->add_flag("--overwrite", arguments->overwrite, "Replace an existing file");
   add_box_options(*command, *arguments);

@@ -138,24 +138,27 @@ void print_geometry(const output::ModelInfo& model) {
         model.is_dark ? "dark" : "bright", model.density_unit);
 }
 
-std::string describe(const LeafShape& shape) {
+// Plain vertices have ranks in the file as well, which mean nothing.
+std::string describe(const LeafShape& shape, FieldKind kind) {
   std::string text = fmt::format("{} × {} × {} vertices", shape.nx, shape.ny, shape.nz);
-  const bool is_factorised = shape.rank_x + shape.rank_y + shape.rank_z > 0;
+  const bool is_factorised =
+      kind == FieldKind::kVm && shape.rank_x + shape.rank_y + shape.rank_z > 0;
   if (is_factorised)
     text += fmt::format(", ranks {}, {}, {}", shape.rank_x, shape.rank_y, shape.rank_z);
   return text;
 }
 
 // Prints a line for each kind of leaves, large ones first.
-void print_leaves(const field::Quadtree& tree, const std::vector<LeafShape>& shapes) {
+void print_leaves(const field::Quadtree& tree, const std::vector<LeafShape>& shapes,
+                  FieldKind kind) {
   std::map<std::tuple<bool, std::int64_t, std::string>, int> kinds;
   for (int i = 0; i < tree.num_leaves(); ++i) {
     const field::QuadtreeNode& leaf = tree.leaf(i);
     ++kinds[{leaf.region == field::Region::kMargin, -leaf.square.size,
-             describe(shapes[static_cast<std::size_t>(i)])}];
+             describe(shapes[static_cast<std::size_t>(i)], kind)}];
   }
-  for (const auto& [kind, count] : kinds) {
-    const auto& [is_margin, size, shape] = kind;
+  for (const auto& [leaf, count] : kinds) {
+    const auto& [is_margin, size, shape] = leaf;
     print("    {:6} of {} px: {}{}\n", count, -size, shape, is_margin ? " (margin)" : "");
   }
 }
@@ -176,7 +179,10 @@ void print_field(const output::Model& model) {
   }
   print("  quadtree         {} × {} root cells of {} px from {},{}; {} leaves\n", roots.columns,
         roots.rows, roots.cell_size, roots.x0, roots.y0, model.tree().num_leaves());
-  print_leaves(model.tree(), model.coded ? model.coded->codes.shapes : model.field->shapes());
+  if (model.coded)
+    print_leaves(model.tree(), model.coded->codes.shapes, FieldKind::kVm);
+  else
+    print_leaves(model.tree(), model.field->shapes(), model.field->kind());
 }
 
 void print_training(const output::TrainingState& state) {
@@ -226,6 +232,8 @@ void add_info_command(CLI::App& program) {
       "Show what an MRC file or a model holds. With tilt angles, check a stack as a tilt series");
   auto choices = std::make_shared<option_table::Choices>();
   add_input_options(*command, *choices);
+  command->get_option("stack")->description(
+      "An MRC file, a model (.h5), or a tilt series: a stack, raw or aligned, or a project");
   add_help_all(*command);
   command->callback([choices] {
     tilt_series::TiltSeriesOptions options =

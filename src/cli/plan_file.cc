@@ -77,9 +77,9 @@ void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries
 void print_estimate(const reconstruction::RunEstimate& estimate, int num_processes) {
   if (estimate.core_seconds) {
     const int threads = base::thread_count() * num_processes;
-    print("about {} of processor time, which is {} if nothing else runs on these {} threads\n",
+    print("about {} of processor time, which is {} if nothing else runs on {}\n",
           base::time_text(*estimate.core_seconds),
-          base::time_text(*estimate.core_seconds / threads), threads);
+          base::time_text(*estimate.core_seconds / threads), count_of(threads, "thread"));
   }
   print("{:.2f} GiB of results, and at most {:.2f} GiB of disk while it runs\n",
         static_cast<double>(estimate.result_bytes) / kGibibyte,

@@ -23,6 +23,7 @@
 #include "cli/exit_status.h"
 #include "cli/help_formatter.h"
 #include "cli/project_arguments.h"
+#include "cli/unknown_options.h"
 #include "io/text_lines.h"
 #include "tomofield/error.h"
 
@@ -125,7 +126,7 @@ std::string materials() {
 void add_version_flag(CLI::App& program) {
   CLI::Option* verbose =
       program.add_flag("--verbose")
-          ->description("With --version: list the packages of the program and their licences, too");
+          ->description("List the packages of the program and their licences, too");
   const auto version = [verbose] {
     const std::string name =
         fmt::format("tomofield " TOMOFIELD_VERSION " ({})", base::source_commit());
@@ -152,14 +153,16 @@ int run_command(CLI::App& program, std::vector<std::string> arguments,
     expand_config_file(program, arguments);
     origins = expand_project(program, arguments);
   });
-  std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them last first
+  std::vector<std::string> last_first(arguments.rbegin(), arguments.rend());  // for CLI11
   try {
-    program.parse(arguments);
+    program.parse(last_first);
   } catch (const CLI::ParseError& error) {  // the same in all processes
-    if (error.get_exit_code() != 0)
-      throw distributed::SharedError(fmt::format("{}; `{} {}` lists the options", error.what(),
-                                                 command_name(program),
-                                                 help_flag_of(called_command(program))));
+    if (error.get_exit_code() != 0) {
+      const std::string unknown = fault_of_unknown_words(called_command(program), arguments);
+      throw distributed::SharedError(
+          fmt::format("{}; `{} {}` lists the options", unknown.empty() ? error.what() : unknown,
+                      command_name(program), help_flag_of(called_command(program))));
+    }
     print_answer(program, error);
     return report_output(/*is_result=*/true);
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/enum_names.h"
+#include "base/log.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
 #include "base/trace.h"
@@ -25,6 +26,7 @@
 #include "io/output_set.h"
 #include "output/volume.h"
 #include "reconstruct/aligned_series.h"
+#include "reconstruct/alignment_output.h"
 #include "reconstruct/exchange_files.h"
 #include "reconstruct/run_report.h"
 #include "report/pictures.h"
@@ -74,11 +76,11 @@ void print_plan(const reconstruction::ReconstructOptions& options,
     print("about {} short trials first, that choose settings by held-out views\n", plan.num_trials);
   const std::string processes =
       num_processes == 1 ? "" : fmt::format(" of each of {} processes", num_processes);
-  print("{} field, {} {}, {} parameters; {} steps on {} threads{}; about {:.2f} GiB of memory{}\n",
+  print("{} field, {} {}, {} parameters; {} steps on {}{}; about {:.2f} GiB of memory{}\n",
         base::name_of(options.field.kind), plan.num_leaves,
         plan.num_leaves == 1 ? "leaf" : "leaves", plan.num_parameters, plan.num_steps,
-        base::thread_count(), processes, static_cast<double>(plan.memory_bytes) / (1 << 30),
-        num_processes == 1 ? "" : " each");
+        count_of(base::thread_count(), "thread"), processes,
+        static_cast<double>(plan.memory_bytes) / (1 << 30), num_processes == 1 ? "" : " each");
   print("epochs: {}\n", epochs_text(plan.stages));
   if (plan.tiles.is_used()) {
     print(
@@ -178,6 +180,13 @@ tilt_series::TiltSeries align_and_open(reconstruction::ReconstructOptions& optio
   return tilt_series::TiltSeries(options.input, processes);
 }
 
+void print_alignment(const reconstruction::ReconstructOptions& options) {
+  if (options.resolved.align == Alignment::kOff) return;
+  print("alignment {}\n", reconstruction::output_paths(options.resolved.output).alignment.string());
+  for (const auto& file : reconstruction::alignment_results(options))
+    if (std::filesystem::exists(file)) print("          {}\n", file.string());
+}
+
 void run_reconstruction(const tilt_series::TiltSeries& series,
                         const reconstruction::ReconstructOptions& options, bool dry_run,
                         const distributed::Communicator& processes) {
@@ -185,6 +194,10 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
     const reconstruction::RunPlan plan = plan_run(series, options, processes);
     require_memory(plan, processes);
     require_few_vertices(plan);
+    if (options.field.kind == FieldKind::kGrid && options.requested.rank != Options().rank)
+      base::log_warning(
+          "--rank changes nothing: it is for factors (--field vm), and this field has plain "
+          "vertices");
     print_plan(options, plan, processes.size());
     if (dry_run && processes.is_root())
       print_estimate(estimate_run(series, options, plan), processes.size());
@@ -206,6 +219,8 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
       report::write_tree_picture(*results.model, paths.tree_picture);
     }
     write_report(results, options, volume, pictures.back());
+    for (const auto& picture : {paths.held_out_picture, paths.choice_picture})
+      if (io::OutputSet::active()->contains(picture)) pictures.push_back(picture);
   };
   if (processes.is_root()) {
     hooks.progress = make_progress_bar("reconstruct");
@@ -223,8 +238,9 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   }
   if (!processes.is_root()) return;
   print_files(options, paths);
-  for (const auto& file : reconstruction::exchange_files(options))
-    print("          {}\n", file.string());
+  for (const auto& file : reconstruction::volume_descriptions(options))
+    print("exchange  {}\n", file.string());
+  print_alignment(options);
   if (options.volume.zarr) print("OME-Zarr  {}\n", output::zarr_path(paths.volume).string());
   print_pictures(pictures);
   if (options.field.tree == TreeKind::kAdaptive)

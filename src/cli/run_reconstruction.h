@@ -27,6 +27,9 @@ tilt_series::TiltSeries open_series(reconstruction::ReconstructOptions& options,
 tilt_series::TiltSeries align_and_open(reconstruction::ReconstructOptions& options,
                                        const distributed::Communicator& processes);
 
+/// Prints the files of an alignment that a run has written. Prints nothing without --align.
+void print_alignment(const reconstruction::ReconstructOptions& options);
+
 /// Prints the plan of a reconstruction, runs it with a progress bar, and writes its pictures. With
 /// `dry_run` it prints the plan alone. The caller has called claim_run() before. If a signal stops
 /// it, it throws an ExitStatus that says how to continue. Every process that shares the run calls

@@ -1,6 +1,7 @@
 #include "compact/budget.h"
 
 #include <fmt/format.h>
+#include <strings.h>
 
 #include <cmath>
 #include <cstdlib>
@@ -25,12 +26,19 @@ const std::map<std::string, Unit>& units() {
   return all;
 }
 
+// Returns a unit of decibels or bytes as it is usually written, whatever its case is.
+std::string with_usual_case(const std::string& unit) {
+  for (const char* usual : {"dB", "kB", "MB"})
+    if (strcasecmp(unit.c_str(), usual) == 0) return usual;
+  return unit;
+}
+
 }  // namespace
 
 Budget parse_budget(const std::string& text) {
   char* end = nullptr;
   const double number = std::strtod(text.c_str(), &end);
-  const auto unit = units().find(end);
+  const auto unit = units().find(with_usual_case(end));
   const bool is_number = end != text.c_str() && std::isfinite(number);
   if (is_number && unit != units().end()) {
     const double amount = number * unit->second.factor;

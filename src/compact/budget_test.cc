@@ -23,11 +23,13 @@ TEST(Budget, HasThreeUnits) {
   expect_budget("1.5M", kParameters, 1.5e6);
   expect_budget("800kB", kBytes, 8e5);
   expect_budget("5MB", kBytes, 5e6);
+  expect_budget("0.1db", kDecibels, 0.1);
+  expect_budget("5mb", kBytes, 5e6);
 }
 
 TEST(Budget, OtherTextsGetASentence) {
   for (const char* text :
-       {"", "dB", "0.1", "-2M", "0dB", "11dB", "nan", "infdB", "5mb", "5 MB", "1MBx", "999e-3kB"}) {
+       {"", "dB", "0.1", "-2M", "0dB", "11dB", "nan", "infdB", "5m", "5 MB", "1MBx", "999e-3kB"}) {
     SCOPED_TRACE(text);
     try {
       parse_budget(text);

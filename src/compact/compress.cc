@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -321,28 +322,64 @@ CompactField within_parameters(Compression& compression, double parameters) {
   return compression.finish(std::move(coded));
 }
 
-// The bytes that a parameter takes are known once a model was coded. Keeps the largest one that is
-// within the budget.
-CompactField within_bytes(Compression& compression, double bytes) {
+// Returns the bytes of a file beside the codes: the tree, the shapes of leaves, and the options.
+double bytes_beside_codes(const CodedField& coded, const FileSize& file_size) {
+  const std::size_t of_codes = coded.codes.bytes.size();
+  return file_size ? static_cast<double>(file_size(coded)) - static_cast<double>(of_codes) : 0.0;
+}
+
+// Looks for the largest number of parameters whose file is within a size. The bytes that a
+// parameter takes are known once a model was coded.
+class ParameterSearch {
+ public:
+  explicit ParameterSearch(double bytes) : bytes_(bytes), parameters_(bytes / kFirstBytes) {}
+
+  double parameters() const { return parameters_; }
+
+  // Chooses the next number after a model of so many bytes of codes and of other bytes. Returns
+  // false if the model is as close to the size as wanted.
+  bool go_on(double of_codes, double beside) {
+    const double part = beside < bytes_ ? of_codes / (bytes_ - beside) : kFar;
+    if (part <= 1 && part > kClose) return false;
+    (part <= 1 ? low_ : high_) = parameters_;
+    parameters_ *= (1 + kClose) / 2 / std::clamp(part, 1 / kFar, kFar);
+    if (low_ > 0 && high_ > 0 && (parameters_ <= low_ || parameters_ >= high_))
+      parameters_ = std::sqrt(low_ * high_);
+    return true;
+  }
+
+ private:
+  static constexpr double kFirstBytes = 0.45, kClose = 0.95, kFar = 10;
+  double bytes_, parameters_;
+  double low_ = 0.0, high_ = 0.0;  // parameters whose files are within the size and above it, or 0
+};
+
+// Keeps the largest model that is within the budget.
+CompactField within_bytes(Compression& compression, double bytes, const FileSize& file_size) {
   constexpr int kTries = 8;
-  constexpr double kFirstBytesPerParameter = 0.45, kClose = 0.95;
-  double parameters = bytes / kFirstBytesPerParameter;
+  ParameterSearch search(bytes);
+  double least_beside = std::numeric_limits<double>::infinity();
   std::optional<CodedField> best;
-  for (int i = 0; i < kTries; ++i) {
-    CodedField coded = coded_parameters(compression, parameters, kRoundingForBytes);
-    const auto size = static_cast<double>(coded.codes.bytes.size());
-    const double part = size / bytes;
-    if (size <= bytes && (!best || coded.codes.bytes.size() >= best->codes.bytes.size()))
+  bool goes_on = true;
+  for (int i = 0; i < kTries && goes_on; ++i) {
+    CodedField coded = coded_parameters(compression, search.parameters(), kRoundingForBytes);
+    const double beside = bytes_beside_codes(coded, file_size);
+    const auto of_codes = static_cast<double>(coded.codes.bytes.size());
+    least_beside = std::min(least_beside, beside);
+    if (of_codes + beside <= bytes &&
+        (!best || coded.codes.bytes.size() >= best->codes.bytes.size()))
       best = std::move(coded);
-    if (part <= 1 && part > kClose) break;
-    parameters *= (1 + kClose) / 2 / std::max(part, 0.1);
+    goes_on = search.go_on(of_codes, beside);
   }
   if (!best)
-    throw Error(fmt::format("no model of {:.0f} bytes was found: give a larger budget", bytes));
+    throw Error(
+        fmt::format("no model of {:.0f} bytes was found, whose tree and options alone take {:.0f}: "
+                    "give a larger budget",
+                    bytes, least_beside));
   return compression.finish(std::move(*best));
 }
 
-CompactField within(const Budget& budget, Compression& compression) {
+CompactField within(const Budget& budget, Compression& compression, const FileSize& file_size) {
   switch (budget.kind) {
     case Budget::Kind::kDecibels:
       return within_decibels(compression, budget.amount);
@@ -351,7 +388,7 @@ CompactField within(const Budget& budget, Compression& compression) {
     case Budget::Kind::kBytes:
       break;
   }
-  return within_bytes(compression, budget.amount);
+  return within_bytes(compression, budget.amount, file_size);
 }
 
 }  // namespace
@@ -381,17 +418,18 @@ double variance_of(const field::Field& vertices, const Rectangle& roi) {
   return measure(VertexDensities(vertices, roi), rows_of(vertices)).variance;
 }
 
-CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget) {
+CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget,
+                      const FileSize& file_size) {
   const base::TraceSpan span("compress");
   Compression compression(vertices, roi, rows_of(vertices), kLargestSide, 0.0);
-  return within(budget, compression);
+  return within(budget, compression, file_size);
 }
 
 CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget,
-                      base::Range rows, double variance) {
+                      base::Range rows, double variance, const FileSize& file_size) {
   const base::TraceSpan span("compress");
   Compression compression(vertices, roi, rows, vertices.tree().roots().cell_size, variance);
-  return within(budget, compression);
+  return within(budget, compression, file_size);
 }
 
 }  // namespace tomofield::compact

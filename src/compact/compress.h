@@ -43,6 +43,9 @@ struct CompactField {
   CompressionReport report;
 };
 
+/// Returns the bytes of a file that holds a coded field.
+using FileSize = std::function<std::size_t(const CodedField&)>;
+
 /// Replaces the vertices of a finished fit by factors in leaves of several sizes. The sides of
 /// leaves and the ranks of their modes are chosen together: among candidates of every place of the
 /// tree (place_tree.h) whose errors were measured (truncation.h), those with the smallest error
@@ -59,12 +62,15 @@ struct CompactField {
 /// `vertices` is of kind "grid", and all leaves must be kept. A place is worked on alone, so memory
 /// is that of the vertices, of a place for each thread, and of the result.
 ///
-/// The model is within the budget. Throws Error if none is found within a budget in bytes or in
-/// parameters. For a budget in decibels, up to eight models of finer and finer rounding are made;
-/// if none is within it, the last model is returned, and `report.decibels` is above the budget.
-CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget);
+/// The model is within the budget. A budget in bytes is that of the whole file, whose size
+/// `file_size` returns; without it, that of the codes alone. Throws Error if none is found within a
+/// budget in bytes or in parameters. For a budget in decibels, up to eight models of finer and
+/// finer rounding are made; if none is within it, the last model is returned, and `report.decibels`
+/// is above the budget.
 CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget,
-                      base::Range rows, double variance);
+                      const FileSize& file_size = {});
+CompactField compress(const field::Field& vertices, const Rectangle& roi, const Budget& budget,
+                      base::Range rows, double variance, const FileSize& file_size = {});
 
 /// Returns the variance of the densities in the region of interest of a field of plain vertices.
 double variance_of(const field::Field& vertices, const Rectangle& roi);

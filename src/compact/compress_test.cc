@@ -113,6 +113,20 @@ TEST(Compress, ParametersAndBytesAreKept) {
   }
 }
 
+TEST(Compress, BytesAreThoseOfTheFile) {
+  const auto vertices = half_empty_field(4);
+  constexpr double kBytes = 2e4, kBeside = 8e3;
+  const auto file_size = [&](const CodedField& coded) {
+    return static_cast<std::size_t>(kBeside) + coded.codes.bytes.size();
+  };
+  const auto made = [&](double bytes) {
+    return compress(*vertices, region_of(4), {Budget::Kind::kBytes, bytes}, file_size).report;
+  };
+  EXPECT_LE(static_cast<double>(made(kBytes).bytes), kBytes - kBeside);
+  EXPECT_GT(static_cast<double>(made(kBytes).bytes), 0.8 * (kBytes - kBeside));
+  EXPECT_THROW(made(kBeside - 1), Error);
+}
+
 TEST(Compress, BudgetsThatCannotBeMetAreRefused) {
   const auto vertices = half_empty_field(1);
   const auto made = [&](Budget::Kind kind, double amount) {

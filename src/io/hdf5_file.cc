@@ -300,11 +300,23 @@ template void Hdf5Group::write_array(const std::string&, std::span<const std::ui
 Hdf5File Hdf5File::create(const std::filesystem::path& path) {
   require_memory_of_a_file();
   const QuietErrors quiet;
+  return create(path.string(), file_access().id());
+}
+
+Hdf5File Hdf5File::create_in_memory() {
+  constexpr std::size_t kStep = 256;  // bytes by which the file grows
+  require_memory_of_a_file();
+  const QuietErrors quiet;
   const Handle access = file_access();
+  H5Pset_fapl_core(access.id(), kStep, false);
+  return create("a file in memory", access.id());
+}
+
+Hdf5File Hdf5File::create(const std::string& path, std::int64_t access) {
   const Handle properties = creation(H5P_FILE_CREATE);
-  const hid_t id = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, properties.id(), access.id());
-  if (id < 0) throw Error(fmt::format("cannot write '{}': {}", path.string(), last_reason()));
-  return {path.string(), id};
+  const hid_t id = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, properties.id(), access);
+  if (id < 0) throw Error(fmt::format("cannot write '{}': {}", path, last_reason()));
+  return {path, id};
 }
 
 Hdf5File::Hdf5File(Hdf5File&& other) noexcept
@@ -320,6 +332,14 @@ Hdf5Group Hdf5File::root() const {
   const hid_t id = H5Gopen2(id_, "/", H5P_DEFAULT);
   if (id < 0) fail_writing(path_, "/");
   return {path_, "", id};
+}
+
+std::size_t Hdf5File::size() const {
+  const QuietErrors quiet;
+  hsize_t bytes = 0;
+  if (H5Fflush(id_, H5F_SCOPE_GLOBAL) < 0 || H5Fget_filesize(id_, &bytes) < 0)
+    throw Error(fmt::format("cannot write '{}': {}", path_, last_reason()));
+  return bytes;
 }
 
 void Hdf5File::close() {

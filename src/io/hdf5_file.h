@@ -62,16 +62,21 @@ class Hdf5File {
  public:
   /// Creates an empty file and replaces any that exists.
   static Hdf5File create(const std::filesystem::path& path);
+  /// Creates an empty file that stays in memory, to find out how large it becomes.
+  static Hdf5File create_in_memory();
   ~Hdf5File();
   Hdf5File(Hdf5File&& other) noexcept;
   Hdf5File& operator=(Hdf5File&&) = delete;
 
   Hdf5Group root() const;
+  /// Returns the bytes of what was written so far.
+  std::size_t size() const;
   /// Writes everything to the disk. Throws Error if the disk does not take it.
   void close();
 
  private:
   Hdf5File(std::string path, std::int64_t id) : path_(std::move(path)), id_(id) {}
+  static Hdf5File create(const std::string& path, std::int64_t access);
   std::string path_;
   std::int64_t id_;
 };

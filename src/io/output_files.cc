@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <system_error>
 
 #include "io/output_target.h"
@@ -56,6 +57,17 @@ void check_output_files(const std::vector<fs::path>& results, const std::vector<
       throw Error(fmt::format("'{}' exists: {}", result.string(), advice));
     require_writable(result);
   }
+}
+
+void require_volume_name(const std::filesystem::path& volume) {
+  std::string extension = volume.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  for (const char* other : {".tif", ".tiff", ".h5", ".hdf", ".hdf5", ".em", ".dm4", ".nii", ".npy",
+                            ".zarr", ".json", ".html", ".png", ".jpg", ".jpeg"})
+    if (extension == other)
+      throw Error(fmt::format(
+          "the volume is an MRC file, and '{}' ends in {}: give a name in .mrc, .rec or .map",
+          volume.string(), other));
 }
 
 std::vector<fs::path> input_files(const SeriesFiles& input) {

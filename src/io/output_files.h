@@ -24,6 +24,9 @@ void check_output_files(const std::vector<std::filesystem::path>& results,
                         const std::vector<std::filesystem::path>& inputs, bool may_replace,
                         const std::string& advice);
 
+/// Throws Error if the name of an MRC volume ends in the extension of another format.
+void require_volume_name(const std::filesystem::path& volume);
+
 /// Returns every file that a series is read from.
 std::vector<std::filesystem::path> input_files(const SeriesFiles& files);
 

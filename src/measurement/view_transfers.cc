@@ -196,7 +196,7 @@ std::vector<microscope::ViewTransfer> view_transfers(const SeriesFiles& files,
   if (!has_ctf(files, options) && !files.ctf && options.contrast == Contrast::kDark)
     base::log_info(
         "ctf: none is given (--ctf or --defocus), so the views count as plain projections: "
-        "the tomogram lacks contrast at low resolution and keeps the fringes of defocus");
+        "a tomogram of them lacks contrast at low resolution and keeps the fringes of defocus");
   if (!wants_transfers(files, options)) return {};
   const auto stack = tilt_series::open_views(input);
   const std::int64_t num_sections = stack->header().nz;

@@ -95,6 +95,9 @@ void save_model(const std::filesystem::path& path, const Model& model,
 void save_coded(const std::filesystem::path& path, const compact::CodedField& coded,
                 const ModelInfo& info, const TrainingState* training = nullptr);
 
+/// Returns the bytes of the file that save_coded() writes without a training state.
+std::size_t coded_file_size(const compact::CodedField& coded, const ModelInfo& info);
+
 /// Reads a model, and its training state into `training` unless that is null. The state is empty if
 /// the model was saved without one. Throws Error, with the file and the reason, for anything but a
 /// whole model of a known version.

@@ -97,6 +97,15 @@ void write_codes(Hdf5Group group, const compact::LeafCodes& codes) {
   group.write_array<std::uint8_t>("bytes", codes.bytes);
 }
 
+void write_coded_field(Hdf5Group group, const compact::CodedField& coded) {
+  write_structure(group, FieldKind::kVm, coded.tree, coded.thickness, 0.0, 0.0);
+  {
+    Hdf5Group leaves = group.create_group("leaves");
+    write_leaves(leaves, coded.tree, coded.codes.shapes);
+  }
+  write_codes(group.create_group("code"), coded.codes);
+}
+
 template <typename T>
 void write_arrays(Hdf5Group group, const std::map<std::string, std::vector<T>>& arrays) {
   for (const auto& [name, values] : arrays) group.write_array<T>(name, values);
@@ -111,26 +120,29 @@ void write_training(Hdf5Group group, const TrainingState& state, const FloatArra
   write_arrays(group.create_group("integers"), state.integers);
 }
 
-// Writes a model whose field and training state come from `write_rest`.
+// Writes what all models have, and then what `write_rest` writes: the field and a training state.
+void write_contents(Hdf5Group root, const ModelInfo& info, std::int64_t version,
+                    const std::function<void(Hdf5Group&)>& write_rest) {
+  root.write_text("format", kFormat);
+  root.write_integer("format_version", version);
+  root.write_text("written_by", fmt::format("tomofield {}", library_version()));
+  root.write_number("x_tilt_deg", info.x_tilt_deg);
+  root.write_number("pixel_size_A", info.pixel_size_A);
+  root.write_number("density_unit", info.density_unit);
+  root.write_text("contrast", info.is_dark ? "dark" : "bright");
+  root.write_text("options_json", info.options_json);
+  write_geometry(root.create_group("geometry"), info);
+  write_rest(root);
+}
+
+// Writes a model (write_contents()) atomically.
 void write_model(const std::filesystem::path& path, const ModelInfo& info, std::int64_t version,
                  const std::function<void(Hdf5Group&)>& write_rest) {
   const base::TraceSpan span("write model");
   io::AtomicFile target(path);
   {
     io::Hdf5File file = io::Hdf5File::create(target.temporary_path());
-    {
-      Hdf5Group root = file.root();
-      root.write_text("format", kFormat);
-      root.write_integer("format_version", version);
-      root.write_text("written_by", fmt::format("tomofield {}", library_version()));
-      root.write_number("x_tilt_deg", info.x_tilt_deg);
-      root.write_number("pixel_size_A", info.pixel_size_A);
-      root.write_number("density_unit", info.density_unit);
-      root.write_text("contrast", info.is_dark ? "dark" : "bright");
-      root.write_text("options_json", info.options_json);
-      write_geometry(root.create_group("geometry"), info);
-      write_rest(root);
-    }
+    write_contents(file.root(), info, version, write_rest);
     file.close();
   }
   target.commit();
@@ -188,15 +200,16 @@ void save_model(const std::filesystem::path& path, const field::Field& field,
 void save_coded(const std::filesystem::path& path, const compact::CodedField& coded,
                 const ModelInfo& info, const TrainingState* training) {
   write_model(path, info, kCompactVersion, [&](Hdf5Group& root) {
-    Hdf5Group group = root.create_group("field");
-    write_structure(group, FieldKind::kVm, coded.tree, coded.thickness, 0.0, 0.0);
-    {
-      Hdf5Group leaves = group.create_group("leaves");
-      write_leaves(leaves, coded.tree, coded.codes.shapes);
-    }
-    write_codes(group.create_group("code"), coded.codes);
+    write_coded_field(root.create_group("field"), coded);
     if (training != nullptr) write_training(root.create_group("training"), *training, {});
   });
+}
+
+std::size_t coded_file_size(const compact::CodedField& coded, const ModelInfo& info) {
+  const io::Hdf5File file = io::Hdf5File::create_in_memory();
+  write_contents(file.root(), info, kCompactVersion,
+                 [&](Hdf5Group& root) { write_coded_field(root.create_group("field"), coded); });
+  return file.size();
 }
 
 void save_model(const std::filesystem::path& path, const Model& model,

@@ -106,6 +106,16 @@ void log_alignment(const json& record) {
                                   fmt::join(left_out, ", ")));
 }
 
+// Says so if beads were found and the alignment could not follow them.
+void log_unused_beads(const tilt_series::MaskMetrics& masks) {
+  if (masks.num_beads == 0) return;
+  base::log_info(fmt::format(
+      "{} beads were found, and the alignment uses none of them: fewer than three have precise "
+      "places in enough of the views, as happens where the views are binned so much that a bead "
+      "has few pixels",
+      masks.num_beads));
+}
+
 // Aligns the views of a series that is not resampled.
 align::Alignment align_views(const tilt_series::TiltSeries& series,
                              const ReconstructOptions& options, const ReconstructHooks& hooks,
@@ -123,7 +133,9 @@ align::Alignment align_views(const tilt_series::TiltSeries& series,
   std::vector<geometry::ViewCorrection> start(series.views().size());
   if (options.resolved.align == Alignment::kFull)
     start = align::with_best_axis(problem, align::correlated_start(problem), processes);
-  return align::refine_alignment(problem, std::move(start), processes);
+  align::Alignment found = align::refine_alignment(problem, std::move(start), processes);
+  if (!found.beads) log_unused_beads(series.mask_metrics());
+  return found;
 }
 
 // Aligns the series.

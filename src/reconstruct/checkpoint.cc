@@ -344,6 +344,13 @@ std::optional<int> stored_tile_rows(const std::filesystem::path& path) {
   throw Error(fmt::format("'{}' is damaged: its tiles have {} rows", path.string(), rows));
 }
 
+void require_state_of_fit(const std::filesystem::path& path) {
+  if (output::load_training(path).integers.contains("fingerprint")) return;
+  throw Error(
+      fmt::format("'{}' is no checkpoint: it has no state of a fit, as no compact model has one",
+                  path.string()));
+}
+
 void restore_fit(const std::filesystem::path& file, const std::string& fingerprint, fit::Fit& fit) {
   const std::string path = file.string();
   const output::TrainingState state = output::load_training(file);

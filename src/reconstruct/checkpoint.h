@@ -57,6 +57,10 @@ std::optional<TunedFit> stored_choice(const std::filesystem::path& path);
 /// `path` is neither.
 std::optional<int> stored_tile_rows(const std::filesystem::path& path);
 
+/// Throws Error if `path` is a model without the state of a fit, such as a compact one, which no
+/// run can continue.
+void require_state_of_fit(const std::filesystem::path& path);
+
 /// Continues a stored fit: puts its field and its state into a new fit with the same options. Each
 /// process reads the parameters that it needs. Throws Error if `path` belongs to another series or
 /// to other options, and names what differs.

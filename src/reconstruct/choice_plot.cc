@@ -27,7 +27,7 @@ bool has_usual_corrections(const FitTrial& trial, const TunedFit& tuned) {
 }
 
 void add_point(const FitTrial& trial, const TunedFit& tuned, report::Curve& curve) {
-  const selection::Difference d = difference_to_best(trial, tuned);
+  const selection::Difference d = difference_to_chosen(trial, tuned);
   curve.points.emplace_back(std::log2(std::max(trial.settings.variation, kLeastWeight)),
                             100 * d.log_ratio);
   curve.errors.push_back(100 * kClearErrors * d.standard_error);
@@ -62,7 +62,7 @@ report::CurvePlot choice_plot(const TunedFit& tuned) {
   report::PlotAxes axes{
       .x_title =
           "weight of total variation, chosen is " + describe(tuned.settings, TrialSettings{}),
-      .y_title = "per cent above the best held-out error, bars of two standard errors",
+      .y_title = "per cent above the chosen, view by view; bars of two standard errors",
       .y_range = {-2, kMostPercent}};
   std::vector<double> at;
   for (const report::Curve& curve : curves)

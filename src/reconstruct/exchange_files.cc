@@ -8,11 +8,16 @@
 
 namespace tomofield::reconstruction {
 
-std::vector<std::filesystem::path> exchange_files(const ReconstructOptions& options) {
+std::vector<std::filesystem::path> volume_descriptions(const ReconstructOptions& options) {
   std::vector<std::filesystem::path> files;
   if (const auto star = relion_output(options)) files.push_back(*star);
   if (options.resolved.alignment_json)
     files.push_back(portal_alignment_path(options.resolved.output));
+  return files;
+}
+
+std::vector<std::filesystem::path> exchange_files(const ReconstructOptions& options) {
+  std::vector<std::filesystem::path> files = volume_descriptions(options);
   for (const auto& file : alignment_results(options)) files.push_back(file);
   return files;
 }

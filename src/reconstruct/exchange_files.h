@@ -8,8 +8,12 @@
 
 namespace tomofield::reconstruction {
 
-/// Returns the small files that a run writes for other programs beside its volume: a STAR file for
+/// Returns the descriptions of the volume that a run writes for other programs: a STAR file for
 /// RELION, the alignment for the CryoET Data Portal.
+std::vector<std::filesystem::path> volume_descriptions(const ReconstructOptions& options);
+
+/// Returns all small files that a run writes for other programs beside its volume: those above, and
+/// the files of its alignment (alignment_results()).
 std::vector<std::filesystem::path> exchange_files(const ReconstructOptions& options);
 
 /// Writes them. The volume's contents are in the file `volume` (Results, WriteMore).

@@ -26,8 +26,8 @@ std::optional<HeldOutSummary> held_out_summary(
   if (held_out) return summary_of(held_out->view_error, held_out->views, tilt_deg);
   const std::optional<TunedFit>& tuned = finished.record.origin.tuned;
   if (!tuned) return std::nullopt;
-  const auto chosen = std::ranges::find(tuned->trials, tuned->settings, &FitTrial::settings);
-  if (chosen == tuned->trials.end() || chosen->score.view_error.empty()) return std::nullopt;
+  const FitTrial* const chosen = chosen_trial(*tuned);
+  if (chosen == nullptr || chosen->score.view_error.empty()) return std::nullopt;
   HeldOutSummary summary = summary_of(chosen->score.view_error, tuned->predicted_views, tilt_deg);
   summary.is_of_trials = true;
   return summary;
@@ -48,7 +48,7 @@ Verdict judge(const FinishedFit& finished, const std::optional<measurement::View
   if (!series.ray_geometry)
     verdict.views = compare_views(fit, series, finished.options.specimen.with_margin);
   if (!series.ray_geometry) verdict.defocus = check_defocus(fit, series);
-  verdict.seconds = finished.record.since_start.seconds();
+  verdict.seconds = finished.options.since_start.seconds();
   verdict.peak_GiB = processes.allreduce_max(static_cast<double>(base::peak_memory())) / (1 << 30);
   verdict.warnings = find_warnings(verdict, {.contrast = finished.options.input.contrast,
                                              .alignment = finished.record.alignment,

@@ -12,7 +12,9 @@
 #include "measurement/view_transfers.h"
 #include "option_table/values.h"
 #include "output/shared_options.h"
+#include "reconstruct/checkpoint.h"
 #include "reconstruct/exchange_files.h"
+#include "reconstruct/run_fit.h"
 #include "reconstruct/tuning.h"
 
 namespace tomofield::reconstruction {
@@ -298,6 +300,7 @@ void check_options(const ReconstructOptions& options) {
   base::require_no_faults(options.faults());
   if (options.resolved.output.empty()) return;
   const Options& resolved = options.resolved;
+  io::require_volume_name(resolved.output);
   const OutputPaths paths = output_paths(resolved.output);
   const bool may_replace = resolved.overwrite || can_resume(options, paths);
   const char* const advice =
@@ -318,7 +321,12 @@ std::vector<io::OutputLock> claim_outputs(const ReconstructOptions& options) {
   if (options.may_use_tiles()) files.push_back(paths.tiles);
   if (options.resolved.align != Alignment::kOff) files.push_back(paths.alignment);
   if (options.resolved.output.empty()) files.clear();
-  return io::claim_outputs(files, [&] { check_options(options); });
+  return io::claim_outputs(files, [&] {
+    check_options(options);
+    const std::filesystem::path& model = options.first_model(paths);
+    if (options.resolved.resume && std::filesystem::exists(model))
+      read_checkpoint([&] { require_state_of_fit(model); });
+  });
 }
 
 nlohmann::json options_json(const ReconstructOptions& options) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/stopwatch.h"
 #include "fit/options.h"
 #include "io/output_lock.h"
 #include "measurement/prepare.h"
@@ -63,6 +64,7 @@ struct ReconstructOptions {
   std::vector<option_table::Setting> origins;
   /// Record of the alignment before the fit (aligned_series.h), for the metrics; null without one.
   nlohmann::json alignment = {};
+  base::Stopwatch since_start = {};  ///< runs from run_options() on, before an alignment
 
   /// Says whether the run makes two fits, of one half of the data each.
   bool makes_halves() const { return (files.even && files.odd) || resolved.split_tilts; }
@@ -102,7 +104,8 @@ void check_options(const ReconstructOptions& options);
 
 /// Checks the options and locks the files of a run against other runs. The run holds the locks to
 /// its end. Returns none if the options name no output. Throws Error as check_options() does, or if
-/// another run writes these files.
+/// another run writes these files, or if
+/// the run would continue a model that has no state of a fit.
 std::vector<io::OutputLock> claim_outputs(const ReconstructOptions& options);
 
 /// Writes the resolved options and the constants of the method for the metrics and the model file.

@@ -94,6 +94,16 @@ int most_vertices(const fit::Domain& domain) {
   return most;
 }
 
+// Refuses views in which nothing can be seen.
+void require_pixels(std::int64_t width, std::int64_t height) {
+  constexpr std::int64_t kFewest = 8;
+  if (std::min(width, height) < kFewest)
+    throw Error(
+        fmt::format("views of {} × {} pixels show nothing: give a smaller --bin, so that they "
+                    "have at least {} along both sides",
+                    width, height, kFewest));
+}
+
 }  // namespace
 
 RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
@@ -107,6 +117,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.num_views = plan.geometry.num_views();
   run.view_width = plan.geometry.width;
   run.view_height = plan.geometry.height;
+  require_pixels(run.view_width, run.view_height);
   run.pixel_size_A = plan.pixel_size_A;
   run.roi = plan.roi;
   run.thickness = plan.geometry.thickness;
@@ -115,9 +126,10 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
   run.stages = fit::make_stages(options.field, options.fit);
   const fit::Stage& last = run.stages.back();
   // Only the views tell whether there is a background or an undecided bead.
-  run.num_trials = options.num_trials(
-      num_fitted_views(plan, options.fit),
-      {.variation = options.open.variation, .view_scale = options.open.view_scale});
+  run.num_trials = options.num_trials(num_fitted_views(plan, options.fit),
+                                      {.variation = options.open.variation,
+                                       .spikes = options.open.spikes,
+                                       .view_scale = options.open.view_scale});
   if (run.num_trials > 0) require_views_for_trials(plan, options.fit);
   run.steps_an_epoch = steps_an_epoch(plan, options.fit);
   run.num_steps = (last.first_epoch + last.epochs) * run.steps_an_epoch;

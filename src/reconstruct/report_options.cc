@@ -22,6 +22,8 @@ constexpr std::array<std::string_view, 8> kOfTrials{
     "fit.penalty",       "fit.density_variation",  "fit.fit_view_scale", "fit.spike_rank",
     "input.black_level", "input.bead_diameter_nm", "fit.epochs",         "field.rank"};
 
+constexpr const char* kNoValue = "–";
+
 // Returns the value under a key such as "fit.epochs", or nothing if the record does not have it.
 const json* value_under(const json& options, std::string_view key) {
   const json* at = &options;
@@ -36,8 +38,8 @@ const json* value_under(const json& options, std::string_view key) {
 }
 
 std::string text_of(const json& value) {
-  if (value.is_null()) return "–";
-  if (value.is_string()) return value.get_ref<const std::string&>().empty() ? "–" : value;
+  if (value.is_null()) return kNoValue;
+  if (value.is_string()) return value.get_ref<const std::string&>().empty() ? kNoValue : value;
   if (value.is_boolean()) return value.get<bool>() ? "on" : "off";
   if (value.is_number_float()) return fmt::format("{:.6g}", value.get<double>());
   if (!value.is_array()) return value.dump();
@@ -85,13 +87,18 @@ std::span<const std::string_view> chosen_by_trials(const json& record) {
   return std::span(kOfTrials).first(kOfTrials.size() - (is_tuned ? 0 : 2));
 }
 
+// Returns the text of a value as the user types it: --no-margin is on if the margin is off.
+std::string typed_text(const Row& row, const json& value) {
+  if (value.is_boolean() && row.flag.starts_with("--no-")) return text_of(!value.get<bool>());
+  return text_of(value);
+}
+
 ReportedOption reported(const Row& row, const json& value, const Wish& wish,
                         std::span<const std::string_view> of_trials) {
   ReportedOption option{.flag = std::string(long_flag(row)),
-                        .value = text_of(value),
+                        .value = typed_text(row, value),
                         .origin = "default",
                         .meaning = std::string(row.help)};
-  if (!value.is_null() && !row.unit.empty()) option.value += fmt::format(" {}", row.unit);
   if (wish.wanted != wish.usual) {
     option.origin = "given";
   } else if (value != wish.wanted) {
@@ -103,6 +110,26 @@ ReportedOption reported(const Row& row, const json& value, const Wish& wish,
   return option;
 }
 
+// Joins the options of rows that share a flag, as --center does, and adds their unit.
+ReportedOption joined(const std::vector<ReportedOption>& parts, std::string_view unit) {
+  ReportedOption option = parts.front();
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    if (parts[i].is_default) continue;
+    option.value += ", " + parts[i].value;
+    if (option.is_default) option.origin = parts[i].origin;
+    option.is_default = false;
+  }
+  if (option.value != kNoValue && !unit.empty()) option.value += fmt::format(" {}", unit);
+  return option;
+}
+
+// Returns the rows that share the flag of the first one.
+std::span<const Row> rows_of_flag(std::span<const Row> rows) {
+  const auto other =
+      std::ranges::find_if(rows, [&](const Row& row) { return row.flag != rows.front().flag; });
+  return rows.first(static_cast<std::size_t>(other - rows.begin()));
+}
+
 }  // namespace
 
 std::vector<ReportedOption> reported_options(const json& record, const SeriesFiles& files,
@@ -112,12 +139,21 @@ std::vector<ReportedOption> reported_options(const json& record, const SeriesFil
   const auto of_trials = chosen_by_trials(record);
   json origins = origins_of(record);
   std::vector<ReportedOption> options;
-  for (const Row& row : option_table::all_rows()) {
-    const json* const value = value_under(record.at("options"), row.key);
-    if (value == nullptr) continue;
-    options.push_back(reported(row, *value, wish_of(row, defaults, wanted), of_trials));
-    const auto origin =
-        std::ranges::find_if(origins, [&](const json& entry) { return is_of(entry, row); });
+  std::span<const Row> left = option_table::all_rows();
+  while (!left.empty()) {
+    const std::span<const Row> rows = rows_of_flag(left);
+    left = left.subspan(rows.size());
+    std::vector<ReportedOption> parts;
+    for (const Row& row : rows) {
+      const json* const value = value_under(record.at("options"), row.key);
+      if (value != nullptr)
+        parts.push_back(reported(row, *value, wish_of(row, defaults, wanted), of_trials));
+    }
+    if (parts.empty()) continue;
+    options.push_back(joined(parts, rows.front().unit));
+    const auto origin = std::ranges::find_if(origins, [&](const json& entry) {
+      return std::ranges::any_of(rows, [&](const Row& row) { return is_of(entry, row); });
+    });
     if (origin == origins.end()) continue;
     options.back().origin = place_of(*origin);
     options.back().is_default = false;

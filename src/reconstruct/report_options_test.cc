@@ -51,6 +51,20 @@ TEST(ReportedOptions, SayWhereEachValueComesFrom) {
             "chosen by trials");
 }
 
+TEST(ReportedOptions, ShowSwitchesAsTheyAreTyped) {
+  Options requested;
+  requested.with_margin = false;
+  requested.axis_x = 100.5;
+  requested.axis_z = 20.0;
+  const auto options = reported_options(record_of(requested), series_files(), requested);
+  EXPECT_EQ(option_of(options, "--no-margin").value, "on");
+  EXPECT_EQ(option_of(options, "--no-noise-fit").value, "off");
+  EXPECT_TRUE(option_of(options, "--no-noise-fit").is_default);
+  EXPECT_EQ(option_of(options, "--center").value, "100.5, 20 unbinned pixels");
+  EXPECT_EQ(std::ranges::count(options, "--center", &ReportedOption::flag), 1);
+  EXPECT_EQ(option_of(reported_options(record_of({}), series_files(), {}), "--center").value, "–");
+}
+
 TEST(ReportedOptions, NameTheFileAndItsEntry) {
   Options requested;
   requested.thickness = 150;

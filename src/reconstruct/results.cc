@@ -174,10 +174,25 @@ void write_results(Results& results, const ResultFiles& files) {
 // Replaces the model of the results by a compact one.
 void make_compact(const compact::Budget& budget, Results& results) {
   const base::Stopwatch running;
-  compact::CompactField made = compact::compress(*results.model->field, results.model->roi, budget);
+  const output::Model& model = *results.model;
+  compact::CompactField made = compact::compress(
+      *model.field, model.roi, budget,
+      [&](const compact::CodedField& coded) { return output::coded_file_size(coded, model); });
   results.model->field = std::move(made.field);
   results.model->coded = std::move(made.coded);
   results.metrics["metrics"]["compact"] = compact::report_json(made.report, running.seconds());
+}
+
+// Does the same. If that fails, keeps the finished fit.
+void make_compact_or_keep(const ResultFiles& files, std::optional<io::OutputSet>& outputs,
+                          Results& results) {
+  const std::filesystem::path model = output_paths(files.options.resolved.output).model;
+  try {
+    make_compact(compact::parse_budget(files.options.resolved.budget), results);
+  } catch (const Error&) {
+    if (!outputs) throw;
+    keep_model(model, *outputs, [&] { output::save_model(model, *results.model, &files.state); });
+  }
 }
 
 }  // namespace
@@ -245,7 +260,7 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
                   .verdict = std::move(found.verdict),
                   .bead_masking = series.masks.bead_masking};
   if (!options.resolved.budget.empty())
-    make_compact(compact::parse_budget(options.resolved.budget), results);
+    make_compact_or_keep({options, origin, state, share, view, write_more}, outputs, results);
   if (writes_files)
     write_together({options, origin, state, share, view, write_more}, *outputs, results);
   return results;

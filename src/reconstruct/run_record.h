@@ -2,7 +2,6 @@
 
 #include <vector>
 
-#include "base/stopwatch.h"
 #include "geometry/raw_from_aligned.h"
 #include "reconstruct/checkpoint.h"
 
@@ -13,7 +12,6 @@ struct RunRecord {
   FitOrigin origin;
   /// Where the pixels of each aligned view come from in the stack.
   std::vector<geometry::RawFromAligned> alignment;
-  base::Stopwatch since_start = {};  ///< runs from the start of reconstruct() on
   double fit_seconds = 0.0;
 };
 

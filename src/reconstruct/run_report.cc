@@ -121,6 +121,19 @@ void add_beads(const json& alignment, std::vector<HtmlFact>& facts) {
                    number(distance_px.at(is_new ? "files" : of_new)))});
 }
 
+// Adds what an alignment found of the specimen's pose.
+void add_pose(const json& alignment, std::vector<HtmlFact>& facts) {
+  if (!alignment.is_object() || !alignment.contains("pose")) return;
+  const json& pose = alignment.at("pose");
+  facts.push_back(
+      {"Thickness and pitch",
+       fmt::format("{:.0f} ± {:.0f} px, {:.1f} ± {:.1f}°", number(pose.at("thickness_px")),
+                   number(pose.at("thickness_error_px")), number(pose.at("pitch_deg")),
+                   number(pose.at("pitch_error_deg"))),
+       "What the alignment found of the specimen, in unbinned pixels, and in degrees against the "
+       "tilt angles. It applied neither: --thickness and --tilt-offset do that."});
+}
+
 std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics) {
   std::vector<HtmlFact> facts;
   facts.push_back({"Residual", fmt::format("{:.2f}", number(verdict.at("residual"))),
@@ -141,9 +154,12 @@ std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics) {
                      "9 of 10 views lie closer than this to where the tomogram predicts them."});
   }
   add_beads(metrics.value("alignment", json()), facts);
+  add_pose(metrics.value("alignment", json()), facts);
   if (const double speckle = number(verdict.value("speckle", json())); std::isfinite(speckle))
-    facts.push_back({"Speckle", fmt::format("{:.3f} %", 100 * speckle),
-                     "Voxels that stick out from all their neighbours."});
+    facts.push_back(
+        {"Speckle", fmt::format("{:.3f} %", 100 * speckle),
+         "Voxels that stick out from all their neighbours. Hardly anybody sees less than "
+         "0.02 %."});
   facts.push_back({"Masked",
                    fmt::format("{:.1f} %", 100 * number(metrics.at("mask").at("masked_part"))),
                    "Pixels of the views that did not count: beads, fill, bad pixels."});
@@ -265,8 +281,10 @@ void add_alignment(const json& metrics, HtmlPage& page) {
 void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
   add_plot(
       "Settings that trials chose",
-      "Short fits without some views were tried before the fit. Lower is better; bars are two "
-      "standard errors long. Of settings that are as good as the best, the smoothest is taken.",
+      "Short fits without some views were tried before the fit. Lower is better, and the chosen "
+      "settings are at 0; bars are two standard errors long. Errors are compared view by view (the "
+      "median over pairs of views). Of settings that are as good as the best, the smoothest is "
+      "taken, and other rules can prefer settings that predict a little worse (docs/fitting.md).",
       trials_plot(fits.front().metrics), page);
   add_alignment(fits.front().metrics, page);
   add_plot("Loss",

@@ -87,7 +87,7 @@ TEST_F(RunReport, ShowsWarningsAndNumbers) {
   EXPECT_FALSE(page_has("even half"));
 }
 
-TEST_F(RunReport, ShowsHowFarGoldBeadsLieFromTheirPlaces) {
+TEST_F(RunReport, ShowsHowFarGoldBeadsLieFromTheirPlacesAndThePose) {
   EXPECT_FALSE(page_has("Gold beads"));
   json& alignment = record_["metrics"]["alignment"];
   alignment = {{"accepted", true},
@@ -105,6 +105,12 @@ TEST_F(RunReport, ShowsHowFarGoldBeadsLieFromTheirPlaces) {
                                   {"tilt_change_deg", 0.0},
                                   {"correlation", 0.9},
                                   {"shift_error_px", {0.1, 0.1}}});
+  EXPECT_FALSE(page_has("Thickness and pitch"));
+  alignment["pose"] = {{"thickness_px", 190.2},
+                       {"thickness_error_px", 18.0},
+                       {"pitch_deg", -4.7},
+                       {"pitch_error_deg", 0.8}};
+  EXPECT_TRUE(page_has("190 ± 18 px, -4.7 ± 0.8°"));
   EXPECT_TRUE(page_has("0.25 px"));
   EXPECT_TRUE(page_has("of the files: 1.25 px"));
   alignment["accepted"] = false;

@@ -163,8 +163,10 @@ class TileFits {
       const field::RootGrid& roots = vertices->tree().roots();
       rows.end = static_cast<int>(roots.y0 + roots.rows * roots.cell_size);
     }
-    compact::CompactField made =
-        compact::compress(*vertices, run_.measurement.roi, budget, rows, start_.variance);
+    const output::ModelInfo info = model_info(run_.measurement, run_.options);
+    compact::CompactField made = compact::compress(
+        *vertices, run_.measurement.roi, budget, rows, start_.variance,
+        [&](const compact::CodedField& coded) { return output::coded_file_size(coded, info); });
     return {std::move(made.coded), made.report, running.seconds()};
   }
 
@@ -207,7 +209,7 @@ RunResult finish_tiles(const Run& run, RunRecord& record, FinishedTiles& finishe
   record.fit_seconds = seconds_of_coarse + finished.sum_of("seconds_fitting");
   Verdict& verdict = example.found.verdict;
   verdict.residual = finished.mean_of("residual");
-  verdict.seconds = record.since_start.seconds();
+  verdict.seconds = run.options.since_start.seconds();
   verdict.peak_GiB = static_cast<double>(base::peak_memory()) / (1 << 30);
   Results results{
       .model = output::Model{model_info(run.measurement, run.options), nullptr, std::nullopt},

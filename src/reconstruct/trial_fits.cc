@@ -18,6 +18,9 @@ namespace tomofield::reconstruction {
 
 using nlohmann::json;
 
+// Part of the work after which the time that is left can be told. The first steps take longer.
+constexpr double kFirstReport = 0.03;
+
 // A trial that is being made. Its fit lives from the first to the last step.
 class TrialFits::Running {
  public:
@@ -205,10 +208,11 @@ bool TrialFits::report(const std::vector<std::unique_ptr<Running>>& own, std::si
     if (!hooks_.progress) continue;
     const double done = num_done_ + of_batch * static_cast<double>(batch_size);
     part_done_ = std::max(part_done_, done / expected);  // more trials than expected may follow
+    if (part_done_ < kFirstReport) continue;
     hooks_.progress(base::progress_at(
         part_done_, running_.seconds(),
-        fmt::format("trial {}/{}  {}", num_done_ + static_cast<int>(trial->index()) + 1, expected,
-                    trial->detail())));
+        fmt::format("trial {} of about {}  {}", num_done_ + static_cast<int>(trial->index()) + 1,
+                    expected, trial->detail())));
   }
   return false;
 }

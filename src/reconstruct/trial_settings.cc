@@ -36,19 +36,35 @@ TrialSettings settings_from(const json& entry) {
               static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank))};
 }
 
-}  // namespace
-
-FitTrials make_trials(FitTrials::RunTrials run) {
+// Says whether settings are equal. Weights may differ by rounding.
+bool are_equal(const TrialSettings& a, const TrialSettings& b) {
   constexpr double kRounding = 1e-9;
-  return {std::move(run), [](const TrialSettings& a, const TrialSettings& b) {
-            TrialSettings same_weight = a;
-            same_weight.variation = b.variation;
-            return same_weight == b &&
-                   std::abs(a.variation - b.variation) <= kRounding * std::abs(b.variation);
-          }};
+  TrialSettings same_weight = a;
+  same_weight.variation = b.variation;
+  return same_weight == b &&
+         std::abs(a.variation - b.variation) <= kRounding * std::abs(b.variation);
 }
 
-selection::Difference difference_to_best(const FitTrial& trial, const TunedFit& tuned) {
+}  // namespace
+
+FitTrials make_trials(FitTrials::RunTrials run) { return {std::move(run), are_equal}; }
+
+const FitTrial* chosen_trial(const TunedFit& tuned) {
+  const auto find = [&](bool with_epochs) {
+    return std::ranges::find_if(tuned.trials, [&](const FitTrial& trial) {
+      TrialSettings settings = trial.settings;
+      if (!with_epochs) settings.epochs = tuned.settings.epochs;
+      return are_equal(settings, tuned.settings);
+    });
+  };
+  auto chosen = find(true);
+  if (chosen == tuned.trials.end()) chosen = find(false);
+  return chosen == tuned.trials.end() ? nullptr : &*chosen;
+}
+
+selection::Difference difference_to_chosen(const FitTrial& trial, const TunedFit& tuned) {
+  if (const FitTrial* const chosen = chosen_trial(tuned))
+    return selection::difference(trial.score, chosen->score);
   const FitTrial& best = *std::ranges::min_element(tuned.trials, {}, [&](const FitTrial& t) {
     return selection::difference(t.score, tuned.trials.front().score).log_ratio;
   });
@@ -92,8 +108,9 @@ FitTrial trial_from(const json& entry) {
 json tuning_json(const TunedFit& tuned) {
   json tuning = selection::tuned_json(tuned, settings_json);
   for (std::size_t i = 0; i < tuned.trials.size(); ++i) {
-    const selection::Difference d = difference_to_best(tuned.trials[i], tuned);
-    tuning["trials"][i].update({{"above_best", d.log_ratio}, {"standard_error", d.standard_error}});
+    const selection::Difference d = difference_to_chosen(tuned.trials[i], tuned);
+    tuning["trials"][i].update(
+        {{"above_chosen", d.log_ratio}, {"standard_error", d.standard_error}});
   }
   return tuning;
 }

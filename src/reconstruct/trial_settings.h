@@ -30,8 +30,13 @@ using TunedFit = selection::Tuned<TrialSettings>;
 /// rounding count as equal.
 FitTrials make_trials(FitTrials::RunTrials run);
 
-/// Compares a trial with the one of a search that predicts best.
-selection::Difference difference_to_best(const FitTrial& trial, const TunedFit& tuned);
+/// Returns the trial that has the chosen settings, or null if there is none. Short trials have
+/// fewer epochs than the fit, so epochs count only if a trial has those that were chosen.
+const FitTrial* chosen_trial(const TunedFit& tuned);
+
+/// Compares a trial with the chosen one, view by view. If the chosen settings are a mixture that no
+/// trial has, compares it with the trial that predicts best.
+selection::Difference difference_to_chosen(const FitTrial& trial, const TunedFit& tuned);
 
 /// Describes settings as in "smooth tv 5", and which corrections of the views differ from those of
 /// `usual`.
@@ -41,7 +46,7 @@ std::string describe(const TrialSettings& settings, const TrialSettings& usual);
 nlohmann::json settings_json(const TrialSettings& settings);
 /// Reads a trial that selection::trial_json() has written with such settings.
 FitTrial trial_from(const nlohmann::json& entry);
-/// Writes the chosen settings and all trials, each with its difference to the best.
+/// Writes the chosen settings and all trials, each with its difference to the chosen one.
 nlohmann::json tuning_json(const TunedFit& tuned);
 /// Reads what tuning_json() has written. Throws nlohmann::json::exception or Error if it is
 /// damaged.

@@ -56,18 +56,24 @@ std::optional<TunedFit> searched(TrialFits& fits, selection::TrialFile* file,
   }
 }
 
-// Writes a line for each trial: its settings, and how much worse than the best it predicts.
+// Writes a line for each trial: its settings, and how much worse than the chosen one it predicts.
+// Says how these are compared.
 void log_trials(const TunedFit& tuned) {
+  const char* const reference =
+      chosen_trial(tuned) != nullptr ? "the chosen settings" : "the best trial";
   for (const FitTrial& t : tuned.trials) {
-    const selection::Difference d = difference_to_best(t, tuned);
-    base::log_info(
-        fmt::format("tried {}, rank {}, epochs {}: held-out error {:.5f}, {:+.2f} % ± "
-                    "{:.2f} from the best{}",
-                    describe(t.settings, tuned.trials.front().settings), t.settings.rank,
-                    t.settings.epochs, t.score.error, 100 * d.log_ratio, 100 * d.standard_error,
-                    t.score.speckle ? fmt::format(", speckle {:.3f} %", 100 * *t.score.speckle)
-                                    : std::string()));
+    const selection::Difference d = difference_to_chosen(t, tuned);
+    base::log_info(fmt::format(
+        "tried {}, rank {}, epochs {}: view by view {:+.2f} % ± {:.2f} from "
+        "{}; mean held-out error {:.5f}{}",
+        describe(t.settings, tuned.trials.front().settings), t.settings.rank, t.settings.epochs,
+        100 * d.log_ratio, 100 * d.standard_error, reference, t.score.error,
+        t.score.speckle ? fmt::format(", speckle {:.3f} %", 100 * *t.score.speckle)
+                        : std::string()));
   }
+  base::log_info(
+      "the choice compares the errors of trials view by view (median over pairs of views); a view "
+      "that all predict badly moves the mean error, but not this");
 }
 
 }  // namespace

@@ -317,6 +317,17 @@ TEST(TunedFit, ComesBackFromItsJson) {
   EXPECT_EQ(read.trials[0].seconds, 2.5);
 }
 
+TEST(TunedFit, FindsTheTrialThatWasChosen) {
+  TunedFit tuned{.settings = {Penalty::kSmooth, 5, 12, 10},
+                 .trials = {{{Penalty::kConcave, 5, 12, 2}}, {{Penalty::kSmooth, 5, 12, 2}}},
+                 .predicted_views = {3}};
+  EXPECT_EQ(chosen_trial(tuned), &tuned.trials[1]);  // short trials have fewer epochs
+  tuned.trials.push_back({{Penalty::kSmooth, 5 * (1 + 1e-12), 12, 10}});
+  EXPECT_EQ(chosen_trial(tuned), &tuned.trials[2]);
+  tuned.settings.rank = 6;
+  EXPECT_EQ(chosen_trial(tuned), nullptr);
+}
+
 TEST(TunedFit, ImplausibleOnesAreRefused) {
   const TunedFit tuned{.settings = {Penalty::kConcave, 7.5, 12, 30},
                        .trials = {{{Penalty::kSmooth, 5, 12, 30}, {1.25, {1.0, 1.5}}, 2.5}},

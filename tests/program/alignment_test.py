@@ -1,5 +1,6 @@
 """Tests --align and the command align, from misaligned views to the files of the alignment."""
 
+import glob
 import json
 import os
 import sys
@@ -96,6 +97,15 @@ def test_gold_beads_make_the_direction_of_the_axis_finer():
     assert found["x_px"] < 0.05 and found["y_px"] < 0.05, found
 
 
+def test_beads_that_are_too_few_to_follow_are_named():
+    folder = simulate("alignment_few_beads", "--misalign", 1, "--gold", 2, "--gold-diameter", 50,
+                      noise=0.02)
+    log = harness.succeed("align", *series_of(folder, SIZE, 4.2), "-o",
+                          os.path.join(folder, "found.mrc")).stderr
+    assert "2 beads were found, and the alignment uses none of them" in log, log
+    assert "beads" not in record(os.path.join(folder, "found_align"))
+
+
 def test_views_of_something_else_are_named_and_left_out():
     folder = simulate("alignment_strange", "--misalign", 3)
     with mrcfile.open(os.path.join(folder, "tilt_series.mrc"), mode="r+") as file:
@@ -148,11 +158,14 @@ def test_local_motion_is_undone():
 def test_reconstruct_takes_the_alignment_and_resumes_from_it(shifted):
     volume = os.path.join(shifted, "made.mrc")
     command = ["reconstruct", *series_of(shifted), *FIT[:-2], "--align", "refine", "-o", volume]
-    harness.succeed(*command)
+    printed = harness.succeed(*command).stdout
+    listed = [word for word in printed.split() if word.startswith(shifted)]
+    assert sorted(listed) == sorted(glob.glob(os.path.join(shifted, "made*"))), printed
     first = harness.read_bytes(volume)
     with open(os.path.join(shifted, "made.json"), encoding="utf-8") as file:
         metrics = json.load(file)["metrics"]
     assert metrics["alignment"] == record(os.path.join(shifted, "made_align"))
+    assert metrics["verdict"]["seconds"] > metrics["alignment"]["seconds"] + metrics["seconds"]
     with open(os.path.join(shifted, "made_report.html"), encoding="utf-8") as file:
         assert "alignment before the fit" in file.read()
     # The written .xf gives the same tomogram to the rounding of its digits.
@@ -193,6 +206,15 @@ def test_wrong_tilt_angles_are_found_and_reach_the_files_of_other_programs():
         assert np.allclose(section["in_plane_rotation"], inverse, atol=1e-5)
         assert np.allclose([section["x_offset"], section["y_offset"]], -inverse @ line[4:],
                            atol=0.01)
+
+
+def test_there_is_no_alignment_without_one(shifted):
+    output = os.path.join(shifted, "none.mrc")
+    refused = harness.tomofield("align", *series_of(shifted), "--align", "off", "-o", output)
+    assert refused.returncode == 2 and "nothing to do with --align off" in refused.stderr
+    assert glob.glob(output[:-4] + "*") == []
+    text = " ".join(harness.succeed("align", "--help").stdout.split())
+    assert "default: refine" in text and "model, metrics" not in text, text
 
 
 def test_too_few_views_are_refused(shifted):

@@ -369,3 +369,30 @@ def test_a_stack_of_nothing_is_answered_in_little_memory(out, path, stack, text_
     assert status == 2 and "section 1" in text and "constant" in text, text
     assert (mebibytes < 1024 or is_sanitized()), mebibytes
     os.remove(empty)
+
+
+def test_unknown_options_are_named_with_those_that_are_like_them():
+    for arguments, says in ((["--thicknes", "160"], "no option --thicknes (did you mean --thickness?);"),
+                            (["--algn", "refine"], "no option --algn (did you mean --aln or --align?);"),
+                            (["--zzzzzz=3", "-q", "-3"], "no option --zzzzzz; there is no option -q;"),
+                            (["a", "b", "--thickness", 3, "-o", "c.mrc"], "'a', 'b' belong to no option")):
+        result = harness.tomofield("reconstruct", "series.mrc", *arguments)
+        assert result.returncode == 2 and says in result.stderr, result.stderr
+
+
+def test_volumes_have_no_name_of_another_format(tmp_path):
+    stack = tmp_path / "series.mrc"
+    write_stack(stack, np.zeros((3, 8, 8), np.float32))
+    for name in ("x.tif", "x.H5"):
+        result = harness.tomofield("reconstruct", stack, "--thickness", 4, "-o", tmp_path / name)
+        assert result.returncode == 2 and "the volume is an MRC file" in result.stderr, result.stderr
+
+
+def test_views_of_few_pixels_are_refused(tmp_path):
+    stack = tmp_path / "series.mrc"
+    write_stack(stack, np.random.default_rng(1).normal(100, 1, (14, 32, 32)).astype(np.float32))
+    angles = tmp_path / "series.tlt"
+    np.savetxt(angles, np.linspace(-50, 50, 14))
+    result = harness.tomofield("reconstruct", stack, "--tlt", angles, "--thickness", 16, "--bin", 8,
+                               "--dry-run", "-o", tmp_path / "x.mrc")
+    assert result.returncode == 2 and "views of 4 × 4 pixels show nothing" in result.stderr, result.stderr

@@ -152,6 +152,18 @@ def test_views_that_score_the_result_have_no_say_in_its_settings(series):
         harness.assert_scored_views_have_no_say(metrics, scored)
 
 
+def test_the_verdict_has_the_held_out_views_of_the_chosen_short_trial(series):
+    results = series.reconstruct("short_trials", "--tv-penalty", "auto")
+    metrics = record(results)["metrics"]
+    chosen = metrics["tuning"]["chosen"]
+    trial, = (t for t in metrics["tuning"]["trials"]
+              if all(t[key] == chosen[key] for key in chosen if key != "epochs"))
+    assert trial["epochs"] < chosen["epochs"]
+    assert metrics["verdict"]["held_out"]["of_trials"]
+    assert metrics["verdict"]["held_out"]["worst"] == max(trial["held_out_error_by_view"])
+    assert "held out in trials" in metrics["verdict"]["line"]
+
+
 TUNE = harness.merge(harness.QUICK, ["--epochs", 4, "--tune"])
 
 
@@ -174,7 +186,7 @@ def test_tune_chooses_what_predicts_best_then_fits_all_views(series):
     # A run that was interrupted after some trials does not repeat them and ends alike.
     path = stem(results, "_tune.json")
     stored = json.load(open(path))
-    derived = ("above_best", "standard_error")
+    derived = ("above_chosen", "standard_error")
     assert stored["trials"] == [{key: value for key, value in trial.items() if key not in derived}
                                 for trial in trials]
     stored["trials"] = stored["trials"][:5]
