@@ -24,8 +24,9 @@ constexpr double kRange_deg = 6.0, kFirstStep_deg = 2.0;
 constexpr double kLastStep_deg = 0.5;
 // A joint alignment leaves a smaller error of the axis.
 constexpr double kRefinedStep_deg = 1.0, kRefinedRange_deg = 3.0;
-// Noise makes residuals of fits differ as well.
-constexpr double kSure = 2.0;  // standard errors over the views
+// Noise makes residuals of fits differ as well: so many standard errors over the views are sure.
+// Views are aligned anew in each fit of the search, and that differs besides.
+constexpr double kSure = 2.0, kSureOfSearch = 3.0;
 // The fits that refine it have pixels so many times as wide.
 constexpr int kAxisBin = 2;
 // In narrower views, other slow errors of an alignment move the lowest place by up to 0.4°.
@@ -79,7 +80,7 @@ std::vector<geometry::ViewCorrection> with_best_axis(
     const JointProblem& problem, const std::vector<geometry::ViewCorrection>& start,
     const distributed::Communicator& processes) {
   const base::TraceSpan span("find tilt axis");
-  AxisLine line(of_axis(problem, start, kMostAxisFits, coarse_residuals, processes), kSure);
+  AxisLine line(of_axis(problem, start, kMostAxisFits, coarse_residuals, processes), kSureOfSearch);
   double best = line.descend(0.0, kFirstStep_deg, kRange_deg);
   for (double step = kFirstStep_deg / 2; step >= kLastStep_deg; step /= 2)
     best = line.downhill(best, step);

@@ -13,8 +13,9 @@ inline constexpr int kMostAxisFits = 10;
 
 /// Returns the corrections with the common rotation about the centres of the views at which the
 /// views agree best with a field that is fitted and aligned with coarse pixels. It goes from 0 to
-/// where they agree better, at most 8° away, and reports its progress. Throws base::StopRequested
-/// if a stop was requested. Every process calls it and gets the same.
+/// where they agree better, at most 8° away, as far as the views are sure of the slope (three
+/// standard errors). Reports its progress. Throws base::StopRequested if a stop was requested.
+/// Every process calls it and gets the same.
 ///
 /// The joint alignment finds the direction of the tilt axis as well, but slowly, because a field
 /// that was fitted with a wrong axis agrees with it.
