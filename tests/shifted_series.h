@@ -19,8 +19,10 @@ class ShiftedSeries {
  public:
   using ViewCorrection = geometry::ViewCorrection;
 
-  /// Makes views of `size` pixels across, a multiple of 48. The thickness is a third of it.
-  explicit ShiftedSeries(std::int64_t size = 48) : size_(size), scene_(scene_of(size)) {
+  /// Makes views of `size` pixels across, a multiple of 48, with noise of deviation `noise`. The
+  /// thickness is a third of the size.
+  explicit ShiftedSeries(std::int64_t size = 48, double noise = 0.1)
+      : size_(size), noise_(noise), scene_(scene_of(size)) {
     for (double tilt = -60; tilt <= 60; tilt += 6) tilt_deg_.push_back(tilt);
     base::Random random(4);
     for (std::size_t view = 0; view < tilt_deg_.size(); ++view) {
@@ -78,12 +80,13 @@ class ShiftedSeries {
       const double x = static_cast<double>(i % size_) + 0.5 - half - right_[view].shift_x_px;
       const double y = static_cast<double>(i / size_) + 0.5 - half - right_[view].shift_y_px;
       pixels_.push_back(
-          static_cast<float>(scene_.projection(x, y, tilt_deg_[view]) + 0.1 * random.normal()));
+          static_cast<float>(scene_.projection(x, y, tilt_deg_[view]) + noise_ * random.normal()));
     }
   }
 
   ScratchDirectory scratch_;
   std::int64_t size_;
+  double noise_;
   GaussianScene scene_;
   measurement::SpecimenOptions specimen_;
   std::vector<double> tilt_deg_;

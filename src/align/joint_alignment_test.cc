@@ -28,6 +28,14 @@ TEST(JointAlignment, FindsRandomShifts) {
   }
 }
 
+TEST(JointAlignment, StepsOfNoisyViewsDieAway) {
+  const ShiftedSeries series(96, 4.0);
+  const JointAlignment found = aligned(series);
+  EXPECT_LT(found.agreement[10].correlation, 0.5) << "the views are not noisy";
+  EXPECT_LT(found.steps_px.back(), 0.25) << "steps go back and forth";
+  EXPECT_LT(series.error_px(found.corrections), 0.7);
+}
+
 TEST(JointAlignment, SameBitsForAnyNumberOfThreads) {
   const ShiftedSeries series;
   const auto run = [&](int threads) {

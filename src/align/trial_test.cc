@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <vector>
 
+#include "base/stop_requested.h"
 #include "shifted_series.h"
 
 namespace tomofield::align {
@@ -44,6 +46,34 @@ TEST(AlignmentTrial, FinePixelsDecideBetweenEqualAlignments) {
     EXPECT_FALSE(trials.comparison.gain.exceeds(1.0));
     EXPECT_EQ(trials.before.fine_errors(), trials.after.fine_errors());
     EXPECT_NE(trials.before.fine_errors(), trials.before.coarse_errors());
+  });
+}
+
+TEST(AlignmentTrial, LeavesOutAViewWithoutPixels) {
+  const ShiftedSeries series;
+  series.with_problem([&](const JointProblem& problem) {
+    std::vector<ViewCorrection> away = series.right();
+    away[4].shift_x_px += 1000.0;  // the first view that is held out
+    ComparedTrials trials(problem, series.right(), away);
+    EXPECT_TRUE(std::isnan(trials.after.coarse_errors()[0]));
+    EXPECT_TRUE(std::isfinite(trials.comparison.before));
+    EXPECT_EQ(trials.comparison.after, trials.comparison.before) << "the other view is the same";
+  });
+}
+
+TEST(AlignmentTrial, StopsInEitherPartIfAsked) {
+  const ShiftedSeries series;
+  series.with_problem([&](const JointProblem& problem) {
+    bool is_asked = true;
+    JointProblem stopping = problem;
+    stopping.stop_requested = [&] { return is_asked; };
+    AlignmentTrial trial(stopping, series.right(), distributed::Communicator::alone());
+    EXPECT_THROW(trial.coarse_errors(), base::StopRequested);
+    AlignmentTrial later(stopping, series.right(), distributed::Communicator::alone());
+    is_asked = false;
+    EXPECT_EQ(later.coarse_errors().size(), 2u);
+    is_asked = true;
+    EXPECT_THROW(later.fine_errors(), base::StopRequested);
   });
 }
 
