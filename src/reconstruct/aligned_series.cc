@@ -67,12 +67,12 @@ void log_beads(const json& beads) {
 
 // Says what the views tell about the specimen's pose. Nothing of it is applied.
 void log_pose(const json& pose) {
-  base::log_info(
-      fmt::format("the specimen is {:.0f} ± {:.0f} pixels thick and has a pitch of {:.1f} ± "
-                  "{:.1f}° against the "
-                  "tilt angles (--thickness and --tilt-offset apply them)",
-                  pose["thickness_px"].get<double>(), pose["thickness_error_px"].get<double>(),
-                  pose["pitch_deg"].get<double>(), pose["pitch_error_deg"].get<double>()));
+  base::log_info(fmt::format(
+      "the specimen seems to be {:.0f} ± {:.0f} pixels thick and to have a pitch of "
+      "{:.1f} ± {:.1f}° against the tilt angles; noisy views give rough values, so look "
+      "at the XZ plane before you apply them (--thickness, --tilt-offset)",
+      pose["thickness_px"].get<double>(), pose["thickness_error_px"].get<double>(),
+      pose["pitch_deg"].get<double>(), pose["pitch_error_deg"].get<double>()));
 }
 
 void log_alignment(const json& record) {

@@ -130,8 +130,10 @@ void add_pose(const json& alignment, std::vector<HtmlFact>& facts) {
        fmt::format("{:.0f} ± {:.0f} px, {:.1f} ± {:.1f}°", number(pose.at("thickness_px")),
                    number(pose.at("thickness_error_px")), number(pose.at("pitch_deg")),
                    number(pose.at("pitch_error_deg"))),
-       "What the alignment found of the specimen, in unbinned pixels, and in degrees against the "
-       "tilt angles. It applied neither: --thickness and --tilt-offset do that."});
+       "What the specimen seems to have, in unbinned pixels, and in degrees against the tilt "
+       "angles. "
+       "Noisy views give rough values, whatever their errors say: look at the XZ plane first. The "
+       "alignment applied neither; --thickness and --tilt-offset do that."});
 }
 
 std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics) {
