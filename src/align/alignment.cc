@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "align/aligning_fit.h"
 #include "align/axis_search.h"
@@ -136,13 +138,15 @@ Alignment refine_alignment(const JointProblem& problem, std::vector<geometry::Vi
   alignment.joint = align_jointly(problem, std::move(start), processes);
   refine_slow_part(problem, processes, alignment);
   alignment.unaligned = unalike_views(problem.recorded, alignment.joint.agreement);
-  AlignmentTrial before(problem, none, processes);
-  AlignmentTrial after(problem, alignment.joint.corrections, processes);
-  alignment.held_out = compare(before, after);
+  std::optional<AlignmentTrial> before(std::in_place, problem, none, processes);
+  std::optional<AlignmentTrial> after(std::in_place, problem, alignment.joint.corrections,
+                                      processes);
+  alignment.held_out = compare(*before, *after);
   alignment.is_accepted = alignment.held_out.gain.exceeds(kSure);
   alignment.corrections = alignment.is_accepted ? alignment.joint.corrections : none;
+  (alignment.is_accepted ? before : after).reset();  // the fit of local motion needs the memory
   if (!alignment.joint.motion.empty())
-    add_motion(problem, alignment.is_accepted ? after : before, processes, alignment);
+    add_motion(problem, alignment.is_accepted ? *after : *before, processes, alignment);
   return alignment;
 }
 

@@ -69,7 +69,6 @@ void AlignmentTrial::begin() {
   fit_ = std::make_unique<fit::Fit>(measurement_, field_, held_out_fit(problem_.seed), processes_);
   run_with_wide_pixels(*fit_, kHeldOutCoarseEpochs, problem_, processes_);
   coarse_errors_ = errors();
-  measurement_.rays.reset();  // the next fit needs the memory
 }
 
 void AlignmentTrial::go_on() {
