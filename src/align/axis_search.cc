@@ -19,9 +19,10 @@ namespace tomofield::align {
 namespace {
 
 constexpr double kRadian_deg = 180.0 / std::numbers::pi;
-constexpr double kRange_deg = 6.0, kFirstStep_deg = 2.0;
+// Far directions tell the way best where views are noisy, and near ones the place.
+constexpr double kFarStep_deg = 4.0;
 // The last parabola has its points so far apart: closer ones differ by less than the fits do.
-constexpr double kLastStep_deg = 0.5;
+constexpr double kNearStep_deg = 1.0, kLastStep_deg = 0.5;
 // A joint alignment leaves a smaller error of the axis.
 constexpr double kRefinedStep_deg = 1.0, kRefinedRange_deg = 3.0;
 // Noise makes residuals of fits differ as well: so many standard errors over the views are sure.
@@ -81,10 +82,10 @@ std::vector<geometry::ViewCorrection> with_best_axis(
     const distributed::Communicator& processes) {
   const base::TraceSpan span("find tilt axis");
   AxisLine line(of_axis(problem, start, kMostAxisFits, coarse_residuals, processes), kSureOfSearch);
-  double best = line.descend(0.0, kFirstStep_deg, kRange_deg);
-  for (double step = kFirstStep_deg / 2; step >= kLastStep_deg; step /= 2)
+  double best = line.lowest(line.downhill(0.0, kFarStep_deg), kFarStep_deg, kFarStep_deg);
+  for (double step = kNearStep_deg; step >= kLastStep_deg; step /= 2)
     best = line.downhill(best, step);
-  const double axis_deg = line.lowest(best, kLastStep_deg, kFirstStep_deg);
+  const double axis_deg = line.lowest(best, kLastStep_deg, kNearStep_deg);
   base::log_info(
       fmt::format("the tilt axis is turned by {:.2f}° from where the files have it", axis_deg));
   return turned(start, axis_deg);

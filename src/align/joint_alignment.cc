@@ -206,7 +206,10 @@ class AligningFit {
 
 fit::FitOptions joint_fit(std::uint64_t seed) {
   constexpr int kCoarseEpochs = 80, kFineEpochs = 3;
-  return aligning_fit(kCoarseEpochs, kFineEpochs, seed);
+  fit::FitOptions options = aligning_fit(kCoarseEpochs, kFineEpochs, seed);
+  // Exposures of raw views differ by more than a noisy view's signal.
+  options.fit_view_scale = true;
+  return options;
 }
 
 JointAlignment align_jointly(const JointProblem& problem, std::vector<ViewCorrection> start,
