@@ -37,15 +37,14 @@ constexpr double kSure = 3.0;  // standard errors by which a freedom must pay
 // A fit and the corrections of the views that it is made with.
 class AligningFit {
  public:
-  AligningFit(const JointProblem& problem, std::vector<ViewCorrection> start,
-              const distributed::Communicator& processes)
+  AligningFit(const JointProblem& problem, const fit::FitOptions& options,
+              std::vector<ViewCorrection> start, const distributed::Communicator& processes)
       : problem_(problem),
         processes_(processes),
         field_(aligning_field(problem.field)),
         measurement_(aligning_measurement(
-            problem, start, fit::make_stages(field_, joint_fit(problem.seed)).front().bin, field_,
-            processes)),
-        fit_(measurement_, field_, joint_fit(problem.seed), processes) {
+            problem, start, fit::make_stages(field_, options).front().bin, field_, processes)),
+        fit_(measurement_, field_, options, processes) {
     found_.agreement.resize(start.size());
     // A start with rotations has errors of rotations.
     found_.freedoms.rotation = std::ranges::any_of(
@@ -206,22 +205,23 @@ class AligningFit {
 
 fit::FitOptions joint_fit(std::uint64_t seed) {
   constexpr int kCoarseEpochs = 80, kFineEpochs = 3;
-  fit::FitOptions options = aligning_fit(kCoarseEpochs, kFineEpochs, seed);
-  // Exposures of raw views differ by more than a noisy view's signal.
-  options.fit_view_scale = true;
-  return options;
+  return aligning_fit(kCoarseEpochs, kFineEpochs, seed);
 }
 
 JointAlignment align_jointly(const JointProblem& problem, std::vector<ViewCorrection> start,
                              const distributed::Communicator& processes) {
-  AligningFit fit(problem, std::move(start), processes);
+  AligningFit fit(problem, joint_fit(problem.seed), std::move(start), processes);
   return fit.run(fit.num_epochs());
 }
 
 std::vector<double> coarse_residuals(const JointProblem& problem,
                                      const std::vector<ViewCorrection>& start,
                                      const distributed::Communicator& processes) {
-  AligningFit fit(problem, start, processes);
+  fit::FitOptions options = joint_fit(problem.seed);
+  // Exposures that differ would hide a wrong axis. In the joint alignment itself, scales of the
+  // views hide errors of shifts that vary slowly over the tilts (docs/results/alignment.md).
+  options.fit_view_scale = true;
+  AligningFit fit(problem, options, start, processes);
   fit.free_rotations();
   fit.run(kResidualEpochs);
   return fit.residuals();
