@@ -75,9 +75,10 @@ void resample(const FitInProgress& run, const distributed::Communicator& process
   run.fit.reread_measurement();
 }
 
-// Returns the mean squared difference of a view and its prediction where the pixels are not near an
-// edge: there the residual depends more on what the fit knows of the specimen outside the views.
-double inner_squares(const ImagePair& images) {
+// Returns the mean squared difference of a view and its scaled prediction where the pixels are not
+// near an edge: there the residual depends more on what the fit knows of the specimen outside the
+// views.
+double inner_squares(const ImagePair& images, const measurement::ViewModel& model) {
   constexpr double kInner = 0.8;  // part of the width and height
   const auto is_inner = [](std::int64_t place, std::int64_t size) {
     const double half = static_cast<double>(size) / 2;
@@ -89,7 +90,9 @@ double inner_squares(const ImagePair& images) {
     for (std::int64_t x = 0; x < images.width; ++x) {
       const auto at = static_cast<std::size_t>(y * images.width + x);
       if (!is_inner(x, images.width) || std::isnan(images.measured[at])) continue;
-      squares += std::pow(static_cast<double>(images.measured[at] - images.predicted[at]), 2);
+      const double predicted =
+          model.scale * static_cast<double>(images.predicted[at]) + model.offset;
+      squares += std::pow(static_cast<double>(images.measured[at]) - predicted, 2);
       count += 1.0;
     }
   }
@@ -203,7 +206,7 @@ std::vector<double> inner_residuals(const fit::Fit& fit,
                                     const fit::Stage& stage) {
   std::vector<double> squares(static_cast<std::size_t>(measurement.geometry.num_views()));
   for_each_prediction(fit, measurement, stage, [&](std::size_t view, const ImagePair& images) {
-    squares[view] = inner_squares(images);
+    squares[view] = inner_squares(images, fit.progress().views[view]);
   });
   return squares;
 }

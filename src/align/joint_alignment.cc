@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "align/aligning_fit.h"
+#include "align/exposures.h"
 #include "align/gauge.h"
 #include "align/local_registration.h"
 #include "align/mean_gain.h"
@@ -44,7 +45,7 @@ class AligningFit {
         field_(aligning_field(problem.field)),
         measurement_(aligning_measurement(
             problem, start, fit::make_stages(field_, options).front().bin, field_, processes)),
-        fit_(measurement_, field_, options, processes) {
+        fit_(measurement_, field_, with_exposures(options), processes) {
     found_.agreement.resize(start.size());
     // A start with rotations has errors of rotations.
     found_.freedoms.rotation = std::ranges::any_of(
@@ -60,6 +61,13 @@ class AligningFit {
         in_progress, num_epochs, [this](const fit::Stage& stage) { return update(stage); },
         processes_);
     return std::move(found_);
+  }
+
+  // Gives the views scales and offsets of their own if their exposures differ. Where they do not,
+  // these would only hide errors of shifts that vary slowly over the tilts.
+  fit::FitOptions with_exposures(fit::FitOptions options) const {
+    options.fit_view_scale = options.fit_view_scale || exposures_differ(measurement_, processes_);
+    return options;
   }
 
   // Lets the views turn from the start on.
@@ -218,8 +226,6 @@ std::vector<double> coarse_residuals(const JointProblem& problem,
                                      const std::vector<ViewCorrection>& start,
                                      const distributed::Communicator& processes) {
   fit::FitOptions options = joint_fit(problem.seed);
-  // Exposures that differ would hide a wrong axis. In the joint alignment itself, scales of the
-  // views hide errors of shifts that vary slowly over the tilts (docs/results/alignment.md).
   options.fit_view_scale = true;
   AligningFit fit(problem, options, start, processes);
   fit.free_rotations();
