@@ -4,6 +4,8 @@
 #include <map>
 #include <vector>
 
+#include "align/mean_gain.h"
+
 namespace tomofield::align {
 
 /// Looks along a line of rotations that all views share for the smallest residual. Each residual is
@@ -17,6 +19,8 @@ class AxisLine {
   /// errors.
   AxisLine(Residuals residuals, double standard_errors);
 
+  /// Says whether the slope of the residuals between both sides of a rotation counts.
+  bool leans(double axis_deg, double step_deg);
   /// Returns the rotation a step further downhill, if the residual is smaller there and the slope
   /// between both sides counts; else the rotation itself.
   double downhill(double axis_deg, double step_deg);
@@ -29,6 +33,7 @@ class AxisLine {
 
  private:
   const std::vector<double>& at(double axis_deg);
+  MeanGain slope(double axis_deg, double step_deg);
 
   Residuals residuals_;
   double standard_errors_;

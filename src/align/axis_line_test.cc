@@ -57,12 +57,14 @@ AxisLine::Residuals unequal_views(double spread) {
 
 TEST(AxisLine, MovesIfTheViewsAreSure) {
   AxisLine line(unequal_views(0.2), 2.0);
+  EXPECT_TRUE(line.leans(0.0, 1.0));
   EXPECT_EQ(line.descend(0.0, 1.0, 3.0), 1.0);
   EXPECT_NEAR(line.lowest(1.0, 1.0, 1.0), 1.2, 1e-12);
 }
 
 TEST(AxisLine, StaysIfTheViewsDisagree) {
   AxisLine line(unequal_views(4.0), 2.0);
+  EXPECT_FALSE(line.leans(0.0, 1.0));
   EXPECT_EQ(line.descend(0.0, 1.0, 3.0), 0.0);
 }
 

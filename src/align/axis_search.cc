@@ -82,7 +82,8 @@ std::vector<geometry::ViewCorrection> with_best_axis(
     const distributed::Communicator& processes) {
   const base::TraceSpan span("find tilt axis");
   AxisLine line(of_axis(problem, start, kMostAxisFits, coarse_residuals, processes), kSureOfSearch);
-  double best = line.lowest(line.downhill(0.0, kFarStep_deg), kFarStep_deg, kFarStep_deg);
+  double best = line.downhill(0.0, kFarStep_deg);
+  if (line.leans(best, kFarStep_deg)) best = line.lowest(best, kFarStep_deg, kFarStep_deg);
   for (double step = kNearStep_deg; step >= kLastStep_deg; step /= 2)
     best = line.downhill(best, step);
   const double axis_deg = line.lowest(best, kLastStep_deg, kNearStep_deg);
