@@ -38,14 +38,16 @@ constexpr double kSure = 3.0;  // standard errors by which a freedom must pay
 // A fit and the corrections of the views that it is made with.
 class AligningFit {
  public:
-  AligningFit(const JointProblem& problem, const fit::FitOptions& options,
-              std::vector<ViewCorrection> start, const distributed::Communicator& processes)
+  // Gives the views scales and offsets of their own if `may_scale` and their exposures differ.
+  AligningFit(const JointProblem& problem, bool may_scale, std::vector<ViewCorrection> start,
+              const distributed::Communicator& processes)
       : problem_(problem),
         processes_(processes),
         field_(aligning_field(problem.field)),
         measurement_(aligning_measurement(
-            problem, start, fit::make_stages(field_, options).front().bin, field_, processes)),
-        fit_(measurement_, field_, with_exposures(options), processes) {
+            problem, start, fit::make_stages(field_, joint_fit(problem.seed)).front().bin, field_,
+            processes)),
+        fit_(measurement_, field_, options(may_scale), processes) {
     found_.agreement.resize(start.size());
     // A start with rotations has errors of rotations.
     found_.freedoms.rotation = std::ranges::any_of(
@@ -63,10 +65,11 @@ class AligningFit {
     return std::move(found_);
   }
 
-  // Gives the views scales and offsets of their own if their exposures differ. Where they do not,
-  // these would only hide errors of shifts that vary slowly over the tilts.
-  fit::FitOptions with_exposures(fit::FitOptions options) const {
-    options.fit_view_scale = options.fit_view_scale || exposures_differ(measurement_, processes_);
+  // Scales of the views hide errors of shifts that vary slowly over the tilts, so they are left out
+  // where they are not needed.
+  fit::FitOptions options(bool may_scale) const {
+    fit::FitOptions options = joint_fit(problem_.seed);
+    options.fit_view_scale = may_scale && exposures_differ(measurement_, processes_);
     return options;
   }
 
@@ -218,16 +221,14 @@ fit::FitOptions joint_fit(std::uint64_t seed) {
 
 JointAlignment align_jointly(const JointProblem& problem, std::vector<ViewCorrection> start,
                              const distributed::Communicator& processes) {
-  AligningFit fit(problem, joint_fit(problem.seed), std::move(start), processes);
+  AligningFit fit(problem, true, std::move(start), processes);
   return fit.run(fit.num_epochs());
 }
 
 std::vector<double> coarse_residuals(const JointProblem& problem,
                                      const std::vector<ViewCorrection>& start,
                                      const distributed::Communicator& processes) {
-  fit::FitOptions options = joint_fit(problem.seed);
-  options.fit_view_scale = true;
-  AligningFit fit(problem, options, start, processes);
+  AligningFit fit(problem, false, start, processes);
   fit.free_rotations();
   fit.run(kResidualEpochs);
   return fit.residuals();
