@@ -87,8 +87,14 @@ std::vector<geometry::ViewCorrection> with_best_axis(
   for (double step = kNearStep_deg; step >= kLastStep_deg; step /= 2)
     best = line.downhill(best, step);
   const double axis_deg = line.lowest(best, kLastStep_deg, kNearStep_deg);
-  base::log_info(
-      fmt::format("the tilt axis is turned by {:.2f}° from where the files have it", axis_deg));
+  if (axis_deg == 0.0)
+    base::log_info(
+        "the tilt axis stays where the files have it, since the views are too noisy to tell "
+        "another "
+        "direction: make sure that it is right");
+  else
+    base::log_info(
+        fmt::format("the tilt axis is turned by {:.2f}° from where the files have it", axis_deg));
   return turned(start, axis_deg);
 }
 
