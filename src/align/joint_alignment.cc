@@ -47,7 +47,7 @@ class AligningFit {
         measurement_(aligning_measurement(
             problem, start, fit::make_stages(field_, joint_fit(problem.seed)).front().bin, field_,
             processes)),
-        fit_(measurement_, field_, options(may_scale), processes) {
+        fit_(measurement_, field_, fit_options(may_scale), processes) {
     found_.agreement.resize(start.size());
     // A start with rotations has errors of rotations.
     found_.freedoms.rotation = std::ranges::any_of(
@@ -65,14 +65,6 @@ class AligningFit {
     return std::move(found_);
   }
 
-  // Scales of the views hide errors of shifts that vary slowly over the tilts, so they are left out
-  // where they are not needed.
-  fit::FitOptions options(bool may_scale) const {
-    fit::FitOptions options = joint_fit(problem_.seed);
-    options.fit_view_scale = may_scale && exposures_differ(measurement_, processes_);
-    return options;
-  }
-
   // Lets the views turn from the start on.
   void free_rotations() { found_.freedoms.rotation = true; }
 
@@ -82,6 +74,14 @@ class AligningFit {
   }
 
  private:
+  // Returns the options of the fit. Scales of the views hide errors of shifts that vary slowly over
+  // the tilts, so they are left out where they are not needed.
+  fit::FitOptions fit_options(bool may_scale) const {
+    fit::FitOptions options = joint_fit(problem_.seed);
+    options.fit_view_scale = may_scale && exposures_differ(measurement_, processes_);
+    return options;
+  }
+
   // Registers every view.
   bool update(const fit::Stage& stage) {
     const base::TraceSpan span("register views");
@@ -221,14 +221,14 @@ fit::FitOptions joint_fit(std::uint64_t seed) {
 
 JointAlignment align_jointly(const JointProblem& problem, std::vector<ViewCorrection> start,
                              const distributed::Communicator& processes) {
-  AligningFit fit(problem, true, std::move(start), processes);
+  AligningFit fit(problem, /*may_scale=*/true, std::move(start), processes);
   return fit.run(fit.num_epochs());
 }
 
 std::vector<double> coarse_residuals(const JointProblem& problem,
                                      const std::vector<ViewCorrection>& start,
                                      const distributed::Communicator& processes) {
-  AligningFit fit(problem, false, start, processes);
+  AligningFit fit(problem, /*may_scale=*/false, start, processes);
   fit.free_rotations();
   fit.run(kResidualEpochs);
   return fit.residuals();
