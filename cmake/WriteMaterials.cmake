@@ -1,13 +1,13 @@
 # cmake -DPROGRAM=… -DSOURCE=… -DFILE=… -P: writes the software bill of materials of the program: the
-# Debian packages of the libraries that it loads and of packages.txt, section "The library and the
-# program", with their versions and the licences that their copyright files name.
+# Debian packages of the libraries that it loads and of packages.txt, section "program", with their
+# versions and the licences that their copyright files name.
 cmake_minimum_required(VERSION 3.25)
 set(docs /usr/share/doc)
 
 # Sets `result` to the names of the packages in the section of packages.txt.
 function(read_listed_packages result)
   file(READ ${SOURCE}/packages.txt text)
-  string(REGEX MATCH "# The library and the program\n([^\n]+\n)+" section "${text}")
+  string(REGEX MATCH "\\[program\\]\n([^\n]+\n)+" section "${text}")
   string(REGEX MATCHALL "\n[a-z0-9][a-z0-9.+-]*" names "${section}")
   list(TRANSFORM names STRIP)
   set(${result} ${names} PARENT_SCOPE)
