@@ -51,7 +51,12 @@ if(TOMOFIELD_WITH_FFTW)
   set(TOMOFIELD_fourier_LIBRARIES PkgConfig::FFTW)
 endif()
 
+set(names_warnings -Wshadow)
+if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  # Sources that are compiled together see the names of each other's unnamed namespaces.
+  set(names_warnings -Wshadow=local -Wno-subobject-linkage)
+endif()
 add_library(tomofield_warnings INTERFACE)
 target_compile_options(tomofield_warnings INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+  -Wall -Wextra -Wpedantic ${names_warnings} -Wconversion -Wno-sign-conversion
   $<$<BOOL:${TOMOFIELD_WERROR}>:-Werror> -fno-math-errno -ffp-contract=fast)

@@ -50,6 +50,18 @@ list(TRANSFORM unused_sources PREPEND ${PROJECT_SOURCE_DIR}/src/)
 set_source_files_properties(${PROJECT_SOURCE_DIR}/src/io/star_parser.cc PROPERTIES
   COMPILE_OPTIONS -std=c++17 SKIP_PRECOMPILE_HEADERS ON)
 
+# The presets compile eight sources of a layer at a time (CMAKE_UNITY_BUILD), which halves the time of
+# a clean build. The sources of kernels include themselves once for each instruction set, and these
+# have a name in their unnamed namespace that another source of their layer has as well.
+set(sources_alone
+  align/axis_search.cc align/bead_alignment.cc batch/task.cc evaluate/field_artefacts.cc
+  evaluate/similarity.cc field/vm/vm_field.cc io/ctffind_table.cc io/hdf5_reader.cc io/star_parser.cc
+  objective/ray_data_term.cc projects/imod_project.cc report/slice.cc
+  tilt_series/fixed_pattern/pixel_pattern.cc tilt_series/masks/straight_fill.cc)
+list(TRANSFORM sources_alone PREPEND ${PROJECT_SOURCE_DIR}/src/)
+set_source_files_properties(${sources_alone} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+set(layers_alone kernels)
+
 # Sets `result` to the sources of a layer that this build has, without its unit tests.
 function(tomofield_layer_sources layer result)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/${layer}/*.cc)
@@ -74,6 +86,9 @@ endfunction()
 function(tomofield_add_layer layer)
   tomofield_layer_sources(${layer} sources)
   add_library(tomofield_${layer} OBJECT ${sources})
+  if(layer IN_LIST layers_alone)
+    set_target_properties(tomofield_${layer} PROPERTIES UNITY_BUILD OFF)
+  endif()
   tomofield_compile_as_layer(tomofield_${layer} ${layer})
   list(GET tomofield_layers 0 first_layer)
   if(layer STREQUAL first_layer)

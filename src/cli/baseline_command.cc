@@ -32,7 +32,7 @@ using option_table::Group;
 using Origins = std::vector<option_table::Setting>;
 
 template <typename Method>
-struct Arguments {
+struct BaselineArguments {
   option_table::Choices choices;
   Method method;
   microscope::CtfCorrection ctf_correction = microscope::CtfCorrection::kFlip;
@@ -83,7 +83,7 @@ void run_method(const baseline::BaselineOptions& options, const baseline::Method
 }
 
 template <typename Method>
-void run(Arguments<Method>& arguments, const Origins& origins) {
+void run(BaselineArguments<Method>& arguments, const Origins& origins) {
   const Options& shared = arguments.choices.options;
   Method& method = arguments.method;
   if constexpr (requires { method.non_negative; })
@@ -103,7 +103,7 @@ void run(Arguments<Method>& arguments, const Origins& origins) {
 
 // Registers the options of every method.
 template <typename Method>
-void add_fit_options(CLI::App& command, Arguments<Method>& arguments) {
+void add_fit_options(CLI::App& command, BaselineArguments<Method>& arguments) {
   add_shared_fit_options(command, arguments.choices);
   if constexpr (baseline::Tunable<Method>) {
     command
@@ -116,7 +116,7 @@ void add_fit_options(CLI::App& command, Arguments<Method>& arguments) {
 
 // Registers the options of methods that iterate.
 template <typename Method>
-void add_iteration_options(CLI::App& command, Arguments<Method>& arguments) {
+void add_iteration_options(CLI::App& command, BaselineArguments<Method>& arguments) {
   command.add_option("--iterations", arguments.method.iterations, "Passes over all views")
       ->check(number_above(0))
       ->capture_default_str()
@@ -125,7 +125,7 @@ void add_iteration_options(CLI::App& command, Arguments<Method>& arguments) {
 }
 
 template <typename Method>
-void add_run_options(CLI::App& command, Arguments<Method>& arguments) {
+void add_run_options(CLI::App& command, BaselineArguments<Method>& arguments) {
   for (const char* key : {"running.output", "running.overwrite"})
     add_row(command, key, arguments.choices);
   command
@@ -135,8 +135,8 @@ void add_run_options(CLI::App& command, Arguments<Method>& arguments) {
 }
 
 template <typename Method>
-std::shared_ptr<Arguments<Method>> add_method(CLI::App& command, const Origins& origins) {
-  auto arguments = std::make_shared<Arguments<Method>>();
+std::shared_ptr<BaselineArguments<Method>> add_method(CLI::App& command, const Origins& origins) {
+  auto arguments = std::make_shared<BaselineArguments<Method>>();
   add_input_options(command, arguments->choices);
   add_groups(command, arguments->choices, {Group::kTransfer, Group::kSpecimen});
   add_enum_option<microscope::CtfCorrection>(

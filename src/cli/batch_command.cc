@@ -42,7 +42,7 @@ constexpr double kGibibyte = 1 << 30;
 constexpr int kMostSeries = 100'000;
 constexpr int kUsualThreadsOfATask = 8;
 
-struct Arguments {
+struct BatchArguments {
   option_table::Choices choices;  // checked here, used by the runs
   std::string list, folder;
   bool skips_existing = false, overwrites = false, dry_run = false, slurm = false;
@@ -73,7 +73,7 @@ std::vector<batch::Series> read_series(const CLI::App& program, const std::strin
 }
 
 // Returns the threads that all jobs share, or those of a task of a job array.
-int threads_of(const CLI::App& command, const Arguments& arguments) {
+int threads_of(const CLI::App& command, const BatchArguments& arguments) {
   if (command.count("--threads") > 0) return base::thread_count();
   if (arguments.slurm) return kUsualThreadsOfATask;
   return batch::slurm_grant().threads.value_or(base::thread_count());
@@ -149,7 +149,7 @@ void run_here(const fs::path& folder, const batch::JobList& list, const batch::R
                        fmt::join(failed, ", "), batch::summary_page(folder).string()));
 }
 
-void run_by_slurm(const Arguments& arguments, const batch::JobList& list, int threads) {
+void run_by_slurm(const BatchArguments& arguments, const batch::JobList& list, int threads) {
   const fs::path folder = arguments.folder;
   if (batch::largest_first(list.jobs).empty()) return print_summary(folder);
   const batch::SlurmOptions options{.program = base::program_path(),
@@ -162,7 +162,7 @@ void run_by_slurm(const Arguments& arguments, const batch::JobList& list, int th
   print_summary(folder);
 }
 
-void run_task(const CLI::App& command, const Arguments& arguments) {
+void run_task(const CLI::App& command, const BatchArguments& arguments) {
   stop_on_signals(/*is_job=*/true);  // Slurm sends SIGUSR1 before the time limit
   const batch::JobList list = batch::read_jobs(arguments.list);
   const auto time_is_up = [] { return stop_was_requested() && stop_status() == 128 + SIGUSR1; };
@@ -176,7 +176,7 @@ void run_task(const CLI::App& command, const Arguments& arguments) {
     throw ExitStatus(stop_status(), "stopped");
 }
 
-void run(const CLI::App& command, const Arguments& arguments,
+void run(const CLI::App& command, const BatchArguments& arguments,
          const std::vector<std::string>& own_options) {
   if (arguments.task) return run_task(command, arguments);
   stop_on_signals();
@@ -205,7 +205,7 @@ void run(const CLI::App& command, const Arguments& arguments,
   run_here(options.folder, list, room);
 }
 
-void add_slurm_options(CLI::App& command, Arguments& arguments) {
+void add_slurm_options(CLI::App& command, BatchArguments& arguments) {
   const char* group = "Slurm";
   CLI::Option* slurm =
       command
@@ -229,7 +229,7 @@ void add_slurm_options(CLI::App& command, Arguments& arguments) {
       ->group(kHelpAllGroup);
 }
 
-std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments) {
+std::vector<std::string> add_own_options(CLI::App& command, BatchArguments& arguments) {
   const char* group = "Batch";
   command
       .add_option(
@@ -266,7 +266,7 @@ std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments
 void add_batch_command(CLI::App& program) {
   CLI::App& command = *program.add_subcommand(
       "batch", "Reconstruct many series, with a summary of all; failures do not stop the others");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<BatchArguments>();
   const auto own_options = add_own_options(command, *arguments);
   add_series_options(command, arguments->choices);
   add_groups(command, arguments->choices,

@@ -29,7 +29,7 @@ namespace {
 
 constexpr double kMaxViews = 1e9;
 
-struct Arguments {
+struct CompareArguments {
   option_table::Choices choices;  // checked here, used by the methods
   std::vector<std::string> names{"grid", "tv", "sirt", "wbp"};
   std::vector<std::string> others;
@@ -78,7 +78,7 @@ void expand_methods(const CLI::App& program, std::vector<compare::Method>& metho
   }
 }
 
-ExitStatus stopped(compare::Outcome outcome, const Arguments& arguments) {
+ExitStatus stopped(compare::Outcome outcome, const CompareArguments& arguments) {
   if (outcome == compare::Outcome::kStoppedBeforeRuns)
     return {stop_status(), "stopped before the first run; nothing has been made or removed"};
   return {stop_status(),
@@ -86,7 +86,7 @@ ExitStatus stopped(compare::Outcome outcome, const Arguments& arguments) {
                       arguments.folder, arguments.overwrite ? " without --overwrite" : "")};
 }
 
-void run(const CLI::App& command, const Arguments& arguments,
+void run(const CLI::App& command, const CompareArguments& arguments,
          const std::vector<std::string>& own_options) {
   compare::CompareOptions options;
   options.program = base::program_path();
@@ -120,7 +120,7 @@ void run(const CLI::App& command, const Arguments& arguments,
         (options.folder / "comparison.csv").string());
 }
 
-std::vector<std::string> add_own_options(CLI::App& command, Arguments& arguments) {
+std::vector<std::string> add_own_options(CLI::App& command, CompareArguments& arguments) {
   const char* group = "Comparison";
   command
       .add_option("--methods", arguments.names,
@@ -175,7 +175,7 @@ void add_compare_command(CLI::App& program) {
   CLI::App& command = *program.add_subcommand(
       "compare",
       "Run several methods on one series, and write their volumes, a table and report.html");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<CompareArguments>();
   add_input_options(command, arguments->choices);
   add_groups(command, arguments->choices,
              {option_table::Group::kTransfer, option_table::Group::kSpecimen});

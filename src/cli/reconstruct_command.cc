@@ -18,13 +18,13 @@ namespace {
 
 using option_table::Group;
 
-struct Arguments {
+struct ReconstructArguments {
   option_table::Choices choices;
   bool dry_run = false;
   std::optional<std::filesystem::path> trace, plan;
 };
 
-void run(const Arguments& arguments, const distributed::Communicator& processes,
+void run(const ReconstructArguments& arguments, const distributed::Communicator& processes,
          const std::vector<option_table::Setting>& origins) {
   reconstruction::ReconstructOptions options =
       reconstruction::run_options(arguments.choices.files, arguments.choices.options);
@@ -55,7 +55,7 @@ void add_reconstruct_command(CLI::App& program, const distributed::Communicator&
                              const std::vector<option_table::Setting>& origins) {
   CLI::App& command = *program.add_subcommand(
       "reconstruct", "Reconstruct a tomogram and a model from a tilt series");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ReconstructArguments>();
   add_input_options(command, arguments->choices);
   add_groups(command, arguments->choices,
              {Group::kTransfer, Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume,

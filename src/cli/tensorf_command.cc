@@ -17,14 +17,14 @@
 namespace tomofield::cli {
 namespace {
 
-struct Arguments {
+struct TensorfArguments {
   option_table::Choices choices{{}, baseline::tensorf_defaults()};
   std::optional<bool> non_negative;
   bool dry_run = false;
   std::optional<std::filesystem::path> trace;
 };
 
-void add_method_options(CLI::App& command, Arguments& arguments) {
+void add_method_options(CLI::App& command, TensorfArguments& arguments) {
   const char* group = "Method";
   for (const char* key : {"field.rank", "fit.epochs", "fit.coarse_epochs", "fit.density_variation",
                           "fit.fourier", "fit.learning_rate", "fit.seed"})
@@ -32,7 +32,7 @@ void add_method_options(CLI::App& command, Arguments& arguments) {
   add_non_negative(command, arguments.non_negative);
 }
 
-void run(Arguments& arguments, const std::vector<option_table::Setting>& origins) {
+void run(TensorfArguments& arguments, const std::vector<option_table::Setting>& origins) {
   Options& requested = arguments.choices.options;
   if (arguments.non_negative)
     requested.activation = *arguments.non_negative ? Activation::kSoftplus : Activation::kIdentity;
@@ -60,7 +60,7 @@ void run(Arguments& arguments, const std::vector<option_table::Setting>& origins
 void add_tensorf(CLI::App& baseline, const std::vector<option_table::Setting>& origins) {
   CLI::App& command = *baseline.add_subcommand(
       "tensorf", "One factorised tensor for the whole region, coarse to fine, as in TensoRF");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<TensorfArguments>();
   add_input_options(command, arguments->choices);
   add_groups(command, arguments->choices,
              {option_table::Group::kTransfer, option_table::Group::kSpecimen});

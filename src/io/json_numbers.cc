@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kDeepest = 32;
+constexpr int kMostLevels = 32;
 
 const json& entry(const json& object, const char* key) {
   const auto found = object.is_object() ? object.find(key) : object.end();
@@ -37,7 +37,8 @@ double number_in(const json& value, const char* key, double low, double high) {
 
 json parse_json(std::string_view text) {
   const auto refuse_depth = [](int depth, json::parse_event_t, json&) {
-    if (depth > kDeepest) throw Error(fmt::format("it is nested deeper than {} levels", kDeepest));
+    if (depth > kMostLevels)
+      throw Error(fmt::format("it is nested deeper than {} levels", kMostLevels));
     return true;
   };
   try {

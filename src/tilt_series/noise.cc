@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "base/statistics.h"
 #include "tilt_series/binning.h"
 
 namespace tomofield::tilt_series {
@@ -14,12 +15,6 @@ constexpr std::size_t kMinDifferences = 64;
 // Rows of larger images are left out: the median of so many sizes is right within a part in a
 // thousand.
 constexpr std::int64_t kEnoughDifferences = 1 << 20;
-
-double median_in_place(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Returns the estimate from mixed second differences at the image's own scale; 0 if there are too
 /// few.
@@ -39,10 +34,7 @@ double sigma_of_differences(const MaskedImage& image) {
     }
   }
   if (differences.size() < kMinDifferences) return 0.0;
-  const auto median = static_cast<float>(median_in_place(differences));
-  for (float& value : differences) value = std::fabs(value - median);
-  constexpr double kSigmaOfMad = 1.4826;  // for a normal distribution
-  return kSigmaOfMad * median_in_place(differences) / 2.0;
+  return base::robust_deviation_in_place(differences) / 2.0;
 }
 
 double standard_deviation(const MaskedImage& image) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 
+#include "base/statistics.h"
 #include "tilt_series/box_sums.h"
 #include "tilt_series/masks/bad_pixels.h"
 
@@ -38,13 +39,6 @@ double deviation(const MaskedImage& differences) {
   return count > 0.0 ? std::sqrt(squares / count) : 0.0;
 }
 
-float median_of(std::vector<float>* values) {
-  if (values->empty()) return 0.0f;
-  const auto middle = values->begin() + std::ssize(*values) / 2;
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
-
 /// Subtracts from `count` valid pixels, `stride` apart, their median.
 void subtract_median(MaskedImage* image, std::size_t first, std::size_t stride,
                      std::int64_t count) {
@@ -52,7 +46,7 @@ void subtract_median(MaskedImage* image, std::size_t first, std::size_t stride,
   const auto at = [&](std::int64_t i) { return first + static_cast<std::size_t>(i) * stride; };
   for (std::int64_t i = 0; i < count; ++i)
     if (image->valid[at(i)]) values.push_back(image->values[at(i)]);
-  const float median = median_of(&values);
+  const float median = base::median_in_place(values);
   for (std::int64_t i = 0; i < count; ++i)
     if (image->valid[at(i)]) image->values[at(i)] -= median;
 }

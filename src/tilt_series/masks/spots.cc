@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "base/parallel.h"
+#include "base/statistics.h"
 #include "tilt_series/binning.h"
 #include "tilt_series/masks/spot_place.h"
 
@@ -132,12 +133,6 @@ std::vector<float> contrasts(const MaskedImage& image, double diameter) {
   return contrast;
 }
 
-double median_in_place(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return static_cast<double>(*middle);
-}
-
 /// Returns the spread of the known contrasts; 0 where nothing varies.
 double spread_of(const std::vector<float>& contrast) {
   std::vector<float> known;
@@ -151,10 +146,7 @@ double spread_of(const std::vector<float>& contrast) {
   if (known.empty()) return 0.0;
   const double count = static_cast<double>(known.size());
   const double deviation = std::sqrt(std::max(squares / count - sum * sum / count / count, 0.0));
-  const auto median = static_cast<float>(median_in_place(known));
-  for (float& value : known) value = std::fabs(value - median);
-  constexpr double kSigmaOfMad = 1.4826;  // for a normal distribution
-  return std::max(kSigmaOfMad * median_in_place(known), kMinSpread * deviation);
+  return std::max(base::robust_deviation_in_place(known), kMinSpread * deviation);
 }
 
 /// Tells whether no pixel within `radius` is higher; the first of equal pixels counts.

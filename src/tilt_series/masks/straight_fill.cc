@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/statistics.h"
+
 namespace tomofield::tilt_series {
 namespace {
 
@@ -174,13 +176,6 @@ FoundSide find_side(const Samples& samples, const std::vector<int>& votes, doubl
   return side;
 }
 
-double median_or_zero(std::vector<float>* values) {
-  if (values->empty()) return 0.0;
-  const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
-
 /// Returns how much neighbouring, separate boxes differ in the fill, relative to
 /// elsewhere.
 double roughness_of_fill(const Samples& samples, const std::vector<FoundSide>& sides) {
@@ -204,8 +199,8 @@ double roughness_of_fill(const Samples& samples, const std::vector<FoundSide>& s
           .push_back(std::abs(samples.means[left] - samples.means[right]));
     }
   }
-  const double rest = median_or_zero(&elsewhere);
-  return rest > 0.0 ? median_or_zero(&in_fill) / rest : 1.0;
+  const double rest = base::median_in_place(elsewhere);
+  return rest > 0.0 ? base::median_in_place(in_fill) / rest : 1.0;
 }
 
 /// Returns the sides of the rectangle that are clear, or none if together they are too short.
