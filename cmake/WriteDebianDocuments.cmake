@@ -16,6 +16,16 @@ endforeach()
 file(WRITE ${docs}/copyright "${copyright}")
 file(REMOVE ${docs}/LICENSE)
 
-configure_file(${CMAKE_CURRENT_LIST_DIR}/../CHANGELOG.md ${docs}/changelog COPYONLY)
+# The changelog of a Debian package has a form of its own, which names versions of the package.
+string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
+file(WRITE ${docs}/changelog
+"tomofield (${CPACK_PACKAGE_VERSION}) stable; urgency=medium
+
+  * Version ${CPACK_PACKAGE_VERSION}. CHANGELOG.md.gz says what has changed.
+
+ -- ${CPACK_PACKAGE_CONTACT}  ${date}
+")
+configure_file(${CMAKE_CURRENT_LIST_DIR}/../CHANGELOG.md ${docs} COPYONLY)
 file(GLOB pages ${share}/man/man1/*.1)
-execute_process(COMMAND gzip -9n ${docs}/changelog ${pages} COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND gzip -9n ${docs}/changelog ${docs}/CHANGELOG.md ${pages}
+                COMMAND_ERROR_IS_FATAL ANY)

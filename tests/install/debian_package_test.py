@@ -54,6 +54,7 @@ def test_the_package_has_the_program_and_its_documents_alone(program, unpacked):
     assert files == {
         "usr/bin/tomofield",
         "usr/share/tomofield/materials.txt",
+        "usr/share/doc/tomofield/CHANGELOG.md.gz",
         "usr/share/doc/tomofield/changelog.gz",
         "usr/share/doc/tomofield/copyright",
         *(f"usr/share/man/man1/{page}" for page in command_pages(program)),
@@ -93,5 +94,12 @@ def test_the_copyright_file_has_the_licence_and_those_of_compiled_headers(unpack
     for package in ("nlohmann-json3-dev", "libeigen3-dev", "gemmi-dev"):
         licence = pathlib.Path(f"/usr/share/doc/{package}/copyright").read_text(encoding="utf-8")
         assert licence in copyright_text, package
+
+
+def test_the_changelogs_name_the_version_and_what_has_changed(package, unpacked):
+    docs = unpacked / "usr/share/doc/tomofield"
+    version = output_of("dpkg-deb", "--field", str(package), "Version").strip()
     with gzip.open(docs / "changelog.gz", "rt", encoding="utf-8") as changelog:
-        assert changelog.read() == (PROJECT / "CHANGELOG.md").read_text(encoding="utf-8")
+        assert changelog.readline().startswith(f"tomofield ({version}) ")
+    with gzip.open(docs / "CHANGELOG.md.gz", "rt", encoding="utf-8") as changes:
+        assert changes.read() == (PROJECT / "CHANGELOG.md").read_text(encoding="utf-8")
