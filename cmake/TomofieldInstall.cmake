@@ -1,14 +1,17 @@
-# cmake --install: the program, its bill of materials, its man pages, the library, its headers and a CMake package.
+# cmake --install has three components. "program": the program, its bill of materials, its man pages
+# and its licence. "development": the library, its headers and a CMake package. "python": the module.
 include(CMakePackageConfigHelpers)
 set(tomofield_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/tomofield)
 
-install(TARGETS tomofield RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(FILES ${tomofield_materials} DESTINATION ${CMAKE_INSTALL_DATADIR}/tomofield)
+install(TARGETS tomofield RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
+install(FILES ${tomofield_materials} DESTINATION ${CMAKE_INSTALL_DATADIR}/tomofield COMPONENT program)
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
 install(TARGETS tomofield_library EXPORT TomofieldTargets
-  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
 install(DIRECTORY include/tomofield ${PROJECT_BINARY_DIR}/include/tomofield
-  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
-install(EXPORT TomofieldTargets NAMESPACE tomofield:: DESTINATION ${tomofield_package_dir})
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development FILES_MATCHING PATTERN "*.h")
+install(EXPORT TomofieldTargets NAMESPACE tomofield:: DESTINATION ${tomofield_package_dir}
+  COMPONENT development)
 
 # The program itself says what its man pages have to say, so a cross-compiled one has none.
 if(NOT CMAKE_CROSSCOMPILING)
@@ -18,7 +21,7 @@ if(NOT CMAKE_CROSSCOMPILING)
             -DVERSION=${PROJECT_VERSION} -P ${PROJECT_SOURCE_DIR}/cmake/WriteManPages.cmake
     DEPENDS tomofield ${PROJECT_SOURCE_DIR}/cmake/WriteManPages.cmake VERBATIM)
   add_custom_target(tomofield_man_pages ALL DEPENDS ${man_dir}/tomofield.1)
-  install(DIRECTORY ${man_dir}/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+  install(DIRECTORY ${man_dir}/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program)
 endif()
 
 configure_package_config_file(cmake/TomofieldConfig.cmake.in
@@ -29,4 +32,4 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/cmake/tomofieldConfigVers
 install(FILES
   ${PROJECT_BINARY_DIR}/cmake/tomofieldConfig.cmake
   ${PROJECT_BINARY_DIR}/cmake/tomofieldConfigVersion.cmake
-  DESTINATION ${tomofield_package_dir})
+  DESTINATION ${tomofield_package_dir} COMPONENT development)

@@ -1,6 +1,7 @@
-# cmake -DPROGRAM=… -DSOURCE=… -DFILE=… -P: writes the software bill of materials of the program: the
-# Debian packages of the libraries that it loads and of packages.txt, section "program", with their
-# versions and the licences that their copyright files name.
+# cmake -DPROGRAM=… -DSOURCE=… -DFILE=… -DUNUSED=… -P: writes the software bill of materials of the
+# program: the Debian packages of the libraries that it loads and of packages.txt, section "program",
+# but for those of the list UNUSED, with their versions and the licences that their copyright files
+# name.
 cmake_minimum_required(VERSION 3.25)
 set(docs /usr/share/doc)
 
@@ -53,6 +54,7 @@ if(dpkg_query)
   set(packages ${listed} ${loaded})
   list(SORT packages)
   list(REMOVE_DUPLICATES packages)
+  list(REMOVE_ITEM packages ${UNUSED})
   set(text "Debian packages that this program was built from or loads: name, version, licences.\n")
   foreach(package IN LISTS packages)
     execute_process(COMMAND dpkg-query -W -f "\${Version}\\n" ${package}

@@ -23,7 +23,7 @@ make_bare_root() {
       return 0
     fi
     echo "bare root: attempt $try of 3 to make a root of $release failed" >&2
-    find "$root" -mindepth 1 -delete
+    find "$root" -xdev -mindepth 1 -delete
     sleep $((try * 20))
   done
   tail -n 20 "$log" >&2

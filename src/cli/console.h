@@ -30,7 +30,7 @@ auto shown(const T& value) {
 void print_text(std::string_view text);
 template <typename... Args>
 void print(fmt::format_string<Args...> format, Args&&... args) {
-  print_text(fmt::vformat(format, fmt::make_format_args(shown(args)...)));
+  print_text(fmt::format(fmt::runtime(format), shown(args)...));
 }
 /// Returns a number with what it counts: "1 thread", "2 threads".
 std::string count_of(int number, std::string_view what);
@@ -43,7 +43,7 @@ std::string output_fault();
 void say_text(std::string_view text);
 template <typename... Args>
 void say(fmt::format_string<Args...> format, Args&&... args) {
-  say_text(fmt::vformat(format, fmt::make_format_args(shown(args)...)));
+  say_text(fmt::format(fmt::runtime(format), shown(args)...));
 }
 
 }  // namespace tomofield::cli

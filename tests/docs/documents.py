@@ -13,7 +13,7 @@ OUTPUTS = {"build", "demo-output", "test-output"}
 # Records of the past name files and options that need not exist any more.
 HISTORY = re.compile(r"docs/results/archive/|CHANGELOG\.md$")
 # These options in the text belong to other programs: mpirun, ctest, cmake and bench scripts.
-FOREIGN_OPTIONS = {"--mca", "--map-by", "--plot", "--preset", "--build", "--install"}
+FOREIGN_OPTIONS = {"--mca", "--map-by", "--plot", "--preset", "--build", "--install", "--component"}
 LAUNCHERS = r"(?:(?:mpirun|srun|time)\s(?:.*?\s)?)?"
 
 FENCE = re.compile(r"^ *```.*?^ *```", re.M | re.S)

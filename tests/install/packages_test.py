@@ -144,7 +144,8 @@ def test_the_tests_import_modules_of_their_sections_alone(files_of):
 
 
 def test_scripts_ask_for_sections_that_exist():
-    for script in ("demo", "test", ".ci/run", ".ci/bookworm", ".ci/trixie", "tools/portable"):
+    for script in ("demo", "test", ".ci/run", ".ci/bookworm", ".ci/trixie", "tools/package",
+                   "tools/portable", "tools/release"):
         asked = re.findall(r"^\s*install_packages (.*)$",
                            (PROJECT / script).read_text(encoding="utf-8"), re.MULTILINE)
         assert asked, script
