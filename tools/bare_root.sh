@@ -15,6 +15,7 @@ require_root() {
 make_bare_root() {
   local release=$1 root=$2 log try
   log=$(mktemp)
+  chmod 755 "$root"  # users of the root who are not root must find its files, too
   for try in 1 2 3; do
     if debootstrap --variant=minbase "$release" "$root" ${DEBIAN_MIRROR:+"$DEBIAN_MIRROR"} >"$log" 2>&1; then
       mkdir -p "$root/work"
