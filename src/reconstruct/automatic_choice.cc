@@ -1,7 +1,10 @@
 #include "reconstruct/automatic_choice.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "objective/options.h"
@@ -13,12 +16,12 @@ namespace {
 // the yardsticks.
 constexpr double kWeightFactor = 1.8;
 constexpr int kMostSteps = 3;  // to one side of the usual weight
-// A concave penalty of a smaller weight leaves isolated voxels, whatever the held-out views say.
+// A concave penalty of less than its usual weight is not taken: one step shows that it would be
+// best.
 constexpr int kMostStepsDownIfConcave = 1;
-// Another concave weight than the usual one, and a fit without a limit of isolated vertices, must
-// predict better by this part. Trials are too short to tell smaller differences: those of the
-// yardsticks prefer a larger weight by up to 0.5 %.
-constexpr double kLeastGain = 0.01;
+// What replaces the usual must predict better by this part and by this number of standard errors.
+// Trials are too short to tell smaller differences: a specimen took another penalty at each bin.
+constexpr double kLeastGain = 0.01, kSureErrors = 3;
 
 // The part of speckle that hardly anybody sees, and the face jump from which leaves show.
 constexpr double kLittleSpeckle = 2e-4, kMostFaceJump = 1.1;
@@ -29,7 +32,7 @@ TrialSettings with_penalty(TrialSettings settings, Penalty penalty) {
   return settings;
 }
 
-TrialSettings with_factor(TrialSettings settings, int step) {
+TrialSettings with_factor(TrialSettings settings, double step) {
   settings.variation *= std::pow(kWeightFactor, step);
   return settings;
 }
@@ -42,39 +45,74 @@ bool is_cleaner(const selection::HeldOutScore& a, const selection::HeldOutScore&
          *a.face_jump <= kMostFaceJump;
 }
 
-// Returns the steps of the weight from the best one on, in order of preference.
-std::vector<int> preferred_steps(Penalty penalty, int lowest, int highest) {
-  std::vector<int> steps;
-  for (int step = highest; step >= lowest; --step) steps.push_back(step);
-  if (penalty == Penalty::kConcave)
-    std::ranges::stable_sort(steps, {}, [](int step) { return std::abs(step); });
-  return steps;
+// Says whether `a` predicts so much better than `b` that it may replace what is usual.
+bool is_surely_better(const selection::HeldOutScore& a, const selection::HeldOutScore& b) {
+  const selection::Difference loss = selection::difference(b, a);
+  return loss.is_beyond(kSureErrors) && loss.log_ratio > kLeastGain;
 }
 
-// Chooses the weight of the penalty of `usual`, which has the usual weight.
-TrialSettings choose_weight(const TrialSettings& usual, FitTrials& trials) {
-  trials.make({usual, with_factor(usual, 1), with_factor(usual, -1)});
-  const auto is_better = [&](int a, int b) {
-    return selection::difference(trials.trial(with_factor(usual, a)).score,
-                                 trials.trial(with_factor(usual, b)).score)
-               .log_ratio < 0;
-  };
-  int highest = 1, lowest = -1;
-  while (highest < kMostSteps && is_better(highest, highest - 1)) ++highest;
-  const int most_down = usual.penalty == Penalty::kConcave ? kMostStepsDownIfConcave : kMostSteps;
-  while (-lowest < most_down && is_better(lowest, lowest + 1)) --lowest;
-  std::vector<TrialSettings> candidates;
-  for (const int step : preferred_steps(usual.penalty, lowest, highest))
-    candidates.push_back(with_factor(usual, step));
-  const std::vector<TrialSettings> good = trials.as_good(candidates, kClearErrors);
-  TrialSettings chosen = good.front();
-  if (usual.penalty == Penalty::kConcave &&
-      selection::difference(trials.trial(usual).score, trials.trial(chosen).score).log_ratio <
-          kLeastGain)
-    chosen = usual;
-  for (const TrialSettings& other : good)
-    if (is_cleaner(trials.trial(other).score, trials.trial(chosen).score)) chosen = other;
+// Trials of weights that are some steps of kWeightFactor from the usual one.
+class Ladder {
+ public:
+  // `usual` has the usual weight. Goes up and down from there, until the best weight has a worse
+  // one on either side, but at most `most_down` steps down.
+  Ladder(const TrialSettings& usual, int most_down, FitTrials& trials)
+      : usual_(usual), trials_(trials) {
+    trials.make({usual, with_factor(usual, 1), with_factor(usual, -1)});
+    while (highest_ < kMostSteps && error(highest_) < error(highest_ - 1)) ++highest_;
+    while (-lowest_ < most_down && error(lowest_) < error(lowest_ + 1)) --lowest_;
+  }
+
+  TrialSettings at(double step) const { return with_factor(usual_, step); }
+  selection::HeldOutScore score(int step) const { return trials_.trial(at(step)).score; }
+  int highest() const { return highest_; }
+
+  int best() const {
+    int best = lowest_;
+    for (int step = lowest_; step <= highest_; ++step)
+      if (error(step) < error(best)) best = step;
+    return best;
+  }
+
+  // Returns the step, between those that were tried, at which the parabola through the best one and
+  // its neighbours is lowest.
+  double lowest_of_parabola() const {
+    const int step = best();
+    if (step == lowest_ || step == highest_) return step;
+    const double below = error(step - 1), here = error(step), above = error(step + 1);
+    return step + (below - above) / (2 * (below - 2 * here + above));
+  }
+
+ private:
+  double error(int step) const { return selection::difference(score(step), score(0)).log_ratio; }
+
+  TrialSettings usual_;
+  FitTrials& trials_;
+  int highest_ = 1, lowest_ = -1;
+};
+
+TrialSettings choose_smooth_weight(const Ladder& ladder) {
+  const int best = ladder.best();
+  if (best < ladder.highest()) {
+    const selection::HeldOutScore heavier = ladder.score(best + 1), here = ladder.score(best);
+    if (!selection::difference(heavier, here).is_beyond(kClearErrors) && is_cleaner(heavier, here))
+      return ladder.at(best + 1);
+  }
+  TrialSettings chosen = ladder.at(ladder.lowest_of_parabola());
+  chosen.variation = std::stod(fmt::format("{:.3g}", chosen.variation));  // as users can give it
   return chosen;
+}
+
+// The best step must not be below the usual weight.
+TrialSettings choose_concave_weight(const Ladder& ladder) {
+  const selection::HeldOutScore best = ladder.score(ladder.best());
+  int chosen = is_surely_better(best, ladder.score(0)) ? ladder.best() : 0;
+  for (int step = 0; step <= ladder.highest(); ++step) {
+    if (!selection::difference(ladder.score(step), best).is_beyond(kClearErrors) &&
+        is_cleaner(ladder.score(step), ladder.score(chosen)))
+      chosen = step;
+  }
+  return ladder.at(chosen);
 }
 
 // Returns the part of the background that is best to subtract: none, unless half of it is clearly
@@ -106,13 +144,23 @@ TrialSettings with_safe_corrections(TrialSettings settings, const OpenSettings& 
 }
 
 TrialSettings choose_penalty(const TrialSettings& start, FitTrials& trials) {
-  return trials.first_as_good(
-      {with_penalty(start, Penalty::kSmooth), with_penalty(start, Penalty::kConcave)},
-      kClearErrors);
+  const TrialSettings smooth = with_penalty(start, Penalty::kSmooth);
+  const TrialSettings concave = with_penalty(start, Penalty::kConcave);
+  trials.make({smooth, concave});
+  return is_surely_better(trials.trial(concave).score, trials.trial(smooth).score) ? concave
+                                                                                   : smooth;
 }
 
 TrialSettings choose_variation(const TrialSettings& start, FitTrials& trials) {
-  return choose_weight(choose_penalty(start, trials), trials);
+  const TrialSettings smooth = with_penalty(start, Penalty::kSmooth);
+  const TrialSettings concave = with_penalty(start, Penalty::kConcave);
+  trials.make({smooth, with_factor(smooth, 1), with_factor(smooth, -1), concave});
+  const Ladder smooth_weights(smooth, kMostSteps, trials);
+  if (!is_surely_better(trials.trial(concave).score, smooth_weights.score(smooth_weights.best())))
+    return choose_smooth_weight(smooth_weights);
+  const Ladder concave_weights(concave, kMostStepsDownIfConcave, trials);
+  return concave_weights.best() < 0 ? choose_smooth_weight(smooth_weights)
+                                    : choose_concave_weight(concave_weights);
 }
 
 TrialSettings choose_spike_rank(const TrialSettings& start, FitTrials& trials) {
@@ -120,9 +168,8 @@ TrialSettings choose_spike_rank(const TrialSettings& start, FitTrials& trials) {
   TrialSettings unlimited = start;
   unlimited.spike_rank = 0;
   trials.make({start, unlimited});
-  const selection::Difference loss =
-      selection::difference(trials.trial(start).score, trials.trial(unlimited).score);
-  return loss.is_beyond(kClearErrors) && loss.log_ratio > kLeastGain ? unlimited : start;
+  return is_surely_better(trials.trial(unlimited).score, trials.trial(start).score) ? unlimited
+                                                                                    : start;
 }
 
 TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings& open,

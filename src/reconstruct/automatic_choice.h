@@ -23,26 +23,28 @@ constexpr double kClearErrors = 2;
 /// do no harm where they are not needed, while a wrong penalty can be chosen without them.
 TrialSettings with_safe_corrections(TrialSettings settings, const OpenSettings& open);
 
-/// Chooses the penalty of total variation, each with its usual weight: the concave one if it is
-/// clearly better, else the smooth one. A concave penalty makes sharp edges, which are right for
-/// some specimens only; where held-out views cannot tell, it paints flat regions that are none.
+/// Chooses the penalty of total variation, each with its usual weight: the concave one if it
+/// predicts better by three standard errors and by 1 %, else the smooth one. A concave penalty
+/// makes sharp edges, which are right for some specimens only; where held-out views cannot tell, it
+/// paints flat regions that are none.
 TrialSettings choose_penalty(const TrialSettings& start, FitTrials& trials);
 
 /// Chooses penalty and weight of total variation:
 ///
-///   1. The penalty, by choose_penalty().
-///   2. The weight of that penalty, in factors of 1.8 about the usual one, until the best has a
-///      worse one on either side. Of the weights that are as good as the best it takes the largest
-///      of the smooth penalty, and of the concave one the usual unless another is better by 1 %:
-///      a smaller one leaves isolated voxels, and a larger one paints.
-///
-/// A weight that is as good, and whose volume is clearly cleaner (fewer than half of the isolated
-/// voxels, or leaves that do not show), goes before.
+///   1. Weights of the smooth penalty are tried in factors of 1.8 about the usual one, until the
+///      best has a worse one on either side. The weight is where a parabola through these three is
+///      lowest, so that chance in the scores changes it little. The next larger one goes before if
+///      it predicts as well and its volume is clearly cleaner (fewer than half of the isolated
+///      voxels, or leaves that do not show).
+///   2. The concave penalty with its usual weight replaces it as in choose_penalty(), unless a
+///      smaller weight of it would be better still: it then keeps grains of noise as if they were
+///      objects, and leaves isolated voxels. A larger weight replaces the usual one under the same
+///      condition, or if it is as good and clearly cleaner.
 TrialSettings choose_variation(const TrialSettings& start, FitTrials& trials);
 
-/// Chooses whether isolated vertices are limited in a smooth fit: not if that predicts clearly
-/// better and by 1 %, as where the peaks of atoms are as narrow as a vertex. Concave fits keep the
-/// limit, which they need on every yardstick.
+/// Chooses whether isolated vertices are limited in a smooth fit: not if that predicts better by
+/// three standard errors and by 1 %, as where the peaks of atoms are as narrow as a vertex. Concave
+/// fits keep the limit, which they need on every yardstick.
 TrialSettings choose_spike_rank(const TrialSettings& start, FitTrials& trials);
 
 /// Chooses the corrections of the views that are open, each by trials that differ in it alone.

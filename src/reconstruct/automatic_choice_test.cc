@@ -47,25 +47,34 @@ Error weights_error(double best_smooth, double best_concave, double of_concave) 
   };
 }
 
-TEST(ChoosePenalty, PrefersTheSmoothOneWhereViewsCannotTell) {
-  FitTrials unsure = trials_with(weights_error(5, 14, -0.01), 0.1);
-  EXPECT_EQ(choose_penalty(kStart, unsure).penalty, Penalty::kSmooth);
-  FitTrials sure = trials_with(weights_error(5, 14, -0.01));
-  EXPECT_EQ(choose_penalty(kStart, sure).penalty, Penalty::kConcave);
+TEST(ChoosePenalty, PrefersTheSmoothOneUnlessTheOtherIsSurelyBetter) {
+  const auto chosen = [](double of_concave, double scatter) {
+    FitTrials trials = trials_with(weights_error(5, 14, of_concave), scatter);
+    return choose_penalty(kStart, trials).penalty;
+  };
+  EXPECT_EQ(chosen(-0.02, 1e-3), Penalty::kConcave);
+  EXPECT_EQ(chosen(-0.02, 0.1), Penalty::kSmooth);    // within the errors
+  EXPECT_EQ(chosen(-0.005, 1e-5), Penalty::kSmooth);  // sure, and too small to matter
 }
 
-TEST(ChooseVariation, FindsTheWeightOfTheSmoothPenalty) {
-  for (const double best : {1.6, 2.8, 5.0, 9.0, 16.0}) {
+TEST(ChooseVariation, FindsTheWeightOfTheSmoothPenaltyBetweenThoseThatAreTried) {
+  for (const double best : {1.6, 2.2, 3.7, 5.0, 9.0, 16.0}) {
     FitTrials trials = trials_with(weights_error(best, 14, 0.5));
     const TrialSettings found = choose_variation(kStart, trials);
     EXPECT_EQ(found.penalty, Penalty::kSmooth);
-    EXPECT_LT(std::abs(std::log(found.variation / best)), std::log(1.8) / 2) << found.variation;
+    EXPECT_LT(std::abs(std::log(found.variation / best)), 0.1) << found.variation;
     EXPECT_LE(trials.made().size(), 6u);
   }
 }
 
-TEST(ChooseVariation, TakesTheLargestSmoothWeightOfThoseThatViewsCannotTellApart) {
-  FitTrials trials = trials_with(weights_error(5, 14, 0.5), 0.05);
+TEST(ChooseVariation, ChanceInTheScoresHardlyChangesTheSmoothWeight) {
+  FitTrials trials = trials_with(weights_error(5, 14, 0.5), 0.02);
+  EXPECT_LT(std::abs(std::log(choose_variation(kStart, trials).variation / 5)), std::log(1.3));
+}
+
+TEST(ChooseVariation, TakesALargerSmoothWeightThatIsAsGoodAndClearlyCleaner) {
+  const auto speckle = [](const TrialSettings& s) { return s.variation > 6 ? 0.001 : 0.01; };
+  FitTrials trials = trials_with(weights_error(6.5, 14, 0.5), 0.05, speckle);
   EXPECT_NEAR(choose_variation(kStart, trials).variation, 9, 1e-9);
 }
 
@@ -76,9 +85,9 @@ TEST(ChooseVariation, KeepsTheUsualConcaveWeightUnlessAnotherIsClearlyBetter) {
   EXPECT_NEAR(choose_variation(kStart, sure).variation, 14 * 1.8, 1e-9);
 }
 
-TEST(ChooseVariation, DoesNotGoFarBelowTheUsualConcaveWeight) {
-  FitTrials trials = trials_with(weights_error(5, 1, -0.9));
-  EXPECT_NEAR(choose_variation(kStart, trials).variation, 14 / 1.8, 1e-9);
+TEST(ChooseVariation, TakesNoConcavePenaltyThatIsBestBelowItsUsualWeight) {
+  FitTrials trials = trials_with(weights_error(5, 6, -0.5));
+  EXPECT_EQ(choose_variation(kStart, trials).penalty, Penalty::kSmooth);
 }
 
 TEST(ChooseVariation, PrefersAWeightThatIsAsGoodAndClearlyCleaner) {

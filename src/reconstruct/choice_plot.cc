@@ -62,7 +62,7 @@ report::CurvePlot choice_plot(const TunedFit& tuned) {
   report::PlotAxes axes{
       .x_title =
           "weight of total variation, chosen is " + describe(tuned.settings, TrialSettings{}),
-      .y_title = "per cent above the chosen, view by view; bars of two standard errors",
+      .y_title = "per cent above the chosen, patch by patch; bars of two standard errors",
       .y_range = {-2, kMostPercent}};
   std::vector<double> at;
   for (const report::Curve& curve : curves)

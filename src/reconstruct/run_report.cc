@@ -284,9 +284,9 @@ void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
   add_plot(
       "Settings that trials chose",
       "Short fits without some views were tried before the fit. Lower is better, and the chosen "
-      "settings are at 0; bars are two standard errors long. Errors are compared view by view (the "
-      "median over pairs of views). Of settings that are as good as the best, the smoothest is "
-      "taken, and other rules can prefer settings that predict a little worse (docs/fitting.md).",
+      "settings are at 0; bars are two standard errors long. Errors are compared patch by patch of "
+      "these views (the median over pairs of patches). The weight lies between those that were "
+      "tried, and a concave penalty is taken only if it is surely better (docs/fitting.md).",
       trials_plot(fits.front().metrics), page);
   add_alignment(fits.front().metrics, page);
   add_plot("Loss",

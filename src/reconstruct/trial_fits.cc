@@ -12,6 +12,7 @@
 #include "base/trace.h"
 #include "evaluate/field_artefacts.h"
 #include "measurement/background.h"
+#include "measurement/patch_errors.h"
 #include "measurement/undecided_beads.h"
 
 namespace tomofield::reconstruction {
@@ -71,12 +72,17 @@ class TrialFits::Running {
  private:
   selection::HeldOutScore score() const {
     measurement::ViewErrors error = fit_->held_out_error(scores_with_view_scale_);
+    std::vector<double> noise_weight;
+    for (const measurement::ViewModel& model : error.models) noise_weight.push_back(model.weight);
+    std::vector<double> patch_error =
+        measurement::patch_errors(fit_->predict(error.views, error.models), noise_weight);
     const Rectangle& roi = measurement_->roi;
     const evaluate::FieldArtefacts artefacts =
         evaluate::find_artefacts(fit_->field(), roi, {0, static_cast<int>(roi.height())});
     std::optional<double> face_jump;
     if (artefacts.faces) face_jump = artefacts.faces->both;
-    return {error.total, std::move(error.view_error), artefacts.speckle, face_jump};
+    return {error.total, std::move(error.view_error), std::move(patch_error), artefacts.speckle,
+            face_jump};
   }
 
   std::size_t index_;

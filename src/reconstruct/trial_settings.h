@@ -34,8 +34,8 @@ FitTrials make_trials(FitTrials::RunTrials run);
 /// fewer epochs than the fit, so epochs count only if a trial has those that were chosen.
 const FitTrial* chosen_trial(const TunedFit& tuned);
 
-/// Compares a trial with the chosen one, view by view. If the chosen settings are a mixture that no
-/// trial has, compares it with the trial that predicts best.
+/// Compares a trial with the chosen one, patch by patch. If the chosen settings are a mixture that
+/// no trial has, compares it with the trial that predicts best.
 selection::Difference difference_to_chosen(const FitTrial& trial, const TunedFit& tuned);
 
 /// Describes settings as in "smooth tv 5", and which corrections of the views differ from those of

@@ -64,7 +64,7 @@ void log_trials(const TunedFit& tuned) {
   for (const FitTrial& t : tuned.trials) {
     const selection::Difference d = difference_to_chosen(t, tuned);
     base::log_info(fmt::format(
-        "tried {}, rank {}, epochs {}: view by view {:+.2f} % ± {:.2f} from "
+        "tried {}, rank {}, epochs {}: patch by patch {:+.2f} % ± {:.2f} from "
         "{}; mean held-out error {:.5f}{}",
         describe(t.settings, tuned.trials.front().settings), t.settings.rank, t.settings.epochs,
         100 * d.log_ratio, 100 * d.standard_error, reference, t.score.error,
@@ -72,8 +72,8 @@ void log_trials(const TunedFit& tuned) {
                         : std::string()));
   }
   base::log_info(
-      "the choice compares the errors of trials view by view (median over pairs of views); a view "
-      "that all predict badly moves the mean error, but not this");
+      "the choice compares the errors of trials patch by patch of the views left out (median over "
+      "pairs of patches); a patch that all predict badly moves the mean error, but not this");
 }
 
 }  // namespace

@@ -27,11 +27,12 @@ bool most_views_prefer(const HeldOutScore& a, const HeldOutScore& b) {
 }
 
 Difference difference(const HeldOutScore& a, const HeldOutScore& b) {
+  const bool by_patch = !a.patch_error.empty() && a.patch_error.size() == b.patch_error.size();
+  const std::vector<double>& of_a = by_patch ? a.patch_error : a.view_error;
+  const std::vector<double>& of_b = by_patch ? b.patch_error : b.view_error;
   std::vector<double> ratios;
-  for (std::size_t v = 0; v < std::min(a.view_error.size(), b.view_error.size()); ++v) {
-    if (a.view_error[v] > 0 && b.view_error[v] > 0)
-      ratios.push_back(std::log(a.view_error[v] / b.view_error[v]));
-  }
+  for (std::size_t i = 0; i < std::min(of_a.size(), of_b.size()); ++i)
+    if (of_a[i] > 0 && of_b[i] > 0) ratios.push_back(std::log(of_a[i] / of_b[i]));
   if (ratios.empty()) return {a.error > 0 && b.error > 0 ? std::log(a.error / b.error) : 0.0, 0.0};
   std::vector<double> means;
   for (std::size_t i = 0; i < ratios.size(); ++i)

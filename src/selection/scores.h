@@ -11,6 +11,7 @@ namespace tomofield::selection {
 struct HeldOutScore {
   double error = 0;                      ///< mean squared residual over the noise variance
   std::vector<double> view_error = {};   ///< the same of each held-out view
+  std::vector<double> patch_error = {};  ///< the same of each patch of these views; may be empty
   std::optional<double> speckle = {};    ///< evaluate/speckle.h; none if it was not measured
   std::optional<double> face_jump = {};  ///< evaluate/face_jump.h; none if no face is in the volume
 };
@@ -26,10 +27,11 @@ struct Difference {
   double standard_error = 0;  ///< of `log_ratio`
   bool is_beyond(double num_errors) const { return log_ratio > num_errors * standard_error; }
 };
-/// Compares `a` with `b` view by view. The noise of the views themselves is the same in both trials
-/// and cancels. `log_ratio` is the estimate of Hodges and Lehmann (Ann. Math. Stat. 34, 598, 1963),
-/// the median of all means of two views; the standard error is from the median absolute deviation.
-/// So a view at the end of the tilt range, which every trial predicts badly, does not decide.
+/// Compares `a` with `b` patch by patch of the held-out views, or view by view if they have no
+/// patches. The noise of the views themselves is the same in both trials and cancels. `log_ratio`
+/// is the estimate of Hodges and Lehmann (Ann. Math. Stat. 34, 598, 1963), the median of all means
+/// of two patches; the standard error is from the median absolute deviation. So a place or a view
+/// that every trial predicts badly, such as one at the end of the tilt range, does not decide.
 Difference difference(const HeldOutScore& a, const HeldOutScore& b);
 
 /// Returns the indices of the trials that the best one does not beat by more than `num_errors`

@@ -77,6 +77,14 @@ TEST(SearchWeight, TakesTheLargestOfThoseThatViewsCannotTellApart) {
   EXPECT_EQ(found, 10.0);
 }
 
+TEST(Difference, IsThatOfPatchesWhereBothHaveThem) {
+  HeldOutScore a = with_errors({2.0, 2.0, 2.0}), b = with_errors({1.0, 1.0, 1.0});
+  a.patch_error = b.patch_error = {1.0, 3.0};
+  EXPECT_EQ(difference(a, b).log_ratio, 0.0);
+  b.patch_error.clear();
+  EXPECT_NEAR(difference(a, b).log_ratio, std::log(2.0), 1e-12);
+}
+
 TEST(AsGoodAsTheBest, CountsWhatViewsCannotTellApartAsEqual) {
   const HeldOutScore best{1.0, {0.5, 1.5, 1.0}}, unsure{1.1, {0.6, 1.4, 1.05}},
       surely_worse{1.2, {0.6, 1.8, 1.2}};

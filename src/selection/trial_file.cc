@@ -32,6 +32,7 @@ json trial_json(json settings, const HeldOutScore& score, double seconds) {
   settings.update({{"held_out_error", score.error},
                    {"held_out_error_by_view", score.view_error},
                    {"seconds", seconds}});
+  if (!score.patch_error.empty()) settings["held_out_error_by_patch"] = score.patch_error;
   if (score.speckle) settings["speckle"] = *score.speckle;
   if (score.face_jump) settings["face_jump"] = *score.face_jump;
   return settings;
@@ -43,8 +44,11 @@ HeldOutScore score_from(const json& trial) {
                                 : std::nullopt;
   };
   return {io::number_at(trial, "held_out_error", 0, kLargestError),
-          io::numbers_at(trial, "held_out_error_by_view", 0, kLargestError), measured("speckle"),
-          measured("face_jump")};
+          io::numbers_at(trial, "held_out_error_by_view", 0, kLargestError),
+          trial.contains("held_out_error_by_patch")
+              ? io::numbers_at(trial, "held_out_error_by_patch", 0, kLargestError)
+              : std::vector<double>(),
+          measured("speckle"), measured("face_jump")};
 }
 
 TrialFile::TrialFile(std::filesystem::path path, std::string fingerprint, bool reuse)
