@@ -26,6 +26,7 @@ struct SimulateArguments {
   std::optional<std::string> contrast;
   std::optional<std::string> defocus;
   std::optional<double> dose_per_tilt;
+  std::vector<std::string> particles;
   std::optional<double> noise;
   std::optional<double> gain_spread;
   std::optional<std::int64_t> num_beads;
@@ -67,6 +68,23 @@ simulate::Imaging::Range parse_defocus(const std::string& text) {
   if (fault != std::errc() || next != end)
     throw Error(fmt::format("--defocus is '{}': give low:high in µm, as 3:5, or one number", text));
   return range;
+}
+
+/// Parses "FILE,COUNT".
+simulate::ParticleFile parse_particles(const std::string& text) {
+  const std::size_t comma = text.rfind(',');
+  simulate::ParticleFile file;
+  std::from_chars_result parsed{nullptr, std::errc::invalid_argument};
+  const char* const end = text.data() + text.size();
+  if (comma != std::string::npos)
+    parsed = std::from_chars(text.data() + comma + 1, end, file.count);
+  if (parsed.ec != std::errc() || parsed.ptr != end || comma == 0)
+    throw Error(fmt::format(
+        "--particles is '{}': give an MRC density and the number of its particles in the field of "
+        "view, as ribosome.mrc,40",
+        text));
+  file.path = text.substr(0, comma);
+  return file;
 }
 
 /// The contrast that is meant: counts of electrons are dark by nature.
@@ -139,6 +157,10 @@ void run_simulate(SimulateArguments& arguments) {
   if (options.noise_blur_px > 0.0 && options.dose)
     throw Error("--noise-blur is for --noise: the counts of --dose are independent");
   resolve_specimen(arguments);
+  if (!arguments.particles.empty() && !options.is_physical())
+    throw Error("--particles is for --yardstick d: other phantoms have no proteins");
+  for (const std::string& text : arguments.particles)
+    options.particle_files.push_back(parse_particles(text));
   options.contrast = resolve_contrast(arguments);
   if (arguments.defocus) options.imaging.defocus = parse_defocus(*arguments.defocus);
   options.imaging.dose_per_tilt = arguments.dose_per_tilt.value_or(options.imaging.dose_per_tilt);
@@ -263,6 +285,11 @@ void add_simulate_command(CLI::App& program) {
       "proteins, membranes, filaments and gold in ice in physical units, as counts of electrons in "
       "41 views from -60 to 60 degrees")
       ->excludes(extended, tilts);
+  command
+      ->add_option("--particles", arguments->particles,
+                   "With --yardstick d: an MRC density, in which high is dense, and the number of "
+                   "its particles in the field of view, in place of random proteins. Repeatable")
+      ->type_name("FILE,COUNT");
   command->add_option("--voxel-size", options.voxel_size_A, "Voxel size in Å")
       ->capture_default_str();
   command->add_option(

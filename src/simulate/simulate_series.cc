@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/percentile.h"
+#include "base/utf8.h"
 #include "geometry/imod_transform.h"
 #include "io/atomic_file.h"
 #include "io/ctf_table.h"
@@ -41,7 +42,8 @@ constexpr std::uint64_t kNoiseStream = std::uint64_t{1} << 32;
 constexpr std::int64_t kTruthBatchVoxels = std::int64_t{1} << 22;
 
 struct OutputFiles {
-  explicit OutputFiles(const fs::path& directory)
+  /// `kinds` are those of the specimen's particles.
+  OutputFiles(const fs::path& directory, std::span<const ParticleKind> kinds)
       : series(directory / "tilt_series.mrc"),
         clean(directory / "clean.mrc"),
         truth(directory / "truth.mrc"),
@@ -55,18 +57,20 @@ struct OutputFiles {
         odd(directory / "tilt_series_odd.mrc"),
         membranes(directory / "membranes.mrc"),
         particles(directory / "particles.star"),
-        record(directory / "phantom.json") {}
+        record(directory / "phantom.json") {
+    for (const ParticleKind& kind : kinds)
+      references.push_back(directory / fmt::format("particle_{}.mrc", kind.name));
+  }
   fs::path series, clean, truth, angles, recorded_angles, transforms, ctf, defocus, mdoc, even, odd,
       membranes, particles, record;
 
-  /// Returns the file with the density of a kind of particle.
-  fs::path reference(const std::string& kind) const {
-    return series.parent_path() / fmt::format("particle_{}.mrc", kind);
-  }
+  std::vector<fs::path> references;  // densities of the kinds of particles
 
   std::vector<fs::path> all() const {
-    return {series,  clean, truth, angles, recorded_angles, transforms, ctf,
-            defocus, mdoc,  even,  odd,    membranes,       particles,  record};
+    std::vector<fs::path> files{series,  clean, truth, angles, recorded_angles, transforms, ctf,
+                                defocus, mdoc,  even,  odd,    membranes,       particles,  record};
+    files.insert(files.end(), references.begin(), references.end());
+    return files;
   }
 };
 
@@ -249,9 +253,20 @@ void write_labels(const OutputFiles& files, const CryoSpecimen& specimen,
   io::write_text_file(files.particles, particle_list(specimen));
   write_volume(files.membranes, membrane_label(specimen, voxel_A), io::MrcMode::kInt8, options,
                "membranes");
-  for (const ParticleKind& kind : specimen.kinds)
-    write_volume(files.reference(kind.name), reference_density(kind, voxel_A),
-                 io::MrcMode::kFloat32, options, kind.name.c_str());
+  for (std::size_t i = 0; i < specimen.kinds.size(); ++i)
+    write_volume(files.references[i], reference_density(specimen.kinds[i], voxel_A),
+                 io::MrcMode::kFloat32, options, "density of a particle");
+}
+
+// Lets densities of particles go that an earlier series wrote and this one does not.
+void remove_old_references(const fs::path& directory, const OutputFiles& files,
+                           io::OutputSet& results) {
+  for (const auto& entry : fs::directory_iterator(directory)) {
+    const fs::path& file = entry.path();
+    if (file.filename().string().starts_with("particle_") && file.extension() == ".mrc" &&
+        std::ranges::find(files.references, file) == files.references.end())
+      results.remove_old(file);
+  }
 }
 
 void write_angles(const fs::path& path, const std::vector<SimulatedView>& views) {
@@ -310,6 +325,7 @@ void add_imaging(const SimulationOptions& options, Json& json) {
   if (imaging.filters()) json["voltage_kV"] = imaging.optics.voltage_kV;
   if (imaging.defocus) {
     json["defocus_um"] = {imaging.defocus->low_um, imaging.defocus->high_um};
+    if (imaging.defocus_scatter_um) json["defocus_scatter_um"] = *imaging.defocus_scatter_um;
     json["astigmatism_um"] = imaging.astigmatism_um;
     json["spherical_aberration_mm"] = imaging.optics.spherical_aberration_mm;
     json["amplitude_contrast"] = imaging.optics.amplitude_contrast;
@@ -343,6 +359,9 @@ Json options_json(const SimulationOptions& options) {
   if (misalignment.local_px > 0.0) json["local_px"] = misalignment.local_px;
   if (cell.content == Content::kTextured) json["content"] = "textured";
   if (cell.content == Content::kCryo) json["content"] = "cryo";
+  for (const ParticleFile& file : options.particle_files)
+    json["particles"].push_back(
+        {{"file", base::utf8_text(file.path.string())}, {"count", file.count}});
   if (!options.reference_has_beads) json["reference_has_gold"] = false;
   add_imaging(options, json);
   if (options.dose) {
@@ -439,17 +458,18 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
                                   bool overwrite) {
   const auto faults = options.validate();
   if (!faults.empty()) throw Error(fmt::format("cannot simulate: {}", fmt::join(faults, "; ")));
-  const OutputFiles files(directory);
   const auto views = plan_views(options);
   CellOptions cell = options.cell;
   cell.max_tilt_deg = 0.0;
   for (const SimulatedView& view : views)
     cell.max_tilt_deg = std::max(cell.max_tilt_deg, std::abs(view.tilt_deg));
   const std::optional<CryoSpecimen> specimen =
-      options.is_physical() ? std::optional(make_cryo_specimen(cell, options.voxel_size_A))
-                            : std::nullopt;
+      options.is_physical()
+          ? std::optional(make_cryo_specimen(cell, options.voxel_size_A, options.particle_files))
+          : std::nullopt;
   const Phantom phantom = specimen ? specimen->phantom : make_cell_phantom(cell);
   const Phantom reference = options.reference_has_beads ? phantom : without_beads(phantom);
+  const OutputFiles files(directory, specimen ? specimen->kinds : std::vector<ParticleKind>());
   const io::OutputFolder folder(directory);
   const std::vector<io::OutputLock> locks = claim_files(files, overwrite);
   io::OutputSet results;
@@ -476,6 +496,7 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
     for (const fs::path& file : {files.even, files.odd, files.membranes, files.particles})
       results.remove_old(file);
   }
+  remove_old_references(directory, files, results);
   write_angles(files.angles, views);
   if (options.misalignment.tilt_spread_deg > 0.0)
     write_recorded_angles(files.recorded_angles, views);

@@ -121,6 +121,9 @@ std::vector<std::string> SimulationOptions::validate() const {
     require(is_spread(low, 50.0) && high >= low && high <= 50.0, "the defocus in µm", high,
             "a range within 0 to 50, the smaller number first");
   }
+  for (const ParticleFile& file : particle_files)
+    require(std::isfinite(file.count) && file.count > 0.0 && file.count <= 1e5,
+            "the number of particles in the field of view", file.count, "above 0 and at most 1e5");
   require(!is_physical() || i.dose_per_tilt > 0.0, "the dose per tilt", i.dose_per_tilt,
           "above 0 electrons per Å² for counts of electrons");
   require(is_spread(i.astigmatism_um, 5.0), "the astigmatism in µm", i.astigmatism_um, "0 to 5");

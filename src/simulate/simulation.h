@@ -10,6 +10,7 @@
 #include "base/enum_names.h"
 #include "geometry/raw_from_aligned.h"
 #include "geometry/view_warp.h"
+#include "simulate/cryo/density_file.h"
 #include "simulate/imaging.h"
 #include "simulate/misalignment.h"
 #include "simulate/phantom.h"
@@ -53,6 +54,7 @@ struct SimulationOptions {
   /// `noise` refers to includes them.
   bool reference_has_beads = true;
   double gain_spread = 0.0;  ///< standard deviation of the logarithm of each view's scale
+  std::vector<ParticleFile> particle_files;  ///< of a physical specimen (cryo/specimen.h)
   Misalignment misalignment;
   Imaging imaging;
   Contrast contrast = Contrast::kBright;

@@ -1,5 +1,7 @@
 #include "simulate/cryo/specimen.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -7,6 +9,7 @@
 #include "field/sampling/sample_box.h"
 #include "simulate/cryo/bilayer.h"
 #include "simulate/cryo/occupancy.h"
+#include "tomofield/error.h"
 
 namespace tomofield::simulate {
 namespace {
@@ -82,11 +85,16 @@ class Builder {
     specimen_.phantom.slab_density = 0.0;
   }
 
-  CryoSpecimen build(const CellOptions& options) {
+  CryoSpecimen build(const CellOptions& options, std::span<const ParticleFile> files) {
     add_gold(options);
     add_membranes();
     add_filaments();
-    for (std::size_t i = 0; i < soluble_proteins().size(); ++i) add_soluble(i);
+    if (files.empty()) {
+      for (const Abundance& protein : soluble_proteins())
+        add_particles(add_kind(protein.kind), number_of(protein.count));
+    }
+    for (const ParticleFile& file : files)
+      add_particles(add_kind(file), number_in_field(file.count));
     return std::move(specimen_);
   }
 
@@ -100,6 +108,13 @@ class Builder {
 
   int number_of(double count_in_reference) const {
     return static_cast<int>(std::lround(count_in_reference * share_));
+  }
+
+  // Returns the number in the box of what has a mean number in the field of view.
+  int number_in_field(double count) const {
+    const base::Shape3& shape = specimen_.phantom.shape;
+    const double field = voxel_size_A_ * voxel_size_A_ * static_cast<double>(shape.nx * shape.ny);
+    return static_cast<int>(std::lround(count * 4.0 * half_A_[0] * half_A_[1] / field));
   }
 
   Vector3 random_point(const Vector3& half, base::Random& random) const {
@@ -221,6 +236,17 @@ class Builder {
     return index;
   }
 
+  std::size_t add_kind(const ParticleFile& file) {
+    const std::string name = file.path.stem().string();
+    if (std::ranges::find(specimen_.kinds, name, &ParticleKind::name) != specimen_.kinds.end())
+      throw Error(fmt::format(
+          "two kinds of particles have the name '{}': rename the file '{}', whose name is that of "
+          "its particles",
+          name, file.path.string()));
+    specimen_.kinds.push_back({name, read_density(file.path)});
+    return specimen_.kinds.size() - 1;
+  }
+
   // Adds a particle if it touches nothing and lies within the slab.
   bool place(std::size_t kind, const Vector3& center_A, const Vector3& euler_deg) {
     const auto gaussians = placed(specimen_.kinds[kind].reference, center_A, euler_deg);
@@ -232,11 +258,9 @@ class Builder {
     return true;
   }
 
-  void add_soluble(std::size_t i) {
-    const Abundance& abundance = soluble_proteins()[i];
-    base::Random random(seed_, kParticleStream + i);
-    const std::size_t kind = add_kind(abundance.kind);
-    for (int n = 0; n < number_of(abundance.count); ++n)
+  void add_particles(std::size_t kind, int count) {
+    base::Random random(seed_, kParticleStream + kind - 1);  // kind 0 is that of receptors
+    for (int n = 0; n < count; ++n)
       for (int attempt = 0; attempt < kTries; ++attempt)
         if (place(kind, random_point(half_A_, random), random_euler_deg(random))) break;
   }
@@ -251,8 +275,9 @@ class Builder {
 
 }  // namespace
 
-CryoSpecimen make_cryo_specimen(const CellOptions& options, double voxel_size_A) {
-  return Builder(options, voxel_size_A).build(options);
+CryoSpecimen make_cryo_specimen(const CellOptions& options, double voxel_size_A,
+                                std::span<const ParticleFile> files) {
+  return Builder(options, voxel_size_A).build(options, files);
 }
 
 }  // namespace tomofield::simulate

@@ -2,9 +2,11 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "simulate/cryo/density_file.h"
 #include "simulate/cryo/protein.h"
 #include "simulate/phantom.h"
 
@@ -47,8 +49,12 @@ struct CryoSpecimen {
 ///   carboxylases 60 of 550 kDa with symmetry D4
 ///   enzymes      400 of 150 kDa without symmetry
 ///
-/// The shapes of all proteins are drawn with the seed. Every Gaussian is widened by the mean over a
-/// voxel, whose variance is 1/12 voxel².
-CryoSpecimen make_cryo_specimen(const CellOptions& options, double voxel_size_A);
+/// Particles of `files` take the place of the last four. Their kinds have the names of the files
+/// without the extension. Throws Error for two files of one name, and as read_density() does.
+///
+/// The shapes of all other proteins are drawn with the seed. Every Gaussian is widened by the mean
+/// over a voxel, whose variance is 1/12 voxel².
+CryoSpecimen make_cryo_specimen(const CellOptions& options, double voxel_size_A,
+                                std::span<const ParticleFile> files = {});
 
 }  // namespace tomofield::simulate
