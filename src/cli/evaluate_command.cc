@@ -13,7 +13,9 @@
 #include "cli/help_formatter.h"
 #include "evaluate/artefacts.h"
 #include "evaluate/fsc.h"
+#include "evaluate/picks.h"
 #include "evaluate/reprojection.h"
+#include "evaluate/sheet_filter.h"
 #include "evaluate/similarity.h"
 #include "io/atomic_file.h"
 #include "io/json.h"
@@ -97,6 +99,27 @@ void correlate(const EvaluateArguments& arguments, Findings& findings) {
   print_fsc(*findings.fsc);
 }
 
+void find_membranes(const EvaluateArguments& arguments, Findings& findings) {
+  const evaluate::VolumePair pair =
+      evaluate::read_pair(arguments.volume, *arguments.membranes, std::nullopt);
+  const evaluate::DetectionScore score = evaluate::membrane_score(pair.first, pair.second);
+  findings.metrics["membranes"] = evaluate::membrane_json(score, *arguments.membranes);
+  print("membranes: best Dice {:.4f}, average precision {:.4f}\n", score.best_dice,
+        score.average_precision);
+}
+
+void find_particles(const EvaluateArguments& arguments, Findings& findings) {
+  const base::Volume volume = evaluate::read_volume(arguments.volume);
+  std::vector<evaluate::PickScore> scores;
+  for (const auto& particle : evaluate::read_particles(*arguments.particles)) {
+    scores.push_back(evaluate::pick_score(volume, particle));
+    const evaluate::PickScore& score = scores.back();
+    print("{:<14} average precision {:.4f} of {} particles, radius {:.0f} Å\n", score.kind,
+          score.average_precision, score.num_particles, score.radius_A);
+  }
+  findings.metrics["picks"] = evaluate::picks_json(scores, *arguments.particles);
+}
+
 void reproject(const EvaluateArguments& arguments, Findings& findings) {
   SeriesFiles files = arguments.choices.files;
   files.stack = *arguments.series;
@@ -141,8 +164,8 @@ void measure_artefacts(const EvaluateArguments& arguments, const base::Volume& v
 // Computes the scores that need the volume alone.
 void examine(const EvaluateArguments& arguments, Findings& findings) {
   const bool has_profile = arguments.profile && !arguments.truth;
-  const bool nothing_asked =
-      !arguments.truth && !arguments.fsc_with && !arguments.profile && !arguments.series;
+  const bool nothing_asked = !arguments.truth && !arguments.fsc_with && !arguments.profile &&
+                             !arguments.series && !arguments.membranes && !arguments.particles;
   const bool has_contrast =
       arguments.contrast || !arguments.regions.foreground.empty() || nothing_asked;
   const base::Volume volume = evaluate::read_volume(arguments.volume);
@@ -170,6 +193,8 @@ void run_evaluate(const EvaluateArguments& arguments) {
   findings.metrics["reconstruction"] = base::utf8_text(arguments.volume.string());
   if (arguments.truth) compare_with_truth(arguments, findings);
   if (arguments.fsc_with) correlate(arguments, findings);
+  if (arguments.membranes) find_membranes(arguments, findings);
+  if (arguments.particles) find_particles(arguments, findings);
   if (arguments.series) reproject(arguments, findings);
   examine(arguments, findings);
   write_findings(arguments, findings);

@@ -67,6 +67,22 @@ void add_fsc_options(CLI::App& command, EvaluateArguments& arguments) {
   add_file("--fsc-picture", arguments.fsc_picture, "Draw the curves (PNG)")->needs(fsc);
 }
 
+void add_finding_options(CLI::App& command, EvaluateArguments& arguments) {
+  const char* group = "Membranes and particles";
+  command
+      .add_option("--membranes", arguments.membranes,
+                  "MRC volume that is 1 in membranes and 0 elsewhere: find sheets in VOLUME, in "
+                  "which high is dense, and compare them voxel by voxel")
+      ->type_name("LABEL")
+      ->group(group);
+  command
+      .add_option("--particles", arguments.particles,
+                  "particles.star of simulate, with particle_KIND.mrc beside it: find particles of "
+                  "each kind in VOLUME by correlation, and compare them with the list")
+      ->type_name("LIST")
+      ->group(group);
+}
+
 void add_contrast_options(CLI::App& command, EvaluateArguments& arguments) {
   const char* group = "Contrast and noise";
   command
@@ -144,7 +160,7 @@ std::vector<io::OutputLock> EvaluateArguments::claim_outputs() const {
   std::vector<std::filesystem::path> inputs = io::input_files(choices.files), outputs;
   inputs.push_back(volume);
   if (!model) inputs.push_back(std::filesystem::path(volume).replace_extension(".h5"));
-  for (const auto& file : {truth, fsc_with, fsc_mask, series, model})
+  for (const auto& file : {truth, fsc_with, fsc_mask, membranes, particles, series, model})
     if (file) inputs.push_back(*file);
   for (const auto& file : {json, fsc_csv, fsc_picture, profile_csv})
     if (file) outputs.push_back(*file);
@@ -157,6 +173,7 @@ std::vector<io::OutputLock> EvaluateArguments::claim_outputs() const {
 void add_evaluate_options(CLI::App& command, EvaluateArguments& arguments) {
   add_comparison_options(command, arguments);
   add_fsc_options(command, arguments);
+  add_finding_options(command, arguments);
   add_contrast_options(command, arguments);
   add_artefact_options(command, arguments);
   add_profile_options(command, arguments);

@@ -23,6 +23,8 @@ struct EvaluateArguments {
   std::optional<std::filesystem::path> fsc_with, fsc_mask, fsc_csv, fsc_picture;
   std::optional<evaluate::TiltRange> tilts;
 
+  std::optional<std::filesystem::path> membranes, particles;
+
   bool contrast = false;
   evaluate::Regions regions;  ///< empty: chosen automatically
 

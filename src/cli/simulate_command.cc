@@ -25,6 +25,8 @@ struct SimulateArguments {
   std::optional<std::string> tilts;
   std::optional<std::string> contrast;
   std::optional<std::string> defocus;
+  std::optional<double> dose_per_tilt;
+  std::vector<std::string> particles;
   std::optional<double> noise;
   std::optional<double> gain_spread;
   std::optional<std::int64_t> num_beads;
@@ -68,6 +70,23 @@ simulate::Imaging::Range parse_defocus(const std::string& text) {
   return range;
 }
 
+/// Parses "FILE,COUNT".
+simulate::ParticleFile parse_particles(const std::string& text) {
+  const std::size_t comma = text.rfind(',');
+  simulate::ParticleFile file;
+  std::from_chars_result parsed{nullptr, std::errc::invalid_argument};
+  const char* const end = text.data() + text.size();
+  if (comma != std::string::npos)
+    parsed = std::from_chars(text.data() + comma + 1, end, file.count);
+  if (parsed.ec != std::errc() || parsed.ptr != end || comma == 0)
+    throw Error(fmt::format(
+        "--particles is '{}': give an MRC density and the number of its particles in the field of "
+        "view, as ribosome.mrc,40",
+        text));
+  file.path = text.substr(0, comma);
+  return file;
+}
+
 /// The contrast that is meant: counts of electrons are dark by nature.
 Contrast resolve_contrast(const SimulateArguments& arguments) {
   const bool has_dose = arguments.options.dose.has_value();
@@ -75,7 +94,23 @@ Contrast resolve_contrast(const SimulateArguments& arguments) {
     throw Error(
         "--dose counts transmitted electrons, which is dark contrast: leave out --contrast "
         "bright");
-  return has_dose || arguments.contrast == "dark" ? Contrast::kDark : Contrast::kBright;
+  return has_dose || arguments.options.is_physical() || arguments.contrast == "dark"
+             ? Contrast::kDark
+             : Contrast::kBright;
+}
+
+/// Refuses options that contradict counts of electrons.
+void require_counts(const SimulateArguments& arguments) {
+  if (arguments.noise || arguments.options.dose)
+    throw Error(
+        "the noise of yardstick d is that of the electrons of --dose-per-tilt: leave out --noise "
+        "and --dose");
+  if (arguments.options.noise_blur_px > 0.0)
+    throw Error("--noise-blur is for --noise: the counts of yardstick d are independent");
+  if (arguments.contrast == "bright")
+    throw Error(
+        "yardstick d counts transmitted electrons, which is dark contrast: leave out --contrast "
+        "bright");
 }
 
 /// Sets what a yardstick sets, from the yardstick and from the options that were given. An option
@@ -84,6 +119,7 @@ void resolve_specimen(SimulateArguments& arguments) {
   simulate::SimulationOptions& options = arguments.options;
   if (arguments.yardstick) {
     simulate::apply_yardstick(*arguments.yardstick, options);
+    if (*arguments.yardstick == simulate::Yardstick::kD) require_counts(arguments);
   } else {
     options.tilts = arguments.tilts ? parse_tilts(*arguments.tilts)
                                     : simulate::default_tilts(options.cell.is_extended);
@@ -98,6 +134,9 @@ std::string how_to_reconstruct(const std::filesystem::path& directory,
                                const simulate::SimulationOptions& options) {
   const auto file = [&](const char* name) { return (directory / name).string(); };
   std::string more = options.cell.is_extended ? "" : " --no-margin";
+  if (options.is_physical())
+    more +=
+        fmt::format(" --ctf {} --mdoc {}", file("tilt_series_ctf.txt"), file("tilt_series.mdoc"));
   if (options.gain_spread > 0.0) more += " --view-scale on";
   if (options.cell.num_beads > 0)
     more += fmt::format(" --bead-diameter {:g}",
@@ -118,8 +157,13 @@ void run_simulate(SimulateArguments& arguments) {
   if (options.noise_blur_px > 0.0 && options.dose)
     throw Error("--noise-blur is for --noise: the counts of --dose are independent");
   resolve_specimen(arguments);
+  if (!arguments.particles.empty() && !options.is_physical())
+    throw Error("--particles is for --yardstick d: other phantoms have no proteins");
+  for (const std::string& text : arguments.particles)
+    options.particle_files.push_back(parse_particles(text));
   options.contrast = resolve_contrast(arguments);
   if (arguments.defocus) options.imaging.defocus = parse_defocus(*arguments.defocus);
+  options.imaging.dose_per_tilt = arguments.dose_per_tilt.value_or(options.imaging.dose_per_tilt);
   options.noise = arguments.noise.value_or(options.noise);
   options.write_truth = !arguments.without_truth;
   options.misalignment.magnification_spread = arguments.magnification_percent / 100.0;
@@ -128,8 +172,11 @@ void run_simulate(SimulateArguments& arguments) {
   std::string line = fmt::format("{} ellipsoids", summary.num_ellipsoids);
   if (summary.num_blobs > 0) line += fmt::format(", {} Gaussian blobs", summary.num_blobs);
   line += fmt::format(", {} views", summary.num_views);
+  if (summary.num_particles > 0) line += fmt::format(", {} particles", summary.num_particles);
   if (summary.num_beads > 0) line += fmt::format(", {} gold beads", summary.num_beads);
   if (summary.sigma) line += fmt::format(", sigma {:.4f}", *summary.sigma);
+  if (options.is_physical())
+    line += fmt::format(", {:.1f} electrons per pixel behind the ice at 0°", summary.empty_beam);
   if (options.dose) line += fmt::format(", {} electrons per pixel and view", *options.dose);
   if (summary.truth)
     line += fmt::format(", truth{} max {:.3f} mean {:.3f}",
@@ -175,7 +222,8 @@ void add_imaging_options(CLI::App& command, SimulateArguments& arguments) {
   CLI::Option* defocus = command.add_option(
       "--defocus", arguments.defocus,
       "Filter the views by a contrast transfer function, with an underfocus of low:high µm that is "
-      "drawn for each view (default: plain projections)");
+      "drawn for each view (default: plain projections; with --yardstick d 2:4, drawn once, and "
+      "views scatter by 0.15 µm)");
   command
       .add_option("--astigmatism", imaging.astigmatism_um,
                   "Difference between the two defoci of a view in µm; its direction is drawn")
@@ -193,12 +241,10 @@ void add_imaging_options(CLI::App& command, SimulateArguments& arguments) {
                   "Share of the contrast that is absorption, 0 to 1")
       ->needs(defocus)
       ->capture_default_str();
-  command
-      .add_option(
-          "--dose-per-tilt", imaging.dose_per_tilt,
-          "Electrons per Å² and view, in dose-symmetric order: radiation damage weakens the "
-          "signal of late views (0: none)")
-      ->capture_default_str();
+  command.add_option(
+      "--dose-per-tilt", arguments.dose_per_tilt,
+      "Electrons per Å² and view, in dose-symmetric order: radiation damage weakens the "
+      "signal of late views (default: none; with --yardstick d 3)");
   command
       .add_option("--noise-blur", arguments.options.noise_blur_px,
                   "Blur the noise of --noise by a Gaussian with this standard deviation in pixels, "
@@ -218,7 +264,8 @@ void add_simulate_command(CLI::App& program) {
   command->add_option("--size", options.cell.size_px, "Width and height in pixels")
       ->capture_default_str();
   command->add_option("--thickness", arguments->thickness_px,
-                      "Thickness in voxels (default: 150; with --yardstick 75/128 of --size)");
+                      "Thickness in voxels (default: 150; with --yardstick 75/128 of --size, with "
+                      "--yardstick d 1120 Å)");
   command->add_option("--seed", options.cell.seed, "Seed of all random numbers")
       ->check(seed_check())
       ->capture_default_str();
@@ -233,8 +280,16 @@ void add_simulate_command(CLI::App& program) {
       "Phantom that the benchmarks use. a: a cell that ends in the field of view, 94 views from "
       "-70 to 69.5 degrees; b: an extended specimen, 61 views from -60 to 60 degrees; c: as b, "
       "with "
-      "thin membranes, filaments, particles and texture, gold, and gains. Its truth has no gold")
+      "thin membranes, filaments, particles and texture, gold, and gains. Its truth has no gold; "
+      "d: "
+      "proteins, membranes, filaments and gold in ice in physical units, as counts of electrons in "
+      "41 views from -60 to 60 degrees")
       ->excludes(extended, tilts);
+  command
+      ->add_option("--particles", arguments->particles,
+                   "With --yardstick d: an MRC density, in which high is dense, and the number of "
+                   "its particles in the field of view, in place of random proteins. Repeatable")
+      ->type_name("FILE,COUNT");
   command->add_option("--voxel-size", options.voxel_size_A, "Voxel size in Å")
       ->capture_default_str();
   command->add_option(

@@ -220,15 +220,18 @@ base::Volume read_mask(const std::filesystem::path& path, const std::filesystem:
   return read_box(mask, box);
 }
 
-nlohmann::json crossing_json(const std::optional<double>& crossing) {
-  return crossing ? nlohmann::json(*crossing) : nlohmann::json();
+nlohmann::json number_json(const std::optional<double>& number) {
+  return number ? nlohmann::json(*number) : nlohmann::json();
 }
 
 nlohmann::json curve_json(const Fsc& fsc, const FscCurve& curve) {
-  return {{"resolution_at_0.5_A", crossing_json(crossing_A(fsc.frequency_per_A, curve, 0.5))},
-          {"resolution_at_0.143_A", crossing_json(crossing_A(fsc.frequency_per_A, curve, 0.143))},
-          {"correlation", curve.correlation},
-          {"voxels", curve.voxels}};
+  return {
+      {"resolution_at_0.5_A", number_json(crossing_A(fsc.frequency_per_A, curve, 0.5))},
+      {"resolution_at_0.143_A", number_json(crossing_A(fsc.frequency_per_A, curve, 0.143))},
+      {"correlation_at_100_A", number_json(correlation_at(fsc.frequency_per_A, curve, kCoarse_A))},
+      {"correlation_at_30_A", number_json(correlation_at(fsc.frequency_per_A, curve, kFine_A))},
+      {"correlation", curve.correlation},
+      {"voxels", curve.voxels}};
 }
 
 }  // namespace
@@ -336,6 +339,25 @@ std::optional<double> crossing_A(std::span<const double> frequency_per_A, const 
     const double before = curve.correlation[*above];
     const double f0 = frequency_per_A[*above], f1 = frequency_per_A[s];
     return 1.0 / (f0 + (f1 - f0) * (before - threshold) / (before - value));
+  }
+  return std::nullopt;
+}
+
+std::optional<double> correlation_at(std::span<const double> frequency_per_A, const FscCurve& curve,
+                                     double resolution_A) {
+  const double frequency = 1.0 / resolution_A;
+  std::optional<std::size_t> below;
+  for (std::size_t s = 0; s < curve.correlation.size(); ++s) {
+    if (std::isnan(curve.correlation[s])) continue;
+    if (frequency_per_A[s] == frequency) return curve.correlation[s];
+    if (frequency_per_A[s] < frequency) {
+      below = s;
+      continue;
+    }
+    if (!below) return std::nullopt;
+    const double part =
+        (frequency - frequency_per_A[*below]) / (frequency_per_A[s] - frequency_per_A[*below]);
+    return std::lerp(curve.correlation[*below], curve.correlation[s], part);
   }
   return std::nullopt;
 }

@@ -106,6 +106,11 @@ Fsc fourier_shell_correlation(const base::Volume& first, const base::Volume& sec
 std::optional<double> crossing_A(std::span<const double> frequency_per_A, const FscCurve& curve,
                                  double threshold);
 
+/// Returns the correlation at a resolution in Å, linear in frequency between the nearest shells
+/// that are not empty; nothing if the resolution lies beyond the first or the last of them.
+std::optional<double> correlation_at(std::span<const double> frequency_per_A, const FscCurve& curve,
+                                     double resolution_A);
+
 /// The two files to correlate and the voxels of them that count.
 struct FscFiles {
   std::filesystem::path first, second;
@@ -119,6 +124,10 @@ struct FscFiles {
 /// no voxel size, frequencies count voxels, and a warning goes to base/log.h. Throws Error for
 /// volumes that cannot be correlated, and if memory is too small.
 Fsc correlate_files(const FscFiles& files);
+
+/// The resolutions in Å at which fsc_json() states each curve's correlation: the size of a complex,
+/// and about the finest that a tomogram with voxels of 10 Å shows.
+inline constexpr double kCoarse_A = 100.0, kFine_A = 30.0;
 
 /// Returns the correlation as JSON. A crossing that does not exist and an empty shell are null.
 nlohmann::json fsc_json(const Fsc& fsc, const FscFiles& files);

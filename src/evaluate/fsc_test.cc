@@ -172,6 +172,16 @@ TEST(Crossing, IsLinearBetweenShells) {
   EXPECT_FALSE(at({0.4, 0.8, 0.7, 0.2}, 0.5).has_value());
 }
 
+TEST(CorrelationAt, IsLinearBetweenShellsThatAreNotEmpty) {
+  const std::vector<double> frequency{0.01, 0.02, 0.03, 0.04};
+  const FscCurve curve{{0.9, 0.7, std::nan(""), 0.1}, {}};
+  EXPECT_NEAR(*correlation_at(frequency, curve, 1.0 / 0.015), 0.8, 1e-9);
+  EXPECT_NEAR(*correlation_at(frequency, curve, 1.0 / 0.03), 0.4, 1e-9);
+  EXPECT_EQ(*correlation_at(frequency, curve, 100.0), 0.9);
+  EXPECT_FALSE(correlation_at(frequency, curve, 200.0).has_value());
+  EXPECT_FALSE(correlation_at(frequency, curve, 20.0).has_value());
+}
+
 TEST(Fsc, RefusesWhatCorrelatesWithNothing) {
   const base::Shape3 shape{8, 8, 8};
   const base::Volume fine = random_volume(shape, 6);

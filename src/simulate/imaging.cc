@@ -20,9 +20,13 @@ std::vector<std::optional<io::Defocus>> draw_defoci(const Imaging& imaging, std:
   std::vector<std::optional<io::Defocus>> defoci(num_views);
   if (!imaging.defocus) return defoci;
   base::Random random(seed, kDefocusStream);
+  const auto [low_um, high_um] = *imaging.defocus;
+  const double of_series_um = imaging.defocus_scatter_um ? random.uniform(low_um, high_um) : 0.0;
   for (std::optional<io::Defocus>& defocus : defoci) {
     // The files state tenths of Å and hundredths of degrees.
-    const double mean_um = random.uniform(imaging.defocus->low_um, imaging.defocus->high_um);
+    const double mean_um = imaging.defocus_scatter_um
+                               ? of_series_um + *imaging.defocus_scatter_um * random.normal()
+                               : random.uniform(low_um, high_um);
     const double mean_A = std::round(10.0 * kAngstroms_in_um * mean_um) / 10.0;
     const double half_A = kAngstroms_in_um * imaging.astigmatism_um / 2.0;
     const double angle_deg = std::round(100.0 * random.uniform(-90.0, 90.0)) / 100.0;

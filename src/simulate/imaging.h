@@ -19,7 +19,10 @@ struct Imaging {
     double low_um = 0.0, high_um = 0.0;
   };
   std::optional<Range> defocus;  ///< drawn for each view; none: no contrast transfer function
-  double astigmatism_um = 0.0;   ///< u − v of each view, whose direction is drawn
+  /// Without it, each view draws its own defocus from the range. With it, the series draws one, and
+  /// this is the standard deviation of the views about it.
+  std::optional<double> defocus_scatter_um;
+  double astigmatism_um = 0.0;  ///< u − v of each view, whose direction is drawn
   microscope::Optics optics;
   double dose_per_tilt = 0.0;  ///< electrons per Å²; 0: no radiation damage
 

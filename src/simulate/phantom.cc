@@ -67,7 +67,42 @@ void place_ellipsoids(int num_tries, double low, double high, base::Random& rand
   }
 }
 
-void place_beads(const CellOptions& options, Phantom& phantom) {
+void place_hollow_ellipsoids(const CellOptions& options, Phantom& phantom) {
+  const double thickness = static_cast<double>(options.thickness_px);
+  const double half_field = static_cast<double>(options.size_px) / 2.0;
+  const double more_tries = options.is_extended ? 1.2 * phantom.half_width_px / half_field : 1.0;
+  base::Random random(options.seed, kCellStream);
+  place_ellipsoids(static_cast<int>(125 * more_tries), 0.15 * thickness, 0.4 * thickness, random,
+                   phantom);
+  place_ellipsoids(static_cast<int>(2000 * more_tries), 0.05 * thickness, 0.25 * thickness, random,
+                   phantom);
+}
+
+}  // namespace
+
+Phantom without_beads(Phantom phantom) {
+  phantom.bodies.resize(phantom.bodies.size() - static_cast<std::size_t>(phantom.num_beads));
+  phantom.num_beads = 0;
+  return phantom;
+}
+
+Phantom make_slab(const CellOptions& options) {
+  const double size = static_cast<double>(options.size_px);
+  const double thickness = static_cast<double>(options.thickness_px);
+  const double max_tilt_rad = options.max_tilt_deg * std::numbers::pi / 180.0;
+  Phantom phantom;
+  phantom.shape = {options.size_px, options.size_px, options.thickness_px};
+  phantom.is_extended = options.is_extended;
+  phantom.slab_density = kSlabDensity / kLargestSum;
+  phantom.half_width_px = size / 2.0;
+  if (options.is_extended) {
+    phantom.half_width_px =
+        size / 2.0 / std::cos(max_tilt_rad) + thickness / 2.0 * std::tan(max_tilt_rad);
+  }
+  return phantom;
+}
+
+void add_beads(const CellOptions& options, Phantom& phantom) {
   base::Random random(options.seed, kBeadStream);
   const double half_field = static_cast<double>(options.size_px) / 2.0;
   const double radius = options.bead_diameter_px / 2.0;
@@ -94,44 +129,14 @@ void place_beads(const CellOptions& options, Phantom& phantom) {
   }
 }
 
-void place_hollow_ellipsoids(const CellOptions& options, Phantom& phantom) {
-  const double thickness = static_cast<double>(options.thickness_px);
-  const double half_field = static_cast<double>(options.size_px) / 2.0;
-  const double more_tries = options.is_extended ? 1.2 * phantom.half_width_px / half_field : 1.0;
-  base::Random random(options.seed, kCellStream);
-  place_ellipsoids(static_cast<int>(125 * more_tries), 0.15 * thickness, 0.4 * thickness, random,
-                   phantom);
-  place_ellipsoids(static_cast<int>(2000 * more_tries), 0.05 * thickness, 0.25 * thickness, random,
-                   phantom);
-}
-
-}  // namespace
-
-Phantom without_beads(Phantom phantom) {
-  phantom.bodies.resize(phantom.bodies.size() - static_cast<std::size_t>(phantom.num_beads));
-  phantom.num_beads = 0;
-  return phantom;
-}
-
 Phantom make_cell_phantom(const CellOptions& options) {
-  const double size = static_cast<double>(options.size_px);
-  const double thickness = static_cast<double>(options.thickness_px);
-  const double max_tilt_rad = options.max_tilt_deg * std::numbers::pi / 180.0;
-  Phantom phantom;
-  phantom.shape = {options.size_px, options.size_px, options.thickness_px};
-  phantom.is_extended = options.is_extended;
-  phantom.slab_density = kSlabDensity / kLargestSum;
-  phantom.half_width_px = size / 2.0;
-  if (options.is_extended) {
-    phantom.half_width_px =
-        size / 2.0 / std::cos(max_tilt_rad) + thickness / 2.0 * std::tan(max_tilt_rad);
-  }
+  Phantom phantom = make_slab(options);
   if (options.content == Content::kTextured) {
     add_textured_content(options.seed, phantom);
   } else {
     place_hollow_ellipsoids(options, phantom);
   }
-  if (options.num_beads > 0) place_beads(options, phantom);
+  add_beads(options, phantom);
   return phantom;
 }
 

@@ -98,6 +98,7 @@ Phantom without_beads(Phantom phantom);
 enum class Content {
   kHollowEllipsoids,  ///< hollow ellipsoids of constant densities
   kTextured,          ///< what textured_content.h places, in an extended slab only
+  kCryo,              ///< what cryo/specimen.h places, in an extended slab only
 };
 
 /// Sets the phantom of make_cell_phantom().
@@ -113,9 +114,16 @@ struct CellOptions {
   double bead_density = 5.0;  ///< added to that of the cell, which is in [0, 1]
 };
 
-/// Makes a phantom of the yardsticks, which all scores of the project refer to. textured_content.h
-/// has the recipe of textured content. The other one is after Kniesel et al. 2022: ice with hollow
-/// ellipsoids that have a membrane and do not overlap. U(a, b) is a uniform random number.
+/// Makes the slab of a phantom without content.
+Phantom make_slab(const CellOptions& options);
+
+/// Adds gold beads to a phantom that has none. Throws Error if they do not fit.
+void add_beads(const CellOptions& options, Phantom& phantom);
+
+/// Makes a phantom of the yardsticks A, B and C, which all scores of the project refer to.
+/// textured_content.h has the recipe of textured content. The other one is after Kniesel et al.
+/// 2022: ice with hollow ellipsoids that have a membrane and do not overlap. U(a, b) is a uniform
+/// random number.
 ///
 ///   slab density                            0.2
 ///   semi-axes of an ellipsoid of radius R   one is R, the others U(0.7 R, R)

@@ -12,7 +12,9 @@
 #include <vector>
 
 #include "base/percentile.h"
+#include "base/utf8.h"
 #include "geometry/imod_transform.h"
+#include "io/atomic_file.h"
 #include "io/ctf_table.h"
 #include "io/json.h"
 #include "io/mrc.h"
@@ -21,6 +23,8 @@
 #include "io/output_lock.h"
 #include "io/output_set.h"
 #include "io/write_alignment.h"
+#include "simulate/cryo/electron_counts.h"
+#include "simulate/cryo/particle_files.h"
 #include "simulate/imaging.h"
 #include "simulate/noise.h"
 #include "simulate/phantom.h"
@@ -38,7 +42,8 @@ constexpr std::uint64_t kNoiseStream = std::uint64_t{1} << 32;
 constexpr std::int64_t kTruthBatchVoxels = std::int64_t{1} << 22;
 
 struct OutputFiles {
-  explicit OutputFiles(const fs::path& directory)
+  /// `kinds` are those of the specimen's particles.
+  OutputFiles(const fs::path& directory, std::span<const ParticleKind> kinds)
       : series(directory / "tilt_series.mrc"),
         clean(directory / "clean.mrc"),
         truth(directory / "truth.mrc"),
@@ -48,17 +53,32 @@ struct OutputFiles {
         ctf(directory / "tilt_series_ctf.txt"),
         defocus(directory / "tilt_series.defocus"),
         mdoc(directory / "tilt_series.mdoc"),
-        record(directory / "phantom.json") {}
-  fs::path series, clean, truth, angles, recorded_angles, transforms, ctf, defocus, mdoc, record;
+        even(directory / "tilt_series_even.mrc"),
+        odd(directory / "tilt_series_odd.mrc"),
+        membranes(directory / "membranes.mrc"),
+        particles(directory / "particles.star"),
+        record(directory / "phantom.json") {
+    for (const ParticleKind& kind : kinds)
+      references.push_back(directory / fmt::format("particle_{}.mrc", kind.name));
+  }
+  fs::path series, clean, truth, angles, recorded_angles, transforms, ctf, defocus, mdoc, even, odd,
+      membranes, particles, record;
+
+  std::vector<fs::path> references;  // densities of the kinds of particles
+
+  std::vector<fs::path> all() const {
+    std::vector<fs::path> files{series,  clean, truth, angles, recorded_angles, transforms, ctf,
+                                defocus, mdoc,  even,  odd,    membranes,       particles,  record};
+    files.insert(files.end(), references.begin(), references.end());
+    return files;
+  }
 };
 
 // Checks that the files can be written, and locks the series, which every simulation writes.
 std::vector<io::OutputLock> claim_files(const OutputFiles& files, bool overwrite) {
   return io::claim_outputs({files.series}, [&] {
-    io::check_output_files(
-        {files.series, files.clean, files.truth, files.angles, files.recorded_angles,
-         files.transforms, files.ctf, files.defocus, files.mdoc, files.record},
-        {}, overwrite, "give another directory, or --overwrite to replace it");
+    io::check_output_files(files.all(), {}, overwrite,
+                           "give another directory, or --overwrite to replace it");
   });
 }
 
@@ -173,6 +193,82 @@ void write_views(const OutputFiles& files, const Phantom& phantom,
   series.close();
 }
 
+io::MrcWriter stack_writer(const fs::path& path, std::size_t num_views,
+                           const SimulationOptions& options, const char* what) {
+  return {path, mrc_spec(options.cell.size_px, options.cell.size_px,
+                         static_cast<std::int64_t>(num_views), false, options, what)};
+}
+
+ElectronCounts electron_counts(const SimulationOptions& options) {
+  return ElectronCounts(
+      {.dose_per_A2 = options.imaging.dose_per_tilt,
+       .pixel_size_A = options.voxel_size_A,
+       .thickness_A = static_cast<double>(options.cell.thickness_px) * options.voxel_size_A,
+       .voltage_kV = options.imaging.optics.voltage_kV});
+}
+
+// Writes the counts of all frames, those of the even and odd ones, and the expected counts.
+void write_counts(const OutputFiles& files, const Phantom& phantom,
+                  const std::vector<SimulatedView>& views, const SimulationOptions& options) {
+  const std::size_t n = views.size();
+  io::MrcWriter clean = stack_writer(files.clean, n, options, "expected electrons");
+  io::MrcWriter series = stack_writer(files.series, n, options, "electrons");
+  io::MrcWriter even = stack_writer(files.even, n, options, "electrons of the even frames");
+  io::MrcWriter odd = stack_writer(files.odd, n, options, "electrons of the odd frames");
+  const ElectronCounts counts = electron_counts(options);
+  const std::int64_t size = options.cell.size_px;
+  std::vector<float> image(static_cast<std::size_t>(size * size));
+  for (std::size_t i = 0; i < n; ++i) {
+    compute_view(phantom, views[i], options, image);
+    counts.expose(image, views[i].tilt_deg, views[i].gain);
+    const auto section = static_cast<std::int64_t>(i);
+    const FrameCounts frames =
+        draw_frames(image, size, options.cell.seed,
+                    kNoiseStream + 2 * static_cast<std::uint64_t>(section * size));
+    clean.write_section(section, image);
+    series.write_section(section, frames.all);
+    even.write_section(section, frames.even);
+    odd.write_section(section, frames.odd);
+  }
+  for (io::MrcWriter* writer : {&clean, &series, &even, &odd}) writer->close();
+}
+
+void write_volume(const fs::path& path, const base::Volume& volume, io::MrcMode mode,
+                  const SimulationOptions& options, const char* what) {
+  const base::Shape3& shape = volume.shape;
+  io::MrcSpec spec = mrc_spec(shape.nx, shape.ny, shape.nz, true, options, what);
+  spec.mode = mode;
+  io::MrcWriter writer(path, spec);
+  const auto section = static_cast<std::size_t>(shape.nx * shape.ny);
+  for (std::int64_t z = 0; z < shape.nz; ++z)
+    writer.write_section(
+        z, std::span(volume.data).subspan(static_cast<std::size_t>(z) * section, section));
+  writer.close();
+}
+
+// Writes what a user can look for in the specimen.
+void write_labels(const OutputFiles& files, const CryoSpecimen& specimen,
+                  const SimulationOptions& options) {
+  const double voxel_A = options.voxel_size_A;
+  io::write_text_file(files.particles, particle_list(specimen));
+  write_volume(files.membranes, membrane_label(specimen, voxel_A), io::MrcMode::kInt8, options,
+               "membranes");
+  for (std::size_t i = 0; i < specimen.kinds.size(); ++i)
+    write_volume(files.references[i], reference_density(specimen.kinds[i], voxel_A),
+                 io::MrcMode::kFloat32, options, "density of a particle");
+}
+
+// Lets densities of particles go that an earlier series wrote and this one does not.
+void remove_old_references(const fs::path& directory, const OutputFiles& files,
+                           io::OutputSet& results) {
+  for (const auto& entry : fs::directory_iterator(directory)) {
+    const fs::path& file = entry.path();
+    if (file.filename().string().starts_with("particle_") && file.extension() == ".mrc" &&
+        std::ranges::find(files.references, file) == files.references.end())
+      results.remove_old(file);
+  }
+}
+
 void write_angles(const fs::path& path, const std::vector<SimulatedView>& views) {
   std::vector<double> angles_deg;
   for (const SimulatedView& view : views) angles_deg.push_back(view.tilt_deg);
@@ -229,6 +325,7 @@ void add_imaging(const SimulationOptions& options, Json& json) {
   if (imaging.filters()) json["voltage_kV"] = imaging.optics.voltage_kV;
   if (imaging.defocus) {
     json["defocus_um"] = {imaging.defocus->low_um, imaging.defocus->high_um};
+    if (imaging.defocus_scatter_um) json["defocus_scatter_um"] = *imaging.defocus_scatter_um;
     json["astigmatism_um"] = imaging.astigmatism_um;
     json["spherical_aberration_mm"] = imaging.optics.spherical_aberration_mm;
     json["amplitude_contrast"] = imaging.optics.amplitude_contrast;
@@ -261,12 +358,16 @@ Json options_json(const SimulationOptions& options) {
   if (misalignment.tilt_spread_deg > 0.0) json["tilt_spread_deg"] = misalignment.tilt_spread_deg;
   if (misalignment.local_px > 0.0) json["local_px"] = misalignment.local_px;
   if (cell.content == Content::kTextured) json["content"] = "textured";
+  if (cell.content == Content::kCryo) json["content"] = "cryo";
+  for (const ParticleFile& file : options.particle_files)
+    json["particles"].push_back(
+        {{"file", base::utf8_text(file.path.string())}, {"count", file.count}});
   if (!options.reference_has_beads) json["reference_has_gold"] = false;
   add_imaging(options, json);
   if (options.dose) {
     json["dose_per_px"] = *options.dose;
     json["absorption_per_A"] = options.absorption_per_A;
-  } else {
+  } else if (!options.is_physical()) {
     json["noise"] = options.noise;
   }
   return json;
@@ -345,7 +446,9 @@ nlohmann::json phantom_json(const SimulationOptions& options, const Phantom& pha
       json["gold_beads"].push_back(bead_json(body));
     }
   }
-  if (!phantom.blobs.empty()) json["blobs_x_y_z_sigma_peak"] = blobs_json(phantom.blobs);
+  // Those of a physical specimen would have gigabytes.
+  if (!phantom.blobs.empty() && !options.is_physical())
+    json["blobs_x_y_z_sigma_peak"] = blobs_json(phantom.blobs);
   return json;
 }
 
@@ -355,14 +458,18 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
                                   bool overwrite) {
   const auto faults = options.validate();
   if (!faults.empty()) throw Error(fmt::format("cannot simulate: {}", fmt::join(faults, "; ")));
-  const OutputFiles files(directory);
   const auto views = plan_views(options);
   CellOptions cell = options.cell;
   cell.max_tilt_deg = 0.0;
   for (const SimulatedView& view : views)
     cell.max_tilt_deg = std::max(cell.max_tilt_deg, std::abs(view.tilt_deg));
-  const Phantom phantom = make_cell_phantom(cell);
+  const std::optional<CryoSpecimen> specimen =
+      options.is_physical()
+          ? std::optional(make_cryo_specimen(cell, options.voxel_size_A, options.particle_files))
+          : std::nullopt;
+  const Phantom phantom = specimen ? specimen->phantom : make_cell_phantom(cell);
   const Phantom reference = options.reference_has_beads ? phantom : without_beads(phantom);
+  const OutputFiles files(directory, specimen ? specimen->kinds : std::vector<ParticleKind>());
   const io::OutputFolder folder(directory);
   const std::vector<io::OutputLock> locks = claim_files(files, overwrite);
   io::OutputSet results;
@@ -372,14 +479,24 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
   summary.num_ellipsoids = static_cast<std::int64_t>(phantom.bodies.size()) - phantom.num_beads;
   summary.num_blobs = static_cast<std::int64_t>(phantom.blobs.size());
   summary.num_views = static_cast<std::int64_t>(views.size());
-  summary.empty_beam = Detector(options).empty_beam();
-  if (!options.dose) summary.sigma = noise_sigma(reference, views, options.noise);
+  summary.empty_beam =
+      specimen ? electron_counts(options).behind_ice(0.0) : Detector(options).empty_beam();
+  if (!options.dose && !specimen) summary.sigma = noise_sigma(reference, views, options.noise);
   // Files of an earlier run that this one does not replace would contradict the others.
   if (options.write_truth)
     summary.truth = write_truth(files.truth, reference, options);
   else
     results.remove_old(files.truth);
-  write_views(files, phantom, views, options, summary.sigma);
+  if (specimen) {
+    write_counts(files, phantom, views, options);
+    write_labels(files, *specimen, options);
+    summary.num_particles = std::ssize(specimen->particles);
+  } else {
+    write_views(files, phantom, views, options, summary.sigma);
+    for (const fs::path& file : {files.even, files.odd, files.membranes, files.particles})
+      results.remove_old(file);
+  }
+  remove_old_references(directory, files, results);
   write_angles(files.angles, views);
   if (options.misalignment.tilt_spread_deg > 0.0)
     write_recorded_angles(files.recorded_angles, views);

@@ -17,9 +17,10 @@ struct SimulationSummary {
   std::int64_t num_blobs = 0;
   std::int64_t num_beads = 0;
   std::int64_t num_views = 0;
-  double empty_beam = 0.0;      ///< intensity without a specimen at gain 1; 0 if bright
-  std::optional<double> sigma;  ///< standard deviation of the Gaussian noise; none for counts
-  std::optional<Truth> truth;   ///< none if it was not written
+  std::int64_t num_particles = 0;  ///< of a physical specimen, also outside of the field of view
+  double empty_beam = 0.0;         ///< intensity without a specimen at gain 1; 0 if bright
+  std::optional<double> sigma;     ///< standard deviation of the Gaussian noise; none for counts
+  std::optional<Truth> truth;      ///< none if it was not written
 };
 
 /// Simulates a tilt series of the cell phantom and writes it into `directory`, which it creates:
@@ -34,6 +35,8 @@ struct SimulationSummary {
 ///   tilt_series_ctf.txt, tilt_series.defocus
 ///                    only with a defocus: the contrast transfer, as CTFFIND and IMOD write it
 ///   tilt_series.mdoc only with a dose per tilt: the exposures
+///   tilt_series_even.mrc, tilt_series_odd.mrc, membranes.mrc, particles.star, particle_KIND.mrc
+///                    only with yardstick D (cryo/particle_files.h)
 ///   phantom.json     options, views and every ellipsoid, blob and bead
 ///
 /// With bright contrast, the views are line integrals in voxels; with a defocus or a dose per tilt,

@@ -47,7 +47,29 @@ TiltRange default_tilts(bool is_extended) {
   return {};
 }
 
+namespace {
+
+void apply_yardstick_d(SimulationOptions& options) {
+  constexpr double kThickness_A = 1120.0, kFieldOfBeads_A = 2560.0, kBeads = 8.0, kGold_V = 25.0;
+  CellOptions& cell = options.cell;
+  cell.content = Content::kCryo;
+  cell.is_extended = true;
+  cell.thickness_px = std::llround(kThickness_A / options.voxel_size_A);
+  const double field = static_cast<double>(cell.size_px) * options.voxel_size_A / kFieldOfBeads_A;
+  cell.num_beads = std::llround(kBeads * field * field);
+  cell.bead_density = kGold_V;
+  options.reference_has_beads = false;
+  options.tilts = {.first_deg = -60.0, .last_deg = 60.0, .step_deg = 3.0};
+  options.imaging.dose_per_tilt = 3.0;
+  options.imaging.defocus = {2.0, 4.0};
+  options.imaging.defocus_scatter_um = 0.15;
+  options.contrast = Contrast::kDark;
+}
+
+}  // namespace
+
 void apply_yardstick(Yardstick yardstick, SimulationOptions& options) {
+  if (yardstick == Yardstick::kD) return apply_yardstick_d(options);
   constexpr double kThicknessOfSize = 75.0 / 128.0;
   CellOptions& cell = options.cell;
   const auto size = static_cast<double>(cell.size_px);
@@ -99,6 +121,11 @@ std::vector<std::string> SimulationOptions::validate() const {
     require(is_spread(low, 50.0) && high >= low && high <= 50.0, "the defocus in µm", high,
             "a range within 0 to 50, the smaller number first");
   }
+  for (const ParticleFile& file : particle_files)
+    require(std::isfinite(file.count) && file.count > 0.0 && file.count <= 1e5,
+            "the number of particles in the field of view", file.count, "above 0 and at most 1e5");
+  require(!is_physical() || i.dose_per_tilt > 0.0, "the dose per tilt", i.dose_per_tilt,
+          "above 0 electrons per Å² for counts of electrons");
   require(is_spread(i.astigmatism_um, 5.0), "the astigmatism in µm", i.astigmatism_um, "0 to 5");
   require(i.optics.voltage_kV >= 20.0 && i.optics.voltage_kV <= 3000.0, "the voltage in kV",
           i.optics.voltage_kV, "20 to 3000");

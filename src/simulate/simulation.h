@@ -10,6 +10,7 @@
 #include "base/enum_names.h"
 #include "geometry/raw_from_aligned.h"
 #include "geometry/view_warp.h"
+#include "simulate/cryo/density_file.h"
 #include "simulate/imaging.h"
 #include "simulate/misalignment.h"
 #include "simulate/phantom.h"
@@ -31,6 +32,7 @@ enum class Yardstick {
   kA,  ///< a cell that ends in the field of view, in 94 views from −70° to 69.5°
   kB,  ///< a specimen that goes on outside it, in 61 views from −60° to 60°
   kC,  ///< as B, with textured content, gold beads, and gains that differ between views
+  kD,  ///< a specimen in ice in physical units, as cryo-EM counts it (cryo/specimen.h)
 };
 
 /// Sets a simulated tilt series.
@@ -52,10 +54,14 @@ struct SimulationOptions {
   /// `noise` refers to includes them.
   bool reference_has_beads = true;
   double gain_spread = 0.0;  ///< standard deviation of the logarithm of each view's scale
+  std::vector<ParticleFile> particle_files;  ///< of a physical specimen (cryo/specimen.h)
   Misalignment misalignment;
   Imaging imaging;
   Contrast contrast = Contrast::kBright;
   bool write_truth = true;
+
+  /// Returns true if the series has counts of electrons of a specimen in physical units.
+  bool is_physical() const { return cell.content == Content::kCryo; }
 
   /// Returns a sentence for each option that is out of range.
   std::vector<std::string> validate() const;
@@ -65,6 +71,10 @@ struct SimulationOptions {
 /// thickness, which is 75/128 of cell.size_px. For C it also sets a gain spread of 0.03 and 12 gold
 /// beads for each 256 × 256 pixels, which are no part of the reference: a reconstruction masks
 /// them. It leaves noise, seed and all else as they are.
+///
+/// For D it sets 41 views from −60° to 60°, an ice of 1120 Å, 3 electrons per Å² and view, an
+/// underfocus of 2 to 4 µm that views scatter about by 0.15 µm, 8 gold beads of 25 V for each
+/// 2560 × 2560 Å², and dark contrast.
 void apply_yardstick(Yardstick yardstick, SimulationOptions& options);
 
 /// Holds the tilt, the alignment and the gain of a simulated view.
@@ -106,9 +116,9 @@ namespace tomofield::base {
 
 template <>
 struct EnumNames<simulate::Yardstick> {
-  static constexpr std::array kNames{std::pair{simulate::Yardstick::kA, "a"},
-                                     std::pair{simulate::Yardstick::kB, "b"},
-                                     std::pair{simulate::Yardstick::kC, "c"}};
+  static constexpr std::array kNames{
+      std::pair{simulate::Yardstick::kA, "a"}, std::pair{simulate::Yardstick::kB, "b"},
+      std::pair{simulate::Yardstick::kC, "c"}, std::pair{simulate::Yardstick::kD, "d"}};
 };
 
 }  // namespace tomofield::base

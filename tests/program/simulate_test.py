@@ -8,6 +8,7 @@ import re
 
 import mrcfile
 import numpy as np
+import pytest
 import scipy.interpolate
 import scipy.ndimage
 
@@ -118,6 +119,118 @@ def test_yardstick_c_is_what_its_record_says():
             np.radians(-60 + 2 * view))
         expected = gains[view] * (specimen.view(-60 + 2 * view) + gold)
         np.testing.assert_allclose(clean[view], expected, atol=5e-5, rtol=1e-6)
+
+
+COUNTED = ["--yardstick", "d", "--size", 64, "--voxel-size", 20, "--gold", 2]
+
+
+@pytest.fixture(name="counted", scope="module")
+def make_counted():
+    return simulate("counted", *COUNTED, "--seed", 4)
+
+
+def test_yardstick_d_counts_electrons(counted):
+    expected, counts = counted.read("clean.mrc"), counted.read("tilt_series.mrc")
+    even, odd = counted.read("tilt_series_even.mrc"), counted.read("tilt_series_odd.mrc")
+    assert counts.shape == (41, 64, 64) and (counts == np.round(counts)).all()
+    np.testing.assert_array_equal(even + odd, counts)
+    for values, mean in ((counts, expected), (even, expected / 2), (odd, expected / 2)):
+        inside = mean > 5  # gold lets few electrons through
+        deviates = ((values - mean) / np.sqrt(np.maximum(mean, 1e-6)))[inside]
+        assert abs(deviates.mean()) < 5 / np.sqrt(deviates.size)
+        assert abs(deviates.var() - 1) < 5 * np.sqrt(2.1 / deviates.size)
+    halves = (even - expected / 2) * (odd - expected / 2) / np.maximum(expected / 2, 1)
+    assert abs(halves.mean()) < 5 / np.sqrt(halves.size)
+    # 3 electrons per Å² on pixels of 400 Å², behind 1120 Å of ice of a mean free path of 3000 Å
+    for view in (0, 20):
+        path = 1120 / 3000 / np.cos(np.radians(counted.views[view]["tilt_deg"]))
+        assert abs(np.median(expected[view]) / (1200 * np.exp(-path)) - 1) < 0.05, view
+
+
+def test_yardstick_d_is_a_weak_phase_object_behind_its_contrast_transfer(counted):
+    views = counted.views
+    assert [view["tilt_deg"] for view in views] == list(range(-60, 61, 3))
+    defoci = np.array([np.mean(view["defocus_A"]) for view in views])
+    assert 15000 < defoci.mean() < 45000 and 500 < defoci.std() < 3000
+    pixel, middle = 20, 20
+    potential = counted.read("truth.mrc").sum(0) * pixel  # V Å
+    contrast = -2 * 6.526e-4 * imaged(potential, views[middle], pixel)
+    background = 1200 * np.exp(-1120 / 3000)
+    expected = background * (1 + contrast)
+    y, x = np.meshgrid(*[np.arange(64) - 31.5] * 2, indexing="ij")
+    clear = (abs(x) < 24) & (abs(y) < 24)
+    for bead in counted.record["gold_beads"]:
+        clear &= np.hypot(x - bead["center_px"][0], y - bead["center_px"][1]) > 10
+    found = counted.read("clean.mrc")[middle]
+    assert clear.sum() > 500
+    assert (found - expected)[clear].std() < 0.1 * expected[clear].std()
+    assert np.corrcoef(found[clear], expected[clear])[0, 1] > 0.99
+
+
+def test_files_of_yardstick_d_are_read_with_the_same_defocus_and_doses(counted):
+    order = np.argsort([view["exposure_before"] for view in counted.views])
+    assert [3 * (i - 20) for i in order[:5]] == [0, 3, -3, -6, 6]
+    ctf = np.loadtxt(counted.path("tilt_series_ctf.txt"))
+    np.testing.assert_allclose(ctf[:, 1:3], [view["defocus_A"] for view in counted.views])
+    said = harness.succeed("reconstruct", counted.path("tilt_series.mrc"), "--tlt",
+                           counted.path("tilt_series.tlt"), "--thickness", 56, "--ctf",
+                           counted.path("tilt_series_ctf.txt"), "--mdoc",
+                           counted.path("tilt_series.mdoc"), "--dry-run", "-o",
+                           counted.path("none.mrc"))
+    assert "ctf" in said.stdout + said.stderr and "dose" in said.stdout + said.stderr
+
+
+def test_particles_of_yardstick_d_are_found_in_its_truth(counted):
+    said = harness.succeed("evaluate", counted.path("truth.mrc"), "--particles",
+                           counted.path("particles.star"), "--membranes",
+                           counted.path("membranes.mrc"), "--json", counted.path("found.json")).stdout
+    found = json.load(open(counted.path("found.json")))
+    kinds = found["picks"]["kinds"]
+    assert kinds["ribosome"]["particles"] >= 5
+    assert kinds["ribosome"]["average_precision"] > 0.9, said
+    assert found["membranes"]["average_precision"] > 0.6, said
+    # The same list moved by a quarter of the field finds less.
+    moved = os.path.join(counted.directory, "moved.star")
+    with open(counted.path("particles.star")) as file, open(moved, "w") as out:
+        for line in file:
+            words = line.split()
+            if len(words) == 7:
+                words[0] = str((float(words[0]) + 16) % 64)
+            out.write("\t".join(words) + "\n")
+    other = harness.succeed("evaluate", counted.path("truth.mrc"), "--particles", moved, "--json",
+                            counted.path("moved.json"))
+    assert other.returncode == 0
+    kinds = json.load(open(counted.path("moved.json")))["picks"]["kinds"]
+    assert kinds["ribosome"]["average_precision"] < 0.5
+
+
+def test_particles_of_files_take_the_place_of_random_proteins(counted):
+    source = os.path.join(counted.directory, "particle_ribosome.mrc")
+    ours = simulate("files", *COUNTED, "--particles", f"{source},12")
+    rows = [line.split() for line in open(ours.path("particles.star")) if len(line.split()) == 7]
+    kinds = [words[6] for words in rows]
+    assert set(kinds) <= {"receptor", "particle_ribosome"}
+    assert 5 <= kinds.count("particle_ribosome") <= 19  # 12 on average, less what finds no place
+    # The new reference looks like the file's density.
+    given = counted.read("particle_ribosome.mrc")
+    made = ours.read("particle_particle_ribosome.mrc")
+    n = min(len(given), len(made)) // 2
+    middle = [slice(len(v) // 2 - n, len(v) // 2 + n) for v in (given, made)]
+    assert np.corrcoef(given[(middle[0],) * 3].ravel(), made[(middle[1],) * 3].ravel())[0, 1] > 0.9
+
+
+def test_yardstick_d_is_made_by_its_seed_whatever_the_threads():
+    first = simulate("first", *COUNTED, "--seed", 4, threads=1)
+    again = simulate("again", *COUNTED, "--seed", 4, threads=2)
+    other = simulate("other", *COUNTED, "--seed", 5)
+    names = [*FILES, "tilt_series_even.mrc", "tilt_series_odd.mrc", "membranes.mrc", "particles.star",
+             "particle_ribosome.mrc", "tilt_series_ctf.txt", "tilt_series.defocus", "tilt_series.mdoc"]
+    for name in names:
+        assert filecmp.cmp(first.path(name), again.path(name), shallow=False), name
+    assert not filecmp.cmp(first.path("truth.mrc"), other.path("truth.mrc"), shallow=False)
+    # A plain series removes what only yardstick D writes.
+    assert run("simulate", first.directory, *SMALL, "--overwrite").returncode == 0
+    assert sorted(os.listdir(first.directory)) == sorted(FILES)
 
 
 def solid(bead):
@@ -406,7 +519,15 @@ def test_bad_options_are_named_and_nothing_is_written():
         (["--dose-per-tilt", "-1"], "dose per tilt"),
         (["--noise-blur", "-1"], "blur"),
         (["--noise-blur", "1", "--dose", "5"], "--noise-blur"),
-        (["--yardstick", "d"], "yardstick"),
+        (["--yardstick", "e"], "yardstick"),
+        (["--yardstick", "d", "--noise", "0.1"], "--dose-per-tilt"),
+        (["--yardstick", "d", "--dose", "100"], "--dose-per-tilt"),
+        (["--yardstick", "d", "--noise-blur", "1"], "--noise-blur"),
+        (["--yardstick", "d", "--contrast", "bright"], "bright"),
+        (["--yardstick", "d", "--dose-per-tilt", "0"], "dose per tilt"),
+        (["--yardstick", "d", "--particles", "ribosome.mrc"], "ribosome.mrc,40"),
+        (["--yardstick", "d", "--particles", "/nowhere/none.mrc,4"], "/nowhere/none.mrc"),
+        (["--yardstick", "c", "--particles", "ribosome.mrc,4"], "--yardstick d"),
         (["--yardstick", "a", "--extended"], "--extended"),
         (["--yardstick", "b", "--tilts", "-60:60:3"], "--tilts"),
     ):

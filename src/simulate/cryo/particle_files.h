@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "base/volume.h"
+#include "simulate/cryo/specimen.h"
+
+namespace tomofield::simulate {
+
+/// Returns a STAR file with the particles whose centres lie in the field of view. Coordinates are
+/// in voxels of the truth, where voxel i covers [i, i + 1), as rlnCoordinateX, Y and Z; angles are
+/// rlnAngleRot, Tilt and Psi; the kind is tomofieldParticleKind.
+std::string particle_list(const CryoSpecimen& specimen);
+
+/// Returns the density of a kind of particle in V above ice, in the orientation of zero angles, in
+/// a cube of an even number of voxels with the particle's origin in its centre.
+base::Volume reference_density(const ParticleKind& kind, double voxel_size_A);
+
+/// Returns a volume [z, y, x] of the phantom's shape that is 1 within 25 Å of the middle surface of
+/// a membrane, and 0 elsewhere.
+base::Volume membrane_label(const CryoSpecimen& specimen, double voxel_size_A);
+
+}  // namespace tomofield::simulate
