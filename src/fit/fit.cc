@@ -272,7 +272,8 @@ measurement::ViewErrors Fit::held_out_error(bool fit_view_scale) const {
     const auto predicted = predict(std::span(&view, 1), std::vector<measurement::ViewModel>(1));
     sums.front().push_back(measurement::sums_of(predicted.front(), {}));
   }
-  return measurement::view_errors(views, sums, binned_->noise_weights(), fit_view_scale);
+  return measurement::view_errors(views, sums, binned_->noise_weights(),
+                                  fit_view_scale || has_free_offsets());
 }
 
 std::vector<measurement::PredictedView> Fit::predict(
@@ -424,6 +425,12 @@ void Fit::score_held_out() {
   progress_.held_out_error.push_back(error.total);
 }
 
+// Says whether the transfers of the views take their means away, so that no density explains them.
+bool Fit::has_free_offsets() const {
+  return std::ranges::any_of(filters_.transfers,
+                             [](const auto& transfer) { return !transfer.passes_mean(); });
+}
+
 // Fits the models of the views to the sums of an epoch, or takes over what keep_views() gave.
 void Fit::fit_views(const std::vector<double>& noise_weights) {
   const bool knows_noise = options_.fit_noise && residuals_are_noise();
@@ -433,8 +440,14 @@ void Fit::fit_views(const std::vector<double>& noise_weights) {
   }
   if (knows_noise)
     measurement::fit_noise(noise_weights, fitted_views_, progress_.epoch_sums, progress_.views);
-  if (options_.fit_view_scale)
-    measurement::fit_nuisances(measurement::NuisancePrior{}, progress_.epoch_sums, progress_.views);
+  std::vector<measurement::ViewModel>& views = progress_.views;
+  const std::vector<measurement::ViewSums>& sums = progress_.epoch_sums;
+  if (options_.fit_view_scale) {
+    measurement::fit_nuisances({.has_free_offsets = has_free_offsets()}, sums, views);
+  } else if (has_free_offsets()) {
+    for (std::size_t v = 0; v < views.size(); ++v)
+      views[v].offset = measurement::mean_offset(sums[v], views[v]);
+  }
 }
 
 void Fit::end_epoch() {

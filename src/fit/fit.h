@@ -148,6 +148,7 @@ class Fit {
   void follow_noise();
   int steps_of_surrogates() const;
   bool needs_surrogates() const;
+  bool has_free_offsets() const;
   void make_surrogates();
   void take_step();
   bool is_traced_in_detail() const;

@@ -15,6 +15,7 @@
 #include "base/trace.h"
 #include "measurement/read_rays.h"
 #include "tilt_series/align_image.h"
+#include "tilt_series/align_means.h"
 #include "tilt_series/view_owner.h"
 #include "tilt_series/views_at_once.h"
 #include "tomofield/error.h"

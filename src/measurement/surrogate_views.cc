@@ -77,9 +77,11 @@ double bound_of(const ViewFilter* transfer, std::span<const double> weights) {
 }
 
 Surrogate surrogate_of(const PredictedView& view, const ViewFilter* transfer,
-                       const std::optional<NoiseColour>& noise, const ViewModel& model) {
+                       const std::optional<NoiseColour>& noise, ViewModel model) {
   PredictedView filtered = view;
   if (transfer) filtered.predicted = transfer->apply(view.predicted);
+  if (transfer && !transfer->passes_mean())
+    model.offset = mean_offset(sums_of(filtered, model), model);
   std::vector<float> residual = residual_of(filtered, model);
   std::vector<double> weights;
   if (noise) weights = weigh_frequencies(*noise, view, residual);

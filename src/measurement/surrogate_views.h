@@ -49,7 +49,8 @@ struct DataFilters {
 ///
 /// (Surrogates of this kind: De Pierro 1995; Daubechies, Defrise and De Mol 2004.) Its gradient at
 /// p₀ is that of the data term itself. A residual of a masked pixel counts as 0, and one that is
-/// larger than the model's limit counts as that limit. W is that of the present residual.
+/// larger than the model's limit counts as that limit. W is that of the present residual. The
+/// offset o is the model's, or mean_offset() if H does not pass the mean of the projection.
 class SurrogateViews {
  public:
   /// Makes room for the surrogates of `views`. `models` are those of all views. The surrogates have

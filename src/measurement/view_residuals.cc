@@ -91,8 +91,12 @@ void fit_nuisances(const NuisancePrior& prior, const std::vector<ViewSums>& sums
   for (std::size_t v = 0; v < views.size(); ++v) {
     const ViewSums& s = sums[v];
     const double w = views[v].weight;
-    const double prior_a = prior.shrinkage * w * s.pp + kNoRays;
-    const double prior_o = prior.shrinkage * w * s.n + kNoRays;
+    const double offsets = prior.has_free_offsets ? 0.0 : prior.shrinkage;
+    // Rounding errors of a prediction that is constant must not become a scale.
+    const double squares =
+        prior.has_free_offsets && s.n > 0 ? std::max(s.pp - s.p * s.p / s.n, 1e-6 * s.pp) : s.pp;
+    const double prior_a = prior.shrinkage * w * squares + kNoRays;
+    const double prior_o = offsets * w * s.n + kNoRays;
     const double aa = w * s.pp + prior_a, ao = w * s.p, oo = w * s.n + prior_o;
     const double rhs_a = w * s.pb + prior_a, rhs_o = w * s.b;
     const double determinant = aa * oo - ao * ao;
@@ -102,6 +106,12 @@ void fit_nuisances(const NuisancePrior& prior, const std::vector<ViewSums>& sums
   }
   const double common = std::exp(log_scales / static_cast<double>(views.size()));
   for (ViewModel& view : views) view.scale /= common;
+  if (!prior.has_free_offsets) return;
+  for (std::size_t v = 0; v < views.size(); ++v) views[v].offset = mean_offset(sums[v], views[v]);
+}
+
+double mean_offset(const ViewSums& sums, const ViewModel& model) {
+  return sums.n > 0 ? (sums.b - model.scale * sums.p) / sums.n : 0.0;
 }
 
 namespace {

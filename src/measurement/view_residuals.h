@@ -50,14 +50,22 @@ double ray_data_term(const ViewModel& model, double multiplicity, double measure
 ///
 ///   min  w Σ (a p + o − b)² + shrinkage · w (Σ p² (a − 1)² + n o²).
 ///
+/// A contrast transfer passes so little of the mean of a projection that the density cannot take it
+/// over. Then the offset is free, and p in the prior is the difference from its mean.
+///
 /// Without it an extended slab's laterally constant part could stay in free
 /// offsets; with it each fit leaves a share of the residual to the density,
 /// which takes it over in the course of the epochs. Afterwards Σ log scale = 0.
 struct NuisancePrior {
   double shrinkage = 0.1;
+  bool has_free_offsets = false;
 };
 void fit_nuisances(const NuisancePrior& prior, const std::vector<ViewSums>& sums,
                    std::vector<ViewModel>& views);
+
+/// Returns the offset with which a view's predictions have the mean of the measurements, with the
+/// scale of `model`; 0 without rays.
+double mean_offset(const ViewSums& sums, const ViewModel& model);
 
 /// Says how well a field predicts views.
 struct ViewErrors {

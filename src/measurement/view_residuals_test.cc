@@ -254,6 +254,24 @@ TEST(Nuisances, SolveTheNormalEquationsOfThePrior) {
   }
 }
 
+// A view may be far brighter than all of its contrast. A prior that shrank its offset would leave a
+// share of that to the density.
+TEST(Nuisances, FreeOffsetsTakeAllOfTheMeans) {
+  Truth truth = balanced_truth();
+  for (double& offset : truth.offsets) offset += 1000.0;
+  const auto sums = sums_of_views(truth);
+  std::vector<ViewModel> views(5);
+  fit_nuisances({.has_free_offsets = true}, sums, views);
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const ViewSums& s = sums[v];
+    EXPECT_NEAR(views[v].scale * s.p + views[v].offset * s.n, s.b, 1e-9 * s.b) << v;
+    EXPECT_EQ(views[v].offset, mean_offset(s, views[v]));
+    // The scale goes from 1 towards that of the view, as far as the prior lets it.
+    EXPECT_GT((views[v].scale - 1.0) * (truth.scales[v] - 1.0), truth.scales[v] == 1.0 ? -1.0 : 0.0)
+        << v;
+  }
+}
+
 TEST(Nuisances, AViewThatShowsNothingKeepsABoundedScale) {
   // A constant prediction or no ray at all: the prior alone decides.
   std::vector<ViewModel> views(2);

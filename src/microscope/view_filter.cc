@@ -145,6 +145,11 @@ void ViewFilter::for_transfers(std::int64_t s, const Visit& visit) const {
   }
 }
 
+bool ViewFilter::passes_mean() const {
+  const auto values = static_cast<float>(transform_.image_size());
+  return 2.0f * std::abs(values * computed_transfer(0, 0, 0)) >= 1.0f;
+}
+
 double ViewFilter::largest_transfer(double from, double to) const {
   const double count = std::ceil((to - from) / kStepOfBound);
   const double first = from / view_.pixel_size_A, step = (to - from) / count / view_.pixel_size_A;

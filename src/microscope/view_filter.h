@@ -52,6 +52,9 @@ class ViewFilter {
   /// Returns the number of defoci, one for each hat function.
   std::int64_t num_defoci() const { return num_defoci_; }
 
+  /// Says whether H leaves at least half of the mean of an image.
+  bool passes_mean() const;
+
   /// Returns a bound of |H_s| at frequencies from one to another, in cycles a pixel, up to 1 / √2.
   double largest_transfer(double from, double to) const;
 

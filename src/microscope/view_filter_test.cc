@@ -154,6 +154,16 @@ TEST(ViewFilter, OfPureAbsorptionInFocusChangesNothing) {
   EXPECT_LT(error_of(ViewFilter(33, 40, view).apply(image), image), 1e-6);
 }
 
+TEST(ViewFilter, PassesTheMeanUnlessAContrastTransferTakesItAway) {
+  ViewTransfer view;
+  view.defocus = {30000, 30000, 0, 0};
+  view.pixel_size_A = 10;
+  EXPECT_FALSE(ViewFilter(33, 40, view).passes_mean());
+  view.optics = without_phase_contrast(view.optics);
+  view.exposure = 60.0;
+  EXPECT_TRUE(ViewFilter(33, 40, view).passes_mean());
+}
+
 TEST(ViewFilter, KeepsAFlatImageFlat) {
   // Frequency 0 has the phase shift of 20 degrees and the amplitude contrast of 0.07.
   const double gain = std::sin(20 * std::numbers::pi / 180 + std::asin(0.07));

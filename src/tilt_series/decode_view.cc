@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "tilt_series/align_image.h"
+#include "tilt_series/band_limited_image.h"
 #include "tilt_series/binning.h"
 #include "tilt_series/masks/bad_pixels.h"
 #include "tilt_series/masks/fill.h"
@@ -35,7 +36,8 @@ std::size_t decoding_memory(double raw_pixels, double bin_factor) {
   constexpr double kBytesPerPixel = 5;
   constexpr double kCopies = 3;
   const double binned = raw_pixels / (bin_factor * bin_factor);
-  return static_cast<std::size_t>(kCopies * kBytesPerPixel * (raw_pixels + binned));
+  return static_cast<std::size_t>(kCopies * kBytesPerPixel * (raw_pixels + binned)) +
+         BandLimitedImage::memory(raw_pixels);
 }
 
 ViewDecoder::ViewDecoder(const io::ImageStack& stack, const SeriesPlan& plan, Contrast contrast,
