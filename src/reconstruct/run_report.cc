@@ -363,7 +363,7 @@ std::string run_report(const ReportSource& source) {
   const json& metrics = fits.front().metrics;
   const json& verdict = source.record.at("metrics").at("verdict");
   const std::vector<float> sample = report::sample_voxels(io::MrcReader(source.volume));
-  const report::EmbeddedVolume volume = report::embed_volume(source.volume, sample);
+  const report::EmbeddedVolume volume = report::embed_volume(source.volume);
   HtmlPage page("Tomogram of " + source.files.stack.filename().string());
   page.add_paragraph(fmt::format("{}, reconstructed with tomofield {} ({})",
                                  source.files.stack.string(), library_version(),
