@@ -74,7 +74,9 @@ void add_verdict(const json& verdict, HtmlPage& page) {
   if (texts.empty()) {
     const char* const checked =
         verdict.at("views").is_object()
-            ? "Contrast, order of the tilts, alignment, thickness and noise were checked"
+            ? "Contrast, order of the tilts, alignment, tilt axis, thickness, noise and residual "
+              "were "
+              "checked"
             : "The thickness was checked, which is all that --engine ray allows";
     page.add_notice("No warning",
                     {fmt::format("{}, and nothing seems off. No check can see a wrong hand, or a "
