@@ -88,16 +88,13 @@ void print_plan(const reconstruction::ReconstructOptions& options,
         "the whole region before them\n",
         plan.tiles.tiles_from(0).size(), plan.tiles.rows, plan.tiles.num_whole_stages);
   }
-  if (plan.num_fits == 2)
-    print(
-        "halves: two such fits, one after the other, which share the scales of views of a short "
-        "fit before them\n");
+  if (options.makes_halves())
+    print("halves: two fits more, of one half of the {} each, after that of all data\n",
+          options.resolved.split_tilts ? "tilts" : "frames");
   flush_output();  // the plan comes before other output, in a file too
 }
 
 void print_files_of_halves(const reconstruction::OutputPaths& paths, bool with_linear_volumes) {
-  print("tomogram  {} (mean of both halves)\nmetrics   {}\nreport    {}\n", paths.volume.string(),
-        paths.json.string(), paths.report.string());
   for (const reconstruction::OutputPaths::OfHalf& half : paths.halves) {
     print("half      {}, model {}\n", half.volume.string(), half.model.string());
     if (with_linear_volumes) print("linear    {}\n", half.linear_volume.string());
@@ -108,10 +105,9 @@ void print_files_of_halves(const reconstruction::OutputPaths& paths, bool with_l
 
 void print_files(const reconstruction::ReconstructOptions& options,
                  const reconstruction::OutputPaths& paths) {
-  if (options.makes_halves())
-    return print_files_of_halves(paths, options.resolved.denoising_halves);
   print("tomogram  {}\nmodel     {}\nmetrics   {}\nreport    {}\n", paths.volume.string(),
         paths.model.string(), paths.json.string(), paths.report.string());
+  if (options.makes_halves()) print_files_of_halves(paths, options.resolved.denoising_halves);
 }
 
 // Writes the report of a run beside its other results, which have temporary names yet.
@@ -129,7 +125,7 @@ void write_report(const reconstruction::Results& results,
                                       .held_out_picture = {}};
   if (options.field.tree == TreeKind::kAdaptive)
     source.tree_picture = written.location_of(paths.tree_picture);
-  if (options.fit.hold_out > 0 && !options.makes_halves())
+  if (options.fit.hold_out > 0)
     source.held_out_picture = written.location_of(paths.held_out_picture);
   io::write_text_file(paths.report, reconstruction::run_report(source));
 }
@@ -206,7 +202,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
   const bool is_job = processes.size() > 1;
   stop_on_signals(is_job);
-  if (is_job) processes.set_waiting_callback(tell_if_stuck(options.first_model(paths), processes));
+  if (is_job) processes.set_waiting_callback(tell_if_stuck(paths.model, processes));
   std::vector<std::filesystem::path> pictures;
   reconstruction::ReconstructHooks hooks{
       .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};

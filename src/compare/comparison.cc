@@ -22,6 +22,7 @@
 #include "io/output_lock.h"
 #include "io/output_set.h"
 #include "output/shared_options.h"
+#include "report/contrast.h"
 #include "report/curve_plot.h"
 #include "report/html.h"
 #include "report/pictures.h"
@@ -105,11 +106,12 @@ void add_pictures(const CompareOptions& options, const std::vector<Row>& rows,
   const fs::path folder = options.folder / "pictures";
   fs::create_directories(folder);
   const std::vector<Shown> shown = shown_volumes(rows, options.truth);
-  const report::GreyScale scale = report::grey_scale_of(shown.front().planes);
+  const bool begins_with_truth = options.truth && shown.size() > rows.size();
+  const report::GreyScale scale(
+      report::contrast_of(io::MrcReader(begins_with_truth ? *options.truth : rows.front().volume)));
   page.add_heading("Central slices");
   page.add_paragraph(
-      "All slices and details share one grey scale: the 0.5 to 99.5 percentiles of the first "
-      "volume.");
+      "All slices and details share one grey scale: that of the middle of the first volume.");
   for (std::size_t plane = 0; plane < 3; ++plane) {
     page.add_paragraph(std::array{"XY", "XZ", "YZ"}[plane]);
     page.add_figures(plane_figures(shown, plane, scale, folder));

@@ -67,6 +67,20 @@ Spectrum cross_correlation(const Image& reference, const Image& moved) {
   return product;
 }
 
+// Returns an image whose content lies dx and dy pixels farther; NaN where it had none.
+Image shifted(const Image& image, std::int64_t dx, std::int64_t dy) {
+  Image result{image.width, image.height,
+               std::vector<float>(image.values.size(), std::numeric_limits<float>::quiet_NaN())};
+  const std::int64_t first_x = std::max<std::int64_t>(dx, 0);
+  const std::int64_t count = image.width - std::abs(dx);
+  if (count <= 0) return result;
+  for (std::int64_t y = std::max<std::int64_t>(dy, 0);
+       y < image.height + std::min<std::int64_t>(dy, 0); ++y)
+    std::copy_n(image.values.begin() + (y - dy) * image.width + first_x - dx, count,
+                result.values.begin() + y * image.width + first_x);
+  return result;
+}
+
 // Returns the place of the maximum of a parabola through three neighbours, from −½ to ½.
 double vertex(double before, double here, double after) {
   const double curvature = before - 2 * here + after;
@@ -134,19 +148,21 @@ double correlation(const Image& one, const Image& other) {
   return vx > 0 && vy > 0 ? (n * xy - x * y) / std::sqrt(vx * vy) : 0.0;
 }
 
-std::array<double, 2> neighbour_correlation(const Image& one, const Image& other) {
+double shifted_correlation(const Image& one, const Image& other, std::int64_t reach) {
+  double best = -1.0;
+  for (std::int64_t dy = -reach; dy <= reach; ++dy)
+    for (std::int64_t dx = -reach; dx <= reach; ++dx)
+      best = std::max(best, correlation(one, shifted(other, dx, dy)));
+  return best;
+}
+
+std::array<double, 2> difference_correlation(const Image& one, const Image& other,
+                                             std::int64_t distance) {
   Image difference{one.width, one.height, {}};
   for (std::size_t i = 0; i < one.values.size(); ++i)
     difference.values.push_back(one.values[i] - other.values[i]);
-  Image along_x = difference, along_y = difference;
-  const auto width = static_cast<std::ptrdiff_t>(one.width);
-  std::ranges::fill(along_x.values, std::numeric_limits<float>::quiet_NaN());
-  along_y.values = along_x.values;
-  for (std::ptrdiff_t y = 0; y < one.height; ++y)
-    std::copy_n(difference.values.begin() + y * width + 1, width - 1,
-                along_x.values.begin() + y * width);
-  std::copy(difference.values.begin() + width, difference.values.end(), along_y.values.begin());
-  return {correlation(difference, along_x), correlation(difference, along_y)};
+  return {correlation(difference, shifted(difference, distance, 0)),
+          correlation(difference, shifted(difference, 0, distance))};
 }
 
 std::array<double, 2> displacement(const Image& reference, const Image& moved) {

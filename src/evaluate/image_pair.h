@@ -26,9 +26,15 @@ Image without_column_means(const Image& image);
 /// there are none or if one of them is constant.
 double correlation(const Image& one, const Image& other);
 
-/// Returns the correlation of the differences of two images between neighbours along x and along y.
-/// It is 0 along an axis without neighbours that both images have, and for a constant difference.
-std::array<double, 2> neighbour_correlation(const Image& one, const Image& other);
+/// Returns the largest correlation of two images of one size that is found by moving one of them by
+/// up to `reach` pixels along x and y.
+double shifted_correlation(const Image& one, const Image& other, std::int64_t reach);
+
+/// Returns the correlation of the differences of two images between pixels that are `distance`
+/// apart along x and along y. It is 0 along an axis without such pixels that both images have, and
+/// for a constant difference.
+std::array<double, 2> difference_correlation(const Image& one, const Image& other,
+                                             std::int64_t distance);
 
 /// Returns how far, along x and y in pixels, the content of `moved` lies from that of `reference`:
 /// the maximum of their cross-correlation within a quarter of the image, between pixels by a

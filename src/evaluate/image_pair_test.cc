@@ -70,12 +70,23 @@ TEST(ImagePair, NeighboursOfCorrelatedNoiseAreAlike) {
       }
     }
     for (std::size_t i = 0; i < 500; ++i) seen.values[7 * i] = kNone;
-    const auto [x, y] = neighbour_correlation(seen, told);
-    EXPECT_NEAR(x, blur, 0.05);
-    EXPECT_NEAR(y, 0.0, 0.05);
+    for (const int distance : {1, 2}) {
+      const auto [x, y] = difference_correlation(seen, told, distance);
+      EXPECT_NEAR(x, std::pow(blur, distance), 0.05);
+      EXPECT_NEAR(y, 0.0, 0.05);
+    }
   }
   const Image row{3, 1, {1, 4, 2}};
-  EXPECT_EQ(neighbour_correlation(row, row), (std::array{0.0, 0.0}));
+  EXPECT_EQ(difference_correlation(row, row, 1), (std::array{0.0, 0.0}));
+  EXPECT_EQ(difference_correlation(row, row, 5), (std::array{0.0, 0.0}));
+}
+
+TEST(ImagePair, ShiftedCorrelationFindsTheContentWithinReach) {
+  const Image here = details(48, 40, 0, 0), there = details(48, 40, 3, -2);
+  EXPECT_GT(shifted_correlation(here, there, 3), 0.98);
+  EXPECT_NEAR(shifted_correlation(here, there, 3), shifted_correlation(there, here, 3), 1e-12);
+  EXPECT_LT(shifted_correlation(here, there, 1), 0.95);
+  EXPECT_EQ(shifted_correlation(here, there, 0), correlation(here, there));
 }
 
 TEST(ImagePair, ReducedImageHasTheMeansOfMeasuredPixels) {

@@ -68,6 +68,15 @@ void StarTable::set(std::size_t row, const std::string& column, std::string valu
   cells_[row * columns_.size() + *index_of(column)] = std::move(value);
 }
 
+void StarTable::remove(std::string_view column) {
+  const auto index = index_of(column);
+  if (!index) return;
+  const std::size_t width = columns_.size();
+  for (std::size_t row = num_rows(); row-- > 0;)
+    cells_.erase(cells_.begin() + static_cast<std::ptrdiff_t>(row * width + *index));
+  columns_.erase(columns_.begin() + static_cast<std::ptrdiff_t>(*index));
+}
+
 std::vector<StarTable> read_star_file(const std::filesystem::path& path) {
   std::string text = read_text_file(path);
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";

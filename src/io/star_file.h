@@ -30,6 +30,8 @@ class StarTable {
   void add_row(std::vector<std::string> cells);
   /// Sets one value. A column that is new is added at the end, with "None" in the other rows.
   void set(std::size_t row, const std::string& column, std::string value);
+  /// Removes a column. Does nothing without such a column.
+  void remove(std::string_view column);
 
  private:
   std::optional<std::size_t> index_of(std::string_view column) const;

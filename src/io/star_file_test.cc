@@ -80,5 +80,17 @@ TEST(StarFile, WritesWhatItReads) {
   EXPECT_EQ(tables[0].find(1, "rlnTomoReconstructedTomogram"), "_a.mrc");
 }
 
+TEST(StarFile, RemovesAColumn) {
+  StarTable table("global", {"a", "b", "c"});
+  table.add_row({"1", "2", "3"});
+  table.add_row({"4", "5", "6"});
+  table.remove("b");
+  table.remove("d");
+  EXPECT_EQ(table.columns(), (std::vector<std::string>{"a", "c"}));
+  EXPECT_EQ(table.num_rows(), 2u);
+  EXPECT_EQ(table.find(1, "a"), "4");
+  EXPECT_EQ(table.find(0, "c"), "3");
+}
+
 }  // namespace
 }  // namespace tomofield::io

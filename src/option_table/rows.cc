@@ -311,7 +311,7 @@ constexpr Row kRows[] = {
     // Halves
     {.key = "input.even", .flag = "--even", MEMBER(SeriesFiles, even), .group = Group::kHalves,
      .help = "MRC stack of the even frames alone; STACK is the sum or the mean of all frames. With "
-             "--odd, the program fits both separately and writes two volumes and their mean"},
+             "--odd, the program also fits both separately and writes how they agree"},
     {.key = "input.odd", .flag = "--odd", MEMBER(SeriesFiles, odd), .group = Group::kHalves,
      .help = "MRC stack of the odd frames alone"},
     {.key = "fit.split_tilts", .flag = "--split-tilts", MEMBER(Options, split_tilts),

@@ -272,6 +272,7 @@ std::string fingerprint_of(const ReconstructOptions& options,
   json.erase("volume");
   for (const char* of_results : {"budget", "tile_rows"})  // they change no stage of the fit
     json["field"].erase(of_results);
+  json["fit"].erase("split_tilts");  // the views of a half tell it apart
   json["tilt_deg"] = series.geometry.tilt_deg;
   if (series.ray_geometry) json["alignment"] = alignment_json(*series.ray_geometry);
   json["bin_factor"] = series.bin_factor;

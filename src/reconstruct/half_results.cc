@@ -11,7 +11,7 @@
 #include "baseline/run_baseline.h"
 #include "evaluate/block_fsc.h"
 #include "evaluate/local_resolution.h"
-#include "evaluate/mean_and_uncertainty.h"
+#include "evaluate/uncertainty.h"
 #include "io/json.h"
 #include "io/output_set.h"
 #include "output/volume.h"
@@ -46,21 +46,24 @@ evaluate::TiltRange tilt_range(const Run& run) {
                                             : evaluate::TiltRange{-high, -low, axes};
 }
 
-// Samples one model after the other. Scaled integers have one factor in both, so that they and
-// their mean compare.
+// Samples one model after the other. Scaled integers have one factor in all volumes, so that these
+// compare.
 void write_volumes(const Run& run) {
   output::VolumeOptions options = run.options.volume;
-  options.zarr = false;  // of the mean alone
+  std::vector<std::pair<std::filesystem::path, std::filesystem::path>> volumes_of_models{
+      {run.paths.model, run.paths.volume}};
+  for (const Half half : tilt_series::kBothHalves)
+    volumes_of_models.emplace_back(paths_of(run, half).model, paths_of(run, half).volume);
   if (options.mode == io::MrcMode::kInt16) {
     float largest = 0.0f;
-    for (const Half half : tilt_series::kBothHalves)
-      largest =
-          std::max(largest, output::largest_density(output::load_model(paths_of(run, half).model)));
+    for (const auto& [model, volume] : volumes_of_models)
+      largest = std::max(largest, output::largest_density(output::load_model(model)));
     options.largest_density = largest;
   }
-  for (const Half half : tilt_series::kBothHalves)
-    output::write_volume(output::load_model(paths_of(run, half).model), options,
-                         paths_of(run, half).volume);
+  for (const auto& [model, volume] : volumes_of_models) {
+    output::write_volume(output::load_model(model), options, volume);
+    options.zarr = false;  // of the volume of all data alone
+  }
 }
 
 void write_linear_volumes(const tilt_series::TiltSeries& series, const Run& run) {
@@ -76,8 +79,6 @@ Agreement write_maps(const tilt_series::TiltSeries& series, const Run& run,
   const std::filesystem::path even = outputs.location_of(paths_of(run, Half::kEven).volume);
   const std::filesystem::path odd = outputs.location_of(paths_of(run, Half::kOdd).volume);
   const evaluate::TiltRange tilts = tilt_range(run);
-  evaluate::write_mean(even, odd, run.options.volume.mode, run.paths.volume);
-  if (run.options.volume.zarr) output::write_zarr(run.paths.volume);
   evaluate::write_uncertainty(even, odd, run.paths.uncertainty);
   Agreement found{.fsc = evaluate::correlate_blocks(even, odd, tilts),
                   .linear_fsc = {},
@@ -106,43 +107,7 @@ void write_fsc_plot(const Agreement& found, const std::filesystem::path& path) {
   report::write_curve_plot(report::fsc_axes(fsc.frequency_per_A.back()), curves, path);
 }
 
-// Returns the members that both objects have with the same value.
-json common_part(const json& a, const json& b) {
-  json common = json::object();
-  for (const auto& [key, value] : a.items())
-    if (b.contains(key) && b.at(key) == value) common[key] = value;
-  return common;
-}
-
-// Returns what both fits share of each view. They have residuals of their own.
-json common_views(const json& a, const json& b) {
-  json common = json::array();
-  for (std::size_t view = 0; view < a.size(); ++view)
-    common.push_back(common_part(a.at(view), b.at(view)));
-  return common;
-}
-
-// Joins two verdicts: mean residuals, and the warnings of both.
-Verdict verdict_on_both(const Verdict& even, const Verdict& odd) {
-  Verdict both = even;
-  both.residual = (even.residual + odd.residual) / 2;
-  both.seconds = std::max(even.seconds, odd.seconds);
-  both.peak_GiB = std::max(even.peak_GiB, odd.peak_GiB);
-  for (const Warning& warning : odd.warnings)
-    if (std::ranges::find(both.warnings, warning.code, &Warning::code) == both.warnings.end())
-      both.warnings.push_back(warning);
-  return both;
-}
-
-json metrics_of_both(const FinishedHalves& halves, const Verdict& verdict) {
-  const json &even = halves.front().metrics, &odd = halves.back().metrics;
-  json metrics = common_part(even, odd);
-  metrics["views"] = common_views(even.at("views"), odd.at("views"));
-  metrics["verdict"] = verdict_json(verdict);
-  return metrics;
-}
-
-json halves_json(const Run& run, const FinishedHalves& halves, const Agreement& found) {
+json halves_json(const Run& run, const FinishedFits& fits, const Agreement& found) {
   const auto text = [](const std::filesystem::path& path) {
     return base::utf8_text(path.string());
   };
@@ -167,7 +132,7 @@ json halves_json(const Run& run, const FinishedHalves& halves, const Agreement& 
   for (const Half half : tilt_series::kBothHalves)
     all[name_of(half)] = {{"volume", text(paths_of(run, half).volume)},
                           {"model", text(paths_of(run, half).model)},
-                          {"metrics", halves[static_cast<std::size_t>(half)].metrics}};
+                          {"metrics", fits.halves[static_cast<std::size_t>(half)].metrics}};
   if (found.linear_fsc)
     all["linear"] = {{"even", text(even.linear_volume)},
                      {"odd", text(odd.linear_volume)},
@@ -199,9 +164,10 @@ void log_halves(const Run& run, const evaluate::Fsc& fsc) {
 // Throws the exception that is being handled, and says that the fits are not lost.
 [[noreturn]] void say_that_models_are_kept(const Run& run) {
   const std::string advice = fmt::format(
-      "; the finished fits are kept in '{}' and '{}': the same command with --resume writes the "
-      "results",
-      paths_of(run, Half::kEven).model.string(), paths_of(run, Half::kOdd).model.string());
+      "; the finished fits are kept in '{}', '{}' and '{}': the same command with --resume writes "
+      "the results",
+      run.paths.model.string(), paths_of(run, Half::kEven).model.string(),
+      paths_of(run, Half::kOdd).model.string());
   try {
     throw;
   } catch (const Error& error) {
@@ -209,16 +175,17 @@ void log_halves(const Run& run, const evaluate::Fsc& fsc) {
   }
 }
 
-void write_all(const tilt_series::TiltSeries& series, const Run& run, const FinishedHalves& halves,
+void write_all(const tilt_series::TiltSeries& series, const Run& run, const FinishedFits& fits,
                const std::optional<TunedFit>& tuned, Results& results) {
   io::OutputSet outputs;
   const Agreement found = write_maps(series, run, outputs);
   write_fsc_plot(found, run.paths.fsc_picture);
   if (tuned) write_choice_plot(*tuned, run.paths.choice_picture);
-  results.metrics["halves"] = halves_json(run, halves, found);
+  if (fits.held_out_view)
+    report::write_held_out_picture(*fits.held_out_view, run.paths.held_out_picture);
+  results.metrics["halves"] = halves_json(run, fits, found);
   io::write_json(run.paths.json, results.metrics);
   if (run.hooks.write_more) run.hooks.write_more(results, outputs.location_of(run.paths.volume));
-  outputs.remove_old(run.paths.model);  // of a run without halves
   outputs.commit();
   log_halves(run, found.fsc);
 }
@@ -226,17 +193,20 @@ void write_all(const tilt_series::TiltSeries& series, const Run& run, const Fini
 }  // namespace
 
 Results write_half_results(const tilt_series::TiltSeries& series, const Run& run,
-                           const FinishedHalves& halves, const std::optional<TunedFit>& tuned) {
-  Verdict verdict = verdict_on_both(halves.front().verdict, halves.back().verdict);
-  json metrics = run_json(run.options, metrics_of_both(halves, verdict));
+                           const FinishedFits& fits, const std::optional<TunedFit>& tuned) {
+  Verdict verdict = fits.whole.verdict;
+  verdict.seconds = fits.halves.back().verdict.seconds;  // of all three fits
+  verdict.peak_GiB = fits.halves.back().verdict.peak_GiB;
+  json metrics = fits.whole.metrics;
+  metrics["verdict"] = verdict_json(verdict);
   Results results{.model = {},
-                  .metrics = std::move(metrics),
+                  .metrics = run_json(run.options, std::move(metrics)),
                   .verdict = std::move(verdict),
                   .bead_masking = run.measurement.masks.bead_masking};
   run.processes.run_collectively([&] {
     if (!run.processes.is_root()) return;
     try {
-      write_all(series, run, halves, tuned, results);
+      write_all(series, run, fits, tuned, results);
     } catch (const Error&) {
       say_that_models_are_kept(run);
     }

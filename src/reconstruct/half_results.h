@@ -10,15 +10,19 @@
 
 namespace tomofield::reconstruction {
 
-/// Holds the findings of the fits of both halves, [tilt_series::Half].
-using FinishedHalves = std::array<Findings, 2>;
+/// Holds what the fits of all data and of both halves found.
+struct FinishedFits {
+  Findings whole;
+  std::optional<measurement::PredictedView> held_out_view;  ///< as the fit of all data predicts it
+  std::array<Findings, 2> halves;                           ///< [tilt_series::Half]
+};
 
-/// Writes the results of two finished fits, whose models are in their files: the volumes of both
-/// halves and their mean, their shell correlation with its plot, the local resolution, the
-/// uncertainty of the mean, linear halves if the options ask for them, and the metrics. All of them
-/// appear together (io::OutputSet). If one cannot be written, none appears; the models stay, and
-/// Error is thrown. Every process calls it; the root writes.
+/// Writes the results of three finished fits, whose models are in their files: the volume of all
+/// data and those of both halves, the shell correlation of the halves with its plot, the local
+/// resolution, the uncertainty, linear halves if the options ask for them, and the metrics. All of
+/// them appear together (io::OutputSet). If one cannot be written, none appears; the models stay,
+/// and Error is thrown. Every process calls it; the root writes.
 Results write_half_results(const tilt_series::TiltSeries& series, const Run& run,
-                           const FinishedHalves& halves, const std::optional<TunedFit>& tuned);
+                           const FinishedFits& fits, const std::optional<TunedFit>& tuned);
 
 }  // namespace tomofield::reconstruction

@@ -3,36 +3,85 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <string>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include "base/log.h"
-#include "base/trace.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/half_measurement.h"
 #include "reconstruct/half_results.h"
 #include "reconstruct/results.h"
 #include "reconstruct/run_fit.h"
-#include "reconstruct/shared_views.h"
 
 namespace tomofield::reconstruction {
 namespace {
 
 using tilt_series::Half;
 
-// Puts the progress of one of two fits into that of both.
-base::ProgressSink progress_of_half(const base::ProgressSink& both, Half half) {
-  if (!both) return {};
-  return [&both, half](base::ProgressReport report) {
-    const bool is_first = half == tilt_series::kBothHalves.front();
-    if (is_first) report.seconds_left += report.seconds_elapsed + report.seconds_left;
-    report.fraction_done = (report.fraction_done + (is_first ? 0 : 1)) / 2;
-    report.detail = fmt::format("{} half  {}", name_of(half), report.detail);
-    both(report);
+// The part of a run's work that one of its fits is, as fractions of all views that are fitted.
+struct Share {
+  double begin = 0.0, size = 1.0;
+};
+
+// Describes one of the fits of a run.
+struct Part {
+  std::string name;
+  const measurement::Measurement& measurement;
+  const std::filesystem::path& model;
+  std::vector<measurement::ViewModel> kept_views;  // empty: the fit finds its own
+  Share share;
+};
+
+// Holds what a finished fit leaves.
+struct FinishedPart {
+  Findings findings;
+  std::vector<measurement::ViewModel> views;
+  std::optional<measurement::PredictedView> held_out_view;
+  bool took_steps = false;
+};
+
+// Puts the progress of one fit into that of all.
+base::ProgressSink progress_of(const base::ProgressSink& all, const Part& part) {
+  if (!all) return {};
+  return [&all, name = part.name, share = part.share](base::ProgressReport report) {
+    const double of_this = report.seconds_elapsed + report.seconds_left;
+    report.seconds_left += of_this * (1 - share.begin - share.size) / share.size;
+    report.fraction_done = share.begin + share.size * report.fraction_done;
+    report.detail = fmt::format("{}  {}", name, report.detail);
+    all(report);
   };
 }
 
-// Removes a model that an earlier run left: it is to be replaced, and a resumed run must not take
-// it for a checkpoint of this one.
+// Makes a fit, examines it, and saves its model. Returns nothing if a stop was requested; there is
+// a checkpoint then.
+std::optional<FinishedPart> fit_part(const Run& run, RunRecord record,
+                                     const std::optional<TunedFit>& tuned, const Part& part,
+                                     bool resumes) {
+  base::log_info(fmt::format("{}: {} views", part.name, part.measurement.num_fitted_views()));
+  record.origin = {fingerprint_of(run.options, part.measurement, run.processes), tuned};
+  const base::ProgressSink progress = progress_of(run.hooks.progress, part);
+  const FitRun made = run_fit(run, {.measurement = part.measurement,
+                                    .model = part.model,
+                                    .origin = record.origin,
+                                    .resumes = resumes,
+                                    .progress = progress,
+                                    .kept_views = part.kept_views});
+  if (made.was_stopped) return std::nullopt;
+  record.fit_seconds = made.seconds;
+  made.fit->free_optimizer();  // the verdict needs the memory
+  FinishedPart finished{.findings = examine(*made.fit, part.measurement, run.options, record),
+                        .views = made.fit->progress().views,
+                        .took_steps = made.took_steps};
+  finished.held_out_view = central_held_out_view(*made.fit, part.measurement, finished.findings);
+  save_fit(part.model, *made.fit, model_info(part.measurement, run.options),
+           progress_state(*made.fit, record.origin));
+  return finished;
+}
+
+// Removes the model of a half that an earlier run left: it is to be replaced, and a resumed run
+// must not take it for a checkpoint of this one.
 void forget_old_model(const Run& run, Half half) {
   std::error_code ignored;
   if (run.processes.is_root())
@@ -43,35 +92,37 @@ void forget_old_model(const Run& run, Half half) {
 
 RunResult reconstruct_halves(const tilt_series::TiltSeries& series, const Run& run,
                              const RunRecord& record, const std::optional<TunedFit>& tuned) {
-  const auto shared_views = find_shared_views(run);
-  if (!shared_views) return {.outcome = Outcome::kStoppedTuning};
-  FinishedHalves finished;
   bool resumes = run.options.resolved.resume;
+  // A half of the tilts has half of the views, and a half of the frames has all of them.
+  const double of_half = run.options.resolved.split_tilts ? 1.0 / 4 : 1.0 / 3;
+  std::optional<FinishedPart> whole = fit_part(run, record, tuned,
+                                               {.name = "all data",
+                                                .measurement = run.measurement,
+                                                .model = run.paths.model,
+                                                .kept_views = {},
+                                                .share = {0.0, 1 - 2 * of_half}},
+                                               resumes);
+  if (!whole) return {.outcome = Outcome::kStopped, .results = {}, .checkpoint = run.paths.model};
+  resumes = resumes && !whole->took_steps;
+  FinishedFits finished{.whole = std::move(whole->findings),
+                        .held_out_view = std::move(whole->held_out_view),
+                        .halves = {}};
   for (const Half half : tilt_series::kBothHalves) {
+    if (!resumes) forget_old_model(run, half);
     const auto at = static_cast<std::size_t>(half);
     const measurement::Measurement measured = half_measurement(series, half, run);
-    base::log_info(fmt::format("{} half of the {}: {} views", name_of(half),
-                               run.options.files.even ? "frames" : "tilts",
-                               measured.num_fitted_views()));
-    RunRecord record_of_half = record;
-    record_of_half.origin = {fingerprint_of(run.options, measured, run.processes), tuned};
-    const base::ProgressSink progress = progress_of_half(run.hooks.progress, half);
     const std::filesystem::path& model = run.paths.halves[at].model;
-    const FitRun made = run_fit(run, {.measurement = measured,
-                                      .model = model,
-                                      .origin = record_of_half.origin,
-                                      .resumes = resumes,
-                                      .progress = progress,
-                                      .kept_views = views_of_half(*shared_views, run)});
-    if (made.was_stopped) return {.outcome = Outcome::kStopped, .checkpoint = model};
-    record_of_half.fit_seconds = made.seconds;
-    finished[at] = examine(*made.fit, measured, run.options, record_of_half);
-    save_fit(model, *made.fit, model_info(measured, run.options),
-             progress_state(*made.fit, record_of_half.origin));
-    if (made.took_steps && half == Half::kEven) {
-      resumes = false;
-      forget_old_model(run, Half::kOdd);
-    }
+    std::optional<FinishedPart> made =
+        fit_part(run, record, tuned,
+                 {.name = fmt::format("{} half", name_of(half)),
+                  .measurement = measured,
+                  .model = model,
+                  .kept_views = views_of_half(whole->views, run),
+                  .share = {1 - of_half * static_cast<double>(2 - at), of_half}},
+                 resumes);
+    if (!made) return {.outcome = Outcome::kStopped, .results = {}, .checkpoint = model};
+    resumes = resumes && !made->took_steps;
+    finished.halves[at] = std::move(made->findings);
   }
   return {.outcome = Outcome::kFinished,
           .results = write_half_results(series, run, finished, tuned)};

@@ -9,11 +9,12 @@
 
 namespace tomofield::reconstruction {
 
-/// Reconstructs both halves of the frames or of the tilts (docs/halves.md): two fits, one after the
-/// other, that share geometry, masks, noise, penalty, weights, and the models of the views
-/// (shared_views.h). Each half has a model file, which is its checkpoint. Then half_results.h
-/// writes the volumes and what they tell. `run` has its settings chosen, by `tuned` if there were
-/// trials. Every process calls it.
+/// Reconstructs all data, and then both halves of the frames or of the tilts (docs/halves.md):
+/// three fits, one after the other, that share geometry, masks, noise, penalty and weights. The
+/// first is the fit of a run without halves. The halves keep the models of the views that it found.
+/// Each fit has a model file, which is its checkpoint. Then half_results.h writes the volumes and
+/// what they tell. `run` has its settings chosen, by `tuned` if there were trials. Every process
+/// calls it.
 RunResult reconstruct_halves(const tilt_series::TiltSeries& series, const Run& run,
                              const RunRecord& record, const std::optional<TunedFit>& tuned);
 

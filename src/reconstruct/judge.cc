@@ -52,6 +52,7 @@ Verdict judge(const FinishedFit& finished, const std::optional<measurement::View
   verdict.peak_GiB = processes.allreduce_max(static_cast<double>(base::peak_memory())) / (1 << 30);
   verdict.warnings = find_warnings(verdict, {.contrast = finished.options.input.contrast,
                                              .alignment = finished.record.alignment,
+                                             .tilt_deg = series.geometry.tilt_deg,
                                              .thickness = series.geometry.thickness,
                                              .bin_factor = series.bin_factor});
   return verdict;

@@ -106,10 +106,9 @@ void add_half_files(const OutputPaths& paths, bool with_linear_volumes,
 bool can_resume(const ReconstructOptions& options, const OutputPaths& paths) {
   const Options& resolved = options.resolved;
   const auto has = [](const std::filesystem::path& file) { return std::filesystem::exists(file); };
-  return resolved.resume &&
-         (has(options.first_model(paths)) || (resolved.tune && has(paths.trials)) ||
-          (resolved.align != Alignment::kOff && has(paths.alignment)) ||
-          (options.may_use_tiles() && has(paths.tiles)));
+  return resolved.resume && (has(paths.model) || (resolved.tune && has(paths.trials)) ||
+                             (resolved.align != Alignment::kOff && has(paths.alignment)) ||
+                             (options.may_use_tiles() && has(paths.tiles)));
 }
 
 // Returns the files that the run writes, but for the pictures of slices.
@@ -121,8 +120,7 @@ std::vector<std::filesystem::path> result_files(const ReconstructOptions& option
   if (options.may_use_tiles()) results.push_back(paths.tiles);
   if (resolved.tune) results.push_back(paths.trials);
   if (resolved.align != Alignment::kOff) results.push_back(paths.alignment);
-  if (options.fit.hold_out > 0 && !options.makes_halves())
-    results.push_back(paths.held_out_picture);
+  if (options.fit.hold_out > 0) results.push_back(paths.held_out_picture);
   if (options.makes_halves()) add_half_files(paths, resolved.denoising_halves, results);
   if (resolved.tune || options.open.any()) results.push_back(paths.choice_picture);
   for (const auto& file : exchange_files(options)) results.push_back(file);
@@ -237,7 +235,7 @@ std::vector<std::string> ReconstructOptions::faults() const {
     }
     refuse_if(field.kind != FieldKind::kGrid,
               "--budget makes plain vertices compact: give --field grid");
-    refuse_if(makes_halves(), "--budget is for one fit, and halves are two: leave it out");
+    refuse_if(makes_halves(), "--budget is for one fit, and halves need three: leave it out");
   }
   refuse_if(resolved.tile_rows.value_or(0) > 0 && resolved.budget.empty(),
             "--tile-rows fits tiles that are made compact: give --budget as well");
@@ -323,9 +321,8 @@ std::vector<io::OutputLock> claim_outputs(const ReconstructOptions& options) {
   if (options.resolved.output.empty()) files.clear();
   return io::claim_outputs(files, [&] {
     check_options(options);
-    const std::filesystem::path& model = options.first_model(paths);
-    if (options.resolved.resume && std::filesystem::exists(model))
-      read_checkpoint([&] { require_state_of_fit(model); });
+    if (options.resolved.resume && std::filesystem::exists(paths.model))
+      read_checkpoint([&] { require_state_of_fit(paths.model); });
   });
 }
 

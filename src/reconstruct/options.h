@@ -66,7 +66,7 @@ struct ReconstructOptions {
   nlohmann::json alignment = {};
   base::Stopwatch since_start = {};  ///< runs from run_options() on, before an alignment
 
-  /// Says whether the run makes two fits, of one half of the data each.
+  /// Says whether the run also makes two fits of one half of the data each.
   bool makes_halves() const { return (files.even && files.odd) || resolved.split_tilts; }
   /// Says whether the run may be fitted by tiles, whose codes it keeps in a file.
   bool may_use_tiles() const { return !resolved.budget.empty() && resolved.tile_rows != 0; }
@@ -74,10 +74,6 @@ struct ReconstructOptions {
   bool filters_views() const {
     return measurement::wants_transfers(files, resolved) ||
            fit.noise_model == NoiseModel::kColoured;
-  }
-  /// Returns the model that the run writes first. Its checkpoint has the chosen settings.
-  const std::filesystem::path& first_model(const OutputPaths& paths) const {
-    return makes_halves() ? paths.halves.front().model : paths.model;
   }
 
   /// Returns the expected number of trials before the fit, which choose the settings `to_choose`; 0

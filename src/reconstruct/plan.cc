@@ -146,7 +146,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
         std::max(run.memory_bytes, memory_of_alignment(series, plan, options, processes));
   if (options.makes_halves()) {
     require_views_for_halves(plan, options);
-    run.num_fits = 2;
+    run.num_fits = 3;
     run.memory_bytes = std::max(run.memory_bytes, memory_of_halves(series, plan, domain, options));
   }
   return run;

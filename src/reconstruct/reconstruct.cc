@@ -88,12 +88,11 @@ void apply(const TrialSettings& settings, Run& run) {
 // Returns false if a stop was requested.
 bool choose_settings(Run& run, std::optional<TunedFit>& tuned) {
   const base::TraceSpan span("choose settings");
-  const std::filesystem::path& first_model = run.options.first_model(run.paths);
   const OpenSettings open = open_settings(run.options.open, run.measurement);
   const bool makes_trials = run.options.num_trials(run.measurement.num_fitted_views(), open) > 0;
-  if (makes_trials && run.options.resolved.resume && std::filesystem::exists(first_model)) {
+  if (makes_trials && run.options.resolved.resume && std::filesystem::exists(run.paths.model)) {
     run.processes.run_collectively(
-        [&] { read_checkpoint([&] { tuned = stored_choice(first_model); }); });
+        [&] { read_checkpoint([&] { tuned = stored_choice(run.paths.model); }); });
   } else if (makes_trials) {
     tuned = choose_by_trials(run, open);
     if (!tuned) return false;

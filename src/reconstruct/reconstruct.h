@@ -45,7 +45,7 @@ struct RunResult {
 /// Does the main job: prepares the views, chooses settings by trials if the options ask for it,
 /// fits a field and samples it. Writes the volume (MRC), the model (HDF5, which is also the
 /// checkpoint during the run), and the metrics with the resolved options (JSON). If Options::output
-/// is empty, it writes no file. With halves it makes two fits (halves.h). Throws Error for bad
+/// is empty, it writes no file. With halves it makes three fits (halves.h). Throws Error for bad
 /// input. The caller has called claim_outputs() and plan_run() before.
 ///
 /// If several processes call it, they share the work. The results have the same bits as those of
@@ -69,7 +69,7 @@ struct RunPlan {
   std::vector<fit::Stage> stages;
   int steps_an_epoch = 0;
   std::int64_t num_steps = 0;    ///< of all stages of a fit
-  int num_fits = 1;              ///< 2 for halves, one after the other
+  int num_fits = 1;              ///< 3 with halves, one after the other
   TilePlan tiles;                ///< by which the region is fitted, if they are used
   std::size_t memory_bytes = 0;  ///< estimated peak of each process
 };

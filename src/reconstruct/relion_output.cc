@@ -55,17 +55,19 @@ void remove_with_commit(const fs::path& file) {
   if (io::OutputSet* const results = io::OutputSet::active()) results->remove_old(file);
 }
 
-// Sets the columns of half maps if the run wrote them.
+// Names the linear halves if the run wrote them. RELION compares half maps and trains denoisers
+// with them, which needs independent errors: the errors of fitted halves are alike. Halves that
+// another program named belong to another tomogram.
 void set_halves(const fs::path& volume, io::StarTable& table) {
   const io::OutputSet* const results = io::OutputSet::active();
-  int number = 0;
-  for (const char* ending : {"_EVN_Vol.mrc", "_ODD_Vol.mrc"}) {
-    ++number;
-    fs::path half = volume;
-    half.replace_extension();
-    half += ending;
-    if (results == nullptr || results->location_of(half) == half) continue;
-    table.set(0, fmt::format("rlnTomoReconstructedTomogramHalf{}", number), half.string());
+  const OutputPaths paths = output_paths(volume);
+  for (const std::size_t half : {0, 1}) {
+    const std::string column = fmt::format("{}Half{}", kTomogram, half + 1);
+    const fs::path& linear = paths.halves[half].linear_volume;
+    if (results != nullptr && results->contains(linear))
+      table.set(0, column, linear.string());
+    else
+      table.remove(column);
   }
 }
 

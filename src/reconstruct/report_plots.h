@@ -7,7 +7,7 @@
 namespace tomofield::reconstruction {
 
 /// The metrics of one fit of a run, as the JSON file has them. A run has one fit without a name, or
-/// one of each half of the data.
+/// one of all data and one of each half.
 struct FitMetrics {
   std::string name;  ///< "even half"
   const nlohmann::json& metrics;

@@ -34,8 +34,8 @@ Findings examine(const fit::Fit& fit, const measurement::Measurement& series,
 
 /// Holds the results of a run.
 struct Results {
-  /// The model; each process has the parameters of its own leaves. Halves have none: theirs are in
-  /// files.
+  /// The model; each process has the parameters of its own leaves. A run with halves has none: its
+  /// models are in files.
   std::optional<output::Model> model;
   nlohmann::json metrics;  ///< the content of the JSON file beside the volume
   Verdict verdict;

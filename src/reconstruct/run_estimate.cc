@@ -199,7 +199,7 @@ RunEstimate estimate_run(const tilt_series::TiltSeries& series, const Reconstruc
   const std::size_t parameters = sizeof(float) * run.num_parameters * num_fits;
   const auto volume = static_cast<std::size_t>(
       num_voxels(run) * (options.volume.mode == io::MrcMode::kFloat32 ? 4 : 2));
-  // Halves are two volumes; their mean, the uncertainty and the local resolution are three more.
+  // Beside the tomogram there are both halves, the uncertainty and the local resolution.
   const std::size_t num_volumes = run.num_fits == 1 ? 1 : 5;
   estimate.result_bytes = num_volumes * volume + parameters + kSmallFiles;
   // A checkpoint has the parameters and two moments, and is there twice while it is replaced. With

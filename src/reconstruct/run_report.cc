@@ -41,12 +41,13 @@ std::string time_text(double seconds) {
   return fmt::format("{:.1f} h", seconds / 3600);
 }
 
-// Returns the metrics of each fit: of the halves, if the run made some.
+// Returns the metrics of each fit: of all data, and of the halves, if the run made some.
 AllFits fits_of(const json& record) {
   for (const json* object : {&record, &record.at("metrics")}) {
     const auto halves = object->find("halves");
     if (halves == object->end() || !halves->contains("even") || !halves->contains("odd")) continue;
-    return {{"even half", halves->at("even").at("metrics")},
+    return {{"all data", record.at("metrics")},
+            {"even half", halves->at("even").at("metrics")},
             {"odd half", halves->at("odd").at("metrics")}};
   }
   return {{"", record.at("metrics")}};
@@ -73,7 +74,9 @@ void add_verdict(const json& verdict, HtmlPage& page) {
   if (texts.empty()) {
     const char* const checked =
         verdict.at("views").is_object()
-            ? "Contrast, order of the tilts, alignment, thickness and noise were checked"
+            ? "Contrast, order of the tilts, alignment, tilt axis, thickness, noise and residual "
+              "were "
+              "checked"
             : "The thickness was checked, which is all that --engine ray allows";
     page.add_notice("No warning",
                     {fmt::format("{}, and nothing seems off. No check can see a wrong hand, or a "
@@ -101,8 +104,7 @@ std::vector<HtmlFact> facts_of_size(const AllFits& fits, const report::EmbeddedV
          fmt::format("The tomogram has {:.4g} × {:.4g} × {:.4g} nm.", nm(0), nm(1), nm(2))});
   }
   facts.push_back({"Views", fmt::format("{}", metrics.at("views").size()),
-                   fmt::format("Tilts from {:.1f}° to {:.1f}°{}.", low, high,
-                               fits.size() > 1 ? ", in each of two halves" : "")});
+                   fmt::format("Tilts from {:.1f}° to {:.1f}°.", low, high)});
   return facts;
 }
 
@@ -363,7 +365,7 @@ std::string run_report(const ReportSource& source) {
   const json& metrics = fits.front().metrics;
   const json& verdict = source.record.at("metrics").at("verdict");
   const std::vector<float> sample = report::sample_voxels(io::MrcReader(source.volume));
-  const report::EmbeddedVolume volume = report::embed_volume(source.volume, sample);
+  const report::EmbeddedVolume volume = report::embed_volume(source.volume);
   HtmlPage page("Tomogram of " + source.files.stack.filename().string());
   page.add_paragraph(fmt::format("{}, reconstructed with tomofield {} ({})",
                                  source.files.stack.string(), library_version(),

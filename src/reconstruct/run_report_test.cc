@@ -123,9 +123,8 @@ TEST_F(RunReport, ShowsBothHalvesAndTheirCorrelation) {
       {"fsc", {{"frequency_per_A", {0.01, 0.02}}, {"all", {{"correlation", {1.0, nullptr}}}}}},
       {"even", {{"metrics", metrics_of_fit(1.2)}}},
       {"odd", {{"metrics", metrics_of_fit(1.3)}}}};
-  record_["metrics"] = {{"verdict", record_["metrics"]["verdict"]}};  // what both have in common
+  EXPECT_TRUE(page_has("fitted views, all data"));
   EXPECT_TRUE(page_has("fitted views, even"));
-  EXPECT_TRUE(page_has("in each of two halves"));
   EXPECT_TRUE(page_has("<h2>Halves</h2>"));
 }
 

@@ -21,6 +21,13 @@ nlohmann::json held_out_json(const HeldOutSummary& held_out) {
           {"of_trials", held_out.is_of_trials}};
 }
 
+nlohmann::json axis_json(const AxisCheck& axis) {
+  return {{"direction_deg", axis.direction_deg},
+          {"best", axis.best},
+          {"vertical", axis.vertical},
+          {"usual", axis.usual}};
+}
+
 nlohmann::json views_json(const ViewAgreement& agreement) {
   nlohmann::json views = nlohmann::json::array();
   for (std::size_t i = 0; i < agreement.views.size(); ++i)
@@ -33,6 +40,8 @@ nlohmann::json views_json(const ViewAgreement& agreement) {
           {"path_correlation", agreement.path.correlation},
           {"path_rise", agreement.path.rise},
           {"residual_correlation", agreement.residual_correlation},
+          {"far_correlation", agreement.far_correlation},
+          {"axis", agreement.axis ? axis_json(*agreement.axis) : nlohmann::json(nullptr)},
           {"usual_displacement_px", agreement.usual_displacement_px()},
           {"usual_displacement_y_px", agreement.usual_displacement_y_px()},
           {"compared", views}};

@@ -21,8 +21,14 @@ constexpr int kViews = 16;
 // more alike than those of some shuffled ones (docs/verdict.md).
 constexpr int kFewestOrderedViews = 12;
 // Sides of the images for displacements, and of those that tell which views are alike. The latter
-// are so small that detail moves by a pixel or two between views that are some degrees apart.
-constexpr std::int64_t kSide = 256, kSmallSide = 64;
+// are so small that detail moves by a pixel or two between views that are some degrees apart. The
+// direction of the tilt axis is found in images of a side between.
+constexpr std::int64_t kSide = 256, kAxisSide = 128, kSmallSide = 64;
+// Pixels by which the small images may be moved where they are compared, so that a stack that is
+// not aligned has its order all the same.
+constexpr std::int64_t kReach = 4;
+// Distance in pixels at which residuals are compared, beyond the reach of an interpolation.
+constexpr std::int64_t kFar = 4;
 
 // Returns the side of the smallest blocks whose means make an image no larger than `side`.
 std::int64_t block_for(const Image& image, std::int64_t side) {
@@ -32,10 +38,18 @@ std::int64_t block_for(const Image& image, std::int64_t side) {
 // Compares images that are in order of tilt.
 std::optional<double> order_of(const std::vector<Image>& images) {
   if (std::ssize(images) < kFewestOrderedViews) return std::nullopt;
-  std::vector<double> neighbours, others;
-  for (std::size_t a = 0; a < images.size(); ++a)
+  std::vector<std::vector<double>> likeness(images.size());  // [a][b − a − 1]
+  base::parallel_for("compare views in pairs", std::ssize(images), [&](std::int64_t i) {
+    const auto a = static_cast<std::size_t>(i);
     for (std::size_t b = a + 1; b < images.size(); ++b)
-      (b == a + 1 ? neighbours : others).push_back(evaluate::correlation(images[a], images[b]));
+      likeness[a].push_back(evaluate::shifted_correlation(images[a], images[b], kReach));
+  });
+  std::vector<double> neighbours, others;
+  for (const std::vector<double>& of_image : likeness) {
+    if (of_image.empty()) continue;
+    neighbours.push_back(of_image.front());
+    others.insert(others.end(), of_image.begin() + 1, of_image.end());
+  }
   double greater = 0;
   for (const double likeness : neighbours)
     greater += static_cast<double>(
@@ -84,8 +98,9 @@ class LineFit {
 struct ComparedView {
   std::array<double, 2> displacement_px{};
   double correlation = 0.0;
-  std::array<double, 2> residual_correlation{};
+  std::array<double, 2> residual_correlation{}, far_correlation{};
   std::vector<double> column_means;
+  Image of_axis;
   Image small;  // without the means of its columns
 };
 
@@ -97,8 +112,12 @@ ComparedView compare(measurement::PredictedView&& both) {
   auto displacement = evaluate::displacement(told, seen);
   for (double& d : displacement) d *= static_cast<double>(block);
   const Image small = reduced(seen, block_for(seen, kSmallSide));
-  return {displacement, evaluate::correlation(told, seen),
-          evaluate::neighbour_correlation(measured, predicted), evaluate::column_means(measured),
+  return {displacement,
+          evaluate::correlation(told, seen),
+          evaluate::difference_correlation(measured, predicted, 1),
+          evaluate::difference_correlation(measured, predicted, kFar),
+          evaluate::column_means(measured),
+          reduced(seen, block_for(seen, kAxisSide)),
           evaluate::without_column_means(small)};
 }
 
@@ -115,6 +134,16 @@ std::vector<ComparedView> compare(const fit::Fit& fit, std::span<const int> view
   return compared;
 }
 
+std::array<double, 2> medians(const std::vector<std::array<double, 2>>& pairs) {
+  std::array<double, 2> found{};
+  for (const std::size_t axis : {0, 1}) {
+    std::vector<float> values;
+    for (const auto& pair : pairs) values.push_back(static_cast<float>(pair[axis]));
+    found[axis] = base::percentile(values, 50);
+  }
+  return found;
+}
+
 double usual(std::vector<float> values) {
   return values.empty() ? 0.0 : base::percentile(std::move(values), 90);
 }
@@ -124,10 +153,14 @@ double usual(std::vector<float> values) {
 std::vector<int> views_to_compare(const std::vector<double>& tilt_deg) {
   const std::vector<std::size_t> all = geometry::order_of_tilts(tilt_deg);
   const int last = static_cast<int>(all.size()) - 1, count = std::min(kViews, last + 1);
+  // Every second one lies a view farther, so that what every second view has in common is no rule.
+  const bool may_move = count > 1 && last / (count - 1) > 1;
   std::vector<int> chosen;
-  for (int i = 0; i < count; ++i)
-    chosen.push_back(
-        static_cast<int>(all[static_cast<std::size_t>(count == 1 ? 0 : i * last / (count - 1))]));
+  for (int i = 0; i < count; ++i) {
+    int at = count == 1 ? 0 : i * last / (count - 1);
+    if (may_move && i % 2 == 1 && at < last) ++at;
+    chosen.push_back(static_cast<int>(all[static_cast<std::size_t>(at)]));
+  }
   return chosen;
 }
 
@@ -157,8 +190,9 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
   ViewAgreement found;
   found.views = views_to_compare(series.geometry.tilt_deg);
   LineFit brightness;
-  std::vector<Image> small;
-  std::vector<float> along_x, along_y;
+  std::vector<Image> small, of_axis;
+  std::vector<double> tilt_deg;
+  std::vector<std::array<double, 2>> near, far;
   const std::span<const int> views(found.views);
   const std::size_t at_once = views_at_once(series);
   for (std::size_t first = 0; first < views.size(); first += at_once) {
@@ -168,8 +202,8 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
       ComparedView& view = compared[i];
       found.displacement_px.push_back(view.displacement_px);
       found.correlation.push_back(view.correlation);
-      along_x.push_back(static_cast<float>(view.residual_correlation[0]));
-      along_y.push_back(static_cast<float>(view.residual_correlation[1]));
+      near.push_back(view.residual_correlation);
+      far.push_back(view.far_correlation);
       for (std::size_t x = 0; x < view.column_means.size(); ++x) {
         if (!std::isfinite(view.column_means[x])) continue;
         const double length =
@@ -177,9 +211,13 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
         brightness.add(length, view.column_means[x]);
       }
       small.push_back(std::move(view.small));
+      of_axis.push_back(std::move(view.of_axis));
+      tilt_deg.push_back(series.geometry.tilt_deg[static_cast<std::size_t>(views[first + i])]);
     }
   }
-  found.residual_correlation = {base::percentile(along_x, 50), base::percentile(along_y, 50)};
+  found.residual_correlation = medians(near);
+  found.far_correlation = medians(far);
+  found.axis = check_axis(of_axis, tilt_deg);
   found.tilt_order = order_of(small);
   found.path = brightness.effect(series.contrast());
   found.side_px = static_cast<double>(std::max(series.geometry.width, series.roi.height()));

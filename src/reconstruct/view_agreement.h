@@ -7,6 +7,7 @@
 
 #include "fit/fit.h"
 #include "measurement/measurement.h"
+#include "reconstruct/axis_check.h"
 
 namespace tomofield::reconstruction {
 
@@ -29,19 +30,24 @@ struct ViewAgreement {
   /// Correlation of what the field leaves of a view between pixels that are neighbours along x and
   /// along y: the median of the views. It is about 0 for white noise.
   std::array<double, 2> residual_correlation{};
+  /// The same of pixels that are four pixels apart, which noise that was interpolated does not
+  /// reach: what the field cannot explain of the specimen does.
+  std::array<double, 2> far_correlation{};
   /// Probability that two views that are neighbours in tilt are more alike than two that are not:
-  /// near 1 for the angles of the views, near ½ for shuffled ones. None if there are few views.
+  /// near 1 for the angles of the views, near ½ for shuffled ones. Views may lie up to a sixteenth
+  /// of their longer side off in x and y. None if there are few views.
   std::optional<double> tilt_order;
   PathEffect path;
-  double side_px = 0.0;  ///< longest side of a view, in pixels of the fit
+  std::optional<AxisCheck> axis;  ///< none if few views are far enough apart
+  double side_px = 0.0;           ///< longest side of a view, in pixels of the fit
 
   /// Return the displacement that 9 of 10 views stay below, in any direction and along y alone.
   double usual_displacement_px() const;
   double usual_displacement_y_px() const;
 };
 
-/// Returns up to 16 views, evenly spaced in order of tilt, and how many of them may be in memory
-/// together.
+/// Returns up to 16 views, nearly evenly spaced in order of tilt, and how many of them may be in
+/// memory together.
 std::vector<int> views_to_compare(const std::vector<double>& tilt_deg);
 std::size_t views_at_once(const measurement::Measurement& series);
 

@@ -1,12 +1,18 @@
 #include "reconstruct/warnings.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/percentile.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -15,12 +21,29 @@ namespace {
 // and of those with the fault.
 
 // Rise of the brightness with the rays' length: 0.1 … 11 where the contrast is right, and the
-// opposite where it is wrong. Views that are normalised one by one may have no rise.
-constexpr double kLeastFall = 1.0, kLeastCorrelation = 0.5;
+// opposite where it is wrong. Views that are normalised one by one may have no rise. A cell that
+// ends in the field of view tells less, but a wrong contrast then leaves a residual; defocus takes
+// the brightness of large areas away, and with it both.
+constexpr double kLeastFall = 1.0, kLeastCorrelation = 0.5, kLeastCorrelationOfBadFit = 0.3;
+constexpr double kResidualOfWrongContrast = 1.2;
 
-// Tilt order: at least 0.89 for the right angles, and at most 0.71 for shuffled ones. Of views that
-// are displaced by several per cent of their width it is less clear: 0.5 to 0.85.
-constexpr double kLeastOrder = 0.75, kLeastOrderIfDisplaced = 0.6;
+// Tilt order: at least 0.73 for the right angles, also of views that are displaced by several per
+// cent of their width, and at most 0.59 for shuffled ones.
+constexpr double kLeastOrder = 0.65;
+
+// Correlation of a view with its prediction, over that of the views that are predicted well: 0.3
+// and more, whatever else is wrong, and 0.00 ± 0.02 if the view shows nothing of the specimen. The
+// second number is what those must have so that this can be said.
+constexpr double kLeastOfView = 0.12, kLeastOfGoodViews = 0.06;
+constexpr std::ptrdiff_t kFewestEmptyViews = 2;
+
+// How much less profiles along the y axis agree than along the best direction, over how much more
+// these agree than usual: at most 0.13 for the right axis, and 0.35 to 1.1 for one that is 30° or
+// more off. A rod along the axis has its profile across the axis in common, but leaves no residual.
+// Where noise hides the residual, profiles along a wrong axis have next to nothing in common.
+constexpr double kMostAxisDeficit = 0.25, kResidualOfWrongAxis = 1.5;
+constexpr double kLeastAxisContrast = 0.1, kLeastAxisContrastOfNoise = 0.15;
+constexpr double kLeastVerticalOfNoise = 0.3;
 
 // Usual displacement in pixels: up to 0.56, along the axis 0.33, for aligned views of which some
 // are off by a pixel; from 1.17 or 0.65 on for unaligned ones.
@@ -38,6 +61,8 @@ constexpr double kSameShifts = 0.75;
 // Simulated ones of half the thickness that have such residuals have 3.2 and more.
 constexpr double kMostAtFaces = 1.5, kLeastResidual = 1.08;
 constexpr double kMostAtFacesOfBadFit = 3.0, kResidualOfBadFit = 1.5;
+// The same if the direction of the axis is sure, so that it is no reason of the residual.
+constexpr double kMostAtFacesOfSureAxis = 1.4, kSureAxisContrast = 0.2, kSureAxisDeficit = 0.1;
 
 // Part of the sections that are empty: up to 0.34 where the thickness is right, and from 0.46 on
 // where it is twice that.
@@ -50,6 +75,9 @@ constexpr double kMostCorrelated = 0.6;
 
 // Error of the defocus, as a part of it and in standard errors: docs/results/ctf.md.
 constexpr double kLeastDefocusError = 0.01, kDefocusErrors = 4.0;
+// Rings explain up to 0.3 % of the residuals of right series whose errors seem to be 9 to 63 %.
+// Farther off, the change of a view is no longer in proportion to that of the defocus.
+constexpr double kLeastRings = 0.005, kMostDefocusError = 0.5;
 // The error of the defocus's slope is 0 for the right hand and −2 for the wrong one, which the
 // density follows in part.
 constexpr double kHandError = -0.5;
@@ -57,12 +85,25 @@ constexpr double kHandError = -0.5;
 // then too small: a yardstick of 256 pixels of 5 Å gives -2.1 ± 0.4 for the right hand.
 constexpr double kMostHandError = 0.25;
 
+// Residual that no noise explains: 0.7 to 1.6 for right series, and 1.4 and more with some faults.
+// A residual between these is a fault if it is alike over four pixels.
+constexpr double kMostResidual = 3.0, kMostStructuredResidual = 1.35, kMostFarCorrelation = 0.06;
+
+// Speckle: up to 2.7 % in specimens with points as small as a voxel, which are predicted as well as
+// the rest; 0.55 % in exosomes whose residual is 1.55, where it is noise.
+constexpr double kMostSpeckle = 0.003, kResidualOfSpeckle = 1.4;
+
+// Error of held-out views over the residual: up to 1.12 for right series.
+constexpr double kMostOverfit = 1.6;
+
 // Beside the sections that are not empty, the suggested thickness has this part of them.
 constexpr double kRoom = 0.2;
 
-std::optional<Warning> wrong_contrast(const ViewAgreement& views, Contrast given) {
-  const PathEffect& path = views.path;
-  if (path.rise > -kLeastFall || path.correlation > -kLeastCorrelation) return std::nullopt;
+std::optional<Warning> wrong_contrast(const Verdict& verdict, Contrast given) {
+  const PathEffect& path = verdict.views->path;
+  const bool is_sure = verdict.residual > kResidualOfWrongContrast && !verdict.defocus;
+  const double least = is_sure ? kLeastCorrelationOfBadFit : kLeastCorrelation;
+  if (path.rise > -kLeastFall || path.correlation > -least) return std::nullopt;
   const bool is_dark = given == Contrast::kDark;
   return Warning{"contrast",
                  fmt::format("the contrast seems wrong, because views count as thinner where their "
@@ -82,8 +123,7 @@ bool is_displaced_along_axis(const ViewAgreement& views) {
 }
 
 std::optional<Warning> shuffled(const ViewAgreement& views) {
-  const double least = is_displaced_along_axis(views) ? kLeastOrderIfDisplaced : kLeastOrder;
-  if (!views.tilt_order || *views.tilt_order >= least) return std::nullopt;
+  if (!views.tilt_order || *views.tilt_order >= kLeastOrder) return std::nullopt;
   return Warning{"tilt-order",
                  "the angles seem to belong to other views, because neighbours in tilt are no more "
                  "alike than any views: give one angle a section in the stack's order (--tlt)"};
@@ -149,10 +189,57 @@ std::optional<Warning> misaligned(const ViewAgreement& views,
                              off)};
 }
 
+std::optional<Warning> empty_views(const ViewAgreement& views,
+                                   const std::vector<double>& tilt_deg) {
+  std::vector<float> all(views.correlation.begin(), views.correlation.end());
+  if (all.empty()) return std::nullopt;
+  const double of_good = base::percentile(all, 90);
+  if (of_good < kLeastOfGoodViews) return std::nullopt;
+  std::vector<std::string> tilts;
+  for (std::size_t i = 0; i < views.views.size(); ++i)
+    if (views.correlation[i] < kLeastOfView * of_good)
+      tilts.push_back(fmt::format("{:.1f}°", tilt_deg[static_cast<std::size_t>(views.views[i])]));
+  if (std::ssize(tilts) < kFewestEmptyViews) return std::nullopt;
+  return Warning{"views",
+                 fmt::format("{} of {} views that were compared show nothing of what the others "
+                             "show (at {}): look at the stack, and leave dark or damaged sections "
+                             "out with --exclude",
+                             tilts.size(), views.views.size(), fmt::join(tilts, ", "))};
+}
+
+// Returns how much less profiles along the y axis agree than along the best direction.
+double axis_deficit(const AxisCheck& axis) {
+  return (axis.best - axis.vertical) / (axis.best - axis.usual);
+}
+
+std::optional<Warning> wrong_axis(const Verdict& verdict) {
+  if (!verdict.views->axis) return std::nullopt;
+  const AxisCheck& axis = *verdict.views->axis;
+  const double contrast = axis.best - axis.usual;
+  const bool leaves_residual = verdict.residual > kResidualOfWrongAxis &&
+                               contrast > kLeastAxisContrast &&
+                               axis_deficit(axis) > kMostAxisDeficit;
+  const bool is_clear_in_noise =
+      contrast > kLeastAxisContrastOfNoise && axis.vertical < kLeastVerticalOfNoise * axis.best;
+  if (!leaves_residual && !is_clear_in_noise) return std::nullopt;
+  return Warning{"tilt-axis",
+                 fmt::format("the tilt axis seems not to be vertical in the aligned views, because "
+                             "what they have in common lies along a direction about {:.0f}° from "
+                             "the y axis: give the transforms with the rotation of the axis (--xf "
+                             "or --aln), or find it with --align full",
+                             axis.direction_deg)};
+}
+
+bool is_axis_sure(const Verdict& verdict) {
+  if (!verdict.views || !verdict.views->axis) return false;
+  const AxisCheck& axis = *verdict.views->axis;
+  return axis.best - axis.usual > kSureAxisContrast && axis_deficit(axis) < kSureAxisDeficit;
+}
+
 std::optional<Warning> thickness_warning(const Verdict& verdict, const GivenInput& input) {
   const SectionProfile& sections = verdict.sections;
-  const double most_at_faces =
-      verdict.residual > kResidualOfBadFit ? kMostAtFacesOfBadFit : kMostAtFaces;
+  const double of_bad_fit = is_axis_sure(verdict) ? kMostAtFacesOfSureAxis : kMostAtFacesOfBadFit;
+  const double most_at_faces = verdict.residual > kResidualOfBadFit ? of_bad_fit : kMostAtFaces;
   if (sections.faces > most_at_faces && verdict.residual > kLeastResidual) {
     return Warning{"thin",
                    fmt::format("the thickness seems too small, because the density varies {:.1f} "
@@ -182,8 +269,8 @@ std::optional<Warning> correlated_noise(const Verdict& verdict, double bin_facto
 }
 
 std::optional<Warning> wrong_defocus(const DefocusCheck& check) {
-  if (std::abs(check.error) < kLeastDefocusError ||
-      std::abs(check.error) < kDefocusErrors * check.standard_error)
+  if (std::abs(check.error) < kLeastDefocusError || std::abs(check.error) > kMostDefocusError ||
+      check.rings < kLeastRings || std::abs(check.error) < kDefocusErrors * check.standard_error)
     return std::nullopt;
   return Warning{"defocus",
                  fmt::format("the residuals have rings as if the defocus were {:.1f} % {} than "
@@ -205,25 +292,77 @@ std::optional<Warning> wrong_defocus_hand(const DefocusCheck& check) {
                              1 + check.slope->error, check.slope->standard_error)};
 }
 
+std::optional<Warning> unexplained(const Verdict& verdict) {
+  double far = 0.0;
+  if (verdict.views)
+    far = std::min(verdict.views->far_correlation[0], verdict.views->far_correlation[1]);
+  if (verdict.residual < kMostResidual &&
+      (verdict.residual < kMostStructuredResidual || far < kMostFarCorrelation))
+    return std::nullopt;
+  return Warning{
+      "residual",
+      fmt::format(
+          "the tomogram does not explain the views: it leaves {:.2g} times the variance of "
+          "their noise. Check the tilt angles and the alignment, first of all the direction "
+          "of the tilt axis (--align refine shows what it would gain), and look for views "
+          "that are damaged or differ from the rest",
+          verdict.residual)};
+}
+
+std::optional<Warning> speckled(const Verdict& verdict) {
+  const auto& speckle = verdict.artefacts.speckle;
+  if (!speckle || *speckle < kMostSpeckle || verdict.residual < kResidualOfSpeckle)
+    return std::nullopt;
+  return Warning{"speckle",
+                 fmt::format("{:.2f} % of the voxels stick out from all their neighbours, and the "
+                             "views are not explained by it, so that it is probably noise: give a "
+                             "larger weight (--tv), or --tv-penalty smooth",
+                             100 * *speckle)};
+}
+
+std::optional<Warning> overfitted(const Verdict& verdict) {
+  if (!verdict.held_out || verdict.held_out->median < kMostOverfit * verdict.residual ||
+      verdict.held_out->median < 1.0)
+    return std::nullopt;
+  return Warning{"overfit",
+                 fmt::format("views that were not fitted are predicted with {:.1f} times the error "
+                             "of those that were: the tomogram has structure that only its own "
+                             "views want; give a larger weight (--tv)",
+                             verdict.held_out->median / verdict.residual)};
+}
+
+// Finds faults of the input that the views show, in the order in which they hide each other.
+std::vector<Warning> faults_of_views(const Verdict& verdict, const GivenInput& input) {
+  const ViewAgreement& views = *verdict.views;
+  if (const auto empty = empty_views(views, input.tilt_deg)) return {*empty};
+  std::vector<Warning> found;
+  if (const auto contrast = wrong_contrast(verdict, input.contrast)) found.push_back(*contrast);
+  const bool is_contrast_wrong = !found.empty();
+  if (const auto order = shuffled(views)) found.push_back(*order);
+  if (!is_contrast_wrong)
+    if (const auto alignment = misaligned(views, input.alignment)) found.push_back(*alignment);
+  if (!found.empty()) return found;
+  if (const auto axis = wrong_axis(verdict)) found.push_back(*axis);
+  return found;
+}
+
 }  // namespace
 
 std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& input) {
   std::vector<Warning> warnings;
+  if (verdict.views) warnings = faults_of_views(verdict, input);
+  if (!warnings.empty()) return warnings;
   const auto add = [&](std::optional<Warning> found) {
     if (found) warnings.push_back(std::move(*found));
   };
-  if (verdict.views) {
-    add(wrong_contrast(*verdict.views, input.contrast));
-    const bool is_contrast_wrong = !warnings.empty();
-    add(shuffled(*verdict.views));
-    if (!is_contrast_wrong) add(misaligned(*verdict.views, input.alignment));
-  }
-  if (warnings.empty()) {
-    if (verdict.defocus) add(wrong_defocus(*verdict.defocus));
-    if (verdict.defocus) add(wrong_defocus_hand(*verdict.defocus));
-    add(thickness_warning(verdict, input));
-    if (verdict.views) add(correlated_noise(verdict, input.bin_factor));
-  }
+  if (verdict.defocus) add(wrong_defocus(*verdict.defocus));
+  if (verdict.defocus) add(wrong_defocus_hand(*verdict.defocus));
+  add(thickness_warning(verdict, input));
+  if (verdict.views) add(correlated_noise(verdict, input.bin_factor));
+  if (!warnings.empty()) return warnings;
+  add(unexplained(verdict));
+  add(speckled(verdict));
+  add(overfitted(verdict));
   return warnings;
 }
 

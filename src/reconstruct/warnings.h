@@ -13,13 +13,15 @@ struct GivenInput {
   Contrast contrast = Contrast::kDark;
   /// Where the pixels of each aligned view come from in the stack.
   std::vector<geometry::RawFromAligned> alignment = {};
-  double thickness = 0.0;   ///< in pixels of the fit
-  double bin_factor = 1.0;  ///< of these pixels to the stack's
+  std::vector<double> tilt_deg = {};  ///< of each view
+  double thickness = 0.0;             ///< in pixels of the fit
+  double bin_factor = 1.0;            ///< of these pixels to the stack's
 };
 
-/// Returns what is off in a run, the gravest first. A series that is given wrongly as a whole
-/// (contrast, order, alignment) has no warning about its thickness, because that cannot be judged
-/// then. docs/verdict.md has the measurements that the limits rest on.
+/// Returns what is off in a run, the gravest first. Faults of the series as a whole (views that
+/// show nothing, contrast, order, alignment, axis) come alone, because nothing else can be judged
+/// then; a fit that is bad for no reason that is known is named last. docs/verdict.md has the
+/// measurements that the limits rest on.
 std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& input);
 
 }  // namespace tomofield::reconstruction

@@ -15,10 +15,12 @@ Verdict good_verdict() {
   ViewAgreement views;
   for (int i = 0; i < 16; ++i) {
     views.views.push_back(i);
+    views.correlation.push_back(0.6);
     views.displacement_px.push_back({0.1, -0.1});
   }
   views.tilt_order = 0.95;
   views.path = {.correlation = 0.9, .rise = 4.0};
+  views.axis = AxisCheck{.direction_deg = 2, .best = 0.9, .vertical = 0.89, .usual = 0.3};
   verdict.views = views;
   return verdict;
 }
@@ -26,6 +28,7 @@ Verdict good_verdict() {
 GivenInput aligned_input() {
   return {.contrast = Contrast::kDark,
           .alignment = std::vector<geometry::RawFromAligned>(16),
+          .tilt_deg = std::vector<double>(16, 30.0),
           .thickness = 100,
           .bin_factor = 2};
 }
@@ -52,6 +55,12 @@ TEST(Warnings, ContrastIsWrongIfLongRaysLookThin) {
   EXPECT_NE(found.front().message.find("give --contrast bright"), std::string::npos);
   verdict.sections.faces = 0.3;
   verdict.views->path.rise = -0.3;  // normalised views may fall a little
+  EXPECT_EQ(codes(verdict), "");
+  verdict.views->path = {.correlation = -0.35, .rise = -1.6};  // a cell that ends in the view
+  EXPECT_EQ(codes(verdict), "");
+  verdict.residual = 1.4;
+  EXPECT_EQ(codes(verdict), "contrast ");
+  verdict.defocus = DefocusCheck{};  // which filters brightness
   EXPECT_EQ(codes(verdict), "");
 }
 
@@ -88,8 +97,12 @@ TEST(Warnings, ThicknessIsJudgedByTheSections) {
   EXPECT_NE(thin.front().message.find("--thickness 300"), std::string::npos);  // unbinned pixels
   verdict.residual = 1.0;                                                      // nothing is missing
   EXPECT_EQ(codes(verdict), "");
-  verdict.residual = 60;  // whatever the model cannot explain
+  verdict.residual = 2;
+  EXPECT_EQ(codes(verdict), "thin ");
+  verdict.views->axis->vertical = 0.8;  // a wrong axis could be the reason
   EXPECT_EQ(codes(verdict), "");
+  verdict.residual = 60;  // whatever the model cannot explain
+  EXPECT_EQ(codes(verdict), "residual ");
   verdict.sections.faces = 4.0;
   EXPECT_EQ(codes(verdict), "thin ");
   verdict.sections = {.faces = 0.1, .empty_part = 0.5};
@@ -121,6 +134,76 @@ TEST(Warnings, NoiseIsCorrelatedIfNeighboursAreAlikeOnBothAxes) {
   EXPECT_NE(find_warnings(verdict, aligned_input()).front().message.find("--bin 4"),
             std::string::npos);
   verdict.residual = 60;  // this is structure
+  EXPECT_EQ(codes(verdict), "residual ");
+}
+
+TEST(Warnings, ViewsThatShowNothingAreNamedBeforeWhatFollowsFromThem) {
+  Verdict verdict = good_verdict();
+  verdict.views->tilt_order = 0.5;
+  verdict.views->correlation[3] = 0.01;
+  EXPECT_EQ(codes(verdict), "tilt-order ");  // a single view
+  verdict.views->correlation[8] = -0.02;
+  EXPECT_EQ(codes(verdict), "views ");
+  const std::string message = find_warnings(verdict, aligned_input()).front().message;
+  EXPECT_NE(message.find("2 of 16 views"), std::string::npos) << message;
+  for (double& correlation : verdict.views->correlation) correlation *= 0.05;  // noise alone
+  EXPECT_EQ(codes(verdict), "tilt-order ");
+}
+
+TEST(Warnings, TheAxisIsWrongIfProfilesAgreeAlongAnotherDirection) {
+  Verdict verdict = good_verdict();
+  verdict.views->axis = AxisCheck{.direction_deg = 30, .best = 0.9, .vertical = 0.6, .usual = 0.3};
+  EXPECT_EQ(codes(verdict), "");  // as of a rod along the axis: the fit explains the views
+  verdict.residual = 1.9;
+  verdict.views->far_correlation = {0.4, 0.3};
+  EXPECT_EQ(codes(verdict), "tilt-axis ");
+  const std::string message = find_warnings(verdict, aligned_input()).front().message;
+  EXPECT_NE(message.find("30°"), std::string::npos) << message;
+  verdict.views->axis->vertical = 0.88;
+  EXPECT_EQ(codes(verdict), "residual ");
+  verdict.residual = 1.1;
+  verdict.views->axis = AxisCheck{.direction_deg = 30, .best = 0.3, .vertical = 0.02, .usual = 0};
+  EXPECT_EQ(codes(verdict), "tilt-axis ");  // noise hides the residual
+}
+
+TEST(Warnings, AResidualIsAFaultIfItIsLargeOrHasStructure) {
+  Verdict verdict = good_verdict();
+  verdict.residual = 1.6;
+  EXPECT_EQ(codes(verdict), "");
+  verdict.views->far_correlation = {0.3, 0.2};
+  EXPECT_EQ(codes(verdict), "residual ");
+  verdict.residual = 1.1;
+  EXPECT_EQ(codes(verdict), "");
+  verdict.views = std::nullopt;
+  verdict.residual = 9.4;
+  EXPECT_EQ(codes(verdict), "residual ");
+}
+
+TEST(Warnings, SpeckleIsNoiseIfTheViewsAreNotExplained) {
+  Verdict verdict = good_verdict();
+  verdict.artefacts.speckle = 0.02;
+  EXPECT_EQ(codes(verdict), "");
+  verdict.residual = 1.55;
+  EXPECT_EQ(codes(verdict), "speckle ");
+  verdict.artefacts.speckle = 0.0005;
+  EXPECT_EQ(codes(verdict), "");
+}
+
+TEST(Warnings, HeldOutViewsTellOfAFitToNoise) {
+  Verdict verdict = good_verdict();
+  verdict.held_out = HeldOutSummary{.median = 1.3, .worst = 2.0};
+  EXPECT_EQ(codes(verdict), "");
+  verdict.residual = 0.7;
+  EXPECT_EQ(codes(verdict), "overfit ");
+}
+
+TEST(Warnings, RingsThatExplainNextToNothingTellNoDefocus) {
+  Verdict verdict = good_verdict();
+  verdict.defocus = DefocusCheck{.error = 0.3, .standard_error = 0.02, .rings = 0.003};
+  EXPECT_EQ(codes(verdict), "");
+  verdict.defocus->rings = 0.01;
+  EXPECT_EQ(codes(verdict), "defocus ");
+  verdict.defocus->error = 1.8;  // too far for what was measured
   EXPECT_EQ(codes(verdict), "");
 }
 

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "png_picture.h"
@@ -28,8 +31,8 @@ std::vector<std::array<std::int64_t, 2>> pixels_of(const testing::PngPicture& pi
 TEST(Text, LettersAreWhereTheyBelong) {
   const testing::ScratchDirectory directory;
   Canvas canvas(60, 30, {255, 255, 255});
-  draw_text(canvas, 4, 6, "l?Å", kRed);
-  EXPECT_EQ(text_width("l?Å"), kDot * 17);
+  draw_text(canvas, 4, 6, "L?Å", kRed);
+  EXPECT_EQ(text_width("L?Å"), kDot * 17);
   canvas.write(directory / "text.png");
   const auto picture = testing::read_png(directory / "text.png", PNG_FORMAT_RGB);
   // The L has a stem of 7 dots and a foot of 5. The unknown sign is blank. Å has 16 dots.
@@ -48,6 +51,31 @@ TEST(Text, LettersAreWhereTheyBelong) {
   }
   EXPECT_EQ(of_l, 11 * kDot * kDot);
   EXPECT_EQ(of_ring, 16 * kDot * kDot);
+}
+
+// Returns the pixels of a text at (4, 10) of a canvas that is 30 high.
+std::vector<std::array<std::int64_t, 2>> pixels_of_text(std::string_view text) {
+  const testing::ScratchDirectory directory;
+  Canvas canvas(60, 30, {255, 255, 255});
+  draw_text(canvas, 4, 10, text, kRed);
+  canvas.write(directory / "text.png");
+  return pixels_of(testing::read_png(directory / "text.png", PNG_FORMAT_RGB), kRed);
+}
+
+TEST(Text, HasSmallLettersThatReachBelowTheBaseLine) {
+  for (const char letter : std::string_view("abcdefghijklmnopqrstuvwxyz")) {
+    const std::string small(1, letter);
+    const std::string capital(1, static_cast<char>(letter - 'a' + 'A'));
+    const auto dots = pixels_of_text(small);
+    ASSERT_FALSE(dots.empty()) << letter;
+    EXPECT_NE(dots, pixels_of_text(capital)) << letter;
+    std::int64_t lowest = 0;
+    for (const auto& [x, y] : dots) lowest = std::max(lowest, y);
+    const bool is_below = std::string_view("gjpqy").find(letter) != std::string_view::npos;
+    EXPECT_EQ(lowest, is_below ? 30 - 10 + 2 * kDot - 1 : 30 - 10 - 1) << letter;
+  }
+  for (const char* sign : {"°", "±", "−", "×", "µ", "σ", "%", ":"})
+    EXPECT_FALSE(pixels_of_text(sign).empty()) << sign;
 }
 
 }  // namespace

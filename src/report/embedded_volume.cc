@@ -5,10 +5,10 @@
 #include <span>
 
 #include "base/parallel.h"
-#include "base/percentile.h"
 #include "io/jpeg.h"
 #include "io/mrc.h"
 #include "report/base64.h"
+#include "report/contrast.h"
 #include "report/reduced_volume.h"
 
 namespace tomofield::report {
@@ -23,12 +23,10 @@ std::int64_t whole_blocks(std::int64_t side) {
   return (side + kBlock_px - 1) / kBlock_px * kBlock_px;
 }
 
-void choose_limits(const std::vector<float>& sample, EmbeddedVolume& volume) {
-  if (sample.empty()) return;
-  const double black = base::percentile(sample, 0.5), white = base::percentile(sample, 99.5);
-  const double beyond = white > black ? (white - black) / 4 : 1.0;
-  volume.contrast = {black, white > black ? white : black + 1};
-  volume.limits = {black - beyond, volume.contrast.second + beyond};
+void choose_limits(const Contrast& contrast, EmbeddedVolume& volume) {
+  const double beyond = (contrast.white - contrast.black) / 2;
+  volume.contrast = {contrast.black, contrast.white};
+  volume.limits = {contrast.black - beyond, contrast.white + beyond};
 }
 
 void arrange_sheets(EmbeddedVolume& volume) {
@@ -97,14 +95,14 @@ std::size_t total_size(const std::vector<std::string>& sheets) {
 
 }  // namespace
 
-EmbeddedVolume embed_volume(const std::filesystem::path& mrc, const std::vector<float>& sample) {
+EmbeddedVolume embed_volume(const std::filesystem::path& mrc) {
   const io::MrcReader file(mrc);
   const io::MrcHeader& header = file.header();
   EmbeddedVolume volume;
   volume.size = reduced_size(header, kMostVoxels);
   volume.file_size = {header.nx, header.ny, header.nz};
   volume.voxel_size_A = header.voxel_size_A[0];
-  choose_limits(sample, volume);
+  choose_limits(contrast_of(file), volume);
   arrange_sheets(volume);
   const Bytes bytes = reduced_bytes(file, volume);
   for (const int quality : kQualities) {

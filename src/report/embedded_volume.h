@@ -26,11 +26,11 @@ struct EmbeddedVolume {
 /// The most bytes that the sheets of a volume may have together.
 inline constexpr std::size_t kMostSheetBytes = std::size_t{5} << 20;
 
-/// Reduces an MRC volume to at most 40 million voxels and encodes it. `sample` holds voxels of the
-/// file (reduced_volume.h), whose percentiles decide the limits: black and white are the 0.5 and
-/// 99.5 percentiles, and the limits lie a quarter of that range beyond. If the sheets were larger
-/// than kMostSheetBytes, they are encoded with less quality. Holds one byte a reduced voxel.
-EmbeddedVolume embed_volume(const std::filesystem::path& mrc, const std::vector<float>& sample);
+/// Reduces an MRC volume to at most 40 million voxels and encodes it. Black and white are the
+/// contrast of the volume (contrast.h), and the limits lie half of that range beyond. If the sheets
+/// were larger than kMostSheetBytes, they are encoded with less quality. Holds one byte a reduced
+/// voxel.
+EmbeddedVolume embed_volume(const std::filesystem::path& mrc);
 
 /// Returns what the script of the page reads (page/report.js). The sheets are base64.
 nlohmann::json volume_json(const EmbeddedVolume& volume);

@@ -13,6 +13,7 @@
 #include "field/sampling/sample_box.h"
 #include "io/png.h"
 #include "report/canvas.h"
+#include "report/contrast.h"
 #include "report/slice.h"
 
 namespace tomofield::report {
@@ -115,7 +116,7 @@ void write_mask_picture(const tilt_series::TiltSeries& series,
 void write_tree_picture(const output::Model& model, const std::filesystem::path& path) {
   const Rectangle& roi = model.roi;
   const std::vector<float> slice = central_slice(model);
-  const GreyScale scale(slice);
+  const GreyScale scale(contrast_of(slice));
   const std::int64_t zoom = picture_zoom(roi.width(), roi.width());
   Canvas canvas(roi.width() * zoom, roi.height() * zoom, {0, 0, 0});
   for (std::int64_t y = 0; y < roi.height(); ++y) {

@@ -62,7 +62,11 @@ void PngSurface::draw_text(Point at, Anchor anchor, std::string_view text) {
   const std::int64_t before = anchor == Anchor::kStart    ? 0
                               : anchor == Anchor::kMiddle ? width / 2
                                                           : width;
-  report::draw_text(canvas_, nearest(at.x) - before, nearest(up(at.y)), text, kBlack);
+  // A text is whole as far as the picture is wide enough for it.
+  constexpr std::int64_t kEdge = 4;
+  const std::int64_t last = std::max(kEdge, canvas_.width() - kEdge - width);
+  report::draw_text(canvas_, std::clamp(nearest(at.x) - before, kEdge, last), nearest(up(at.y)),
+                    text, kBlack);
 }
 
 double PngSurface::text_width(std::string_view text) {

@@ -8,7 +8,6 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
-#include "base/percentile.h"
 #include "io/mrc.h"
 #include "io/png.h"
 
@@ -16,7 +15,6 @@ namespace tomofield::report {
 namespace {
 
 constexpr std::int64_t kChunkValues = std::int64_t{1} << 18;
-constexpr std::size_t kMaxSample = std::size_t{1} << 20;
 
 }  // namespace
 
@@ -49,16 +47,6 @@ std::vector<Slice> read_central_slices(const std::filesystem::path& mrc) {
   return slices;
 }
 
-GreyScale grey_scale_of(const std::vector<Slice>& slices) {
-  std::size_t total = 0;
-  for (const Slice& slice : slices) total += slice.values.size();
-  const std::size_t stride = total / kMaxSample + 1;
-  std::vector<float> sample;
-  for (const Slice& slice : slices)
-    for (std::size_t i = 0; i < slice.values.size(); i += stride) sample.push_back(slice.values[i]);
-  return GreyScale(std::move(sample));
-}
-
 void write_slice_picture(const std::filesystem::path& path, const Slice& slice,
                          const GreyScale& scale, std::int64_t zoom) {
   const std::int64_t width = slice.width * zoom, height = slice.height * zoom;
@@ -70,14 +58,6 @@ void write_slice_picture(const std::filesystem::path& path, const Slice& slice,
           scale.grey(static_cast<double>(row[x / zoom]));
   }
   io::write_png_grey(path, width, height, pixels);
-}
-
-GreyScale::GreyScale(std::vector<float> sample) {
-  std::erase_if(sample, [](float value) { return !std::isfinite(value); });
-  if (sample.empty()) return;
-  black_ = base::percentile(sample, 0.5);
-  const double white = base::percentile(sample, 99.5);
-  if (white > black_) to_grey_ = 255.0 / (white - black_);
 }
 
 std::uint8_t GreyScale::grey(double value) const {
@@ -96,7 +76,7 @@ std::int64_t picture_zoom(std::int64_t narrowest, std::int64_t widest) {
 std::vector<std::filesystem::path> write_slice_pictures(const std::filesystem::path& mrc,
                                                         const std::filesystem::path& prefix) {
   const auto slices = read_central_slices(mrc);
-  const GreyScale scale = grey_scale_of(slices);
+  const GreyScale scale(contrast_of(io::MrcReader(mrc)));
   const auto [narrowest, widest] = std::minmax({slices[0].width, slices[2].width});
   const std::int64_t zoom = picture_zoom(narrowest, widest);
   std::vector<std::filesystem::path> paths;

@@ -5,18 +5,20 @@
 #include <string>
 #include <vector>
 
+#include "report/contrast.h"
+
 namespace tomofield::report {
 
-/// Maps densities to greys. The 0.5 and 99.5 percentiles of a sample are black and white.
+/// Maps densities to greys.
 class GreyScale {
  public:
-  /// Takes the scale from the finite values of a sample. If there are none, everything is black.
-  explicit GreyScale(std::vector<float> sample);
+  explicit GreyScale(const Contrast& contrast)
+      : black_(contrast.black), to_grey_(255.0 / (contrast.white - contrast.black)) {}
   /// Returns the grey of a value, from 0 to 255. NaN is black.
   std::uint8_t grey(double value) const;
 
  private:
-  double black_ = 0.0, to_grey_ = 0.0;
+  double black_, to_grey_;
 };
 
 /// Returns the pixels a voxel at which pictures of small volumes are at least 512 wide, unless
@@ -41,17 +43,14 @@ struct Slice {
 /// file once, rows at a time.
 std::vector<Slice> read_central_slices(const std::filesystem::path& mrc);
 
-/// Returns one grey scale for all slices.
-GreyScale grey_scale_of(const std::vector<Slice>& slices);
-
 /// Writes a PNG with `zoom` pixels a value; the first row is at the bottom. Replaces `path`.
 void write_slice_picture(const std::filesystem::path& path, const Slice& slice,
                          const GreyScale& scale, std::int64_t zoom);
 
 /// Draws the three central planes of an MRC volume: PREFIX_xy.png, PREFIX_xz.png and PREFIX_yz.png
 /// (the file's own axes). The first axis of each name runs to the right, the second upwards, as in
-/// 3dmod. One grey scale serves all three: black and white are the 0.5 and 99.5 percentiles of the
-/// planes' finite values, densities as stored. Voxels stay square. Small volumes are enlarged,
+/// 3dmod. One grey scale serves all three, the contrast of the volume (contrast.h), densities as
+/// stored. Voxels stay square. Small volumes are enlarged,
 /// whole pixels a voxel, until each picture is at least 512 pixels wide (unless another would then
 /// be wider than 4096).
 ///

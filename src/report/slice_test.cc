@@ -75,7 +75,7 @@ TEST_F(SlicePictures, ShowEachVoxelAtItsPlace) {
   EXPECT_EQ(pixel(yz, 12, 8), 0);
 }
 
-TEST_F(SlicePictures, GreysRunBetweenThePercentiles) {
+TEST_F(SlicePictures, GreysAreThoseOfTheContrast) {
   const std::int64_t n = 512;
   std::vector<float> voxels(static_cast<std::size_t>(n * n));
   for (std::size_t i = 0; i < voxels.size(); ++i) voxels[i] = static_cast<float>(i % 512);
@@ -89,6 +89,7 @@ TEST_F(SlicePictures, GreysRunBetweenThePercentiles) {
   EXPECT_EQ(xy.at(1, 511), 0);
   EXPECT_EQ(xy.at(0, 0), 0);
   EXPECT_NEAR(xy.at(256, 100), 128, 2);
+  EXPECT_EQ(xy.at(450, 100), 255);  // the middle three quarters go from black to white
   EXPECT_EQ(xy.at(511, 100), 255);
 }
 

@@ -37,7 +37,7 @@ nlohmann::json description(const ViewedVolume& volume) {
           {"note", volume.note()},
           {"size", volume.size()},
           {"voxel_size_A", volume.voxel_size_A()},
-          {"contrast", volume.contrast()}};
+          {"contrast", {volume.contrast().black, volume.contrast().white}}};
 }
 
 void refuse(int status, std::string_view reason, httplib::Response& response) {

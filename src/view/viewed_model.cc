@@ -30,7 +30,7 @@ class ViewedModel : public ViewedVolume {
     note_ = "model: every zoom is evaluated from the fitted field";
     size_ = region_.size;
     voxel_size_A_ = model_.pixel_size_A;
-    choose_contrast(coarse_values());
+    contrast_ = report::contrast_of(middle_values());
   }
 
  private:
@@ -103,11 +103,12 @@ class ViewedModel : public ViewedVolume {
     return values;
   }
 
-  // Returns the region in at most 64 voxels a side, in the units of the file.
-  std::vector<float> coarse_values() const {
-    constexpr double kSide = 64;
-    const auto longest = static_cast<double>(*std::ranges::max_element(region_.size));
+  // Returns the middle of the region in at most 128 voxels a side, in the units of the file.
+  std::vector<float> middle_values() const {
+    constexpr double kSide = 128;
     field::OrientedBox box = region_;
+    box.size = report::middle_size(region_.size);
+    const auto longest = static_cast<double>(*std::ranges::max_element(box.size));
     box.voxel_px = std::max(1.0, longest / kSide);
     for (std::int64_t& size : box.size)
       size = std::max<std::int64_t>(1, std::lround(static_cast<double>(size) / box.voxel_px));

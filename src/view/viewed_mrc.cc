@@ -25,7 +25,7 @@ class ViewedMrc : public ViewedVolume {
     title_ = path.filename().string();
     size_ = {header.nx, header.ny, header.nz};
     voxel_size_A_ = header.voxel_size_A[0];
-    choose_contrast(report::sample_voxels(file));
+    contrast_ = report::contrast_of(file);
     held_ = report::reduced_size(header, most_voxels());
     if (held_ != size_) {
       note_ = fmt::format(

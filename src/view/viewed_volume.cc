@@ -3,7 +3,6 @@
 #include <cmath>
 #include <limits>
 
-#include "base/percentile.h"
 #include "io/hdf5_reader.h"
 
 namespace tomofield::view {
@@ -21,12 +20,6 @@ std::vector<float> ViewedVolume::sample(const Plane& plane) const {
     }
   }
   return values;
-}
-
-void ViewedVolume::choose_contrast(const std::vector<float>& sample) {
-  if (sample.empty()) return;
-  const double black = base::percentile(sample, 0.5), white = base::percentile(sample, 99.5);
-  contrast_ = {black, white > black ? white : black + 1};
 }
 
 std::unique_ptr<ViewedVolume> open_volume(const std::filesystem::path& path) {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "report/contrast.h"
 #include "view/plane.h"
 
 namespace tomofield::view {
@@ -28,8 +29,8 @@ class ViewedVolume {
   const std::array<std::int64_t, 3>& size() const { return size_; }
   /// Returns the side of a voxel, or 0 if the file does not say.
   double voxel_size_A() const { return voxel_size_A_; }
-  /// Returns the values that are black and white at first: the 0.5 and 99.5 percentiles.
-  const std::pair<double, double>& contrast() const { return contrast_; }
+  /// Returns the values that are black and white at first.
+  const report::Contrast& contrast() const { return contrast_; }
   /// Says what the viewer should know, such as that the volume is reduced; may be empty.
   const std::string& note() const { return note_; }
 
@@ -37,13 +38,11 @@ class ViewedVolume {
   ViewedVolume() = default;
   /// Returns the values of a plane, with any value outside of the volume.
   virtual std::vector<float> sample_voxels(const Plane& plane) const = 0;
-  /// Chooses the contrast by finite values from all over the volume.
-  void choose_contrast(const std::vector<float>& sample);
 
   std::string title_, note_;
   std::array<std::int64_t, 3> size_{};
   double voxel_size_A_ = 0;
-  std::pair<double, double> contrast_{0, 1};
+  report::Contrast contrast_;
 };
 
 /// Opens a model (.h5) of reconstruct, whose region of interest is shown. A plane is evaluated from

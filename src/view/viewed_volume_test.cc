@@ -32,7 +32,7 @@ TEST(ViewedMrc, HasItsVoxelsInPlanesAlongTheAxes) {
   const auto volume = open_volume(write_ramp(directory));
   EXPECT_EQ(volume->size(), (std::array<std::int64_t, 3>{6, 5, 4}));
   EXPECT_EQ(volume->voxel_size_A(), 2.0);
-  EXPECT_LT(volume->contrast().first, volume->contrast().second);
+  EXPECT_LT(volume->contrast().black, volume->contrast().white);
   const std::vector<float> xy = volume->sample({.centre = {3, 2.5, 2.5},
                                                 .right = {1, 0, 0},
                                                 .up = {0, 1, 0},

@@ -97,6 +97,30 @@ def test_the_result_goes_back_to_relion(relion, finished):
     assert "rlnTomoReconstructedTomogramHalf1" not in row
 
 
+def test_relion_gets_linear_halves_or_none(relion):
+    """Programs train with the halves of a row, whose errors must be independent."""
+    columns = [f"rlnTomoReconstructedTomogramHalf{half}" for half in (1, 2)]
+    foreign = relion.path("with_halves.star")
+    rows = star_projects.read_rows(relion.star)
+    for row in rows:
+        row.update(dict.fromkeys(columns, "tomograms/of_another_program.mrc"))
+    cells = [[f'"{value}"' for value in row.values()] for row in rows]
+    star_projects.write_star(foreign, "global", list(rows[0]), cells)
+    for options in ([], ["--denoising-halves"]):
+        output = relion.path("halves.mrc")
+        command = ["reconstruct", foreign, "--series", "TS_01", "--split-tilts", "--overwrite",
+                   "-o", output, *QUICK, *options]
+        harness.succeed(*command, cwd=relion.folder)
+        (row,) = star_projects.read_rows(output[:-4] + ".star")
+        assert row["rlnTomoReconstructedTomogram"] == output
+        linear = [f"{output[:-4]}_wbp_{half}_Vol.mrc" for half in ("EVN", "ODD")]
+        if options:
+            assert [row[column] for column in columns] == linear
+            assert harness.read_volume(linear[0]).shape == harness.read_volume(output).shape
+        else:
+            assert not set(columns) & set(row)
+
+
 def test_sizes_for_relion_are_unbinned(relion, finished):
     result, output = relion.run("--series", "TS_01", "--bin", 2, "--alignment-json")
     (row,) = star_projects.read_rows(output[:-4] + ".star")

@@ -156,24 +156,24 @@ TEST(PublicReconstruct, TheCallbackStopsARunWhichResumes) {
   EXPECT_EQ(read_volume(options.output), whole);
 }
 
-TEST(PublicReconstruct, AStopAtTheEndOfTheFitForBothHalvesComesInTheFirstHalf) {
+TEST(PublicReconstruct, AStopAtTheEndOfTheFitOfAllDataComesInTheFirstHalf) {
   const ScratchDirectory scratch;
   const TiltSeries series = TiltSeries::from_images(spheres());
   Options options = quick_options();
   options.split_tilts = true;
-  const auto is_for_both = [](const Progress& progress) {
-    return progress.detail.starts_with("scales and weights of views");
+  const auto is_of_all = [](const Progress& progress) {
+    return progress.detail.starts_with("all data");
   };
   int reports = 0, seen = 0;
   options.output = scratch / "whole.mrc";
   reconstruct(series, options, [&](const Progress& progress) {
-    reports += is_for_both(progress) ? 1 : 0;
+    reports += is_of_all(progress) ? 1 : 0;
     return true;
   });
   ASSERT_GT(reports, 0);
   options.output = scratch / "stopped.mrc";
   const Reconstruction stopped = reconstruct(series, options, [&](const Progress& progress) {
-    seen += is_for_both(progress) ? 1 : 0;
+    seen += is_of_all(progress) ? 1 : 0;
     return seen < reports;
   });
   EXPECT_FALSE(stopped.is_finished);

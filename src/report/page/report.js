@@ -60,10 +60,10 @@ async function showVolume() {
   const view = new View(source.size);
   const shown = element("div", {className: "shown"});
   const controls = element("div", {className: "controls"});
-  root.replaceChildren(shown, controls);
+  root.replaceChildren(controls, shown);
   const planes = new Planes(shown, source, view);
   controls.append(...positionControls(view, source), ...contrastControls(planes), ...viewControls(view));
-  const fit = () => planes.resize(shown.clientWidth, Math.max(320, 0.8 * window.innerHeight));
+  const fit = () => planes.resize(shown.clientWidth, Infinity);  // as wide as the page
   window.addEventListener("resize", fit);
   fit();
   root.dataset.ready = "yes";

@@ -3,19 +3,12 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "io/mrc.h"
-
 namespace tomofield::evaluate {
 
 /// Side of the box over which write_uncertainty() averages, in voxels.
 constexpr std::int64_t kUncertaintyBox = 7;
 
-/// Writes the mean of two MRC volumes of one size, voxel by voxel, with their voxel type. A section
-/// of each is in memory at a time.
-void write_mean(const std::filesystem::path& first, const std::filesystem::path& second,
-                io::MrcMode mode, const std::filesystem::path& path);
-
-/// Writes the standard error of that mean as the halves a and b show it:
+/// Writes the standard error of the mean of two MRC volumes a and b of one size, as they show it:
 ///   u(x) = ½ √⟨(a − b)²⟩,
 /// where ⟨⟩ is the mean over the box of 7 × 7 × 7 voxels around x, as far as it lies within the
 /// volume. If the errors of a and b are independent and their variance is σ² around x, u estimates

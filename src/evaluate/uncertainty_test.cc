@@ -1,4 +1,4 @@
-#include "evaluate/mean_and_uncertainty.h"
+#include "evaluate/uncertainty.h"
 
 #include <gtest/gtest.h>
 
@@ -54,18 +54,6 @@ TEST(Uncertainty, AveragesOverTheBoxThatLiesWithin) {
       for (std::int64_t x = 7; x < 14; ++x)
         squares += std::pow(static_cast<double>(even.at(x, y, z) - odd.at(x, y, z)), 2);
   EXPECT_NEAR(map.at(10, 25, 1), std::sqrt(squares / (5 * 4 * 7)) / 2, 1e-5);
-}
-
-TEST(MeanOfHalves, HasTheirMeanTheirPlaceAndTheirVoxelType) {
-  const base::Volume even = noisy(1, 1, 1), odd = noisy(1, 1, 2);
-  const HalfFiles halves(even, odd);
-  write_mean(halves.even(), halves.odd(), io::MrcMode::kFloat16, halves.result());
-  const io::MrcReader mean(halves.result());
-  EXPECT_EQ(mean.header().mode, io::MrcMode::kFloat16);
-  EXPECT_EQ(mean.header().origin_A[2], -30);
-  EXPECT_EQ(mean.header().voxel_size_A[0], 4.0);
-  EXPECT_NEAR(read_volume(halves.result()).at(3, 4, 5), (even.at(3, 4, 5) + odd.at(3, 4, 5)) / 2,
-              0.01);
 }
 
 }  // namespace

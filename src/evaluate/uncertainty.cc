@@ -1,4 +1,4 @@
-#include "evaluate/mean_and_uncertainty.h"
+#include "evaluate/uncertainty.h"
 
 #include <algorithm>
 #include <cmath>
@@ -71,22 +71,6 @@ void sum_squares(std::int64_t nx, std::int64_t ny, std::vector<float>& section) 
 }
 
 }  // namespace
-
-void write_mean(const std::filesystem::path& first, const std::filesystem::path& second,
-                io::MrcMode mode, const std::filesystem::path& path) {
-  const base::TraceSpan span("mean of halves");
-  const SectionPair halves(first, second);
-  io::MrcSpec spec = map_like(halves.header(), "");
-  spec.mode = mode;
-  spec.labels = halves.header().labels;
-  if (spec.labels.empty()) spec.labels.emplace_back();
-  spec.labels.front() += ", mean of both";
-  io::MrcWriter mean(path, spec);
-  base::parallel_for("write mean", spec.nz, [&](std::int64_t z) {
-    mean.write_section(z, halves.section(z, [](float a, float b) { return 0.5f * (a + b); }));
-  });
-  mean.close();
-}
 
 void write_uncertainty(const std::filesystem::path& first, const std::filesystem::path& second,
                        const std::filesystem::path& path) {
