@@ -56,7 +56,8 @@ set_source_files_properties(${PROJECT_SOURCE_DIR}/src/io/star_parser.cc PROPERTI
 set(sources_alone
   align/axis_search.cc align/bead_alignment.cc batch/task.cc evaluate/field_artefacts.cc
   evaluate/similarity.cc field/vm/vm_field.cc io/ctffind_table.cc io/hdf5_reader.cc io/star_parser.cc
-  objective/ray_data_term.cc projects/imod_project.cc report/slice.cc
+  objective/ray_data_term.cc projects/imod_project.cc report/slice.cc simulate/rasterize.cc
+  tilt_series/band_limited_image.cc
   tilt_series/fixed_pattern/pixel_pattern.cc tilt_series/masks/straight_fill.cc)
 list(TRANSFORM sources_alone PREPEND ${PROJECT_SOURCE_DIR}/src/)
 set_source_files_properties(${sources_alone} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)

@@ -73,6 +73,7 @@ std::optional<FinishedPart> fit_part(const Run& run, RunRecord record,
   made.fit->free_optimizer();  // the verdict needs the memory
   FinishedPart finished{.findings = examine(*made.fit, part.measurement, run.options, record),
                         .views = made.fit->progress().views,
+                        .held_out_view = {},
                         .took_steps = made.took_steps};
   finished.held_out_view = central_held_out_view(*made.fit, part.measurement, finished.findings);
   save_fit(part.model, *made.fit, model_info(part.measurement, run.options),

@@ -51,9 +51,9 @@ std::optional<double> order_of(const std::vector<Image>& images) {
     others.insert(others.end(), of_image.begin() + 1, of_image.end());
   }
   double greater = 0;
-  for (const double likeness : neighbours)
+  for (const double of_neighbours : neighbours)
     greater += static_cast<double>(
-        std::ranges::count_if(others, [&](double other) { return likeness > other; }));
+        std::ranges::count_if(others, [&](double other) { return of_neighbours > other; }));
   return greater / static_cast<double>(neighbours.size() * others.size());
 }
 

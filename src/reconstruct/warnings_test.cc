@@ -199,7 +199,7 @@ TEST(Warnings, HeldOutViewsTellOfAFitToNoise) {
 
 TEST(Warnings, RingsThatExplainNextToNothingTellNoDefocus) {
   Verdict verdict = good_verdict();
-  verdict.defocus = DefocusCheck{.error = 0.3, .standard_error = 0.02, .rings = 0.003};
+  verdict.defocus = DefocusCheck{0.3, 0.02, 0.003, {}};
   EXPECT_EQ(codes(verdict), "");
   verdict.defocus->rings = 0.01;
   EXPECT_EQ(codes(verdict), "defocus ");
