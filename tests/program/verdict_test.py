@@ -105,3 +105,26 @@ def test_thickness_that_is_too_small_or_too_large(cell):
     check_codes(verdict, result, "thick")
     suggested = int(verdict["warnings"][0]["message"].split("--thickness ")[1].split()[0])
     assert THICKNESS <= suggested <= 1.3 * THICKNESS, verdict["warnings"]
+
+
+def test_an_axis_that_is_not_vertical(cell):
+    angle = np.radians(40)
+    row = [np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle), 0, 0]
+    np.savetxt(f"{cell}/turned.xf", np.tile(row, (94, 1)), fmt="%.6f")
+    verdict, result = reconstruct(cell, *CELL, "--xf", f"{cell}/turned.xf")
+    check_codes(verdict, result, "tilt-axis")
+    assert abs(verdict["views"]["axis"]["direction_deg"] - 40) <= 6, verdict["views"]["axis"]
+
+
+def test_views_without_the_specimen(cell):
+    dark = os.path.join(harness.fresh_directory("dark"), "tilt_series.mrc")
+    views = harness.read_volume(f"{cell}/tilt_series.mrc").copy()
+    noise = np.random.default_rng(9).normal(0, 1, views[::2].shape)
+    views[::2] = views.min() + noise * np.std(np.diff(views[:, :, :4], axis=2)) / np.sqrt(2)
+    harness.write_stack(dark, views.astype(np.float32))
+    output = dark.replace("tilt_series", "out")
+    result = harness.succeed("reconstruct", dark, "--tlt", f"{cell}/tilt_series.tlt", "--thickness",
+                             THICKNESS, *QUICK, *CELL, "-o", output)
+    with open(output.replace(".mrc", ".json"), encoding="utf-8") as file:
+        verdict = json.load(file)["metrics"]["verdict"]
+    check_codes(verdict, result, "views")
