@@ -15,7 +15,7 @@ namespace tomofield::tilt_series {
 /// white-noise equivalent: the larger of the estimates at one and at two
 /// pixels (the latter times two). Structure also grows with the scale, but
 /// faster and faster, while correlated noise levels off. The second scale therefore
-/// counts only if the step to four pixels is no larger than the one before.
+/// counts only if it is 1.4 times the first and the step to four pixels is no larger.
 ///
 /// The result is always positive, and at least 1e-3 of the view's own standard deviation, since
 /// noise-free data would get infinite weight.
