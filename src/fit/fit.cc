@@ -24,6 +24,10 @@ namespace {
 // The bias moves every density at once, so it takes smaller steps than a factor.
 constexpr double kBiasRate = 0.02;
 
+// The first moment averages about 20 steps, which is more than the 16 of an epoch. So the noise
+// that the views of one subset have and those of others do not have nearly cancels in it.
+constexpr AdamOptions kAdam{.beta1 = 0.95};
+
 // Random streams from here on give the order of an epoch's subsets.
 constexpr std::uint64_t kOrderStream = 1000;
 
@@ -101,7 +105,7 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
                                 measurement.geometry.thickness, measurement.mean_density,
                                 of_kind(field_options, stages_.front().field_kind), options.seed,
                                 leaves_to_keep(processes, domain_.tree, share_))),
-      optimizer_(*field_, AdamOptions{}),
+      optimizer_(*field_, kAdam),
       may_change_tree_(field_options.tree != TreeKind::kUniform),
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())),
       fitted_views_(measurement.fitted_views()),
@@ -151,7 +155,7 @@ void Fit::resample_field() {
   free_optimizer();  // before the other field needs memory
   field_ = field_->kind() == stage().field_kind ? field_->resampled(std::move(shapes))
                                                 : field::factorised(*field_, std::move(shapes));
-  optimizer_ = Adam(*field_, AdamOptions{});
+  optimizer_ = Adam(*field_, kAdam);
 }
 
 // Goes from the end of a stage to the start of the next one.
@@ -207,7 +211,7 @@ void Fit::go_on_from(Progress progress, std::unique_ptr<field::Field> field) {
   progress_ = std::move(progress);
   enter_stage();
   field_ = std::move(field);
-  optimizer_ = Adam(*field_, AdamOptions{});
+  optimizer_ = Adam(*field_, kAdam);
   follow_tree();
 }
 
