@@ -14,6 +14,7 @@
 #include "field/vm/factorise.h"
 #include "measurement/noise_fit.h"
 #include "measurement/surrogate_views.h"
+#include "objective/noise_scale.h"
 #include "objective/ray_data_term.h"
 #include "objective/slab_objective.h"
 #include "objective/terms.h"
@@ -23,6 +24,19 @@ namespace {
 
 // The bias moves every density at once, so it takes smaller steps than a factor.
 constexpr double kBiasRate = 0.02;
+
+// The first moment averages about 20 steps, which is more than the 16 of an epoch. So the noise
+// that the views of one subset have and those of others do not have nearly cancels in it.
+constexpr AdamOptions kAdam{.beta1 = 0.95};
+
+// Returns a factor on the learning rate. Adam divides by the size of the gradient of a subset. If
+// the views are mostly noise, so is that gradient, and the part of it that the subsets have in
+// common moves the field by less than the learning rate says, as the contrast is below the noise.
+double rate_for_noise(const measurement::Measurement& measurement) {
+  constexpr double kRateOfNoise = 1.5, kMostRate = 10.0;  // docs/results/convergence.md
+  const double noise = objective::typical_noise(measurement.noise_sigma);
+  return std::clamp(kRateOfNoise * noise / measurement.contrast(), 1.0, kMostRate);
+}
 
 // Random streams from here on give the order of an epoch's subsets.
 constexpr std::uint64_t kOrderStream = 1000;
@@ -101,7 +115,7 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
                                 measurement.geometry.thickness, measurement.mean_density,
                                 of_kind(field_options, stages_.front().field_kind), options.seed,
                                 leaves_to_keep(processes, domain_.tree, share_))),
-      optimizer_(*field_, AdamOptions{}),
+      optimizer_(*field_, kAdam),
       may_change_tree_(field_options.tree != TreeKind::kUniform),
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())),
       fitted_views_(measurement.fitted_views()),
@@ -151,7 +165,7 @@ void Fit::resample_field() {
   free_optimizer();  // before the other field needs memory
   field_ = field_->kind() == stage().field_kind ? field_->resampled(std::move(shapes))
                                                 : field::factorised(*field_, std::move(shapes));
-  optimizer_ = Adam(*field_, AdamOptions{});
+  optimizer_ = Adam(*field_, kAdam);
 }
 
 // Goes from the end of a stage to the start of the next one.
@@ -207,7 +221,7 @@ void Fit::go_on_from(Progress progress, std::unique_ptr<field::Field> field) {
   progress_ = std::move(progress);
   enter_stage();
   field_ = std::move(field);
-  optimizer_ = Adam(*field_, AdamOptions{});
+  optimizer_ = Adam(*field_, kAdam);
   follow_tree();
 }
 
@@ -332,7 +346,7 @@ double Fit::learning_rate(std::int64_t step) const {
   const double done =
       (static_cast<double>(step) / steps_per_epoch() - static_cast<double>(s.first_epoch)) /
       s.epochs;
-  return s.first_rate * std::pow(s.last_rate / s.first_rate, done);
+  return rate_for_noise(measurement_) * s.first_rate * std::pow(s.last_rate / s.first_rate, done);
 }
 
 // Says whether the trace has the tasks of the next step: the second one of each stage. The first
