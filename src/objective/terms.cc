@@ -1,5 +1,7 @@
 #include "objective/terms.h"
 
+#include <cmath>
+
 #include "objective/boundary_consistency.h"
 #include "objective/fourier_prior.h"
 #include "objective/noise_scale.h"
@@ -19,6 +21,17 @@ kernels::VariationPenalty variation_penalty(const TermContext& c) {
     penalty.concavity =
         static_cast<float>(concavity(c.options.concavity, c.full.noise_sigma) / (c.bin * c.bin));
   return penalty;
+}
+
+// Returns a factor on the weight of the density's variation in a stage. Total variation counts a
+// slow change less where there is fine detail on top of it, because slopes add up as squares do. A
+// coarse field has no fine detail, so the whole weight of the smooth penalty would flatten it more
+// than the fit at full resolution wants, which brings back little of it in a few epochs
+// (docs/results/convergence.md).
+double factor_of_stage(const TermContext& c) {
+  constexpr double kFactorOfHalving = 0.8;
+  if (c.options.penalty == Penalty::kConcave) return 1.0;
+  return std::pow(kFactorOfHalving, std::log2(c.bin));
 }
 
 // A jump at a face counts like total variation: density times area. Faces and the Fourier prior
@@ -50,7 +63,8 @@ double variation_gain(const ObjectiveOptions& options, const measurement::Measur
 // pixels serves every size.
 std::vector<std::unique_ptr<Term>> make_terms(const TermContext& c) {
   const double noise = typical_noise(c.measured.noise_sigma);
-  const double density = variation_gain(c.options, c.full) * c.options.density_variation / noise;
+  const double density =
+      factor_of_stage(c) * variation_gain(c.options, c.full) * c.options.density_variation / noise;
   const double factors = c.has_factors ? c.options.factor_variation / noise : 0.0;
   const kernels::VariationPenalty penalty = variation_penalty(c);
   const bool has_rays = c.full.ray_geometry.has_value();
