@@ -16,8 +16,8 @@ namespace {
 // the yardsticks.
 constexpr double kWeightFactor = 1.8;
 constexpr int kMostSteps = 3;  // to one side of the usual weight
-// A concave penalty of less than its usual weight is not taken: one step shows that it would be
-// best.
+// A concave penalty of less than its usual weight is not taken, so one step down is enough to see
+// whether the usual one is needed.
 constexpr int kMostStepsDownIfConcave = 1;
 // What replaces the usual must predict better by this part and by this number of standard errors.
 // Trials are too short to tell smaller differences: a specimen took another penalty at each bin.
@@ -92,18 +92,16 @@ class Ladder {
 };
 
 TrialSettings choose_smooth_weight(const Ladder& ladder) {
-  const int best = ladder.best();
-  if (best < ladder.highest()) {
-    const selection::HeldOutScore heavier = ladder.score(best + 1), here = ladder.score(best);
-    if (!selection::difference(heavier, here).is_beyond(kClearErrors) && is_cleaner(heavier, here))
-      return ladder.at(best + 1);
-  }
   TrialSettings chosen = ladder.at(ladder.lowest_of_parabola());
   chosen.variation = std::stod(fmt::format("{:.3g}", chosen.variation));  // as users can give it
   return chosen;
 }
 
-// The best step must not be below the usual weight.
+// Says whether a smaller weight than the usual one predicts clearly worse.
+bool needs_its_weight(const Ladder& ladder) {
+  return selection::difference(ladder.score(-1), ladder.score(0)).is_beyond(kClearErrors);
+}
+
 TrialSettings choose_concave_weight(const Ladder& ladder) {
   const selection::HeldOutScore best = ladder.score(ladder.best());
   int chosen = is_surely_better(best, ladder.score(0)) ? ladder.best() : 0;
@@ -159,8 +157,8 @@ TrialSettings choose_variation(const TrialSettings& start, FitTrials& trials) {
   if (!is_surely_better(trials.trial(concave).score, smooth_weights.score(smooth_weights.best())))
     return choose_smooth_weight(smooth_weights);
   const Ladder concave_weights(concave, kMostStepsDownIfConcave, trials);
-  return concave_weights.best() < 0 ? choose_smooth_weight(smooth_weights)
-                                    : choose_concave_weight(concave_weights);
+  return needs_its_weight(concave_weights) ? choose_concave_weight(concave_weights)
+                                           : choose_smooth_weight(smooth_weights);
 }
 
 TrialSettings choose_spike_rank(const TrialSettings& start, FitTrials& trials) {

@@ -33,13 +33,12 @@ TrialSettings choose_penalty(const TrialSettings& start, FitTrials& trials);
 ///
 ///   1. Weights of the smooth penalty are tried in factors of 1.8 about the usual one, until the
 ///      best has a worse one on either side. The weight is where a parabola through these three is
-///      lowest, so that chance in the scores changes it little. The next larger one goes before if
-///      it predicts as well and its volume is clearly cleaner (fewer than half of the isolated
+///      lowest, so that chance in the scores changes it little.
+///   2. The concave penalty with its usual weight replaces it as in choose_penalty(), if a smaller
+///      weight of it predicts clearly worse. Else it keeps grains of noise as if they were objects,
+///      and leaves isolated voxels. A larger weight replaces the usual one as in choose_penalty(),
+///      or if it is as good and its volume is clearly cleaner (fewer than half of the isolated
 ///      voxels, or leaves that do not show).
-///   2. The concave penalty with its usual weight replaces it as in choose_penalty(), unless a
-///      smaller weight of it would be better still: it then keeps grains of noise as if they were
-///      objects, and leaves isolated voxels. A larger weight replaces the usual one under the same
-///      condition, or if it is as good and clearly cleaner.
 TrialSettings choose_variation(const TrialSettings& start, FitTrials& trials);
 
 /// Chooses whether isolated vertices are limited in a smooth fit: not if that predicts better by
