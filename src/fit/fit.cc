@@ -30,9 +30,11 @@ constexpr double kBiasRate = 0.02;
 constexpr AdamOptions kAdam{.beta1 = 0.95};
 
 // Returns a factor on the learning rate. Adam divides by the size of the gradient of a subset. If
-// the views are mostly noise, so is that gradient, and the part of it that the subsets have in
-// common moves the field by less than the learning rate says, as the contrast is below the noise.
+// the views are mostly noise, so is that gradient, and what a microscope passes of slow changes
+// moves the field by much less than the learning rate says. Plain projections pass slow changes
+// fully and keep their rate.
 double rate_for_noise(const measurement::Measurement& measurement) {
+  if (measurement.transfers.empty()) return 1.0;
   constexpr double kRateOfNoise = 1.5, kMostRate = 10.0;  // docs/results/convergence.md
   const double noise = objective::typical_noise(measurement.noise_sigma);
   return std::clamp(kRateOfNoise * noise / measurement.contrast(), 1.0, kMostRate);
