@@ -48,15 +48,15 @@ bool is_whole_shift(const RawFromAligned& map, const RawPlaces::Vector& first) {
 MaskedImage align_image(const MaskedImage& raw, const RawFromAligned& transform, std::int64_t width,
                         std::int64_t height, const std::optional<geometry::ViewWarp>& local) {
   const RawPlaces places(transform, raw.width, raw.height, local);
-  const auto [centre_x, centre_y] = RawPlaces::centre_of(width, height);
+  const RawPlaces::Vector centre = RawPlaces::centre_of(width, height);
   std::optional<BandLimitedImage> between_pixels;
-  if (local || !is_whole_shift(transform, places.of(-centre_x, -centre_y)))
+  if (local || !is_whole_shift(transform, places.of(-centre[0], -centre[1])))
     between_pixels.emplace(raw);
   MaskedImage out(width, height);
   base::parallel_for("align view", out.height, [&](std::int64_t y) {
     for (std::int64_t x = 0; x < out.width; ++x) {
       const auto [raw_x, raw_y] =
-          places.of(static_cast<double>(x) - centre_x, static_cast<double>(y) - centre_y);
+          places.of(static_cast<double>(x) - centre[0], static_cast<double>(y) - centre[1]);
       const Neighbours columns = neighbours_of(raw_x, raw.width);
       const Neighbours rows = neighbours_of(raw_y, raw.height);
       const std::size_t at = out.index(x, y);
