@@ -69,7 +69,7 @@ def test_variation_smooths_and_prior_takes_from_the_axes(plain, tensorf):
 
     without, _ = tensorf("without-tv", "--tv", 0)
     assert roughness(without.volume) > 1.1 * roughness(plain.volume)
-    prior, _ = tensorf("ifp", "--ifp", 30)
+    prior, _ = tensorf("ifp", "--ifp", 1000)
     assert axes(prior.volume) < 0.95 * axes(plain.volume)
 
 
