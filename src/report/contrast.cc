@@ -41,7 +41,8 @@ Contrast contrast_of(std::vector<float> values) {
 Contrast contrast_of(const io::MrcReader& volume) {
   constexpr std::int64_t kSections = 32, kMostVoxels = std::int64_t{1} << 22;
   const io::MrcHeader& h = volume.header();
-  const auto [nx, ny, nz] = middle_size({h.nx, h.ny, h.nz});
+  const auto size = middle_size({h.nx, h.ny, h.nz});
+  const std::int64_t nx = size[0], ny = size[1], nz = size[2];
   const std::int64_t x0 = (h.nx - nx) / 2, y0 = (h.ny - ny) / 2, z0 = (h.nz - nz) / 2;
   const std::int64_t sections = std::min(nz, kSections);
   const std::int64_t stride = nx * ny * sections / kMostVoxels + 1;
