@@ -1,24 +1,11 @@
 #include "align/blur.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "base/gaussian_kernel.h"
 
 namespace tomofield::align {
 namespace {
-
-std::vector<float> kernel_of(double sigma_px) {
-  constexpr double kReach = 3.5;  // standard deviations
-  const auto reach = static_cast<std::int64_t>(std::ceil(kReach * sigma_px));
-  std::vector<float> kernel;
-  double sum = 0.0;
-  for (std::int64_t i = -reach; i <= reach; ++i) {
-    const double at = static_cast<double>(i) / sigma_px;
-    kernel.push_back(static_cast<float>(std::exp(-0.5 * at * at)));
-    sum += static_cast<double>(kernel.back());
-  }
-  for (float& weight : kernel) weight = static_cast<float>(static_cast<double>(weight) / sum);
-  return kernel;
-}
 
 // Adds to each pixel the pixels of its row, weighted by the kernel.
 void blur_rows(std::span<const float> from, std::int64_t width, std::span<const float> kernel,
@@ -56,7 +43,8 @@ void blur_columns(std::span<const float> from, std::int64_t width, std::span<con
 std::vector<float> gaussian_blur(std::span<const float> image, std::int64_t width,
                                  double sigma_px) {
   if (sigma_px <= 0.0) return {image.begin(), image.end()};
-  const std::vector<float> kernel = kernel_of(sigma_px);
+  constexpr double kDeviations = 3.5;
+  const std::vector<float> kernel = base::gaussian_kernel(sigma_px, kDeviations);
   std::vector<float> rows(image.size()), blurred(image.size());
   blur_rows(image, width, kernel, rows);
   blur_columns(rows, width, kernel, blurred);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/check.h"
+#include "base/gaussian_kernel.h"
 #include "base/parallel.h"
 #include "base/utf8.h"
 #include "evaluate/volume_pair.h"
@@ -21,19 +22,6 @@ constexpr double kSheetSigma_A = 20.0;
 std::int64_t mirrored(std::int64_t i, std::int64_t n) {
   while (i < 0 || i >= n) i = i < 0 ? -1 - i : 2 * n - 1 - i;
   return i;
-}
-
-std::vector<float> gaussian_kernel(double sigma) {
-  const auto reach = static_cast<std::int64_t>(std::ceil(4.0 * sigma));
-  std::vector<float> kernel;
-  double sum = 0.0;
-  for (std::int64_t i = -reach; i <= reach; ++i) {
-    const double x = static_cast<double>(i) / sigma;
-    kernel.push_back(static_cast<float>(std::exp(-0.5 * x * x)));
-    sum += static_cast<double>(kernel.back());
-  }
-  for (float& value : kernel) value /= static_cast<float>(sum);
-  return kernel;
 }
 
 // Blurs all lines along one axis, whose neighbours are `stride` apart.
@@ -102,7 +90,8 @@ base::Volume sheet_response(const base::Volume& volume, double sigma_px) {
   if (std::min({shape.nx, shape.ny, shape.nz}) < 3)
     throw Error("a volume needs 3 voxels along each axis to look for sheets in it");
   base::Volume blurred = volume;
-  const std::vector<float> kernel = gaussian_kernel(sigma_px);
+  constexpr double kDeviations = 4.0;
+  const std::vector<float> kernel = base::gaussian_kernel(sigma_px, kDeviations);
   blur_axis(shape.nx, 1, kernel, blurred.data);
   blur_axis(shape.ny, shape.nx, kernel, blurred.data);
   blur_axis(shape.nz, shape.nx * shape.ny, kernel, blurred.data);

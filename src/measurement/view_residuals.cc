@@ -121,7 +121,9 @@ ViewModel fitted_model(const ViewSums& s, double weight) {
   const double spread = s.n * s.pp - s.p * s.p;
   const bool is_flat = !(spread > 1e-9 * s.n * s.pp);
   const double scale = is_flat ? 1.0 : (s.n * s.pb - s.p * s.b) / spread;
-  return {scale, s.n > 0 ? (s.b - scale * s.p) / s.n : 0.0, weight};
+  ViewModel model{scale, 0.0, weight};
+  model.offset = mean_offset(s, model);
+  return model;
 }
 
 }  // namespace

@@ -50,12 +50,12 @@ double ray_data_term(const ViewModel& model, double multiplicity, double measure
 ///
 ///   min  w Σ (a p + o − b)² + shrinkage · w (Σ p² (a − 1)² + n o²).
 ///
-/// A contrast transfer passes so little of the mean of a projection that the density cannot take it
-/// over. Then the offset is free, and p in the prior is the difference from its mean.
-///
 /// Without it an extended slab's laterally constant part could stay in free
 /// offsets; with it each fit leaves a share of the residual to the density,
 /// which takes it over in the course of the epochs. Afterwards Σ log scale = 0.
+///
+/// A contrast transfer passes so little of the mean of a projection that the density cannot take it
+/// over. Then offsets are free, and p in the prior is the difference from its mean.
 struct NuisancePrior {
   double shrinkage = 0.1;
   bool has_free_offsets = false;

@@ -19,8 +19,9 @@ constexpr int kMostSteps = 3;  // to one side of the usual weight
 // A concave penalty of less than its usual weight is not taken, so one step down is enough to see
 // whether the usual one is needed.
 constexpr int kMostStepsDownIfConcave = 1;
-// What replaces the usual must predict better by this part and by this number of standard errors.
-// Trials are too short to tell smaller differences: a specimen took another penalty at each bin.
+// A trial replaces the usual settings only if it predicts better by this part and by this number of
+// standard errors. Trials are too short to tell smaller differences: a specimen took another
+// penalty at each bin.
 constexpr double kLeastGain = 0.01, kSureErrors = 3;
 
 // The part of speckle that hardly anybody sees, and the face jump from which leaves show.

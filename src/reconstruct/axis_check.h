@@ -22,8 +22,8 @@ struct AxisCheck {
 
 /// Compares the profiles of views, one image a tilt, that are 10° to 40° apart. Details between a
 /// third of a view and four pixels count. Returns nothing if fewer than five pairs are that far
-/// apart. Common lines determine the tilt axis in
-/// AreTomo too.
+/// apart. AreTomo
+/// determines the tilt axis by common lines, too.
 std::optional<AxisCheck> check_axis(const std::vector<evaluate::Image>& views,
                                     const std::vector<double>& tilt_deg);
 

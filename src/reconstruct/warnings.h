@@ -18,10 +18,10 @@ struct GivenInput {
   double bin_factor = 1.0;            ///< of these pixels to the stack's
 };
 
-/// Returns what is off in a run, the gravest first. Faults of the series as a whole (views that
-/// show nothing, contrast, order, alignment, axis) come alone, because nothing else can be judged
-/// then; a fit that is bad for no reason that is known is named last. docs/verdict.md has the
-/// measurements that the limits rest on.
+/// Returns what is off in a run, the most serious first. Faults of the series as a whole (views
+/// that show nothing, contrast, order, alignment, axis) come alone, because nothing else can be
+/// judged then; a fit that is bad for no reason that is known is named last. docs/verdict.md has
+/// the measurements that the limits rest on.
 std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& input);
 
 }  // namespace tomofield::reconstruction

@@ -21,9 +21,9 @@ constexpr int kTaps = 8;
 // There are 5/4 finer pixels for each pixel.
 constexpr std::int64_t kFine = 5, kCoarse = 4;
 constexpr double kFiner = static_cast<double>(kFine) / kCoarse;
-// The image begins behind so many pixels of its extension, so that the taps never wrap around.
+// Number of pixels of its extension that lie before the image, so that the taps never wrap around.
 constexpr std::int64_t kMargin_px = 16;
-// The weights of the taps are computed at so many places between two pixels.
+// Number of places between two pixels at which the weights of the taps are tabulated.
 constexpr std::size_t kSteps = 1024;
 
 using Weights = std::array<float, kTaps>;

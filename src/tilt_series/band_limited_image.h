@@ -26,7 +26,7 @@ class BandLimitedImage {
   /// of the first pixel.
   float at(double x, double y) const;
 
-  /// Returns the bytes that the construction takes for an image of so many pixels.
+  /// Returns the bytes that the construction takes for an image of that number of pixels.
   static std::size_t memory(double pixels);
 
  private:

@@ -38,7 +38,10 @@ def read_dependencies():
     shown = subprocess.run(
         ["dpkg-query", "-W", "-f", "${Package}\t${Provides}\t${Pre-Depends}, ${Depends}\n"],
         capture_output=True, text=True, check=True).stdout
-    names = lambda text: re.findall(r"(?:^|[,|])\s*([a-z0-9][a-z0-9.+-]*)", text)
+
+    def names(text):
+        return re.findall(r"(?:^|[,|])\s*([a-z0-9][a-z0-9.+-]*)", text)
+
     dependencies = {}
     for line in shown.splitlines():
         package, provided, needed = line.split("\t")
