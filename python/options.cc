@@ -146,6 +146,7 @@ void add_field_and_fit(Class& options) {
       .def_readwrite("rays_per_step", &Options::rays_per_step)
       .def_readwrite("learning_rate", &Options::learning_rate)
       .def_readwrite("density_variation", &Options::density_variation)
+      .def_readwrite("denoise", &Options::denoise)
       .def_readwrite("factor_variation", &Options::factor_variation)
       .def_readwrite("boundary", &Options::boundary)
       .def_readwrite("fourier", &Options::fourier)

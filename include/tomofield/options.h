@@ -121,8 +121,11 @@ struct Options {
   std::optional<double> density_variation;  ///< weight of total variation, in noise units
   double factor_variation = 0.0;            ///< weight of the factors' total variation
   std::optional<Penalty> penalty;           ///< of total variation
-  double boundary = 4.0;                    ///< weight of the boundary consistency (eq. 6)
-  double fourier = 0.0;                     ///< weight of the isotropic Fourier prior (eq. 7)
+  /// How strongly to denoise: "light", "medium", "strong", or the factor by which to multiply the
+  /// weight that would be used else.
+  std::string denoise = "medium";
+  double boundary = 4.0;  ///< weight of the boundary consistency (eq. 6)
+  double fourier = 0.0;   ///< weight of the isotropic Fourier prior (eq. 7)
   RingReference fourier_ring = RingReference::kMean;
   /// A plain vertex is at most the one of this rank among the 26 around it; 0: no limit.
   std::optional<int> spike_rank;

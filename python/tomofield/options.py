@@ -72,6 +72,7 @@ class Options(TypedDict, total=False):
     density_variation: Optional[float]
     factor_variation: float
     penalty: Optional[Literal["concave", "smooth"]]
+    denoise: str
     boundary: float
     fourier: float
     fourier_ring: Literal["mean", "max"]

@@ -122,11 +122,15 @@ void write_report(const reconstruction::Results& results,
                                       .volume = volume,
                                       .mask_picture = written.location_of(mask_picture),
                                       .tree_picture = {},
-                                      .held_out_picture = {}};
+                                      .held_out_picture = {},
+                                      .dial_picture = {}};
   if (options.field.tree == TreeKind::kAdaptive)
     source.tree_picture = written.location_of(paths.tree_picture);
   if (options.fit.hold_out > 0)
     source.held_out_picture = written.location_of(paths.held_out_picture);
+  const bool chose_weight = options.resolved.tune || options.open.variation;
+  if (chose_weight && std::filesystem::exists(paths.dial_picture))
+    source.dial_picture = paths.dial_picture;
   io::write_text_file(paths.report, reconstruction::run_report(source));
 }
 

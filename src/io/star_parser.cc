@@ -25,7 +25,8 @@ ParsedTable table_of_loop(const std::string& name, const cif::Loop& loop) {
 }
 
 void append_tables(const cif::Block& block, std::vector<ParsedTable>& tables) {
-  const std::string name = block.name == "#" ? "" : block.name;  // gemmi's sign for no name
+  // gemmi's signs for no name: "#" up to version 0.5, and a blank later
+  const std::string name = block.name == "#" || block.name == " " ? "" : block.name;
   ParsedTable single{name, {}, {{}}};
   for (const cif::Item& item : block.items) {
     if (item.type == cif::ItemType::Loop) tables.push_back(table_of_loop(name, item.loop));

@@ -243,6 +243,9 @@ constexpr Row kRows[] = {
      .group = Group::kFit, .range = Range::above(0), .automatic = "0.05; 0.035 for --field grid",
      .help = "Learning rate of the first step; it decays exponentially. Vertices that are "
              "factorised later take 0.7 of it, the factors made of them 0.3"},
+    {.key = "fit.denoise", .flag = "--denoise", MEMBER(Options, denoise), .group = Group::kFit,
+     .label = "STRENGTH", .help = "Smoothness: light, medium, strong or a factor",
+     .is_common = true},
     {.key = "fit.density_variation", .flag = "--tv", MEMBER(Options, density_variation),
      .group = Group::kFit, .unit = "noise units", .range = Range::at_least(0),
      .automatic = "14; with the smooth penalty 5, or 2.8 to 16 by trials if both are chosen",
@@ -288,8 +291,7 @@ constexpr Row kRows[] = {
      .group = Group::kFit, .range = Range::zero_or_between(2, kMaxCount),
      .help = "Leave every Nth view out of the fit and score it. 0: none"},
     {.key = "tune", .flag = "--tune", MEMBER(Options, tune), .group = Group::kFit,
-     .help = "Choose --tv-penalty, --tv, --rank and --epochs by short trials that predict every "
-             "8th view, then fit all views",
+     .help = "Choose penalty, weight, rank and epochs by longer trials, then fit",
      .is_common = true},
     {.key = "fit.patience", .flag = "--early-stop", MEMBER(Options, patience),
      .group = Group::kFit, .unit = "epochs", .range = Range::between(0, kMaxCount),

@@ -19,13 +19,6 @@ constexpr double kMostPercent = 12;
 // Weights below this one, such as 0, are drawn at it.
 constexpr double kLeastWeight = 0.125;
 
-bool has_usual_corrections(const FitTrial& trial, const TunedFit& tuned) {
-  TrialSettings usual = tuned.trials.front().settings;
-  usual.penalty = trial.settings.penalty;
-  usual.variation = trial.settings.variation;
-  return trial.settings == usual;
-}
-
 void add_point(const FitTrial& trial, const TunedFit& tuned, report::Curve& curve) {
   const selection::Difference d = difference_to_chosen(trial, tuned);
   curve.points.emplace_back(std::log2(std::max(trial.settings.variation, kLeastWeight)),
@@ -38,7 +31,7 @@ report::Curve curve_of(Penalty penalty, const TunedFit& tuned) {
   report::Curve curve{.name = fmt::format("{} penalty", base::name_of(penalty)), .points = {}};
   std::vector<FitTrial> trials;
   std::ranges::copy_if(tuned.trials, std::back_inserter(trials), [&](const FitTrial& t) {
-    return t.settings.penalty == penalty && has_usual_corrections(t, tuned);
+    return t.settings.penalty == penalty && differs_from_first_in_variation_alone(t, tuned);
   });
   std::ranges::sort(trials, {}, [](const FitTrial& t) { return t.settings.variation; });
   for (const FitTrial& trial : trials) add_point(trial, tuned, curve);
@@ -54,7 +47,7 @@ report::CurvePlot choice_plot(const TunedFit& tuned) {
     if (curves.back().points.empty()) curves.pop_back();
   }
   for (const FitTrial& trial : tuned.trials) {
-    if (has_usual_corrections(trial, tuned)) continue;
+    if (differs_from_first_in_variation_alone(trial, tuned)) continue;
     curves.push_back(
         {.name = describe(trial.settings, tuned.trials.front().settings), .points = {}});
     add_point(trial, tuned, curves.back());

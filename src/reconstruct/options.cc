@@ -13,6 +13,7 @@
 #include "option_table/values.h"
 #include "output/shared_options.h"
 #include "reconstruct/checkpoint.h"
+#include "reconstruct/denoise_dial.h"
 #include "reconstruct/exchange_files.h"
 #include "reconstruct/run_fit.h"
 #include "reconstruct/tuning.h"
@@ -123,6 +124,7 @@ std::vector<std::filesystem::path> result_files(const ReconstructOptions& option
   if (options.fit.hold_out > 0) results.push_back(paths.held_out_picture);
   if (options.makes_halves()) add_half_files(paths, resolved.denoising_halves, results);
   if (resolved.tune || options.open.any()) results.push_back(paths.choice_picture);
+  if (resolved.tune || options.open.variation) results.push_back(paths.dial_picture);
   for (const auto& file : exchange_files(options)) results.push_back(file);
   return results;
 }
@@ -182,6 +184,7 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
           .picture_prefix = stem,
           .held_out_picture = with("_held_out.png"),
           .choice_picture = with("_choice.png"),
+          .dial_picture = with("_denoise.png"),
           .trials = with("_tune.json"),
           .alignment = with("_align.json"),
           .tiles = with("_tiles.h5"),
@@ -216,6 +219,14 @@ std::vector<std::string> ReconstructOptions::faults() const {
       fit.vertex_epochs > 0 && (field.kind != FieldKind::kVm || field.tree != TreeKind::kUniform),
       "--vertex-epochs is for the factors of a uniform tree: leave it out, or give --field "
       "vm and --tree uniform");
+  refuse_if(requested.density_variation && requested.denoise != Options().denoise,
+            "--denoise changes the weight that the program would take, and --tv gives one: leave "
+            "one of them out");
+  try {
+    denoise_factor(resolved.denoise);
+  } catch (const Error& error) {
+    all.emplace_back(error.what());
+  }
   refuse_if(fit.patience > 0 && fit.hold_out == 0,
             "--early-stop watches views that --hold-out keeps from the fit: give that as well");
   refuse_if(fit.hold_out > 0 && is_ray,

@@ -33,6 +33,7 @@ struct OutputPaths {
   std::filesystem::path picture_prefix;    ///< of the slices
   std::filesystem::path held_out_picture;  ///< if views are held out
   std::filesystem::path choice_picture;    ///< of the trials, if there are any
+  std::filesystem::path dial_picture;      ///< what --denoise does (denoise_dial.h)
   std::filesystem::path trials;            ///< trials of --tune (JSON)
   std::filesystem::path alignment;         ///< of --align, from which a run resumes (JSON)
   std::filesystem::path tiles;  ///< finished tiles, from which a run resumes (a compact model)

@@ -1,5 +1,7 @@
 #include "reconstruct/reconstruct.h"
 
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -16,6 +18,7 @@
 #include "measurement/undecided_beads.h"
 #include "measurement/view_transfers.h"
 #include "reconstruct/checkpoint.h"
+#include "reconstruct/denoise_dial.h"
 #include "reconstruct/finished_tiles.h"
 #include "reconstruct/halves.h"
 #include "reconstruct/results.h"
@@ -84,6 +87,23 @@ void apply(const TrialSettings& settings, Run& run) {
   if (settings.masks_beads) measurement::hide_beads(run.measurement, run.processes);
 }
 
+// Multiplies the weight of total variation by what --denoise says, unless the user gave the weight.
+void turn_the_dial(ReconstructOptions& options) {
+  if (options.requested.density_variation) return;
+  options.fit.density_variation *= denoise_factor(options.resolved.denoise);
+  options.resolved.density_variation = options.fit.density_variation;
+  if (options.resolved.denoise != Options().denoise)
+    base::log_info(fmt::format("--denoise {}: the weight of total variation is {:.3g}",
+                               options.resolved.denoise, options.fit.density_variation));
+}
+
+// Shows what the dial does, as soon as there are trials of its places.
+void write_dial_picture(const Run& run, const TunedFit& tuned) {
+  if (!run.writes_files() || !run.processes.is_root()) return;
+  const double sign = run.options.input.contrast == Contrast::kDark ? -1 : 1;
+  write_dial_picture(tuned, run.options.volume.invert ? -sign : sign, run.paths.dial_picture);
+}
+
 // Chooses the settings that are left to trials. A resumed run takes those that its checkpoint has.
 // Returns false if a stop was requested.
 bool choose_settings(Run& run, std::optional<TunedFit>& tuned) {
@@ -96,8 +116,10 @@ bool choose_settings(Run& run, std::optional<TunedFit>& tuned) {
   } else if (makes_trials) {
     tuned = choose_by_trials(run, open);
     if (!tuned) return false;
+    run.processes.run_collectively([&] { write_dial_picture(run, *tuned); });
   }
   if (tuned) apply(tuned->settings, run);
+  turn_the_dial(run.options);
   measurement::keep_beads(run.measurement);
   return true;
 }

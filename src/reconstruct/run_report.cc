@@ -11,6 +11,7 @@
 
 #include "base/trace.h"
 #include "base/version.h"
+#include "io/json_numbers.h"
 #include "io/mrc.h"
 #include "reconstruct/alignment_output.h"
 #include "reconstruct/report_options.h"
@@ -26,10 +27,6 @@ namespace {
 using nlohmann::json;
 using report::HtmlFact;
 using report::HtmlPage;
-
-double number(const json& value) {
-  return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
-}
 
 std::string size_text(const std::array<std::int64_t, 3>& size) {
   return fmt::format("{} × {} × {}", size[0], size[1], size[2]);
@@ -57,8 +54,8 @@ AllFits fits_of(const json& record) {
 std::pair<double, double> tilt_range(const json& metrics) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const json& view : metrics.at("views")) {
-    low = std::min(low, number(view.at("tilt_deg")));
-    high = std::max(high, number(view.at("tilt_deg")));
+    low = std::min(low, io::number_or_nan(view.at("tilt_deg")));
+    high = std::max(high, io::number_or_nan(view.at("tilt_deg")));
   }
   return {low, high};
 }
@@ -115,12 +112,13 @@ void add_beads(const json& alignment, std::vector<HtmlFact>& facts) {
   const bool is_new = alignment.at("accepted").get<bool>();
   const char* of_new = beads.at("accepted").get<bool>() ? "after" : "before";
   facts.push_back(
-      {"Gold beads", fmt::format("{:.2f} px", number(distance_px.at(is_new ? of_new : "files"))),
+      {"Gold beads",
+       fmt::format("{:.2f} px", io::number_or_nan(distance_px.at(is_new ? of_new : "files"))),
        fmt::format("{} beads lie so far from their places (root mean square in x and y). With the "
                    "alignment {}: {:.2f} px.",
                    beads.at("beads").get<int>(),
                    is_new ? "of the files" : "that was tried and not taken",
-                   number(distance_px.at(is_new ? "files" : of_new)))});
+                   io::number_or_nan(distance_px.at(is_new ? "files" : of_new)))});
 }
 
 // Adds what an alignment found of the specimen's pose.
@@ -129,9 +127,10 @@ void add_pose(const json& alignment, std::vector<HtmlFact>& facts) {
   const json& pose = alignment.at("pose");
   facts.push_back(
       {"Thickness and pitch",
-       fmt::format("{:.0f} ± {:.0f} px, {:.1f} ± {:.1f}°", number(pose.at("thickness_px")),
-                   number(pose.at("thickness_error_px")), number(pose.at("pitch_deg")),
-                   number(pose.at("pitch_error_deg"))),
+       fmt::format(
+           "{:.0f} ± {:.0f} px, {:.1f} ± {:.1f}°", io::number_or_nan(pose.at("thickness_px")),
+           io::number_or_nan(pose.at("thickness_error_px")),
+           io::number_or_nan(pose.at("pitch_deg")), io::number_or_nan(pose.at("pitch_error_deg"))),
        "What the specimen seems to have, in unbinned pixels, and in degrees against the tilt "
        "angles. "
        "Noisy views give rough values, whatever their errors say: look at the XZ plane first. The "
@@ -140,37 +139,41 @@ void add_pose(const json& alignment, std::vector<HtmlFact>& facts) {
 
 std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics) {
   std::vector<HtmlFact> facts;
-  facts.push_back({"Residual", fmt::format("{:.2f}", number(verdict.at("residual"))),
+  facts.push_back({"Residual", fmt::format("{:.2f}", io::number_or_nan(verdict.at("residual"))),
                    "What the tomogram leaves of the views, over the noise's variance: about 1 if "
                    "nothing but noise is left, more if it cannot explain the views."});
   if (const json& held_out = verdict.at("held_out"); held_out.is_object()) {
     facts.push_back(
         {held_out.at("of_trials").get<bool>() ? "Held-out views, in trials" : "Held-out views",
-         fmt::format("{:.2f}", number(held_out.at("median"))),
+         fmt::format("{:.2f}", io::number_or_nan(held_out.at("median"))),
          fmt::format("The same of views that were not fitted (median): near the residual if the "
                      "tomogram has no structure that only the fitted views want. Worst {:.2f} at "
                      "{:.1f}°.",
-                     number(held_out.at("worst")), number(held_out.at("worst_tilt_deg")))});
+                     io::number_or_nan(held_out.at("worst")),
+                     io::number_or_nan(held_out.at("worst_tilt_deg")))});
   }
   if (const json& views = verdict.at("views"); views.is_object()) {
     facts.push_back({"Alignment",
-                     fmt::format("{:.2g} px", number(views.at("usual_displacement_px"))),
+                     fmt::format("{:.2g} px", io::number_or_nan(views.at("usual_displacement_px"))),
                      "9 of 10 views lie closer than this to where the tomogram predicts them."});
   }
   add_beads(metrics.value("alignment", json()), facts);
   add_pose(metrics.value("alignment", json()), facts);
-  if (const double speckle = number(verdict.value("speckle", json())); std::isfinite(speckle))
+  if (const double speckle = io::number_or_nan(verdict.value("speckle", json()));
+      std::isfinite(speckle))
     facts.push_back(
         {"Speckle", fmt::format("{:.3f} %", 100 * speckle),
          "Voxels that stick out from all their neighbours. Hardly anybody sees less than "
          "0.02 %."});
-  facts.push_back({"Masked",
-                   fmt::format("{:.1f} %", 100 * number(metrics.at("mask").at("masked_part"))),
-                   "Pixels of the views that did not count: beads, fill, bad pixels."});
-  facts.push_back({"Time and memory",
-                   fmt::format("{}, {:.2g} GiB", time_text(number(verdict.at("seconds"))),
-                               number(verdict.at("peak_GiB"))),
-                   fmt::format("Threads: {}.", metrics.at("threads").get<int>())});
+  facts.push_back(
+      {"Masked",
+       fmt::format("{:.1f} %", 100 * io::number_or_nan(metrics.at("mask").at("masked_part"))),
+       "Pixels of the views that did not count: beads, fill, bad pixels."});
+  facts.push_back(
+      {"Time and memory",
+       fmt::format("{}, {:.2g} GiB", time_text(io::number_or_nan(verdict.at("seconds"))),
+                   io::number_or_nan(verdict.at("peak_GiB"))),
+       fmt::format("Threads: {}.", metrics.at("threads").get<int>())});
   return facts;
 }
 
@@ -232,14 +235,14 @@ std::string mask_text(const json& mask) {
     text += "No beads were found";
   else if (mask.at("bead_masking") == "masked")
     text += fmt::format("{} beads of {:.3g} nm were found and masked", beads,
-                        number(mask.at("bead_diameter_nm")));
+                        io::number_or_nan(mask.at("bead_diameter_nm")));
   else
     text += fmt::format(
         "{} beads of {:.3g} nm were found and kept (blue), because that predicts views better",
-        beads, number(mask.at("bead_diameter_nm")));
+        beads, io::number_or_nan(mask.at("bead_diameter_nm")));
   return text + fmt::format("; {} hot or dead pixels; {:.1f} % of all pixels are masked.",
                             mask.at("bad_pixels").get<std::int64_t>(),
-                            100 * number(mask.at("masked_part")));
+                            100 * io::number_or_nan(mask.at("masked_part")));
 }
 
 void add_pictures(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
@@ -282,6 +285,22 @@ void add_alignment(const json& metrics, HtmlPage& page) {
     page.add_svg(report::curve_plot_svg(plot.axes, plot.curves), "");
 }
 
+// Shows what another place of the dial would do.
+void add_dial(const ReportSource& source, HtmlPage& page) {
+  if (!source.dial_picture) return;
+  page.add_heading("Lighter or stronger denoising");
+  page.add_paragraph(fmt::format(
+      "One section of three of the short fits. This run was made with --denoise {}. Where the "
+      "strong one loses what you want to see, give --denoise light; where the medium one is too "
+      "grainy, give --denoise strong, or any factor such as 1.5. The whole fit is a little "
+      "smoother than these.",
+      source.record.at("options").at("fit").at("denoise").get<std::string>()));
+  page.add_figures({{*source.dial_picture,
+                     "Half of the chosen weight, the chosen one, and twice "
+                     "of it, or the nearest that were tried"}},
+                   report::FigureSize::kLarge);
+}
+
 void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
   add_plot(
       "Settings that trials chose",
@@ -290,6 +309,7 @@ void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
       "these views (the median over pairs of patches). The weight lies between those that were "
       "tried, and a concave penalty is taken only if it is surely better (docs/fitting.md).",
       trials_plot(fits.front().metrics), page);
+  add_dial(source, page);
   add_alignment(fits.front().metrics, page);
   add_plot("Loss",
            "The fit begins with coarse pixels, whose noise is lower; the curves jump where it goes "
@@ -343,9 +363,10 @@ void add_costs(const json& verdict, const json& metrics, HtmlPage& page) {
   page.add_paragraph(fmt::format(
       "The whole run took {}, of which the fit {} ({} steps, {} parameters); at most {:.2f} GiB of "
       "memory. {}.",
-      time_text(number(verdict.at("seconds"))), time_text(number(metrics.at("seconds"))),
-      metrics.at("steps").get<std::int64_t>(), metrics.at("parameters").get<std::int64_t>(),
-      number(verdict.at("peak_GiB")), metrics.at("threads_why").get<std::string>()));
+      time_text(io::number_or_nan(verdict.at("seconds"))),
+      time_text(io::number_or_nan(metrics.at("seconds"))), metrics.at("steps").get<std::int64_t>(),
+      metrics.at("parameters").get<std::int64_t>(), io::number_or_nan(verdict.at("peak_GiB")),
+      metrics.at("threads_why").get<std::string>()));
   std::vector<std::vector<report::HtmlCell>> rows{
       {{"stage", ""}, {"epochs", ""}, {"pixels binned by", ""}, {"field", ""}}};
   for (const json& stage : metrics.at("stages"))

@@ -67,7 +67,8 @@ class RunReport : public ::testing::Test {
                        .volume = directory_ / "volume.mrc",
                        .mask_picture = directory_ / "mask.png",
                        .tree_picture = {},
-                       .held_out_picture = {}});
+                       .held_out_picture = {},
+                       .dial_picture = {}});
   }
   bool page_has(const std::string& text) const { return page().find(text) != std::string::npos; }
 

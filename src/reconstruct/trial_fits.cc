@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <string>
 
 #include "base/enum_names.h"
 #include "base/parallel.h"
 #include "base/trace.h"
 #include "evaluate/field_artefacts.h"
+#include "field/sampling/sample_box.h"
 #include "measurement/background.h"
 #include "measurement/patch_errors.h"
 #include "measurement/undecided_beads.h"
@@ -56,7 +58,9 @@ class TrialFits::Running {
     part_done_ = is_last ? 1.0 : fit_->work(fit_->progress().step) / fit_->work(fit_->num_steps());
     detail_ = fmt::format("{} tv {:.3g}  rank {}  epochs {}", base::name_of(settings_.penalty),
                           settings_.variation, settings_.rank, settings_.epochs);
-    if (is_last) finished_ = FitTrial{settings_, score(), 0.0};
+    if (is_last)
+      finished_ = FitTrial{
+          .settings = settings_, .score = score(), .seconds = 0.0, .section = middle_section()};
     seconds_ += stopwatch.seconds();
     if (!is_last) return;
     finished_->seconds = seconds_;
@@ -70,6 +74,16 @@ class TrialFits::Running {
   const std::optional<FitTrial>& finished() const { return finished_; }
 
  private:
+  // Returns the densities at half the thickness, one value a pixel.
+  selection::Section middle_section() const {
+    const Rectangle& roi = measurement_->roi;
+    field::OrientedBox box;
+    box.size = {roi.width(), roi.height(), 1};
+    box.centre_px = {0.5 * static_cast<double>(roi.x0 + roi.x1),
+                     0.5 * static_cast<double>(roi.y0 + roi.y1), 0.5 * fit_->field().thickness()};
+    return {roi.width(), field::sample_box(fit_->field(), box)};
+  }
+
   selection::HeldOutScore score() const {
     measurement::ViewErrors error = fit_->held_out_error(scores_with_view_scale_);
     std::vector<double> noise_weight;
@@ -223,6 +237,16 @@ bool TrialFits::report(const std::vector<std::unique_ptr<Running>>& own, std::si
   return false;
 }
 
+// Returns the section that `owner` has on every process.
+selection::Section TrialFits::shared_section(selection::Section section, int owner) const {
+  double sizes[] = {static_cast<double>(section.width), static_cast<double>(section.values.size())};
+  for (double& size : sizes) size = processes_.allreduce_max(size);
+  section.width = static_cast<std::int64_t>(sizes[0]);
+  section.values.resize(static_cast<std::size_t>(sizes[1]));
+  processes_.broadcast(std::as_writable_bytes(std::span(section.values)), owner);
+  return section;
+}
+
 // Gives the trials that any process has finished to all of them.
 void TrialFits::share(Trials& trials) const {
   if (processes_.size() == 1) return;
@@ -233,7 +257,9 @@ void TrialFits::share(Trials& trials) const {
         trial ? selection::trial_json(settings_json(trial->settings), trial->score, trial->seconds)
                     .dump()
               : "";
+    selection::Section section = trial ? std::move(trial->section) : selection::Section();
     trial = trial_from(json::parse(processes_.broadcast(text, static_cast<int>(owner))));
+    trial->section = shared_section(std::move(section), static_cast<int>(owner));
   }
 }
 

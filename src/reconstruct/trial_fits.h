@@ -45,6 +45,7 @@ class TrialFits {
   bool take_steps(std::vector<std::unique_ptr<Running>>& own, std::size_t batch_size);
   bool report(const std::vector<std::unique_ptr<Running>>& own, std::size_t batch_size);
   void share(Trials& trials) const;
+  selection::Section shared_section(selection::Section section, int owner) const;
 
   selection::TrialViews views_;
   measurement::Measurement measurement_;  // with nothing corrected

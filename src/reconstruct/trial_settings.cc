@@ -62,6 +62,13 @@ const FitTrial* chosen_trial(const TunedFit& tuned) {
   return chosen == tuned.trials.end() ? nullptr : &*chosen;
 }
 
+bool differs_from_first_in_variation_alone(const FitTrial& trial, const TunedFit& tuned) {
+  TrialSettings first = tuned.trials.front().settings;
+  first.penalty = trial.settings.penalty;
+  first.variation = trial.settings.variation;
+  return trial.settings == first;
+}
+
 selection::Difference difference_to_chosen(const FitTrial& trial, const TunedFit& tuned) {
   if (const FitTrial* const chosen = chosen_trial(tuned))
     return selection::difference(trial.score, chosen->score);

@@ -34,6 +34,10 @@ FitTrials make_trials(FitTrials::RunTrials run);
 /// fewer epochs than the fit, so epochs count only if a trial has those that were chosen.
 const FitTrial* chosen_trial(const TunedFit& tuned);
 
+/// Says whether a trial differs from the first one of its search in nothing but the penalty and the
+/// weight of total variation.
+bool differs_from_first_in_variation_alone(const FitTrial& trial, const TunedFit& tuned);
+
 /// Compares a trial with the chosen one, patch by patch. If the chosen settings are a mixture that
 /// no trial has, compares it with the trial that predicts best.
 selection::Difference difference_to_chosen(const FitTrial& trial, const TunedFit& tuned);

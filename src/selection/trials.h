@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <utility>
@@ -10,6 +11,12 @@
 #include "selection/scores.h"
 
 namespace tomofield::selection {
+
+/// A plane of the volume that a trial made, to look at: [row][x].
+struct Section {
+  std::int64_t width = 0;
+  std::vector<float> values = {};
+};
 
 /// A short fit with some settings, and how well it predicts the held-out views. `Settings` is
 /// whatever a method lets a search choose.
@@ -20,6 +27,7 @@ struct Trial {
   double seconds = 0;
   /// Relative decrease of the objective in the last tenth of an iterative method.
   std::optional<double> last_decrease = {};
+  Section section = {};  ///< is empty if none was kept
 };
 
 /// Holds the chosen settings and all trials of a search.

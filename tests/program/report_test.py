@@ -98,9 +98,9 @@ def test_a_dark_series_has_a_word_on_ctf_and_dose_and_its_trials(series):
     with open(os.path.join(folder, "out_report.html"), encoding="utf-8") as file:
         page = file.read()
     assert "CTF and dose" in page and "chosen by trials" in page
-    for heading in ("Settings that trials chose", "Tree"):
+    for heading in ("Settings that trials chose", "Lighter or stronger denoising", "Tree"):
         assert f"<h2>{heading}</h2>" in page, heading
-    assert page.count("data:image/png") == 2, "masks and tree"
+    assert page.count("data:image/png") == 3, "masks, tree and the sections of three trials"
 
 
 def test_an_existing_report_is_kept(series):

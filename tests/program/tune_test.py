@@ -221,3 +221,33 @@ def test_options_that_do_not_fit_are_refused(series):
                                    *harness.merge(harness.QUICK, options))
         assert result.returncode == 2 and fact in result.stderr, (options, result.stderr)
         assert not os.listdir(os.path.dirname(output)), options
+
+
+def test_the_dial_multiplies_the_weight_that_trials_choose(series):
+    options = [option for option in harness.QUICK if option not in ("--tv-penalty", "concave")]
+    weights, results = {}, {}
+    for strength in ("medium", "light", "3"):
+        results[strength] = harness.fresh_results(f"dial_{strength}")
+        harness.succeed("reconstruct", *series.input, "-o", results[strength].volume_path, *options,
+                        "--denoise", strength)
+        fit = record(results[strength])["options"]["fit"]
+        assert fit["denoise"] == strength
+        weights[strength] = fit["density_variation"]
+    assert weights["light"] == pytest.approx(weights["medium"] / 2)
+    assert weights["3"] == pytest.approx(3 * weights["medium"])
+    assert not results["medium"].same_as(results["3"])
+
+
+def test_the_dial_multiplies_the_usual_weight_without_trials(series):
+    results = series.reconstruct("dial_usual", "--tv-penalty", "smooth", "--denoise", "strong")
+    assert record(results)["options"]["fit"]["density_variation"] == 10
+
+
+def test_the_dial_is_refused_beside_a_weight_and_with_a_wrong_word(series):
+    output = os.path.join(harness.fresh_directory("dial_refused"), "out.mrc")
+    for options, said in ((["--tv", 3, "--denoise", "light"], "leave one of them out"),
+                          (["--denoise", "hard"], "'hard' is no strength")):
+        run = harness.tomofield("reconstruct", *series.input, "-o", output, "--thickness", 24,
+                                *options)
+        assert run.returncode == 2 and said in run.stderr, run.stderr
+    assert not os.listdir(os.path.dirname(output))

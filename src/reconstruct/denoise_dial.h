@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "reconstruct/trial_settings.h"
+
+namespace tomofield::reconstruction {
+
+/// Returns by what `--denoise` multiplies the weight of total variation: light is 0.5, medium is 1
+/// and strong is 2; a number is itself. Throws Error for any other text, and for numbers that are
+/// not from 0.05 to 20.
+double denoise_factor(const std::string& text);
+
+/// A place of the dial, and the trial whose weight is nearest to that of this place.
+struct DialTrial {
+  std::string place;      ///< "light", "medium", "strong"
+  const FitTrial* trial;  ///< of the search that chose the settings
+};
+
+/// Returns the trials that show what the dial does: those with the chosen penalty and corrections
+/// whose weights are nearest to those of light, medium and strong. Returns none if they are not
+/// three different trials. `tuned` must outlive the result.
+std::vector<DialTrial> dial_trials(const TunedFit& tuned);
+
+/// Draws the sections of these trials under each other in one scale of greys, the contrast of the
+/// medium one (report/contrast.h), each with its place and weight. Densities are multiplied by
+/// `output_scale`, so that greys are those of the tomogram. Replaces the file. Removes it and
+/// returns without a picture if dial_trials() has none, or if one of them has no section.
+void write_dial_picture(const TunedFit& tuned, double output_scale,
+                        const std::filesystem::path& path);
+
+}  // namespace tomofield::reconstruction

@@ -1,0 +1,93 @@
+#include "reconstruct/denoise_dial.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "png_picture.h"
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+FitTrial trial_of(Penalty penalty, double weight, bool fits_view_scale = true) {
+  FitTrial trial;
+  trial.settings = {.penalty = penalty,
+                    .variation = weight,
+                    .rank = 24,
+                    .epochs = 2,
+                    .fits_view_scale = fits_view_scale};
+  trial.section = {4, std::vector<float>(8, static_cast<float>(weight))};
+  return trial;
+}
+
+TunedFit tuned_to(Penalty penalty, double weight) {
+  TunedFit tuned;
+  for (const double tried : {5.0, 9.0, 2.8, 1.5})
+    tuned.trials.push_back(trial_of(Penalty::kSmooth, tried));
+  tuned.trials.push_back(trial_of(Penalty::kConcave, 14.0));
+  tuned.trials.push_back(trial_of(Penalty::kSmooth, 5.0, false));
+  tuned.settings = trial_of(penalty, weight).settings;
+  tuned.settings.epochs = 10;  // of the whole fit
+  return tuned;
+}
+
+TEST(DenoiseFactor, IsThatOfAPlaceOrANumber) {
+  EXPECT_EQ(denoise_factor("light"), 0.5);
+  EXPECT_EQ(denoise_factor("medium"), 1.0);
+  EXPECT_EQ(denoise_factor("strong"), 2.0);
+  EXPECT_EQ(denoise_factor("1.25"), 1.25);
+  for (const char* wrong : {"", "Strong", "0", "-1", "21", "nan", "inf", "1.5x", "medium "})
+    EXPECT_THROW(denoise_factor(wrong), Error) << wrong;
+}
+
+TEST(DialTrials, HaveTheWeightsNearestToThoseOfThePlaces) {
+  const TunedFit tuned = tuned_to(Penalty::kSmooth, 4.7);
+  const std::vector<DialTrial> shown = dial_trials(tuned);
+  ASSERT_EQ(shown.size(), 3U);
+  EXPECT_EQ(shown[0].place, "light");
+  EXPECT_EQ(shown[0].trial, &tuned.trials[2]);
+  EXPECT_EQ(shown[1].trial, &tuned.trials[0]);
+  EXPECT_EQ(shown[2].trial, &tuned.trials[1]);
+}
+
+TEST(DialTrials, AreNoneIfTheyAreNotThree) {
+  EXPECT_TRUE(dial_trials(tuned_to(Penalty::kConcave, 14)).empty());
+  EXPECT_TRUE(dial_trials(tuned_to(Penalty::kSmooth, 9)).empty());  // nothing stronger was tried
+}
+
+TEST(DialPicture, ShowsTheSectionsUnderEachOtherInTheContrastOfTheMediumOne) {
+  const testing::ScratchDirectory directory;
+  const std::filesystem::path path = directory / "dial.png";
+  TunedFit tuned = tuned_to(Penalty::kSmooth, 4.7);
+  tuned.trials[0].section.values = {0, 10, 0, 10, 0, 10, 0, 10};
+  write_dial_picture(tuned, 1.0, path);
+  const testing::PngPicture picture = testing::read_png(path, PNG_FORMAT_GRAY);
+  ASSERT_EQ(picture.width % 4, 0);
+  const std::int64_t zoom = picture.width / 4, height = picture.height / 3;
+  const auto grey_near_bottom_of = [&](int place, int x) {  // 0 is the uppermost section
+    return picture.at(x * zoom + zoom / 2, (place + 1) * height - zoom / 2);
+  };
+  EXPECT_EQ(grey_near_bottom_of(1, 0), 0);
+  EXPECT_EQ(grey_near_bottom_of(1, 1), 255);
+  const int light = grey_near_bottom_of(0, 0), strong = grey_near_bottom_of(2, 0);
+  EXPECT_NEAR(light, 255 * 0.28, 12);
+  EXPECT_NEAR(strong, 255 * 0.9, 12);
+}
+
+TEST(DialPicture, IsRemovedIfTheTrialsHaveNone) {
+  const testing::ScratchDirectory directory;
+  const std::filesystem::path path = directory / "dial.png";
+  TunedFit tuned = tuned_to(Penalty::kSmooth, 4.7);
+  write_dial_picture(tuned, 1.0, path);
+  EXPECT_TRUE(std::filesystem::exists(path));
+  tuned.trials[0].section = {};
+  write_dial_picture(tuned, 1.0, path);
+  EXPECT_FALSE(std::filesystem::exists(path));
+}
+
+}  // namespace
+}  // namespace tomofield::reconstruction
