@@ -121,8 +121,8 @@ struct Options {
   std::optional<double> density_variation;  ///< weight of total variation, in noise units
   double factor_variation = 0.0;            ///< weight of the factors' total variation
   std::optional<Penalty> penalty;           ///< of total variation
-  /// How strongly to denoise: "light", "medium", "strong", or the factor by which to multiply the
-  /// weight that would be used else.
+  /// How strongly to denoise: "light", "medium", "strong" or a factor. It multiplies the weight, be
+  /// it given or chosen, by 0.5, 1, 2 or the factor.
   std::string denoise = "medium";
   double boundary = 4.0;  ///< weight of the boundary consistency (eq. 6)
   double fourier = 0.0;   ///< weight of the isotropic Fourier prior (eq. 7)

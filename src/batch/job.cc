@@ -20,6 +20,7 @@ namespace fs = std::filesystem;
 constexpr std::int64_t kMostBytes = std::int64_t{1} << 60;
 constexpr double kMostSamples = 1e30;
 constexpr std::int64_t kMostThreads = 1 << 20;
+constexpr std::int64_t kMostTrials = 1 << 20;
 
 // Returns what `read` makes of a JSON file. Mistakes in the file are errors that name it.
 template <typename Read>
@@ -45,6 +46,10 @@ std::optional<double> core_seconds_at(const json& object) {
   return io::number_at(object, "core_seconds", 0, base::kLargestNumber);
 }
 
+int trials_at(const json& object) {
+  return static_cast<int>(io::integer_at(object, "trials", 0, kMostTrials));
+}
+
 std::string checked_text(const std::string& text) {
   if (base::utf8_text(text) == text) return text;
   throw Error(
@@ -66,7 +71,10 @@ json job_json(const Job& job) {
           {"core_seconds", needs.core_seconds ? json(*needs.core_seconds) : json(nullptr)},
           {"sample_steps", needs.sample_steps},
           {"result_bytes", needs.result_bytes},
-          {"disk_bytes", needs.disk_bytes}};
+          {"disk_bytes", needs.disk_bytes},
+          {"open_variation", needs.open_variation},
+          {"open_spike_rank", needs.open_spike_rank},
+          {"trials", needs.num_trials}};
 }
 
 Job job_from(const json& object) {
@@ -78,7 +86,10 @@ Job job_from(const json& object) {
                     .core_seconds = core_seconds_at(object),
                     .sample_steps = io::number_at(object, "sample_steps", 0, kMostSamples),
                     .result_bytes = bytes_at(object, "result_bytes"),
-                    .disk_bytes = bytes_at(object, "disk_bytes")},
+                    .disk_bytes = bytes_at(object, "disk_bytes"),
+                    .open_variation = object.at("open_variation").get<bool>(),
+                    .open_spike_rank = object.at("open_spike_rank").get<bool>(),
+                    .num_trials = trials_at(object)},
           .is_skipped = object.at("skipped").get<bool>()};
 }
 
@@ -97,6 +108,9 @@ Needs read_needs(const fs::path& file) {
     needs.sample_steps = io::number_at(plan, "sample_steps", 0, kMostSamples);
     needs.result_bytes = bytes_at(plan, "result_bytes");
     needs.disk_bytes = bytes_at(plan, "disk_bytes");
+    needs.open_variation = plan.at("open_variation").get<bool>();
+    needs.open_spike_rank = plan.at("open_spike_rank").get<bool>();
+    needs.num_trials = trials_at(plan);
     return needs;
   });
 }
@@ -122,9 +136,25 @@ bool has_results(const fs::path& output) {
   return fs::exists(paths.volume) && fs::exists(paths.json);
 }
 
-bool can_resume(const fs::path& output) {
+bool has_checkpoint(const fs::path& output) {
   const reconstruction::OutputPaths paths = reconstruction::output_paths(output);
   return fs::exists(paths.model) || fs::exists(paths.trials);
+}
+
+bool can_resume(const fs::path& output) {
+  return has_checkpoint(output) || fs::exists(reconstruction::output_paths(output).alignment);
+}
+
+std::vector<std::string> command_of(const fs::path& program, const Job& job, int threads,
+                                    EarlierFiles earlier) {
+  std::vector<std::string> words{program.string()};
+  words.insert(words.end(), job.command.begin(), job.command.end());
+  words.push_back(fmt::format("--threads={}", threads));
+  if (earlier.resumes && can_resume(job.output))
+    words.emplace_back("--resume");
+  else if (earlier.overwrites)
+    words.emplace_back("--overwrite");
+  return words;
 }
 
 }  // namespace tomofield::batch

@@ -16,6 +16,9 @@ struct Needs {
   double sample_steps = 0;                 ///< the size of the job, the same on every machine
   std::int64_t result_bytes = 0;           ///< of the files that stay
   std::int64_t disk_bytes = 0;             ///< at most, while it runs
+  bool open_variation = false;   ///< nobody has given the penalty and weight of total variation
+  bool open_spike_rank = false;  ///< nor the limit of spikes
+  int num_trials = 0;            ///< that would choose what is open
 
   std::int64_t memory_bytes(int threads) const {
     return memory_bytes_of_one_thread + (threads - 1) * memory_bytes_a_thread;
@@ -48,7 +51,18 @@ JobList read_jobs(const std::filesystem::path& file);
 
 /// Returns whether the results of a job are there: the tomogram and its metrics.
 bool has_results(const std::filesystem::path& output);
-/// Returns whether a run can continue: there is a checkpoint, or trials of --tune.
+/// Returns whether a fit has begun: there is a checkpoint, or trials of --tune.
+bool has_checkpoint(const std::filesystem::path& output);
+/// Returns whether a run can continue: there is a checkpoint, or an alignment.
 bool can_resume(const std::filesystem::path& output);
+
+/// Says what a run is to do with the files of an earlier one.
+struct EarlierFiles {
+  bool resumes = false;     ///< continue from them if that is possible
+  bool overwrites = false;  ///< else replace them
+};
+/// Returns the words that run a job with some threads; `program` is tomofield itself.
+std::vector<std::string> command_of(const std::filesystem::path& program, const Job& job,
+                                    int threads, EarlierFiles earlier);
 
 }  // namespace tomofield::batch

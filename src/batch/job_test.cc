@@ -22,7 +22,10 @@ TEST(Jobs, AreReadAsTheyAreWritten) {
                           .core_seconds = 2.5,
                           .sample_steps = 1e9,
                           .result_bytes = 20,
-                          .disk_bytes = 30}},
+                          .disk_bytes = 30,
+                          .open_variation = true,
+                          .open_spike_rank = false,
+                          .num_trials = 6}},
                {.name = "b", .output = "b.mrc", .command = {}, .needs = {}, .is_skipped = true}},
       .overwrites = true};
   write_jobs(directory / "batch.json", list);
@@ -34,6 +37,9 @@ TEST(Jobs, AreReadAsTheyAreWritten) {
   EXPECT_EQ(read.jobs[0].needs.memory_bytes(4), 1030);
   EXPECT_EQ(read.jobs[0].needs.core_seconds, 2.5);
   EXPECT_EQ(read.jobs[0].needs.sample_steps, 1e9);
+  EXPECT_TRUE(read.jobs[0].needs.open_variation);
+  EXPECT_FALSE(read.jobs[0].needs.open_spike_rank);
+  EXPECT_EQ(read.jobs[0].needs.num_trials, 6);
   EXPECT_FALSE(read.jobs[0].is_skipped);
   EXPECT_TRUE(read.jobs[1].is_skipped);
   EXPECT_FALSE(read.jobs[1].needs.core_seconds.has_value());
@@ -58,12 +64,17 @@ TEST(Needs, ComeFromThePlanOfARun) {
     return read_needs(directory.write(
         "plan.json", R"({"threads": )" + threads + R"(, "memory_bytes": 1300,
                          "memory_bytes_of_one_thread": 1000, "core_seconds": )" +
-                         seconds + R"(, "sample_steps": 5, "result_bytes": 7, "disk_bytes": 9})"));
+                         seconds +
+                         R"(, "sample_steps": 5, "result_bytes": 7, "disk_bytes": 9, "trials": 6,
+                         "open_variation": true, "open_spike_rank": false})"));
   };
   EXPECT_EQ(read("4", "1.5").memory_bytes(2), 1100);
   EXPECT_EQ(read("1", "1.5").memory_bytes(2), 1000);
   EXPECT_FALSE(read("4", "null").core_seconds.has_value());
   EXPECT_EQ(read("4", "2").disk_bytes, 9);
+  EXPECT_TRUE(read("4", "2").open_variation);
+  EXPECT_FALSE(read("4", "2").open_spike_rank);
+  EXPECT_EQ(read("4", "2").num_trials, 6);
   EXPECT_THROW(read("0", "1"), Error);
   EXPECT_THROW(read("4", "-1"), Error);
   EXPECT_THROW(read("4", "\"x\""), Error);

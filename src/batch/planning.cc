@@ -32,14 +32,10 @@ GivenOption option_for(const Series& series, GivenOption option) {
 // Returns the words that check a job and write what it needs to `plan`.
 std::vector<std::string> plan_command(const PlanOptions& options, const Job& job,
                                       const fs::path& plan) {
-  std::vector<std::string> words{options.program.string()};
-  words.insert(words.end(), job.command.begin(), job.command.end());
-  words.push_back(fmt::format("--threads={}", options.threads));
+  std::vector<std::string> words =
+      command_of(options.program, job, options.threads,
+                 {.resumes = options.skips_existing, .overwrites = options.overwrites});
   words.push_back("--plan=" + plan.string());
-  if (options.skips_existing && can_resume(job.output))
-    words.emplace_back("--resume");
-  else if (options.overwrites)
-    words.emplace_back("--overwrite");
   return words;
 }
 

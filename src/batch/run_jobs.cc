@@ -22,18 +22,6 @@ bool continues(const RunOptions& options, const Job& job, const State& before) {
   return can_resume(job.output) && (has_run || !options.overwrites);
 }
 
-std::vector<std::string> command_of(const RunOptions& options, const Job& job, int threads,
-                                    bool resumes) {
-  std::vector<std::string> words{options.program.string()};
-  words.insert(words.end(), job.command.begin(), job.command.end());
-  words.push_back(fmt::format("--threads={}", threads));
-  if (resumes)
-    words.emplace_back("--resume");
-  else if (options.overwrites)
-    words.emplace_back("--overwrite");
-  return words;
-}
-
 std::string why_it_failed(int status, const fs::path& log) {
   constexpr int kKilled = 128 + SIGKILL;
   if (status == kKilled) return "it was killed, as the system does when memory runs out";
@@ -63,7 +51,9 @@ RunningJob::RunningJob(const RunOptions& options, const Job& job, int threads)
       job_(&job),
       threads_(threads),
       session_(begin(options, job)),
-      child_(command_of(options, job, threads, session_.resumes), log_of(options.folder, job)) {}
+      child_(command_of(options.program, job, threads,
+                        {.resumes = session_.resumes, .overwrites = options.overwrites}),
+             log_of(options.folder, job)) {}
 
 bool RunningJob::has_ended() {
   const auto result = child_.poll();

@@ -107,11 +107,13 @@ std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jo
   return script;
 }
 
-std::string submit(const fs::path& folder, std::optional<int> job) {
+std::string submit(const fs::path& folder, std::optional<int> task, const std::string& after) {
   std::vector<std::string> command{"/usr/bin/env", "sbatch", "--parsable"};
-  if (job) command.push_back(fmt::format("--array={}", *job));
+  if (task) command.push_back(fmt::format("--array={}", *task));
+  if (!after.empty()) command.push_back("--dependency=afterany:" + after);
   command.push_back(fs::absolute(script_of(folder)).string());
-  const fs::path answer = log_folder(folder) / fmt::format("sbatch-{}.out", job.value_or(0));
+  const fs::path answer =
+      log_folder(folder) / (task ? fmt::format("sbatch-{}.out", *task) : "sbatch.out");
   const base::ChildResult result = base::run_child(command, answer, {});
   const std::string said(io::trim(io::read_text_file(answer)));
   if (result.exit_status == 127)

@@ -37,8 +37,13 @@ std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jo
 std::filesystem::path script_of(const std::filesystem::path& folder);
 std::filesystem::path list_of(const std::filesystem::path& folder);
 
-/// Submits the script with sbatch: all of its tasks, or that of one job, counted from 1. Returns
-/// the number of the Slurm job. Throws Error with what sbatch says if that fails.
-std::string submit(const std::filesystem::path& folder, std::optional<int> job = std::nullopt);
+/// The task that makes the choice for all series (make_choice.h); the jobs are counted from 1.
+inline constexpr int kChoosingTask = 0;
+
+/// Submits the script with sbatch: all of its tasks, or one of them. They begin when the Slurm job
+/// `after` has ended, in whatever way, if it is not empty. Returns the number of the Slurm job.
+/// Throws Error with what sbatch says if that fails.
+std::string submit(const std::filesystem::path& folder, std::optional<int> task = std::nullopt,
+                   const std::string& after = {});
 
 }  // namespace tomofield::batch

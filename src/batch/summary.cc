@@ -14,6 +14,7 @@
 
 #include "base/log.h"
 #include "base/time_text.h"
+#include "batch/choice.h"
 #include "batch/csv.h"
 #include "batch/relion_table.h"
 #include "batch/state.h"
@@ -170,12 +171,28 @@ std::string counts_text(const std::vector<Line>& lines) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
+// Returns what the page says of the choice for all series, or an empty text if there is none. Says
+// why a choice cannot be read, which only matters to a batch that goes on.
+std::string choice_text(const fs::path& folder) {
+  try {
+    const std::optional<Choice> choice = read_choice(folder);
+    if (!choice) return {};
+    return fmt::format(
+        "Total variation of all series that do not state their own: {}. With --choose each, every "
+        "series chooses for itself.",
+        describe(*choice));
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
 std::string page_text(const fs::path& folder, const std::vector<Line>& lines) {
   report::HtmlPage page("Batch: " + folder.filename().string());
   page.add_paragraph(
       fmt::format("tomofield {}; {} series: {}. Times and memory are those of all "
                   "sessions of a series.",
                   TOMOFIELD_VERSION, lines.size(), counts_text(lines)));
+  if (const std::string choice = choice_text(folder); !choice.empty()) page.add_paragraph(choice);
   std::vector<std::vector<report::HtmlCell>> rows(1);
   for (const char* title : {"series", "", "state", "verdict", "time", "processor time",
                             "memory, GiB", "held-out error", "files"})

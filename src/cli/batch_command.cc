@@ -13,6 +13,8 @@
 #include "base/program_path.h"
 #include "base/time_text.h"
 #include "batch/batch.h"
+#include "batch/choice.h"
+#include "batch/make_choice.h"
 #include "batch/run_jobs.h"
 #include "batch/series_list.h"
 #include "batch/slurm.h"
@@ -21,6 +23,7 @@
 #include "cli/commands.h"
 #include "cli/common_options.h"
 #include "cli/console.h"
+#include "cli/enum_option.h"
 #include "cli/exit_status.h"
 #include "cli/given_options.h"
 #include "cli/help_formatter.h"
@@ -47,6 +50,7 @@ struct BatchArguments {
   std::string list, folder;
   bool skips_existing = false, overwrites = false, dry_run = false, slurm = false;
   int at_once = kMostSeries;
+  batch::Choose choose = batch::Choose::kOnce;
   std::optional<int> task;
   std::vector<std::string> sbatch;
 };
@@ -54,7 +58,7 @@ struct BatchArguments {
 // Says what a table may do with an option of reconstruct.
 batch::ColumnKind kind_of_column(const CLI::App& reconstruct, const std::string& flag) {
   for (const char* own : {"--output", "--overwrite", "--resume", "--threads", "--dry-run", "--plan",
-                          "--trace", "--help", "--help-all"})
+                          "--choice", "--trace", "--help", "--help-all"})
     if (flag == own) return batch::ColumnKind::kNotHere;
   const CLI::Option* option = reconstruct.get_option_no_throw(flag);
   if (option == nullptr) return batch::ColumnKind::kUnknown;
@@ -106,6 +110,16 @@ void print_plan(const batch::JobList& list, const batch::Room& room) {
   flush_output();
 }
 
+void print_choosing(const batch::JobList& list, const batch::ChoicePlan& plan) {
+  if (plan.stored) print("for all series, as stored: {}\n", describe(*plan.stored));
+  if (plan.choosing.empty()) return;
+  std::vector<std::string> names;
+  for (const std::size_t i : plan.choosing) names.push_back(list.jobs[i].name);
+  print("trials of {} choose the total variation of all series first\n",
+        fmt::format("{}", fmt::join(names, ", ")));
+  flush_output();
+}
+
 void print_summary(const fs::path& folder) {
   print("table     {}\npage      {}\n", batch::summary_table(folder).string(),
         batch::summary_page(folder).string());
@@ -129,6 +143,13 @@ batch::RunOptions run_options(const fs::path& folder, bool overwrites) {
               }};
 }
 
+// Chooses for all series by trials of some. Throws ExitStatus if it was stopped.
+void choose_for_all(const batch::RunOptions& options, const std::vector<std::size_t>& choosing,
+                    int threads, batch::JobList& list) {
+  if (choosing.empty() || make_choice(options, choosing, threads, list)) return;
+  throw ExitStatus(stop_status(), "stopped during the trials that choose for all series");
+}
+
 // Runs the jobs on this machine. Throws ExitStatus if some failed or it was stopped.
 void run_here(const fs::path& folder, const batch::JobList& list, const batch::Room& room) {
   const bool is_finished = run_jobs(run_options(folder, list.overwrites), list.jobs, room);
@@ -149,7 +170,8 @@ void run_here(const fs::path& folder, const batch::JobList& list, const batch::R
                        fmt::join(failed, ", "), batch::summary_page(folder).string()));
 }
 
-void run_by_slurm(const BatchArguments& arguments, const batch::JobList& list, int threads) {
+void run_by_slurm(const BatchArguments& arguments, const batch::JobList& list, int threads,
+                  bool chooses) {
   const fs::path folder = arguments.folder;
   if (batch::largest_first(list.jobs).empty()) return print_summary(folder);
   const batch::SlurmOptions options{.program = base::program_path(),
@@ -157,18 +179,24 @@ void run_by_slurm(const BatchArguments& arguments, const batch::JobList& list, i
                                     .threads = threads,
                                     .more = arguments.sbatch};
   io::write_text_file(batch::script_of(folder), slurm_script(options, list.jobs));
-  const std::string job = batch::submit(folder);
-  print("script    {}\nSlurm job {}\n", batch::script_of(folder).string(), job);
+  const std::string choosing = chooses ? batch::submit(folder, batch::kChoosingTask) : "";
+  const std::string job = batch::submit(folder, std::nullopt, choosing);
+  print("script    {}\nSlurm job {}{}\n", batch::script_of(folder).string(), job,
+        chooses ? fmt::format(", after {}, which chooses for all series", choosing) : "");
   print_summary(folder);
 }
 
 void run_task(const CLI::App& command, const BatchArguments& arguments) {
   stop_on_signals(/*is_job=*/true);  // Slurm sends SIGUSR1 before the time limit
-  const batch::JobList list = batch::read_jobs(arguments.list);
+  batch::JobList list = batch::read_jobs(arguments.list);
+  const batch::RunOptions options = run_options(arguments.folder, list.overwrites);
+  const int threads = threads_of(command, arguments);
+  if (*arguments.task == batch::kChoosingTask) {
+    const auto plan = batch::plan_choice(arguments.folder, /*continues=*/false, list.jobs);
+    return choose_for_all(options, plan.choosing, threads, list);
+  }
   const auto time_is_up = [] { return stop_was_requested() && stop_status() == 128 + SIGUSR1; };
-  const batch::TaskResult result =
-      run_task(run_options(arguments.folder, list.overwrites), list, *arguments.task,
-               threads_of(command, arguments), time_is_up);
+  const batch::TaskResult result = run_task(options, list, *arguments.task, threads, time_is_up);
   base::log_info(fmt::format("{}{}{}", name_of(result.state.progress),
                              result.state.reason.empty() ? "" : ": ", result.state.reason));
   if (result.state.progress == batch::Progress::kFailed) throw ExitStatus(1, result.state.reason);
@@ -191,7 +219,7 @@ void run(const CLI::App& command, const BatchArguments& arguments,
   settle_outputs(series, options);
   const io::OutputFolder folder(options.folder);
   const io::OutputLock lock(batch::list_of(options.folder));
-  const batch::JobList list = plan_jobs(series, options);
+  batch::JobList list = plan_jobs(series, options);
   if (stop_was_requested())
     throw ExitStatus(stop_status(), "stopped before the first series; nothing has been made");
   const batch::Room room{.threads = options.threads,
@@ -199,9 +227,20 @@ void run(const CLI::App& command, const BatchArguments& arguments,
                          .jobs = arguments.at_once};
   if (!arguments.slurm) require_room(list.jobs, room);
   print_plan(list, room);
+  batch::ChoicePlan choice;
+  if (arguments.choose == batch::Choose::kOnce)
+    choice = batch::plan_choice(options.folder, options.skips_existing, list.jobs);
+  print_choosing(list, choice);
   if (arguments.dry_run) return;
+  if (choice.stored)
+    give_choice(*choice.stored, list.jobs);
+  else
+    batch::forget_choice(options.folder);
   begin_batch(options.folder, list);
-  if (arguments.slurm) return run_by_slurm(arguments, list, options.threads);
+  if (arguments.slurm)
+    return run_by_slurm(arguments, list, options.threads, !choice.choosing.empty());
+  choose_for_all(run_options(options.folder, list.overwrites), choice.choosing, options.threads,
+                 list);
   run_here(options.folder, list, room);
 }
 
@@ -224,8 +263,10 @@ void add_slurm_options(CLI::App& command, BatchArguments& arguments) {
           },
           ""))
       ->group(group);
-  command.add_option("--task", arguments.task, "Run one series of the list batch.json, from 1")
-      ->check(number_between(1, kMostSeries))
+  command
+      .add_option("--task", arguments.task,
+                  "Run one series of the list batch.json, from 1; 0 chooses for all series")
+      ->check(number_between(0, kMostSeries))
       ->group(kHelpAllGroup);
 }
 
@@ -256,9 +297,15 @@ std::vector<std::string> add_own_options(CLI::App& command, BatchArguments& argu
       ->check(number_between(1, kMostSeries))
       ->default_str("as many as the threads and the memory allow")
       ->group(group);
+  add_enum_option<batch::Choose>(
+      command, "--choose", arguments.choose,
+      "Choose the kind and the weight of total variation, and the limit of spikes, once for all "
+      "series, by trials of three of them, or let each series choose for itself")
+      ->default_str("once")
+      ->group(group);
   add_slurm_options(command, arguments);
   return {"LIST",      "--output", "--skip-existing", "--resume", "--overwrite", "--dry-run",
-          "--at-once", "--slurm",  "--sbatch",        "--task",   "--threads"};
+          "--at-once", "--choose", "--slurm",         "--sbatch", "--task",      "--threads"};
 }
 
 }  // namespace

@@ -28,6 +28,12 @@ std::size_t memory_of_one_thread(const tilt_series::TiltSeries& series,
   return bytes;
 }
 
+// Says whether a run would take a setting that the options leave open from another run. With --tune
+// it looks for its own.
+bool is_left_to_runs(const reconstruction::ReconstructOptions& options, bool is_open) {
+  return is_open && !options.resolved.tune;
+}
+
 }  // namespace
 
 void add_plan_option(CLI::App& command, std::optional<std::filesystem::path>& file) {
@@ -39,11 +45,12 @@ void add_plan_option(CLI::App& command, std::optional<std::filesystem::path>& fi
       ->group(kHelpAllGroup);
 }
 
-void check_plan_file(const std::optional<std::filesystem::path>& file,
-                     const reconstruction::ReconstructOptions& options) {
+void check_answer_file(const std::optional<std::filesystem::path>& file, const char* flag,
+                       const reconstruction::ReconstructOptions& options) {
   if (!file) return;
-  io::check_output_files({*file}, io::input_files(options.files), options.resolved.overwrite,
-                         "give another name with --plan, or --overwrite to replace it");
+  io::check_output_files(
+      {*file}, io::input_files(options.files), options.resolved.overwrite,
+      fmt::format("give another name with {}, or --overwrite to replace it", flag));
 }
 
 void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries& series,
@@ -63,6 +70,8 @@ void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries
                           {"pixel_size_A", plan.pixel_size_A},
                           {"parameters", plan.num_parameters},
                           {"trials", plan.num_trials},
+                          {"open_variation", is_left_to_runs(options, options.open.variation)},
+                          {"open_spike_rank", is_left_to_runs(options, options.open.spikes)},
                           {"steps", plan.num_steps},
                           {"threads", base::thread_count()},
                           {"memory_bytes", plan.memory_bytes},

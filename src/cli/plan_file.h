@@ -14,9 +14,9 @@ namespace tomofield::cli {
 /// Registers --plan.
 void add_plan_option(CLI::App& command, std::optional<std::filesystem::path>& file);
 
-/// Checks that the file of --plan, if there is one, can be written.
-void check_plan_file(const std::optional<std::filesystem::path>& file,
-                     const reconstruction::ReconstructOptions& options);
+/// Checks that the file of an option such as --plan, if it is given, can be written.
+void check_answer_file(const std::optional<std::filesystem::path>& file, const char* flag,
+                       const reconstruction::ReconstructOptions& options);
 
 /// Writes what a run needs as JSON, whether this machine has it or not, for programs that start
 /// runs elsewhere or later (batch).

@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "cli/choice_file.h"
 #include "cli/commands.h"
 #include "cli/common_options.h"
 #include "cli/help_formatter.h"
@@ -21,7 +22,7 @@ using option_table::Group;
 struct ReconstructArguments {
   option_table::Choices choices;
   bool dry_run = false;
-  std::optional<std::filesystem::path> trace, plan;
+  std::optional<std::filesystem::path> trace, plan, choice;
 };
 
 void run(const ReconstructArguments& arguments, const distributed::Communicator& processes,
@@ -32,7 +33,8 @@ void run(const ReconstructArguments& arguments, const distributed::Communicator&
   std::vector<io::OutputLock> locks;
   processes.run_collectively([&] {
     locks = claim_run(options, arguments.dry_run || arguments.plan || !processes.is_root());
-    check_plan_file(arguments.plan, options);
+    check_answer_file(arguments.plan, "--plan", options);
+    check_answer_file(arguments.choice, "--choice", options);
     const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
     check_trace_file(arguments.trace, {paths.volume, paths.model, paths.json}, options.files,
                      options.resolved.overwrite);
@@ -45,6 +47,7 @@ void run(const ReconstructArguments& arguments, const distributed::Communicator&
   options.input.keep_views = !arguments.dry_run;
   run_traced(arguments.dry_run ? std::nullopt : arguments.trace, processes, [&] {
     const tilt_series::TiltSeries series = open_series(options, arguments.dry_run, processes);
+    if (arguments.choice) return write_choice(*arguments.choice, series, options, processes);
     run_reconstruction(series, options, arguments.dry_run, processes);
   });
 }
@@ -64,6 +67,7 @@ void add_reconstruct_command(CLI::App& program, const distributed::Communicator&
   add_common_options(command);
   add_trace_option(command, arguments->trace);
   add_plan_option(command, arguments->plan);
+  add_choice_option(command, arguments->choice);
   add_help_all(command);
   command.footer(
       "Example: tomofield reconstruct series.mrc --tlt series.tlt --xf series.xf --bin 4 \\\n"

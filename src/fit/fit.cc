@@ -103,6 +103,14 @@ TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
           options.seed};
 }
 
+// Scales predictions by the models of their views.
+void apply_models(std::span<const measurement::ViewModel> models,
+                  std::vector<measurement::PredictedView>& views) {
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (float& value : views[i].predicted)
+      value = static_cast<float>(models[i].scale * static_cast<double>(value) + models[i].offset);
+}
+
 }  // namespace
 
 Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_options,
@@ -282,14 +290,31 @@ bool Fit::is_done() const {
 measurement::ViewErrors Fit::held_out_error(bool fit_view_scale) const {
   if (filters_.transfers.empty())
     return objective_->held_out_error(binned_->noise_weights(), fit_view_scale);
-  const std::vector<int>& views = measurement_.held_out;
-  measurement::SlabSums sums(1);
-  for (const int view : views) {
+  std::vector<measurement::ViewSums> sums;
+  for (const int view : measurement_.held_out) {
     const auto predicted = predict(std::span(&view, 1), std::vector<measurement::ViewModel>(1));
-    sums.front().push_back(measurement::sums_of(predicted.front(), {}));
+    sums.push_back(measurement::sums_of(predicted.front(), {}));
   }
-  return measurement::view_errors(views, sums, binned_->noise_weights(),
-                                  fit_view_scale || has_free_offsets());
+  return errors_of(std::move(sums), fit_view_scale);
+}
+
+Fit::HeldOut Fit::predict_held_out(bool fit_view_scale) const {
+  const std::vector<int>& views = measurement_.held_out;
+  HeldOut found{.errors = {},
+                .views = predict(views, std::vector<measurement::ViewModel>(views.size()))};
+  std::vector<measurement::ViewSums> sums;
+  for (const measurement::PredictedView& view : found.views)
+    sums.push_back(measurement::sums_of(view, {}));
+  found.errors = errors_of(std::move(sums), fit_view_scale);
+  apply_models(found.errors.models, found.views);
+  return found;
+}
+
+// Returns the errors of the held-out views from the sums over all of their rays.
+measurement::ViewErrors Fit::errors_of(std::vector<measurement::ViewSums> held_out,
+                                       bool fit_view_scale) const {
+  return measurement::view_errors(measurement_.held_out, {std::move(held_out)},
+                                  binned_->noise_weights(), fit_view_scale || has_free_offsets());
 }
 
 std::vector<measurement::PredictedView> Fit::predict(
@@ -297,9 +322,7 @@ std::vector<measurement::PredictedView> Fit::predict(
   if (filters_.transfers.empty()) return objective_->predict(views, models);
   auto predicted = project(views);
   measurement::filter_predictions(filters_.transfers, views, predicted, processes());
-  for (std::size_t i = 0; i < predicted.size(); ++i)
-    for (float& value : predicted[i].predicted)
-      value = static_cast<float>(models[i].scale * static_cast<double>(value) + models[i].offset);
+  apply_models(models, predicted);
   return predicted;
 }
 

@@ -112,6 +112,15 @@ class Fit {
   /// Does the same, with a scale and an offset of each view if `fit_view_scale`, whatever the
   /// options say.
   measurement::ViewErrors held_out_error(bool fit_view_scale) const;
+  /// Holds the score of the held-out views and their predictions, scaled by the models of the
+  /// score.
+  struct HeldOut {
+    measurement::ViewErrors errors;
+    std::vector<measurement::PredictedView> views;
+  };
+  /// Does the same, and returns the predictions as well, which are made once. All of them are in
+  /// memory together.
+  HeldOut predict_held_out(bool fit_view_scale) const;
   /// Predicts some views, each scaled by its model, beside the measured ones. All of them are in
   /// memory together.
   std::vector<measurement::PredictedView> predict(
@@ -157,6 +166,8 @@ class Fit {
   bool residuals_are_noise() const;
   void limit_spikes();
   void score_held_out();
+  measurement::ViewErrors errors_of(std::vector<measurement::ViewSums> held_out,
+                                    bool fit_view_scale) const;
   std::vector<int> views_of_step(std::int64_t step) const;
   double learning_rate(std::int64_t step) const;
   const Stage& stage_at(std::int64_t step) const;

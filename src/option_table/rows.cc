@@ -248,15 +248,16 @@ constexpr Row kRows[] = {
      .is_common = true},
     {.key = "fit.density_variation", .flag = "--tv", MEMBER(Options, density_variation),
      .group = Group::kFit, .unit = "noise units", .range = Range::at_least(0),
-     .automatic = "14; with the smooth penalty 5, or 2.8 to 16 by trials if both are chosen",
+     .automatic = "14; with the smooth penalty 5, or 0.9 to 29 by trials if the penalty is left to "
+                  "them too",
      .help = "Weight of the density's total variation"},
     {.key = "fit.factor_variation", .flag = "--tv-factors", MEMBER(Options, factor_variation),
      .group = Group::kFit, .unit = "noise units", .range = Range::at_least(0),
      .help = "Weight of the factors' total variation"},
     {.key = "fit.penalty", .flag = "--tv-penalty", MEMBER(Options, penalty),
      .group = Group::kFit,
-     .automatic = "concave if it clearly predicts held-out views better in short trials or if --tv is "
-                  "given, else smooth",
+     .automatic = "concave if --tv is given, or if it predicts held-out views better in short trials "
+                  "by three standard errors and by 1 %; else smooth",
      .help = "Kind of total variation: concave keeps edges sharp, smooth is the standard one"},
     {.key = "fit.boundary", .flag = "--bcc", MEMBER(Options, boundary), .group = Group::kFit,
      .range = Range::at_least(0),

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "objective/options.h"
+#include "reconstruct/lowest_loss.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -15,6 +16,9 @@ namespace {
 // Neighbouring weights of the search. A factor of 1.8 from the best weight costs 0.05 to 0.3 dB on
 // the yardsticks.
 constexpr double kWeightFactor = 1.8;
+// What one step from the best smooth weight usually costs: 0.6 to 2.5 % in 48 runs of four
+// specimens, with a median of 1.5 % (docs/results/choice.md).
+constexpr UsualCurvature kUsualCurvature{.loss_a_step = 0.016, .deviation = 0.016};
 constexpr int kMostSteps = 3;  // to one side of the usual weight
 // A concave penalty of less than its usual weight is not taken, so one step down is enough to see
 // whether the usual one is needed.
@@ -75,13 +79,18 @@ class Ladder {
     return best;
   }
 
-  // Returns the step, between those that were tried, at which the parabola through the best one and
-  // its neighbours is lowest.
-  double lowest_of_parabola() const {
-    const int step = best();
-    if (step == lowest_ || step == highest_) return step;
-    const double below = error(step - 1), here = error(step), above = error(step + 1);
-    return step + (below - above) / (2 * (below - 2 * here + above));
+  // Returns the step, between those that were tried, at which a parabola through the scores of all
+  // of them is lowest.
+  double lowest() const {
+    const selection::HeldOutScore of_best = score(best());
+    std::vector<LossAt> losses;
+    for (int step = lowest_; step <= highest_; ++step) {
+      const selection::Difference loss = selection::difference(score(step), of_best);
+      losses.push_back({.place = static_cast<double>(step),
+                        .loss = loss.log_ratio,
+                        .standard_error = loss.standard_error});
+    }
+    return lowest_loss(losses, kUsualCurvature);
   }
 
  private:
@@ -93,7 +102,7 @@ class Ladder {
 };
 
 TrialSettings choose_smooth_weight(const Ladder& ladder) {
-  TrialSettings chosen = ladder.at(ladder.lowest_of_parabola());
+  TrialSettings chosen = ladder.at(ladder.lowest());
   chosen.variation = std::stod(fmt::format("{:.3g}", chosen.variation));  // as users can give it
   return chosen;
 }

@@ -32,8 +32,8 @@ TrialSettings choose_penalty(const TrialSettings& start, FitTrials& trials);
 /// Chooses penalty and weight of total variation:
 ///
 ///   1. Weights of the smooth penalty are tried in factors of 1.8 about the usual one, until the
-///      best has a worse one on either side. The weight is where a parabola through these three is
-///      lowest, so that chance in the scores changes it little.
+///      best has a worse one on either side. The weight is where a parabola through all scores is
+///      lowest (reconstruct/lowest_loss.h), so that chance in the scores changes it little.
 ///   2. The concave penalty with its usual weight replaces it as in choose_penalty(), if a smaller
 ///      weight of it predicts clearly worse. Else it keeps grains of noise as if they were objects,
 ///      and leaves isolated voxels. A larger weight replaces the usual one as in choose_penalty(),

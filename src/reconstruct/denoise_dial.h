@@ -8,9 +8,9 @@
 
 namespace tomofield::reconstruction {
 
-/// Returns by what `--denoise` multiplies the weight of total variation: light is 0.5, medium is 1
-/// and strong is 2; a number is itself. Throws Error for any other text, and for numbers that are
-/// not from 0.05 to 20.
+/// Returns the factor by which `--denoise` multiplies the weight of total variation: light is 0.5,
+/// medium is 1 and strong is 2; a number is itself. Throws Error for any other text, and for
+/// numbers that are not from 0.05 to 20.
 double denoise_factor(const std::string& text);
 
 /// A place of the dial, and the trial whose weight is nearest to that of this place.

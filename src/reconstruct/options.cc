@@ -219,9 +219,6 @@ std::vector<std::string> ReconstructOptions::faults() const {
       fit.vertex_epochs > 0 && (field.kind != FieldKind::kVm || field.tree != TreeKind::kUniform),
       "--vertex-epochs is for the factors of a uniform tree: leave it out, or give --field "
       "vm and --tree uniform");
-  refuse_if(requested.density_variation && requested.denoise != Options().denoise,
-            "--denoise changes the weight that the program would take, and --tv gives one: leave "
-            "one of them out");
   try {
     denoise_factor(resolved.denoise);
   } catch (const Error& error) {

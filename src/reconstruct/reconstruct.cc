@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -87,9 +88,8 @@ void apply(const TrialSettings& settings, Run& run) {
   if (settings.masks_beads) measurement::hide_beads(run.measurement, run.processes);
 }
 
-// Multiplies the weight of total variation by what --denoise says, unless the user gave the weight.
+// Multiplies the weight of total variation by what --denoise says.
 void turn_the_dial(ReconstructOptions& options) {
-  if (options.requested.density_variation) return;
   options.fit.density_variation *= denoise_factor(options.resolved.denoise);
   options.resolved.density_variation = options.fit.density_variation;
   if (options.resolved.denoise != Options().denoise)
@@ -122,6 +122,15 @@ bool choose_settings(Run& run, std::optional<TunedFit>& tuned) {
   turn_the_dial(run.options);
   measurement::keep_beads(run.measurement);
   return true;
+}
+
+Run begin_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
+              const ReconstructHooks& hooks, const distributed::Communicator& processes) {
+  return {.hooks = hooks,
+          .processes = processes,
+          .options = options,
+          .paths = output_paths(options.resolved.output),
+          .measurement = prepare(series, options, processes)};
 }
 
 // Returns what the fit is made from. All processes call it.
@@ -162,19 +171,27 @@ RunResult fit_all_views(const Run& run, const TilePlan& tiles, RunRecord& record
 
 RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
                       const ReconstructHooks& hooks, const distributed::Communicator& processes) {
-  RunRecord record{.origin = {}, .alignment = alignment_of(series)};
+  RunRecord record;
+  record.alignment = alignment_of(series);
   base::log_info(base::describe_threads());
   TilePlan tiles;
   if (!options.resolved.budget.empty()) tiles = plan_run(series, options, processes).tiles;
-  Run run{.hooks = hooks,
-          .processes = processes,
-          .options = options,
-          .paths = output_paths(options.resolved.output),
-          .measurement = prepare(series, options, processes)};
+  Run run = begin_run(series, options, hooks, processes);
   std::optional<TunedFit> tuned;
   if (!choose_settings(run, tuned)) return {.outcome = Outcome::kStoppedTuning};
   if (options.makes_halves()) return reconstruct_halves(series, run, record, tuned);
   return fit_all_views(run, tiles, record, std::move(tuned));
+}
+
+std::optional<nlohmann::json> choose_settings_alone(const tilt_series::TiltSeries& series,
+                                                    const ReconstructOptions& options,
+                                                    const ReconstructHooks& hooks,
+                                                    const distributed::Communicator& processes) {
+  base::log_info(base::describe_threads());
+  Run run = begin_run(series, options, hooks, processes);
+  std::optional<TunedFit> tuned;
+  if (!choose_settings(run, tuned)) return std::nullopt;
+  return tuned ? tuning_json(*tuned) : nlohmann::json(nullptr);
 }
 
 }  // namespace tomofield::reconstruction

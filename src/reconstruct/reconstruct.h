@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <vector>
 
@@ -51,6 +52,15 @@ struct RunResult {
 /// If several processes call it, they share the work. The results have the same bits as those of
 /// one process. The root writes the files.
 RunResult reconstruct(
+    const tilt_series::TiltSeries& series, const ReconstructOptions& options,
+    const ReconstructHooks& hooks,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
+
+/// Prepares the views, makes the trials of a run, and ends there: no field is fitted to all views.
+/// Returns the choice and the trials as tuning_json() writes them, and null if the options leave
+/// nothing to trials. Returns nothing if a stop was requested. Throws Error and shares work as
+/// reconstruct() does, and the caller has called the same functions before.
+std::optional<nlohmann::json> choose_settings_alone(
     const tilt_series::TiltSeries& series, const ReconstructOptions& options,
     const ReconstructHooks& hooks,
     const distributed::Communicator& processes = distributed::Communicator::alone());

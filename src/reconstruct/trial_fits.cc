@@ -85,11 +85,11 @@ class TrialFits::Running {
   }
 
   selection::HeldOutScore score() const {
-    measurement::ViewErrors error = fit_->held_out_error(scores_with_view_scale_);
+    fit::Fit::HeldOut held_out = fit_->predict_held_out(scores_with_view_scale_);
+    measurement::ViewErrors& error = held_out.errors;
     std::vector<double> noise_weight;
     for (const measurement::ViewModel& model : error.models) noise_weight.push_back(model.weight);
-    std::vector<double> patch_error =
-        measurement::patch_errors(fit_->predict(error.views, error.models), noise_weight);
+    std::vector<double> patch_error = measurement::patch_errors(held_out.views, noise_weight);
     const Rectangle& roi = measurement_->roi;
     const evaluate::FieldArtefacts artefacts =
         evaluate::find_artefacts(fit_->field(), roi, {0, static_cast<int>(roi.height())});

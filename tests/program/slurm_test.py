@@ -1,6 +1,7 @@
 """Tests batch --slurm with Debian's Slurm: munged, slurmctld and slurmd on this machine's loopback,
 with a configuration of their own. Skipped where they are not installed or cannot run."""
 
+import json
 import os
 import re
 import shutil
@@ -11,7 +12,7 @@ import time
 import pytest
 
 import harness
-from batch_test import QUICK, make_data, pattern, summary, write_table  # noqa: F401
+from batch_test import QUICK, make_data, options_of, pattern, summary, write_table  # noqa: F401
 
 PROJECT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 # The options of QUICK that have a value, as columns of a table.
@@ -160,6 +161,22 @@ def test_every_series_is_a_task_and_a_failure_stops_none(cluster, data):
         assert "--array=3\n" in file.read()
     cluster.wait_for_jobs()
     assert [summary(folder)[name]["state"] for name in "abc"] == ["skipped", "skipped", "done"]
+
+
+def test_one_task_chooses_for_all_series_before_they_run(cluster, data):
+    folder = harness.fresh_directory("choosing")
+    table = write_table(os.path.join(folder, "list.csv"), [["stack", "tlt"], *(
+        [os.path.join(data, name + ".mrc"), os.path.join(data, name + ".tlt")] for name in "ab")])
+    at = QUICK.index("--tv-penalty")
+    submit(cluster, folder, table, *QUICK[:at], *QUICK[at + 2:])
+    cluster.wait_for_jobs()
+    with open(os.path.join(folder, "choice.json"), encoding="utf-8") as file:
+        choice = json.load(file)
+    assert [vote["series"] for vote in choice["votes"]] == ["a", "b"]
+    for name in "ab":
+        assert summary(folder)[name]["state"] == "done"
+        fit = options_of(os.path.join(folder, name + ".mrc"))["fit"]
+        assert [fit["penalty"], fit["density_variation"]] == [choice["tv_penalty"], choice["tv"]]
 
 
 def test_the_example_of_the_documentation_runs(cluster, data):

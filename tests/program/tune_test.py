@@ -238,16 +238,16 @@ def test_the_dial_multiplies_the_weight_that_trials_choose(series):
     assert not results["medium"].same_as(results["3"])
 
 
-def test_the_dial_multiplies_the_usual_weight_without_trials(series):
-    results = series.reconstruct("dial_usual", "--tv-penalty", "smooth", "--denoise", "strong")
-    assert record(results)["options"]["fit"]["density_variation"] == 10
+def test_the_dial_multiplies_a_weight_that_no_trial_chose(series):
+    for name, options, weight in (("usual", [], 10), ("given", ["--tv", 3], 6)):
+        results = series.reconstruct(f"dial_{name}", "--tv-penalty", "smooth", "--denoise", "strong",
+                                     *options)
+        assert record(results)["options"]["fit"]["density_variation"] == weight
 
 
-def test_the_dial_is_refused_beside_a_weight_and_with_a_wrong_word(series):
+def test_a_wrong_word_of_the_dial_is_refused(series):
     output = os.path.join(harness.fresh_directory("dial_refused"), "out.mrc")
-    for options, said in ((["--tv", 3, "--denoise", "light"], "leave one of them out"),
-                          (["--denoise", "hard"], "'hard' is no strength")):
-        run = harness.tomofield("reconstruct", *series.input, "-o", output, "--thickness", 24,
-                                *options)
-        assert run.returncode == 2 and said in run.stderr, run.stderr
+    run = harness.tomofield("reconstruct", *series.input, "-o", output, "--thickness", 24,
+                            "--denoise", "hard")
+    assert run.returncode == 2 and "'hard' is no strength" in run.stderr, run.stderr
     assert not os.listdir(os.path.dirname(output))

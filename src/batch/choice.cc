@@ -1,0 +1,196 @@
+#include "batch/choice.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "base/plausible.h"
+#include "io/json.h"
+#include "io/json_numbers.h"
+#include "kernels/spikes.h"
+#include "tomofield/error.h"
+
+namespace tomofield::batch {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+bool has_vote(const Vote& vote) { return vote.failure.empty(); }
+
+bool takes_choice(const Job& job) { return !job.is_skipped && job.needs.open_variation; }
+
+// Returns the votes for the penalty that most of them are for.
+std::vector<Vote> majority(const std::vector<Vote>& votes) {
+  std::vector<Vote> smooth, concave;
+  for (const Vote& vote : votes)
+    if (has_vote(vote)) (vote.penalty == Penalty::kSmooth ? smooth : concave).push_back(vote);
+  return concave.size() > smooth.size() ? concave : smooth;
+}
+
+// Returns the median of weights, on a logarithmic scale, as users can give it.
+double median_weight(const std::vector<Vote>& votes) {
+  std::vector<double> weights;
+  for (const Vote& vote : votes) weights.push_back(vote.variation);
+  std::ranges::sort(weights);
+  const double below = weights[(weights.size() - 1) / 2], above = weights[weights.size() / 2];
+  return std::stod(fmt::format("{:.3g}", std::sqrt(below * above)));
+}
+
+// Returns the median of the limits. Of two that differ it takes the one that limits more.
+std::optional<int> median_spike_rank(const std::vector<Vote>& votes) {
+  std::vector<int> ranks;
+  for (const Vote& vote : votes)
+    if (vote.spike_rank) ranks.push_back(*vote.spike_rank);
+  if (ranks.empty()) return std::nullopt;
+  std::ranges::sort(ranks);
+  return ranks[ranks.size() / 2];
+}
+
+std::string settings_text(Penalty penalty, double variation, std::optional<int> spike_rank) {
+  return fmt::format("{} tv {:.3g}{}", base::name_of(penalty), variation,
+                     spike_rank == 0 ? ", spikes kept" : "");
+}
+
+json settings_json(Penalty penalty, double variation, std::optional<int> spike_rank) {
+  return {{"tv_penalty", base::name_of(penalty)},
+          {"tv", variation},
+          {"spike_rank", spike_rank ? json(*spike_rank) : json(nullptr)}};
+}
+
+json vote_json(const Vote& vote) {
+  json entry = has_vote(vote) ? settings_json(vote.penalty, vote.variation, vote.spike_rank)
+                              : json{{"failure", vote.failure}};
+  entry["series"] = vote.series;
+  return entry;
+}
+
+// Reads the settings of a vote or of a choice into it.
+template <typename Settings>
+void read_settings(const json& entry, Settings& settings) {
+  const auto penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>());
+  if (!penalty) throw Error("'tv_penalty' is no penalty");
+  settings.penalty = *penalty;
+  settings.variation = io::number_at(entry, "tv", 0, base::kLargestNumber);
+  if (!entry.at("spike_rank").is_null())
+    settings.spike_rank =
+        static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank));
+}
+
+Vote vote_from(const json& entry) {
+  Vote vote;
+  vote.series = entry.at("series").get<std::string>();
+  if (entry.contains("failure"))
+    vote.failure = entry.at("failure").get<std::string>();
+  else
+    read_settings(entry, vote);
+  return vote;
+}
+
+Choice choice_from(const json& document) {
+  Choice choice;
+  read_settings(document, choice);
+  for (const json& vote : document.at("votes")) choice.votes.push_back(vote_from(vote));
+  return choice;
+}
+
+// Returns what `read` makes of a JSON file. Mistakes in the file are errors that name it.
+template <typename Read>
+auto read_file(const fs::path& file, const char* what, const Read& read) {
+  std::string why;
+  try {
+    return read(io::read_json(file));
+  } catch (const json::exception& fault) {
+    why = fault.what();
+  } catch (const Error& fault) {
+    why = fault.what();
+  }
+  throw Error(fmt::format("'{}' is not {} ({}): remove it, and the batch chooses again",
+                          file.string(), what, why));
+}
+
+}  // namespace
+
+ChoicePlan plan_choice(const fs::path& folder, bool continues, std::vector<Job>& jobs) {
+  if (continues) {
+    if (auto stored = read_choice(folder)) return {.stored = std::move(stored), .choosing = {}};
+    for (Job& job : jobs)
+      if (has_checkpoint(job.output)) job.needs.open_variation = job.needs.open_spike_rank = false;
+  }
+  std::vector<std::size_t> able;
+  for (std::size_t i = 0; i < jobs.size(); ++i)
+    if (takes_choice(jobs[i]) && jobs[i].needs.num_trials > 0) able.push_back(i);
+  if (able.empty() || std::ranges::count_if(jobs, takes_choice) < 2) return {};
+  ChoicePlan plan;
+  for (const std::size_t at : {std::size_t{0}, able.size() / 2, able.size() - 1})
+    if (!std::ranges::count(plan.choosing, able[at])) plan.choosing.push_back(able[at]);
+  return plan;
+}
+
+std::optional<Choice> count_votes(std::vector<Vote> votes) {
+  const std::vector<Vote> winners = majority(votes);
+  if (winners.empty()) return std::nullopt;
+  return Choice{.penalty = winners.front().penalty,
+                .variation = median_weight(winners),
+                .spike_rank = median_spike_rank(winners),
+                .votes = std::move(votes)};
+}
+
+void give_choice(const Choice& choice, std::vector<Job>& jobs) {
+  for (Job& job : jobs) {
+    if (!takes_choice(job)) continue;
+    job.command.push_back(fmt::format("--tv-penalty={}", base::name_of(choice.penalty)));
+    job.command.push_back(fmt::format("--tv={}", choice.variation));
+    if (job.needs.open_spike_rank && choice.spike_rank)
+      job.command.push_back(fmt::format("--spike-rank={}", *choice.spike_rank));
+  }
+}
+
+std::string describe(const Choice& choice) {
+  std::vector<std::string> votes;
+  for (const Vote& vote : choice.votes)
+    votes.push_back(fmt::format("{} ({})", vote.series,
+                                has_vote(vote)
+                                    ? settings_text(vote.penalty, vote.variation, vote.spike_rank)
+                                    : "its trials failed: " + vote.failure));
+  return fmt::format("{}, by the trials of {}",
+                     settings_text(choice.penalty, choice.variation, choice.spike_rank),
+                     fmt::join(votes, ", "));
+}
+
+fs::path choice_file(const fs::path& folder) { return folder / "choice.json"; }
+
+void write_choice(const fs::path& folder, const Choice& choice) {
+  json document = settings_json(choice.penalty, choice.variation, choice.spike_rank);
+  document["tomofield"] = TOMOFIELD_VERSION;
+  document["votes"] = json::array();
+  for (const Vote& vote : choice.votes) document["votes"].push_back(vote_json(vote));
+  io::write_json(choice_file(folder), document);
+}
+
+std::optional<Choice> read_choice(const fs::path& folder) {
+  const fs::path file = choice_file(folder);
+  if (!fs::exists(file)) return std::nullopt;
+  return read_file(file, "the choice of a batch", choice_from);
+}
+
+void forget_choice(const fs::path& folder) { fs::remove(choice_file(folder)); }
+
+Vote read_vote(const Job& job, const fs::path& file) {
+  return read_file(file, "the choice of a run", [&](const json& document) {
+    Vote vote;
+    vote.series = job.name;
+    if (document.is_null()) {
+      vote.failure = "nothing was left to trials";
+      return vote;
+    }
+    read_settings(document.at("chosen"), vote);
+    if (!job.needs.open_spike_rank) vote.spike_rank.reset();
+    return vote;
+  });
+}
+
+}  // namespace tomofield::batch

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/enum_names.h"
+#include "batch/job.h"
+#include "tomofield/options.h"
+
+namespace tomofield::batch {
+
+/// Says how often a batch chooses penalty, weight and limit of spikes of its total variation.
+enum class Choose {
+  kOnce,  ///< a few series make trials, and all get the same
+  kEach   ///< every series makes trials of its own
+};
+
+/// What one series chose by its trials, or the reason why it has no vote.
+struct Vote {
+  std::string series;
+  Penalty penalty = Penalty::kSmooth;
+  double variation = 0;           ///< weight in noise units, as --tv
+  std::optional<int> spike_rank;  ///< nothing if it was given to this series
+  std::string failure;            ///< empty if it has a vote
+};
+
+/// What all series of a batch get that do not state their own.
+struct Choice {
+  Penalty penalty = Penalty::kSmooth;
+  double variation = 0;
+  std::optional<int> spike_rank;  ///< nothing if no series has chosen one
+  std::vector<Vote> votes;        ///< those without a vote are among them
+};
+
+/// Says where a batch has its choice from. Both are empty if there is nothing to share.
+struct ChoicePlan {
+  std::optional<Choice> stored;       ///< of the batch that this one continues
+  std::vector<std::size_t> choosing;  ///< jobs that are to make trials
+};
+/// Plans the choice of a batch. If it `continues` another one, it takes what that has stored, and
+/// without that, series that have begun go on as they were: their `needs` are marked as settled.
+/// Else the first, the middle and the last of the series with trials are to choose, if there are
+/// at least two series to share the choice.
+ChoicePlan plan_choice(const std::filesystem::path& folder, bool continues, std::vector<Job>& jobs);
+
+/// Returns the penalty of most votes (smooth if there is no majority), and the medians of the
+/// weight and the limit of spikes of those who chose it. Returns nothing if nobody has a vote.
+std::optional<Choice> count_votes(std::vector<Vote> votes);
+
+/// Adds the choice to the commands of the jobs that lack it.
+void give_choice(const Choice& choice, std::vector<Job>& jobs);
+
+/// Describes a choice and the votes, as in "smooth tv 5, by the trials of a (smooth tv 4.8) and …".
+std::string describe(const Choice& choice);
+
+/// Returns the file of a batch's choice, choice.json in its folder.
+std::filesystem::path choice_file(const std::filesystem::path& folder);
+void write_choice(const std::filesystem::path& folder, const Choice& choice);
+/// Returns nothing if there is none. Throws Error if it is damaged.
+std::optional<Choice> read_choice(const std::filesystem::path& folder);
+/// Removes a choice of an earlier batch.
+void forget_choice(const std::filesystem::path& folder);
+
+/// Reads what `reconstruct --choice` has written for a job. Throws Error for anything else.
+Vote read_vote(const Job& job, const std::filesystem::path& file);
+
+}  // namespace tomofield::batch
+
+template <>
+struct tomofield::base::EnumNames<tomofield::batch::Choose> {
+  static constexpr std::array kNames{std::pair{tomofield::batch::Choose::kOnce, "once"},
+                                     std::pair{tomofield::batch::Choose::kEach, "each"}};
+};

@@ -1,0 +1,140 @@
+#include "batch/choice.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+
+namespace tomofield::batch {
+namespace {
+
+using testing::ScratchDirectory;
+
+Vote vote(Penalty penalty, double variation, std::optional<int> spike_rank = 3) {
+  Vote made;
+  made.series = "a";
+  made.penalty = penalty;
+  made.variation = variation;
+  made.spike_rank = spike_rank;
+  return made;
+}
+
+Vote no_vote() {
+  Vote made;
+  made.series = "broken";
+  made.failure = "its views are black";
+  return made;
+}
+
+// Jobs that leave everything to trials, with these results in a folder.
+std::vector<Job> open_jobs(int count, const std::filesystem::path& folder) {
+  std::vector<Job> jobs(static_cast<std::size_t>(count));
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    jobs[i].name = std::string(1, static_cast<char>('a' + i));
+    jobs[i].output = folder / (jobs[i].name + ".mrc");
+    jobs[i].needs.open_variation = jobs[i].needs.open_spike_rank = true;
+    jobs[i].needs.num_trials = 6;
+  }
+  return jobs;
+}
+
+TEST(CountVotes, TakesTheMedianOfThePenaltyThatMostAreFor) {
+  const auto smooth = count_votes(
+      {vote(Penalty::kSmooth, 8), vote(Penalty::kConcave, 14), vote(Penalty::kSmooth, 2, 0)});
+  ASSERT_TRUE(smooth);
+  EXPECT_EQ(smooth->penalty, Penalty::kSmooth);
+  EXPECT_EQ(smooth->variation, 4);  // the geometric mean of two
+  EXPECT_EQ(smooth->spike_rank, 3);
+  EXPECT_EQ(smooth->votes.size(), 3u);
+  const auto of_three = count_votes(
+      {vote(Penalty::kConcave, 25), vote(Penalty::kConcave, 14), vote(Penalty::kConcave, 14)});
+  EXPECT_EQ(of_three->penalty, Penalty::kConcave);
+  EXPECT_EQ(of_three->variation, 14);
+}
+
+TEST(CountVotes, IsSmoothWithoutAMajorityAndNothingWithoutVotes) {
+  EXPECT_EQ(count_votes({vote(Penalty::kConcave, 14), vote(Penalty::kSmooth, 5)})->penalty,
+            Penalty::kSmooth);
+  const auto one = count_votes({no_vote(), vote(Penalty::kConcave, 14, {})});
+  EXPECT_EQ(one->penalty, Penalty::kConcave);
+  EXPECT_FALSE(one->spike_rank.has_value());
+  EXPECT_FALSE(count_votes({no_vote()}).has_value());
+}
+
+TEST(PlanChoice, LetsTheFirstTheMiddleAndTheLastOfTheListChoose) {
+  const ScratchDirectory directory;
+  const auto choosing = [&](std::vector<Job> jobs) {
+    return plan_choice(directory.path(), false, jobs).choosing;
+  };
+  using Numbers = std::vector<std::size_t>;
+  EXPECT_EQ(choosing(open_jobs(1, directory.path())), Numbers{});  // there is nothing to share
+  EXPECT_EQ(choosing(open_jobs(2, directory.path())), (Numbers{0, 1}));
+  EXPECT_EQ(choosing(open_jobs(9, directory.path())), (Numbers{0, 4, 8}));
+  std::vector<Job> jobs = open_jobs(5, directory.path());
+  jobs[0].is_skipped = true;
+  jobs[2].needs.open_variation = false;  // it has a weight of its own
+  jobs[4].needs.num_trials = 0;          // it has too few views
+  EXPECT_EQ(choosing(jobs), (Numbers{1, 3}));
+}
+
+TEST(PlanChoice, TakesTheStoredOneIfTheBatchGoesOn) {
+  const ScratchDirectory directory;
+  std::vector<Job> jobs = open_jobs(3, directory.path());
+  directory.write("b.h5", "");  // the checkpoint of a series that chose for itself
+  EXPECT_EQ(plan_choice(directory.path(), true, jobs).choosing, (std::vector<std::size_t>{0, 2}));
+  EXPECT_FALSE(jobs[1].needs.open_variation);
+  write_choice(directory.path(), *count_votes({vote(Penalty::kSmooth, 4.5, 0), no_vote()}));
+  jobs = open_jobs(3, directory.path());
+  const ChoicePlan plan = plan_choice(directory.path(), true, jobs);
+  EXPECT_TRUE(plan.choosing.empty());
+  ASSERT_TRUE(plan.stored);
+  EXPECT_EQ(plan.stored->variation, 4.5);
+  EXPECT_EQ(plan.stored->spike_rank, 0);
+  EXPECT_EQ(plan.stored->votes[1].failure, "its views are black");
+  EXPECT_NE(describe(*plan.stored).find("smooth tv 4.5, spikes kept, by the trials of a (smooth"),
+            std::string::npos)
+      << describe(*plan.stored);
+  EXPECT_FALSE(plan_choice(directory.path(), false, jobs).stored.has_value());
+  forget_choice(directory.path());
+  EXPECT_FALSE(read_choice(directory.path()).has_value());
+}
+
+TEST(GiveChoice, AddsWhatASeriesLacks) {
+  std::vector<Job> jobs = open_jobs(3, "out");
+  jobs[1].needs.open_spike_rank = false;
+  jobs[2].needs.open_variation = jobs[2].needs.open_spike_rank = false;
+  give_choice(*count_votes({vote(Penalty::kSmooth, 4.5)}), jobs);
+  using Words = std::vector<std::string>;
+  EXPECT_EQ(jobs[0].command, (Words{"--tv-penalty=smooth", "--tv=4.5", "--spike-rank=3"}));
+  EXPECT_EQ(jobs[1].command, (Words{"--tv-penalty=smooth", "--tv=4.5"}));
+  EXPECT_TRUE(jobs[2].command.empty());
+}
+
+TEST(ReadVote, TakesWhatARunChose) {
+  const ScratchDirectory directory;
+  Job job;
+  job.name = "a";
+  const auto file = directory.write(
+      "a.json", R"({"chosen": {"tv_penalty": "concave", "tv": 14, "spike_rank": 3}})");
+  EXPECT_FALSE(read_vote(job, file).spike_rank.has_value());  // it was given
+  job.needs.open_spike_rank = true;
+  EXPECT_EQ(read_vote(job, file).spike_rank, 3);
+  EXPECT_EQ(read_vote(job, file).penalty, Penalty::kConcave);
+  EXPECT_FALSE(read_vote(job, directory.write("b.json", "null")).failure.empty());
+  for (const char* text : {"{}", R"({"chosen": {"tv_penalty": "flat", "tv": 14}})"})
+    EXPECT_THROW(read_vote(job, directory.write("c.json", text)), Error) << text;
+}
+
+TEST(ReadChoice, RefusesADamagedFileAndSaysWhatToDo) {
+  const ScratchDirectory directory;
+  directory.write("choice.json", R"({"tv": 5})");
+  const std::string said = testing::message_of<Error>([&] { read_choice(directory.path()); });
+  EXPECT_NE(said.find("choice.json"), std::string::npos);
+  EXPECT_NE(said.find("remove it"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tomofield::batch

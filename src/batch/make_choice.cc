@@ -1,0 +1,64 @@
+#include "batch/make_choice.h"
+
+#include <fmt/format.h>
+
+#include <string>
+#include <utility>
+
+#include "base/child_process.h"
+#include "base/log.h"
+#include "batch/slurm.h"
+#include "batch/state.h"
+#include "batch/summary.h"
+#include "tomofield/error.h"
+
+namespace tomofield::batch {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Lets a job make its trials, and returns its vote.
+Vote vote_of(const RunOptions& options, const Job& job, int threads) {
+  const fs::path folder = log_folder(options.folder) / "choice";
+  fs::create_directories(folder);
+  const fs::path answer = folder / (job.name + ".json"), log = folder / (job.name + ".log");
+  fs::remove(answer);
+  std::vector<std::string> command =
+      command_of(options.program, job, threads,
+                 {.resumes = !options.overwrites, .overwrites = options.overwrites});
+  command.push_back("--choice=" + answer.string());
+  const base::ChildResult result = base::run_child(command, log, options.stop_requested);
+  if (result.exit_status == 0) return read_vote(job, answer);
+  Vote none;
+  none.series = job.name;
+  none.failure = base::reason_of_failure(log);
+  return none;
+}
+
+}  // namespace
+
+bool make_choice(const RunOptions& options, const std::vector<std::size_t>& choosing, int threads,
+                 JobList& list) {
+  std::vector<Vote> votes;
+  for (const std::size_t i : choosing) {
+    base::log_info(fmt::format("{}: makes trials that choose for all series", list.jobs[i].name));
+    votes.push_back(vote_of(options, list.jobs[i], threads));
+    if (options.stop_requested && options.stop_requested()) return false;
+    if (!votes.back().failure.empty())
+      base::log_warning(
+          fmt::format("{}: its trials failed: {}", votes.back().series, votes.back().failure));
+  }
+  const std::optional<Choice> choice = count_votes(std::move(votes));
+  if (!choice) {
+    base::log_warning("no trials for all series have succeeded: every series chooses for itself");
+    return true;
+  }
+  base::log_info(fmt::format("for all series: {}", describe(*choice)));
+  write_choice(options.folder, *choice);
+  give_choice(*choice, list.jobs);
+  write_jobs(list_of(options.folder), list);
+  write_summary(options.folder, list.jobs);
+  return true;
+}
+
+}  // namespace tomofield::batch

@@ -1,0 +1,165 @@
+"""Tests that a batch chooses its total variation once for all series, by the trials of some."""
+
+import json
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+import harness
+from batch_test import QUICK, options_of, page, pattern, write_table
+
+# The options of QUICK that leave the total variation to trials.
+OPEN = QUICK[:QUICK.index("--tv-penalty")] + QUICK[QUICK.index("--tv-penalty") + 2:]
+NAMES = "abc"
+
+
+@pytest.fixture(scope="module", name="data")
+def make_data():
+    """Returns a folder with three series whose trials choose different weights, and a fourth one
+    whose third view is constant, which only a run finds."""
+    folder = harness.fresh_directory("choice_data")
+    views = harness.Series("choice_source").views[:, 2:34, 8:40].astype(np.float32)
+    for number, name in enumerate(NAMES):
+        noise = np.random.default_rng(number).normal(size=views.shape)
+        noisy = views + np.float32(0.1 * (1 + number) * views.std()) * noise.astype(np.float32)
+        harness.write_stack(os.path.join(folder, name + ".mrc"), noisy)
+        np.savetxt(os.path.join(folder, name + ".tlt"), harness.TILTS, fmt="%.1f")
+    views[2] = 5
+    harness.write_stack(os.path.join(folder, "broken.mrc"), views)
+    np.savetxt(os.path.join(folder, "broken.tlt"), harness.TILTS, fmt="%.1f")
+    return folder
+
+
+def read(folder, name):
+    with open(os.path.join(folder, name), encoding="utf-8") as file:
+        return json.load(file)
+
+
+def commands(folder):
+    """Returns the words of each series' command by its name."""
+    return {job["name"]: job["command"] for job in read(folder, "batch.json")["jobs"]}
+
+
+def settings(fit):
+    return {"tv_penalty": fit["penalty"], "tv": fit["density_variation"],
+            "spike_rank": fit["spike_rank"]}
+
+
+def chosen_settings(folder, name):
+    """Returns what the trials of a series chose for it."""
+    chosen = read(folder, name + ".json")["metrics"]["tuning"]["chosen"]
+    return {key: chosen[key] for key in ("tv_penalty", "tv", "spike_rank")}
+
+
+@pytest.fixture(scope="module", name="each")
+def run_each(data):
+    folder = harness.fresh_directory("choice_each")
+    harness.succeed("batch", *pattern(data), *OPEN, "--choose", "each", "-o", folder)
+    return folder
+
+
+@pytest.fixture(scope="module", name="once")
+def run_once(data):
+    folder = harness.fresh_directory("choice_once")
+    harness.succeed("batch", *pattern(data), *OPEN, "-o", folder)
+    return folder
+
+
+def test_all_series_of_a_batch_get_the_median_choice_of_three(once, each):
+    own = [chosen_settings(each, name) for name in NAMES]
+    assert len({settings["tv"] for settings in own}) > 1  # else this test says nothing
+    choice = read(once, "choice.json")
+    assert [vote["series"] for vote in choice["votes"]] == list(NAMES)
+    assert [{**vote, "series": None} for vote in choice["votes"]] == [
+        {**settings, "series": None} for settings in own]
+    winners = [vote["tv"] for vote in own if vote["tv_penalty"] == choice["tv_penalty"]]
+    assert min(winners) <= choice["tv"] <= max(winners)
+    for name in NAMES:
+        used = settings(options_of(os.path.join(once, name + ".mrc"))["fit"])
+        assert used == {key: choice[key] for key in used}
+        assert f"--tv={choice['tv']:g}" in commands(once)[name]
+    text = page(once)
+    assert f"{choice['tv_penalty']} tv {choice['tv']:.3g}" in text and "trials of a (" in text
+
+
+def test_every_series_chooses_for_itself_if_that_is_wanted(each):
+    assert not os.path.exists(os.path.join(each, "choice.json"))
+    assert "trials of" not in page(each)
+    for name in NAMES:
+        assert not any(word.startswith("--tv") for word in commands(each)[name])
+        used = settings(options_of(os.path.join(each, name + ".mrc"))["fit"])
+        assert used == chosen_settings(each, name)
+
+
+def test_a_series_keeps_what_it_states_and_one_alone_has_nothing_to_share(data):
+    folder = harness.fresh_directory("choice_table")
+    rows = [[os.path.join(data, name + ".mrc"), os.path.join(data, name + ".tlt"), tv]
+            for name, tv in (("a", ""), ("b", "7"), ("c", ""))]
+    table = write_table(os.path.join(folder, "list.csv"), [["stack", "tlt", "tv"], *rows])
+    results = os.path.join(folder, "results")
+    planned = harness.succeed("batch", table, *OPEN, "--dry-run", "-o", results).stdout
+    assert "trials of a, c choose" in planned and not os.path.exists(results)
+    harness.succeed("batch", table, *OPEN, "-o", results)
+    assert [vote["series"] for vote in read(results, "choice.json")["votes"]] == ["a", "c"]
+    own = options_of(os.path.join(results, "b.mrc"))["fit"]
+    assert own["density_variation"] == 7 and own["penalty"] == "concave"
+    used = [settings(options_of(os.path.join(results, name + ".mrc"))["fit"]) for name in "ac"]
+    assert used[0] == used[1] and used[0]["tv"] != 7
+    alone = harness.fresh_directory("choice_alone")
+    harness.succeed("batch", os.path.join(data, "a.mrc"), *pattern(data)[1:], *OPEN, "-o", alone)
+    assert not os.path.exists(os.path.join(alone, "choice.json"))
+
+
+def test_a_series_whose_trials_fail_has_no_vote(data):
+    folder = harness.fresh_directory("choice_broken")
+    rows = [[os.path.join(data, name + ".mrc"), os.path.join(data, name + ".tlt")]
+            for name in ("a", "broken")]
+    table = write_table(os.path.join(folder, "list.csv"), [["stack", "tlt"], *rows])
+    results = os.path.join(folder, "results")
+    result = harness.tomofield("batch", table, *OPEN, "-o", results)
+    assert result.returncode == 1 and "broken: its trials failed" in result.stderr, result.stderr
+    choice = read(results, "choice.json")
+    assert "section 3" in choice["votes"][1]["failure"] and choice["tv"] == choice["votes"][0]["tv"]
+    assert settings(options_of(os.path.join(results, "a.mrc"))["fit"])["tv"] == choice["tv"]
+    assert "section 3" in page(results)
+
+
+def test_a_batch_that_goes_on_takes_the_stored_choice(data):
+    folder = harness.fresh_directory("choice_stopped")
+    command = ["batch", *pattern(data), *harness.merge(OPEN, ["--epochs", 4000]),
+               "--checkpoint-minutes", 0, "--at-once", 1, "-o", folder]
+    run = harness.start(*command)
+    while run.poll() is None and not any(name.endswith(".h5") for name in os.listdir(folder)):
+        time.sleep(0.02)
+    run.send_signal(signal.SIGINT)
+    _, errors = run.communicate(timeout=60)
+    assert run.returncode == 130, errors
+    stored, before = harness.read_bytes(os.path.join(folder, "choice.json")), commands(folder)
+    again = harness.start(*command, "--skip-existing")
+    begun, = (name[:-3] for name in os.listdir(folder) if name.endswith(".h5"))
+    log = os.path.join(folder, "logs", begun + ".log")
+    while again.poll() is None and b"resuming" not in harness.read_bytes(log):
+        time.sleep(0.02)
+    again.send_signal(signal.SIGTERM)
+    again.communicate(timeout=60)
+    assert b"resuming" in harness.read_bytes(log)
+    assert harness.read_bytes(os.path.join(folder, "choice.json")) == stored
+    assert commands(folder) == before and any(w.startswith("--tv=") for w in before[begun])
+
+
+def test_a_run_writes_what_its_trials_choose_and_does_not_fit(data):
+    folder = harness.fresh_directory("choice_alone_run")
+    choice = os.path.join(folder, "choice.json")
+    command = ["reconstruct", os.path.join(data, "a.mrc"), "--tlt", os.path.join(data, "a.tlt"),
+               *OPEN, "-o", os.path.join(folder, "a.mrc"), "--choice", choice]
+    harness.succeed(*command)
+    assert os.listdir(folder) == ["choice.json"]
+    found = read(folder, "choice.json")
+    assert found["chosen"]["tv"] > 0 and len(found["trials"]) >= 4
+    refused = harness.tomofield(*command)
+    assert refused.returncode == 2 and "--choice" in refused.stderr
+    harness.succeed(*command, "--overwrite", "--tv", 3, "--black-level", 0, "--bead-diameter", 0)
+    assert read(folder, "choice.json") is None  # nothing is left to trials
