@@ -18,7 +18,7 @@ namespace {
 constexpr double kCore_radii = 1.1, kCore_px = 1.0;
 
 // What is left of a bead is masked within so many diameters of its middle.
-constexpr double kMaskWithoutFringes = 0.9;
+constexpr double kMaskWithoutFringes = 1.05;
 
 // Standard deviations by which beads are believed to differ: their densities as a part of the mean,
 // their radii as a part of the given one, and their places from those that were found.
