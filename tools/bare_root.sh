@@ -10,11 +10,12 @@ require_root() {
   fi
 }
 
-# Makes the root of a Debian release in an empty folder. A server that does not answer is asked three
+# Makes the root of a Debian release in a folder that is empty or not there. A server that does not answer is asked three
 # times, ever more patiently.
 make_bare_root() {
   local release=$1 root=$2 log try
   log=$(mktemp)
+  mkdir -p "$root"
   chmod 755 "$root"  # users of the root who are not root must find its files, too
   for try in 1 2 3; do
     if debootstrap --variant=minbase "$release" "$root" ${DEBIAN_MIRROR:+"$DEBIAN_MIRROR"} >"$log" 2>&1; then

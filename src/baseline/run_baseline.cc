@@ -187,17 +187,21 @@ BaselineSummary summary_of(const Solution& solution, std::int64_t num_rays,
           series.masks.bead_masking};
 }
 
-// Corrects the contrast transfer of the views, if the options have one.
-void correct_views(const BaselineOptions& options, const tilt_series::TiltSeries& tilt_series,
-                   measurement::Measurement& series) {
-  series.transfers = measurement::view_transfers(
-      options.files, options.shared, output::series_options(options.files, options.shared),
-      tilt_series);
-  if (series.transfers.empty()) return;
+// Prepares the views, and corrects their contrast transfer if the options have one.
+measurement::Measurement prepare(const tilt_series::TiltSeries& tilt_series,
+                                 const BaselineOptions& options,
+                                 const std::filesystem::path& scratch_dir) {
+  measurement::Measurement series =
+      prepare_measurement(tilt_series, output::specimen_options(options.shared), scratch_dir,
+                          measurement::view_transfers(
+                              options.files, options.shared,
+                              output::series_options(options.files, options.shared), tilt_series));
+  if (series.transfers.empty()) return series;
   const base::TraceSpan span("correct contrast transfer");
   measurement::correct_ctf(options.ctf_correction, series);
   base::log_info(
       fmt::format("ctf: views are corrected before ({})", base::name_of(options.ctf_correction)));
+  return series;
 }
 
 }  // namespace
@@ -264,9 +268,8 @@ BaselineSummary run_baseline(const tilt_series::TiltSeries& tilt_series,
   BaselineOptions options = requested;
   const BaselinePaths paths = baseline_paths(options.shared.output);
   const bool fit_view_scale = fits_view_scale(options);
-  measurement::Measurement series = prepare_measurement(
-      tilt_series, output::specimen_options(options.shared), io::scratch_directory(paths.volume));
-  correct_views(options, tilt_series, series);
+  measurement::Measurement series =
+      prepare(tilt_series, options, io::scratch_directory(paths.volume));
   keep_beads(series);  // as bright particles may be the specimen
   const std::vector<int> held_out =
       measurement::held_out_views(series.geometry.tilt_deg, options.shared.hold_out);

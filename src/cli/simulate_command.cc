@@ -30,6 +30,7 @@ struct SimulateArguments {
   std::optional<double> noise;
   std::optional<double> gain_spread;
   std::optional<std::int64_t> num_beads;
+  std::optional<double> gold_density;
   double gold_diameter_A = 100.0;
   double magnification_percent = 0.0;
   bool without_truth = false;
@@ -126,6 +127,7 @@ void resolve_specimen(SimulateArguments& arguments) {
   }
   options.cell.thickness_px = arguments.thickness_px.value_or(options.cell.thickness_px);
   options.cell.num_beads = arguments.num_beads.value_or(options.cell.num_beads);
+  options.cell.bead_density = arguments.gold_density.value_or(options.cell.bead_density);
   options.gain_spread = arguments.gain_spread.value_or(options.gain_spread);
 }
 
@@ -317,10 +319,10 @@ void add_simulate_command(CLI::App& program) {
       "per 256 x 256 pixels)");
   command->add_option("--gold-diameter", arguments->gold_diameter_A, "Diameter of a gold bead in Å")
       ->capture_default_str();
-  command
-      ->add_option("--gold-density", options.cell.bead_density,
-                   "Density of gold (the cell's densest walls have 1)")
-      ->capture_default_str();
+  command->add_option(
+      "--gold-density", arguments->gold_density,
+      "Density of gold (the cell's densest walls have 1) (default: 5; with --yardstick d 25 V). 0: "
+      "the same specimen without its beads");
   command->add_flag("--no-truth", arguments->without_truth, "Do not write truth.mrc");
   command->add_flag("--overwrite", arguments->overwrite, "Replace files that exist");
   add_common_options(*command);

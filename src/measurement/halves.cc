@@ -17,7 +17,7 @@ Measurement half_of_frames(const tilt_series::TiltSeries& series, Half half,
   const std::shared_ptr<SlabViews> rays = read_rays(
       series, {whole.rays_shape(), 1, whole.unit, band_rows, scratch_dir},
       [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
-        series.read_half(half, view, image, valid);
+        series.read_half(half, view, image, valid, transfer_of(whole.transfers, view));
       },
       processes);
   if (whole.subtracted_background > 0)

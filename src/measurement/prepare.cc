@@ -309,18 +309,21 @@ Measurement plan_measurement(const tilt_series::TiltSeries& series,
 
 Measurement prepare_measurement(const tilt_series::TiltSeries& series,
                                 const SpecimenOptions& specimen,
-                                const std::filesystem::path& scratch_dir) {
+                                const std::filesystem::path& scratch_dir,
+                                std::vector<microscope::ViewTransfer> transfers) {
   // All rows in one band.
   return prepare_measurement(series, specimen, scratch_dir,
                              series.height() + series.aligned_height(),
-                             distributed::Communicator::alone());
+                             distributed::Communicator::alone(), std::move(transfers));
 }
 
 Measurement prepare_measurement(const tilt_series::TiltSeries& series,
                                 const SpecimenOptions& specimen,
                                 const std::filesystem::path& scratch_dir, std::int64_t band_rows,
-                                const distributed::Communicator& processes) {
+                                const distributed::Communicator& processes,
+                                std::vector<microscope::ViewTransfer> transfers) {
   Measurement prepared = plan_measurement(series, specimen);
+  prepared.transfers = std::move(transfers);
   const SlabViews::Shape shape = prepared.rays_shape();
   const ReadView read_view = [&](std::size_t view, std::span<float> image,
                                  std::span<std::uint8_t> valid) {
@@ -331,7 +334,7 @@ Measurement prepare_measurement(const tilt_series::TiltSeries& series,
   prepared.rays = read_rays(
       series, {shape, 1, prepared.unit, band_rows, scratch_dir},
       [&](std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) {
-        series.read_view(view, image, valid);
+        series.read_view(view, image, valid, transfer_of(prepared.transfers, view));
         series.forget_view(view);
       },
       processes);

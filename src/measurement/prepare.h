@@ -45,16 +45,20 @@ std::size_t decoding_memory(
 
 /// Turns a series into rays in density units. The stored pixels of the series' views are given up
 /// (TiltSeries::forget_view). `scratch_dir` takes the rays if they do not fit in memory.
+/// `transfers` become those of the measurement (view_transfers.h); with a contrast transfer, the
+/// fringes of masked beads are subtracted from the views.
 Measurement prepare_measurement(const tilt_series::TiltSeries& series,
                                 const SpecimenOptions& specimen,
-                                const std::filesystem::path& scratch_dir);
+                                const std::filesystem::path& scratch_dir,
+                                std::vector<microscope::ViewTransfer> transfers = {});
 
 /// Does the same on each of the processes that share a series. They get the same but for `rays`:
 /// each holds those of its share (row_share.h) of bands of `band_rows` rows.
 Measurement prepare_measurement(const tilt_series::TiltSeries& series,
                                 const SpecimenOptions& specimen,
                                 const std::filesystem::path& scratch_dir, std::int64_t band_rows,
-                                const distributed::Communicator& processes);
+                                const distributed::Communicator& processes,
+                                std::vector<microscope::ViewTransfer> transfers = {});
 
 /// Reads a view of a series that is not resampled, and aligns it with a correction.
 tilt_series::MaskedImage read_aligned(const tilt_series::TiltSeries& recorded, std::size_t view,

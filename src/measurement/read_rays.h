@@ -1,11 +1,14 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "distributed/communicator.h"
 #include "measurement/slab_views.h"
+#include "microscope/view_transfer.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::measurement {
@@ -18,6 +21,12 @@ struct RaySpec {
   std::int64_t band_rows = 0;  ///< of the bands that processes share (row_share.h)
   const std::filesystem::path& scratch_dir;
 };
+
+/// Returns the transfer of a view, or null if there are none.
+inline const microscope::ViewTransfer* transfer_of(
+    const std::vector<microscope::ViewTransfer>& transfers, std::size_t view) {
+  return transfers.empty() ? nullptr : &transfers[view];
+}
 
 /// Reads all views of a series as rays. With `bin` above 1, read_view() gets images of the shape of
 /// binned views (SlabViews::binned_shape), and the rays are like those of SlabViews::binned(). Each

@@ -36,13 +36,13 @@ measurement::Measurement prepare(const tilt_series::TiltSeries& series,
                                  const ReconstructOptions& options,
                                  const distributed::Communicator& processes) {
   const base::TraceSpan span("prepare rays");
+  std::vector<microscope::ViewTransfer> transfers;
+  processes.run_collectively([&] {
+    transfers = measurement::view_transfers(options.files, options.resolved, options.input, series);
+  });
   measurement::Measurement measurement = measurement::prepare_measurement(
       series, options.specimen, io::scratch_directory(options.resolved.output),
-      fit::band_rows(options.field), processes);
-  processes.run_collectively([&] {
-    measurement.transfers =
-        measurement::view_transfers(options.files, options.resolved, options.input, series);
-  });
+      fit::band_rows(options.field), processes, std::move(transfers));
   measurement.held_out =
       measurement::held_out_views(measurement.geometry.tilt_deg, options.fit.hold_out);
   return measurement;

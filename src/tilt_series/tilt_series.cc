@@ -23,6 +23,7 @@
 #include "tilt_series/half_stacks.h"
 #include "tilt_series/intensity.h"
 #include "tilt_series/masks/series_masks.h"
+#include "tilt_series/masks/subtract_beads.h"
 #include "tilt_series/noise.h"
 #include "tilt_series/open_views.h"
 #include "tilt_series/series_plan.h"
@@ -308,9 +309,10 @@ struct TiltSeries::Impl {
             disc.radius_px * std::sqrt(std::abs(m.m11 * m.m22 - m.m12 * m.m21))};
   }
 
-  /// Returns a view as line integrals, without what masked beads and fiducials hide.
-  MaskedImage line_integrals(std::size_t view) const {
-    return line_integrals(stored_or_decoded(view), view);
+  /// Returns a view as line integrals, without what masked beads and fiducials hide and, if its
+  /// transfer is given, without their fringes.
+  MaskedImage line_integrals(std::size_t view, const microscope::ViewTransfer* transfer) const {
+    return line_integrals(stored_or_decoded(view), view, transfer);
   }
 
   /// Returns a view as line integrals in which no beads are masked.
@@ -326,9 +328,10 @@ struct TiltSeries::Impl {
     return in_wanted_frame(decoder.decode(view, wanted_frame()));
   }
 
-  MaskedImage line_integrals_of_half(Half half, std::size_t view) const {
+  MaskedImage line_integrals_of_half(Half half, std::size_t view,
+                                     const microscope::ViewTransfer* transfer) const {
     return line_integrals(in_wanted_frame(decoder.decode_half(half, *halves, view, wanted_frame())),
-                          view);
+                          view, transfer);
   }
 
   Frames wanted_frame() const {
@@ -339,10 +342,16 @@ struct TiltSeries::Impl {
     return std::move(options.resample ? decoded.aligned : decoded.recorded);
   }
 
-  MaskedImage line_integrals(MaskedImage image, std::size_t view) const {
-    mask_discs(beads.discs[view], &image);
-    mark_undecided(beads.undecided[view], &image);
+  MaskedImage line_integrals(MaskedImage image, std::size_t view,
+                             const microscope::ViewTransfer* transfer) const {
     intensity.convert(&image);
+    std::vector<MaskDisc> hidden = beads.discs[view];
+    if (transfer && transfer->optics.amplitude_contrast < 1.0) {  // there is a contrast transfer
+      const double pixel_A = plan.pixel_size_A * plan.bin_factor;
+      hidden = subtract_beads(hidden, beads.metrics.bead_diameter_A / pixel_A, *transfer, &image);
+    }
+    mask_discs(hidden, &image);
+    mark_undecided(beads.undecided[view], &image);
     return image;
   }
 };
@@ -399,21 +408,22 @@ std::vector<std::vector<BeadSpot>> TiltSeries::find_bead_spots(
   return search_beads(impl_->options, impl_->plan, bead_views, processes).spots;
 }
 
-void TiltSeries::read_view(std::size_t view, std::span<float> image,
-                           std::span<std::uint8_t> valid) const {
+void TiltSeries::read_view(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid,
+                           const microscope::ViewTransfer* transfer) const {
   TOMOFIELD_CHECK(view < impl_->views.size(), fmt::format("there is no view {}", view));
   TOMOFIELD_CHECK(
       image.size() == static_cast<std::size_t>(width() * height()) && valid.size() == image.size(),
       "image and mask must have width × height elements");
-  const MaskedImage integrals = impl_->line_integrals(view);
+  const MaskedImage integrals = impl_->line_integrals(view, transfer);
   std::ranges::copy(integrals.values, image.begin());
   std::ranges::copy(integrals.valid, valid.begin());
 }
 
 void TiltSeries::read_half(Half half, std::size_t view, std::span<float> image,
-                           std::span<std::uint8_t> valid) const {
+                           std::span<std::uint8_t> valid,
+                           const microscope::ViewTransfer* transfer) const {
   TOMOFIELD_CHECK(impl_->halves.has_value(), "the options name no halves");
-  const MaskedImage integrals = impl_->line_integrals_of_half(half, view);
+  const MaskedImage integrals = impl_->line_integrals_of_half(half, view, transfer);
   std::ranges::copy(integrals.values, image.begin());
   std::ranges::copy(integrals.valid, valid.begin());
 }

@@ -19,6 +19,10 @@
 #include "tilt_series/masks/mask_disc.h"
 #include "tomofield/options.h"
 
+namespace tomofield::microscope {
+struct ViewTransfer;
+}
+
 namespace tomofield::tilt_series {
 
 /// Names the files of a tilt series and says how its intensities are read.
@@ -129,13 +133,15 @@ class TiltSeries {
   /// outside a rotated image, masked beads, fiducials and what the user's mask leaves out, and
   /// kUndecidedBead for beads that are undecided.
   /// Pixels that are not measurements are 0. A view that is not in this process's store is
-  /// decoded anew. Thread-safe.
-  void read_view(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid) const;
+  /// decoded anew. With the `transfer` of the view, the fringes that a contrast transfer makes of
+  /// masked beads are subtracted (masks/subtract_beads.h). Thread-safe.
+  void read_view(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid,
+                 const microscope::ViewTransfer* transfer = nullptr) const;
 
   /// Does the same with one half of the frames, in the units of all of them (half_stacks.h) and
   /// with the masks of all of them. It decodes the view. The options must name the halves.
-  void read_half(Half half, std::size_t view, std::span<float> image,
-                 std::span<std::uint8_t> valid) const;
+  void read_half(Half half, std::size_t view, std::span<float> image, std::span<std::uint8_t> valid,
+                 const microscope::ViewTransfer* transfer = nullptr) const;
 
   /// Gives up the stored pixels of a view that will not be read soon, to make room.
   void forget_view(std::size_t view) const;

@@ -11,6 +11,7 @@ import shutil
 import mrcfile
 import numpy as np
 import pytest
+import scipy.ndimage
 import tifffile
 
 import harness
@@ -284,6 +285,33 @@ def test_a_public_series_of_etomo_is_reconstructed():
     # The data are said to be bright: they have no logarithm.
     again = harness.succeed("info", folder, "--contrast", "bright").stdout
     assert "(not used: --contrast bright is given)" in again
+
+
+def test_the_raw_stack_is_read_though_the_aligned_one_is_there():
+    """Moves views by fractions of a pixel as newstack -linear does, which leaves coloured noise in the
+    aligned stack. The noise of the raw one, which the program moves itself, stays white."""
+    folder = fresh_directory("raw_and_aligned")
+    harness.succeed("simulate", folder, "--size", 64, "--thickness", 38, "--yardstick", "c", "--contrast",
+                    "dark", "--noise", 0.3, "--seed", 32, "--gold", 0, "--misalign", 2, "--overwrite")
+    for before, after in (("mrc", "st"), ("tlt", "tlt"), ("xf", "xf")):
+        os.rename(os.path.join(folder, f"tilt_series.{before}"), os.path.join(folder, f"TS_01.{after}"))
+    shifts = np.loadtxt(os.path.join(folder, "TS_01.xf"))[:, :3:-1]  # y, x
+    raw = harness.read_volume(os.path.join(folder, "TS_01.st"))
+    aligned = [scipy.ndimage.shift(view, shift, order=1, mode="nearest")
+               for view, shift in zip(raw, shifts)]
+    harness.write_stack(os.path.join(folder, "TS_01_ali.mrc"), np.float32(aligned))
+    write_command_files(folder, "TS_01", "st", ["THICKNESS 38"], [])
+    options = ["--contrast", "dark", "--bead-diameter", 0, "--tv-penalty", "smooth", "--tv", 5,
+               "--view-scale", "on", "--epochs", 3, "--coarse-epochs", 40]
+
+    def most_alike_neighbours(stack, *more):
+        results, printed = reconstruct(stack, folder, *options, *more)
+        assert f"stack {os.path.join(folder, stack)} from" in printed.stdout, printed.stdout
+        with open(results.json_path, encoding="utf-8") as file:
+            return max(json.load(file)["metrics"]["verdict"]["views"]["residual_correlation"])
+
+    assert most_alike_neighbours("TS_01.st") < 0.06
+    assert most_alike_neighbours("TS_01_ali.mrc", "--ignore", "TransformFile") > 0.15
 
 
 # ----------------------------------------------------------------------------------- AreTomo
