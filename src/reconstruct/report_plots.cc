@@ -24,7 +24,9 @@ using report::range_with_room;
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();  // is not drawn
 constexpr const char* kTilt = "tilt, degrees";
 
-double number(const json& value) { return value.is_number() ? value.get<double>() : kNothing; }
+double number_or_nothing(const json& value) {
+  return value.is_number() ? value.get<double>() : kNothing;
+}
 
 double log10_of(double value) { return value > 0 ? std::log10(value) : kNothing; }
 
@@ -54,7 +56,7 @@ Curve epoch_curve(std::string name, const json& values) {
   Curve curve{std::move(name), {}};
   for (const json& value : values)
     curve.points.emplace_back(static_cast<double>(curve.points.size() + 1),
-                              log10_of(number(value)));
+                              log10_of(number_or_nothing(value)));
   return curve;
 }
 
@@ -62,7 +64,8 @@ Curve epoch_curve(std::string name, const json& values) {
 Curve tilt_curve(std::string name, const json& views, const char* key, double unit = 1.0) {
   Curve curve{std::move(name), {}};
   for (const json& view : views)
-    curve.points.emplace_back(number(member(view, "tilt_deg")), number(member(view, key)) / unit);
+    curve.points.emplace_back(number_or_nothing(member(view, "tilt_deg")),
+                              number_or_nothing(member(view, key)) / unit);
   std::ranges::sort(curve.points);
   return curve;
 }
@@ -149,8 +152,9 @@ std::string displacement_plot(const AllFits& fits) {
       Curve curve{name_of(names[axis], fit), {}};
       for (const json& view : compared)
         curve.points.emplace_back(
-            number(fit.metrics.at("views").at(view.at("view").get<std::size_t>()).at("tilt_deg")),
-            number(view.at("displacement_px").at(axis)));
+            number_or_nothing(
+                fit.metrics.at("views").at(view.at("view").get<std::size_t>()).at("tilt_deg")),
+            number_or_nothing(view.at("displacement_px").at(axis)));
       curves.push_back(with_marks(std::move(curve)));
     }
   }
@@ -165,7 +169,7 @@ std::string masked_plot(const AllFits& fits) {
   std::vector<Curve> curves;
   for (const FitMetrics& fit : fits) {
     const json& mask = member(fit.metrics, "mask");
-    if (number(member(mask, "masked_part")) > 0)
+    if (number_or_nothing(member(mask, "masked_part")) > 0)
       curves.push_back(
           tilt_curve(name_of("masked pixels", fit), member(mask, "views"), "masked_part", 0.01));
   }
@@ -178,7 +182,8 @@ std::string masked_plot(const AllFits& fits) {
 std::string halves_plot(const json& fsc) {
   if (!fsc.is_object() || !fsc.contains("frequency_per_A")) return "";
   std::vector<double> frequencies;
-  for (const json& frequency : fsc["frequency_per_A"]) frequencies.push_back(number(frequency));
+  for (const json& frequency : fsc["frequency_per_A"])
+    frequencies.push_back(number_or_nothing(frequency));
   if (frequencies.empty()) return "";
   std::vector<Curve> curves;
   const std::pair<const char*, const char*> kinds[] = {
@@ -186,7 +191,8 @@ std::string halves_plot(const json& fsc) {
   for (const auto& [key, name] : kinds) {
     if (!fsc.contains(key)) continue;
     std::vector<double> correlation;
-    for (const json& value : fsc[key].at("correlation")) correlation.push_back(number(value));
+    for (const json& value : fsc[key].at("correlation"))
+      correlation.push_back(number_or_nothing(value));
     correlation.resize(frequencies.size(), kNothing);
     curves.push_back(report::fsc_curve(name, frequencies, correlation));
   }
