@@ -27,16 +27,25 @@ constexpr std::int64_t kSide = 256, kAxisSide = 128, kSmallSide = 64;
 // Pixels by which the small images may be moved where they are compared, so that a stack that is
 // not aligned has its order all the same.
 constexpr std::int64_t kReach = 4;
-// How far the most alike pair stands above the median of all pairs, in units of the deviation of
-// correlations of white noise, 1 / √pixels: 2.8 and less if the views are noise to the eye, and 5.4
-// and more if neighbours can be told, also by shuffled views.
-constexpr double kStandsOut = 3.7;
+// How alike views are that are noise to the eye, in units of the deviation of correlations of white
+// noise, 1 / √pixels: the median of all pairs is 2.9 to 3.3 there (it is that of the best of many
+// shifts) and 7 or more for views of which one sees something, and the most alike pair stands above
+// the median by 2.8 or less, and by 5.4 and more if neighbours can be told, also of shuffled views.
+constexpr double kMedianOfNoise = 5.0, kStandsOut = 3.7;
 // Distance in pixels at which residuals are compared, beyond the reach of an interpolation.
 constexpr std::int64_t kFar = 4;
 
 // Returns the side of the smallest blocks whose means make an image no larger than `side`.
 std::int64_t block_for(const Image& image, std::int64_t side) {
   return (std::max(image.width, image.height) + side - 1) / side;
+}
+
+// Says whether the likenesses of all pairs of images of that many pixels are those of noise.
+bool is_of_noise(const std::vector<double>& likeness, std::size_t num_pixels) {
+  const double deviation = 1 / std::sqrt(static_cast<double>(num_pixels));
+  const double median = base::percentile({likeness.begin(), likeness.end()}, 50);
+  return median < kMedianOfNoise * deviation &&
+         std::ranges::max(likeness) - median < kStandsOut * deviation;
 }
 
 // Compares images that are in order of tilt.
@@ -54,11 +63,9 @@ std::optional<double> order_of(const std::vector<Image>& images) {
     neighbours.push_back(of_image.front());
     others.insert(others.end(), of_image.begin() + 1, of_image.end());
   }
-  std::vector<float> all(others.begin(), others.end());
+  std::vector<double> all = others;
   all.insert(all.end(), neighbours.begin(), neighbours.end());
-  const double pixels = static_cast<double>(images.front().values.size());
-  if (*std::ranges::max_element(all) - base::percentile(all, 50) < kStandsOut / std::sqrt(pixels))
-    return std::nullopt;
+  if (is_of_noise(all, images.front().values.size())) return std::nullopt;
   double greater = 0;
   for (const double of_neighbours : neighbours)
     greater += static_cast<double>(

@@ -38,8 +38,8 @@ constexpr double kLeastOfView = 0.12, kLeastOfGoodViews = 0.06;
 constexpr std::ptrdiff_t kFewestEmptyViews = 2;
 
 // Angle of the tilt axis by the shears of the views, in degrees and in standard errors: right axes
-// have up to 2.2 standard errors, and 0.04° where these are small. One that is 5° off has 0.33° and
-// 4.7 standard errors: a fit with a light weight follows it, and leaves no residual.
+// have up to 2.2 standard errors, and 0.08° where these are small. One that is 5° off has 0.33° and
+// 5.1 standard errors: a fit with a light weight follows it, and leaves no residual.
 constexpr double kMostAxisAngle_deg = 0.2, kMostAxisErrors = 3.6;
 
 // How much less profiles along the y axis agree than along the best direction, over how much more
