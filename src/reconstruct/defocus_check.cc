@@ -26,6 +26,10 @@ constexpr double kStep = 0.01, kSlopeStep = 0.5;
 constexpr int kGains = 4;
 constexpr int kDefocus = kGains, kSlope = kGains + 1, kColumns = kGains + 2;
 
+// Larger views tell no more than their middle, whose rings are finer than the steps of its
+// transform.
+constexpr std::int64_t kSpectrumSide = 512;
+
 using Columns = std::vector<std::vector<float>>;
 
 // Holds a number that a view tells of its defocus, and how well it tells it: the sum of squares
@@ -36,6 +40,7 @@ struct Estimate {
 struct OfView {
   Estimate defocus, slope;
   double rings = 0.0;
+  evaluate::Image middle;  // of the measured view
 };
 
 microscope::ViewTransfer with_factors(microscope::ViewTransfer transfer, double defocus,
@@ -124,6 +129,18 @@ OfView check_view(const measurement::PredictedView& projected,
   return found;
 }
 
+// Returns at most kSpectrumSide² pixels from the middle of a measured view.
+evaluate::Image middle_of(const measurement::PredictedView& view) {
+  evaluate::Image middle{
+      std::min(view.width, kSpectrumSide), std::min(view.height, kSpectrumSide), {}};
+  const std::int64_t x0 = (view.width - middle.width) / 2, y0 = (view.height - middle.height) / 2;
+  for (std::int64_t y = y0; y < y0 + middle.height; ++y) {
+    const auto row = view.measured.begin() + y * view.width + x0;
+    middle.values.insert(middle.values.end(), row, row + middle.width);
+  }
+  return middle;
+}
+
 // Returns what each of some views tells.
 std::vector<OfView> check_views(const fit::Fit& fit, const measurement::Measurement& series,
                                 const std::vector<int>& views) {
@@ -134,12 +151,25 @@ std::vector<OfView> check_views(const fit::Fit& fit, const measurement::Measurem
     const std::vector<measurement::PredictedView> projected = fit.project(some);
     base::parallel_for("check defocus", std::ssize(some), [&](std::int64_t i) {
       const auto view = static_cast<std::size_t>(some[static_cast<std::size_t>(i)]);
-      found[first + static_cast<std::size_t>(i)] =
-          check_view(projected[static_cast<std::size_t>(i)], series.transfers[view],
-                     fit.progress().views[view]);
+      OfView& of_view = found[first + static_cast<std::size_t>(i)];
+      of_view = check_view(projected[static_cast<std::size_t>(i)], series.transfers[view],
+                           fit.progress().views[view]);
+      of_view.middle = middle_of(projected[static_cast<std::size_t>(i)]);
     });
   }
   return found;
+}
+
+std::optional<RingCheck> check_spectra(const std::vector<OfView>& found,
+                                       const measurement::Measurement& series,
+                                       const std::vector<int>& views) {
+  std::vector<evaluate::Image> images;
+  std::vector<microscope::ViewTransfer> transfers;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    images.push_back(found[i].middle);
+    transfers.push_back(series.transfers[static_cast<std::size_t>(views[i])]);
+  }
+  return check_rings(images, transfers);
 }
 
 // Returns the weighted mean of what the views say of the slope, and its standard error by their
@@ -167,8 +197,8 @@ std::optional<DefocusCheck> check_defocus(const fit::Fit& fit,
       series.transfers, [](const auto& transfer) { return transfer.defocus.u_A != 0.0; });
   if (!has_defocus) return std::nullopt;
   const base::TraceSpan span("check defocus");
-  const std::vector<OfView> found =
-      check_views(fit, series, views_to_compare(series.geometry.tilt_deg));
+  const std::vector<int> views = views_to_compare(series.geometry.tilt_deg);
+  const std::vector<OfView> found = check_views(fit, series, views);
   std::vector<float> errors, rings;
   for (const OfView& view : found) {
     if (view.defocus.weight == 0.0) continue;
@@ -185,6 +215,7 @@ std::optional<DefocusCheck> check_defocus(const fit::Fit& fit,
   check.standard_error =
       1.25 * 1.48 * base::percentile(errors, 50) / std::sqrt(static_cast<double>(errors.size()));
   check.slope = mean_slope(found);
+  check.spectra = check_spectra(found, series, views);
   return check;
 }
 

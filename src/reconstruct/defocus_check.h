@@ -4,6 +4,7 @@
 
 #include "fit/fit.h"
 #include "measurement/measurement.h"
+#include "reconstruct/ring_check.h"
 
 namespace tomofield::reconstruction {
 
@@ -23,7 +24,9 @@ struct DefocusCheck {
   };
   /// True slope over the given one, less 1: about 0 for the right hand, and towards −2 for the
   /// wrong one. None if few views are tilted.
-  std::optional<Slope> slope;
+  std::optional<Slope> slope = {};
+
+  std::optional<RingCheck> spectra = {};  ///< what the views say without a field; none of few views
 };
 
 /// Checks up to 16 views, evenly spaced in order of tilt. Returns nothing if the views have no

@@ -27,12 +27,25 @@ constexpr std::int64_t kSide = 256, kAxisSide = 128, kSmallSide = 64;
 // Pixels by which the small images may be moved where they are compared, so that a stack that is
 // not aligned has its order all the same.
 constexpr std::int64_t kReach = 4;
+// How alike views are that are noise to the eye, in units of the deviation of correlations of white
+// noise, 1 / √pixels: the median of all pairs is 2.9 to 3.3 there (it is that of the best of many
+// shifts) and 7 or more for views of which one sees something, and the most alike pair stands above
+// the median by 2.8 or less, and by 5.4 and more if neighbours can be told, also of shuffled views.
+constexpr double kMedianOfNoise = 5.0, kStandsOut = 3.7;
 // Distance in pixels at which residuals are compared, beyond the reach of an interpolation.
 constexpr std::int64_t kFar = 4;
 
 // Returns the side of the smallest blocks whose means make an image no larger than `side`.
 std::int64_t block_for(const Image& image, std::int64_t side) {
   return (std::max(image.width, image.height) + side - 1) / side;
+}
+
+// Says whether the likenesses of all pairs of images of that many pixels are those of noise.
+bool is_of_noise(const std::vector<double>& likeness, std::size_t num_pixels) {
+  const double deviation = 1 / std::sqrt(static_cast<double>(num_pixels));
+  const double median = base::percentile({likeness.begin(), likeness.end()}, 50);
+  return median < kMedianOfNoise * deviation &&
+         std::ranges::max(likeness) - median < kStandsOut * deviation;
 }
 
 // Compares images that are in order of tilt.
@@ -50,6 +63,9 @@ std::optional<double> order_of(const std::vector<Image>& images) {
     neighbours.push_back(of_image.front());
     others.insert(others.end(), of_image.begin() + 1, of_image.end());
   }
+  std::vector<double> all = others;
+  all.insert(all.end(), neighbours.begin(), neighbours.end());
+  if (is_of_noise(all, images.front().values.size())) return std::nullopt;
   double greater = 0;
   for (const double of_neighbours : neighbours)
     greater += static_cast<double>(
@@ -101,6 +117,7 @@ struct ComparedView {
   std::array<double, 2> residual_correlation{}, far_correlation{};
   std::vector<double> column_means;
   Image of_axis;
+  ViewShear shear;
   Image small;  // without the means of its columns
 };
 
@@ -112,12 +129,16 @@ ComparedView compare(measurement::PredictedView&& both) {
   auto displacement = evaluate::displacement(told, seen);
   for (double& d : displacement) d *= static_cast<double>(block);
   const Image small = reduced(seen, block_for(seen, kSmallSide));
+  const std::int64_t block_of_axis = block_for(seen, kAxisSide);
+  Image of_axis = reduced(seen, block_of_axis);
+  const ViewShear shear = shear_of(of_axis, reduced(told, block_of_axis));
   return {displacement,
           evaluate::correlation(told, seen),
           evaluate::difference_correlation(measured, predicted, 1),
           evaluate::difference_correlation(measured, predicted, kFar),
           evaluate::column_means(measured),
-          reduced(seen, block_for(seen, kAxisSide)),
+          std::move(of_axis),
+          shear,
           evaluate::without_column_means(small)};
 }
 
@@ -193,6 +214,7 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
   std::vector<Image> small, of_axis;
   std::vector<double> tilt_deg;
   std::vector<std::array<double, 2>> near, far;
+  std::vector<ViewShear> shears;
   const std::span<const int> views(found.views);
   const std::size_t at_once = views_at_once(series);
   for (std::size_t first = 0; first < views.size(); first += at_once) {
@@ -212,12 +234,14 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
       }
       small.push_back(std::move(view.small));
       of_axis.push_back(std::move(view.of_axis));
+      shears.push_back(view.shear);
       tilt_deg.push_back(series.geometry.tilt_deg[static_cast<std::size_t>(views[first + i])]);
     }
   }
   found.residual_correlation = medians(near);
   found.far_correlation = medians(far);
   found.axis = check_axis(of_axis, tilt_deg);
+  found.axis_error = axis_error(shears, tilt_deg);
   found.tilt_order = order_of(small);
   found.path = brightness.effect(series.contrast());
   found.side_px = static_cast<double>(std::max(series.geometry.width, series.roi.height()));

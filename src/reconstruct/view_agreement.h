@@ -8,6 +8,7 @@
 #include "fit/fit.h"
 #include "measurement/measurement.h"
 #include "reconstruct/axis_check.h"
+#include "reconstruct/axis_error.h"
 
 namespace tomofield::reconstruction {
 
@@ -35,11 +36,13 @@ struct ViewAgreement {
   std::array<double, 2> far_correlation{};
   /// Probability that two views that are neighbours in tilt are more alike than two that are not:
   /// near 1 for the angles of the views, near ½ for shuffled ones. Views may lie up to a sixteenth
-  /// of their longer side off in x and y. None if there are few views.
+  /// of their longer side off in x and y. None if there are few views, or if no two of them are
+  /// more alike than noise is.
   std::optional<double> tilt_order;
   PathEffect path;
-  std::optional<AxisCheck> axis;  ///< none if few views are far enough apart
-  double side_px = 0.0;           ///< longest side of a view, in pixels of the fit
+  std::optional<AxisCheck> axis;        ///< none if few views are far enough apart
+  std::optional<AxisError> axis_error;  ///< none if few views tell it
+  double side_px = 0.0;                 ///< longest side of a view, in pixels of the fit
 
   /// Return the displacement that 9 of 10 views stay below, in any direction and along y alone.
   double usual_displacement_px() const;

@@ -37,6 +37,11 @@ constexpr double kLeastOrder = 0.65;
 constexpr double kLeastOfView = 0.12, kLeastOfGoodViews = 0.06;
 constexpr std::ptrdiff_t kFewestEmptyViews = 2;
 
+// Angle of the tilt axis by the shears of the views, in degrees and in standard errors: right axes
+// have up to 2.2 standard errors, and 0.08° where these are small. One that is 5° off has 0.33° and
+// 5.1 standard errors: a fit with a light weight follows it, and leaves no residual.
+constexpr double kMostAxisAngle_deg = 0.2, kMostAxisErrors = 3.6;
+
 // How much less profiles along the y axis agree than along the best direction, over how much more
 // these agree than usual: at most 0.13 for the right axis, and 0.35 to 1.1 for one that is 30° or
 // more off. A rod along the axis has its profile across the axis in common, but leaves no residual.
@@ -78,6 +83,11 @@ constexpr double kLeastDefocusError = 0.01, kDefocusErrors = 4.0;
 // Rings explain up to 0.3 % of the residuals of right series whose errors seem to be 9 to 63 %.
 // Farther off, the change of a view is no longer in proportion to that of the defocus.
 constexpr double kLeastRings = 0.005, kMostDefocusError = 0.5;
+// Correlation of the views' spectra with the rings of a defocus, and part of it that rings of the
+// given defocus have: 0.7 and all of it for a right series of 14 rings. Where there are fewer than
+// three rings, a right series has 0.44 and none of it.
+constexpr double kFewestRings = 5.0, kLeastRingAgreement = 0.3, kLeastOfRings = 0.5;
+constexpr double kLeastRingErrors = 5.0;
 // The error of the defocus's slope is 0 for the right hand and −2 for the wrong one, which the
 // density follows in part.
 constexpr double kHandError = -0.5;
@@ -230,6 +240,22 @@ std::optional<Warning> wrong_axis(const Verdict& verdict) {
                              axis.direction_deg)};
 }
 
+// Judges an axis that is off by a few degrees, which changes profiles too little.
+std::optional<Warning> turned_axis(const ViewAgreement& views) {
+  if (!views.axis_error) return std::nullopt;
+  const double angle = views.axis_error->angle_deg;
+  if (std::abs(angle) < kMostAxisAngle_deg ||
+      std::abs(angle) < kMostAxisErrors * views.axis_error->standard_error_deg)
+    return std::nullopt;
+  return Warning{"tilt-axis",
+                 fmt::format("the tilt axis seems to be turned {}clockwise from the y axis of the "
+                             "aligned views, because views are sheared against their predictions "
+                             "as by {:.1f}° (and more, since a fit follows a wrong axis): give the "
+                             "transforms with the rotation of the axis (--xf or --aln), or find it "
+                             "with --align full",
+                             angle > 0 ? "counter-" : "", std::abs(angle))};
+}
+
 bool is_axis_sure(const Verdict& verdict) {
   if (!verdict.views || !verdict.views->axis) return false;
   const AxisCheck& axis = *verdict.views->axis;
@@ -268,16 +294,34 @@ std::optional<Warning> correlated_noise(const Verdict& verdict, double bin_facto
                   std::min(x, y), 2 * bin_factor)};
 }
 
+std::string defocus_advice(double error) {
+  return fmt::format("as if the defocus were {:.1f} % {} than given", 100 * std::abs(error),
+                     error > 0 ? "larger" : "smaller");
+}
+
+// Judges the spectra of the views alone, which tell a defocus that is far off.
+std::optional<Warning> wrong_rings(const RingCheck& check) {
+  if (check.rings < kFewestRings || check.agreement < kLeastRingAgreement ||
+      check.given > kLeastOfRings * check.agreement ||
+      check.agreement - check.given < kLeastRingErrors * check.standard_error)
+    return std::nullopt;
+  return Warning{"defocus",
+                 fmt::format("the spectra of the views have rings {} (correlation {:.2f}, and "
+                             "{:.2f} with the given one): check --ctf or --defocus, the pixel size "
+                             "and the voltage",
+                             defocus_advice(check.factor - 1), check.agreement, check.given)};
+}
+
 std::optional<Warning> wrong_defocus(const DefocusCheck& check) {
+  if (check.spectra)
+    if (const auto rings = wrong_rings(*check.spectra)) return rings;
   if (std::abs(check.error) < kLeastDefocusError || std::abs(check.error) > kMostDefocusError ||
       check.rings < kLeastRings || std::abs(check.error) < kDefocusErrors * check.standard_error)
     return std::nullopt;
   return Warning{"defocus",
-                 fmt::format("the residuals have rings as if the defocus were {:.1f} % {} than "
-                             "given (rings explain {:.2f} % of them): check --ctf or --defocus, "
-                             "the pixel size and the voltage",
-                             100 * std::abs(check.error), check.error > 0 ? "larger" : "smaller",
-                             100 * check.rings)};
+                 fmt::format("the residuals have rings {} (rings explain {:.2f} % of them): check "
+                             "--ctf or --defocus, the pixel size and the voltage",
+                             defocus_advice(check.error), 100 * check.rings)};
 }
 
 std::optional<Warning> wrong_defocus_hand(const DefocusCheck& check) {
@@ -342,7 +386,10 @@ std::vector<Warning> faults_of_views(const Verdict& verdict, const GivenInput& i
   if (!is_contrast_wrong)
     if (const auto alignment = misaligned(views, input.alignment)) found.push_back(*alignment);
   if (!found.empty()) return found;
-  if (const auto axis = wrong_axis(verdict)) found.push_back(*axis);
+  if (const auto axis = wrong_axis(verdict))
+    found.push_back(*axis);
+  else if (const auto turned = turned_axis(views))
+    found.push_back(*turned);
   return found;
 }
 

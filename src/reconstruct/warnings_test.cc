@@ -166,6 +166,42 @@ TEST(Warnings, TheAxisIsWrongIfProfilesAgreeAlongAnotherDirection) {
   EXPECT_EQ(codes(verdict), "tilt-axis ");  // noise hides the residual
 }
 
+TEST(Warnings, TheAxisIsTurnedIfViewsAreShearedForSure) {
+  Verdict verdict = good_verdict();
+  verdict.views->axis_error = AxisError{.angle_deg = 0.33, .standard_error_deg = 0.07};
+  EXPECT_EQ(codes(verdict), "tilt-axis ");
+  const std::string message = find_warnings(verdict, aligned_input()).front().message;
+  EXPECT_NE(message.find("turned counter-clockwise"), std::string::npos) << message;
+  verdict.views->axis_error = AxisError{.angle_deg = -0.33, .standard_error_deg = 0.07};
+  EXPECT_NE(find_warnings(verdict, aligned_input()).front().message.find("turned clockwise"),
+            std::string::npos);
+  verdict.views->axis_error = AxisError{.angle_deg = -1.55, .standard_error_deg = 0.7};  // noise
+  EXPECT_EQ(codes(verdict), "");
+  verdict.views->axis_error = AxisError{.angle_deg = 0.1, .standard_error_deg = 0.01};  // small
+  EXPECT_EQ(codes(verdict), "");
+}
+
+TEST(Warnings, SpectraTellADefocusThatIsFarOff) {
+  Verdict verdict = good_verdict();
+  const RingCheck wrong{
+      .factor = 1.3, .agreement = 0.7, .given = 0.0, .standard_error = 0.02, .rings = 14};
+  verdict.defocus = DefocusCheck{.spectra = wrong};
+  EXPECT_EQ(codes(verdict), "defocus ");
+  const std::string message = find_warnings(verdict, aligned_input()).front().message;
+  EXPECT_NE(message.find("30.0 % larger"), std::string::npos) << message;
+  verdict.defocus->spectra->rings = 2.9;
+  EXPECT_EQ(codes(verdict), "");
+  verdict.defocus->spectra = wrong;
+  verdict.defocus->spectra->agreement = 0.2;
+  EXPECT_EQ(codes(verdict), "");
+  verdict.defocus->spectra = wrong;
+  verdict.defocus->spectra->given = 0.6;
+  EXPECT_EQ(codes(verdict), "");
+  verdict.defocus->spectra = wrong;
+  verdict.defocus->spectra->standard_error = 0.2;
+  EXPECT_EQ(codes(verdict), "");
+}
+
 TEST(Warnings, AResidualIsAFaultIfItIsLargeOrHasStructure) {
   Verdict verdict = good_verdict();
   verdict.residual = 1.6;
