@@ -16,7 +16,6 @@ void add_choice_option(CLI::App& command, std::optional<std::filesystem::path>& 
                   "Make the trials that choose settings, write what they choose, and do not fit")
       ->type_name("FILE.json")
       ->excludes("--plan")
-      ->excludes("--dry-run")
       ->group(kHelpAllGroup);
 }
 

@@ -47,7 +47,8 @@ void run(const ReconstructArguments& arguments, const distributed::Communicator&
   options.input.keep_views = !arguments.dry_run;
   run_traced(arguments.dry_run ? std::nullopt : arguments.trace, processes, [&] {
     const tilt_series::TiltSeries series = open_series(options, arguments.dry_run, processes);
-    if (arguments.choice) return write_choice(*arguments.choice, series, options, processes);
+    if (arguments.choice && !arguments.dry_run)
+      return write_choice(*arguments.choice, series, options, processes);
     run_reconstruction(series, options, arguments.dry_run, processes);
   });
 }

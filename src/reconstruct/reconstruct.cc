@@ -97,9 +97,11 @@ void turn_the_dial(ReconstructOptions& options) {
                                options.resolved.denoise, options.fit.density_variation));
 }
 
-// Shows what the dial does, as soon as there are trials of its places.
+// Shows what the dial does. A resumed run keeps the picture of its first session: the trials that
+// it reads have no sections.
 void write_dial_picture(const Run& run, const TunedFit& tuned) {
   if (!run.writes_files() || !run.processes.is_root()) return;
+  if (tuned.trials.front().section.values.empty()) return;
   const double sign = run.options.input.contrast == Contrast::kDark ? -1 : 1;
   write_dial_picture(tuned, run.options.volume.invert ? -sign : sign, run.paths.dial_picture);
 }
@@ -116,7 +118,6 @@ bool choose_settings(Run& run, std::optional<TunedFit>& tuned) {
   } else if (makes_trials) {
     tuned = choose_by_trials(run, open);
     if (!tuned) return false;
-    run.processes.run_collectively([&] { write_dial_picture(run, *tuned); });
   }
   if (tuned) apply(tuned->settings, run);
   turn_the_dial(run.options);
@@ -179,6 +180,7 @@ RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOp
   Run run = begin_run(series, options, hooks, processes);
   std::optional<TunedFit> tuned;
   if (!choose_settings(run, tuned)) return {.outcome = Outcome::kStoppedTuning};
+  if (tuned) processes.run_collectively([&] { write_dial_picture(run, *tuned); });
   if (options.makes_halves()) return reconstruct_halves(series, run, record, tuned);
   return fit_all_views(run, tiles, record, std::move(tuned));
 }

@@ -10,6 +10,7 @@
 #include "base/trace.h"
 #include "evaluate/image_pair.h"
 #include "geometry/tilt_order.h"
+#include "reconstruct/likeness_order.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -17,60 +18,16 @@ namespace {
 using evaluate::Image;
 
 constexpr int kViews = 16;
-// Fewer views are too far apart to tell an order: with 8 of them, those of correct series are no
-// more alike than those of some shuffled ones (docs/verdict.md).
-constexpr int kFewestOrderedViews = 12;
 // Sides of the images for displacements, and of those that tell which views are alike. The latter
 // are so small that detail moves by a pixel or two between views that are some degrees apart. The
 // direction of the tilt axis is found in images of a side between.
 constexpr std::int64_t kSide = 256, kAxisSide = 128, kSmallSide = 64;
-// Pixels by which the small images may be moved where they are compared, so that a stack that is
-// not aligned has its order all the same.
-constexpr std::int64_t kReach = 4;
-// How alike views are that are noise to the eye, in units of the deviation of correlations of white
-// noise, 1 / √pixels: the median of all pairs is 2.9 to 3.3 there (it is that of the best of many
-// shifts) and 7 or more for views of which one sees something, and the most alike pair stands above
-// the median by 2.8 or less, and by 5.4 and more if neighbours can be told, also of shuffled views.
-constexpr double kMedianOfNoise = 5.0, kStandsOut = 3.7;
 // Distance in pixels at which residuals are compared, beyond the reach of an interpolation.
 constexpr std::int64_t kFar = 4;
 
 // Returns the side of the smallest blocks whose means make an image no larger than `side`.
 std::int64_t block_for(const Image& image, std::int64_t side) {
   return (std::max(image.width, image.height) + side - 1) / side;
-}
-
-// Says whether the likenesses of all pairs of images of that many pixels are those of noise.
-bool is_of_noise(const std::vector<double>& likeness, std::size_t num_pixels) {
-  const double deviation = 1 / std::sqrt(static_cast<double>(num_pixels));
-  const double median = base::percentile({likeness.begin(), likeness.end()}, 50);
-  return median < kMedianOfNoise * deviation &&
-         std::ranges::max(likeness) - median < kStandsOut * deviation;
-}
-
-// Compares images that are in order of tilt.
-std::optional<double> order_of(const std::vector<Image>& images) {
-  if (std::ssize(images) < kFewestOrderedViews) return std::nullopt;
-  std::vector<std::vector<double>> likeness(images.size());  // [a][b − a − 1]
-  base::parallel_for("compare views in pairs", std::ssize(images), [&](std::int64_t i) {
-    const auto a = static_cast<std::size_t>(i);
-    for (std::size_t b = a + 1; b < images.size(); ++b)
-      likeness[a].push_back(evaluate::shifted_correlation(images[a], images[b], kReach));
-  });
-  std::vector<double> neighbours, others;
-  for (const std::vector<double>& of_image : likeness) {
-    if (of_image.empty()) continue;
-    neighbours.push_back(of_image.front());
-    others.insert(others.end(), of_image.begin() + 1, of_image.end());
-  }
-  std::vector<double> all = others;
-  all.insert(all.end(), neighbours.begin(), neighbours.end());
-  if (is_of_noise(all, images.front().values.size())) return std::nullopt;
-  double greater = 0;
-  for (const double of_neighbours : neighbours)
-    greater += static_cast<double>(
-        std::ranges::count_if(others, [&](double other) { return of_neighbours > other; }));
-  return greater / static_cast<double>(neighbours.size() * others.size());
 }
 
 // Returns the length of a ray in the volume, in pixels. Without a margin the volume ends at the
@@ -242,7 +199,7 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
   found.far_correlation = medians(far);
   found.axis = check_axis(of_axis, tilt_deg);
   found.axis_error = axis_error(shears, tilt_deg);
-  found.tilt_order = order_of(small);
+  found.tilt_order = order_by_likeness(small);
   found.path = brightness.effect(series.contrast());
   found.side_px = static_cast<double>(std::max(series.geometry.width, series.roi.height()));
   return found;

@@ -34,7 +34,8 @@ def test_files_with_the_defaults_give_the_bytes_of_the_program(series, tmp_path)
     assert (tmp_path / "t.mrc").read_bytes() == (series.folder / "tomogram.mrc").read_bytes()
     assert made.metrics == tomofield.read_metrics(tmp_path / "t.mrc")
     assert made.metrics == tomofield.read_metrics(tmp_path / "t.json")
-    assert sorted(os.listdir(tmp_path)) == ["t.h5", "t.json", "t.mrc", "t_choice.png"]
+    assert sorted(os.listdir(tmp_path)) == ["t.h5", "t.json", "t.mrc", "t_choice.png",
+                                            "t_denoise.png"]
 
 
 def read_json(series, name):
