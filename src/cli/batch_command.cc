@@ -234,7 +234,7 @@ void run(const CLI::App& command, const BatchArguments& arguments,
   if (arguments.dry_run) return;
   if (choice.stored)
     give_choice(*choice.stored, list.jobs);
-  else
+  else if (arguments.choose == batch::Choose::kOnce || !options.skips_existing)
     batch::forget_choice(options.folder);
   begin_batch(options.folder, list);
   if (arguments.slurm)

@@ -221,6 +221,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
     write_report(results, options, volume, pictures.back());
     for (const auto& picture : {paths.held_out_picture, paths.choice_picture})
       if (io::OutputSet::active()->contains(picture)) pictures.push_back(picture);
+    if (std::filesystem::exists(paths.dial_picture)) pictures.push_back(paths.dial_picture);
   };
   if (processes.is_root()) {
     hooks.progress = make_progress_bar("reconstruct");

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -88,22 +89,27 @@ void apply(const TrialSettings& settings, Run& run) {
   if (settings.masks_beads) measurement::hide_beads(run.measurement, run.processes);
 }
 
-// Multiplies the weight of total variation by what --denoise says.
+// Multiplies the weight of total variation by what --denoise says. The options keep the weight that
+// was given or chosen, so that they make the same fit when they are given again.
 void turn_the_dial(ReconstructOptions& options) {
   options.fit.density_variation *= denoise_factor(options.resolved.denoise);
-  options.resolved.density_variation = options.fit.density_variation;
   if (options.resolved.denoise != Options().denoise)
     base::log_info(fmt::format("--denoise {}: the weight of total variation is {:.3g}",
                                options.resolved.denoise, options.fit.density_variation));
 }
 
 // Shows what the dial does. A resumed run keeps the picture of its first session: the trials that
-// it reads have no sections.
-void write_dial_picture(const Run& run, const TunedFit& tuned) {
+// it reads have no sections. Another run removes the picture of an earlier one.
+void show_dial(const Run& run, const std::optional<TunedFit>& tuned) {
   if (!run.writes_files() || !run.processes.is_root()) return;
-  if (tuned.trials.front().section.values.empty()) return;
+  if (tuned && tuned->trials.front().section.values.empty()) return;
+  if (!tuned) {
+    std::error_code ignored;
+    std::filesystem::remove(run.paths.dial_picture, ignored);
+    return;
+  }
   const double sign = run.options.input.contrast == Contrast::kDark ? -1 : 1;
-  write_dial_picture(tuned, run.options.volume.invert ? -sign : sign, run.paths.dial_picture);
+  write_dial_picture(*tuned, run.options.volume.invert ? -sign : sign, run.paths.dial_picture);
 }
 
 // Chooses the settings that are left to trials. A resumed run takes those that its checkpoint has.
@@ -180,7 +186,7 @@ RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOp
   Run run = begin_run(series, options, hooks, processes);
   std::optional<TunedFit> tuned;
   if (!choose_settings(run, tuned)) return {.outcome = Outcome::kStoppedTuning};
-  if (tuned) processes.run_collectively([&] { write_dial_picture(run, *tuned); });
+  processes.run_collectively([&] { show_dial(run, tuned); });
   if (options.makes_halves()) return reconstruct_halves(series, run, record, tuned);
   return fit_all_views(run, tiles, record, std::move(tuned));
 }

@@ -208,6 +208,7 @@ Findings examine(const fit::Fit& fit, const measurement::Measurement& series,
                  const ReconstructOptions& options, const RunRecord& record) {
   Findings found;
   found.metrics = output::metrics_json(fit, series, record.fit_seconds);
+  found.metrics["tv_weight"] = options.fit.density_variation;
   if (options.fit.hold_out > 0) {
     const base::TraceSpan span("score held-out views");
     found.held_out = fit.held_out_error();

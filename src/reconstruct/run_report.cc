@@ -290,14 +290,14 @@ void add_dial(const ReportSource& source, HtmlPage& page) {
   if (!source.dial_picture) return;
   page.add_heading("Lighter or stronger denoising");
   page.add_paragraph(fmt::format(
-      "One section of three of the short fits. This run was made with --denoise {}. Where the "
+      "The same section from three short fits. This run was made with --denoise {}. Where the "
       "strong one loses what you want to see, give --denoise light; where the medium one is too "
       "grainy, give --denoise strong, or any factor such as 1.5. The whole fit is a little "
       "smoother than these.",
       source.record.at("options").at("fit").at("denoise").get<std::string>()));
   page.add_figures({{*source.dial_picture,
-                     "Half of the chosen weight, the chosen one, and twice "
-                     "of it, or the nearest that were tried"}},
+                     "The trials whose weights are nearest to half of the "
+                     "chosen one, to the chosen one, and to twice it"}},
                    report::FigureSize::kLarge);
 }
 

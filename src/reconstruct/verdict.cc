@@ -28,10 +28,6 @@ nlohmann::json axis_json(const AxisCheck& axis) {
           {"usual", axis.usual}};
 }
 
-nlohmann::json axis_error_json(const AxisError& axis) {
-  return {{"angle_deg", axis.angle_deg}, {"standard_error_deg", axis.standard_error_deg}};
-}
-
 nlohmann::json views_json(const ViewAgreement& agreement) {
   nlohmann::json views = nlohmann::json::array();
   for (std::size_t i = 0; i < agreement.views.size(); ++i)
@@ -46,8 +42,6 @@ nlohmann::json views_json(const ViewAgreement& agreement) {
           {"residual_correlation", agreement.residual_correlation},
           {"far_correlation", agreement.far_correlation},
           {"axis", agreement.axis ? axis_json(*agreement.axis) : nlohmann::json(nullptr)},
-          {"axis_error",
-           agreement.axis_error ? axis_error_json(*agreement.axis_error) : nlohmann::json(nullptr)},
           {"usual_displacement_px", agreement.usual_displacement_px()},
           {"usual_displacement_y_px", agreement.usual_displacement_y_px()},
           {"compared", views}};

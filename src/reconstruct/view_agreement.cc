@@ -74,7 +74,6 @@ struct ComparedView {
   std::array<double, 2> residual_correlation{}, far_correlation{};
   std::vector<double> column_means;
   Image of_axis;
-  ViewShear shear;
   Image small;  // without the means of its columns
 };
 
@@ -86,16 +85,12 @@ ComparedView compare(measurement::PredictedView&& both) {
   auto displacement = evaluate::displacement(told, seen);
   for (double& d : displacement) d *= static_cast<double>(block);
   const Image small = reduced(seen, block_for(seen, kSmallSide));
-  const std::int64_t block_of_axis = block_for(seen, kAxisSide);
-  Image of_axis = reduced(seen, block_of_axis);
-  const ViewShear shear = shear_of(of_axis, reduced(told, block_of_axis));
   return {displacement,
           evaluate::correlation(told, seen),
           evaluate::difference_correlation(measured, predicted, 1),
           evaluate::difference_correlation(measured, predicted, kFar),
           evaluate::column_means(measured),
-          std::move(of_axis),
-          shear,
+          reduced(seen, block_for(seen, kAxisSide)),
           evaluate::without_column_means(small)};
 }
 
@@ -171,7 +166,6 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
   std::vector<Image> small, of_axis;
   std::vector<double> tilt_deg;
   std::vector<std::array<double, 2>> near, far;
-  std::vector<ViewShear> shears;
   const std::span<const int> views(found.views);
   const std::size_t at_once = views_at_once(series);
   for (std::size_t first = 0; first < views.size(); first += at_once) {
@@ -191,14 +185,12 @@ ViewAgreement compare_views(const fit::Fit& fit, const measurement::Measurement&
       }
       small.push_back(std::move(view.small));
       of_axis.push_back(std::move(view.of_axis));
-      shears.push_back(view.shear);
       tilt_deg.push_back(series.geometry.tilt_deg[static_cast<std::size_t>(views[first + i])]);
     }
   }
   found.residual_correlation = medians(near);
   found.far_correlation = medians(far);
   found.axis = check_axis(of_axis, tilt_deg);
-  found.axis_error = axis_error(shears, tilt_deg);
   found.tilt_order = order_by_likeness(small);
   found.path = brightness.effect(series.contrast());
   found.side_px = static_cast<double>(std::max(series.geometry.width, series.roi.height()));

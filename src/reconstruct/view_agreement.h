@@ -8,7 +8,6 @@
 #include "fit/fit.h"
 #include "measurement/measurement.h"
 #include "reconstruct/axis_check.h"
-#include "reconstruct/axis_error.h"
 
 namespace tomofield::reconstruction {
 
@@ -40,9 +39,8 @@ struct ViewAgreement {
   /// more alike than noise is.
   std::optional<double> tilt_order;
   PathEffect path;
-  std::optional<AxisCheck> axis;        ///< none if few views are far enough apart
-  std::optional<AxisError> axis_error;  ///< none if few views tell it
-  double side_px = 0.0;                 ///< longest side of a view, in pixels of the fit
+  std::optional<AxisCheck> axis;  ///< none if few views are far enough apart
+  double side_px = 0.0;           ///< longest side of a view, in pixels of the fit
 
   /// Return the displacement that 9 of 10 views stay below, in any direction and along y alone.
   double usual_displacement_px() const;

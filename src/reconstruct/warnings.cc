@@ -37,11 +37,6 @@ constexpr double kLeastOrder = 0.65;
 constexpr double kLeastOfView = 0.12, kLeastOfGoodViews = 0.06;
 constexpr std::ptrdiff_t kFewestEmptyViews = 2;
 
-// Angle of the tilt axis by the shears of the views, in degrees and in standard errors: right axes
-// have up to 2.2 standard errors, and 0.08° where these are small. One that is 5° off has 0.33° and
-// 5.1 standard errors: a fit with a light weight follows it, and leaves no residual.
-constexpr double kMostAxisAngle_deg = 0.2, kMostAxisErrors = 3.6;
-
 // How much less profiles along the y axis agree than along the best direction, over how much more
 // these agree than usual: at most 0.13 for the right axis, and 0.35 to 1.1 for one that is 30° or
 // more off. A rod along the axis has its profile across the axis in common, but leaves no residual.
@@ -240,22 +235,6 @@ std::optional<Warning> wrong_axis(const Verdict& verdict) {
                              axis.direction_deg)};
 }
 
-// Judges an axis that is off by a few degrees, which changes profiles too little.
-std::optional<Warning> turned_axis(const ViewAgreement& views) {
-  if (!views.axis_error) return std::nullopt;
-  const double angle = views.axis_error->angle_deg;
-  if (std::abs(angle) < kMostAxisAngle_deg ||
-      std::abs(angle) < kMostAxisErrors * views.axis_error->standard_error_deg)
-    return std::nullopt;
-  return Warning{"tilt-axis",
-                 fmt::format("the tilt axis seems to be turned {}clockwise from the y axis of the "
-                             "aligned views, because views are sheared against their predictions "
-                             "as by {:.1f}° (and more, since a fit follows a wrong axis): give the "
-                             "transforms with the rotation of the axis (--xf or --aln), or find it "
-                             "with --align full",
-                             angle > 0 ? "counter-" : "", std::abs(angle))};
-}
-
 bool is_axis_sure(const Verdict& verdict) {
   if (!verdict.views || !verdict.views->axis) return false;
   const AxisCheck& axis = *verdict.views->axis;
@@ -360,7 +339,7 @@ std::optional<Warning> speckled(const Verdict& verdict) {
   return Warning{"speckle",
                  fmt::format("{:.2f} % of the voxels stick out from all their neighbours, and the "
                              "views are not explained by it, so that it is probably noise: give a "
-                             "larger weight (--tv), or --tv-penalty smooth",
+                             "stronger --denoise, or --tv-penalty smooth",
                              100 * *speckle)};
 }
 
@@ -371,7 +350,7 @@ std::optional<Warning> overfitted(const Verdict& verdict) {
   return Warning{"overfit",
                  fmt::format("views that were not fitted are predicted with {:.1f} times the error "
                              "of those that were: the tomogram has structure that only its own "
-                             "views want; give a larger weight (--tv)",
+                             "views want; give a stronger --denoise",
                              verdict.held_out->median / verdict.residual)};
 }
 
@@ -386,10 +365,7 @@ std::vector<Warning> faults_of_views(const Verdict& verdict, const GivenInput& i
   if (!is_contrast_wrong)
     if (const auto alignment = misaligned(views, input.alignment)) found.push_back(*alignment);
   if (!found.empty()) return found;
-  if (const auto axis = wrong_axis(verdict))
-    found.push_back(*axis);
-  else if (const auto turned = turned_axis(views))
-    found.push_back(*turned);
+  if (const auto axis = wrong_axis(verdict)) found.push_back(*axis);
   return found;
 }
 

@@ -166,21 +166,6 @@ TEST(Warnings, TheAxisIsWrongIfProfilesAgreeAlongAnotherDirection) {
   EXPECT_EQ(codes(verdict), "tilt-axis ");  // noise hides the residual
 }
 
-TEST(Warnings, TheAxisIsTurnedIfViewsAreShearedForSure) {
-  Verdict verdict = good_verdict();
-  verdict.views->axis_error = AxisError{.angle_deg = 0.33, .standard_error_deg = 0.07};
-  EXPECT_EQ(codes(verdict), "tilt-axis ");
-  const std::string message = find_warnings(verdict, aligned_input()).front().message;
-  EXPECT_NE(message.find("turned counter-clockwise"), std::string::npos) << message;
-  verdict.views->axis_error = AxisError{.angle_deg = -0.33, .standard_error_deg = 0.07};
-  EXPECT_NE(find_warnings(verdict, aligned_input()).front().message.find("turned clockwise"),
-            std::string::npos);
-  verdict.views->axis_error = AxisError{.angle_deg = -1.55, .standard_error_deg = 0.7};  // noise
-  EXPECT_EQ(codes(verdict), "");
-  verdict.views->axis_error = AxisError{.angle_deg = 0.1, .standard_error_deg = 0.01};  // small
-  EXPECT_EQ(codes(verdict), "");
-}
-
 TEST(Warnings, SpectraTellADefocusThatIsFarOff) {
   Verdict verdict = good_verdict();
   const RingCheck wrong{

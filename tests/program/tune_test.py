@@ -230,19 +230,22 @@ def test_the_dial_multiplies_the_weight_that_trials_choose(series):
         results[strength] = harness.fresh_results(f"dial_{strength}")
         harness.succeed("reconstruct", *series.input, "-o", results[strength].volume_path, *options,
                         "--denoise", strength)
-        fit = record(results[strength])["options"]["fit"]
-        assert fit["denoise"] == strength
-        weights[strength] = fit["density_variation"]
+        written = record(results[strength])
+        assert written["options"]["fit"]["denoise"] == strength
+        weights[strength] = written["metrics"]["tv_weight"]
+        chosen = written["options"]["fit"]["density_variation"]
+        assert chosen == weights["medium"], "the weight that trials chose"
     assert weights["light"] == pytest.approx(weights["medium"] / 2)
     assert weights["3"] == pytest.approx(3 * weights["medium"])
     assert not results["medium"].same_as(results["3"])
 
 
 def test_the_dial_multiplies_a_weight_that_no_trial_chose(series):
-    for name, options, weight in (("usual", [], 10), ("given", ["--tv", 3], 6)):
+    for name, options, weight in (("usual", [], 5), ("given", ["--tv", 3], 3)):
         results = series.reconstruct(f"dial_{name}", "--tv-penalty", "smooth", "--denoise", "strong",
                                      *options)
         assert record(results)["options"]["fit"]["density_variation"] == weight
+        assert record(results)["metrics"]["tv_weight"] == 2 * weight
 
 
 def test_a_wrong_word_of_the_dial_is_refused(series):
