@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/plausible.h"
+#include "batch/read_json.h"
 #include "io/json.h"
 #include "io/json_numbers.h"
 #include "kernels/spikes.h"
@@ -97,19 +98,13 @@ Choice choice_from(const json& document) {
   return choice;
 }
 
-// Returns what `read` makes of a JSON file. Mistakes in the file are errors that name it.
+// Reads a file of a choice. Mistakes in it are errors that name it.
 template <typename Read>
-auto read_file(const fs::path& file, const char* what, const Read& read) {
-  std::string why;
-  try {
-    return read(io::read_json(file));
-  } catch (const json::exception& fault) {
-    why = fault.what();
-  } catch (const Error& fault) {
-    why = fault.what();
-  }
-  throw Error(fmt::format("'{}' is not {} ({}): remove it, and the batch chooses again",
-                          file.string(), what, why));
+auto read_choice_file(const fs::path& file, const char* what, const Read& read) {
+  return read_json(file, read, [&](const std::string& why) {
+    return fmt::format("'{}' is not {} ({}): remove it, and the batch chooses again", file.string(),
+                       what, why);
+  });
 }
 
 }  // namespace
@@ -174,13 +169,13 @@ void write_choice(const fs::path& folder, const Choice& choice) {
 std::optional<Choice> read_choice(const fs::path& folder) {
   const fs::path file = choice_file(folder);
   if (!fs::exists(file)) return std::nullopt;
-  return read_file(file, "the choice of a batch", choice_from);
+  return read_choice_file(file, "the choice of a batch", choice_from);
 }
 
 void forget_choice(const fs::path& folder) { fs::remove(choice_file(folder)); }
 
 Vote read_vote(const Job& job, const fs::path& file) {
-  return read_file(file, "the choice of a run", [&](const json& document) {
+  return read_choice_file(file, "the choice of a run", [&](const json& document) {
     Vote vote;
     vote.series = job.name;
     if (document.is_null()) {

@@ -20,7 +20,7 @@ enum class Choose {
   kEach   ///< every series makes trials of its own
 };
 
-/// What one series chose by its trials, or the reason why it has no vote.
+/// Holds what one series chose by its trials, or the reason why it has no vote.
 struct Vote {
   std::string series;
   Penalty penalty = Penalty::kSmooth;
@@ -29,7 +29,7 @@ struct Vote {
   std::string failure;            ///< empty if it has a vote
 };
 
-/// What all series of a batch get that do not state their own.
+/// Holds the settings that all series of a batch get if they do not state their own.
 struct Choice {
   Penalty penalty = Penalty::kSmooth;
   double variation = 0;

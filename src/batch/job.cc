@@ -6,6 +6,7 @@
 
 #include "base/plausible.h"
 #include "base/utf8.h"
+#include "batch/read_json.h"
 #include "io/json.h"
 #include "io/json_numbers.h"
 #include "reconstruct/options.h"
@@ -22,19 +23,12 @@ constexpr double kMostSamples = 1e30;
 constexpr std::int64_t kMostThreads = 1 << 20;
 constexpr std::int64_t kMostTrials = 1 << 20;
 
-// Returns what `read` makes of a JSON file. Mistakes in the file are errors that name it.
+// Reads a plan or a list of jobs. Mistakes in it are errors that name the file.
 template <typename Read>
-auto read_json(const fs::path& file, const char* what, Read&& read) {
-  const auto fail = [&](const char* why) {
-    return Error(fmt::format("'{}' is not {}: {}", file.string(), what, why));
-  };
-  try {
-    return read(io::read_json(file));
-  } catch (const json::exception& fault) {
-    throw fail(fault.what());
-  } catch (const Error& fault) {
-    throw fail(fault.what());
-  }
+auto read_job_file(const fs::path& file, const char* what, const Read& read) {
+  return read_json(file, read, [&](const std::string& why) {
+    return fmt::format("'{}' is not {}: {}", file.string(), what, why);
+  });
 }
 
 std::int64_t bytes_at(const json& object, const char* key) {
@@ -96,7 +90,7 @@ Job job_from(const json& object) {
 }  // namespace
 
 Needs read_needs(const fs::path& file) {
-  return read_json(file, "the plan of a run", [](const json& plan) {
+  return read_job_file(file, "the plan of a run", [](const json& plan) {
     Needs needs;
     const std::int64_t threads = io::integer_at(plan, "threads", 1, kMostThreads);
     const std::int64_t most = bytes_at(plan, "memory_bytes");
@@ -123,7 +117,7 @@ void write_jobs(const fs::path& file, const JobList& list) {
 }
 
 JobList read_jobs(const fs::path& file) {
-  return read_json(file, "the list of a batch", [](const json& document) {
+  return read_job_file(file, "the list of a batch", [](const json& document) {
     JobList list;
     list.overwrites = document.at("overwrites").get<bool>();
     for (const json& job : document.at("jobs")) list.jobs.push_back(job_from(job));

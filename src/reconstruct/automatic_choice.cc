@@ -16,8 +16,8 @@ namespace {
 // Neighbouring weights of the search. A factor of 1.8 from the best weight costs 0.05 to 0.3 dB on
 // the yardsticks.
 constexpr double kWeightFactor = 1.8;
-// What one step from the best smooth weight usually costs: 0.6 to 2.5 % in 48 runs of four
-// specimens, with a median of 1.5 % (docs/results/choice.md).
+// One step from the best smooth weight usually costs 1.5 % (the median of 48 runs of four
+// specimens, which range from 0.6 to 2.5 %; docs/results/choice.md).
 constexpr UsualCurvature kUsualCurvature{.loss_a_step = 0.016, .deviation = 0.016};
 constexpr int kMostSteps = 3;  // to one side of the usual weight
 // A concave penalty of less than its usual weight is not taken, so one step down is enough to see

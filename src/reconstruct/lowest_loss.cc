@@ -7,7 +7,7 @@
 namespace tomofield::reconstruction {
 namespace {
 
-// What a loss may deviate from a parabola: a part of it, and a little in any case.
+// A loss may deviate from a parabola by a part of itself, and by a little in any case.
 constexpr double kPartOfLoss = 0.25, kLittle = 0.002;
 // A curvature cannot be below this part of the usual one, which keeps the lowest place near.
 constexpr double kLeastPart = 0.25;

@@ -12,7 +12,7 @@
 #include "base/parallel.h"
 #include "base/trace.h"
 #include "evaluate/field_artefacts.h"
-#include "field/sampling/sample_box.h"
+#include "field/sampling/middle_plane.h"
 #include "measurement/background.h"
 #include "measurement/patch_errors.h"
 #include "measurement/undecided_beads.h"
@@ -59,8 +59,11 @@ class TrialFits::Running {
     detail_ = fmt::format("{} tv {:.3g}  rank {}  epochs {}", base::name_of(settings_.penalty),
                           settings_.variation, settings_.rank, settings_.epochs);
     if (is_last)
-      finished_ = FitTrial{
-          .settings = settings_, .score = score(), .seconds = 0.0, .section = middle_section()};
+      finished_ = FitTrial{.settings = settings_,
+                           .score = score(),
+                           .seconds = 0.0,
+                           .section = {measurement_->roi.width(),
+                                       field::middle_plane(fit_->field(), measurement_->roi)}};
     seconds_ += stopwatch.seconds();
     if (!is_last) return;
     finished_->seconds = seconds_;
@@ -74,16 +77,6 @@ class TrialFits::Running {
   const std::optional<FitTrial>& finished() const { return finished_; }
 
  private:
-  // Returns the densities at half the thickness, one value a pixel.
-  selection::Section middle_section() const {
-    const Rectangle& roi = measurement_->roi;
-    field::OrientedBox box;
-    box.size = {roi.width(), roi.height(), 1};
-    box.centre_px = {0.5 * static_cast<double>(roi.x0 + roi.x1),
-                     0.5 * static_cast<double>(roi.y0 + roi.y1), 0.5 * fit_->field().thickness()};
-    return {roi.width(), field::sample_box(fit_->field(), box)};
-  }
-
   selection::HeldOutScore score() const {
     fit::Fit::HeldOut held_out = fit_->predict_held_out(scores_with_view_scale_);
     measurement::ViewErrors& error = held_out.errors;

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/percentile.h"
-#include "field/sampling/sample_box.h"
+#include "field/sampling/middle_plane.h"
 #include "io/png.h"
 #include "report/canvas.h"
 #include "report/contrast.h"
@@ -53,12 +53,7 @@ std::vector<std::uint8_t> grey_values(const std::vector<float>& image,
 
 // Returns the slice at half the thickness, one voxel a pixel: [y, x].
 std::vector<float> central_slice(const output::Model& model) {
-  const Rectangle& roi = model.roi;
-  field::OrientedBox box;
-  box.size = {roi.width(), roi.height(), 1};
-  box.centre_px = {0.5 * static_cast<double>(roi.x0 + roi.x1),
-                   0.5 * static_cast<double>(roi.y0 + roi.y1), 0.5 * model.field->thickness()};
-  std::vector<float> slice = field::sample_box(*model.field, box);
+  std::vector<float> slice = field::middle_plane(*model.field, model.roi);
   for (float& value : slice) value *= static_cast<float>(model.output_scale());
   return slice;
 }

@@ -17,7 +17,7 @@ namespace {
 // A bead has no say within so many radii and pixels of its middle.
 constexpr double kCore_radii = 1.1, kCore_px = 1.0;
 
-// What is left of a bead is masked within so many diameters of its middle.
+// The mask of a bead whose fringes were subtracted has a radius of 1.05 of its diameters.
 constexpr double kMaskWithoutFringes = 1.05;
 
 // Standard deviations by which beads are believed to differ: their densities as a part of the mean,
