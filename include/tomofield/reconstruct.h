@@ -82,7 +82,8 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
 void set_thread_count(int count);
 
 /// Fills in the options that follow from other options, as reconstruct() does. The penalty and its
-/// weight stay empty if neither is given, since trials on the data choose them.
-Options resolve_options(const Options& options);
+/// weight stay empty if neither is given, since trials on the data choose them. `files` are those
+/// of the series: with a contrast transfer, plain vertices take more epochs.
+Options resolve_options(const Options& options, const SeriesFiles& files = {});
 
 }  // namespace tomofield

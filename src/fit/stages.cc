@@ -60,11 +60,12 @@ bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit) {
          (!field.with_margin || margin_side <= 4 * field.margin_rank);
 }
 
-Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit) {
+Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit, bool is_filtered) {
   Schedule schedule{fit.vertex_epochs > 0 ? 10 : 30, 0.05};
   if (field.kind == FieldKind::kGrid) schedule = {10, 0.035};
   const std::vector<int> bins = coarse_bins(field, fit);
   if (!bins.empty() && field.finest_spacing() >= bins.front()) schedule.epochs = 5;
+  if (is_filtered && field.kind == FieldKind::kGrid) schedule.epochs *= 2;
   return schedule;
 }
 

@@ -44,9 +44,12 @@ bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit);
 /// Returns the default schedule of a field. Plain vertices, and factors that begin with them,
 /// converge in a third of the epochs that other factors need. Vertices that are at least as far
 /// apart as the pixels of the last coarse stage need few epochs at full resolution, because the
-/// coarse stages have fitted all that they can express (docs/results/ablation.md). Only the members
-/// of `fit` that decide which stages there are have an effect.
-Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit);
+/// coarse stages have fitted all that they can express (docs/results/ablation.md). Plain
+/// vertices take twice the epochs at full resolution for views that a microscope filtered
+/// (`is_filtered`), because the largest transfer bounds the steps to their surrogates
+/// (docs/results/convergence.md).
+/// Only the members of `fit` that decide which stages there are have an effect.
+Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit, bool is_filtered = false);
 
 /// Returns the stages of a fit in order:
 ///

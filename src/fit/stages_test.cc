@@ -190,6 +190,15 @@ TEST(Stages, FactorsThatBeginAsVerticesTakeAThirdOfTheEpochs) {
   EXPECT_EQ(usual.vertex_epochs_of(50), usual.epochs);
 }
 
+TEST(Stages, FilteredViewsTakeTwiceTheEpochsOfPlainVertices) {
+  FieldOptions vertices;
+  vertices.kind = FieldKind::kGrid;
+  const FitOptions fit;
+  EXPECT_EQ(usual_schedule(vertices, fit, true).epochs, 2 * usual_schedule(vertices, fit).epochs);
+  EXPECT_EQ(usual_schedule(factors(32, 24), fit, true).epochs,
+            usual_schedule(factors(32, 24), fit).epochs);
+}
+
 Schedule usual(FieldKind kind, double spacing, int coarse_epochs = 1,
                TreeKind tree = TreeKind::kUniform) {
   FieldOptions field;

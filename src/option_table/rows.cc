@@ -209,8 +209,9 @@ constexpr Row kRows[] = {
      .is_common = true},
     {.key = "fit.epochs", .flag = "--epochs", MEMBER(Options, epochs), .group = Group::kFit,
      .range = Range::between(1, kMaxCount),
-     .automatic = "10; 30 for factors that do not begin with vertices; 5 for vertices 2 or more "
-                  "pixels apart (4 or more in an adaptive tree)",
+     .automatic = "10; 20 for plain vertices with a contrast transfer, dose or MTF; 30 for factors "
+                  "that do not begin with vertices; half for vertices 2 or more pixels apart (4 or "
+                  "more in an adaptive tree)",
      .help = "Passes over all views at full resolution"},
     {.key = "fit.vertex_epochs", .flag = "--vertex-epochs", MEMBER(Options, vertex_epochs),
      .group = Group::kFit, .range = Range::between(0, kMaxCount),

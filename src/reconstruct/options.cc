@@ -63,14 +63,15 @@ fit::FitOptions fit_options(const Options& options) {
   return fit;
 }
 
-void choose_schedule(Options& options) {
+void choose_schedule(const SeriesFiles& files, Options& options) {
   const fit::FieldOptions field = field_options(options);
   fit::FitOptions fit = fit_options(options);
   // One epoch stands for any number: the usual schedule depends on which stages there are.
   fit.coarse_epochs = options.coarse_epochs.value_or(1);
   const bool has_vertices = fit::begins_with_vertices(field, fit);
   fit.vertex_epochs = options.vertex_epochs.value_or(has_vertices ? 1 : 0);
-  const fit::Schedule usual = fit::usual_schedule(field, fit);
+  const fit::Schedule usual =
+      fit::usual_schedule(field, fit, measurement::wants_transfers(files, options));
   const int epochs = options.epochs.value_or(usual.epochs);
   const int vertex_epochs =
       options.vertex_epochs.value_or(has_vertices ? usual.vertex_epochs_of(epochs) : 0);
@@ -131,13 +132,13 @@ std::vector<std::filesystem::path> result_files(const ReconstructOptions& option
 
 }  // namespace
 
-Options resolve(const Options& requested) {
+Options resolve(const SeriesFiles& files, const Options& requested) {
   Options options = requested;
   option_table::choose_by_contrast(options);
   options.fit_view_scale = requested.fit_view_scale;  // trials choose it
   choose_field(options);
   options.leaf_size = field_options(options).leaf_size;
-  choose_schedule(options);
+  choose_schedule(files, options);
   choose_variation(options);
   return options;
 }
@@ -146,7 +147,7 @@ ReconstructOptions run_options(const SeriesFiles& files, const Options& requeste
   ReconstructOptions run;
   run.files = files;
   run.requested = requested;
-  run.resolved = resolve(requested);
+  run.resolved = resolve(files, requested);
   const bool is_bright = run.resolved.contrast == Contrast::kBright;
   run.open = {.variation = !run.resolved.penalty,
               .spikes = !run.resolved.penalty && !requested.spike_rank,

@@ -21,9 +21,9 @@ namespace tomofield::reconstruction {
 
 /// Fills in the options that follow from other options: leaves, epochs, learning rate, weights,
 /// activation and the scale of views. If neither the penalty nor its weight is given, both stay
-/// empty, because trials choose them. Values out of range stay as they are; check_options() names
-/// them.
-Options resolve(const Options& requested);
+/// empty, because trials choose them. `files` say whether a microscope filtered the views. Values
+/// out of range stay as they are; check_options() names them.
+Options resolve(const SeriesFiles& files, const Options& requested);
 
 /// Names the files of a reconstruction after its volume.
 struct OutputPaths {

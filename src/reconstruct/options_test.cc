@@ -104,7 +104,7 @@ TEST(ReconstructOptions, ABudgetIsForAdaptiveTrees) {
 }
 
 TEST(ResolvedOptions, FollowOtherOptions) {
-  const Options usual = resolve(good_options());
+  const Options usual = resolve({}, good_options());
   EXPECT_EQ(usual.field, FieldKind::kGrid);
   EXPECT_EQ(usual.leaf_size, 64);
   EXPECT_EQ(usual.epochs, 10);
@@ -116,7 +116,7 @@ TEST(ResolvedOptions, FollowOtherOptions) {
 
   Options requested = good_options();
   requested.field = FieldKind::kVm;
-  const Options factors = resolve(requested);
+  const Options factors = resolve({}, requested);
   EXPECT_EQ(factors.leaf_size, 32);
   EXPECT_EQ(factors.epochs, 10);
   EXPECT_EQ(factors.vertex_epochs, 10);
@@ -126,7 +126,7 @@ TEST(ResolvedOptions, FollowOtherOptions) {
   requested.field = FieldKind::kGrid;
   requested.epochs = 5;
   requested.contrast = Contrast::kBright;
-  const Options grid = resolve(requested);
+  const Options grid = resolve({}, requested);
   EXPECT_EQ(grid.leaf_size, 64);
   EXPECT_EQ(grid.epochs, 5);
   EXPECT_EQ(grid.vertex_epochs, 0);
@@ -135,14 +135,27 @@ TEST(ResolvedOptions, FollowOtherOptions) {
   EXPECT_EQ(grid.activation, Activation::kSoftplus);
 }
 
+TEST(ResolvedOptions, AContrastTransferTakesMoreEpochs) {
+  Options options = good_options();
+  EXPECT_EQ(resolve({}, options).epochs, 10);
+  SeriesFiles files;
+  files.ctf = "ctf.txt";
+  EXPECT_EQ(resolve(files, options).epochs, 20);
+  files.ctf = "none";
+  EXPECT_EQ(resolve(files, options).epochs, 10);
+  options.defocus_um = 3.0;
+  EXPECT_EQ(resolve({}, options).epochs, 20);
+  EXPECT_EQ(resolve({}, options).coarse_epochs, 160);
+}
+
 TEST(ResolvedOptions, HaveFactorsWhereOtherOptionsAreForThem) {
   Options adaptive = good_options(), begun = good_options();
   adaptive.tree = TreeKind::kAdaptive;
   begun.vertex_epochs = 4;
-  EXPECT_EQ(resolve(adaptive).field, FieldKind::kVm);
-  EXPECT_EQ(resolve(begun).field, FieldKind::kVm);
+  EXPECT_EQ(resolve({}, adaptive).field, FieldKind::kVm);
+  EXPECT_EQ(resolve({}, begun).field, FieldKind::kVm);
   begun.field = FieldKind::kGrid;
-  EXPECT_EQ(resolve(begun).field, FieldKind::kGrid);
+  EXPECT_EQ(resolve({}, begun).field, FieldKind::kGrid);
 }
 
 TEST(ResolvedOptions, KeepWhatIsGiven) {
@@ -157,7 +170,7 @@ TEST(ResolvedOptions, KeepWhatIsGiven) {
   requested.penalty = Penalty::kSmooth;
   requested.activation = Activation::kSoftplus;
   requested.fit_view_scale = false;
-  EXPECT_EQ(json_text(resolve(requested)), json_text(requested));
+  EXPECT_EQ(json_text(resolve({}, requested)), json_text(requested));
 }
 
 TEST(ResolvedOptions, StayTheSameWhenResolvedAgain) {
@@ -166,14 +179,14 @@ TEST(ResolvedOptions, StayTheSameWhenResolvedAgain) {
       Options options = good_options();
       options.field = kind;
       options.tree = tree;
-      const Options resolved = resolve(options);
-      EXPECT_EQ(json_text(resolve(resolved)), json_text(resolved));
+      const Options resolved = resolve({}, options);
+      EXPECT_EQ(json_text(resolve({}, resolved)), json_text(resolved));
     }
   }
 }
 
 TEST(ResolvedOptions, TrialsChooseWhatIsNotGiven) {
-  const Options open = resolve(good_options());
+  const Options open = resolve({}, good_options());
   EXPECT_FALSE(open.penalty || open.density_variation);
   const ReconstructOptions run = run_options({}, good_options());
   EXPECT_TRUE(run.open.variation);

@@ -221,7 +221,9 @@ Reconstruction reconstruct(const TiltSeries& series, const Options& options,
   return made;
 }
 
-Options resolve_options(const Options& options) { return reconstruction::resolve(options); }
+Options resolve_options(const Options& options, const SeriesFiles& files) {
+  return reconstruction::resolve(files, options);
+}
 
 void set_message_handler(MessageHandler handler) {
   if (!handler) return base::set_log_sink({});
