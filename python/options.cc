@@ -163,6 +163,7 @@ void add_field_and_fit(Class& options) {
   add_choice(options, "activation", &Options::activation);
   add_choice(options, "engine", &Options::engine);
   add_choice(options, "penalty", &Options::penalty);
+  add_choice(options, "prior", &Options::prior);
   add_choice(options, "fourier_ring", &Options::fourier_ring);
   add_choice(options, "noise_model", &Options::noise_model);
 }

@@ -22,6 +22,9 @@ enum class Activation { kSoftplus, kIdentity };
 enum class Engine { kSlab, kRay };
 /// Total variation of the usual kind, or a concave penalty, which spares edges.
 enum class Penalty { kConcave, kSmooth };
+/// The fit ends with total variation, with little of it, or with a prior that was learned from
+/// simulated series. The prior answers to the other two, which its training needs.
+enum class Prior { kTv, kLight, kLearned };
 /// The Fourier prior compares an axis with its ring's mean or largest amplitude.
 enum class RingReference { kMean, kMax };
 /// The noise of a view has the same power at all frequencies, or that of the residual.
@@ -124,8 +127,9 @@ struct Options {
   /// How strongly to denoise: "light", "medium", "strong" or a factor. It multiplies the weight, be
   /// it given or chosen, by 0.5, 1, 2 or the factor.
   std::string denoise = "medium";
-  double boundary = 4.0;  ///< weight of the boundary consistency (eq. 6)
-  double fourier = 0.0;   ///< weight of the isotropic Fourier prior (eq. 7)
+  std::optional<Prior> prior;  ///< what ends the fit
+  double boundary = 4.0;       ///< weight of the boundary consistency (eq. 6)
+  double fourier = 0.0;        ///< weight of the isotropic Fourier prior (eq. 7)
   RingReference fourier_ring = RingReference::kMean;
   /// A plain vertex is at most the one of this rank among the 26 around it; 0: no limit.
   std::optional<int> spike_rank;

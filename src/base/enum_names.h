@@ -52,6 +52,11 @@ struct EnumNames<Penalty> {
                                      std::pair{Penalty::kSmooth, "smooth"}};
 };
 template <>
+struct EnumNames<Prior> {
+  static constexpr std::array kNames{std::pair{Prior::kTv, "tv"}, std::pair{Prior::kLight, "light"},
+                                     std::pair{Prior::kLearned, "learned"}};
+};
+template <>
 struct EnumNames<RingReference> {
   static constexpr std::array kNames{std::pair{RingReference::kMean, "mean"},
                                      std::pair{RingReference::kMax, "max"}};

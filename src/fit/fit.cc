@@ -18,6 +18,7 @@
 #include "objective/ray_data_term.h"
 #include "objective/slab_objective.h"
 #include "objective/terms.h"
+#include "prior/answer.h"
 
 namespace tomofield::fit {
 namespace {
@@ -178,9 +179,32 @@ void Fit::resample_field() {
   optimizer_ = Adam(*field_, kAdam);
 }
 
+// Goes on to a stage of the learned prior, at the same resolution.
+void Fit::follow_prior() {
+  const std::span<float> parameters = field_->parameters();
+  if (stage().has_answer) {
+    const prior::Lattice lattice(*field_, measurement_.roi);
+    const std::span<float> state(prior_state_.data(), prior_state_.size());
+    prior::replace_by_answer(prior::Network::trained(), lattice, state, parameters);
+    std::ranges::copy(state, parameters.begin());
+  } else {
+    prior_state_.reset(parameters.size());
+    std::ranges::copy(parameters, prior_state_.begin());
+  }
+  optimizer_ = Adam(*field_, kAdam);
+  follow_tree();
+}
+
+void Fit::restore_prior_state(std::span<const float> state) {
+  prior_state_.reset(state.size());
+  std::ranges::copy(state, prior_state_.begin());
+  follow_tree();
+}
+
 // Goes from the end of a stage to the start of the next one.
 void Fit::refine() {
   const base::TraceSpan span("enter stage");
+  if (stage().is_light) return follow_prior();
   const int last_bin = std::prev(&stage())->bin;
   enter_stage();
   resample_field();
@@ -211,7 +235,9 @@ void Fit::follow_tree() {
       .share = share_of_stage(),
       .own_leaves = own_leaves(),
       .options = options_,
-      .processes = processes_});
+      .processes = processes_,
+      .is_light = stage().is_light,
+      .answer = stage().has_answer ? prior_state() : std::span<const float>()});
   halo_.emplace(*field_, share_of_stage(), stage().bin, processes());
 }
 
@@ -440,7 +466,7 @@ void Fit::take_step() {
 // plug-and-play step of a prior (Venkatakrishnan, Bouman and Wohlberg 2013): total variation makes
 // an isolated vertex cheap enough to fit the noise of some rays.
 void Fit::limit_spikes() {
-  if (options_.spike_rank == 0 || field_->kind() != FieldKind::kGrid) return;
+  if (stage().has_answer || options_.spike_rank == 0 || field_->kind() != FieldKind::kGrid) return;
   const base::TraceSpan span("limit spikes");
   const base::Range own = own_leaves();
   base::parallel_for("limit spikes", own.size(), [&](std::int64_t i) {

@@ -138,6 +138,12 @@ class Fit {
   const Adam& optimizer() const { return optimizer_; }
   Adam& optimizer() { return optimizer_; }
 
+  /// Returns what the stages of the learned prior keep beside the field, with its places: the
+  /// parameters at the start of the light stage, and in the last stage the answer. Empty before.
+  std::span<const float> prior_state() const { return {prior_state_.data(), prior_state_.size()}; }
+  /// Restores it after go_on_from().
+  void restore_prior_state(std::span<const float> state);
+
   const distributed::Communicator& processes() const { return processes_; }
   /// Returns the rows that this process works on; one process alone has all of them.
   const measurement::RowShare& share() const { return share_; }
@@ -174,6 +180,7 @@ class Fit {
   measurement::RowShare share_of_stage() const;
   void enter_stage();
   void resample_field();
+  void follow_prior();
   void refine();
   void follow_tree();
 
@@ -181,6 +188,7 @@ class Fit {
   const distributed::Communicator& processes_;
   FitOptions options_;
   std::vector<Stage> stages_;
+  base::AlignedBuffer<float> prior_state_;  // prior_state()
   Domain domain_;
   measurement::RowShare share_;
   std::unique_ptr<field::Field> field_;

@@ -47,8 +47,9 @@ struct FitOptions : objective::ObjectiveOptions {
   bool fit_view_scale = false;  ///< fit a scale and an offset of every view
   int hold_out = 0;             ///< keep every Nth view from the fit; 0: none
   bool scores_epochs = true;    ///< score the held-out views after each epoch
-  int patience = 0;    ///< stop after this many epochs without a better held-out error; 0: never
-  int num_stages = 0;  ///< of stages.h, from the first one on; 0: all
+  int patience = 0;  ///< stop after this many epochs without a better held-out error; 0: never
+  Prior prior = Prior::kTv;  ///< see can_have_learned_prior()
+  int num_stages = 0;        ///< of stages.h, from the first one on; 0: all
 };
 
 /// Returns the usual side of a leaf. Plain vertices express as much in larger leaves, which have

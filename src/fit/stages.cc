@@ -39,6 +39,26 @@ std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
   return bins;
 }
 
+// Adds the stages of the learned prior. A few epochs are enough: the field is near its end.
+void add_learned_prior(const FitOptions& fit, std::vector<Stage>& stages) {
+  constexpr int kPartOfEpochs = 2, kLeastEpochs = 2, kMostEpochs = 10;
+  constexpr double kAnswerRate = 0.2;  // a larger first step would leave the answer
+  Stage light = stages.back();
+  light.first_epoch += light.epochs;
+  light.epochs =
+      std::clamp((fit.epochs + kPartOfEpochs - 1) / kPartOfEpochs, kLeastEpochs, kMostEpochs);
+  light.first_rate = fit.learning_rate;
+  light.is_light = true;
+  stages.push_back(light);
+  if (fit.prior == Prior::kLight) return;
+  Stage answer = light;
+  answer.first_epoch += light.epochs;
+  answer.epochs = 1;
+  answer.first_rate = fit.learning_rate * kAnswerRate;
+  answer.has_answer = true;
+  stages.push_back(answer);
+}
+
 }  // namespace
 
 int Schedule::vertex_epochs_of(int fine) const { return std::min(fine, epochs); }
@@ -58,6 +78,11 @@ bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit) {
   const double margin_side = (field.leaf_size << field.depth) / field.margin_spacing;
   return side <= 2 * field.rank && left > 0 && left * left >= field.rank &&
          (!field.with_margin || margin_side <= 4 * field.margin_rank);
+}
+
+bool can_have_learned_prior(const FieldOptions& field, const FitOptions& fit) {
+  return field.kind == FieldKind::kGrid && field.tree == TreeKind::kUniform &&
+         field.vertex_spacing == 1.0 && fit.engine == Engine::kSlab;
 }
 
 Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit, bool is_filtered) {
@@ -95,6 +120,7 @@ std::vector<Stage> make_stages(const FieldOptions& field, const FitOptions& fit)
   }
   stages.push_back(
       {field.kind, 1, first_epoch, fit.epochs, first_rate, fit.learning_rate * fit.final_rate});
+  if (fit.prior != Prior::kTv) add_learned_prior(fit, stages);
   if (fit.num_stages > 0)
     stages.resize(std::min(stages.size(), static_cast<std::size_t>(fit.num_stages)));
   return stages;

@@ -19,6 +19,8 @@ struct Stage {
   int epochs = 0;
   double first_rate = 0, last_rate = 0;  ///< learning rates; the rate decays exponentially
   double step_cost = 1;                  ///< estimated time of a step, in steps of the last stage
+  bool is_light = false;    ///< has little total variation, as the learned prior expects it
+  bool has_answer = false;  ///< begins with the answer of the learned prior, and is pulled to it
 };
 
 /// Says how long a fit takes with the default options.
@@ -41,6 +43,10 @@ struct Schedule {
 /// rank, so that each vector along z has something to hold.
 bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit);
 
+/// Says whether a fit can end with the learned prior, which works on plain vertices a pixel apart
+/// in the uniform tree of the slab engine.
+bool can_have_learned_prior(const FieldOptions& field, const FitOptions& fit);
+
 /// Returns the default schedule of a field. Plain vertices, and factors that begin with them,
 /// converge in a third of the epochs that other factors need. Vertices that are at least as far
 /// apart as the pixels of the last coarse stage need few epochs at full resolution, because the
@@ -56,7 +62,10 @@ Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit, bool i
 ///   1. Coarse stages share the coarse epochs. The pixels of each are half as wide as those of the
 ///      one before. There is no stage whose slabs would straddle two leaves.
 ///   2. A stage at full resolution has plain vertices, if FitOptions::vertex_epochs is above 0.
-///   3. The last stage has the field that was asked for.
+///   3. A stage has the field that was asked for.
+///   4. With the learned prior (FitOptions::prior), a light stage follows. Its end and its start
+///   are
+///      what the prior answers to. The last stage begins with the answer.
 ///
 /// The ray engine has the last stage alone. With FitOptions::num_stages the later ones are left
 /// out.

@@ -41,8 +41,8 @@ std::vector<int> pair_of_each_slab(const projection::SlabSampler& sampler) {
 }
 
 TermContext term_context(const SlabObjectiveContext& c, const projection::SlabSampler& sampler) {
-  return {c.field,   sampler,       c.measured,   c.full,    c.bin,
-          c.support, c.has_factors, c.own_leaves, c.options, c.processes};
+  return {c.field,       sampler,      c.measured, c.full,      c.bin,      c.support,
+          c.has_factors, c.own_leaves, c.options,  c.processes, c.is_light, c.answer};
 }
 
 }  // namespace

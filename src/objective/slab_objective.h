@@ -28,6 +28,8 @@ struct SlabObjectiveContext {
   base::Range own_leaves;                      ///< leaves of its bands
   const ObjectiveOptions& options;
   const distributed::Communicator& processes = distributed::Communicator::alone();
+  bool is_light = false;               ///< the stage has little total variation (Stage::is_light)
+  std::span<const float> answer = {};  ///< of the learned prior, if the stage is pulled towards one
 };
 
 /// Evaluates the terms on batches of slabs with the cores of this machine. A task works on the

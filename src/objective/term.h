@@ -132,6 +132,8 @@ struct TermContext {
   base::Range own_leaves;                    ///< leaves of this process
   const ObjectiveOptions& options;
   const distributed::Communicator& processes = distributed::Communicator::alone();
+  bool is_light = false;               ///< the stage has little total variation (Stage::is_light)
+  std::span<const float> answer = {};  ///< of the learned prior, if the stage is pulled towards one
 };
 
 }  // namespace tomofield::objective

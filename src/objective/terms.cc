@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "objective/answer_pull.h"
 #include "objective/boundary_consistency.h"
 #include "objective/fourier_prior.h"
 #include "objective/noise_scale.h"
@@ -17,7 +18,7 @@ namespace {
 kernels::VariationPenalty variation_penalty(const TermContext& c) {
   kernels::VariationPenalty penalty;
   penalty.epsilon = static_cast<float>(c.options.gradient_floor);
-  if (c.options.penalty == Penalty::kConcave)
+  if (c.options.penalty == Penalty::kConcave && !c.is_light)
     penalty.concavity =
         static_cast<float>(concavity(c.options.concavity, c.full.noise_sigma) / (c.bin * c.bin));
   return penalty;
@@ -32,6 +33,25 @@ double factor_of_stage(const TermContext& c) {
   constexpr double kFactorOfHalving = 0.8;
   if (c.options.penalty == Penalty::kConcave) return 1.0;
   return std::pow(kFactorOfHalving, std::log2(c.bin));
+}
+
+// Returns the weight of the density's variation in a stage, in noise units. A light stage has a
+// part of the weight that the smooth penalty would have in place of the one that was chosen.
+double variation_weight(const TermContext& c) {
+  constexpr double kLightPart = 0.3;  // as in the training of the prior (tools/train_prior)
+  const double weight = c.options.density_variation;
+  if (c.is_light)
+    return kLightPart * weight * usual_variation(Penalty::kSmooth) /
+           usual_variation(c.options.penalty);
+  return factor_of_stage(c) * variation_gain(c.options, c.full) * weight;
+}
+
+// The views measure fine detail of a voxel with a precision of about their number over the variance
+// of a ray. The answer of the prior counts as much as a part of them.
+double pull_weight(const TermContext& c, double noise) {
+  constexpr double kPartOfViews = 10;  // from 3 on it changes nothing (docs/prior.md)
+  const auto num_views = static_cast<double>(c.full.num_fitted_views());
+  return kPartOfViews * num_views / (noise * noise);
 }
 
 // A jump at a face counts like total variation: density times area. Faces and the Fourier prior
@@ -63,8 +83,7 @@ double variation_gain(const ObjectiveOptions& options, const measurement::Measur
 // pixels serves every size.
 std::vector<std::unique_ptr<Term>> make_terms(const TermContext& c) {
   const double noise = typical_noise(c.measured.noise_sigma);
-  const double density =
-      factor_of_stage(c) * variation_gain(c.options, c.full) * c.options.density_variation / noise;
+  const double density = variation_weight(c) / noise;
   const double factors = c.has_factors ? c.options.factor_variation / noise : 0.0;
   const kernels::VariationPenalty penalty = variation_penalty(c);
   const bool has_rays = c.full.ray_geometry.has_value();
@@ -76,6 +95,7 @@ std::vector<std::unique_ptr<Term>> make_terms(const TermContext& c) {
       c.field, c.sampler.leaves_of_slabs({0, c.sampler.num_slabs()}), boundary_options(c, noise)));
   terms.push_back(std::make_unique<FourierPrior>(c.field, c.full.roi, fourier_options(c, noise),
                                                  c.processes, c.own_leaves));
+  terms.push_back(std::make_unique<AnswerPull>(c.field, c.answer, pull_weight(c, noise)));
   if (has_rays)
     terms.push_back(std::make_unique<RayDataTerm>(*c.full.ray_geometry, *c.full.rays, c.field,
                                                   RayRegion{c.full.roi, c.support}, c.options));

@@ -260,6 +260,12 @@ constexpr Row kRows[] = {
      .automatic = "concave if --tv is given, or if it predicts held-out views better in short trials "
                   "by three standard errors and by 1 %; else smooth",
      .help = "Kind of total variation: concave keeps edges sharp, smooth is the standard one"},
+    {.key = "fit.prior", .flag = "--prior", MEMBER(Options, prior), .group = Group::kFit,
+     .automatic = "learned where it can be and trials choose the weight, unless views that were left "
+                  "out speak against it; else tv",
+     .help = "learned: end the fit with a prior that simulated tilt series taught, for plain vertices "
+             "a pixel apart. tv: total variation alone. light: little of it, as the training needs",
+     .is_common = true},
     {.key = "fit.boundary", .flag = "--bcc", MEMBER(Options, boundary), .group = Group::kFit,
      .range = Range::at_least(0),
      .help = "Weight of the boundary consistency: neighbouring leaves agree on their faces"},

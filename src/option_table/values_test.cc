@@ -27,10 +27,10 @@ std::vector<const void*> members_of(const Choices& choices) {
                with_margin, field, leaf_size, tree, leaf_budget, vertex_spacing, rank, activation,
                margin_spacing, budget, tile_rows, epochs, vertex_epochs, coarse_epochs, coarse_bin,
                subsets, engine, ray_samples, rays_per_step, learning_rate, density_variation,
-               factor_variation, penalty, denoise, boundary, fourier, fourier_ring, spike_rank,
-               fit_noise, noise_model, fit_view_scale, hold_out, tune, patience, seed, align,
-               split_tilts, denoising_halves, voxel_type, axes, invert, zarr, output, overwrite,
-               resume, checkpoint_minutes, alignment_json] = choices.options;
+               factor_variation, penalty, denoise, prior, boundary, fourier, fourier_ring,
+               spike_rank, fit_noise, noise_model, fit_view_scale, hold_out, tune, patience, seed,
+               align, split_tilts, denoising_halves, voxel_type, axes, invert, zarr, output,
+               overwrite, resume, checkpoint_minutes, alignment_json] = choices.options;
   return {&stack,
           &tlt,
           &xf,
@@ -94,6 +94,7 @@ std::vector<const void*> members_of(const Choices& choices) {
           &factor_variation,
           &penalty,
           &denoise,
+          &prior,
           &boundary,
           &fourier,
           &fourier_ring,

@@ -213,6 +213,19 @@ void restore_optimizer(const std::filesystem::path& file, const output::Training
   require_sound(adam, fit, path);
 }
 
+// Restores what the stages of the learned prior keep beside the field.
+void restore_prior_state(const std::filesystem::path& file, const output::TrainingState& state,
+                         fit::Fit& fit) {
+  const std::string path = file.string();
+  if (single(state, "has_prior_state", path) != 1)
+    throw Error(fmt::format("'{}' is damaged: it lacks the state of the learned prior", path));
+  base::AlignedBuffer<float> values(fit.field().num_parameters());
+  output::load_floats(file, "prior_state", fit.field(), {values.data(), values.size()});
+  if (!std::ranges::all_of(values, [](float value) { return std::isfinite(value); }))
+    throw Error(fmt::format("'{}' is damaged: the state of its learned prior is not finite", path));
+  fit.restore_prior_state({values.data(), values.size()});
+}
+
 // Prepares to gather arrays with one number for each parameter from the leaves of all processes.
 distributed::GatheredArrays own_parts(const fit::Fit& fit) {
   const base::Range leaves = fit.own_leaves();
@@ -317,7 +330,10 @@ void save_checkpoint(const std::filesystem::path& path, const fit::Fit& fit,
   state.integers["leaf_steps"] = std::move(leaf_steps);
   state.doubles["bias_moments"] = {adam.bias_m, adam.bias_v};
   state.integers["bias_steps"] = {adam.bias_steps};
-  save(path, fit, info, state, {{"adam_m", adam.m}, {"adam_v", adam.v}});
+  std::map<std::string, std::span<const float>> moments{{"adam_m", adam.m}, {"adam_v", adam.v}};
+  if (!fit.prior_state().empty()) moments.emplace("prior_state", fit.prior_state());
+  state.integers["has_prior_state"] = {fit.prior_state().empty() ? 0 : 1};
+  save(path, fit, info, state, moments);
 }
 
 std::optional<TunedFit> stored_choice(const std::filesystem::path& path) {
@@ -371,7 +387,9 @@ void restore_fit(const std::filesystem::path& file, const std::string& fingerpri
   fit::Progress progress = progress_from(state, path);
   require_no_fault(fit.fault_of(progress, *model.field));
   fit.go_on_from(std::move(progress), std::move(model.field));
-  if (!fit.is_done()) restore_optimizer(file, state, fit);
+  if (fit.is_done()) return;
+  restore_optimizer(file, state, fit);
+  if (fit.stage().is_light) restore_prior_state(file, state, fit);
 }
 
 }  // namespace tomofield::reconstruction

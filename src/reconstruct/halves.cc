@@ -32,6 +32,8 @@ struct Part {
   const std::filesystem::path& model;
   std::vector<measurement::ViewModel> kept_views;  // empty: the fit finds its own
   Share share;
+  // Halves are compared to see what the data say, so that no prior may add the same to both.
+  bool may_learn = false;
 };
 
 // Holds what a finished fit leaves.
@@ -67,7 +69,8 @@ std::optional<FinishedPart> fit_part(const Run& run, RunRecord record,
                                     .origin = record.origin,
                                     .resumes = resumes,
                                     .progress = progress,
-                                    .kept_views = part.kept_views});
+                                    .kept_views = part.kept_views,
+                                    .may_learn = part.may_learn});
   if (made.was_stopped) return std::nullopt;
   record.fit_seconds = made.seconds;
   made.fit->free_optimizer();  // the verdict needs the memory
@@ -101,7 +104,8 @@ RunResult reconstruct_halves(const tilt_series::TiltSeries& series, const Run& r
                                                 .measurement = run.measurement,
                                                 .model = run.paths.model,
                                                 .kept_views = {},
-                                                .share = {0.0, 1 - 2 * of_half}},
+                                                .share = {0.0, 1 - 2 * of_half},
+                                                .may_learn = true},
                                                resumes);
   if (!whole) return {.outcome = Outcome::kStopped, .results = {}, .checkpoint = run.paths.model};
   resumes = resumes && !whole->took_steps;

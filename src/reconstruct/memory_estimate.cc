@@ -1,6 +1,7 @@
 #include "reconstruct/memory_estimate.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/parallel.h"
 #include "field/vm/factorise.h"
@@ -11,6 +12,7 @@
 #include "measurement/row_share.h"
 #include "measurement/slab_views.h"
 #include "objective/ray_data_term.h"
+#include "prior/answer.h"
 #include "projection/slab_projector.h"
 
 namespace tomofield::reconstruction {
@@ -80,6 +82,16 @@ measurement::SlabViews::Shape own_part(measurement::SlabViews::Shape shape,
   }
   shape.num_rows = std::min(shape.num_rows, most);
   return shape;
+}
+
+// Returns the bytes of the learned prior: one more number for each parameter, and its answer.
+std::size_t prior_memory(const measurement::Measurement& plan, std::size_t fitted,
+                         const fit::FitOptions& options) {
+  if (options.prior == Prior::kTv) return 0;
+  const prior::BoxShape lattice{static_cast<int>(plan.roi.width()),
+                                static_cast<int>(std::lround(plan.geometry.thickness)),
+                                static_cast<int>(plan.roi.height())};
+  return fitted / 4 + prior::answer_memory(lattice);
 }
 
 }  // namespace
@@ -153,7 +165,7 @@ std::size_t estimate_memory(const PlannedFit& planned, const std::vector<fit::St
           ? fit::surrogate_memory(own_shape, plan.rays_shape(), steps, slabs_in_use)
           : 0;
   const std::size_t fitting =
-      parameters + surrogates +
+      parameters + surrogates + prior_memory(plan, parameters, options.fit) +
       static_cast<std::size_t>(bands_in_use) * band_memory(plan, domain, views_a_step) +
       static_cast<std::size_t>(base::thread_count()) * thread_memory(plan, domain);
   const std::size_t tracing =

@@ -58,6 +58,7 @@ fit::FitOptions fit_options(const Options& options) {
   fit.noise_model = options.noise_model;
   fit.fit_view_scale = options.fit_view_scale.value_or(fit.fit_view_scale);
   fit.seed = options.seed;
+  fit.prior = options.prior.value_or(fit.prior);
   fit.hold_out = options.hold_out;
   fit.patience = options.patience;
   return fit;
@@ -92,6 +93,12 @@ void choose_variation(Options& options) {
   if (!options.penalty && options.density_variation) options.penalty = fit::FitOptions{}.penalty;
   if (options.penalty && !options.density_variation)
     options.density_variation = objective::usual_variation(*options.penalty);
+}
+
+// Says whether the fit can end with the learned prior.
+bool may_learn(const Options& options) {
+  return options.budget.empty() &&
+         fit::can_have_learned_prior(field_options(options), fit_options(options));
 }
 
 void add_half_files(const OutputPaths& paths, bool with_linear_volumes,
@@ -151,6 +158,7 @@ ReconstructOptions run_options(const SeriesFiles& files, const Options& requeste
   const bool is_bright = run.resolved.contrast == Contrast::kBright;
   run.open = {.variation = !run.resolved.penalty,
               .spikes = !run.resolved.penalty && !requested.spike_rank,
+              .prior = !run.resolved.penalty && !requested.prior && may_learn(run.resolved),
               .view_scale = !requested.fit_view_scale,
               .background = is_bright && !requested.black_level,
               .beads = is_bright && !requested.bead_diameter_nm};
@@ -159,6 +167,7 @@ ReconstructOptions run_options(const SeriesFiles& files, const Options& requeste
     run.resolved.penalty = fit::FitOptions{}.penalty;
     choose_variation(run.resolved);
   }
+  if (!run.resolved.prior) run.resolved.prior = run.open.prior ? Prior::kLearned : Prior::kTv;
   run.input = output::series_options(files, run.resolved);
   run.specimen = output::specimen_options(run.resolved);
   run.field = field_options(run.resolved);
@@ -225,6 +234,9 @@ std::vector<std::string> ReconstructOptions::faults() const {
   } catch (const Error& error) {
     all.emplace_back(error.what());
   }
+  refuse_if(fit.prior != Prior::kTv && !may_learn(resolved),
+            "--prior learned works on plain vertices a pixel apart: it needs --field grid, --tree "
+            "uniform, --vertex-spacing 1 and --engine slab, and no --budget");
   refuse_if(fit.patience > 0 && fit.hold_out == 0,
             "--early-stop watches views that --hold-out keeps from the fit: give that as well");
   refuse_if(fit.hold_out > 0 && is_ray,
@@ -297,6 +309,7 @@ std::vector<std::string> ReconstructOptions::faults_of_job() const {
         "several processes cannot share {} yet: start one, with more --threads", option));
   };
   if (field.tree == TreeKind::kAdaptive) refuse("--tree adaptive");
+  if (fit.prior != Prior::kTv && !open.prior) refuse("--prior learned");
   if (fit.engine == Engine::kRay) refuse("--engine ray");
   if (resolved.denoising_halves) refuse("--denoising-halves");
   if (!resolved.budget.empty()) refuse("--budget");

@@ -78,6 +78,7 @@ void apply(const TrialSettings& settings, Run& run) {
   if (options.open.view_scale)
     resolved.fit_view_scale = options.fit.fit_view_scale = settings.fits_view_scale;
   if (options.open.spikes) resolved.spike_rank = options.fit.spike_rank = settings.spike_rank;
+  if (options.open.prior) resolved.prior = options.fit.prior = settings.prior;
   if (run.options.open.background) {
     resolved.black_level =
         settings.background_part * run.measurement.background * run.measurement.unit;
@@ -131,11 +132,21 @@ bool choose_settings(Run& run, std::optional<TunedFit>& tuned) {
   return true;
 }
 
+// Several processes cannot share the learned prior yet: its network would need rows of others.
+ReconstructOptions options_of_job(ReconstructOptions options,
+                                  const distributed::Communicator& processes) {
+  if (processes.size() == 1 || !options.open.prior) return options;
+  base::log_info("several processes: the fit ends with total variation alone (--prior tv)");
+  options.open.prior = false;
+  options.resolved.prior = options.fit.prior = Prior::kTv;
+  return options;
+}
+
 Run begin_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
               const ReconstructHooks& hooks, const distributed::Communicator& processes) {
   return {.hooks = hooks,
           .processes = processes,
-          .options = options,
+          .options = options_of_job(options, processes),
           .paths = output_paths(options.resolved.output),
           .measurement = prepare(series, options, processes)};
 }

@@ -16,8 +16,9 @@ namespace {
 
 std::unique_ptr<fit::Fit> begin_fit(const Run& run, const FitJob& job) {
   const base::TraceSpan span("begin fit");
-  auto fit = std::make_unique<fit::Fit>(job.measurement, run.options.field, run.options.fit,
-                                        run.processes);
+  fit::FitOptions options = run.options.fit;
+  if (!job.may_learn) options.prior = Prior::kTv;
+  auto fit = std::make_unique<fit::Fit>(job.measurement, run.options.field, options, run.processes);
   if (!job.kept_views.empty()) fit->keep_views(job.kept_views);
   return fit;
 }

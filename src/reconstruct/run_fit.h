@@ -23,6 +23,7 @@ struct FitJob {
   const base::ProgressSink& progress;
   /// Models that the views keep (fit::Fit::keep_views()). Empty: the fit finds its own.
   std::vector<measurement::ViewModel> kept_views = {};
+  bool may_learn = true;  ///< with the prior that the options say; else with total variation alone
 };
 
 /// Holds a fit after its steps.

@@ -57,6 +57,7 @@ fit::FitOptions one_epoch_a_stage(const std::vector<fit::Stage>& stages, fit::Fi
   options.epochs = 1;
   options.hold_out = 0;
   options.patience = 0;
+  options.prior = Prior::kTv;  // its stages have steps as those before
   return options;
 }
 

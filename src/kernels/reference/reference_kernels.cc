@@ -261,4 +261,26 @@ void limit_spikes(const LatticeShape& s, int rank, double* values) {
   }
 }
 
+void convolve(const ChannelShape& shape, const Convolution& c, const double* in, double* out) {
+  const int together = c.num_out == 1 ? 1 : kOutputsTogether;
+  const auto weight = [&](int o, int i, int tap) {
+    return static_cast<double>(
+        c.weights[((o / together * c.num_in + i) * 27 + tap) * together + o % together]);
+  };
+  for (int o = 0; o < c.num_out; ++o) {
+    for (int voxel = 0; voxel < shape.nx * shape.ny * shape.nz; ++voxel) {
+      const int x = voxel % shape.nx, y = voxel / shape.nx % shape.ny,
+                z = voxel / (shape.nx * shape.ny);
+      double sum = 0.0;
+      for (int i = 0; i < c.num_in; ++i)
+        for (int tap = 0; tap < 27; ++tap)
+          sum += weight(o, i, tap) *
+                 in[i * shape.stride_channel() +
+                    shape.at(x + tap % 3 - 1, y + tap / 3 % 3 - 1, z + tap / 9 - 1)];
+      out[o * shape.stride_channel() + shape.at(x, y, z)] =
+          sum > 0 ? sum : static_cast<double>(c.slope) * sum;
+    }
+  }
+}
+
 }  // namespace tomofield::kernels::reference

@@ -3,6 +3,7 @@
 #include <cstddef>
 
 #include "kernels/adam.h"
+#include "kernels/convolution.h"
 #include "kernels/leaf_decoding.h"
 #include "kernels/line_projection.h"
 #include "kernels/ray_samples.h"
@@ -78,5 +79,9 @@ void adam_step(const AdamStep& step, std::ptrdiff_t count, double* parameters, d
 
 /// Moves values beyond the kSpikeRank-th of the 26 values around them to that one.
 void limit_spikes(const LatticeShape& shape, int rank, double* values);
+
+/// Convolves all planes of channels; the weights are those of `convolution`.
+void convolve(const ChannelShape& shape, const Convolution& convolution, const double* in,
+              double* out);
 
 }  // namespace tomofield::kernels::reference
