@@ -32,7 +32,7 @@ constexpr double kPartOfViews = 0.5;
 // Beads that few views see count if so many of these views, and this part of them, show a strong
 // spot. Specimens without beads have no such track.
 constexpr std::size_t kMinStrongViews = 4;
-constexpr double kStrongPartOfVisible = 0.75;
+constexpr double kStrongPartOfVisible = 0.6;  // spots at the border of a view are not found
 
 // The maximum number of spots of a view that are followed. Nobody adds more beads, and with this
 // limit the tracks of a view full of ice crystals are found in seconds.
