@@ -152,6 +152,51 @@ def test_nothing_is_found_where_there_are_none(plain):
     assert metrics["metrics"]["mask"]["beads"] == 0
 
 
+def simulate_beads(name, contrast, *options):
+    """Simulates a specimen with few beads and returns its folder."""
+    folder = os.path.join(harness.fresh_directory(name), "series")
+    harness.succeed("simulate", folder, "--yardstick", "c", "--size", 96, "--thickness", 48, "--seed",
+                    57, "--noise", 0.1, "--contrast", contrast, "--no-truth", *options)
+    return folder
+
+
+def mask_of(folder, contrast):
+    series = [os.path.join(folder, "tilt_series.mrc"), "--tlt",
+              os.path.join(folder, "tilt_series.tlt"), "--contrast", contrast]
+    return reconstruct("few", series, command=("baseline", "sirt"),
+                       quick=["--thickness", 48, "--iterations", 1])[1]
+
+
+def numbers_of_beads(folder, beyond_px):
+    """Returns how many beads are in each view, or at most so far beside it."""
+    with open(os.path.join(folder, "phantom.json"), encoding="utf-8") as file:
+        beads = np.array([bead["center_px"] for bead in json.load(file)["gold_beads"]])
+    tilts = np.radians(np.loadtxt(os.path.join(folder, "tilt_series.tlt")))[:, None]
+    x = beads[:, 0] * np.cos(tilts) + beads[:, 2] * np.sin(tilts)
+    return ((np.abs(x) < 48 + beyond_px) & (np.abs(beads[:, 1]) < 48 + beyond_px)).sum(axis=1)
+
+
+@pytest.mark.parametrize("options", [["--contrast", "dark"], ["--contrast", "bright"],
+                                     ["--contrast", "dark", "--defocus", 3]])
+def test_few_beads_of_any_size_are_found(options):
+    contrast = options[1]
+    for diameter in (6, 10):
+        gold = ["--gold", 4, "--gold-diameter", 10 * diameter]
+        folder = simulate_beads("few_beads", contrast, *gold, *options[2:])
+        mask = mask_of(folder, contrast)
+        assert 0.65 * diameter < mask["bead_diameter_nm"] < 1.1 * diameter, mask["bead_diameter_nm"]
+        found = np.array([view["beads_found"] for view in mask["views"]])
+        at_least, at_most = (numbers_of_beads(folder, beyond) for beyond in (-diameter, diameter))
+        assert at_least.sum() > 0 and found.sum() >= 0.95 * at_least.sum(), (found, at_least)
+        assert (found <= at_most).all(), (found, at_most)
+
+
+def test_the_specimen_without_its_beads_has_none():
+    for contrast in ("dark", "bright"):
+        folder = simulate_beads("no_beads", contrast, "--gold", 4, "--gold-density", 0)
+        assert mask_of(folder, contrast)["beads"] == 0
+
+
 def test_masked_pixels_carry_no_loss(directory, plain, write_series):
     views = views_of(0)
     counts = np.ones_like(views, dtype=np.int16)

@@ -21,16 +21,18 @@ constexpr double kStrong = 6.0;
 constexpr double kLikely = 4.5;  // enough for a seed once it is known that there are beads
 constexpr double kWeak = 3.5;    // enough where a track says that a bead is there
 
-constexpr std::size_t kDiameterViews = 5;  // the lowest tilts, which the diameter is measured in
+// The diameter is measured in the lowest tilts and, since beads may lie beside the field of view
+// there, in so many views that are spread over all tilts.
+constexpr std::size_t kLowViews = 5, kSpreadViews = 8;
 constexpr double kDiameterStep = 1.4142135623730951;  // between the diameters that are tried
 
 // Beads are taken as found if this many of them have spots in this part of all views each.
 constexpr std::size_t kMinBeads = 3;
 constexpr double kPartOfViews = 0.5;
 // Beads that few views see count if so many of these views, and this part of them, show a strong
-// spot. A chance track has strong spots in fewer.
-constexpr std::size_t kMinStrongViews = 8;
-constexpr double kStrongPartOfVisible = 0.75;
+// spot. Specimens without beads have no such track.
+constexpr std::size_t kMinStrongViews = 4;
+constexpr double kStrongPartOfVisible = 0.6;  // spots at the border of a view are not found
 
 // The maximum number of spots of a view that are followed. Nobody adds more beads, and with this
 // limit the tracks of a view full of ice crystals are found in seconds.
@@ -135,15 +137,19 @@ MaskedImage read_on_all(const BeadViews& views, std::size_t view,
   return image;
 }
 
-/// Returns the views of lowest tilt.
-std::vector<std::size_t> lowest_tilts(const BeadViews& views) {
+/// Returns the views that the diameter is measured in: the lowest tilts, and some of all others.
+std::vector<std::size_t> diameter_views(const BeadViews& views) {
   std::vector<std::size_t> order(views.tilt_deg.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return std::fabs(views.tilt_deg[a]) < std::fabs(views.tilt_deg[b]);
   });
-  order.resize(std::min(order.size(), kDiameterViews));
-  return order;
+  if (order.size() <= kLowViews + kSpreadViews) return order;
+  std::vector<std::size_t> chosen(order.begin(), order.begin() + kLowViews);
+  const std::size_t num_others = order.size() - kLowViews;
+  for (std::size_t i = 1; i <= kSpreadViews; ++i)
+    chosen.push_back(order[kLowViews - 1 + i * num_others / kSpreadViews]);
+  return chosen;
 }
 
 /// The spots of one size in several views.
@@ -153,14 +159,20 @@ struct SizeTrial {
   double strength = 0.0;  ///< of all spots together
 };
 
-/// Returns the diameter of the spots that stand out most; nothing if none does.
-std::optional<double> estimate_diameter(const BeadViews& views, const BeadSearchOptions& options,
-                                        const distributed::Communicator& processes) {
+/// The size of the spots that stand out most.
+struct SpotSize {
+  double about_px = 0.0;     ///< the trial that makes them stand out
+  double diameter_px = 0.0;  ///< their full width at half height
+};
+
+/// Returns the size of the spots that stand out most; nothing if none does.
+std::optional<SpotSize> estimate_size(const BeadViews& views, const BeadSearchOptions& options,
+                                      const distributed::Communicator& processes) {
   std::vector<SizeTrial> trials;
   for (double about = options.smallest_px; about <= options.largest_px; about *= kDiameterStep) {
     trials.push_back({about, BeadProfile(about)});
   }
-  for (const std::size_t view : lowest_tilts(views)) {
+  for (const std::size_t view : diameter_views(views)) {
     const MaskedImage image = read_on_all(views, view, processes);
     base::parallel_for("compare beads", static_cast<std::int64_t>(trials.size()),
                        [&](std::int64_t i) {
@@ -174,12 +186,15 @@ std::optional<double> estimate_diameter(const BeadViews& views, const BeadSearch
       trials.begin(), trials.end(),
       [](const SizeTrial& a, const SizeTrial& b) { return a.strength < b.strength; });
   if (best == trials.end() || best->strength == 0.0) return std::nullopt;
-  return best->profile.diameter_px();
+  const auto width_px = best->profile.diameter_px();
+  if (!width_px) return std::nullopt;
+  // Fringes of a contrast transfer make small spots narrower than their beads.
+  return SpotSize{best->about_px, std::max(*width_px, options.smallest_px)};
 }
 
-/// Tells whether at least three beads have a spot in at least half of all views each, or as many
-/// strong spots together: beads beside the field of view come into few views, and all views that
-/// see them show them clearly.
+/// Tells whether at least three beads have a spot in at least half of all views each, or strong
+/// spots in nearly all of the few views that see them (beads beside the field of view), together as
+/// many as one bead in half of all views.
 bool is_evident(const std::vector<BeadTrack>& tracks, std::size_t num_views) {
   const double half_of_views = kPartOfViews * static_cast<double>(num_views);
   std::size_t num_lasting = 0, num_clear = 0, num_strong_spots = 0;
@@ -193,26 +208,35 @@ bool is_evident(const std::vector<BeadTrack>& tracks, std::size_t num_views) {
     num_strong_spots += track.num_strong;
   }
   return num_lasting >= kMinBeads ||
-         (num_clear >= kMinBeads &&
-          static_cast<double>(num_strong_spots) >= half_of_views * static_cast<double>(kMinBeads));
+         (num_clear >= kMinBeads && static_cast<double>(num_strong_spots) >= half_of_views);
 }
 
-/// Returns tracks of beads; none if evidence is wanted and there is not enough.
+double tolerance_of(double diameter_px) { return std::max(kMinTolerance_px, diameter_px / 2); }
+
+/// Returns tracks through the spots of this diameter that begin with two of `seed_strength`.
 std::vector<BeadTrack> find_bead_tracks(const SearchedViews& searched,
-                                        const std::vector<double>& tilt_deg, double tolerance_px,
-                                        bool wants_evidence) {
+                                        const std::vector<double>& tilt_deg, double diameter_px,
+                                        double seed_strength) {
   TrackRules rules;
-  rules.tolerance_px = tolerance_px;
+  rules.tolerance_px = tolerance_of(diameter_px);
   rules.max_z_px = static_cast<double>(searched.width) / 2;
-  rules.seed_strength = kStrong;
+  rules.seed_strength = seed_strength;
   const TrackedViews tracked{
       tilt_deg, searched.axis_x_px,
       [&](std::size_t view, double x, double y) { return searched.is_measured(view, x, y); }};
-  if (wants_evidence && !is_evident(find_tracks(searched.spots, tracked, rules), tilt_deg.size())) {
-    return {};
-  }
-  rules.seed_strength = kLikely;
   return find_tracks(searched.spots, tracked, rules);
+}
+
+/// Returns the diameter of beads; nothing if the series does not clearly have some. The evidence is
+/// that of the size that stands out most: with fringes, it is not always the width of the spots.
+std::optional<double> evident_diameter(const BeadViews& views, const BeadSearchOptions& options,
+                                       const distributed::Communicator& processes) {
+  const auto size = estimate_size(views, options, processes);
+  if (!size) return std::nullopt;
+  const SearchedViews searched = search_views(views, size->about_px, processes);
+  const auto tracks = find_bead_tracks(searched, views.tilt_deg, size->about_px, kStrong);
+  if (!is_evident(tracks, views.tilt_deg.size())) return std::nullopt;
+  return size->diameter_px;
 }
 
 double distance_between(const Spot& spot, const MaskDisc& disc) {
@@ -323,12 +347,12 @@ BeadSearch find_beads(const BeadViews& views, const BeadSearchOptions& options,
   result.num_found.assign(num_views, 0);
   result.discs.resize(num_views);
   const auto diameter =
-      options.diameter_px ? options.diameter_px : estimate_diameter(views, options, processes);
+      options.diameter_px ? options.diameter_px : evident_diameter(views, options, processes);
   if (!diameter) return result;
   const SearchedViews searched = search_views(views, *diameter, processes);
-  const double tolerance_px = std::max(kMinTolerance_px, *diameter / 2);
+  const double tolerance_px = tolerance_of(*diameter);
   const std::vector<BeadTrack> tracks =
-      find_bead_tracks(searched, views.tilt_deg, tolerance_px, !options.diameter_px);
+      find_bead_tracks(searched, views.tilt_deg, *diameter, kLikely);
   if (tracks.empty() && !options.diameter_px) return result;
   result.diameter_px = *diameter;
   result.num_beads = tracks.size();

@@ -43,10 +43,11 @@ struct BeadSearch {
 /// spots as strong as those of beads get one as well although no track has
 /// them (beads that few views see).
 ///
-/// Without a diameter it is estimated from the views of lowest tilt, and beads are believed in only
-/// if the evidence is clear. Either at least three have a spot in most views; or at least three
-/// have a spot far beyond noise and specimen in most of the views that see them, and all together
-/// they have as many such spots.
+/// Without a diameter it is estimated from the views of lowest tilt and some of the others, and
+/// beads are believed in only if the evidence is clear. Either at least three have a spot in most
+/// views; or at least three have a spot far beyond noise and specimen in four or more of the views
+/// that see them, and in most of these, and all together have as many such spots as half of the
+/// views.
 ///
 /// Each process looks for spots in the views that it owns; all get the same result.
 BeadSearch find_beads(

@@ -117,6 +117,40 @@ TEST(Beads, ThatFewViewsSeeAreEvidenceIfTheyShowThemClearly) {
   expect_discs_on_beads(scene, search, 2.5);
 }
 
+TEST(Beads, ThatNoViewOfLowTiltShowsAreFound) {
+  BeadScene scene;
+  scene.beads = {{100, 20, 0}, {-102, 50, 0}, {104, 76, 0}, {-100, 108, 0}};  // seen from 37° on
+  for (std::size_t view = 0; view < scene.tilt_deg.size(); ++view) {
+    if (std::fabs(scene.tilt_deg[view]) > 30) continue;
+    for (const TrueBead& bead : scene.beads)
+      ASSERT_GT(std::fabs(scene.bead_x(bead, view) - 80), 80 + scene.diameter_px / 2);
+  }
+  const BeadSearch search = find_beads(scene.views(), {});
+  EXPECT_EQ(search.num_beads, 4u);
+  EXPECT_NEAR(search.diameter_px, 0.866 * scene.diameter_px, 0.15 * scene.diameter_px);
+  expect_discs_on_beads(scene, search, 2.5);
+}
+
+TEST(Beads, OfWhichOnlyTheBrightMiddleStandsOutAreFound) {
+  // Fringes make the full width at half height smaller than the disc that stands out most. The
+  // search for spots keeps the size of that disc.
+  BeadScene scene;
+  scene.diameter_px = 6;
+  scene.contrast = 7.5;
+  scene.scatter_beads(4, 23);
+  BeadScene halo = scene;
+  halo.diameter_px = 11;
+  const BeadViews views{scene.tilt_deg, [&](std::size_t view) {
+                          MaskedImage image = scene.view(view);
+                          for (const TrueBead& bead : scene.beads)
+                            halo.add_sphere(scene.bead_x(bead, view), bead.y_px, -2.5, &image);
+                          return image;
+                        }};
+  const BeadSearch search = find_beads(views, {});
+  EXPECT_EQ(search.num_beads, 4u);
+  expect_discs_on_beads(scene, search, 2.5);
+}
+
 TEST(Beads, AGivenDiameterFindsASingleBead) {
   BeadScene scene;
   scene.scatter_beads(1, 3);
