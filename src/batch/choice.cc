@@ -28,14 +28,15 @@ bool takes_choice(const Job& job) { return !job.is_skipped && job.needs.open_var
 std::vector<Vote> majority(const std::vector<Vote>& votes) {
   std::vector<Vote> smooth, concave;
   for (const Vote& vote : votes)
-    if (has_vote(vote)) (vote.penalty == Penalty::kSmooth ? smooth : concave).push_back(vote);
+    if (has_vote(vote))
+      (vote.settings.penalty == Penalty::kSmooth ? smooth : concave).push_back(vote);
   return concave.size() > smooth.size() ? concave : smooth;
 }
 
 // Returns the median of weights, on a logarithmic scale, as users can give it.
 double median_weight(const std::vector<Vote>& votes) {
   std::vector<double> weights;
-  for (const Vote& vote : votes) weights.push_back(vote.variation);
+  for (const Vote& vote : votes) weights.push_back(vote.settings.variation);
   std::ranges::sort(weights);
   const double below = weights[(weights.size() - 1) / 2], above = weights[weights.size() / 2];
   return std::stod(fmt::format("{:.3g}", std::sqrt(below * above)));
@@ -45,33 +46,31 @@ double median_weight(const std::vector<Vote>& votes) {
 std::optional<int> median_spike_rank(const std::vector<Vote>& votes) {
   std::vector<int> ranks;
   for (const Vote& vote : votes)
-    if (vote.spike_rank) ranks.push_back(*vote.spike_rank);
+    if (vote.settings.spike_rank) ranks.push_back(*vote.settings.spike_rank);
   if (ranks.empty()) return std::nullopt;
   std::ranges::sort(ranks);
   return ranks[ranks.size() / 2];
 }
 
-std::string settings_text(Penalty penalty, double variation, std::optional<int> spike_rank) {
-  return fmt::format("{} tv {:.3g}{}", base::name_of(penalty), variation,
-                     spike_rank == 0 ? ", spikes kept" : "");
+std::string settings_text(const SharedSettings& settings) {
+  return fmt::format("{} tv {:.3g}{}", base::name_of(settings.penalty), settings.variation,
+                     settings.spike_rank == 0 ? ", spikes kept" : "");
 }
 
-json settings_json(Penalty penalty, double variation, std::optional<int> spike_rank) {
-  return {{"tv_penalty", base::name_of(penalty)},
-          {"tv", variation},
-          {"spike_rank", spike_rank ? json(*spike_rank) : json(nullptr)}};
+json settings_json(const SharedSettings& settings) {
+  return {{"tv_penalty", base::name_of(settings.penalty)},
+          {"tv", settings.variation},
+          {"spike_rank", settings.spike_rank ? json(*settings.spike_rank) : json(nullptr)}};
 }
 
 json vote_json(const Vote& vote) {
-  json entry = has_vote(vote) ? settings_json(vote.penalty, vote.variation, vote.spike_rank)
-                              : json{{"failure", vote.failure}};
+  json entry = has_vote(vote) ? settings_json(vote.settings) : json{{"failure", vote.failure}};
   entry["series"] = vote.series;
   return entry;
 }
 
-// Reads the settings of a vote or of a choice into it.
-template <typename Settings>
-void read_settings(const json& entry, Settings& settings) {
+SharedSettings settings_from(const json& entry) {
+  SharedSettings settings;
   const auto penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>());
   if (!penalty) throw Error("'tv_penalty' is no penalty");
   settings.penalty = *penalty;
@@ -79,6 +78,7 @@ void read_settings(const json& entry, Settings& settings) {
   if (!entry.at("spike_rank").is_null())
     settings.spike_rank =
         static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank));
+  return settings;
 }
 
 Vote vote_from(const json& entry) {
@@ -87,13 +87,12 @@ Vote vote_from(const json& entry) {
   if (entry.contains("failure"))
     vote.failure = entry.at("failure").get<std::string>();
   else
-    read_settings(entry, vote);
+    vote.settings = settings_from(entry);
   return vote;
 }
 
 Choice choice_from(const json& document) {
-  Choice choice;
-  read_settings(document, choice);
+  Choice choice{.settings = settings_from(document), .votes = {}};
   for (const json& vote : document.at("votes")) choice.votes.push_back(vote_from(vote));
   return choice;
 }
@@ -128,38 +127,36 @@ ChoicePlan plan_choice(const fs::path& folder, bool continues, std::vector<Job>&
 std::optional<Choice> count_votes(std::vector<Vote> votes) {
   const std::vector<Vote> winners = majority(votes);
   if (winners.empty()) return std::nullopt;
-  return Choice{.penalty = winners.front().penalty,
-                .variation = median_weight(winners),
-                .spike_rank = median_spike_rank(winners),
+  return Choice{.settings = {.penalty = winners.front().settings.penalty,
+                             .variation = median_weight(winners),
+                             .spike_rank = median_spike_rank(winners)},
                 .votes = std::move(votes)};
 }
 
 void give_choice(const Choice& choice, std::vector<Job>& jobs) {
   for (Job& job : jobs) {
     if (!takes_choice(job)) continue;
-    job.command.push_back(fmt::format("--tv-penalty={}", base::name_of(choice.penalty)));
-    job.command.push_back(fmt::format("--tv={}", choice.variation));
-    if (job.needs.open_spike_rank && choice.spike_rank)
-      job.command.push_back(fmt::format("--spike-rank={}", *choice.spike_rank));
+    job.command.push_back(fmt::format("--tv-penalty={}", base::name_of(choice.settings.penalty)));
+    job.command.push_back(fmt::format("--tv={}", choice.settings.variation));
+    if (job.needs.open_spike_rank && choice.settings.spike_rank)
+      job.command.push_back(fmt::format("--spike-rank={}", *choice.settings.spike_rank));
   }
 }
 
 std::string describe(const Choice& choice) {
   std::vector<std::string> votes;
   for (const Vote& vote : choice.votes)
-    votes.push_back(fmt::format("{} ({})", vote.series,
-                                has_vote(vote)
-                                    ? settings_text(vote.penalty, vote.variation, vote.spike_rank)
-                                    : "its trials failed: " + vote.failure));
-  return fmt::format("{}, by the trials of {}",
-                     settings_text(choice.penalty, choice.variation, choice.spike_rank),
+    votes.push_back(fmt::format(
+        "{} ({})", vote.series,
+        has_vote(vote) ? settings_text(vote.settings) : "its trials failed: " + vote.failure));
+  return fmt::format("{}, by the trials of {}", settings_text(choice.settings),
                      fmt::join(votes, ", "));
 }
 
 fs::path choice_file(const fs::path& folder) { return folder / "choice.json"; }
 
 void write_choice(const fs::path& folder, const Choice& choice) {
-  json document = settings_json(choice.penalty, choice.variation, choice.spike_rank);
+  json document = settings_json(choice.settings);
   document["tomofield"] = TOMOFIELD_VERSION;
   document["votes"] = json::array();
   for (const Vote& vote : choice.votes) document["votes"].push_back(vote_json(vote));
@@ -182,8 +179,8 @@ Vote read_vote(const Job& job, const fs::path& file) {
       vote.failure = "nothing was left to trials";
       return vote;
     }
-    read_settings(document.at("chosen"), vote);
-    if (!job.needs.open_spike_rank) vote.spike_rank.reset();
+    vote.settings = settings_from(document.at("chosen"));
+    if (!job.needs.open_spike_rank) vote.settings.spike_rank.reset();
     return vote;
   });
 }

@@ -20,21 +20,24 @@ enum class Choose {
   kEach   ///< every series makes trials of its own
 };
 
+/// Holds the settings of total variation that the series of a batch share.
+struct SharedSettings {
+  Penalty penalty = Penalty::kSmooth;
+  double variation = 0;           ///< weight in noise units, as --tv
+  std::optional<int> spike_rank;  ///< nothing if no trials have chosen it
+};
+
 /// Holds what one series chose by its trials, or the reason why it has no vote.
 struct Vote {
   std::string series;
-  Penalty penalty = Penalty::kSmooth;
-  double variation = 0;           ///< weight in noise units, as --tv
-  std::optional<int> spike_rank;  ///< nothing if it was given to this series
-  std::string failure;            ///< empty if it has a vote
+  SharedSettings settings;
+  std::string failure;  ///< empty if it has a vote
 };
 
 /// Holds the settings that all series of a batch get if they do not state their own.
 struct Choice {
-  Penalty penalty = Penalty::kSmooth;
-  double variation = 0;
-  std::optional<int> spike_rank;  ///< nothing if no series has chosen one
-  std::vector<Vote> votes;        ///< those without a vote are among them
+  SharedSettings settings;
+  std::vector<Vote> votes;  ///< those without a vote are among them
 };
 
 /// Says where a batch has its choice from. Both are empty if there is nothing to share.

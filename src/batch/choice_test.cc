@@ -16,9 +16,7 @@ using testing::ScratchDirectory;
 Vote vote(Penalty penalty, double variation, std::optional<int> spike_rank = 3) {
   Vote made;
   made.series = "a";
-  made.penalty = penalty;
-  made.variation = variation;
-  made.spike_rank = spike_rank;
+  made.settings = {.penalty = penalty, .variation = variation, .spike_rank = spike_rank};
   return made;
 }
 
@@ -45,22 +43,22 @@ TEST(CountVotes, TakesTheMedianOfThePenaltyThatMostAreFor) {
   const auto smooth = count_votes(
       {vote(Penalty::kSmooth, 8), vote(Penalty::kConcave, 14), vote(Penalty::kSmooth, 2, 0)});
   ASSERT_TRUE(smooth);
-  EXPECT_EQ(smooth->penalty, Penalty::kSmooth);
-  EXPECT_EQ(smooth->variation, 4);  // the geometric mean of two
-  EXPECT_EQ(smooth->spike_rank, 3);
+  EXPECT_EQ(smooth->settings.penalty, Penalty::kSmooth);
+  EXPECT_EQ(smooth->settings.variation, 4);  // the geometric mean of two
+  EXPECT_EQ(smooth->settings.spike_rank, 3);
   EXPECT_EQ(smooth->votes.size(), 3u);
   const auto of_three = count_votes(
       {vote(Penalty::kConcave, 25), vote(Penalty::kConcave, 14), vote(Penalty::kConcave, 14)});
-  EXPECT_EQ(of_three->penalty, Penalty::kConcave);
-  EXPECT_EQ(of_three->variation, 14);
+  EXPECT_EQ(of_three->settings.penalty, Penalty::kConcave);
+  EXPECT_EQ(of_three->settings.variation, 14);
 }
 
 TEST(CountVotes, IsSmoothWithoutAMajorityAndNothingWithoutVotes) {
-  EXPECT_EQ(count_votes({vote(Penalty::kConcave, 14), vote(Penalty::kSmooth, 5)})->penalty,
+  EXPECT_EQ(count_votes({vote(Penalty::kConcave, 14), vote(Penalty::kSmooth, 5)})->settings.penalty,
             Penalty::kSmooth);
   const auto one = count_votes({no_vote(), vote(Penalty::kConcave, 14, {})});
-  EXPECT_EQ(one->penalty, Penalty::kConcave);
-  EXPECT_FALSE(one->spike_rank.has_value());
+  EXPECT_EQ(one->settings.penalty, Penalty::kConcave);
+  EXPECT_FALSE(one->settings.spike_rank.has_value());
   EXPECT_FALSE(count_votes({no_vote()}).has_value());
 }
 
@@ -91,8 +89,8 @@ TEST(PlanChoice, TakesTheStoredOneIfTheBatchGoesOn) {
   const ChoicePlan plan = plan_choice(directory.path(), true, jobs);
   EXPECT_TRUE(plan.choosing.empty());
   ASSERT_TRUE(plan.stored);
-  EXPECT_EQ(plan.stored->variation, 4.5);
-  EXPECT_EQ(plan.stored->spike_rank, 0);
+  EXPECT_EQ(plan.stored->settings.variation, 4.5);
+  EXPECT_EQ(plan.stored->settings.spike_rank, 0);
   EXPECT_EQ(plan.stored->votes[1].failure, "its views are black");
   EXPECT_NE(describe(*plan.stored).find("smooth tv 4.5, spikes kept, by the trials of a (smooth"),
             std::string::npos)
@@ -119,10 +117,10 @@ TEST(ReadVote, TakesWhatARunChose) {
   job.name = "a";
   const auto file = directory.write(
       "a.json", R"({"chosen": {"tv_penalty": "concave", "tv": 14, "spike_rank": 3}})");
-  EXPECT_FALSE(read_vote(job, file).spike_rank.has_value());  // it was given
+  EXPECT_FALSE(read_vote(job, file).settings.spike_rank.has_value());  // it was given
   job.needs.open_spike_rank = true;
-  EXPECT_EQ(read_vote(job, file).spike_rank, 3);
-  EXPECT_EQ(read_vote(job, file).penalty, Penalty::kConcave);
+  EXPECT_EQ(read_vote(job, file).settings.spike_rank, 3);
+  EXPECT_EQ(read_vote(job, file).settings.penalty, Penalty::kConcave);
   EXPECT_FALSE(read_vote(job, directory.write("b.json", "null")).failure.empty());
   for (const char* text : {"{}", R"({"chosen": {"tv_penalty": "flat", "tv": 14}})"})
     EXPECT_THROW(read_vote(job, directory.write("c.json", text)), Error) << text;

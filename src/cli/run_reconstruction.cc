@@ -191,9 +191,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
                         const reconstruction::ReconstructOptions& options, bool dry_run,
                         const distributed::Communicator& processes) {
   processes.run_collectively([&] {
-    const reconstruction::RunPlan plan = plan_run(series, options, processes);
-    require_memory(plan, processes);
-    require_few_vertices(plan);
+    const reconstruction::RunPlan plan = require_possible_run(series, options, processes);
     if (options.field.kind == FieldKind::kGrid && options.requested.rank != Options().rank)
       base::log_warning(
           "--rank changes nothing: it is for factors (--field vm), and this field has plain "
