@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/plausible.h"
+#include "batch/begun_settings.h"
 #include "batch/read_json.h"
 #include "io/json.h"
 #include "io/json_numbers.h"
@@ -72,7 +73,7 @@ json vote_json(const Vote& vote) {
 SharedSettings settings_from(const json& entry) {
   SharedSettings settings;
   const auto penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>());
-  if (!penalty) throw Error("'tv_penalty' is no penalty");
+  if (!penalty) throw Error("'tv_penalty' is neither smooth nor concave");
   settings.penalty = *penalty;
   settings.variation = io::number_at(entry, "tv", 0, base::kLargestNumber);
   if (!entry.at("spike_rank").is_null())
@@ -94,7 +95,41 @@ Vote vote_from(const json& entry) {
 Choice choice_from(const json& document) {
   Choice choice{.settings = settings_from(document), .votes = {}};
   for (const json& vote : document.at("votes")) choice.votes.push_back(vote_from(vote));
+  if (std::ranges::none_of(choice.votes, has_vote))
+    throw Error("no series under 'votes' has chosen anything");
   return choice;
+}
+
+// Returns the words that give shared settings to a job.
+std::vector<std::string> settings_words(const SharedSettings& settings, const Needs& needs) {
+  std::vector<std::string> words{fmt::format("--tv-penalty={}", base::name_of(settings.penalty)),
+                                 fmt::format("--tv={}", settings.variation)};
+  if (needs.open_spike_rank && settings.spike_rank)
+    words.push_back(fmt::format("--spike-rank={}", *settings.spike_rank));
+  return words;
+}
+
+// Lets the jobs that have begun go on with the settings that they began with. Without an entry in
+// the list of the earlier batch, a job takes the stored choice if there is one. Returns the jobs
+// whose settings differ from the stored ones.
+std::vector<std::size_t> keep_begun_settings(const fs::path& folder,
+                                             const std::optional<Choice>& stored,
+                                             std::vector<Job>& jobs) {
+  std::vector<std::size_t> differing;
+  const auto begun = begun_settings(folder);
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    Job& job = jobs[i];
+    const auto entry = begun.find(job.name);
+    if (!takes_choice(job) || !has_checkpoint(job.output)) continue;
+    if (entry == begun.end() && stored) continue;
+    if (entry != begun.end()) {
+      if (stored && entry->second != settings_words(stored->settings, job.needs))
+        differing.push_back(i);
+      job.command.insert(job.command.end(), entry->second.begin(), entry->second.end());
+    }
+    job.needs.open_variation = job.needs.open_spike_rank = false;
+  }
+  return differing;
 }
 
 // Reads a file of a choice. Mistakes in it are errors that name it.
@@ -110,9 +145,10 @@ auto read_choice_file(const fs::path& file, const char* what, const Read& read) 
 
 ChoicePlan plan_choice(const fs::path& folder, bool continues, std::vector<Job>& jobs) {
   if (continues) {
-    if (auto stored = read_choice(folder)) return {.stored = std::move(stored), .choosing = {}};
-    for (Job& job : jobs)
-      if (has_checkpoint(job.output)) job.needs.open_variation = job.needs.open_spike_rank = false;
+    std::optional<Choice> stored = read_choice(folder);
+    std::vector<std::size_t> differing = keep_begun_settings(folder, stored, jobs);
+    if (stored)
+      return {.stored = std::move(stored), .choosing = {}, .differing = std::move(differing)};
   }
   std::vector<std::size_t> able;
   for (std::size_t i = 0; i < jobs.size(); ++i)
@@ -136,10 +172,8 @@ std::optional<Choice> count_votes(std::vector<Vote> votes) {
 void give_choice(const Choice& choice, std::vector<Job>& jobs) {
   for (Job& job : jobs) {
     if (!takes_choice(job)) continue;
-    job.command.push_back(fmt::format("--tv-penalty={}", base::name_of(choice.settings.penalty)));
-    job.command.push_back(fmt::format("--tv={}", choice.settings.variation));
-    if (job.needs.open_spike_rank && choice.settings.spike_rank)
-      job.command.push_back(fmt::format("--spike-rank={}", *choice.settings.spike_rank));
+    const std::vector<std::string> words = settings_words(choice.settings, job.needs);
+    job.command.insert(job.command.end(), words.begin(), words.end());
   }
 }
 

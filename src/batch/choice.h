@@ -40,15 +40,17 @@ struct Choice {
   std::vector<Vote> votes;  ///< those without a vote are among them
 };
 
-/// Says where a batch has its choice from. Both are empty if there is nothing to share.
+/// Says where a batch has its choice from. All are empty if there is nothing to share.
 struct ChoicePlan {
-  std::optional<Choice> stored;       ///< of the batch that this one continues
-  std::vector<std::size_t> choosing;  ///< jobs that are to make trials
+  std::optional<Choice> stored;        ///< of the batch that this one continues
+  std::vector<std::size_t> choosing;   ///< jobs that are to make trials
+  std::vector<std::size_t> differing;  ///< jobs that go on with other settings than the stored ones
 };
-/// Plans the choice of a batch. If it `continues` another one, it takes what that has stored, and
-/// without that, series that have begun go on as they were: their `needs` are marked as settled.
-/// Else the first, the middle and the last of the series with trials are to choose, if there are
-/// at least two series to share the choice.
+/// Plans the choice of a batch. If it `continues` another one, series that have begun go on as they
+/// were: their commands get the settings that the list of that batch (begun_settings.h) has for
+/// them, and their `needs` are marked as settled. The others take the choice that is stored, if one
+/// is. Else the first, the middle and the last of the series with trials are to choose, if there
+/// are at least two series to share the choice.
 ChoicePlan plan_choice(const std::filesystem::path& folder, bool continues, std::vector<Job>& jobs);
 
 /// Returns the penalty of most votes (smooth if there is no majority), and the medians of the

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "batch/slurm.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 
@@ -100,6 +102,39 @@ TEST(PlanChoice, TakesTheStoredOneIfTheBatchGoesOn) {
   EXPECT_FALSE(read_choice(directory.path()).has_value());
 }
 
+TEST(PlanChoice, LetsSeriesThatHaveBegunGoOnWithTheirSettings) {
+  const ScratchDirectory directory;
+  using Words = std::vector<std::string>;
+  std::vector<Job> jobs = open_jobs(4, directory.path());
+  give_choice(*count_votes({vote(Penalty::kSmooth, 4.5)}), jobs);
+  jobs.pop_back();  // the last series is new in the list of the next batch
+  write_jobs(list_of(directory.path()), {.jobs = jobs, .overwrites = false});
+  for (const char* model : {"a.h5", "d.h5"}) directory.write(model, "");
+  const auto planned = [&] {
+    std::vector<Job> next = open_jobs(4, directory.path());
+    const ChoicePlan plan = plan_choice(directory.path(), true, next);
+    if (plan.stored) give_choice(*plan.stored, next);
+    return std::pair(plan, next);
+  };
+  write_choice(directory.path(), *count_votes({vote(Penalty::kConcave, 14)}));  // edited
+  auto [plan, next] = planned();
+  EXPECT_EQ(next[0].command, (Words{"--tv-penalty=smooth", "--tv=4.5", "--spike-rank=3"}));
+  EXPECT_EQ(next[1].command, (Words{"--tv-penalty=concave", "--tv=14", "--spike-rank=3"}));
+  EXPECT_EQ(next[3].command, next[1].command);  // nothing says what it began with
+  EXPECT_EQ(plan.differing, std::vector<std::size_t>{0});
+  write_choice(directory.path(), *count_votes({vote(Penalty::kSmooth, 4.5)}));
+  EXPECT_TRUE(planned().first.differing.empty());
+  forget_choice(directory.path());
+  next = planned().second;
+  EXPECT_EQ(next[0].command, (Words{"--tv-penalty=smooth", "--tv=4.5", "--spike-rank=3"}));
+  EXPECT_TRUE(next[1].command.empty());
+  directory.write("batch.json", R"({"jobs": [{}]})");
+  const std::string said = testing::message_of<Error>(planned);
+  EXPECT_NE(said.find("batch.json' is not the list of a batch (there is no 'name')"),
+            std::string::npos)
+      << said;
+}
+
 TEST(GiveChoice, AddsWhatASeriesLacks) {
   std::vector<Job> jobs = open_jobs(3, "out");
   jobs[1].needs.open_spike_rank = false;
@@ -126,12 +161,28 @@ TEST(ReadVote, TakesWhatARunChose) {
     EXPECT_THROW(read_vote(job, directory.write("c.json", text)), Error) << text;
 }
 
-TEST(ReadChoice, RefusesADamagedFileAndSaysWhatToDo) {
+TEST(ReadChoice, RefusesADamagedFileAndSaysWhatIsWrongAndWhatToDo) {
   const ScratchDirectory directory;
-  directory.write("choice.json", R"({"tv": 5})");
-  const std::string said = testing::message_of<Error>([&] { read_choice(directory.path()); });
-  EXPECT_NE(said.find("choice.json"), std::string::npos);
-  EXPECT_NE(said.find("remove it"), std::string::npos);
+  const auto said_of = [&](const std::string& text) {
+    directory.write("choice.json", text);
+    return testing::message_of<Error>([&] { read_choice(directory.path()); });
+  };
+  const std::string settings = R"("tv_penalty": "smooth", "tv": 5, "spike_rank": null)";
+  const std::pair<std::string, std::string> faults[] = {
+      {"{\"tv\": 5,\n \"votes\"", "line 2, column"},
+      {R"({"tv": 5})", "there is no 'tv_penalty'"},
+      {R"({"tv_penalty": 5, "tv": 5})", "another kind"},
+      {R"({"tv_penalty": "flat", "tv": 5})", "'tv_penalty'"},
+      {R"({"tv_penalty": "smooth", "tv": "5"})", "'tv'"},
+      {"{" + settings + "}", "there is no 'votes'"},
+      {"{" + settings + R"(, "votes": []})", "'votes'"},
+      {"{" + settings + R"(, "votes": [{"series": "a", "failure": "it is black"}]})", "'votes'"}};
+  for (const auto& [text, fault] : faults) {
+    const std::string said = said_of(text);
+    for (const std::string& fact : {std::string("choice.json"), fault, std::string("remove it")})
+      EXPECT_NE(said.find(fact), std::string::npos) << text << ": " << said;
+    EXPECT_EQ(said.find("exception"), std::string::npos) << said;  // the library's words
+  }
 }
 
 }  // namespace
