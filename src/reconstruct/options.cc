@@ -124,7 +124,7 @@ std::vector<std::filesystem::path> result_files(const ReconstructOptions& option
   if (options.fit.hold_out > 0) results.push_back(paths.held_out_picture);
   if (options.makes_halves()) add_half_files(paths, resolved.denoising_halves, results);
   if (resolved.tune || options.open.any()) results.push_back(paths.choice_picture);
-  if (resolved.tune || options.open.variation) results.push_back(paths.dial_picture);
+  if (options.chooses_weight()) results.push_back(paths.dial_picture);
   for (const auto& file : exchange_files(options)) results.push_back(file);
   return results;
 }
@@ -224,6 +224,10 @@ std::vector<std::string> ReconstructOptions::faults() const {
   } catch (const Error& error) {
     all.emplace_back(error.what());
   }
+  refuse_if(resolved.density_variation == 0.0 && !chooses_weight() &&
+                resolved.denoise != Options().denoise,
+            "--denoise multiplies the weight of total variation, and --tv 0 turns that off: leave "
+            "one of them out");
   refuse_if(fit.patience > 0 && fit.hold_out == 0,
             "--early-stop watches views that --hold-out keeps from the fit: give that as well");
   refuse_if(fit.hold_out > 0 && is_ray,

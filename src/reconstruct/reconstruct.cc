@@ -99,15 +99,10 @@ void turn_the_dial(ReconstructOptions& options) {
 }
 
 // Shows what the dial does. A resumed run keeps the picture of its first session: the trials that
-// it reads have no sections. Another run removes the picture of an earlier one.
+// it reads have no sections.
 void show_dial(const Run& run, const std::optional<TunedFit>& tuned) {
   if (!run.writes_files() || !run.processes.is_root()) return;
-  if (tuned && tuned->trials.front().section.values.empty()) return;
-  if (!tuned) {
-    std::error_code ignored;
-    std::filesystem::remove(run.paths.dial_picture, ignored);
-    return;
-  }
+  if (!tuned || tuned->trials.front().section.values.empty()) return;
   const double sign = run.options.input.contrast == Contrast::kDark ? -1 : 1;
   write_dial_picture(*tuned, run.options.volume.invert ? -sign : sign, run.paths.dial_picture);
 }
