@@ -16,10 +16,9 @@ namespace {
 using testing::ScratchDirectory;
 
 Vote vote(Penalty penalty, double variation, std::optional<int> spike_rank = 3) {
-  Vote made;
-  made.series = "a";
-  made.settings = {.penalty = penalty, .variation = variation, .spike_rank = spike_rank};
-  return made;
+  return {.series = "a",
+          .settings = {.penalty = penalty, .variation = variation, .spike_rank = spike_rank},
+          .failure = {}};
 }
 
 Vote no_vote() {
