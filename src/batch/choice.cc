@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/plausible.h"
+#include "batch/begun_settings.h"
 #include "batch/read_json.h"
 #include "io/json.h"
 #include "io/json_numbers.h"
@@ -28,14 +29,15 @@ bool takes_choice(const Job& job) { return !job.is_skipped && job.needs.open_var
 std::vector<Vote> majority(const std::vector<Vote>& votes) {
   std::vector<Vote> smooth, concave;
   for (const Vote& vote : votes)
-    if (has_vote(vote)) (vote.penalty == Penalty::kSmooth ? smooth : concave).push_back(vote);
+    if (has_vote(vote))
+      (vote.settings.penalty == Penalty::kSmooth ? smooth : concave).push_back(vote);
   return concave.size() > smooth.size() ? concave : smooth;
 }
 
 // Returns the median of weights, on a logarithmic scale, as users can give it.
 double median_weight(const std::vector<Vote>& votes) {
   std::vector<double> weights;
-  for (const Vote& vote : votes) weights.push_back(vote.variation);
+  for (const Vote& vote : votes) weights.push_back(vote.settings.variation);
   std::ranges::sort(weights);
   const double below = weights[(weights.size() - 1) / 2], above = weights[weights.size() / 2];
   return std::stod(fmt::format("{:.3g}", std::sqrt(below * above)));
@@ -45,40 +47,39 @@ double median_weight(const std::vector<Vote>& votes) {
 std::optional<int> median_spike_rank(const std::vector<Vote>& votes) {
   std::vector<int> ranks;
   for (const Vote& vote : votes)
-    if (vote.spike_rank) ranks.push_back(*vote.spike_rank);
+    if (vote.settings.spike_rank) ranks.push_back(*vote.settings.spike_rank);
   if (ranks.empty()) return std::nullopt;
   std::ranges::sort(ranks);
   return ranks[ranks.size() / 2];
 }
 
-std::string settings_text(Penalty penalty, double variation, std::optional<int> spike_rank) {
-  return fmt::format("{} tv {:.3g}{}", base::name_of(penalty), variation,
-                     spike_rank == 0 ? ", spikes kept" : "");
+std::string settings_text(const SharedSettings& settings) {
+  return fmt::format("{} tv {:.3g}{}", base::name_of(settings.penalty), settings.variation,
+                     settings.spike_rank == 0 ? ", spikes kept" : "");
 }
 
-json settings_json(Penalty penalty, double variation, std::optional<int> spike_rank) {
-  return {{"tv_penalty", base::name_of(penalty)},
-          {"tv", variation},
-          {"spike_rank", spike_rank ? json(*spike_rank) : json(nullptr)}};
+json settings_json(const SharedSettings& settings) {
+  return {{"tv_penalty", base::name_of(settings.penalty)},
+          {"tv", settings.variation},
+          {"spike_rank", settings.spike_rank ? json(*settings.spike_rank) : json(nullptr)}};
 }
 
 json vote_json(const Vote& vote) {
-  json entry = has_vote(vote) ? settings_json(vote.penalty, vote.variation, vote.spike_rank)
-                              : json{{"failure", vote.failure}};
+  json entry = has_vote(vote) ? settings_json(vote.settings) : json{{"failure", vote.failure}};
   entry["series"] = vote.series;
   return entry;
 }
 
-// Reads the settings of a vote or of a choice into it.
-template <typename Settings>
-void read_settings(const json& entry, Settings& settings) {
+SharedSettings settings_from(const json& entry) {
+  SharedSettings settings;
   const auto penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>());
-  if (!penalty) throw Error("'tv_penalty' is no penalty");
+  if (!penalty) throw Error("'tv_penalty' is neither smooth nor concave");
   settings.penalty = *penalty;
   settings.variation = io::number_at(entry, "tv", 0, base::kLargestNumber);
   if (!entry.at("spike_rank").is_null())
     settings.spike_rank =
         static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank));
+  return settings;
 }
 
 Vote vote_from(const json& entry) {
@@ -87,15 +88,48 @@ Vote vote_from(const json& entry) {
   if (entry.contains("failure"))
     vote.failure = entry.at("failure").get<std::string>();
   else
-    read_settings(entry, vote);
+    vote.settings = settings_from(entry);
   return vote;
 }
 
 Choice choice_from(const json& document) {
-  Choice choice;
-  read_settings(document, choice);
+  Choice choice{.settings = settings_from(document), .votes = {}};
   for (const json& vote : document.at("votes")) choice.votes.push_back(vote_from(vote));
+  if (std::ranges::none_of(choice.votes, has_vote))
+    throw Error("no series under 'votes' has chosen anything");
   return choice;
+}
+
+// Returns the words that give shared settings to a job.
+std::vector<std::string> settings_words(const SharedSettings& settings, const Needs& needs) {
+  std::vector<std::string> words{fmt::format("--tv-penalty={}", base::name_of(settings.penalty)),
+                                 fmt::format("--tv={}", settings.variation)};
+  if (needs.open_spike_rank && settings.spike_rank)
+    words.push_back(fmt::format("--spike-rank={}", *settings.spike_rank));
+  return words;
+}
+
+// Lets the jobs that have begun go on with the settings that they began with. Without an entry in
+// the list of the earlier batch, a job takes the stored choice if there is one. Returns the jobs
+// whose settings differ from the stored ones.
+std::vector<std::size_t> keep_begun_settings(const fs::path& folder,
+                                             const std::optional<Choice>& stored,
+                                             std::vector<Job>& jobs) {
+  std::vector<std::size_t> differing;
+  const auto begun = begun_settings(folder);
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    Job& job = jobs[i];
+    const auto entry = begun.find(job.name);
+    if (!takes_choice(job) || !has_checkpoint(job.output)) continue;
+    if (entry == begun.end() && stored) continue;
+    if (entry != begun.end()) {
+      if (stored && entry->second != settings_words(stored->settings, job.needs))
+        differing.push_back(i);
+      job.command.insert(job.command.end(), entry->second.begin(), entry->second.end());
+    }
+    job.needs.open_variation = job.needs.open_spike_rank = false;
+  }
+  return differing;
 }
 
 // Reads a file of a choice. Mistakes in it are errors that name it.
@@ -111,9 +145,10 @@ auto read_choice_file(const fs::path& file, const char* what, const Read& read) 
 
 ChoicePlan plan_choice(const fs::path& folder, bool continues, std::vector<Job>& jobs) {
   if (continues) {
-    if (auto stored = read_choice(folder)) return {.stored = std::move(stored), .choosing = {}};
-    for (Job& job : jobs)
-      if (has_checkpoint(job.output)) job.needs.open_variation = job.needs.open_spike_rank = false;
+    std::optional<Choice> stored = read_choice(folder);
+    std::vector<std::size_t> differing = keep_begun_settings(folder, stored, jobs);
+    if (stored)
+      return {.stored = std::move(stored), .choosing = {}, .differing = std::move(differing)};
   }
   std::vector<std::size_t> able;
   for (std::size_t i = 0; i < jobs.size(); ++i)
@@ -128,38 +163,34 @@ ChoicePlan plan_choice(const fs::path& folder, bool continues, std::vector<Job>&
 std::optional<Choice> count_votes(std::vector<Vote> votes) {
   const std::vector<Vote> winners = majority(votes);
   if (winners.empty()) return std::nullopt;
-  return Choice{.penalty = winners.front().penalty,
-                .variation = median_weight(winners),
-                .spike_rank = median_spike_rank(winners),
+  return Choice{.settings = {.penalty = winners.front().settings.penalty,
+                             .variation = median_weight(winners),
+                             .spike_rank = median_spike_rank(winners)},
                 .votes = std::move(votes)};
 }
 
 void give_choice(const Choice& choice, std::vector<Job>& jobs) {
   for (Job& job : jobs) {
     if (!takes_choice(job)) continue;
-    job.command.push_back(fmt::format("--tv-penalty={}", base::name_of(choice.penalty)));
-    job.command.push_back(fmt::format("--tv={}", choice.variation));
-    if (job.needs.open_spike_rank && choice.spike_rank)
-      job.command.push_back(fmt::format("--spike-rank={}", *choice.spike_rank));
+    const std::vector<std::string> words = settings_words(choice.settings, job.needs);
+    job.command.insert(job.command.end(), words.begin(), words.end());
   }
 }
 
 std::string describe(const Choice& choice) {
   std::vector<std::string> votes;
   for (const Vote& vote : choice.votes)
-    votes.push_back(fmt::format("{} ({})", vote.series,
-                                has_vote(vote)
-                                    ? settings_text(vote.penalty, vote.variation, vote.spike_rank)
-                                    : "its trials failed: " + vote.failure));
-  return fmt::format("{}, by the trials of {}",
-                     settings_text(choice.penalty, choice.variation, choice.spike_rank),
+    votes.push_back(fmt::format(
+        "{} ({})", vote.series,
+        has_vote(vote) ? settings_text(vote.settings) : "its trials failed: " + vote.failure));
+  return fmt::format("{}, by the trials of {}", settings_text(choice.settings),
                      fmt::join(votes, ", "));
 }
 
 fs::path choice_file(const fs::path& folder) { return folder / "choice.json"; }
 
 void write_choice(const fs::path& folder, const Choice& choice) {
-  json document = settings_json(choice.penalty, choice.variation, choice.spike_rank);
+  json document = settings_json(choice.settings);
   document["tomofield"] = TOMOFIELD_VERSION;
   document["votes"] = json::array();
   for (const Vote& vote : choice.votes) document["votes"].push_back(vote_json(vote));
@@ -182,8 +213,8 @@ Vote read_vote(const Job& job, const fs::path& file) {
       vote.failure = "nothing was left to trials";
       return vote;
     }
-    read_settings(document.at("chosen"), vote);
-    if (!job.needs.open_spike_rank) vote.spike_rank.reset();
+    vote.settings = settings_from(document.at("chosen"));
+    if (!job.needs.open_spike_rank) vote.settings.spike_rank.reset();
     return vote;
   });
 }

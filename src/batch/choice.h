@@ -20,32 +20,37 @@ enum class Choose {
   kEach   ///< every series makes trials of its own
 };
 
+/// Holds the settings of total variation that the series of a batch share.
+struct SharedSettings {
+  Penalty penalty = Penalty::kSmooth;
+  double variation = 0;           ///< weight in noise units, as --tv
+  std::optional<int> spike_rank;  ///< nothing if no trials have chosen it
+};
+
 /// Holds what one series chose by its trials, or the reason why it has no vote.
 struct Vote {
   std::string series;
-  Penalty penalty = Penalty::kSmooth;
-  double variation = 0;           ///< weight in noise units, as --tv
-  std::optional<int> spike_rank;  ///< nothing if it was given to this series
-  std::string failure;            ///< empty if it has a vote
+  SharedSettings settings;
+  std::string failure;  ///< empty if it has a vote
 };
 
 /// Holds the settings that all series of a batch get if they do not state their own.
 struct Choice {
-  Penalty penalty = Penalty::kSmooth;
-  double variation = 0;
-  std::optional<int> spike_rank;  ///< nothing if no series has chosen one
-  std::vector<Vote> votes;        ///< those without a vote are among them
+  SharedSettings settings;
+  std::vector<Vote> votes;  ///< those without a vote are among them
 };
 
-/// Says where a batch has its choice from. Both are empty if there is nothing to share.
+/// Says where a batch has its choice from. All are empty if there is nothing to share.
 struct ChoicePlan {
-  std::optional<Choice> stored;       ///< of the batch that this one continues
-  std::vector<std::size_t> choosing;  ///< jobs that are to make trials
+  std::optional<Choice> stored;        ///< of the batch that this one continues
+  std::vector<std::size_t> choosing;   ///< jobs that are to make trials
+  std::vector<std::size_t> differing;  ///< jobs that go on with other settings than the stored ones
 };
-/// Plans the choice of a batch. If it `continues` another one, it takes what that has stored, and
-/// without that, series that have begun go on as they were: their `needs` are marked as settled.
-/// Else the first, the middle and the last of the series with trials are to choose, if there are
-/// at least two series to share the choice.
+/// Plans the choice of a batch. If it `continues` another one, series that have begun go on as they
+/// were: their commands get the settings that the list of that batch (begun_settings.h) has for
+/// them, and their `needs` are marked as settled. The others take the choice that is stored, if one
+/// is. Else the first, the middle and the last of the series with trials are to choose, if there
+/// are at least two series to share the choice.
 ChoicePlan plan_choice(const std::filesystem::path& folder, bool continues, std::vector<Job>& jobs);
 
 /// Returns the penalty of most votes (smooth if there is no majority), and the medians of the

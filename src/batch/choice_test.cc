@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "batch/slurm.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 
@@ -14,12 +16,9 @@ namespace {
 using testing::ScratchDirectory;
 
 Vote vote(Penalty penalty, double variation, std::optional<int> spike_rank = 3) {
-  Vote made;
-  made.series = "a";
-  made.penalty = penalty;
-  made.variation = variation;
-  made.spike_rank = spike_rank;
-  return made;
+  return {.series = "a",
+          .settings = {.penalty = penalty, .variation = variation, .spike_rank = spike_rank},
+          .failure = {}};
 }
 
 Vote no_vote() {
@@ -45,22 +44,22 @@ TEST(CountVotes, TakesTheMedianOfThePenaltyThatMostAreFor) {
   const auto smooth = count_votes(
       {vote(Penalty::kSmooth, 8), vote(Penalty::kConcave, 14), vote(Penalty::kSmooth, 2, 0)});
   ASSERT_TRUE(smooth);
-  EXPECT_EQ(smooth->penalty, Penalty::kSmooth);
-  EXPECT_EQ(smooth->variation, 4);  // the geometric mean of two
-  EXPECT_EQ(smooth->spike_rank, 3);
+  EXPECT_EQ(smooth->settings.penalty, Penalty::kSmooth);
+  EXPECT_EQ(smooth->settings.variation, 4);  // the geometric mean of two
+  EXPECT_EQ(smooth->settings.spike_rank, 3);
   EXPECT_EQ(smooth->votes.size(), 3u);
   const auto of_three = count_votes(
       {vote(Penalty::kConcave, 25), vote(Penalty::kConcave, 14), vote(Penalty::kConcave, 14)});
-  EXPECT_EQ(of_three->penalty, Penalty::kConcave);
-  EXPECT_EQ(of_three->variation, 14);
+  EXPECT_EQ(of_three->settings.penalty, Penalty::kConcave);
+  EXPECT_EQ(of_three->settings.variation, 14);
 }
 
 TEST(CountVotes, IsSmoothWithoutAMajorityAndNothingWithoutVotes) {
-  EXPECT_EQ(count_votes({vote(Penalty::kConcave, 14), vote(Penalty::kSmooth, 5)})->penalty,
+  EXPECT_EQ(count_votes({vote(Penalty::kConcave, 14), vote(Penalty::kSmooth, 5)})->settings.penalty,
             Penalty::kSmooth);
   const auto one = count_votes({no_vote(), vote(Penalty::kConcave, 14, {})});
-  EXPECT_EQ(one->penalty, Penalty::kConcave);
-  EXPECT_FALSE(one->spike_rank.has_value());
+  EXPECT_EQ(one->settings.penalty, Penalty::kConcave);
+  EXPECT_FALSE(one->settings.spike_rank.has_value());
   EXPECT_FALSE(count_votes({no_vote()}).has_value());
 }
 
@@ -91,8 +90,8 @@ TEST(PlanChoice, TakesTheStoredOneIfTheBatchGoesOn) {
   const ChoicePlan plan = plan_choice(directory.path(), true, jobs);
   EXPECT_TRUE(plan.choosing.empty());
   ASSERT_TRUE(plan.stored);
-  EXPECT_EQ(plan.stored->variation, 4.5);
-  EXPECT_EQ(plan.stored->spike_rank, 0);
+  EXPECT_EQ(plan.stored->settings.variation, 4.5);
+  EXPECT_EQ(plan.stored->settings.spike_rank, 0);
   EXPECT_EQ(plan.stored->votes[1].failure, "its views are black");
   EXPECT_NE(describe(*plan.stored).find("smooth tv 4.5, spikes kept, by the trials of a (smooth"),
             std::string::npos)
@@ -100,6 +99,39 @@ TEST(PlanChoice, TakesTheStoredOneIfTheBatchGoesOn) {
   EXPECT_FALSE(plan_choice(directory.path(), false, jobs).stored.has_value());
   forget_choice(directory.path());
   EXPECT_FALSE(read_choice(directory.path()).has_value());
+}
+
+TEST(PlanChoice, LetsSeriesThatHaveBegunGoOnWithTheirSettings) {
+  const ScratchDirectory directory;
+  using Words = std::vector<std::string>;
+  std::vector<Job> jobs = open_jobs(4, directory.path());
+  give_choice(*count_votes({vote(Penalty::kSmooth, 4.5)}), jobs);
+  jobs.pop_back();  // the last series is new in the list of the next batch
+  write_jobs(list_of(directory.path()), {.jobs = jobs, .overwrites = false});
+  for (const char* model : {"a.h5", "d.h5"}) directory.write(model, "");
+  const auto planned = [&] {
+    std::vector<Job> next = open_jobs(4, directory.path());
+    const ChoicePlan plan = plan_choice(directory.path(), true, next);
+    if (plan.stored) give_choice(*plan.stored, next);
+    return std::pair(plan, next);
+  };
+  write_choice(directory.path(), *count_votes({vote(Penalty::kConcave, 14)}));  // edited
+  auto [plan, next] = planned();
+  EXPECT_EQ(next[0].command, (Words{"--tv-penalty=smooth", "--tv=4.5", "--spike-rank=3"}));
+  EXPECT_EQ(next[1].command, (Words{"--tv-penalty=concave", "--tv=14", "--spike-rank=3"}));
+  EXPECT_EQ(next[3].command, next[1].command);  // nothing says what it began with
+  EXPECT_EQ(plan.differing, std::vector<std::size_t>{0});
+  write_choice(directory.path(), *count_votes({vote(Penalty::kSmooth, 4.5)}));
+  EXPECT_TRUE(planned().first.differing.empty());
+  forget_choice(directory.path());
+  next = planned().second;
+  EXPECT_EQ(next[0].command, (Words{"--tv-penalty=smooth", "--tv=4.5", "--spike-rank=3"}));
+  EXPECT_TRUE(next[1].command.empty());
+  directory.write("batch.json", R"({"jobs": [{}]})");
+  const std::string said = testing::message_of<Error>(planned);
+  EXPECT_NE(said.find("batch.json' is not the list of a batch (there is no 'name')"),
+            std::string::npos)
+      << said;
 }
 
 TEST(GiveChoice, AddsWhatASeriesLacks) {
@@ -119,21 +151,37 @@ TEST(ReadVote, TakesWhatARunChose) {
   job.name = "a";
   const auto file = directory.write(
       "a.json", R"({"chosen": {"tv_penalty": "concave", "tv": 14, "spike_rank": 3}})");
-  EXPECT_FALSE(read_vote(job, file).spike_rank.has_value());  // it was given
+  EXPECT_FALSE(read_vote(job, file).settings.spike_rank.has_value());  // it was given
   job.needs.open_spike_rank = true;
-  EXPECT_EQ(read_vote(job, file).spike_rank, 3);
-  EXPECT_EQ(read_vote(job, file).penalty, Penalty::kConcave);
+  EXPECT_EQ(read_vote(job, file).settings.spike_rank, 3);
+  EXPECT_EQ(read_vote(job, file).settings.penalty, Penalty::kConcave);
   EXPECT_FALSE(read_vote(job, directory.write("b.json", "null")).failure.empty());
   for (const char* text : {"{}", R"({"chosen": {"tv_penalty": "flat", "tv": 14}})"})
     EXPECT_THROW(read_vote(job, directory.write("c.json", text)), Error) << text;
 }
 
-TEST(ReadChoice, RefusesADamagedFileAndSaysWhatToDo) {
+TEST(ReadChoice, RefusesADamagedFileAndSaysWhatIsWrongAndWhatToDo) {
   const ScratchDirectory directory;
-  directory.write("choice.json", R"({"tv": 5})");
-  const std::string said = testing::message_of<Error>([&] { read_choice(directory.path()); });
-  EXPECT_NE(said.find("choice.json"), std::string::npos);
-  EXPECT_NE(said.find("remove it"), std::string::npos);
+  const auto said_of = [&](const std::string& text) {
+    directory.write("choice.json", text);
+    return testing::message_of<Error>([&] { read_choice(directory.path()); });
+  };
+  const std::string settings = R"("tv_penalty": "smooth", "tv": 5, "spike_rank": null)";
+  const std::pair<std::string, std::string> faults[] = {
+      {"{\"tv\": 5,\n \"votes\"", "line 2, column"},
+      {R"({"tv": 5})", "there is no 'tv_penalty'"},
+      {R"({"tv_penalty": 5, "tv": 5})", "another kind"},
+      {R"({"tv_penalty": "flat", "tv": 5})", "'tv_penalty'"},
+      {R"({"tv_penalty": "smooth", "tv": "5"})", "'tv'"},
+      {"{" + settings + "}", "there is no 'votes'"},
+      {"{" + settings + R"(, "votes": []})", "'votes'"},
+      {"{" + settings + R"(, "votes": [{"series": "a", "failure": "it is black"}]})", "'votes'"}};
+  for (const auto& [text, fault] : faults) {
+    const std::string said = said_of(text);
+    for (const std::string& fact : {std::string("choice.json"), fault, std::string("remove it")})
+      EXPECT_NE(said.find(fact), std::string::npos) << text << ": " << said;
+    EXPECT_EQ(said.find("exception"), std::string::npos) << said;  // the library's words
+  }
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ auto read_json(const std::filesystem::path& file, const Read& read, const Senten
   try {
     return read(io::read_json(file));
   } catch (const nlohmann::json::exception& fault) {
-    why = fault.what();
+    why = io::fault_text(fault);
   } catch (const Error& fault) {
     why = fault.what();
   }

@@ -111,13 +111,17 @@ void print_plan(const batch::JobList& list, const batch::Room& room) {
 }
 
 void print_choosing(const batch::JobList& list, const batch::ChoicePlan& plan) {
+  const auto names_of = [&](const std::vector<std::size_t>& jobs) {
+    std::vector<std::string> names;
+    for (const std::size_t i : jobs) names.push_back(list.jobs[i].name);
+    return fmt::format("{}", fmt::join(names, ", "));
+  };
   if (plan.stored) print("for all series, as stored: {}\n", describe(*plan.stored));
-  if (plan.choosing.empty()) return;
-  std::vector<std::string> names;
-  for (const std::size_t i : plan.choosing) names.push_back(list.jobs[i].name);
-  print("trials of {} choose the total variation of all series first\n",
-        fmt::format("{}", fmt::join(names, ", ")));
-  flush_output();
+  if (!plan.differing.empty())
+    print("with the other settings that they began with: {}\n", names_of(plan.differing));
+  if (!plan.choosing.empty())
+    print("trials of {} choose the total variation of all series first\n", names_of(plan.choosing));
+  flush_output();  // the choice comes before other output, in a file too
 }
 
 void print_summary(const fs::path& folder) {

@@ -22,11 +22,7 @@ void add_choice_option(CLI::App& command, std::optional<std::filesystem::path>& 
 void write_choice(const std::filesystem::path& file, const tilt_series::TiltSeries& series,
                   const reconstruction::ReconstructOptions& options,
                   const distributed::Communicator& processes) {
-  processes.run_collectively([&] {
-    const reconstruction::RunPlan plan = plan_run(series, options, processes);
-    require_memory(plan, processes);
-    require_few_vertices(plan);
-  });
+  processes.run_collectively([&] { require_possible_run(series, options, processes); });
   stop_on_signals(processes.size() > 1);
   reconstruction::ReconstructHooks hooks{
       .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};

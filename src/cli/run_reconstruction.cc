@@ -110,6 +110,13 @@ void print_files(const reconstruction::ReconstructOptions& options,
   if (options.makes_halves()) print_files_of_halves(paths, options.resolved.denoising_halves);
 }
 
+// Says whether there is a picture of what --denoise does, which only trials can show.
+bool has_dial_picture(const reconstruction::ReconstructOptions& options) {
+  return options.chooses_weight() &&
+         std::filesystem::exists(
+             reconstruction::output_paths(options.resolved.output).dial_picture);
+}
+
 // Writes the report of a run beside its other results, which have temporary names yet.
 void write_report(const reconstruction::Results& results,
                   const reconstruction::ReconstructOptions& options,
@@ -128,9 +135,7 @@ void write_report(const reconstruction::Results& results,
     source.tree_picture = written.location_of(paths.tree_picture);
   if (options.fit.hold_out > 0)
     source.held_out_picture = written.location_of(paths.held_out_picture);
-  const bool chose_weight = options.resolved.tune || options.open.variation;
-  if (chose_weight && std::filesystem::exists(paths.dial_picture))
-    source.dial_picture = paths.dial_picture;
+  if (has_dial_picture(options)) source.dial_picture = paths.dial_picture;
   io::write_text_file(paths.report, reconstruction::run_report(source));
 }
 
@@ -191,9 +196,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
                         const reconstruction::ReconstructOptions& options, bool dry_run,
                         const distributed::Communicator& processes) {
   processes.run_collectively([&] {
-    const reconstruction::RunPlan plan = plan_run(series, options, processes);
-    require_memory(plan, processes);
-    require_few_vertices(plan);
+    const reconstruction::RunPlan plan = require_possible_run(series, options, processes);
     if (options.field.kind == FieldKind::kGrid && options.requested.rank != Options().rank)
       base::log_warning(
           "--rank changes nothing: it is for factors (--field vm), and this field has plain "
@@ -221,7 +224,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
     write_report(results, options, volume, pictures.back());
     for (const auto& picture : {paths.held_out_picture, paths.choice_picture})
       if (io::OutputSet::active()->contains(picture)) pictures.push_back(picture);
-    if (std::filesystem::exists(paths.dial_picture)) pictures.push_back(paths.dial_picture);
+    if (has_dial_picture(options)) pictures.push_back(paths.dial_picture);
   };
   if (processes.is_root()) {
     hooks.progress = make_progress_bar("reconstruct");

@@ -26,14 +26,14 @@ constexpr const char* kAdvice =
 // Returns what `read` makes of a JSON file. Mistakes in the file are errors that name it.
 template <typename Read>
 auto read_json(const fs::path& path, Read&& read) {
-  const auto fail = [&](const char* why) {
+  const auto fail = [&](const std::string& why) {
     return Error(fmt::format("'{}' is not what this comparison wrote ({}): {}", path.string(), why,
                              kAdvice));
   };
   try {
     return read(io::read_json(path));
   } catch (const json::exception& fault) {
-    throw fail(fault.what());
+    throw fail(io::fault_text(fault));
   } catch (const Error& fault) {
     throw fail(fault.what());
   }

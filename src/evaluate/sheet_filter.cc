@@ -18,8 +18,9 @@ namespace {
 
 constexpr double kSheetSigma_A = 20.0;
 
-// Returns the index of a line of n values that goes on as its mirror image.
-std::int64_t mirrored(std::int64_t i, std::int64_t n) {
+// Returns the index of a line of n values that goes on as its mirror image, in which the value at
+// an edge is its own neighbour.
+std::int64_t mirrored_about_edges(std::int64_t i, std::int64_t n) {
   while (i < 0 || i >= n) i = i < 0 ? -1 - i : 2 * n - 1 - i;
   return i;
 }
@@ -35,7 +36,7 @@ void blur_axis(std::int64_t n, std::int64_t stride, std::span<const float> kerne
     for (std::int64_t l = task * kLines; l < std::min(lines, (task + 1) * kLines); ++l) {
       float* first = values.data() + l / stride * stride * n + l % stride;
       for (std::int64_t i = -reach; i < n + reach; ++i)
-        line[static_cast<std::size_t>(i + reach)] = first[mirrored(i, n) * stride];
+        line[static_cast<std::size_t>(i + reach)] = first[mirrored_about_edges(i, n) * stride];
       for (std::int64_t i = 0; i < n; ++i) {
         float sum = 0.0f;
         for (std::size_t k = 0; k < kernel.size(); ++k)
@@ -68,8 +69,9 @@ std::array<double, 3> eigenvalues(const Symmetric& m) {
 Symmetric hessian(const base::Volume& volume, std::int64_t x, std::int64_t y, std::int64_t z) {
   const base::Shape3& n = volume.shape;
   const auto at = [&](std::int64_t dx, std::int64_t dy, std::int64_t dz) {
-    return static_cast<double>(
-        volume.at(mirrored(x + dx, n.nx), mirrored(y + dy, n.ny), mirrored(z + dz, n.nz)));
+    return static_cast<double>(volume.at(mirrored_about_edges(x + dx, n.nx),
+                                         mirrored_about_edges(y + dy, n.ny),
+                                         mirrored_about_edges(z + dz, n.nz)));
   };
   const double centre = 2.0 * at(0, 0, 0);
   const auto mixed = [&](double pp, double pm, double mp, double mm) {

@@ -44,18 +44,6 @@ double rate_for_noise(const measurement::Measurement& measurement) {
 // Random streams from here on give the order of an epoch's subsets.
 constexpr std::uint64_t kOrderStream = 1000;
 
-// Surrogates are made anew so many times in an epoch. With fewer they are cheaper, because a
-// prediction decodes the whole volume, but the fit follows older surrogates (docs/results/ctf.md).
-constexpr int kSurrogatesInEpoch = 2;
-
-// Predictions of views that surrogates are made from are at most so large at a time, or one view.
-constexpr std::size_t kPredictionBytes = std::size_t{256} << 20;
-
-// Returns after how many steps surrogates are made anew in an epoch of so many.
-int steps_of_surrogates_in(int steps_an_epoch) {
-  return (steps_an_epoch + kSurrogatesInEpoch - 1) / kSurrogatesInEpoch;
-}
-
 FitOptions with_at_most_one_subset_a_view(FitOptions options, int num_views) {
   if (options.engine == Engine::kSlab) options.subsets = std::min(options.subsets, num_views);
   return options;
@@ -102,14 +90,6 @@ TreeUpdates make_tree_updates(const FieldOptions& field, const Domain& domain,
           field.leaf_budget > 0 ? field.leaf_budget : static_cast<int>(num_leaves),
           first.bin > 1 ? first.epochs - 1 : static_cast<std::int64_t>(kOpenPart * first.epochs),
           options.seed};
-}
-
-// Scales predictions by the models of their views.
-void apply_models(std::span<const measurement::ViewModel> models,
-                  std::vector<measurement::PredictedView>& views) {
-  for (std::size_t i = 0; i < views.size(); ++i)
-    for (float& value : views[i].predicted)
-      value = static_cast<float>(models[i].scale * static_cast<double>(value) + models[i].offset);
 }
 
 }  // namespace
@@ -313,49 +293,6 @@ bool Fit::is_done() const {
   return errors.end() - best > options_.patience;
 }
 
-measurement::ViewErrors Fit::held_out_error(bool fit_view_scale) const {
-  if (filters_.transfers.empty())
-    return objective_->held_out_error(binned_->noise_weights(), fit_view_scale);
-  std::vector<measurement::ViewSums> sums;
-  for (const int view : measurement_.held_out) {
-    const auto predicted = predict(std::span(&view, 1), std::vector<measurement::ViewModel>(1));
-    sums.push_back(measurement::sums_of(predicted.front(), {}));
-  }
-  return errors_of(std::move(sums), fit_view_scale);
-}
-
-Fit::HeldOut Fit::predict_held_out(bool fit_view_scale) const {
-  const std::vector<int>& views = measurement_.held_out;
-  HeldOut found{.errors = {},
-                .views = predict(views, std::vector<measurement::ViewModel>(views.size()))};
-  std::vector<measurement::ViewSums> sums;
-  for (const measurement::PredictedView& view : found.views)
-    sums.push_back(measurement::sums_of(view, {}));
-  found.errors = errors_of(std::move(sums), fit_view_scale);
-  apply_models(found.errors.models, found.views);
-  return found;
-}
-
-// Returns the errors of the held-out views from the sums over all of their rays.
-measurement::ViewErrors Fit::errors_of(std::vector<measurement::ViewSums> held_out,
-                                       bool fit_view_scale) const {
-  return measurement::view_errors(measurement_.held_out, {std::move(held_out)},
-                                  binned_->noise_weights(), fit_view_scale || has_free_offsets());
-}
-
-std::vector<measurement::PredictedView> Fit::predict(
-    std::span<const int> views, std::span<const measurement::ViewModel> models) const {
-  if (filters_.transfers.empty()) return objective_->predict(views, models);
-  auto predicted = project(views);
-  measurement::filter_predictions(filters_.transfers, views, predicted, processes());
-  apply_models(models, predicted);
-  return predicted;
-}
-
-std::vector<measurement::PredictedView> Fit::project(std::span<const int> views) const {
-  return objective_->predict(views, std::vector<measurement::ViewModel>(views.size()));
-}
-
 void Fit::run(const AfterStep& after_step) {
   while (!is_done()) {
     const auto before = processes().traffic();
@@ -370,11 +307,6 @@ void Fit::run(const AfterStep& after_step) {
     const bool may_stop = filters_.empty() || needs_surrogates() || is_done();
     if (may_stop && !after_step(*this)) return;
   }
-}
-
-std::int64_t Fit::last_stop_before(std::int64_t step) const {
-  const std::int64_t last = step - 1;
-  return filters_.empty() ? last : last - last % steps_per_epoch() % steps_of_surrogates();
 }
 
 // Returns the views of a step: a subset of interleaved views, which covers the tilt range evenly.
@@ -413,31 +345,6 @@ void Fit::follow_noise() {
   const measurement::SlabViews::Shape& shape = binned_->rays->shape();
   filters_.noise.emplace(shape.width, shape.num_rows);
   surrogates_.reset();
-}
-
-// Returns after how many steps surrogates are made anew, and in any case after an epoch.
-int Fit::steps_of_surrogates() const { return steps_of_surrogates_in(steps_per_epoch()); }
-
-bool Fit::needs_surrogates() const {
-  const std::int64_t in_epoch = progress_.step % steps_per_epoch();
-  return !filters_.empty() && (!surrogates_ || in_epoch % steps_of_surrogates() == 0);
-}
-
-// Makes the surrogates of the views of the next steps from the present field.
-void Fit::make_surrogates() {
-  const base::TraceSpan span("make surrogate views");
-  std::vector<int> views;
-  const std::int64_t left = steps_per_epoch() - progress_.step % steps_per_epoch();
-  for (std::int64_t s = 0; s < std::min<std::int64_t>(steps_of_surrogates(), left); ++s)
-    std::ranges::copy(views_of_step(progress_.step + s), std::back_inserter(views));
-  surrogates_.reset();  // its successor needs the memory
-  surrogates_.emplace(*binned_->rays, views, progress_.views);
-  const auto at_once = std::max<std::size_t>(
-      1, kPredictionBytes / measurement::bytes_of_prediction(binned_->rays->shape()));
-  for (std::size_t first = 0; first < views.size(); first += at_once) {
-    const auto some = std::span(views).subspan(first, std::min(at_once, views.size() - first));
-    surrogates_->set(filters_, some, project(some), processes());
-  }
 }
 
 void Fit::take_step() {
@@ -480,14 +387,6 @@ void Fit::limit_spikes() {
 bool Fit::residuals_are_noise() const {
   const std::int64_t epochs_done = progress_.step / steps_per_epoch();
   return stage().bin == 1 && epochs_done > stage().first_epoch && 2 * epochs_done >= num_epochs();
-}
-
-void Fit::score_held_out() {
-  const base::TraceSpan span("score held-out views");
-  const measurement::ViewErrors error = held_out_error();
-  for (std::size_t i = 0; i < error.views.size(); ++i)
-    progress_.views[static_cast<std::size_t>(error.views[i])] = error.models[i];
-  progress_.held_out_error.push_back(error.total);
 }
 
 // Says whether the transfers of the views take their means away, so that no density explains them.
@@ -535,25 +434,6 @@ void Fit::end_epoch() {
   if (tree_updates_.update(epochs_done, *field_, optimizer_.state(), progress_.tree)) follow_tree();
   if (epochs_done > 0 && epochs_done == stage().first_epoch) refine();
   follow_noise();
-}
-
-std::size_t surrogate_memory(const measurement::SlabViews::Shape& own,
-                             const measurement::SlabViews::Shape& all, int steps_an_epoch,
-                             int slabs_in_use) {
-  // A view that is filtered: its copy, its residual, the extended image and two spectra.
-  constexpr std::size_t kImagesOfFilter = 8;
-  const int steps = steps_of_surrogates_in(steps_an_epoch);
-  measurement::SlabViews::Shape surrogates = own;
-  surrogates.num_views = (own.num_views * static_cast<std::size_t>(steps) +
-                          static_cast<std::size_t>(steps_an_epoch) - 1) /
-                         static_cast<std::size_t>(steps_an_epoch);
-  const std::size_t of_view = measurement::bytes_of_prediction(all);
-  const std::size_t predicted =
-      std::max(of_view, std::min(kPredictionBytes, surrogates.num_views * of_view));
-  const std::size_t filtering =
-      static_cast<std::size_t>(base::thread_count()) * (kImagesOfFilter / 2) * of_view;
-  return measurement::SlabViews::resident_memory(surrogates, slabs_in_use) + predicted + filtering +
-         all.num_views * microscope::ViewFilter::kMostKept;
 }
 
 }  // namespace tomofield::fit

@@ -41,7 +41,7 @@ std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
 
 // Adds the stages of the learned prior. A few epochs are enough: the field is near its end.
 void add_learned_prior(const FitOptions& fit, std::vector<Stage>& stages) {
-  constexpr int kPartOfEpochs = 2, kLeastEpochs = 2, kMostEpochs = 10;
+  constexpr int kPartOfEpochs = 2, kLeastEpochs = 2, kMostEpochs = 10, kAnswerEpochs = 3;
   constexpr double kAnswerRate = 0.2;  // a larger first step would leave the answer
   Stage light = stages.back();
   light.first_epoch += light.epochs;
@@ -53,7 +53,7 @@ void add_learned_prior(const FitOptions& fit, std::vector<Stage>& stages) {
   if (fit.prior == Prior::kLight) return;
   Stage answer = light;
   answer.first_epoch += light.epochs;
-  answer.epochs = 1;
+  answer.epochs = std::min(light.epochs, kAnswerEpochs);
   answer.first_rate = fit.learning_rate * kAnswerRate;
   answer.has_answer = true;
   stages.push_back(answer);

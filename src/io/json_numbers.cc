@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 #include <string>
 
@@ -34,7 +35,24 @@ double number_in(const json& value, const char* key, double low, double high) {
       fmt::format("'{}' is {}, not a number from {} to {}", key, text_of(value), low, high));
 }
 
+// Says where a document stops to be JSON.
+std::string place_text(std::string_view text, std::size_t byte) {
+  const std::string_view before = text.substr(0, byte > 0 ? byte - 1 : 0);
+  const auto line = 1 + std::ranges::count(before, '\n');
+  const std::size_t column = before.size() - (before.rfind('\n') + 1) + 1;
+  return fmt::format("it is no JSON from line {}, column {} on", line, column);
+}
+
 }  // namespace
+
+std::string fault_text(const json::exception& fault) {
+  constexpr int kKeyNotFound = 403;
+  const std::string said = fault.what();
+  const std::size_t key = said.find('\''), end = said.rfind('\'');
+  if (fault.id == kKeyNotFound && key < end)
+    return fmt::format("there is no '{}'", quote(said.substr(key + 1, end - key - 1)));
+  return "an entry is of another kind than tomofield writes there";
+}
 
 json parse_json(std::string_view text) {
   const auto refuse_depth = [](int depth, json::parse_event_t, json&) {
@@ -44,8 +62,10 @@ json parse_json(std::string_view text) {
   };
   try {
     return json::parse(text.begin(), text.end(), refuse_depth);
-  } catch (const json::exception& error) {
-    throw Error(quote(error.what()));
+  } catch (const json::parse_error& error) {
+    throw Error(place_text(text, error.byte));
+  } catch (const json::exception&) {
+    throw Error("it has a number that is too large");
   }
 }
 

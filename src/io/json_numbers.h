@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -14,6 +15,10 @@ namespace tomofield::io {
 /// Parses a document. Refuses one that is nested deeper than any that tomofield writes, because
 /// copying it would need more stack than there is.
 nlohmann::json parse_json(std::string_view text);
+
+/// Says in a clause what is wrong with a document in which the JSON library found another entry
+/// than it was asked for.
+std::string fault_text(const nlohmann::json::exception& fault);
 
 /// Reads and parses a file as parse_json() does. Throws Error also for a file that is not regular,
 /// or is larger than any that tomofield writes.

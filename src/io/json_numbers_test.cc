@@ -42,6 +42,24 @@ TEST(JsonNumbers, DamagedAndDeeplyNestedDocumentsAreRefused) {
     EXPECT_THROW(parse_json(text), Error) << text.substr(0, 20);
 }
 
+TEST(JsonNumbers, FaultsOfADocumentAreSaidInPlainWords) {
+  const std::string broken = message_of<Error>([] { parse_json("{\n \"a\": 1,\n}"); });
+  EXPECT_EQ(broken, "it is no JSON from line 3, column 1 on");
+  const auto fault_of = [](const auto& read) {
+    try {
+      read(parse_json(R"({"a": 1})"));
+    } catch (const nlohmann::json::exception& fault) {
+      return fault_text(fault);
+    }
+    return std::string();
+  };
+  EXPECT_EQ(fault_of([](const auto& object) { object.at("it's"); }), "there is no 'it's'");
+  for (const auto& said :
+       {fault_of([](const auto& object) { object.at("a").at("b"); }),
+        fault_of([](const auto& object) { object.at("a").template get<std::string>(); })})
+    EXPECT_NE(said.find("another kind"), std::string::npos) << said;
+}
+
 TEST(JsonNumbers, OnlyRegularFilesOfFairSizeAreRead) {
   const testing::ScratchDirectory scratch;
   EXPECT_EQ(read_json(scratch.write("a.json", "[1]"))[0], 1);

@@ -47,11 +47,10 @@ double variation_weight(const TermContext& c) {
 }
 
 // The views measure fine detail of a voxel with a precision of about their number over the variance
-// of a ray. The answer of the prior counts as much as a part of them.
+// of a ray. The answer of the prior counts as much as all of them.
 double pull_weight(const TermContext& c, double noise) {
-  constexpr double kPartOfViews = 10;  // from 3 on it changes nothing (docs/prior.md)
   const auto num_views = static_cast<double>(c.full.num_fitted_views());
-  return kPartOfViews * num_views / (noise * noise);
+  return num_views / (noise * noise);
 }
 
 // A jump at a face counts like total variation: density times area. Faces and the Fourier prior

@@ -261,8 +261,6 @@ constexpr Row kRows[] = {
                   "by three standard errors and by 1 %; else smooth",
      .help = "Kind of total variation: concave keeps edges sharp, smooth is the standard one"},
     {.key = "fit.prior", .flag = "--prior", MEMBER(Options, prior), .group = Group::kFit,
-     .automatic = "learned where it can be and trials choose the weight, unless views that were left "
-                  "out speak against it; else tv",
      .help = "learned: end the fit with a prior that simulated tilt series taught, for plain vertices "
              "a pixel apart. tv: total variation alone. light: little of it, as the training needs",
      .is_common = true},

@@ -180,12 +180,6 @@ TrialSettings choose_spike_rank(const TrialSettings& start, FitTrials& trials) {
                                                                                     : start;
 }
 
-TrialSettings choose_prior(const TrialSettings& start, FitTrials& trials) {
-  TrialSettings learned = start;
-  learned.prior = Prior::kLearned;
-  return trials.first_as_good({learned, start}, kClearErrors);
-}
-
 TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings& open,
                                  FitTrials& trials) {
   if (!open.view_scale && !open.background && !open.beads) return start;
@@ -209,7 +203,7 @@ TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings&
 
 int usual_trials(const OpenSettings& open) {
   const int corrections = open.view_scale + open.background + open.beads;
-  if (open.variation) return 4 + open.spikes + 2 * open.prior + corrections;
+  if (open.variation) return 4 + open.spikes + corrections;
   return corrections > 0 ? 1 + corrections : 0;
 }
 

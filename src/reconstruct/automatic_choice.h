@@ -8,11 +8,10 @@ namespace tomofield::reconstruction {
 struct OpenSettings {
   bool variation = false;   ///< penalty and weight of total variation
   bool spikes = false;      ///< the limit of isolated vertices
-  bool prior = false;       ///< whether the fit ends with the learned prior
   bool view_scale = false;  ///< scales and offsets of the views
   bool background = false;  ///< subtraction of the series' background
   bool beads = false;       ///< masks of the beads that were found
-  bool any() const { return variation || spikes || prior || view_scale || background || beads; }
+  bool any() const { return variation || spikes || view_scale || background || beads; }
   bool operator==(const OpenSettings&) const = default;
 };
 
@@ -46,10 +45,6 @@ TrialSettings choose_variation(const TrialSettings& start, FitTrials& trials);
 /// three standard errors and by 1 %, as where the peaks of atoms are as narrow as a vertex. Concave
 /// fits keep the limit, which they need on every yardstick.
 TrialSettings choose_spike_rank(const TrialSettings& start, FitTrials& trials);
-
-/// Chooses whether the fit ends with the learned prior: not if the views that trials leave out are
-/// predicted clearly worse with it. What a prior adds that is not there makes them worse.
-TrialSettings choose_prior(const TrialSettings& start, FitTrials& trials);
 
 /// Chooses the corrections of the views that are open, each by trials that differ in it alone.
 /// Scales are fitted if that is clearly better. Beads are masked unless a fit to them is clearly

@@ -15,6 +15,7 @@
 #include "distributed/gathered_arrays.h"
 #include "io/json_numbers.h"
 #include "option_table/rows.h"
+#include "reconstruct/denoise_dial.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
@@ -286,6 +287,7 @@ std::string fingerprint_of(const ReconstructOptions& options,
   for (const char* of_results : {"budget", "tile_rows"})  // they change no stage of the fit
     json["field"].erase(of_results);
   json["fit"].erase("split_tilts");  // the views of a half tell it apart
+  json["fit"]["denoise"] = denoise_factor(options.resolved.denoise);  // "strong" and "2" are one
   json["tilt_deg"] = series.geometry.tilt_deg;
   if (series.ray_geometry) json["alignment"] = alignment_json(*series.ray_geometry);
   json["bin_factor"] = series.bin_factor;
@@ -340,13 +342,13 @@ std::optional<TunedFit> stored_choice(const std::filesystem::path& path) {
   const output::TrainingState state = output::load_training(path);
   const auto tuning = state.integers.find("tuning");
   if (tuning == state.integers.end()) return std::nullopt;
-  const auto refuse = [&](const char* reason) {
+  const auto refuse = [&](const std::string& reason) {
     return Error(fmt::format("'{}' is damaged: its tuning ({})", path.string(), reason));
   };
   try {
     return tuned_from(io::parse_json(as_text(tuning->second)));
   } catch (const nlohmann::json::exception& error) {
-    throw refuse(error.what());
+    throw refuse(io::fault_text(error));
   } catch (const Error& error) {
     throw refuse(error.what());
   }

@@ -61,8 +61,7 @@ void draw_section(const DialTrial& shown, double output_scale, const report::Gre
                   {grey, grey, grey});
     }
   }
-  report::draw_text(canvas, 0, bottom + height * zoom + kTextAboveSection_px,
-                    fmt::format("Weight {:.3g}: {}", shown.trial->settings.variation, shown.place),
+  report::draw_text(canvas, 0, bottom + height * zoom + kTextAboveSection_px, caption_of(shown),
                     kBlack);
 }
 
@@ -92,11 +91,21 @@ std::vector<DialTrial> dial_trials(const TunedFit& tuned) {
   std::set<const FitTrial*> different;
   for (const Place& place : kPlaces) {
     const FitTrial* const trial = nearest_trial(tuned, place.factor * tuned.settings.variation);
-    found.push_back({place.name, trial});
+    if (trial == nullptr) return {};
+    found.push_back({place.name, trial, trial->settings.variation / tuned.settings.variation});
     different.insert(trial);
   }
-  if (different.contains(nullptr) || different.size() < std::size(kPlaces)) return {};
+  if (different.size() < std::size(kPlaces)) return {};
   return found;
+}
+
+std::string caption_of(const DialTrial& shown) {
+  const double of_place = denoise_factor(shown.place);
+  const std::string factor = fmt::format("{:.2g}", shown.factor);
+  if (factor == fmt::format("{:.2g}", of_place))
+    return fmt::format("Factor {}: {}", factor, shown.place);
+  return fmt::format("Factor {}: {} than {} ({:.2g})", factor,
+                     shown.factor < of_place ? "lighter" : "stronger", shown.place, of_place);
 }
 
 void write_dial_picture(const TunedFit& tuned, double output_scale,

@@ -17,6 +17,7 @@ double denoise_factor(const std::string& text);
 struct DialTrial {
   std::string place;      ///< "light", "medium", "strong"
   const FitTrial* trial;  ///< of the search that chose the settings
+  double factor;          ///< its weight over the chosen one, as --denoise takes it
 };
 
 /// Returns the trials that show what the dial does: those with the chosen penalty and corrections
@@ -24,8 +25,12 @@ struct DialTrial {
 /// three different trials. `tuned` must outlive the result.
 std::vector<DialTrial> dial_trials(const TunedFit& tuned);
 
+/// Says which factor of --denoise a trial shows, and how that compares with the factor of its
+/// place: "Factor 0.33: lighter than light (0.5)".
+std::string caption_of(const DialTrial& shown);
+
 /// Draws the sections of these trials under each other in one scale of greys, the contrast of the
-/// medium one (report/contrast.h), each with its place and weight. Densities are multiplied by
+/// medium one (report/contrast.h), each with its caption_of(). Densities are multiplied by
 /// `output_scale`, so that greys are those of the tomogram. Replaces the file. Removes it and
 /// returns without a picture if dial_trials() has none, or if one of them has no section.
 void write_dial_picture(const TunedFit& tuned, double output_scale,

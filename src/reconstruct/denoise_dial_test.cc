@@ -54,6 +54,17 @@ TEST(DialTrials, HaveTheWeightsNearestToThoseOfThePlaces) {
   EXPECT_EQ(shown[2].trial, &tuned.trials[1]);
 }
 
+TEST(DialTrials, SayWhichFactorTheyShow) {
+  const FitTrial trial = trial_of(Penalty::kSmooth, 5);
+  EXPECT_EQ(caption_of({"light", &trial, 0.5}), "Factor 0.5: light");
+  EXPECT_EQ(caption_of({"light", &trial, 0.333}), "Factor 0.33: lighter than light (0.5)");
+  EXPECT_EQ(caption_of({"medium", &trial, 1.064}), "Factor 1.1: stronger than medium (1)");
+  EXPECT_EQ(caption_of({"strong", &trial, 1.004 * 2}), "Factor 2: strong");
+  const std::vector<DialTrial> shown = dial_trials(tuned_to(Penalty::kSmooth, 4.5));
+  ASSERT_EQ(shown.size(), 3U);
+  EXPECT_DOUBLE_EQ(shown[0].factor, 2.8 / 4.5);
+}
+
 TEST(DialTrials, AreNoneIfTheyAreNotThree) {
   EXPECT_TRUE(dial_trials(tuned_to(Penalty::kConcave, 14)).empty());
   EXPECT_TRUE(dial_trials(tuned_to(Penalty::kSmooth, 9)).empty());  // nothing stronger was tried

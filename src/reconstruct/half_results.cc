@@ -17,6 +17,7 @@
 #include "output/volume.h"
 #include "reconstruct/choice_plot.h"
 #include "reconstruct/half_measurement.h"
+#include "reconstruct/stale_files.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
 
@@ -186,6 +187,7 @@ void write_all(const tilt_series::TiltSeries& series, const Run& run, const Fini
   results.metrics["halves"] = halves_json(run, fits, found);
   io::write_json(run.paths.json, results.metrics);
   if (run.hooks.write_more) run.hooks.write_more(results, outputs.location_of(run.paths.volume));
+  remove_stale_files(run.options, outputs);
   outputs.commit();
   log_halves(run, found.fsc);
 }

@@ -58,7 +58,7 @@ fit::FitOptions fit_options(const Options& options) {
   fit.noise_model = options.noise_model;
   fit.fit_view_scale = options.fit_view_scale.value_or(fit.fit_view_scale);
   fit.seed = options.seed;
-  fit.prior = options.prior.value_or(fit.prior);
+  fit.prior = options.prior;
   fit.hold_out = options.hold_out;
   fit.patience = options.patience;
   return fit;
@@ -132,7 +132,7 @@ std::vector<std::filesystem::path> result_files(const ReconstructOptions& option
   if (options.fit.hold_out > 0) results.push_back(paths.held_out_picture);
   if (options.makes_halves()) add_half_files(paths, resolved.denoising_halves, results);
   if (resolved.tune || options.open.any()) results.push_back(paths.choice_picture);
-  if (resolved.tune || options.open.variation) results.push_back(paths.dial_picture);
+  if (options.chooses_weight()) results.push_back(paths.dial_picture);
   for (const auto& file : exchange_files(options)) results.push_back(file);
   return results;
 }
@@ -158,7 +158,6 @@ ReconstructOptions run_options(const SeriesFiles& files, const Options& requeste
   const bool is_bright = run.resolved.contrast == Contrast::kBright;
   run.open = {.variation = !run.resolved.penalty,
               .spikes = !run.resolved.penalty && !requested.spike_rank,
-              .prior = !run.resolved.penalty && !requested.prior && may_learn(run.resolved),
               .view_scale = !requested.fit_view_scale,
               .background = is_bright && !requested.black_level,
               .beads = is_bright && !requested.bead_diameter_nm};
@@ -167,7 +166,6 @@ ReconstructOptions run_options(const SeriesFiles& files, const Options& requeste
     run.resolved.penalty = fit::FitOptions{}.penalty;
     choose_variation(run.resolved);
   }
-  if (!run.resolved.prior) run.resolved.prior = run.open.prior ? Prior::kLearned : Prior::kTv;
   run.input = output::series_options(files, run.resolved);
   run.specimen = output::specimen_options(run.resolved);
   run.field = field_options(run.resolved);
@@ -237,6 +235,10 @@ std::vector<std::string> ReconstructOptions::faults() const {
   refuse_if(fit.prior != Prior::kTv && !may_learn(resolved),
             "--prior learned works on plain vertices a pixel apart: it needs --field grid, --tree "
             "uniform, --vertex-spacing 1 and --engine slab, and no --budget");
+  refuse_if(resolved.density_variation == 0.0 && !chooses_weight() &&
+                resolved.denoise != Options().denoise,
+            "--denoise multiplies the weight of total variation, and --tv 0 turns that off: leave "
+            "one of them out");
   refuse_if(fit.patience > 0 && fit.hold_out == 0,
             "--early-stop watches views that --hold-out keeps from the fit: give that as well");
   refuse_if(fit.hold_out > 0 && is_ray,
@@ -309,7 +311,7 @@ std::vector<std::string> ReconstructOptions::faults_of_job() const {
         "several processes cannot share {} yet: start one, with more --threads", option));
   };
   if (field.tree == TreeKind::kAdaptive) refuse("--tree adaptive");
-  if (fit.prior != Prior::kTv && !open.prior) refuse("--prior learned");
+  if (fit.prior != Prior::kTv) refuse("--prior learned");
   if (fit.engine == Engine::kRay) refuse("--engine ray");
   if (resolved.denoising_halves) refuse("--denoising-halves");
   if (!resolved.budget.empty()) refuse("--budget");

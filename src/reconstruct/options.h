@@ -71,6 +71,8 @@ struct ReconstructOptions {
   bool makes_halves() const { return (files.even && files.odd) || resolved.split_tilts; }
   /// Says whether the run may be fitted by tiles, whose codes it keeps in a file.
   bool may_use_tiles() const { return !resolved.budget.empty() && resolved.tile_rows != 0; }
+  /// Says whether trials choose the weight of total variation, which --denoise multiplies.
+  bool chooses_weight() const { return resolved.tune || open.variation; }
   /// Says whether the fit filters views, which mixes their rows.
   bool filters_views() const {
     return measurement::wants_transfers(files, resolved) ||

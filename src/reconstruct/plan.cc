@@ -159,15 +159,20 @@ void require_memory(const RunPlan& plan, const distributed::Communicator& proces
                        "fewer --threads, or --budget, which fits tiles and makes them compact");
 }
 
+RunPlan require_possible_run(const tilt_series::TiltSeries& series,
+                             const ReconstructOptions& options,
+                             const distributed::Communicator& processes) {
+  RunPlan plan = plan_run(series, options, processes);
+  require_memory(plan, processes);
+  require_few_vertices(plan);
+  return plan;
+}
+
 void check_before_alignment(const ReconstructOptions& options,
                             const distributed::Communicator& processes) {
   if (options.resolved.align == Alignment::kOff) return;
   const tilt_series::TiltSeries series = planned_series(options, processes);
-  processes.run_collectively([&] {
-    const RunPlan plan = plan_run(series, options, processes);
-    require_memory(plan, processes);
-    require_few_vertices(plan);
-  });
+  processes.run_collectively([&] { require_possible_run(series, options, processes); });
 }
 
 void check_alignment_alone(const ReconstructOptions& options) {

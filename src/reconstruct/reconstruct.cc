@@ -78,7 +78,6 @@ void apply(const TrialSettings& settings, Run& run) {
   if (options.open.view_scale)
     resolved.fit_view_scale = options.fit.fit_view_scale = settings.fits_view_scale;
   if (options.open.spikes) resolved.spike_rank = options.fit.spike_rank = settings.spike_rank;
-  if (options.open.prior) resolved.prior = options.fit.prior = settings.prior;
   if (run.options.open.background) {
     resolved.black_level =
         settings.background_part * run.measurement.background * run.measurement.unit;
@@ -100,15 +99,10 @@ void turn_the_dial(ReconstructOptions& options) {
 }
 
 // Shows what the dial does. A resumed run keeps the picture of its first session: the trials that
-// it reads have no sections. Another run removes the picture of an earlier one.
+// it reads have no sections.
 void show_dial(const Run& run, const std::optional<TunedFit>& tuned) {
   if (!run.writes_files() || !run.processes.is_root()) return;
-  if (tuned && tuned->trials.front().section.values.empty()) return;
-  if (!tuned) {
-    std::error_code ignored;
-    std::filesystem::remove(run.paths.dial_picture, ignored);
-    return;
-  }
+  if (!tuned || tuned->trials.front().section.values.empty()) return;
   const double sign = run.options.input.contrast == Contrast::kDark ? -1 : 1;
   write_dial_picture(*tuned, run.options.volume.invert ? -sign : sign, run.paths.dial_picture);
 }
@@ -132,21 +126,11 @@ bool choose_settings(Run& run, std::optional<TunedFit>& tuned) {
   return true;
 }
 
-// Several processes cannot share the learned prior yet: its network would need rows of others.
-ReconstructOptions options_of_job(ReconstructOptions options,
-                                  const distributed::Communicator& processes) {
-  if (processes.size() == 1 || !options.open.prior) return options;
-  base::log_info("several processes: the fit ends with total variation alone (--prior tv)");
-  options.open.prior = false;
-  options.resolved.prior = options.fit.prior = Prior::kTv;
-  return options;
-}
-
 Run begin_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
               const ReconstructHooks& hooks, const distributed::Communicator& processes) {
   return {.hooks = hooks,
           .processes = processes,
-          .options = options_of_job(options, processes),
+          .options = options,
           .paths = output_paths(options.resolved.output),
           .measurement = prepare(series, options, processes)};
 }

@@ -93,9 +93,14 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions
 void require_memory(const RunPlan& plan, const distributed::Communicator& processes =
                                              distributed::Communicator::alone());
 
+/// Returns plan_run(), and throws Error also as require_memory() and require_few_vertices() do.
+RunPlan require_possible_run(
+    const tilt_series::TiltSeries& series, const ReconstructOptions& options,
+    const distributed::Communicator& processes = distributed::Communicator::alone());
+
 /// Checks a run with --align before its views are aligned, which takes long: throws Error as
-/// plan_run(), require_memory() and require_few_vertices() do. Reads no view. Does nothing for a
-/// run without --align. Every process calls it.
+/// require_possible_run() does. Reads no view. Does nothing for a run without --align. Every
+/// process calls it.
 void check_before_alignment(
     const ReconstructOptions& options,
     const distributed::Communicator& processes = distributed::Communicator::alone());

@@ -18,10 +18,9 @@ using nlohmann::json;
 using option_table::Row;
 
 // The options that trials may choose: the last two with --tune alone.
-constexpr std::array<std::string_view, 9> kOfTrials{
-    "fit.penalty", "fit.density_variation", "fit.fit_view_scale",     "fit.spike_rank",
-    "fit.prior",   "input.black_level",     "input.bead_diameter_nm", "fit.epochs",
-    "field.rank"};
+constexpr std::array<std::string_view, 8> kOfTrials{
+    "fit.penalty",       "fit.density_variation",  "fit.fit_view_scale", "fit.spike_rank",
+    "input.black_level", "input.bead_diameter_nm", "fit.epochs",         "field.rank"};
 
 constexpr const char* kNoValue = "–";
 

@@ -29,6 +29,7 @@
 #include "output/volume.h"
 #include "reconstruct/choice_plot.h"
 #include "reconstruct/judge.h"
+#include "reconstruct/stale_files.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
 
@@ -275,6 +276,7 @@ void write_together(const ResultFiles& files, io::OutputSet& outputs, Results& r
     processes.run_collectively([&] {
       if (!processes.is_root()) return;
       if (files.write_more) files.write_more(results, outputs.location_of(paths.volume));
+      remove_stale_files(files.options, outputs);
       outputs.commit();
     });
   } catch (...) {

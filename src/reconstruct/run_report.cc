@@ -285,10 +285,20 @@ void add_alignment(const json& metrics, HtmlPage& page) {
     page.add_svg(report::curve_plot_svg(plot.axes, plot.curves), "");
 }
 
+// Says why no section shows what another place of the dial would do.
+const char* why_no_dial(const Options& requested) {
+  if (requested.penalty || requested.density_variation)
+    return "No sections show what --denoise would do: the weight of total variation was given to "
+           "this run (by --tv, --tv-penalty, or a batch that chose once for all its series), so it "
+           "tried no others.";
+  return "No sections show what --denoise would do: this run has no trials with three weights near "
+         "half of the chosen one, the chosen one, and twice it.";
+}
+
 // Shows what another place of the dial would do.
 void add_dial(const ReportSource& source, HtmlPage& page) {
-  if (!source.dial_picture) return;
   page.add_heading("Lighter or stronger denoising");
+  if (!source.dial_picture) return page.add_paragraph(why_no_dial(source.requested));
   page.add_paragraph(fmt::format(
       "The same section from three short fits. This run was made with --denoise {}. Where the "
       "strong one loses what you want to see, give --denoise light; where the medium one is too "
@@ -296,8 +306,8 @@ void add_dial(const ReportSource& source, HtmlPage& page) {
       "smoother than these.",
       source.record.at("options").at("fit").at("denoise").get<std::string>()));
   page.add_figures({{*source.dial_picture,
-                     "The trials whose weights are nearest to half of the "
-                     "chosen one, to the chosen one, and to twice it"}},
+                     "The trials whose weights are nearest to half of the chosen one, to the "
+                     "chosen one, and to twice it. --denoise takes the factors"}},
                    report::FigureSize::kLarge);
 }
 

@@ -39,7 +39,7 @@ class TrialFits::Running {
     options.density_variation = settings_.variation;
     options.epochs = settings_.epochs;
     options.spike_rank = settings_.spike_rank;
-    options.prior = settings_.prior;
+    options.prior = Prior::kTv;  // the weight that trials choose is that of total variation
     options.fit_view_scale = settings_.fits_view_scale;
     options.patience = 0;
     options.scores_epochs = false;

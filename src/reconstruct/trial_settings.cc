@@ -25,8 +25,6 @@ constexpr std::int64_t kMostOfAnything = 1000000000;
 TrialSettings settings_from(const json& entry) {
   const auto penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>());
   if (!penalty) throw Error("'tv_penalty' is no penalty");
-  const auto prior = base::enum_named<Prior>(entry.value("prior", "tv"));
-  if (!prior) throw Error("'prior' is no prior");
   return {.penalty = *penalty,
           .variation = io::number_at(entry, "tv", 0, base::kLargestNumber),
           .rank = static_cast<int>(io::integer_at(entry, "rank", 1, kMostOfAnything)),
@@ -35,8 +33,7 @@ TrialSettings settings_from(const json& entry) {
           .background_part = io::number_at(entry, "background_part", 0, 1),
           .masks_beads = entry.at("masks_beads"),
           .spike_rank =
-              static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank)),
-          .prior = *prior};
+              static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank))};
 }
 
 // Says whether settings are equal. Weights may differ by rounding.
@@ -91,8 +88,6 @@ std::string describe(const TrialSettings& settings, const TrialSettings& usual) 
   if (settings.spike_rank != usual.spike_rank)
     text += settings.spike_rank == 0 ? std::string(", spikes kept")
                                      : fmt::format(", spike rank {}", settings.spike_rank);
-  if (settings.prior != usual.prior)
-    text += fmt::format(", prior {}", base::name_of(settings.prior));
   if (settings.background_part != usual.background_part)
     text += fmt::format(", {:.0f} % of the background subtracted", 100 * settings.background_part);
   return text;
@@ -106,8 +101,7 @@ json settings_json(const TrialSettings& s) {
           {"view_scale", s.fits_view_scale},
           {"background_part", s.background_part},
           {"masks_beads", s.masks_beads},
-          {"spike_rank", s.spike_rank},
-          {"prior", base::name_of(s.prior)}};
+          {"spike_rank", s.spike_rank}};
 }
 
 FitTrial trial_from(const json& entry) {

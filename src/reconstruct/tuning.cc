@@ -143,8 +143,7 @@ std::optional<TunedFit> tune(const measurement::Measurement& measurement,
   const std::optional<TunedFit> tuned = searched(fits, &file, [&](FitTrials& trials) {
     TrialSettings best = search_settings(start, space, trials);
     if (open.spikes) best = choose_spike_rank(best, trials);
-    best = choose_corrections(best, open, trials);
-    return open.prior ? choose_prior(best, trials) : best;
+    return choose_corrections(best, open, trials);
   });
   if (!tuned) return std::nullopt;
   log_trials(*tuned);
@@ -174,8 +173,7 @@ std::optional<TunedFit> choose_by_short_trials(const measurement::Measurement& m
   std::optional<TunedFit> tuned = searched(fits, nullptr, [&](FitTrials& trials) {
     TrialSettings best = open.variation ? choose_variation(start, trials) : start;
     if (open.spikes) best = choose_spike_rank(best, trials);
-    best = choose_corrections(best, open, trials);
-    return open.prior ? choose_prior(best, trials) : best;
+    return choose_corrections(best, open, trials);
   });
   if (!tuned) return std::nullopt;
   log_trials(*tuned);

@@ -65,8 +65,8 @@ TrialFile::TrialFile(std::filesystem::path path, std::string fingerprint, bool r
       trials_.push_back(trial);
     }
   } catch (const json::exception& error) {
-    throw Error(fmt::format("cannot resume: '{}' is damaged ({}); {}", path_.string(), error.what(),
-                            advice));
+    throw Error(fmt::format("cannot resume: '{}' is damaged ({}); {}", path_.string(),
+                            io::fault_text(error), advice));
   } catch (const Error& error) {
     throw Error(fmt::format("cannot resume: '{}' is damaged ({}); {}", path_.string(), error.what(),
                             advice));

@@ -316,53 +316,50 @@ void write_exposures(const OutputFiles& files, const std::vector<SimulatedView>&
   io::write_mdoc(files.mdoc, mdoc);
 }
 
-}  // namespace
-
-SimulationSummary simulate_series(const fs::path& directory, const SimulationOptions& options,
-                                  bool overwrite) {
-  const auto faults = options.validate();
-  if (!faults.empty()) throw Error(fmt::format("cannot simulate: {}", fmt::join(faults, "; ")));
-  const auto views = plan_views(options);
+// Returns the options of the cell, which must be wide enough for the tilts of the views.
+CellOptions cell_options(const SimulationOptions& options,
+                         const std::vector<SimulatedView>& views) {
   CellOptions cell = options.cell;
   cell.max_tilt_deg = 0.0;
   for (const SimulatedView& view : views)
     cell.max_tilt_deg = std::max(cell.max_tilt_deg, std::abs(view.tilt_deg));
-  const std::optional<CryoSpecimen> specimen =
-      options.is_physical()
-          ? std::optional(make_cryo_specimen(cell, options.voxel_size_A, options.particle_files))
-          : std::nullopt;
-  std::optional<Phantom> cell_phantom;
-  const Phantom& phantom =
-      specimen ? specimen->phantom : cell_phantom.emplace(make_cell_phantom(cell));
-  const Phantom reference = options.reference_has_beads ? phantom : without_beads(phantom);
-  const OutputFiles files(directory, specimen ? specimen->kinds : std::vector<ParticleKind>());
-  const io::OutputFolder folder(directory);
-  const std::vector<io::OutputLock> locks = claim_files(files, overwrite);
-  io::OutputSet results;
+  return cell;
+}
 
+// Says what is simulated; `reference` is what the truth shows.
+SimulationSummary summary_of(const Phantom& phantom, const Phantom& reference,
+                             const std::vector<SimulatedView>& views,
+                             const SimulationOptions& options) {
   SimulationSummary summary;
   summary.num_beads = phantom.num_beads;
   summary.num_ellipsoids = static_cast<std::int64_t>(phantom.bodies.size()) - phantom.num_beads;
   summary.num_blobs = static_cast<std::int64_t>(phantom.blobs.size());
   summary.num_views = static_cast<std::int64_t>(views.size());
-  summary.empty_beam =
-      specimen ? electron_counts(options).behind_ice(0.0) : Detector(options).empty_beam();
-  if (!options.dose && !specimen) summary.sigma = noise_sigma(reference, views, options.noise);
-  // Files of an earlier run that this one does not replace would contradict the others.
-  if (options.write_truth)
-    summary.truth = write_truth(files.truth, reference, options);
-  else
-    results.remove_old(files.truth);
+  summary.empty_beam = options.is_physical() ? electron_counts(options).behind_ice(0.0)
+                                             : Detector(options).empty_beam();
+  if (!options.dose && !options.is_physical())
+    summary.sigma = noise_sigma(reference, views, options.noise);
+  return summary;
+}
+
+// Writes the stacks of views, and what can be found in a physical specimen.
+void write_stacks(const OutputFiles& files, const Phantom& phantom,
+                  const std::optional<CryoSpecimen>& specimen,
+                  const std::vector<SimulatedView>& views, const SimulationOptions& options,
+                  std::optional<double> sigma, io::OutputSet& results) {
   if (specimen) {
     write_counts(files, phantom, views, options);
     write_labels(files, *specimen, options);
-    summary.num_particles = std::ssize(specimen->particles);
-  } else {
-    write_views(files, phantom, views, options, summary.sigma);
-    for (const fs::path& file : {files.even, files.odd, files.membranes, files.particles})
-      results.remove_old(file);
+    return;
   }
-  remove_old_references(directory, files, results);
+  write_views(files, phantom, views, options, sigma);
+  for (const fs::path& file : {files.even, files.odd, files.membranes, files.particles})
+    results.remove_old(file);
+}
+
+// Writes the tables of angles, transforms, contrast transfer and exposures.
+void write_tables(const OutputFiles& files, const std::vector<SimulatedView>& views,
+                  const SimulationOptions& options, io::OutputSet& results) {
   write_angles(files.angles, views);
   if (options.misalignment.tilt_spread_deg > 0.0)
     write_recorded_angles(files.recorded_angles, views);
@@ -382,6 +379,38 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
     write_exposures(files, views, options);
   else
     results.remove_old(files.mdoc);
+}
+
+}  // namespace
+
+SimulationSummary simulate_series(const fs::path& directory, const SimulationOptions& options,
+                                  bool overwrite) {
+  const auto faults = options.validate();
+  if (!faults.empty()) throw Error(fmt::format("cannot simulate: {}", fmt::join(faults, "; ")));
+  const auto views = plan_views(options);
+  const CellOptions cell = cell_options(options, views);
+  std::optional<CryoSpecimen> specimen;
+  if (options.is_physical())
+    specimen = make_cryo_specimen(cell, options.voxel_size_A, options.particle_files);
+  std::optional<Phantom> cell_phantom;
+  const Phantom& phantom =
+      specimen ? specimen->phantom : cell_phantom.emplace(make_cell_phantom(cell));
+  const Phantom reference = options.reference_has_beads ? phantom : without_beads(phantom);
+  const OutputFiles files(directory, specimen ? specimen->kinds : std::vector<ParticleKind>());
+  const io::OutputFolder folder(directory);
+  const std::vector<io::OutputLock> locks = claim_files(files, overwrite);
+
+  // Files of an earlier run that this one does not replace would contradict the others.
+  io::OutputSet results;
+  SimulationSummary summary = summary_of(phantom, reference, views, options);
+  if (specimen) summary.num_particles = std::ssize(specimen->particles);
+  if (options.write_truth)
+    summary.truth = write_truth(files.truth, reference, options);
+  else
+    results.remove_old(files.truth);
+  write_stacks(files, phantom, specimen, views, options, summary.sigma, results);
+  remove_old_references(directory, files, results);
+  write_tables(files, views, options, results);
   io::write_json(files.record, phantom_json(options, phantom, views, summary));
   results.commit();
   return summary;

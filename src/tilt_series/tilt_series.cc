@@ -38,6 +38,10 @@ namespace {
 
 bool has_lower_tilt(const View& a, const View& b) { return a.tilt_deg < b.tilt_deg; }
 
+// Says whether a part of the contrast is that of phases, whose transfer puts fringes around beads.
+// Optics without it (microscope::without_phase_contrast()) are those of pure absorption.
+bool has_phase_contrast(const microscope::Optics& optics) { return optics.amplitude_contrast < 1; }
+
 std::optional<io::MrcReader> open_mask_of(const TiltSeriesOptions& options,
                                           const io::ImageStack& stack) {
   if (!options.mask) return std::nullopt;
@@ -346,7 +350,7 @@ struct TiltSeries::Impl {
                              const microscope::ViewTransfer* transfer) const {
     intensity.convert(&image);
     std::vector<MaskDisc> hidden = beads.discs[view];
-    if (transfer && transfer->optics.amplitude_contrast < 1.0) {  // there is a contrast transfer
+    if (transfer && has_phase_contrast(transfer->optics)) {
       const double pixel_A = plan.pixel_size_A * plan.bin_factor;
       hidden = subtract_beads(hidden, beads.metrics.bead_diameter_A / pixel_A, *transfer, &image);
     }

@@ -38,6 +38,18 @@ def read(folder, name):
         return json.load(file)
 
 
+def edit_choice(folder, **changes):
+    with open(os.path.join(folder, "choice.json"), "r+", encoding="utf-8") as file:
+        choice = {**json.load(file), **changes}
+        file.seek(0)
+        file.truncate()
+        json.dump(choice, file)
+
+
+def has_words(path, words):
+    return os.path.exists(path) and words in harness.read_bytes(path)
+
+
 def commands(folder):
     """Returns the words of each series' command by its name."""
     return {job["name"]: job["command"] for job in read(folder, "batch.json")["jobs"]}
@@ -148,6 +160,32 @@ def test_a_batch_that_goes_on_takes_the_stored_choice(data):
     assert b"resuming" in harness.read_bytes(log)
     assert harness.read_bytes(os.path.join(folder, "choice.json")) == stored
     assert commands(folder) == before and any(w.startswith("--tv=") for w in before[begun])
+    edit_choice(folder, tv=3.5)
+    os.remove(log)
+    edited = harness.start(*command, "--skip-existing")
+    while edited.poll() is None and not has_words(log, b"resuming"):
+        time.sleep(0.02)
+    edited.send_signal(signal.SIGTERM)
+    said, errors = edited.communicate(timeout=60)
+    assert has_words(log, b"resuming"), errors
+    assert f"began with: {begun}" in said
+    for name in NAMES:
+        assert (commands(folder)[name] == before[name]) == (name == begun), name
+        assert ("--tv=3.5" in commands(folder)[name]) == (name != begun), name
+
+
+def test_a_damaged_choice_is_refused_with_what_to_do(data, once):
+    folder = harness.fresh_directory("choice_damaged")
+    stored = read(once, "choice.json")
+    for damaged, fact in ((json.dumps({**stored, "votes": []}), "'votes'"),
+                          (json.dumps(stored)[:-1], "line 1")):
+        with open(os.path.join(folder, "choice.json"), "w", encoding="utf-8") as file:
+            file.write(damaged)
+        run = harness.tomofield("batch", *pattern(data), *OPEN, "--skip-existing", "-o", folder)
+        assert run.returncode == 2 and os.listdir(folder) == ["choice.json"], run.stderr
+        for part in ("choice.json", fact, "remove it"):
+            assert part in run.stderr, run.stderr
+        assert "exception" not in run.stderr, run.stderr  # the words of the JSON library
 
 
 def test_a_run_writes_what_its_trials_choose_and_does_not_fit(data):

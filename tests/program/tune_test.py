@@ -248,6 +248,23 @@ def test_the_dial_multiplies_a_weight_that_no_trial_chose(series):
         assert record(results)["metrics"]["tv_weight"] == 2 * weight
 
 
+def test_a_run_goes_on_with_the_same_dial_however_it_is_written(series):
+    results = series.reconstruct("dial_resumed", "--tv-penalty", "smooth", "--denoise", "strong")
+    command = ["reconstruct", *series.input, "-o", results.volume_path,
+               *harness.merge(harness.QUICK, ["--tv-penalty", "smooth"]), "--resume", "--denoise"]
+    harness.succeed(*command, "2")
+    refused = harness.tomofield(*command, "3")
+    assert refused.returncode == 2 and "--denoise" in refused.stderr, refused.stderr
+
+
+def test_a_dial_without_total_variation_is_refused(series):
+    output = os.path.join(harness.fresh_directory("dial_of_nothing"), "out.mrc")
+    run = harness.tomofield("reconstruct", *series.input, "-o", output, *harness.QUICK, "--tv", 0,
+                            "--denoise", "strong")
+    assert run.returncode == 2 and "--denoise" in run.stderr and "--tv 0" in run.stderr, run.stderr
+    assert not os.listdir(os.path.dirname(output))
+
+
 def test_a_wrong_word_of_the_dial_is_refused(series):
     output = os.path.join(harness.fresh_directory("dial_refused"), "out.mrc")
     run = harness.tomofield("reconstruct", *series.input, "-o", output, "--thickness", 24,

@@ -92,15 +92,16 @@ HWY_EXPORT(limit_row_of_any_rank);
 
 namespace {
 
-// Returns the vertex that stands for vertex `i`, which may be one beyond the lattice.
-int mirrored(int i, int n) { return n == 1 ? 0 : n - 1 - std::abs(n - 1 - std::abs(i)); }
+// Returns the vertex that stands for vertex `i`, which may be one beyond the lattice: its mirror
+// image about the outermost vertex, which is not repeated.
+int mirrored_about_ends(int i, int n) { return n == 1 ? 0 : n - 1 - std::abs(n - 1 - std::abs(i)); }
 
 // Copies the rows of a lattice, each with one mirrored vertex before it and one after it.
 void copy_mirrored(const LatticeShape& shape, const float* values, float* copy) {
   for (int row = 0; row < shape.nx * shape.nz; ++row, values += shape.ny, copy += shape.ny + 2) {
-    copy[0] = values[mirrored(-1, shape.ny)];
+    copy[0] = values[mirrored_about_ends(-1, shape.ny)];
     std::copy_n(values, shape.ny, copy + 1);
-    copy[shape.ny + 1] = values[mirrored(shape.ny, shape.ny)];
+    copy[shape.ny + 1] = values[mirrored_about_ends(shape.ny, shape.ny)];
   }
 }
 
@@ -116,8 +117,8 @@ void limit_spikes(const LatticeShape& shape, int rank, float* values) {
     for (int z = 0; z < shape.nz; ++z, values += shape.ny) {
       const float* rows[9];
       for (int i = 0; i < 9; ++i) {
-        const int at_x = mirrored(x + i / 3 - 1, shape.nx),
-                  at_z = mirrored(z + i % 3 - 1, shape.nz);
+        const int at_x = mirrored_about_ends(x + i / 3 - 1, shape.nx),
+                  at_z = mirrored_about_ends(z + i % 3 - 1, shape.nz);
         rows[i] = copy.data() + (static_cast<std::ptrdiff_t>(at_x) * shape.nz + at_z) * row_size;
       }
       HWY_DYNAMIC_DISPATCH(limit_row_of_any_rank)(rank, rows, shape.ny, values);
