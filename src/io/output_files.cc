@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cctype>
 #include <system_error>
-#include <utility>
 
 #include "io/output_target.h"
 #include "tomofield/error.h"
@@ -20,34 +19,25 @@ std::vector<fs::path>& other_inputs() {
   return files;
 }
 
-// Returns the input that is this file, or null.
-const fs::path* find_input(const fs::path& file, const std::vector<fs::path>& inputs) {
-  for (const std::vector<fs::path>* list : {&inputs, &std::as_const(other_inputs())}) {
-    const auto same = std::ranges::find_if(*list, [&](const fs::path& input) {
-      std::error_code absent;
-      return fs::equivalent(file, input, absent);
-    });
-    if (same != list->end()) return &*same;
+void require_no_input(const fs::path& result, const std::vector<fs::path>& inputs) {
+  for (const fs::path& file : inputs) {
+    std::error_code absent;
+    if (!fs::equivalent(result, file, absent)) continue;
+    throw Error(
+        fmt::format("the result '{}' would replace the input '{}': give another name or directory",
+                    result.string(), file.string()));
   }
-  return nullptr;
 }
 
 }  // namespace
 
 void add_input(const fs::path& file) { other_inputs().push_back(file); }
 
-bool is_input(const fs::path& file, const std::vector<fs::path>& inputs) {
-  return find_input(file, inputs) != nullptr;
-}
-
 void require_no_input_is_replaced(const std::vector<fs::path>& results,
                                   const std::vector<fs::path>& inputs) {
   for (const fs::path& result : results) {
-    const fs::path* const input = find_input(result, inputs);
-    if (input == nullptr) continue;
-    throw Error(
-        fmt::format("the result '{}' would replace the input '{}': give another name or directory",
-                    result.string(), input->string()));
+    require_no_input(result, inputs);
+    require_no_input(result, other_inputs());
   }
 }
 
@@ -91,7 +81,7 @@ std::vector<fs::path> input_files(const SeriesFiles& input) {
 
 void check_result_files(std::vector<fs::path> results, const fs::path& picture_prefix,
                         const SeriesFiles& input, bool may_replace, const std::string& advice) {
-  for (const char* picture : kPicturesOfVolume)
+  for (const char* picture : {"_xy.png", "_xz.png", "_yz.png", "_mask.png"})
     results.emplace_back(picture_prefix.string() + picture);
   check_output_files(results, input_files(input), may_replace, advice);
 }

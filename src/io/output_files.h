@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -12,9 +11,6 @@ namespace tomofield::io {
 /// Names a file that the program reads beside those of a series, as that of --config. It counts
 /// as an input of everything that the process writes from then on.
 void add_input(const std::filesystem::path& file);
-
-/// Says whether a file is one of the `inputs` or of add_input(), by whatever path.
-bool is_input(const std::filesystem::path& file, const std::vector<std::filesystem::path>& inputs);
 
 /// Throws Error if a result would replace one of the `inputs` or of add_input().
 void require_no_input_is_replaced(const std::vector<std::filesystem::path>& results,
@@ -33,9 +29,6 @@ void require_volume_name(const std::filesystem::path& volume);
 
 /// Returns every file that a series is read from.
 std::vector<std::filesystem::path> input_files(const SeriesFiles& files);
-
-/// Ends of the names of the pictures that are drawn beside every volume (report/slice.h).
-inline constexpr std::array kPicturesOfVolume{"_xy.png", "_xz.png", "_yz.png", "_mask.png"};
 
 /// Checks that the results of a series can be written (check_output_files()) and that none replaces
 /// a file that the series is read from. Pictures of slices (report/slice.h) are results too. Throws

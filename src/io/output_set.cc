@@ -125,11 +125,6 @@ void OutputSet::remove_old(const fs::path& path) {
   to_remove_.push_back(path);
 }
 
-void OutputSet::remove_old_folder(const fs::path& path) {
-  const std::lock_guard guard(mutex_);
-  folders_to_remove_.push_back(path);
-}
-
 fs::path OutputSet::location_of(const fs::path& path) const {
   const std::lock_guard guard(mutex_);
   for (const AtomicFile& file : files_)
@@ -139,7 +134,6 @@ fs::path OutputSet::location_of(const fs::path& path) const {
 
 void OutputSet::make_changes(std::vector<Change>& changes) const {
   for (const fs::path& path : to_remove_) changes.push_back(Change::begin(path, true));
-  for (const fs::path& path : folders_to_remove_) changes.push_back(Change::begin_folder(path));
   for (const AtomicFile& file : files_) {
     changes.push_back(Change::begin(file.target_, false));
     if (!rename_file(file.temporary_path_, file.target_)) throw_cannot_replace(file.path_);
@@ -175,7 +169,6 @@ void OutputSet::commit() {
   files_.clear();
   folders_.clear();
   to_remove_.clear();
-  folders_to_remove_.clear();
 }
 
 bool OutputSet::commit_only(const fs::path& path) {
@@ -189,7 +182,6 @@ bool OutputSet::commit_only(const fs::path& path) {
     files_.swap(kept);
     folders_.clear();
     to_remove_.clear();
-    folders_to_remove_.clear();
   }
   if (is_in_set) commit();
   return is_in_set;

@@ -38,8 +38,6 @@ class OutputSet {
   void add(AtomicFolder folder);
   /// Lets commit() remove a file that would contradict the new ones, if it exists.
   void remove_old(const std::filesystem::path& path);
-  /// Does the same with a folder and all that is in it.
-  void remove_old_folder(const std::filesystem::path& path);
   /// Returns where the contents of a result are until commit(): in its temporary file. For other
   /// files, returns `path`.
   std::filesystem::path location_of(const std::filesystem::path& path) const;
@@ -61,7 +59,7 @@ class OutputSet {
   mutable std::mutex mutex_;  // guards the members below
   std::vector<AtomicFile> files_;
   std::vector<AtomicFolder> folders_;
-  std::vector<std::filesystem::path> to_remove_, folders_to_remove_;
+  std::vector<std::filesystem::path> to_remove_;
 };
 
 }  // namespace tomofield::io

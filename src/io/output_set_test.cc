@@ -86,25 +86,6 @@ TEST_F(OutputSetTest, RemovesOldFilesWithItsCommit) {
   EXPECT_EQ(scratch_.num_files(), 1u);
 }
 
-TEST_F(OutputSetTest, RemovesOldFoldersWithItsCommitOrGivesThemBack) {
-  const fs::path folder = scratch_ / "old.zarr";
-  fs::create_directory(folder);
-  scratch_.write("old.zarr/chunk", "old");
-  {
-    OutputSet results;
-    results.remove_old_folder(folder);
-    write_text_file(scratch_ / "blocked.txt", "new");
-    fs::create_directory(scratch_ / "blocked.txt");  // cannot be replaced by a file
-    EXPECT_THROW(results.commit(), Error);
-    EXPECT_EQ(read_whole_file(folder / "chunk"), "old");
-  }
-  OutputSet results;
-  results.remove_old_folder(folder);
-  EXPECT_TRUE(fs::exists(folder));
-  results.commit();
-  EXPECT_FALSE(fs::exists(folder));
-}
-
 TEST_F(OutputSetTest, KeepsOneFileOfMany) {
   OutputSet results;
   write_text_file(old_, "new");

@@ -5,11 +5,10 @@
 
 namespace tomofield::reconstruction {
 
-/// Lets `results` remove what an earlier run of the same name has left and this run does not write,
-/// such as the halves or the picture of trials: it would contradict the new tomogram. Only a run
-/// with --overwrite does so. Inputs stay, and so do alignments (NAME_align.*), which are of use
-/// without the tomogram and which `tomofield align` writes too. Logs the names. All new files must
-/// be in the set.
+/// Lets `results` remove the pictures that an earlier run of the same name has drawn and this run
+/// does not draw, such as that of its trials: they would contradict the new tomogram. Only a run
+/// with --overwrite does so. Volumes, models and records stay: they may be another program's. Logs
+/// the names. All new files must be in the set.
 void remove_stale_files(const ReconstructOptions& options, io::OutputSet& results);
 
 }  // namespace tomofield::reconstruction
