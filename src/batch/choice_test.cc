@@ -129,7 +129,7 @@ TEST(PlanChoice, LetsSeriesThatHaveBegunGoOnWithTheirSettings) {
   EXPECT_TRUE(next[1].command.empty());
   directory.write("batch.json", R"({"jobs": [{}]})");
   const std::string said = testing::message_of<Error>(planned);
-  EXPECT_NE(said.find("batch.json' is not the list of a batch (there is no 'name')"),
+  EXPECT_NE(said.find("batch.json' is not the list of a batch (there is no 'command')"),
             std::string::npos)
       << said;
 }

@@ -262,8 +262,7 @@ constexpr Row kRows[] = {
      .help = "Kind of total variation: concave keeps edges sharp, smooth is the standard one"},
     {.key = "fit.prior", .flag = "--prior", MEMBER(Options, prior), .group = Group::kFit,
      .help = "learned: end the fit with a prior that simulated tilt series taught, for plain vertices "
-             "a pixel apart. tv: total variation alone. light: little of it, as the training needs",
-     .is_common = true},
+             "a pixel apart. tv: total variation alone. light: little of it, as the training needs"},
     {.key = "fit.boundary", .flag = "--bcc", MEMBER(Options, boundary), .group = Group::kFit,
      .range = Range::at_least(0),
      .help = "Weight of the boundary consistency: neighbouring leaves agree on their faces"},

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -33,7 +34,9 @@ std::vector<std::int8_t> bytes_of(std::string_view text) {
 }
 
 std::vector<float> decoded_weights() {
-  const std::vector<std::int8_t> bytes = bytes_of(kWeights);
+  std::string text;
+  for (const std::string_view line : kWeights) text += line;
+  const std::vector<std::int8_t> bytes = bytes_of(text);
   TOMOFIELD_CHECK(bytes.size() == Network::num_weights(), "a number for each weight");
   std::vector<float> weights;
   const float* scale = kScales;

@@ -66,7 +66,8 @@ def test_it_says_what_went_in_and_what_came_out(results, page):
     for warning in metrics["verdict"]["warnings"]:
         assert warning["message"][1:60] in text, warning
     headings = re.findall("<h2>([^<]*)</h2>", page)
-    assert headings == ["The tomogram", "What went in, and what was assumed", "Masks", "Loss",
+    assert headings == ["The tomogram", "What went in, and what was assumed", "Masks",
+                        "Lighter or stronger denoising", "Loss",
                         "Views: residual", "Views: scale and weight", "Views: offset and noise",
                         "Views: alignment", "Histogram", "Time and memory"], headings
     assert "CTF and dose" not in text, "a bright series has none"
