@@ -50,8 +50,8 @@ bool can_have_learned_prior(const FieldOptions& field, const FitOptions& fit);
 /// Returns the default schedule of a field. Plain vertices, and factors that begin with them,
 /// converge in a third of the epochs that other factors need. Vertices that are at least as far
 /// apart as the pixels of the last coarse stage need few epochs at full resolution, because the
-/// coarse stages have fitted all that they can express (docs/results/ablation.md). Plain
-/// vertices take twice the epochs at full resolution for views that a microscope filtered
+/// coarse stages have fitted all that they can express (docs/results/ablation.md). Plain vertices
+/// take twice the epochs at full resolution for views that a microscope filtered
 /// (`is_filtered`), because the largest transfer bounds the steps to their surrogates
 /// (docs/results/convergence.md).
 /// Only the members of `fit` that decide which stages there are have an effect.
@@ -63,9 +63,8 @@ Schedule usual_schedule(const FieldOptions& field, const FitOptions& fit, bool i
 ///      one before. There is no stage whose slabs would straddle two leaves.
 ///   2. A stage at full resolution has plain vertices, if FitOptions::vertex_epochs is above 0.
 ///   3. A stage has the field that was asked for.
-///   4. With the learned prior (FitOptions::prior), a light stage follows. Its end and its start
-///   are
-///      what the prior answers to. The last stage begins with the answer.
+///   4. With the learned prior (FitOptions::prior), a light stage follows. The prior answers to its
+///      start and its end. The last stage begins with the answer.
 ///
 /// The ray engine has the last stage alone. With FitOptions::num_stages the later ones are left
 /// out.

@@ -30,10 +30,9 @@ inline constexpr int kOutputsTogether = 8;
 /// follows it: max(s, slope · s) with 0 ≤ slope ≤ 1. A slope of 1 is none.
 struct Convolution {
   int num_in = 1;
-  int num_out = 1;  ///< 1, or a multiple of kOutputsTogether
+  int num_out = kOutputsTogether;  ///< a multiple of kOutputsTogether
   float slope = 1.0f;
-  /// [group of outputs, input, tap, output in its group]; taps are [z, y, x]. A single output is a
-  /// group of its own.
+  /// [group of outputs, input, tap, output in its group]; taps are [z, y, x]
   const float* weights = nullptr;
 };
 

@@ -39,7 +39,7 @@ TEST(Convolution, AgreesWithTheReference) {
   for_each_simd_target([] {
     for (const ChannelShape& shape : {ChannelShape{1, 1, 1}, ChannelShape{5, 3, 2},
                                       ChannelShape{16, 2, 3}, ChannelShape{37, 4, 3}}) {
-      for (const auto& [num_in, num_out] : {std::pair{1, 8}, {3, 16}, {8, 1}}) {
+      for (const auto& [num_in, num_out] : {std::pair{1, 8}, {3, 16}, {8, 8}}) {
         const std::vector<float> in = random_channels(shape, num_in);
         const std::vector<float> weights = random_weights(num_in, num_out);
         const Convolution convolution{num_in, num_out, 0.1f, weights.data()};

@@ -62,6 +62,9 @@ std::vector<Lattice::Place> Lattice::places(std::int64_t first, int count,
 void Lattice::read(std::span<const float> parameters, const Part& part,
                    std::span<float> box) const {
   const std::ptrdiff_t side = leaf_size_ + 1;
+  std::vector<Place> rows;
+  for (int y = part.y.begin; y < part.y.end; ++y)
+    rows.push_back(y_[static_cast<std::size_t>(mirrored(y, shape_.ny))]);
   base::parallel_for("read lattice", part.x.size(), [&](std::int64_t i) {
     const Place x =
         x_[static_cast<std::size_t>(mirrored(part.x.begin + static_cast<int>(i), shape_.nx))];
@@ -69,8 +72,7 @@ void Lattice::read(std::span<const float> parameters, const Part& part,
     float* const first = out;
     for (int z = part.z.begin; z < part.z.end; ++z) {
       const std::ptrdiff_t row = x.vertex * shape_.nz + mirrored(z, shape_.nz);
-      for (int at = part.y.begin; at < part.y.end; ++at) {
-        const Place y = y_[static_cast<std::size_t>(mirrored(at, shape_.ny))];
+      for (const Place& y : rows) {
         const int leaf = leaves_[static_cast<std::size_t>(y.cell * num_columns_ + x.cell)];
         *out++ = field_.bias +
                  parameters[field_.offset(leaf) + static_cast<std::size_t>(row * side + y.vertex)];

@@ -40,7 +40,6 @@ class Lattice {
     int cell = 0, vertex = 0;
   };
   std::vector<Place> places(std::int64_t first, int count, std::int64_t cells_begin) const;
-  const float* column(std::span<const float> parameters, const Place& x, const Place& y) const;
 
   const field::Field& field_;
   BoxShape shape_;

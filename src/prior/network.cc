@@ -39,14 +39,14 @@ ChannelShape channel_shape(const BoxShape& box, int level) {
 
 // Returns the filters of a layer in the order of the kernel.
 base::AlignedBuffer<float> kernel_order(const LayerShape& layer, std::span<const float> filters) {
-  const int together = layer.num_out == 1 ? 1 : kernels::kOutputsTogether;
+  constexpr int kTogether = kernels::kOutputsTogether;
   base::AlignedBuffer<float> ordered(filters.size());
   std::size_t next = 0;
   for (int o = 0; o < layer.num_out; ++o)
     for (int i = 0; i < layer.num_in; ++i)
       for (int tap = 0; tap < kTaps; ++tap)
         ordered[static_cast<std::size_t>(
-            ((o / together * layer.num_in + i) * kTaps + tap) * together + o % together)] =
+            ((o / kTogether * layer.num_in + i) * kTaps + tap) * kTogether + o % kTogether)] =
             filters[next++];
   return ordered;
 }

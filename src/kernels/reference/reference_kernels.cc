@@ -262,10 +262,10 @@ void limit_spikes(const LatticeShape& s, int rank, double* values) {
 }
 
 void convolve(const ChannelShape& shape, const Convolution& c, const double* in, double* out) {
-  const int together = c.num_out == 1 ? 1 : kOutputsTogether;
+  constexpr int kTogether = kOutputsTogether;
   const auto weight = [&](int o, int i, int tap) {
     return static_cast<double>(
-        c.weights[((o / together * c.num_in + i) * 27 + tap) * together + o % together]);
+        c.weights[((o / kTogether * c.num_in + i) * 27 + tap) * kTogether + o % kTogether]);
   };
   for (int o = 0; o < c.num_out; ++o) {
     for (int voxel = 0; voxel < shape.nx * shape.ny * shape.nz; ++voxel) {

@@ -22,7 +22,7 @@ constexpr double kLikely = 4.5;  // enough for a seed once it is known that ther
 constexpr double kWeak = 3.5;    // enough where a track says that a bead is there
 
 // The diameter is measured in the lowest tilts and, since beads may lie beside the field of view
-// there, in so many views that are spread over all tilts.
+// there, in some that are spread over all tilts.
 constexpr std::size_t kLowViews = 5, kSpreadViews = 8;
 constexpr double kDiameterStep = 1.4142135623730951;  // between the diameters that are tried
 
