@@ -12,8 +12,8 @@
 
 namespace tomofield::reconstruction {
 
-/// The program with its libraries.
-constexpr std::size_t kProgramBytes = std::size_t{20} << 20;
+/// The resident part of the program and its libraries (measured: 24 MiB of files, 3 MiB of heap).
+constexpr std::size_t kProgramBytes = std::size_t{28} << 20;
 
 /// A fit whose memory is wanted. `plan` has no rays.
 struct PlannedFit {
