@@ -127,9 +127,11 @@ struct Options {
   /// How strongly to denoise: "light", "medium", "strong" or a factor. It multiplies the weight, be
   /// it given or chosen, by 0.5, 1, 2 or the factor.
   std::string denoise = "medium";
-  Prior prior = Prior::kTv;  ///< what ends the fit
-  double boundary = 4.0;     ///< weight of the boundary consistency (eq. 6)
-  double fourier = 0.0;      ///< weight of the isotropic Fourier prior (eq. 7)
+  /// What ends the fit. Without it a trial takes the learned prior if that predicts views that were
+  /// left out better, unless `penalty` or `density_variation` is given.
+  std::optional<Prior> prior;
+  double boundary = 4.0;  ///< weight of the boundary consistency (eq. 6)
+  double fourier = 0.0;   ///< weight of the isotropic Fourier prior (eq. 7)
   RingReference fourier_ring = RingReference::kMean;
   /// A plain vertex is at most the one of this rank among the 26 around it; 0: no limit.
   std::optional<int> spike_rank;

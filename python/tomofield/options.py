@@ -72,7 +72,7 @@ class Options(TypedDict, total=False):
     density_variation: Optional[float]
     factor_variation: float
     penalty: Optional[Literal["concave", "smooth"]]
-    prior: Literal["tv", "light", "learned"]
+    prior: Optional[Literal["tv", "light", "learned"]]
     denoise: str
     boundary: float
     fourier: float

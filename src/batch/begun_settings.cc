@@ -18,7 +18,7 @@ std::vector<std::string> shared_words(const std::vector<std::string>& command) {
   std::vector<std::string> words;
   std::ranges::copy_if(command, std::back_inserter(words), [](const std::string& word) {
     return word.starts_with("--tv=") || word.starts_with("--tv-penalty=") ||
-           word.starts_with("--spike-rank=");
+           word.starts_with("--spike-rank=") || word.starts_with("--prior=");
   });
   return words;
 }

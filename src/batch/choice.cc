@@ -53,15 +53,28 @@ std::optional<int> median_spike_rank(const std::vector<Vote>& votes) {
   return ranks[ranks.size() / 2];
 }
 
+// Returns the prior of most votes; total variation if there is no majority.
+std::optional<Prior> prior_of_most(const std::vector<Vote>& votes) {
+  std::ptrdiff_t learned = 0, any = 0;
+  for (const Vote& vote : votes) {
+    any += vote.settings.prior.has_value();
+    learned += vote.settings.prior == Prior::kLearned;
+  }
+  if (any == 0) return std::nullopt;
+  return 2 * learned > any ? Prior::kLearned : Prior::kTv;
+}
+
 std::string settings_text(const SharedSettings& settings) {
-  return fmt::format("{} tv {:.3g}{}", base::name_of(settings.penalty), settings.variation,
-                     settings.spike_rank == 0 ? ", spikes kept" : "");
+  return fmt::format("{} tv {:.3g}{}{}", base::name_of(settings.penalty), settings.variation,
+                     settings.spike_rank == 0 ? ", spikes kept" : "",
+                     settings.prior == Prior::kLearned ? ", learned prior" : "");
 }
 
 json settings_json(const SharedSettings& settings) {
   return {{"tv_penalty", base::name_of(settings.penalty)},
           {"tv", settings.variation},
-          {"spike_rank", settings.spike_rank ? json(*settings.spike_rank) : json(nullptr)}};
+          {"spike_rank", settings.spike_rank ? json(*settings.spike_rank) : json(nullptr)},
+          {"prior", settings.prior ? json(base::name_of(*settings.prior)) : json(nullptr)}};
 }
 
 json vote_json(const Vote& vote) {
@@ -79,6 +92,10 @@ SharedSettings settings_from(const json& entry) {
   if (!entry.at("spike_rank").is_null())
     settings.spike_rank =
         static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank));
+  if (!entry.at("prior").is_null()) {
+    settings.prior = base::enum_named<Prior>(entry.at("prior").get<std::string>());
+    if (!settings.prior) throw Error("'prior' is neither tv nor learned");
+  }
   return settings;
 }
 
@@ -106,6 +123,8 @@ std::vector<std::string> settings_words(const SharedSettings& settings, const Ne
                                  fmt::format("--tv={}", settings.variation)};
   if (needs.open_spike_rank && settings.spike_rank)
     words.push_back(fmt::format("--spike-rank={}", *settings.spike_rank));
+  if (needs.open_prior && settings.prior)
+    words.push_back(fmt::format("--prior={}", base::name_of(*settings.prior)));
   return words;
 }
 
@@ -127,7 +146,7 @@ std::vector<std::size_t> keep_begun_settings(const fs::path& folder,
         differing.push_back(i);
       job.command.insert(job.command.end(), entry->second.begin(), entry->second.end());
     }
-    job.needs.open_variation = job.needs.open_spike_rank = false;
+    job.needs.open_variation = job.needs.open_spike_rank = job.needs.open_prior = false;
   }
   return differing;
 }
@@ -165,7 +184,8 @@ std::optional<Choice> count_votes(std::vector<Vote> votes) {
   if (winners.empty()) return std::nullopt;
   return Choice{.settings = {.penalty = winners.front().settings.penalty,
                              .variation = median_weight(winners),
-                             .spike_rank = median_spike_rank(winners)},
+                             .spike_rank = median_spike_rank(winners),
+                             .prior = prior_of_most(winners)},
                 .votes = std::move(votes)};
 }
 
@@ -215,6 +235,7 @@ Vote read_vote(const Job& job, const fs::path& file) {
     }
     vote.settings = settings_from(document.at("chosen"));
     if (!job.needs.open_spike_rank) vote.settings.spike_rank.reset();
+    if (!job.needs.open_prior) vote.settings.prior.reset();
     return vote;
   });
 }

@@ -14,17 +14,19 @@
 
 namespace tomofield::batch {
 
-/// Says how often a batch chooses penalty, weight and limit of spikes of its total variation.
+/// Says how often a batch chooses its total variation (penalty, weight and limit of spikes) and its
+/// prior.
 enum class Choose {
   kOnce,  ///< a few series make trials, and all get the same
   kEach   ///< every series makes trials of its own
 };
 
-/// Holds the settings of total variation that the series of a batch share.
+/// Holds the settings that the series of a batch share.
 struct SharedSettings {
   Penalty penalty = Penalty::kSmooth;
   double variation = 0;           ///< weight in noise units, as --tv
   std::optional<int> spike_rank;  ///< nothing if no trials have chosen it
+  std::optional<Prior> prior;     ///< likewise
 };
 
 /// Holds what one series chose by its trials, or the reason why it has no vote.
@@ -54,7 +56,8 @@ struct ChoicePlan {
 ChoicePlan plan_choice(const std::filesystem::path& folder, bool continues, std::vector<Job>& jobs);
 
 /// Returns the penalty of most votes (smooth if there is no majority), and the medians of the
-/// weight and the limit of spikes of those who chose it. Returns nothing if nobody has a vote.
+/// weight and the limit of spikes of those who chose it. The prior is that of most of them (total
+/// variation if there is no majority). Returns nothing if nobody has a vote.
 std::optional<Choice> count_votes(std::vector<Vote> votes);
 
 /// Adds the choice to the commands of the jobs that lack it.

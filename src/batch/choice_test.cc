@@ -15,9 +15,13 @@ namespace {
 
 using testing::ScratchDirectory;
 
-Vote vote(Penalty penalty, double variation, std::optional<int> spike_rank = 3) {
+Vote vote(Penalty penalty, double variation, std::optional<int> spike_rank = 3,
+          std::optional<Prior> prior = {}) {
   return {.series = "a",
-          .settings = {.penalty = penalty, .variation = variation, .spike_rank = spike_rank},
+          .settings = {.penalty = penalty,
+                       .variation = variation,
+                       .spike_rank = spike_rank,
+                       .prior = prior},
           .failure = {}};
 }
 
@@ -61,6 +65,23 @@ TEST(CountVotes, IsSmoothWithoutAMajorityAndNothingWithoutVotes) {
   EXPECT_EQ(one->settings.penalty, Penalty::kConcave);
   EXPECT_FALSE(one->settings.spike_rank.has_value());
   EXPECT_FALSE(count_votes({no_vote()}).has_value());
+}
+
+TEST(CountVotes, TakesTheLearnedPriorIfMostAreForIt) {
+  const Vote learned = vote(Penalty::kSmooth, 5, 3, Prior::kLearned);
+  const Vote without = vote(Penalty::kSmooth, 5, 3, Prior::kTv);
+  EXPECT_EQ(count_votes({learned, without, learned})->settings.prior, Prior::kLearned);
+  EXPECT_EQ(count_votes({learned, without})->settings.prior, Prior::kTv);
+  EXPECT_FALSE(count_votes({vote(Penalty::kSmooth, 5)})->settings.prior.has_value());
+}
+
+TEST(GiveChoice, GivesThePriorToSeriesThatLeaveItOpen) {
+  const Choice choice = *count_votes({vote(Penalty::kSmooth, 4.5, 3, Prior::kLearned)});
+  std::vector<Job> jobs = open_jobs(2, "/");
+  jobs[0].needs.open_prior = true;
+  give_choice(choice, jobs);
+  EXPECT_EQ(jobs[0].command.back(), "--prior=learned");
+  EXPECT_EQ(jobs[1].command.back(), "--spike-rank=3");
 }
 
 TEST(PlanChoice, LetsTheFirstTheMiddleAndTheLastOfTheListChoose) {
@@ -150,7 +171,8 @@ TEST(ReadVote, TakesWhatARunChose) {
   Job job;
   job.name = "a";
   const auto file = directory.write(
-      "a.json", R"({"chosen": {"tv_penalty": "concave", "tv": 14, "spike_rank": 3}})");
+      "a.json",
+      R"({"chosen": {"tv_penalty": "concave", "tv": 14, "spike_rank": 3, "prior": "learned"}})");
   EXPECT_FALSE(read_vote(job, file).settings.spike_rank.has_value());  // it was given
   job.needs.open_spike_rank = true;
   EXPECT_EQ(read_vote(job, file).settings.spike_rank, 3);
@@ -166,7 +188,8 @@ TEST(ReadChoice, RefusesADamagedFileAndSaysWhatIsWrongAndWhatToDo) {
     directory.write("choice.json", text);
     return testing::message_of<Error>([&] { read_choice(directory.path()); });
   };
-  const std::string settings = R"("tv_penalty": "smooth", "tv": 5, "spike_rank": null)";
+  const std::string settings =
+      R"("tv_penalty": "smooth", "tv": 5, "spike_rank": null, "prior": null)";
   const std::pair<std::string, std::string> faults[] = {
       {"{\"tv\": 5,\n \"votes\"", "line 2, column"},
       {R"({"tv": 5})", "there is no 'tv_penalty'"},

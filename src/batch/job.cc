@@ -68,6 +68,7 @@ json job_json(const Job& job) {
           {"disk_bytes", needs.disk_bytes},
           {"open_variation", needs.open_variation},
           {"open_spike_rank", needs.open_spike_rank},
+          {"open_prior", needs.open_prior},
           {"trials", needs.num_trials}};
 }
 
@@ -83,6 +84,7 @@ Job job_from(const json& object) {
                     .disk_bytes = bytes_at(object, "disk_bytes"),
                     .open_variation = object.at("open_variation").get<bool>(),
                     .open_spike_rank = object.at("open_spike_rank").get<bool>(),
+                    .open_prior = object.at("open_prior").get<bool>(),
                     .num_trials = trials_at(object)},
           .is_skipped = object.at("skipped").get<bool>()};
 }
@@ -104,6 +106,7 @@ Needs read_needs(const fs::path& file) {
     needs.disk_bytes = bytes_at(plan, "disk_bytes");
     needs.open_variation = plan.at("open_variation").get<bool>();
     needs.open_spike_rank = plan.at("open_spike_rank").get<bool>();
+    needs.open_prior = plan.at("open_prior").get<bool>();
     needs.num_trials = trials_at(plan);
     return needs;
   });

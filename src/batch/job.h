@@ -18,6 +18,7 @@ struct Needs {
   std::int64_t disk_bytes = 0;             ///< at most, while it runs
   bool open_variation = false;   ///< nobody has given the penalty and weight of total variation
   bool open_spike_rank = false;  ///< nor the limit of spikes
+  bool open_prior = false;       ///< nor the prior
   int num_trials = 0;            ///< that would choose what is open
 
   std::int64_t memory_bytes(int threads) const {

@@ -25,6 +25,7 @@ TEST(Jobs, AreReadAsTheyAreWritten) {
                           .disk_bytes = 30,
                           .open_variation = true,
                           .open_spike_rank = false,
+                          .open_prior = true,
                           .num_trials = 6}},
                {.name = "b", .output = "b.mrc", .command = {}, .needs = {}, .is_skipped = true}},
       .overwrites = true};
@@ -39,6 +40,7 @@ TEST(Jobs, AreReadAsTheyAreWritten) {
   EXPECT_EQ(read.jobs[0].needs.sample_steps, 1e9);
   EXPECT_TRUE(read.jobs[0].needs.open_variation);
   EXPECT_FALSE(read.jobs[0].needs.open_spike_rank);
+  EXPECT_TRUE(read.jobs[0].needs.open_prior);
   EXPECT_EQ(read.jobs[0].needs.num_trials, 6);
   EXPECT_FALSE(read.jobs[0].is_skipped);
   EXPECT_TRUE(read.jobs[1].is_skipped);
@@ -66,7 +68,7 @@ TEST(Needs, ComeFromThePlanOfARun) {
                          "memory_bytes_of_one_thread": 1000, "core_seconds": )" +
                          seconds +
                          R"(, "sample_steps": 5, "result_bytes": 7, "disk_bytes": 9, "trials": 6,
-                         "open_variation": true, "open_spike_rank": false})"));
+                         "open_variation": true, "open_spike_rank": false, "open_prior": true})"));
   };
   EXPECT_EQ(read("4", "1.5").memory_bytes(2), 1100);
   EXPECT_EQ(read("1", "1.5").memory_bytes(2), 1000);

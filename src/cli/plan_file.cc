@@ -72,6 +72,7 @@ void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries
                           {"trials", plan.num_trials},
                           {"open_variation", is_left_to_runs(options, options.open.variation)},
                           {"open_spike_rank", is_left_to_runs(options, options.open.spikes)},
+                          {"open_prior", is_left_to_runs(options, options.open.prior)},
                           {"steps", plan.num_steps},
                           {"threads", base::thread_count()},
                           {"memory_bytes", plan.memory_bytes},

@@ -117,6 +117,13 @@ bool has_dial_picture(const reconstruction::ReconstructOptions& options) {
              reconstruction::output_paths(options.resolved.output).dial_picture);
 }
 
+// Says whether there is a picture of what the learned prior does.
+bool has_prior_picture(const reconstruction::ReconstructOptions& options) {
+  return options.open.prior &&
+         std::filesystem::exists(
+             reconstruction::output_paths(options.resolved.output).prior_picture);
+}
+
 // Writes the report of a run beside its other results, which have temporary names yet.
 void write_report(const reconstruction::Results& results,
                   const reconstruction::ReconstructOptions& options,
@@ -130,12 +137,14 @@ void write_report(const reconstruction::Results& results,
                                       .mask_picture = written.location_of(mask_picture),
                                       .tree_picture = {},
                                       .held_out_picture = {},
-                                      .dial_picture = {}};
+                                      .dial_picture = {},
+                                      .prior_picture = {}};
   if (options.field.tree == TreeKind::kAdaptive)
     source.tree_picture = written.location_of(paths.tree_picture);
   if (options.fit.hold_out > 0)
     source.held_out_picture = written.location_of(paths.held_out_picture);
   if (has_dial_picture(options)) source.dial_picture = paths.dial_picture;
+  if (has_prior_picture(options)) source.prior_picture = paths.prior_picture;
   io::write_text_file(paths.report, reconstruction::run_report(source));
 }
 
@@ -225,6 +234,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
     for (const auto& picture : {paths.held_out_picture, paths.choice_picture})
       if (io::OutputSet::active()->contains(picture)) pictures.push_back(picture);
     if (has_dial_picture(options)) pictures.push_back(paths.dial_picture);
+    if (has_prior_picture(options)) pictures.push_back(paths.prior_picture);
   };
   if (processes.is_root()) {
     hooks.progress = make_progress_bar("reconstruct");

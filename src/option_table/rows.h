@@ -63,7 +63,7 @@ using Member = std::variant<
     std::optional<bool> Options::*, std::optional<int> Options::*, std::optional<double> Options::*,
     std::optional<Rectangle> Options::*, Contrast Options::*, Alignment Options::*,
     std::optional<FieldKind> Options::*, TreeKind Options::*, std::optional<Activation> Options::*,
-    Engine Options::*, std::optional<Penalty> Options::*, Prior Options::*,
+    Engine Options::*, std::optional<Penalty> Options::*, std::optional<Prior> Options::*,
     RingReference Options::*, NoiseModel Options::*, VoxelType Options::*, VolumeAxes Options::*>;
 
 /// Describes one option: the command line, the configuration file, the checks, the JSON, the

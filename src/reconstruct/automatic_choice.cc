@@ -201,6 +201,15 @@ TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings&
   return corrected;
 }
 
+TrialSettings choose_prior(const TrialSettings& start, FitTrials& trials) {
+  TrialSettings learned = start;
+  learned.prior = Prior::kLearned;
+  trials.make({start, learned});
+  const selection::Difference gain =
+      selection::difference(trials.trial(start).score, trials.trial(learned).score);
+  return gain.log_ratio > 0 ? learned : start;
+}
+
 int usual_trials(const OpenSettings& open) {
   const int corrections = open.view_scale + open.background + open.beads;
   if (open.variation) return 4 + open.spikes + corrections;

@@ -11,6 +11,8 @@ struct OpenSettings {
   bool view_scale = false;  ///< scales and offsets of the views
   bool background = false;  ///< subtraction of the series' background
   bool beads = false;       ///< masks of the beads that were found
+  bool prior = false;       ///< the learned prior, once the others are chosen
+  /// Says whether there is one but for the prior, which has trials of its own.
   bool any() const { return variation || spikes || view_scale || background || beads; }
   bool operator==(const OpenSettings&) const = default;
 };
@@ -55,7 +57,13 @@ TrialSettings choose_spike_rank(const TrialSettings& start, FitTrials& trials);
 TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings& open,
                                  FitTrials& trials);
 
-/// Returns the number of trials that the functions above usually make for what is open.
+constexpr int kPriorTrials = 2;
+/// Chooses whether the learned prior ends the fit: if it lowers the error of held-out views, by
+/// however little. The trials must be whole fits, since the end of a fit is what it replaces.
+TrialSettings choose_prior(const TrialSettings& start, FitTrials& trials);
+
+/// Returns the number of trials that the functions above, but for choose_prior(), usually make for
+/// what is open.
 int usual_trials(const OpenSettings& open);
 
 }  // namespace tomofield::reconstruction

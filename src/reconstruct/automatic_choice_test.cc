@@ -106,6 +106,17 @@ TEST(ChooseSpikeRank, KeepsSpikesOnlyIfThatIsBetterByOnePerCent) {
   EXPECT_EQ(chosen_if_kept_is(0.9, Penalty::kConcave), kStart.spike_rank);
 }
 
+TEST(ChoosePrior, TakesTheLearnedOneIfItLowersTheErrorOfHeldOutViews) {
+  const auto chosen_if_learned_is = [](double error) {
+    FitTrials trials = trials_with(
+        [=](const TrialSettings& s) { return s.prior == Prior::kLearned ? error : 1.0; }, 0);
+    return choose_prior(kStart, trials).prior;
+  };
+  EXPECT_EQ(chosen_if_learned_is(0.999), Prior::kLearned);
+  EXPECT_EQ(chosen_if_learned_is(1.001), Prior::kTv);
+  EXPECT_EQ(chosen_if_learned_is(1.0), Prior::kTv);
+}
+
 TEST(ChooseCorrections, FitsScalesIfThatIsBetterAndMasksBeadsUnlessThatIsWorse) {
   const OpenSettings open{.view_scale = true, .beads = true};
   const auto scales_help = [](const TrialSettings& s) { return s.fits_view_scale ? 1.0 : 1.2; };

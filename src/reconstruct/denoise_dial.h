@@ -29,10 +29,9 @@ std::vector<DialTrial> dial_trials(const TunedFit& tuned);
 /// place: "Factor 0.33: lighter than light (0.5)".
 std::string caption_of(const DialTrial& shown);
 
-/// Draws the sections of these trials under each other in one scale of greys, the contrast of the
-/// medium one (report/contrast.h), each with its caption_of(). Densities are multiplied by
-/// `output_scale`, so that greys are those of the tomogram. Replaces the file. Removes it and
-/// returns without a picture if dial_trials() has none, or if one of them has no section.
+/// Draws the sections of these trials in the contrast of the medium one, each with its
+/// caption_of() (trial_sections.h). Removes the file and draws nothing if dial_trials() has none,
+/// or if one of them has no section.
 void write_dial_picture(const TunedFit& tuned, double output_scale,
                         const std::filesystem::path& path);
 

@@ -33,6 +33,15 @@ std::optional<HeldOutSummary> held_out_summary(
   return summary;
 }
 
+PriorSummary prior_summary(const FinishedFit& finished) {
+  PriorSummary summary{.is_used = finished.fit.stage().has_answer, .gain = {}};
+  const std::optional<TunedFit>& tuned = finished.record.origin.tuned;
+  if (tuned && !tuned->last_trials.empty())
+    summary.gain =
+        selection::difference(tuned->last_trials.front().score, tuned->last_trials.back().score);
+  return summary;
+}
+
 }  // namespace
 
 Verdict judge(const FinishedFit& finished, const std::optional<measurement::ViewErrors>& held_out) {
@@ -43,6 +52,7 @@ Verdict judge(const FinishedFit& finished, const std::optional<measurement::View
   const std::vector<double>& residuals = fit.progress().data_loss;
   if (!residuals.empty()) verdict.residual = residuals.back();
   verdict.held_out = held_out_summary(finished, held_out);
+  verdict.prior = prior_summary(finished);
   verdict.artefacts = evaluate::find_artefacts(fit.field(), series.roi, finished.rows, processes);
   verdict.sections = section_profile(verdict.artefacts.section_deviation);
   if (!series.ray_geometry)

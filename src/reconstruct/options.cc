@@ -58,7 +58,7 @@ fit::FitOptions fit_options(const Options& options) {
   fit.noise_model = options.noise_model;
   fit.fit_view_scale = options.fit_view_scale.value_or(fit.fit_view_scale);
   fit.seed = options.seed;
-  fit.prior = options.prior;
+  fit.prior = options.prior.value_or(fit.prior);
   fit.hold_out = options.hold_out;
   fit.patience = options.patience;
   return fit;
@@ -133,6 +133,7 @@ std::vector<std::filesystem::path> result_files(const ReconstructOptions& option
   if (options.makes_halves()) add_half_files(paths, resolved.denoising_halves, results);
   if (resolved.tune || options.open.any()) results.push_back(paths.choice_picture);
   if (options.chooses_weight()) results.push_back(paths.dial_picture);
+  if (options.open.prior) results.push_back(paths.prior_picture);
   for (const auto& file : exchange_files(options)) results.push_back(file);
   return results;
 }
@@ -162,6 +163,8 @@ ReconstructOptions run_options(const SeriesFiles& files, const Options& requeste
               .background = is_bright && !requested.black_level,
               .beads = is_bright && !requested.bead_diameter_nm};
   option_table::choose_by_contrast(run.resolved);
+  run.open.prior = !requested.prior && run.chooses_weight() && may_learn(run.resolved);
+  if (!run.resolved.prior) run.resolved.prior = fit::FitOptions{}.prior;
   if (run.open.variation) {
     run.resolved.penalty = fit::FitOptions{}.penalty;
     choose_variation(run.resolved);
@@ -193,6 +196,7 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
           .held_out_picture = with("_held_out.png"),
           .choice_picture = with("_choice.png"),
           .dial_picture = with("_denoise.png"),
+          .prior_picture = with("_prior.png"),
           .trials = with("_tune.json"),
           .alignment = with("_align.json"),
           .tiles = with("_tiles.h5"),
@@ -200,6 +204,12 @@ OutputPaths output_paths(const std::filesystem::path& volume) {
           .fsc_picture = with("_fsc.png"),
           .local_resolution = with("_local_resolution.mrc"),
           .uncertainty = with("_uncertainty.mrc")};
+}
+
+ReconstructOptions ReconstructOptions::with_open_prior() const {
+  ReconstructOptions longest = *this;
+  if (open.prior) longest.fit.prior = Prior::kLearned;
+  return longest;
 }
 
 int ReconstructOptions::num_trials(int num_fitted_views, const OpenSettings& to_choose) const {

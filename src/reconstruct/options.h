@@ -34,6 +34,7 @@ struct OutputPaths {
   std::filesystem::path held_out_picture;  ///< if views are held out
   std::filesystem::path choice_picture;    ///< of the trials, if there are any
   std::filesystem::path dial_picture;      ///< what --denoise does (denoise_dial.h)
+  std::filesystem::path prior_picture;     ///< what the learned prior does (prior_picture.h)
   std::filesystem::path trials;            ///< trials of --tune (JSON)
   std::filesystem::path alignment;         ///< of --align, from which a run resumes (JSON)
   std::filesystem::path tiles;  ///< finished tiles, from which a run resumes (a compact model)
@@ -71,6 +72,8 @@ struct ReconstructOptions {
   bool makes_halves() const { return (files.even && files.odd) || resolved.split_tilts; }
   /// Says whether the run may be fitted by tiles, whose codes it keeps in a file.
   bool may_use_tiles() const { return !resolved.budget.empty() && resolved.tile_rows != 0; }
+  /// Returns the options of the longest fit: that with the learned prior if it is left to a trial.
+  ReconstructOptions with_open_prior() const;
   /// Says whether trials choose the weight of total variation, which --denoise multiplies.
   bool chooses_weight() const { return resolved.tune || open.variation; }
   /// Says whether the fit filters views, which mixes their rows.

@@ -106,9 +106,10 @@ void require_pixels(std::int64_t width, std::int64_t height) {
 
 }  // namespace
 
-RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
+RunPlan plan_run(const tilt_series::TiltSeries& series, const ReconstructOptions& given,
                  const distributed::Communicator& processes) {
-  if (processes.size() > 1) base::require_no_faults(options.faults_of_job());
+  const ReconstructOptions options = given.with_open_prior();
+  if (processes.size() > 1) base::require_no_faults(given.faults_of_job());
   const measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
   const fit::Domain domain = plan.ray_geometry
                                  ? fit::make_domain(*plan.ray_geometry, plan.roi, options.field)

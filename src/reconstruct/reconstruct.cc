@@ -23,6 +23,7 @@
 #include "reconstruct/denoise_dial.h"
 #include "reconstruct/finished_tiles.h"
 #include "reconstruct/halves.h"
+#include "reconstruct/prior_picture.h"
 #include "reconstruct/results.h"
 #include "reconstruct/run.h"
 #include "reconstruct/run_fit.h"
@@ -78,6 +79,7 @@ void apply(const TrialSettings& settings, Run& run) {
   if (options.open.view_scale)
     resolved.fit_view_scale = options.fit.fit_view_scale = settings.fits_view_scale;
   if (options.open.spikes) resolved.spike_rank = options.fit.spike_rank = settings.spike_rank;
+  if (options.open.prior) resolved.prior = options.fit.prior = settings.prior;
   if (run.options.open.background) {
     resolved.black_level =
         settings.background_part * run.measurement.background * run.measurement.unit;
@@ -98,13 +100,15 @@ void turn_the_dial(ReconstructOptions& options) {
                                options.resolved.denoise, options.fit.density_variation));
 }
 
-// Shows what the dial does. A resumed run keeps the picture of its first session: the trials that
-// it reads have no sections.
-void show_dial(const Run& run, const std::optional<TunedFit>& tuned) {
+// Shows what the dial and the learned prior do. A resumed run keeps the pictures of its first
+// session: the trials that it reads have no sections.
+void show_trials(const Run& run, const std::optional<TunedFit>& tuned) {
   if (!run.writes_files() || !run.processes.is_root()) return;
   if (!tuned || tuned->trials.front().section.values.empty()) return;
   const double sign = run.options.input.contrast == Contrast::kDark ? -1 : 1;
-  write_dial_picture(*tuned, run.options.volume.invert ? -sign : sign, run.paths.dial_picture);
+  const double output_scale = run.options.volume.invert ? -sign : sign;
+  write_dial_picture(*tuned, output_scale, run.paths.dial_picture);
+  if (run.options.open.prior) write_prior_picture(*tuned, output_scale, run.paths.prior_picture);
 }
 
 // Chooses the settings that are left to trials. A resumed run takes those that its checkpoint has.
@@ -181,7 +185,7 @@ RunResult reconstruct(const tilt_series::TiltSeries& series, const ReconstructOp
   Run run = begin_run(series, options, hooks, processes);
   std::optional<TunedFit> tuned;
   if (!choose_settings(run, tuned)) return {.outcome = Outcome::kStoppedTuning};
-  processes.run_collectively([&] { show_dial(run, tuned); });
+  processes.run_collectively([&] { show_trials(run, tuned); });
   if (options.makes_halves()) return reconstruct_halves(series, run, record, tuned);
   return fit_all_views(run, tiles, record, std::move(tuned));
 }

@@ -152,6 +152,11 @@ Work work_of(const measurement::Measurement& plan, const ReconstructOptions& opt
                                                                measurement::largest_reach_px(plan));
   work.add_fit(plan, trial.field, trial.fit, run.steps_an_epoch, static_cast<double>(trial.rows),
                run.num_trials);
+  if (options.open.prior) {
+    const TrialShape whole = prior_trial(options.field, options.fit);
+    work.add_fit(plan, whole.field, whole.fit, run.steps_an_epoch, static_cast<double>(whole.rows),
+                 kPriorTrials);
+  }
   return work;
 }
 
@@ -189,8 +194,9 @@ std::size_t scratch_bytes(const tilt_series::TiltSeries& series,
 
 }  // namespace
 
-RunEstimate estimate_run(const tilt_series::TiltSeries& series, const ReconstructOptions& options,
+RunEstimate estimate_run(const tilt_series::TiltSeries& series, const ReconstructOptions& given,
                          const RunPlan& run) {
+  const ReconstructOptions options = given.with_open_prior();
   measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
   plan.transfers =
       measurement::view_transfers(options.files, options.resolved, options.input, series);

@@ -137,6 +137,20 @@ void add_pose(const json& alignment, std::vector<HtmlFact>& facts) {
        "alignment applied neither; --thickness and --tilt-offset do that."});
 }
 
+void add_prior(const json& prior, std::vector<HtmlFact>& facts) {
+  const bool is_used = prior.at("learned").get<bool>();
+  const double gain = io::number_or_nan(prior.at("gain"));
+  if (!is_used && !std::isfinite(gain)) return;
+  std::string note =
+      "A network that was trained on simulated series suggested what is shown, and the views "
+      "corrected it. ";
+  if (!is_used) note = "A trial of the learned prior predicted held-out views no better. ";
+  if (std::isfinite(gain))
+    note += fmt::format("Error of held-out views with it, in trials: {:+.2f} % ± {:.2f}.",
+                        -100 * gain, 100 * io::number_or_nan(prior.at("standard_error")));
+  facts.push_back({"Learned prior", is_used ? "yes" : "no", note});
+}
+
 std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics) {
   std::vector<HtmlFact> facts;
   facts.push_back({"Residual", fmt::format("{:.2f}", io::number_or_nan(verdict.at("residual"))),
@@ -152,6 +166,7 @@ std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics) {
                      io::number_or_nan(held_out.at("worst")),
                      io::number_or_nan(held_out.at("worst_tilt_deg")))});
   }
+  add_prior(verdict.at("prior"), facts);
   if (const json& views = verdict.at("views"); views.is_object()) {
     facts.push_back({"Alignment",
                      fmt::format("{:.2g} px", io::number_or_nan(views.at("usual_displacement_px"))),
@@ -311,6 +326,22 @@ void add_dial(const ReportSource& source, HtmlPage& page) {
                    report::FigureSize::kLarge);
 }
 
+// Shows what the learned prior changes, if trials have compared it.
+void add_prior_picture(const ReportSource& source, HtmlPage& page) {
+  if (!source.prior_picture) return;
+  const bool is_used = source.record.at("options").at("fit").at("prior") == "learned";
+  page.add_heading("The learned prior");
+  page.add_paragraph(fmt::format(
+      "The same section from two fits of some rows, without some views. {} (docs/prior.md).",
+      is_used ? "With the prior the views left out were predicted better, so it ended this fit. Look "
+                "whether you trust what it adds; --prior tv does without"
+              : "With the prior the views left out were not predicted better, so this fit does "
+                "without"));
+  page.add_figures({{*source.prior_picture,
+                     "Without the prior, with it, and the difference in the same greys"}},
+                   report::FigureSize::kLarge);
+}
+
 void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
   add_plot(
       "Settings that trials chose",
@@ -320,6 +351,7 @@ void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
       "tried, and a concave penalty is taken only if it is surely better (docs/fitting.md).",
       trials_plot(fits.front().metrics), page);
   add_dial(source, page);
+  add_prior_picture(source, page);
   add_alignment(fits.front().metrics, page);
   add_plot("Loss",
            "The fit begins with coarse pixels, whose noise is lower; the curves jump where it goes "

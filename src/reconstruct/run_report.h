@@ -16,7 +16,7 @@ struct ReportSource {
   const Options& requested;      ///< as the user gave them
   std::filesystem::path volume;  ///< the file that holds the tomogram (MRC)
   std::filesystem::path mask_picture;
-  std::optional<std::filesystem::path> tree_picture, held_out_picture, dial_picture;
+  std::optional<std::filesystem::path> tree_picture, held_out_picture, dial_picture, prior_picture;
 };
 
 /// Returns the report of a finished run: a page in one file that needs no network (docs/report.md).

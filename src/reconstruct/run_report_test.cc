@@ -38,6 +38,7 @@ json metrics_of_fit(double residual) {
           {"verdict",
            {{"residual", residual},
             {"held_out", nullptr},
+            {"prior", {{"learned", false}, {"gain", -0.04}, {"standard_error", 0.01}}},
             {"views", nullptr},
             {"seconds", 7000},
             {"peak_GiB", 1.5},
@@ -68,7 +69,8 @@ class RunReport : public ::testing::Test {
                        .mask_picture = directory_ / "mask.png",
                        .tree_picture = {},
                        .held_out_picture = {},
-                       .dial_picture = {}});
+                       .dial_picture = {},
+                       .prior_picture = {}});
   }
   bool page_has(const std::string& text) const { return page().find(text) != std::string::npos; }
 
@@ -86,6 +88,16 @@ TEST_F(RunReport, ShowsWarningsAndNumbers) {
   EXPECT_TRUE(page_has("1.9 h, 1.5 GiB"));
   EXPECT_TRUE(page_has("CTF and dose"));
   EXPECT_FALSE(page_has("even half"));
+}
+
+TEST_F(RunReport, SaysWhetherTheLearnedPriorHelped) {
+  EXPECT_TRUE(page_has("Learned prior"));
+  EXPECT_TRUE(page_has("+4.00 % ± 1.00"));
+  json& prior = record_["metrics"]["verdict"]["prior"];
+  prior = {{"learned", true}, {"gain", 0.013}, {"standard_error", 0.002}};
+  EXPECT_TRUE(page_has("-1.30 % ± 0.20"));
+  prior = {{"learned", false}, {"gain", nullptr}, {"standard_error", nullptr}};
+  EXPECT_FALSE(page_has("Learned prior"));
 }
 
 TEST_F(RunReport, ShowsHowFarGoldBeadsLieFromTheirPlacesAndThePose) {

@@ -26,6 +26,7 @@ void remove_stale_files(const ReconstructOptions& options, io::OutputSet& result
   const OutputPaths paths = output_paths(options.resolved.output);
   std::vector<fs::path> stale;
   if (!options.chooses_weight()) stale.push_back(paths.dial_picture);
+  if (!options.open.prior) stale.push_back(paths.prior_picture);
   for (const fs::path& picture : optional_pictures(paths))
     if (!results.contains(picture)) stale.push_back(picture);
   std::vector<std::string> removed;

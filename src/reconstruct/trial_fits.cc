@@ -39,7 +39,7 @@ class TrialFits::Running {
     options.density_variation = settings_.variation;
     options.epochs = settings_.epochs;
     options.spike_rank = settings_.spike_rank;
-    options.prior = Prior::kTv;  // the weight that trials choose is that of total variation
+    options.prior = settings_.prior;
     options.fit_view_scale = settings_.fits_view_scale;
     options.patience = 0;
     options.scores_epochs = false;
@@ -57,8 +57,9 @@ class TrialFits::Running {
     fit_->run([](const fit::Fit&) { return false; });
     const bool is_last = fit_->is_done();
     part_done_ = is_last ? 1.0 : fit_->work(fit_->progress().step) / fit_->work(fit_->num_steps());
-    detail_ = fmt::format("{} tv {:.3g}  rank {}  epochs {}", base::name_of(settings_.penalty),
-                          settings_.variation, settings_.rank, settings_.epochs);
+    detail_ = fmt::format("{} tv {:.3g}  rank {}  epochs {}{}", base::name_of(settings_.penalty),
+                          settings_.variation, settings_.rank, settings_.epochs,
+                          settings_.prior == Prior::kLearned ? "  learned prior" : "");
     if (is_last)
       finished_ = FitTrial{.settings = settings_,
                            .score = score(),

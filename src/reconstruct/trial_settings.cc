@@ -25,6 +25,8 @@ constexpr std::int64_t kMostOfAnything = 1000000000;
 TrialSettings settings_from(const json& entry) {
   const auto penalty = base::enum_named<Penalty>(entry.at("tv_penalty").get<std::string>());
   if (!penalty) throw Error("'tv_penalty' is no penalty");
+  const auto prior = base::enum_named<Prior>(entry.at("prior").get<std::string>());
+  if (!prior) throw Error("'prior' is no prior");
   return {.penalty = *penalty,
           .variation = io::number_at(entry, "tv", 0, base::kLargestNumber),
           .rank = static_cast<int>(io::integer_at(entry, "rank", 1, kMostOfAnything)),
@@ -33,7 +35,8 @@ TrialSettings settings_from(const json& entry) {
           .background_part = io::number_at(entry, "background_part", 0, 1),
           .masks_beads = entry.at("masks_beads"),
           .spike_rank =
-              static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank))};
+              static_cast<int>(io::integer_at(entry, "spike_rank", 0, kernels::kMostSpikeRank)),
+          .prior = *prior};
 }
 
 // Says whether settings are equal. Weights may differ by rounding.
@@ -53,6 +56,7 @@ const FitTrial* chosen_trial(const TunedFit& tuned) {
   const auto find = [&](bool with_epochs) {
     return std::ranges::find_if(tuned.trials, [&](const FitTrial& trial) {
       TrialSettings settings = trial.settings;
+      settings.prior = tuned.settings.prior;  // these trials end with total variation
       if (!with_epochs) settings.epochs = tuned.settings.epochs;
       return are_equal(settings, tuned.settings);
     });
@@ -101,7 +105,8 @@ json settings_json(const TrialSettings& s) {
           {"view_scale", s.fits_view_scale},
           {"background_part", s.background_part},
           {"masks_beads", s.masks_beads},
-          {"spike_rank", s.spike_rank}};
+          {"spike_rank", s.spike_rank},
+          {"prior", base::name_of(s.prior)}};
 }
 
 FitTrial trial_from(const json& entry) {
@@ -128,6 +133,7 @@ TunedFit tuned_from(const json& tuning) {
   for (const double view : io::numbers_at(tuning, "predicted_views", 0, base::kLargestNumber))
     tuned.predicted_views.push_back(static_cast<int>(view));
   for (const json& trial : tuning.at("trials")) tuned.trials.push_back(trial_from(trial));
+  for (const json& trial : tuning.at("last_trials")) tuned.last_trials.push_back(trial_from(trial));
   return tuned;
 }
 

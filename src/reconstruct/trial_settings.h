@@ -20,6 +20,7 @@ struct TrialSettings {
   double background_part = 0;           ///< that is subtracted (measurement/background.h)
   bool masks_beads = false;             ///< whose search left that open (undecided_beads.h)
   int spike_rank = fit::FitOptions{}.spike_rank;  ///< FitOptions::spike_rank
+  Prior prior = Prior::kTv;                       ///< FitOptions::prior
   bool operator==(const TrialSettings&) const = default;
 };
 using FitTrial = selection::Trial<TrialSettings>;

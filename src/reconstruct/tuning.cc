@@ -56,6 +56,38 @@ std::optional<TunedFit> searched(TrialFits& fits, selection::TrialFile* file,
   }
 }
 
+// Says how the trial with the learned prior compares with that without it.
+void log_prior(const TunedFit& tuned) {
+  const selection::Difference gain =
+      selection::difference(tuned.last_trials.front().score, tuned.last_trials.back().score);
+  base::log_info(fmt::format(
+      "learned prior: patch by patch of the views left out, whole fits of some rows err "
+      "{:+.2f} % ± {:.2f} with it: {}",
+      -100 * gain.log_ratio, 100 * gain.standard_error,
+      tuned.settings.prior == Prior::kLearned ? "it ends the fit"
+                                              : "total variation alone ends the fit"));
+}
+
+// Compares fits with and without the learned prior, if that is open.
+std::optional<TunedFit> with_prior(std::optional<TunedFit> tuned,
+                                   const measurement::Measurement& measurement,
+                                   const fit::FieldOptions& field, const fit::FitOptions& fit,
+                                   const OpenSettings& open, selection::TrialFile* file,
+                                   const TuneHooks& hooks,
+                                   const distributed::Communicator& processes) {
+  if (!tuned || !open.prior) return tuned;
+  const TrialShape shape = prior_trial(field, fit);
+  TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
+                 open.view_scale || fit.fit_view_scale, hooks, kPriorTrials, processes);
+  const std::optional<TunedFit> compared = searched(
+      fits, file, [&](FitTrials& trials) { return choose_prior(tuned->settings, trials); });
+  if (!compared) return std::nullopt;
+  tuned->settings.prior = compared->settings.prior;
+  tuned->last_trials = compared->trials;
+  log_prior(*tuned);
+  return tuned;
+}
+
 // Writes a line for each trial: its settings, and how much worse than the chosen one it predicts.
 // Says how these are compared.
 void log_trials(const TunedFit& tuned) {
@@ -83,6 +115,10 @@ int expected_trials(const SearchSpace& space) {
 }
 
 TrialShape trial_of_tune(const fit::FieldOptions& field, const fit::FitOptions& fit) {
+  return {selection::kTrialRows, field, fit};
+}
+
+TrialShape prior_trial(const fit::FieldOptions& field, const fit::FitOptions& fit) {
   return {selection::kTrialRows, field, fit};
 }
 
@@ -152,7 +188,7 @@ std::optional<TunedFit> tune(const measurement::Measurement& measurement,
       "--vertex-epochs {} --coarse-epochs {}",
       base::name_of(tuned->settings.penalty), tuned->settings.variation, tuned->settings.rank,
       tuned->settings.epochs, fit.vertex_epochs, fit.coarse_epochs));
-  return tuned;
+  return with_prior(tuned, measurement, field, fit, open, &file, hooks, processes);
 }
 
 std::optional<TunedFit> choose_by_short_trials(const measurement::Measurement& measurement,
@@ -179,7 +215,7 @@ std::optional<TunedFit> choose_by_short_trials(const measurement::Measurement& m
   log_trials(*tuned);
   base::log_info("chose " + describe(tuned->settings, TrialSettings{}));
   tuned->settings.epochs = fit.epochs;
-  return tuned;
+  return with_prior(std::move(tuned), measurement, field, fit, open, nullptr, hooks, processes);
 }
 
 }  // namespace tomofield::reconstruction

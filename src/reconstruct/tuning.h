@@ -53,10 +53,15 @@ TrialShape trial_of_tune(const fit::FieldOptions& field, const fit::FitOptions& 
 TrialShape short_trial(const fit::FieldOptions& field, const fit::FitOptions& fit,
                        std::int64_t reach_px = 0);
 
+/// Returns the trials that say whether the learned prior helps a run: whole fits of some rows with
+/// plain vertices. Shorter ones say nothing of it, since the end of a fit is what it replaces.
+TrialShape prior_trial(const fit::FieldOptions& field, const fit::FitOptions& fit);
+
 /// Returns what trials can choose of `wanted`: there must be a background or undecided beads.
 OpenSettings open_settings(OpenSettings wanted, const measurement::Measurement& measurement);
 
-/// Chooses settings by search_settings(); the penalty only if `open` has the variation. Chooses the
+/// Chooses settings by search_settings(), and then the prior as choose_by_short_trials() does; the
+/// penalty only if `open` has the variation. Chooses the
 /// corrections of the views that are open after that. Trials use some rows in the middle and none
 /// of the views that `measurement` holds out to score the result. `file` stores finished trials,
 /// and trials that it has are not repeated. Returns nothing if a stop was requested. Throws Error
@@ -69,8 +74,10 @@ std::optional<TunedFit> tune(
 
 /// Chooses the open settings by short trials (automatic_choice.h). The trials use plain vertices,
 /// whatever the field of the run: the right settings depend on the specimen, and plain vertices
-/// converge in a fraction of the time. Each trial takes about 3 % of a fit of 256 rows. Returns
-/// nothing if a stop was requested. Every process calls it.
+/// converge in a fraction of the time. Each trial takes about 3 % of a fit of 256 rows. If the
+/// prior is open, two trials of prior_trial() follow, with the chosen settings, and the learned
+/// prior is taken if it predicts better. Returns nothing if a stop was requested. Every process
+/// calls it.
 std::optional<TunedFit> choose_by_short_trials(
     const measurement::Measurement& measurement, const fit::FieldOptions& field,
     const fit::FitOptions& fit, const OpenSettings& open, const TuneHooks& hooks,

@@ -70,6 +70,20 @@ nlohmann::json sections_json(const SectionProfile& sections) {
   return {{"faces", sections.faces}, {"empty_part", sections.empty_part}};
 }
 
+nlohmann::json prior_json(const PriorSummary& prior) {
+  nlohmann::json json{{"learned", prior.is_used}, {"gain", nullptr}, {"standard_error", nullptr}};
+  if (prior.gain)
+    json.update({{"gain", prior.gain->log_ratio}, {"standard_error", prior.gain->standard_error}});
+  return json;
+}
+
+std::string prior_text(const PriorSummary& prior) {
+  if (!prior.gain) return "learned prior";
+  return fmt::format("{}learned prior: {:+.2f} % ± {:.2f} of the held-out error in trials",
+                     prior.is_used ? "" : "no ", -100 * prior.gain->log_ratio,
+                     100 * prior.gain->standard_error);
+}
+
 std::string held_out_text(const HeldOutSummary& held_out) {
   return fmt::format("held out{}: median {:.2f}, worst {:.2f} (at {:.1f}°)",
                      held_out.is_of_trials ? " in trials" : "", held_out.median, held_out.worst,
@@ -100,6 +114,7 @@ nlohmann::json verdict_json(const Verdict& verdict) {
   json["line"] = verdict_line(verdict);
   json["residual"] = verdict.residual;
   json["held_out"] = verdict.held_out ? held_out_json(*verdict.held_out) : nlohmann::json(nullptr);
+  json["prior"] = prior_json(verdict.prior);
   json["sections"] = sections_json(verdict.sections);
   json["views"] = verdict.views ? views_json(*verdict.views) : nlohmann::json(nullptr);
   json["defocus"] = verdict.defocus ? defocus_json(*verdict.defocus) : nlohmann::json(nullptr);
@@ -119,6 +134,7 @@ std::string verdict_line(const Verdict& verdict) {
     parts.push_back(fmt::format("correlation of neighbours {:.2f}, {:.2f}", x, y));
   }
   if (verdict.held_out) parts.push_back(held_out_text(*verdict.held_out));
+  if (verdict.prior.is_used || verdict.prior.gain) parts.push_back(prior_text(verdict.prior));
   if (verdict.artefacts.speckle)
     parts.push_back(fmt::format("speckle {:.3f} %", 100 * *verdict.artefacts.speckle));
   if (verdict.artefacts.faces)

@@ -30,7 +30,8 @@ template <typename Settings, typename SettingsJson>
 nlohmann::json tuned_json(const Tuned<Settings>& tuned, const SettingsJson& settings_json) {
   return {{"predicted_views", tuned.predicted_views},
           {"chosen", settings_json(tuned.settings)},
-          {"trials", trials_json(tuned.trials, settings_json)}};
+          {"trials", trials_json(tuned.trials, settings_json)},
+          {"last_trials", trials_json(tuned.last_trials, settings_json)}};
 }
 
 /// Keeps the finished trials of a search in a file (JSON), so that an interrupted run need not

@@ -36,6 +36,9 @@ struct Tuned {
   Settings settings = {};
   std::vector<Trial<Settings>> trials;  ///< in the order in which they were made
   std::vector<int> predicted_views;     ///< held-out views that the choice rests on
+  /// Trials of another shape than `trials`, made with the chosen settings. They compare with each
+  /// other alone.
+  std::vector<Trial<Settings>> last_trials = {};
 };
 
 /// Makes the trials of a search, none of them twice, and applies the rules by which settings are

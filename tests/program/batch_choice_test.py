@@ -57,13 +57,13 @@ def commands(folder):
 
 def settings(fit):
     return {"tv_penalty": fit["penalty"], "tv": fit["density_variation"],
-            "spike_rank": fit["spike_rank"]}
+            "spike_rank": fit["spike_rank"], "prior": fit["prior"]}
 
 
 def chosen_settings(folder, name):
     """Returns what the trials of a series chose for it."""
     chosen = read(folder, name + ".json")["metrics"]["tuning"]["chosen"]
-    return {key: chosen[key] for key in ("tv_penalty", "tv", "spike_rank")}
+    return {key: chosen[key] for key in ("tv_penalty", "tv", "spike_rank", "prior")}
 
 
 @pytest.fixture(scope="module", name="each")
@@ -93,6 +93,7 @@ def test_all_series_of_a_batch_get_the_median_choice_of_three(once, each):
         used = settings(options_of(os.path.join(once, name + ".mrc"))["fit"])
         assert used == {key: choice[key] for key in used}
         assert f"--tv={choice['tv']:g}" in commands(once)[name]
+        assert f"--prior={choice['prior']}" in commands(once)[name]
     text = page(once)
     assert f"{choice['tv_penalty']} tv {choice['tv']:.3g}" in text and "trials of a (" in text
 

@@ -35,7 +35,7 @@ def test_files_with_the_defaults_give_the_bytes_of_the_program(series, tmp_path)
     assert made.metrics == tomofield.read_metrics(tmp_path / "t.mrc")
     assert made.metrics == tomofield.read_metrics(tmp_path / "t.json")
     assert sorted(os.listdir(tmp_path)) == ["t.h5", "t.json", "t.mrc", "t_choice.png",
-                                            "t_denoise.png"]
+                                            "t_denoise.png", "t_prior.png"]
 
 
 def read_json(series, name):

@@ -1,0 +1,38 @@
+#include "reconstruct/prior_picture.h"
+
+#include <cstddef>
+#include <vector>
+
+#include "base/percentile.h"
+#include "reconstruct/trial_sections.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+// Returns what `with` has more than `without`, around the median of that: no change is a middle
+// grey.
+selection::Section difference_of(const selection::Section& with,
+                                 const selection::Section& without) {
+  selection::Section difference = with;
+  const auto middle = static_cast<float>(base::percentile(without.values, 50));
+  for (std::size_t i = 0; i < difference.values.size(); ++i)
+    difference.values[i] += middle - without.values[i];
+  return difference;
+}
+
+}  // namespace
+
+void write_prior_picture(const TunedFit& tuned, double output_scale,
+                         const std::filesystem::path& path) {
+  std::vector<CaptionedSection> shown;
+  if (!tuned.last_trials.empty() && !tuned.last_trials.front().section.values.empty()) {
+    const selection::Section& without = tuned.last_trials.front().section;
+    const selection::Section& with = tuned.last_trials.back().section;
+    shown = {{without, "Total variation alone"},
+             {with, "With the learned prior"},
+             {difference_of(with, without), "What the prior adds"}};
+  }
+  draw_sections(shown, 0, output_scale, path);
+}
+
+}  // namespace tomofield::reconstruction
