@@ -74,8 +74,22 @@ int steps_per_epoch_of(const measurement::Measurement& measurement, const FitOpt
 
 // Returns the leaves that a process keeps; an empty list means all.
 std::vector<int> leaves_to_keep(const distributed::Communicator& processes,
-                                const field::Quadtree& tree, const measurement::RowShare& share) {
-  return processes.size() == 1 ? std::vector<int>{} : needed_leaves(tree, share);
+                                const field::Quadtree& tree, const measurement::RowShare& share,
+                                const FitOptions& options) {
+  return processes.size() == 1 ? std::vector<int>{}
+                               : needed_leaves(tree, share, rows_beyond(options.prior));
+}
+
+// Copies the parameters of the leaves that this process keeps. Those of other leaves take no memory
+// until they are written.
+void copy_kept(const field::Field& field, std::span<const float> from, std::span<float> to) {
+  base::parallel_for("copy leaves", field.tree().num_leaves(), [&](std::int64_t i) {
+    const int leaf = static_cast<int>(i);
+    if (!field.keeps(leaf)) return;
+    std::copy(from.begin() + static_cast<std::ptrdiff_t>(field.offset(leaf)),
+              from.begin() + static_cast<std::ptrdiff_t>(field.offset(leaf + 1)),
+              to.begin() + static_cast<std::ptrdiff_t>(field.offset(leaf)));
+  });
 }
 
 // The tree may change in the coarse stage. Without one, it may change in this part of the fit.
@@ -105,7 +119,7 @@ Fit::Fit(const measurement::Measurement& measurement, const FieldOptions& field_
       field_(make_initial_field(with_shapes_for(options, stages_.front(), domain_),
                                 measurement.geometry.thickness, measurement.mean_density,
                                 of_kind(field_options, stages_.front().field_kind), options.seed,
-                                leaves_to_keep(processes, domain_.tree, share_))),
+                                leaves_to_keep(processes, domain_.tree, share_, options_))),
       optimizer_(*field_, kAdam),
       may_change_tree_(field_options.tree != TreeKind::kUniform),
       tree_updates_(make_tree_updates(field_options, domain_, options, stages_.front())),
@@ -146,6 +160,12 @@ void Fit::enter_stage() {
 }
 
 void Fit::free_optimizer() {
+  free_moments();
+  prior_state_.reset(0);
+}
+
+// Frees the gradient and the state of the optimiser, which begins anew.
+void Fit::free_moments() {
   gradient_.reset(0);
   optimizer_.state() = {};
 }
@@ -153,7 +173,7 @@ void Fit::free_optimizer() {
 // Resamples the field to the vertices of the stage, or factorises it. The optimiser starts anew.
 void Fit::resample_field() {
   std::vector<field::LeafShape> shapes = domain_.shapes_in(field_->tree(), stage().bin);
-  free_optimizer();  // before the other field needs memory
+  free_moments();  // before the other field needs memory
   field_ = field_->kind() == stage().field_kind ? field_->resampled(std::move(shapes))
                                                 : field::factorised(*field_, std::move(shapes));
   optimizer_ = Adam(*field_, kAdam);
@@ -162,22 +182,35 @@ void Fit::resample_field() {
 // Goes on to a stage of the learned prior, at the same resolution.
 void Fit::follow_prior() {
   const std::span<float> parameters = field_->parameters();
+  free_moments();  // before the answer needs memory
   if (stage().has_answer) {
-    const prior::Lattice lattice(*field_, measurement_.roi);
-    const std::span<float> state(prior_state_.data(), prior_state_.size());
-    prior::replace_by_answer(prior::Network::trained(), lattice, state, parameters);
-    std::ranges::copy(state, parameters.begin());
+    answer();
+    copy_kept(*field_, prior_state(), parameters);
+    halo_->refresh(parameters);
   } else {
     prior_state_.reset(parameters.size());
-    std::ranges::copy(parameters, prior_state_.begin());
+    copy_kept(*field_, parameters, prior_state_);
   }
   optimizer_ = Adam(*field_, kAdam);
   follow_tree();
 }
 
-void Fit::restore_prior_state(std::span<const float> state) {
-  prior_state_.reset(state.size());
-  std::ranges::copy(state, prior_state_.begin());
+// Replaces the state of the prior in the leaves of this process by the answer to it and to the
+// field.
+void Fit::answer() {
+  Halo beyond(*field_, share_.without_help(), prior::kRowsBeyond - field::kPixelCentre,
+              processes());
+  beyond.refresh(prior_state_);
+  beyond.refresh(field_->parameters());
+  const prior::Lattice lattice(*field_, measurement_.roi);
+  const base::Range own = lattice.rows_of(share_.bands);
+  const float mean = prior::mean_density(lattice, own, prior_state(), processes());
+  prior::replace_by_answer(prior::Network::trained(), lattice, {own, mean}, prior_state_,
+                           field_->parameters());
+}
+
+void Fit::restore_prior_state(base::AlignedBuffer<float> state) {
+  prior_state_ = std::move(state);
   follow_tree();
 }
 
@@ -196,7 +229,7 @@ void Fit::refine() {
     progress_.views[v] = {last.scale, last.offset * longer, noise_weights[v]};
   }
   follow_tree();
-  halo_->refresh(*field_);  // other vertices depend on more of the old ones
+  halo_->refresh(field_->parameters());  // other vertices depend on more of the old ones
 }
 
 // Makes the objects that belong to one tree.
@@ -218,7 +251,7 @@ void Fit::follow_tree() {
       .processes = processes_,
       .is_light = stage().is_light,
       .answer = stage().has_answer ? prior_state() : std::span<const float>()});
-  halo_.emplace(*field_, share_of_stage(), stage().bin, processes());
+  halo_.emplace(*field_, share_of_stage(), 0.5 * stage().bin, processes());
 }
 
 void Fit::keep_views(std::vector<measurement::ViewModel> models) {
@@ -230,7 +263,7 @@ void Fit::keep_views(std::vector<measurement::ViewModel> models) {
 }
 
 std::vector<int> Fit::kept_leaves(const field::Quadtree& tree) const {
-  return leaves_to_keep(processes(), tree, share_);
+  return leaves_to_keep(processes(), tree, share_, options_);
 }
 
 void Fit::go_on_from(Progress progress, std::unique_ptr<field::Field> field) {
@@ -366,7 +399,7 @@ void Fit::take_step() {
       gradient_.data(), surrogates ? of_surrogates : progress_.epoch_sums,
       [&](int leaf) { optimizer_.step(*field_, leaf, gradient_, rate); });
   optimizer_.step_bias(*field_, grad_bias, kBiasRate * rate);
-  halo_->refresh(*field_);
+  halo_->refresh(field_->parameters());
 }
 
 // Moves the vertices of the own leaves back that stand out from their neighbours. This is the
@@ -379,7 +412,7 @@ void Fit::limit_spikes() {
   base::parallel_for("limit spikes", own.size(), [&](std::int64_t i) {
     field_->limit_spikes(own.begin + static_cast<int>(i), options_.spike_rank);
   });
-  halo_->refresh(*field_);
+  halo_->refresh(field_->parameters());
 }
 
 // Says whether the residuals of the last epoch are those of noise rather than of structure that is

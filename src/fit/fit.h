@@ -133,16 +133,17 @@ class Fit {
   field::Field& field() { return *field_; }
   /// Hands over the fitted field; the fit cannot go on afterwards.
   std::unique_ptr<field::Field> take_field() { return std::move(field_); }
-  /// Frees the gradient and the state of the optimiser. The fit cannot take steps afterwards.
+  /// Frees what only steps need: the gradient, the state of the optimiser and that of the learned
+  /// prior. The fit cannot take steps afterwards.
   void free_optimizer();
   const Adam& optimizer() const { return optimizer_; }
   Adam& optimizer() { return optimizer_; }
 
   /// Returns what the stages of the learned prior keep beside the field, with its places: the
   /// parameters at the start of the light stage, and in the last stage the answer. Empty before.
-  std::span<const float> prior_state() const { return {prior_state_.data(), prior_state_.size()}; }
+  std::span<const float> prior_state() const { return prior_state_; }
   /// Restores it after go_on_from().
-  void restore_prior_state(std::span<const float> state);
+  void restore_prior_state(base::AlignedBuffer<float> state);
 
   const distributed::Communicator& processes() const { return processes_; }
   /// Returns the rows that this process works on; one process alone has all of them.
@@ -179,8 +180,10 @@ class Fit {
   const Stage& stage_at(std::int64_t step) const;
   measurement::RowShare share_of_stage() const;
   void enter_stage();
+  void free_moments();
   void resample_field();
   void follow_prior();
+  void answer();
   void refine();
   void follow_tree();
 

@@ -1,13 +1,19 @@
 #include "fit/halo.h"
-#include "base/enum_names.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
+#include <memory>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "base/enum_names.h"
+#include "prior/answer.h"
+#include "random_arrays.h"
 
 namespace tomofield::fit {
 namespace {
@@ -124,6 +130,100 @@ TEST(Share, AFewParametersAreAllThatTheBoundaryNeeds) {
       }
     }
   }
+}
+
+// Three columns of plain vertices, two leaves a row and band, of which the last row ends early.
+struct AnsweredField {
+  static constexpr int kThickness = 6, kNumRows = 101;
+  static constexpr Rectangle kRoi{0, 0, 40, kNumRows};
+
+  std::unique_ptr<field::Field> field = make();
+  prior::Lattice lattice{*field, kRoi};
+
+  static std::unique_ptr<field::Field> make() {
+    const field::RootGrid roots{.x0 = 0, .y0 = 0, .cell_size = 32, .columns = 2, .rows = 4};
+    field::Quadtree tree(roots, std::vector<field::Region>(8, field::Region::kInterest));
+    tree.split_to_level(field::Region::kInterest, 1);
+    std::vector<field::LeafShape> shapes(static_cast<std::size_t>(tree.num_leaves()),
+                                         {.nx = 17, .ny = 17, .nz = kThickness});
+    return make_field(FieldKind::kGrid, std::move(tree), kThickness, std::move(shapes));
+  }
+};
+
+// Has what one of several processes knows of two volumes.
+struct OfProcess {
+  measurement::RowShare share;
+  Range leaves;
+  std::vector<float> smooth, light;
+  Halo halo;
+
+  OfProcess(const AnsweredField& whole, int rank, int size)
+      : share(measurement::row_share(AnsweredField::kNumRows, 32, rank, size)),
+        leaves(field::leaves_of_bands(whole.field->tree(), share.bands)),
+        halo(*whole.field, share.without_help(), prior::kRowsBeyond - field::kPixelCentre,
+             distributed::Communicator::alone()) {}
+
+  // Returns the own leaves of a volume; what others own is no number.
+  std::vector<float> own_part(const field::Field& field, std::span<const float> volume) const {
+    std::vector<float> part(volume.size(), std::numeric_limits<float>::quiet_NaN());
+    const auto first = static_cast<std::ptrdiff_t>(field.offset(leaves.begin)),
+               end = static_cast<std::ptrdiff_t>(field.offset(leaves.end));
+    std::copy(volume.begin() + first, volume.begin() + end, part.begin() + first);
+    return part;
+  }
+};
+
+// Does what the processes do together in Halo::refresh().
+void refresh_all(std::vector<OfProcess>& processes, std::vector<float> OfProcess::*volume) {
+  std::vector<distributed::Communicator::Halo> packed;
+  for (OfProcess& process : processes) packed.push_back(process.halo.pack(process.*volume));
+  for (std::size_t i = 1; i < packed.size(); ++i) {
+    ASSERT_EQ(packed[i - 1].to_after.size(), packed[i].from_before.size());
+    ASSERT_EQ(packed[i].to_before.size(), packed[i - 1].from_after.size());
+    std::ranges::copy(packed[i - 1].to_after, packed[i].from_before.begin());
+    std::ranges::copy(packed[i].to_before, packed[i - 1].from_after.begin());
+  }
+  for (OfProcess& process : processes) process.halo.unpack(process.*volume);
+}
+
+TEST(Share, EachProcessAnswersForItsLeavesWithTheBitsOfOneProcess) {
+  const AnsweredField whole;
+  const auto num_parameters = whole.field->num_parameters();
+  const std::vector<float> smooth = testing::random_floats(num_parameters, 3),
+                           light = testing::random_floats(num_parameters, 4);
+  const Range all{0, AnsweredField::kNumRows};
+  const float mean =
+      prior::mean_density(whole.lattice, all, smooth, distributed::Communicator::alone());
+  std::vector<float> expected = smooth;
+  prior::replace_by_answer(prior::Network::trained(), whole.lattice, {all, mean}, expected, light);
+  for (const int size : {2, 3, 4}) {
+    std::vector<OfProcess> processes;
+    for (int rank = 0; rank < size; ++rank) {
+      processes.emplace_back(whole, rank, size);
+      processes.back().smooth = processes.back().own_part(*whole.field, smooth);
+      processes.back().light = processes.back().own_part(*whole.field, light);
+    }
+    refresh_all(processes, &OfProcess::smooth);
+    refresh_all(processes, &OfProcess::light);
+    for (OfProcess& process : processes) {
+      prior::replace_by_answer(prior::Network::trained(), whole.lattice,
+                               {whole.lattice.rows_of(process.share.bands), mean}, process.smooth,
+                               process.light);
+      for (std::size_t i = whole.field->offset(process.leaves.begin);
+           i < whole.field->offset(process.leaves.end); ++i)
+        ASSERT_EQ(process.smooth[i], expected[i]) << size << " " << i;
+    }
+  }
+}
+
+// What the learned prior reads beyond the bands lies in leaves that the process keeps.
+TEST(Share, LeavesOfAllRowsThatTheLearnedPriorReadsAreKept) {
+  EXPECT_EQ(rows_beyond(Prior::kTv), 1);
+  const AnsweredField whole;
+  const field::Quadtree& tree = whole.field->tree();
+  const std::vector<int> kept = needed_leaves(tree, share_of({1, 2}), rows_beyond(Prior::kLearned));
+  for (int leaf = 0; leaf < tree.num_leaves(); ++leaf)
+    EXPECT_EQ(std::ranges::count(kept, leaf), tree.leaf(leaf).square.y0 < 96 ? 1 : 0) << leaf;
 }
 
 TEST(Share, WhatIsNotKeptStaysZeroAndTheRestIsTheSame) {

@@ -4,6 +4,8 @@
 
 #include <cstddef>
 #include <memory>
+#include <numeric>
+#include <span>
 #include <vector>
 
 #include "base/parallel.h"
@@ -17,12 +19,13 @@ using testing::random_floats;
 constexpr int kSide = 16, kThickness = 12;
 constexpr Rectangle kRoi{0, 0, 40, 24};
 
-// Three columns and two rows of leaves of plain vertices, of which a part lies outside of the
+// Three columns and some rows of leaves of plain vertices, of which a part lies outside of the
 // region, and a column of the margin before them.
-std::unique_ptr<field::Field> make_vertices(float beta) {
-  const field::RootGrid roots{.x0 = -kSide, .y0 = 0, .cell_size = kSide, .columns = 4, .rows = 2};
+std::unique_ptr<field::Field> make_vertices(float beta, int rows = 2) {
+  const field::RootGrid roots{
+      .x0 = -kSide, .y0 = 0, .cell_size = kSide, .columns = 4, .rows = rows};
   std::vector<field::Region> regions;
-  for (int cell = 0; cell < 8; ++cell)
+  for (int cell = 0; cell < 4 * rows; ++cell)
     regions.push_back(cell % 4 == 0 ? field::Region::kMargin : field::Region::kInterest);
   std::vector<field::LeafShape> shapes;
   field::Quadtree tree(roots, regions);
@@ -36,6 +39,14 @@ std::unique_ptr<field::Field> make_vertices(float beta) {
   field->bias = 0.25f;
   field->activation = {beta};
   return field;
+}
+
+// Replaces all rows by their answer.
+void answer_all(const Lattice& lattice, std::span<float> smooth, std::span<const float> light,
+                const PartSize& size = {}) {
+  const base::Range all{0, lattice.shape().ny};
+  const float mean = mean_density(lattice, all, smooth, distributed::Communicator::alone());
+  replace_by_answer(Network::trained(), lattice, {all, mean}, smooth, light, size);
 }
 
 double density_at(const field::Field& field, int x, int z, int y) {
@@ -104,10 +115,60 @@ TEST(PriorAnswer, DoesNotDependOnThePartsOfTheLattice) {
   const std::vector<float> before(field->parameters().begin(), field->parameters().end());
   const std::vector<float> light = random_floats(before.size(), 7);
   std::vector<float> whole = before, in_parts = before;
-  replace_by_answer(Network::trained(), lattice, whole, light);
-  replace_by_answer(Network::trained(), lattice, in_parts, light, {.x = 12, .z = 8, .y = 8});
+  answer_all(lattice, whole, light);
+  answer_all(lattice, in_parts, light, {.x = 12, .z = 8, .y = 8});
   EXPECT_NE(whole, before);
-  for (std::size_t i = 0; i < whole.size(); ++i) ASSERT_NEAR(whole[i], in_parts[i], 1e-5) << i;
+  EXPECT_EQ(whole, in_parts);
+}
+
+TEST(PriorLattice, KnowsTheRowsOfBands) {
+  const auto field = make_vertices(0.0f, 4);
+  const Lattice lattice(*field, {0, 0, 40, 56});
+  EXPECT_EQ(lattice.rows_of({0, 1}), (base::Range{0, 16}));
+  EXPECT_EQ(lattice.rows_of({1, 3}), (base::Range{16, 48}));
+  EXPECT_EQ(lattice.rows_of({3, 4}), (base::Range{48, 56}));
+}
+
+TEST(PriorAnswer, IsThatOfItsRowsWhateverLiesFarFromThem) {
+  const auto field = make_vertices(4.0f, 8);
+  const Lattice lattice(*field, {0, 0, 40, 120});
+  const std::vector<float> before(field->parameters().begin(), field->parameters().end());
+  const std::vector<float> light = random_floats(before.size(), 9);
+  std::vector<float> whole = before;
+  answer_all(lattice, whole, light);
+  const base::Range all{0, 120}, own{48, 64}, replaced{48, 65};
+  std::vector<float> smooth = before, light_nearby = light;
+  const float mean = mean_density(lattice, all, smooth, distributed::Communicator::alone());
+  const auto box_of = [&](base::Range rows, std::span<const float> parameters) {
+    const Lattice::Part part{{0, 40}, {0, kThickness}, rows};
+    std::vector<float> box(part.shape().size());
+    lattice.read(parameters, part, box);
+    return box;
+  };
+  for (const base::Range far : {base::Range{0, 48 - kRowsBeyond}, {64 + kRowsBeyond, 120}}) {
+    const Lattice::Part part{{0, 40}, {0, kThickness}, far};
+    const std::vector<float> other = random_floats(part.shape().size(), 10, 5.0, 6.0);
+    lattice.write(other, part, smooth);
+    lattice.write(other, part, light_nearby);
+  }
+  replace_by_answer(Network::trained(), lattice, {own, mean}, smooth, light_nearby);
+  EXPECT_EQ(box_of(replaced, smooth), box_of(replaced, whole));
+  for (const base::Range others : {base::Range{20, 48}, {65, 92}})
+    EXPECT_EQ(box_of(others, smooth), box_of(others, before));
+}
+
+// Sums of a divided lattice are those of its rows, so they add up to the sum of all of them.
+TEST(PriorAnswer, TakesTheMeanOfItsRows) {
+  const auto field = make_vertices(0.0f);
+  const Lattice lattice(*field, kRoi);
+  const auto mean_of = [&](base::Range rows) {
+    return mean_density(lattice, rows, field->parameters(), distributed::Communicator::alone());
+  };
+  std::vector<float> box(lattice.shape().size());
+  lattice.read(field->parameters(), {{0, 40}, {0, kThickness}, {0, 24}}, box);
+  const double sum = std::accumulate(box.begin(), box.end(), 0.0);
+  EXPECT_NEAR(mean_of({0, 24}), sum / static_cast<double>(box.size()), 1e-7);
+  EXPECT_NEAR(mean_of({0, 16}) + mean_of({16, 24}), mean_of({0, 24}), 1e-7);
 }
 
 TEST(PriorAnswer, HasTheSameBitsForAnyNumberOfThreads) {
@@ -118,7 +179,7 @@ TEST(PriorAnswer, HasTheSameBitsForAnyNumberOfThreads) {
   for (const int threads : {1, 3}) {
     base::set_thread_count(threads);
     answers.emplace_back(field->parameters().begin(), field->parameters().end());
-    replace_by_answer(Network::trained(), lattice, answers.back(), light);
+    answer_all(lattice, answers.back(), light);
   }
   base::set_thread_count(0);
   EXPECT_EQ(answers[0], answers[1]);

@@ -33,7 +33,8 @@ int leaf_at(const field::Field& field, std::int64_t x, std::int64_t y) {
 
 }  // namespace
 
-Lattice::Lattice(const field::Field& field, const Rectangle& roi) : field_(field) {
+Lattice::Lattice(const field::Field& field, const Rectangle& roi)
+    : field_(field), first_row_(roi.y0) {
   const int first = leaf_at(field, roi.x0, roi.y0);
   const field::Square& square = field.tree().leaf(first).square;
   leaf_size_ = static_cast<int>(square.size);
@@ -57,6 +58,15 @@ std::vector<Lattice::Place> Lattice::places(std::int64_t first, int count,
     places.push_back({from_begin / leaf_size_, from_begin % leaf_size_});
   }
   return places;
+}
+
+base::Range Lattice::rows_of(base::Range bands) const {
+  const field::RootGrid& roots = field_.tree().roots();
+  const auto row_at = [&](int band) {
+    const std::int64_t row = roots.y0 + band * roots.cell_size - first_row_;
+    return static_cast<int>(std::clamp<std::int64_t>(row, 0, shape_.ny));
+  };
+  return {row_at(bands.begin), row_at(bands.end)};
 }
 
 void Lattice::read(std::span<const float> parameters, const Part& part,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -21,6 +22,9 @@ class Lattice {
 
   /// Returns the vertices along each axis: a pixel of the region, and of the thickness, each.
   const BoxShape& shape() const { return shape_; }
+  /// Returns the rows (y) that begin in some bands of root cells of the tree. The row on the face
+  /// between two bands is the first one of the upper band.
+  base::Range rows_of(base::Range bands) const;
 
   /// Some vertices along each axis. Those beyond the lattice stand for their mirror images in it.
   struct Part {
@@ -43,6 +47,7 @@ class Lattice {
 
   const field::Field& field_;
   BoxShape shape_;
+  std::int64_t first_row_;  // in the field's coordinates
   int leaf_size_ = 0, num_columns_ = 0;
   std::vector<int> leaves_;  // [row of cells, column of cells]
   std::vector<Place> x_, y_;

@@ -221,10 +221,10 @@ void restore_prior_state(const std::filesystem::path& file, const output::Traini
   if (single(state, "has_prior_state", path) != 1)
     throw Error(fmt::format("'{}' is damaged: it lacks the state of the learned prior", path));
   base::AlignedBuffer<float> values(fit.field().num_parameters());
-  output::load_floats(file, "prior_state", fit.field(), {values.data(), values.size()});
+  output::load_floats(file, "prior_state", fit.field(), values);
   if (!std::ranges::all_of(values, [](float value) { return std::isfinite(value); }))
     throw Error(fmt::format("'{}' is damaged: the state of its learned prior is not finite", path));
-  fit.restore_prior_state({values.data(), values.size()});
+  fit.restore_prior_state(std::move(values));
 }
 
 // Prepares to gather arrays with one number for each parameter from the leaves of all processes.

@@ -33,14 +33,15 @@ std::size_t band_memory(const measurement::Measurement& plan, const fit::Domain&
   return kSlabsOfBand * (2 * slab + views) + 3 * slab / kernels::kLanes;
 }
 
-// Returns the part of all parameters that this process keeps: its own and those of its neighbours.
+// Returns the part of all parameters that this process keeps: its own and those of its neighbours
+// in `rows` rows beyond its bands.
 double part_of_parameters(const fit::Domain& domain, FieldKind kind,
-                          const distributed::Communicator& processes) {
+                          const distributed::Communicator& processes, std::int64_t rows = 1) {
   if (processes.size() == 1) return 1.0;
   const measurement::RowShare share =
       measurement::row_share(domain.num_rows, domain.tree.roots().cell_size, processes);
   std::vector<field::LeafShape> needed;
-  for (const int leaf : fit::needed_leaves(domain.tree, share))
+  for (const int leaf : fit::needed_leaves(domain.tree, share, rows))
     needed.push_back(domain.shapes[static_cast<std::size_t>(leaf)]);
   return static_cast<double>(field::count_parameters(kind, needed)) /
          static_cast<double>(field::count_parameters(kind, domain.shapes));
@@ -84,14 +85,38 @@ measurement::SlabViews::Shape own_part(measurement::SlabViews::Shape shape,
   return shape;
 }
 
-// Returns the bytes of the learned prior: one more number for each parameter, and its answer.
-std::size_t prior_memory(const measurement::Measurement& plan, std::size_t fitted,
-                         const fit::FitOptions& options) {
-  if (options.prior == Prior::kTv) return 0;
+// Returns the bytes that this process takes for an answer of the learned prior, with the rows that
+// it exchanges with its neighbours.
+std::size_t answer_memory(const measurement::Measurement& plan, const fit::Domain& domain,
+                          const distributed::Communicator& processes) {
   const prior::BoxShape lattice{static_cast<int>(plan.roi.width()),
                                 static_cast<int>(std::lround(plan.geometry.thickness)),
                                 static_cast<int>(plan.roi.height())};
-  return fitted / 4 + prior::answer_memory(lattice);
+  const std::int64_t band_rows = domain.tree.roots().cell_size;
+  const base::Range bands = measurement::row_share(domain.num_rows, band_rows, processes).bands;
+  const auto row_at = [&](int band) {
+    return static_cast<int>(std::min(band * band_rows, domain.num_rows));
+  };
+  const prior::BoxShape beyond{lattice.nx, lattice.nz, prior::kRowsBeyond};
+  const std::size_t exchanged = processes.size() > 1 ? 4 * beyond.size() * sizeof(float) : 0;
+  return prior::answer_memory(lattice, {row_at(bands.begin), row_at(bands.end)}) + exchanged;
+}
+
+// Returns the bytes that the learned prior adds to those of the fitted field: one more number for
+// each parameter, leaves of the neighbours that it alone reads, and what its answer takes beyond
+// the room that the gradient and the two moments make for it.
+double prior_memory(const PlannedFit& planned) {
+  const auto& [series, plan, domain, options, processes] = planned;
+  if (options.fit.prior == Prior::kTv) return 0;
+  const double parameters = parameter_bytes(domain, options.field, FieldKind::kGrid, processes);
+  const double with_rows_beyond =
+      parameters *
+      part_of_parameters(domain, FieldKind::kGrid, processes, fit::rows_beyond(options.fit.prior)) /
+      part_of_parameters(domain, FieldKind::kGrid, processes);
+  const double answer = options.fit.prior == Prior::kLearned
+                            ? static_cast<double>(answer_memory(plan, domain, processes))
+                            : 0.0;
+  return 2 * with_rows_beyond - parameters + std::max(0.0, answer - 3 * parameters);
 }
 
 }  // namespace
@@ -165,7 +190,7 @@ std::size_t estimate_memory(const PlannedFit& planned, const std::vector<fit::St
           ? fit::surrogate_memory(own_shape, plan.rays_shape(), steps, slabs_in_use)
           : 0;
   const std::size_t fitting =
-      parameters + surrogates + prior_memory(plan, parameters, options.fit) +
+      parameters + surrogates + static_cast<std::size_t>(prior_memory(planned)) +
       static_cast<std::size_t>(bands_in_use) * band_memory(plan, domain, views_a_step) +
       static_cast<std::size_t>(base::thread_count()) * thread_memory(plan, domain);
   const std::size_t tracing =

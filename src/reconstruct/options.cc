@@ -321,7 +321,6 @@ std::vector<std::string> ReconstructOptions::faults_of_job() const {
         "several processes cannot share {} yet: start one, with more --threads", option));
   };
   if (field.tree == TreeKind::kAdaptive) refuse("--tree adaptive");
-  if (fit.prior != Prior::kTv) refuse("--prior learned");
   if (fit.engine == Engine::kRay) refuse("--engine ray");
   if (resolved.denoising_halves) refuse("--denoising-halves");
   if (!resolved.budget.empty()) refuse("--budget");
