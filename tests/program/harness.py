@@ -10,6 +10,7 @@ import signal
 import subprocess
 import tempfile
 
+import h5py
 import mrcfile
 import numpy as np
 
@@ -186,6 +187,14 @@ class Results:
         """Returns true if volume and model have the same bytes as another run's."""
         return (read_bytes(self.volume_path) == read_bytes(other.volume_path)
                 and read_bytes(self.model_path) == read_bytes(other.model_path))
+
+    def steps_done(self):
+        """Returns the steps that the checkpoint has done; 0 without one."""
+        try:
+            with h5py.File(self.model_path) as model:
+                return int(model["training/integers/step"][0])
+        except OSError:
+            return 0
 
     def leftovers(self):
         """Returns the files of the directory that are no results."""

@@ -22,7 +22,7 @@ MPI = {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS
        "OMPI_MCA_btl_vader_single_copy_mechanism": "none"}
 ROWS, COLUMNS, THICKNESS = 120, 40, 16  # rows end in the middle of a slab and of a root cell
 PRIORS = ["--tv-factors", 0.5, "--bcc", 5, "--ifp", 0.2]
-NUM_STEPS = 4 * 7
+LEARNED = ["--field", "grid", "--tv-penalty", "smooth", "--prior", "learned"]
 FIT = harness.merge(harness.QUICK, ["--thickness", THICKNESS, "--rank", 3, "--epochs", 4, *PRIORS])
 
 
@@ -106,6 +106,9 @@ def test_results_have_the_bytes_of_one_process(command):
              "coarser": (["--field", "grid", "--leaf-size", 64, "--coarse-epochs", 4], (2,)),
              "filtered": (["--field", "grid", "--leaf-size", 32, "--coarse-epochs", 3, "--defocus", 3,
                            "--pixel-size", 8, "--dose-per-tilt", 2, "--hold-out", 5], (2,)),
+             "learned": (LEARNED, (3, 4)),
+             "learned filtered": ([*LEARNED, "--leaf-size", 32, "--coarse-epochs", 3, "--defocus", 3,
+                                   "--pixel-size", 8, "--hold-out", 5], (2,)),
              "margin": (["--contrast", "dark", "--hold-out", 5, "--axes", "xzy", "--mode", 12],
                         (3,))}
     for name, (options, numbers) in cases.items():
@@ -168,7 +171,8 @@ def test_a_divided_band_has_the_bytes_of_one_process(command):
     cases = {"grid": ["--field", "grid", "--leaf-size", 64],
              "factors": ["--field", "vm", "--leaf-size", 32, "--vertex-epochs", 2,
                          "--coarse-epochs", 2, "--hold-out", 5],
-             "smooth": ["--field", "vm", "--leaf-size", 32, "--tv-penalty", "smooth"]}
+             "smooth": ["--field", "vm", "--leaf-size", 32, "--tv-penalty", "smooth"],
+             "learned": [*LEARNED, "--leaf-size", 64]}
     for name, options in cases.items():
         alone, shared = harness.fresh_results(f"tall_{name}"), harness.fresh_results(f"tall_{name}2")
         harness.succeed(*command(alone, *options, input=tall, fit=with_margin))
@@ -251,11 +255,6 @@ def stop_after_a_step(run, number):
     return errors
 
 
-def step_of(results):
-    with h5py.File(results.model_path) as model:
-        return int(model["training/integers/step"][0])
-
-
 def test_checkpoints_go_on_with_any_number_of_processes(command):
     undisturbed, results = harness.fresh_results("undisturbed"), harness.fresh_results("resumed")
     long = ["--epochs", 400]  # to be stopped in, three times
@@ -269,7 +268,7 @@ def test_checkpoints_go_on_with_any_number_of_processes(command):
         run = start(processes, *words) if processes > 1 else harness.start(*words)
         errors = stop_after_a_step(run, number)
         assert run.returncode == status, (run.returncode, errors)
-        steps.append(step_of(results))
+        steps.append(results.steps_done())
     assert 0 < steps[0] < steps[1] < steps[2] < 400 * 7, steps
     succeed(3, *command(results, "--resume", *long))
     assert results.same_as(undisturbed)
@@ -296,6 +295,42 @@ def test_a_process_that_dies_ends_the_job_and_leaves_a_checkpoint(command):
     resumed = succeed(2, *command(results, "--resume", *long))
     assert "resuming" in resumed.stderr, resumed.stderr
     assert results.same_as(undisturbed)
+
+
+def killed_at(step, words, results):
+    """Starts a job of two processes until one is killed after this step, and returns the steps that
+    its checkpoint has done."""
+    run = start(2, *words)
+    while run.poll() is None and results.steps_done() < step:
+        time.sleep(0.001)
+    if run.poll() is None:
+        os.kill(processes_of(run)[1], signal.SIGKILL)
+    run.communicate(timeout=60)
+    return results.steps_done()
+
+
+# The light stage begins after 20 epochs, and the last one after 30. The prior has a state in both.
+@pytest.mark.parametrize("first_epoch, end_epoch", [(20, 30), (30, 33)])
+def test_the_learned_prior_goes_on_with_any_number_of_processes(command, first_epoch, end_epoch):
+    fit = [*LEARNED, "--epochs", 20, "--coarse-epochs", 0, "--checkpoint-minutes", 0]
+    undisturbed, killed = harness.fresh_results("whole_prior"), harness.fresh_results("killed_prior")
+    harness.succeed(*command(undisturbed, *fit))
+    for _ in range(10):
+        harness.fresh_results("killed_prior")
+        if killed_at(7 * first_epoch + 1, command(killed, *fit), killed) < 7 * end_epoch:
+            break
+    else:
+        raise AssertionError("every run got further before it was killed")
+    with h5py.File(killed.model_path) as model:
+        assert "prior_state" in model["training/floats"]
+    checkpoint = read_bytes(killed.model_path)
+    for processes in (1, 3):
+        resumed = harness.fresh_results(f"resumed_prior{processes}")
+        with open(resumed.model_path, "wb") as file:
+            file.write(checkpoint)
+        said = succeed(processes, *command(resumed, *fit, "--resume")).stderr
+        assert "resuming" in said, said
+        assert resumed.same_as(undisturbed), processes
 
 
 def refuse(words, processes, *arguments):
