@@ -106,7 +106,8 @@ std::optional<fit::TreeProgress> unflatten_tree(std::span<const std::int64_t> nu
 // Writes the trials without their times, so that a fit gives the same bytes whenever it is made.
 nlohmann::json without_times(const TunedFit& tuned) {
   nlohmann::json json = tuning_json(tuned);
-  for (nlohmann::json& trial : json["trials"]) trial.erase("seconds");
+  for (const char* key : {"trials", "last_trials"})
+    for (nlohmann::json& trial : json[key]) trial.erase("seconds");
   return json;
 }
 

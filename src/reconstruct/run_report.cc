@@ -333,13 +333,14 @@ void add_prior_picture(const ReportSource& source, HtmlPage& page) {
   page.add_heading("The learned prior");
   page.add_paragraph(fmt::format(
       "The same section from two fits of some rows, without some views. {} (docs/prior.md).",
-      is_used ? "With the prior the views left out were predicted better, so it ended this fit. Look "
-                "whether you trust what it adds; --prior tv does without"
-              : "With the prior the views left out were not predicted better, so this fit does "
-                "without"));
-  page.add_figures({{*source.prior_picture,
-                     "Without the prior, with it, and the difference in the same greys"}},
-                   report::FigureSize::kLarge);
+      is_used
+          ? "With the prior the views left out were predicted better, so it ended this fit. Look "
+            "whether you trust what it adds; --prior tv does without"
+          : "With the prior the views left out were not predicted better, so this fit does "
+            "without"));
+  page.add_figures(
+      {{*source.prior_picture, "Without the prior, with it, and the difference in the same greys"}},
+      report::FigureSize::kLarge);
 }
 
 void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {

@@ -90,7 +90,7 @@ def metrics(results):
     for key in ("seconds", "peak_GiB", "line"):
         found["verdict"].pop(key)
     if found["tuning"]:
-        for trial in found["tuning"]["trials"]:
+        for trial in found["tuning"]["trials"] + found["tuning"]["last_trials"]:
             trial.pop("seconds")
     return found
 
