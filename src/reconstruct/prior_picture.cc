@@ -3,18 +3,19 @@
 #include <cstddef>
 #include <vector>
 
-#include "base/percentile.h"
 #include "reconstruct/trial_sections.h"
+#include "report/contrast.h"
 
 namespace tomofield::reconstruction {
 namespace {
 
-// Returns what `with` has more than `without`, around the median of that: no change is a middle
-// grey.
+// Returns what `with` has more than `without`, around the middle of the contrast of that: where
+// nothing changes, it is a middle grey.
 selection::Section difference_of(const selection::Section& with,
                                  const selection::Section& without) {
   selection::Section difference = with;
-  const auto middle = static_cast<float>(base::percentile(without.values, 50));
+  const report::Contrast contrast = report::contrast_of(without.values);
+  const auto middle = static_cast<float>((contrast.black + contrast.white) / 2);
   for (std::size_t i = 0; i < difference.values.size(); ++i)
     difference.values[i] += middle - without.values[i];
   return difference;
