@@ -101,14 +101,16 @@ void turn_the_dial(ReconstructOptions& options) {
 }
 
 // Shows what the dial and the learned prior do. A resumed run keeps the pictures of its first
-// session: the trials that it reads have no sections.
+// session: the trials that it reads have no sections. A run without trials removes those of an
+// earlier run.
 void show_trials(const Run& run, const std::optional<TunedFit>& tuned) {
   if (!run.writes_files() || !run.processes.is_root()) return;
-  if (!tuned || tuned->trials.front().section.values.empty()) return;
+  if (tuned && tuned->trials.front().section.values.empty()) return;
+  const TunedFit shown = tuned.value_or(TunedFit());
   const double sign = run.options.input.contrast == Contrast::kDark ? -1 : 1;
   const double output_scale = run.options.volume.invert ? -sign : sign;
-  write_dial_picture(*tuned, output_scale, run.paths.dial_picture);
-  if (run.options.open.prior) write_prior_picture(*tuned, output_scale, run.paths.prior_picture);
+  if (run.options.chooses_weight()) write_dial_picture(shown, output_scale, run.paths.dial_picture);
+  if (run.options.open.prior) write_prior_picture(shown, output_scale, run.paths.prior_picture);
 }
 
 // Chooses the settings that are left to trials. A resumed run takes those that its checkpoint has.

@@ -230,6 +230,17 @@ def test_a_run_that_overwrites_another_leaves_none_of_its_pictures(series):
         assert "was given to this run" in file.read(), "why there is no picture of the dial"
 
 
+def test_a_run_of_too_few_views_for_trials_leaves_no_picture_of_earlier_trials(series):
+    folder = harness.fresh_directory("few_views")
+    command = ["reconstruct", *series.input, "--thickness", harness.THICKNESS, "--contrast", "bright",
+               "--no-margin", "--epochs", 2, "-o", os.path.join(folder, "out.mrc"), "--overwrite"]
+    harness.succeed(*command)
+    pictures = {"out_denoise.png", "out_prior.png"}
+    assert pictures <= set(os.listdir(folder))
+    harness.succeed(*command, "--exclude", f"1-{len(harness.TILTS) - 11}")
+    assert not pictures & set(os.listdir(folder))
+
+
 def test_a_run_that_overwrites_another_keeps_volumes_and_records(series):
     folder = harness.fresh_directory("overwritten_files")
     names = ("out_EVN_Vol.mrc", "out_tune.json", "out_align.xf", "out_alignment.json")
