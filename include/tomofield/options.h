@@ -127,8 +127,8 @@ struct Options {
   /// How strongly to denoise: "light", "medium", "strong" or a factor. It multiplies the weight, be
   /// it given or chosen, by 0.5, 1, 2 or the factor.
   std::string denoise = "medium";
-  /// What ends the fit. Without it a trial takes the learned prior if that predicts views that were
-  /// left out better, unless `penalty` or `density_variation` is given.
+  /// Says what ends the fit. If it is empty, a trial takes the learned prior if that predicts views
+  /// better that were left out. With `penalty` or `density_variation`, empty means kTv.
   std::optional<Prior> prior;
   double boundary = 4.0;  ///< weight of the boundary consistency (eq. 6)
   double fourier = 0.0;   ///< weight of the isotropic Fourier prior (eq. 7)

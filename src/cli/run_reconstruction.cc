@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/enum_names.h"
@@ -110,18 +111,19 @@ void print_files(const reconstruction::ReconstructOptions& options,
   if (options.makes_halves()) print_files_of_halves(paths, options.resolved.denoising_halves);
 }
 
-// Says whether there is a picture of what --denoise does, which only trials can show.
-bool has_dial_picture(const reconstruction::ReconstructOptions& options) {
-  return options.chooses_weight() &&
-         std::filesystem::exists(
-             reconstruction::output_paths(options.resolved.output).dial_picture);
-}
-
-// Says whether there is a picture of what the learned prior does.
-bool has_prior_picture(const reconstruction::ReconstructOptions& options) {
-  return options.open.prior &&
-         std::filesystem::exists(
-             reconstruction::output_paths(options.resolved.output).prior_picture);
+// The pictures that trials draw, if there are any: of what --denoise does, and of what the learned
+// prior does.
+struct PicturesOfTrials {
+  std::optional<std::filesystem::path> dial, prior;
+};
+PicturesOfTrials pictures_of_trials(const reconstruction::ReconstructOptions& options) {
+  const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
+  PicturesOfTrials drawn;
+  if (options.chooses_weight() && std::filesystem::exists(paths.dial_picture))
+    drawn.dial = paths.dial_picture;
+  if (options.open.prior && std::filesystem::exists(paths.prior_picture))
+    drawn.prior = paths.prior_picture;
+  return drawn;
 }
 
 // Writes the report of a run beside its other results, which have temporary names yet.
@@ -130,6 +132,7 @@ void write_report(const reconstruction::Results& results,
                   const std::filesystem::path& volume, const std::filesystem::path& mask_picture) {
   const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
   const io::OutputSet& written = *io::OutputSet::active();
+  PicturesOfTrials of_trials = pictures_of_trials(options);
   reconstruction::ReportSource source{.record = results.metrics,
                                       .files = options.files,
                                       .requested = options.requested,
@@ -137,14 +140,12 @@ void write_report(const reconstruction::Results& results,
                                       .mask_picture = written.location_of(mask_picture),
                                       .tree_picture = {},
                                       .held_out_picture = {},
-                                      .dial_picture = {},
-                                      .prior_picture = {}};
+                                      .dial_picture = std::move(of_trials.dial),
+                                      .prior_picture = std::move(of_trials.prior)};
   if (options.field.tree == TreeKind::kAdaptive)
     source.tree_picture = written.location_of(paths.tree_picture);
   if (options.fit.hold_out > 0)
     source.held_out_picture = written.location_of(paths.held_out_picture);
-  if (has_dial_picture(options)) source.dial_picture = paths.dial_picture;
-  if (has_prior_picture(options)) source.prior_picture = paths.prior_picture;
   io::write_text_file(paths.report, reconstruction::run_report(source));
 }
 
@@ -233,8 +234,9 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
     write_report(results, options, volume, pictures.back());
     for (const auto& picture : {paths.held_out_picture, paths.choice_picture})
       if (io::OutputSet::active()->contains(picture)) pictures.push_back(picture);
-    if (has_dial_picture(options)) pictures.push_back(paths.dial_picture);
-    if (has_prior_picture(options)) pictures.push_back(paths.prior_picture);
+    const PicturesOfTrials of_trials = pictures_of_trials(options);
+    for (const auto& picture : {of_trials.dial, of_trials.prior})
+      if (picture) pictures.push_back(*picture);
   };
   if (processes.is_root()) {
     hooks.progress = make_progress_bar("reconstruct");

@@ -216,7 +216,7 @@ TEST(Share, EachProcessAnswersForItsLeavesWithTheBitsOfOneProcess) {
   }
 }
 
-// What the learned prior reads beyond the bands lies in leaves that the process keeps.
+// A process keeps the leaves of all rows that the learned prior reads beyond its bands.
 TEST(Share, LeavesOfAllRowsThatTheLearnedPriorReadsAreKept) {
   EXPECT_EQ(rows_beyond(Prior::kTv), 1);
   const AnsweredField whole;

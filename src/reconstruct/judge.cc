@@ -36,9 +36,7 @@ std::optional<HeldOutSummary> held_out_summary(
 PriorSummary prior_summary(const FinishedFit& finished) {
   PriorSummary summary{.is_used = finished.fit.stage().has_answer, .gain = {}};
   const std::optional<TunedFit>& tuned = finished.record.origin.tuned;
-  if (tuned && !tuned->last_trials.empty())
-    summary.gain =
-        selection::difference(tuned->last_trials.front().score, tuned->last_trials.back().score);
+  if (tuned) summary.gain = gain_of_prior(*tuned);
   return summary;
 }
 

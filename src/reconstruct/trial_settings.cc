@@ -82,6 +82,11 @@ selection::Difference difference_to_chosen(const FitTrial& trial, const TunedFit
   return selection::difference(trial.score, best.score);
 }
 
+std::optional<selection::Difference> gain_of_prior(const TunedFit& tuned) {
+  if (tuned.last_trials.empty()) return std::nullopt;
+  return selection::difference(tuned.last_trials.front().score, tuned.last_trials.back().score);
+}
+
 std::string describe(const TrialSettings& settings, const TrialSettings& usual) {
   std::string text =
       fmt::format("{} tv {:.3g}", base::name_of(settings.penalty), settings.variation);

@@ -58,8 +58,7 @@ std::optional<TunedFit> searched(TrialFits& fits, selection::TrialFile* file,
 
 // Says how the trial with the learned prior compares with that without it.
 void log_prior(const TunedFit& tuned) {
-  const selection::Difference gain =
-      selection::difference(tuned.last_trials.front().score, tuned.last_trials.back().score);
+  const selection::Difference gain = gain_of_prior(tuned).value();
   base::log_info(fmt::format(
       "learned prior: patch by patch of the views left out, whole fits of some rows err "
       "{:+.2f} % ± {:.2f} with it: {}",
