@@ -42,7 +42,7 @@ std::vector<int> coarse_bins(const FieldOptions& field, const FitOptions& fit) {
 // Adds the stages of the learned prior. A few epochs are enough: the field is near its end.
 void add_learned_prior(const FitOptions& fit, std::vector<Stage>& stages) {
   constexpr int kPartOfEpochs = 2, kLeastEpochs = 2, kMostEpochs = 10, kAnswerEpochs = 3;
-  constexpr double kAnswerRate = 0.2;  // a larger first step would leave the answer
+  constexpr double kAnswerRate = 0.05;  // larger steps would leave the answer and add grain
   Stage light = stages.back();
   light.first_epoch += light.epochs;
   light.epochs =

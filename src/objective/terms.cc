@@ -35,22 +35,24 @@ double factor_of_stage(const TermContext& c) {
   return std::pow(kFactorOfHalving, std::log2(c.bin));
 }
 
-// Returns the weight of the density's variation in a stage, in noise units. A light stage has a
-// part of the weight that the smooth penalty would have in place of the one that was chosen.
+// Returns the weight of the density's variation in a stage, in noise units. The stages of the prior
+// have the smooth penalty with its usual weight in place of the one that was chosen, and the one
+// before the answer has a part of that.
 double variation_weight(const TermContext& c) {
   constexpr double kLightPart = 0.3;  // as in the training of the prior (tools/train_prior)
   const double weight = c.options.density_variation;
   if (c.is_light)
-    return kLightPart * weight * usual_variation(Penalty::kSmooth) /
+    return (c.answer.empty() ? kLightPart : 1.0) * weight * usual_variation(Penalty::kSmooth) /
            usual_variation(c.options.penalty);
   return factor_of_stage(c) * variation_gain(c.options, c.full) * weight;
 }
 
 // The views measure fine detail of a voxel with a precision of about their number over the variance
-// of a ray. The answer of the prior counts as much as all of them.
+// of a ray. Of such detail the answer of the prior knows more than all of them.
 double pull_weight(const TermContext& c, double noise) {
+  constexpr double kAnswerOverViews = 4.0;
   const auto num_views = static_cast<double>(c.full.num_fitted_views());
-  return num_views / (noise * noise);
+  return kAnswerOverViews * num_views / (noise * noise);
 }
 
 // A jump at a face counts like total variation: density times area. Faces and the Fourier prior

@@ -17,10 +17,18 @@ using base::Range;
 // Vertices beyond the ends of the lattice, where there are mirror images.
 constexpr int kMirrored = 8;
 
+int rounded_up(int count) {
+  constexpr int kUnit = Network::kSideUnit;
+  return (count + kUnit - 1) / kUnit * kUnit;
+}
+
+// Divides a range into parts of about the same length, at most `size`.
 std::vector<Range> parts(Range range, int size) {
   std::vector<Range> all;
-  for (int first = range.begin; first < range.end; first += size)
-    all.push_back({first, std::min(first + size, range.end)});
+  const int count = (range.size() + size - 1) / size;
+  const int length = count > 0 ? rounded_up((range.size() + count - 1) / count) : size;
+  for (int first = range.begin; first < range.end; first += length)
+    all.push_back({first, std::min(first + length, range.end)});
   return all;
 }
 
@@ -29,11 +37,6 @@ std::vector<Range> parts_of_rows(Range rows, int num_rows, int size) {
   std::vector<Range> all = parts(rows, size);
   if (rows.end < num_rows && !all.empty()) ++all.back().end;
   return all;
-}
-
-int rounded_up(int count) {
-  constexpr int kUnit = Network::kSideUnit;
-  return (count + kUnit - 1) / kUnit * kUnit;
 }
 
 // Returns a part with what the network's answer to it depends on.

@@ -58,9 +58,16 @@ class Network::Channels {
  public:
   Channels(const ChannelShape& shape, int num_channels)
       : shape_(shape),
+        num_channels_(num_channels),
         data_(static_cast<std::size_t>(num_channels * shape.stride_channel()) + kPastTheEnd) {}
 
   const ChannelShape& shape() const { return shape_; }
+  int num_channels() const { return num_channels_; }
+  // Sets a plane of all channels to zero.
+  void clear_plane(int z) {
+    for (int c = 0; c < num_channels_; ++c)
+      std::fill_n(channel(c) + (z + 1) * shape_.stride_z(), shape_.stride_z(), 0.0f);
+  }
   float* channel(int index) { return data_.data() + index * shape_.stride_channel(); }
   const float* channel(int index) const { return data_.data() + index * shape_.stride_channel(); }
   float* row(int channel, int y, int z) { return this->channel(channel) + shape_.at(0, y, z); }
@@ -71,6 +78,7 @@ class Network::Channels {
  private:
   static constexpr std::size_t kPastTheEnd = 16;  // the last vector of the last row reads them
   ChannelShape shape_;
+  int num_channels_;
   base::AlignedBuffer<float> data_;
 };
 
@@ -88,11 +96,11 @@ void fill_channel(std::span<const float> box, int channel, Channels& channels) {
 
 // Writes the means of blocks of 2 × 2 × 2 voxels.
 template <class Channels>
-void halve(const Channels& fine, int num_channels, Channels& coarse) {
+void halve(const Channels& fine, Channels& coarse) {
   const ChannelShape& s = coarse.shape();
   base::parallel_for("halve channels", s.nz, [&](std::int64_t plane) {
     const int z = static_cast<int>(plane);
-    for (int c = 0; c < num_channels; ++c) {
+    for (int c = 0; c < coarse.num_channels(); ++c) {
       for (int y = 0; y < s.ny; ++y) {
         const float *a = fine.row(c, 2 * y, 2 * z), *b = fine.row(c, 2 * y + 1, 2 * z),
                     *d = fine.row(c, 2 * y, 2 * z + 1), *e = fine.row(c, 2 * y + 1, 2 * z + 1);
@@ -106,20 +114,26 @@ void halve(const Channels& fine, int num_channels, Channels& coarse) {
   });
 }
 
-// Writes each voxel of `coarse` into the 2 × 2 × 2 of `fine`, from channel `first` on.
+// Writes a plane of channels into a plane of others.
 template <class Channels>
-void repeat(const Channels& coarse, int num_channels, int first, Channels& fine) {
+void copy_plane(const Channels& from, int z, Channels& to, int to_z) {
+  const ChannelShape& s = to.shape();
+  for (int c = 0; c < from.num_channels(); ++c)
+    for (int y = 0; y < s.ny; ++y) std::copy_n(from.row(c, y, z), s.nx, to.row(c, y, to_z));
+}
+
+// Writes each voxel of a plane of `coarse` into 2 × 2 of a plane of `fine`, from channel `first`
+// on.
+template <class Channels>
+void repeat_plane(const Channels& coarse, int z, int first, Channels& fine, int to_z) {
   const ChannelShape& s = fine.shape();
-  base::parallel_for("repeat channels", s.nz, [&](std::int64_t plane) {
-    const int z = static_cast<int>(plane);
-    for (int c = 0; c < num_channels; ++c) {
-      for (int y = 0; y < s.ny; ++y) {
-        const float* const in = coarse.row(c, y / 2, z / 2);
-        float* const out = fine.row(first + c, y, z);
-        for (int x = 0; x < s.nx; ++x) out[x] = in[x / 2];
-      }
+  for (int c = 0; c < coarse.num_channels(); ++c) {
+    for (int y = 0; y < s.ny; ++y) {
+      const float* const in = coarse.row(c, y / 2, z);
+      float* const out = fine.row(first + c, y, to_z);
+      for (int x = 0; x < s.nx; ++x) out[x] = in[x / 2];
     }
-  });
+  }
 }
 
 }  // namespace
@@ -163,13 +177,42 @@ void Network::convolve(const Layer& layer, const Channels& in, Channels& out) co
   });
 }
 
+// A whole input of both would take twice the memory of everything else. Every thread lays out the
+// three planes that a plane of the output depends on.
+void Network::convolve_joined(const Layer& layer, const Channels& fine, const Channels& coarse,
+                              Channels& out) const {
+  const ChannelShape& shape = fine.shape();
+  const ChannelShape plane{shape.nx, shape.ny, 1};
+  std::vector<Channels> inputs, outputs;  // of each thread
+  for (int thread = 0; thread < base::thread_count(); ++thread) {
+    inputs.emplace_back(plane, layer.num_in);
+    outputs.emplace_back(plane, layer.num_out);
+  }
+  const kernels::Convolution convolution{layer.num_in, layer.num_out, kSlope, layer.weights.data()};
+  base::parallel_for("convolve", shape.nz, [&](std::int64_t i) {
+    const int z = static_cast<int>(i);
+    const auto thread = static_cast<std::size_t>(base::thread_index());
+    Channels& in = inputs[thread];
+    for (int step = -1; step <= 1; ++step) {
+      if (z + step < 0 || z + step >= shape.nz) {
+        in.clear_plane(step);
+        continue;
+      }
+      copy_plane(fine, z + step, in, step);
+      repeat_plane(coarse, (z + step) / 2, fine.num_channels(), in, step);
+    }
+    kernels::convolve(plane, convolution, {0, 1}, in.channel(0), outputs[thread].channel(0));
+    copy_plane(outputs[thread], 0, out, z);
+  });
+}
+
 void Network::apply(const BoxShape& box, std::span<float> smooth,
                     std::span<const float> light) const {
   TOMOFIELD_CHECK(box.nx % kSideUnit == 0 && box.ny % kSideUnit == 0 && box.nz % kSideUnit == 0,
                   "sides that can be halved twice");
   const ChannelShape fine = channel_shape(box, 0), half = channel_shape(box, 1),
                      quarter = channel_shape(box, 2);
-  Channels a(fine, 8), b(fine, 24), c(half, 16), d(half, 48), e(quarter, 32), f(quarter, 32);
+  Channels a(fine, 8), b(fine, 8), c(half, 16), d(half, 16), e(quarter, 32), f(quarter, 32);
   {
     Channels in(fine, kInputs);
     fill_channel(smooth, 0, in);
@@ -179,21 +222,19 @@ void Network::apply(const BoxShape& box, std::span<float> smooth,
   convolve(layers_[1], a, b);
   {
     Channels halved(half, 8);
-    halve(b, 8, halved);
+    halve(b, halved);
     convolve(layers_[2], halved, c);
   }
   convolve(layers_[3], c, d);
   {
     Channels halved(quarter, 16);
-    halve(d, 16, halved);
+    halve(d, halved);
     convolve(layers_[4], halved, e);
   }
   convolve(layers_[5], e, f);
-  repeat(f, 32, 16, d);
-  convolve(layers_[6], d, c);
-  convolve(layers_[7], c, d);  // its first channels are read no more
-  repeat(d, 16, 8, b);
-  convolve(layers_[8], b, a);
+  convolve_joined(layers_[6], d, f, c);
+  convolve(layers_[7], c, d);
+  convolve_joined(layers_[8], b, d, a);
   convolve(layers_[9], a, b);
   for (int z = 0; z < fine.nz; ++z) {
     for (int y = 0; y < fine.ny; ++y) {
@@ -212,7 +253,7 @@ std::size_t Network::memory(const BoxShape& box) {
     return static_cast<std::size_t>(channels * channel_shape(box, level).stride_channel()) *
            sizeof(float);
   };
-  return bytes(0, 8 + 24 + kInputs) + bytes(1, 16 + 48 + 8) + bytes(2, 32 + 32 + 16);
+  return bytes(0, 8 + 8 + kInputs) + bytes(1, 16 + 16 + 8) + bytes(2, 32 + 32 + 16);
 }
 
 }  // namespace tomofield::prior

@@ -58,6 +58,10 @@ class Network {
   };
   class Channels;
   void convolve(const Layer& layer, const Channels& in, Channels& out) const;
+  // Convolves the channels of a level together with those of the next coarser one, of which each
+  // voxel stands for 2 × 2 × 2.
+  void convolve_joined(const Layer& layer, const Channels& fine, const Channels& coarse,
+                       Channels& out) const;
 
   std::vector<Layer> layers_;
   std::vector<float> last_;  // weight of each of the last channels in the output

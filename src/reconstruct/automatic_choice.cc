@@ -206,8 +206,8 @@ TrialSettings choose_prior(const TrialSettings& start, FitTrials& trials) {
   learned.prior = Prior::kLearned;
   trials.make({start, learned});
   const selection::Difference gain =
-      selection::difference(trials.trial(start).score, trials.trial(learned).score);
-  return gain.log_ratio > 0 ? learned : start;
+      selection::difference_of_means(trials.trial(start).score, trials.trial(learned).score);
+  return gain.log_ratio > -gain.standard_error ? learned : start;
 }
 
 int usual_trials(const OpenSettings& open) {

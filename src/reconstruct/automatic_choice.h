@@ -58,8 +58,10 @@ TrialSettings choose_corrections(const TrialSettings& start, const OpenSettings&
                                  FitTrials& trials);
 
 constexpr int kPriorTrials = 2;
-/// Chooses whether the learned prior ends the fit: if it lowers the error of held-out views, by
-/// however little. The trials must be whole fits, since the end of a fit is what it replaces.
+/// Chooses whether the learned prior ends the fit: if it lowers the error of held-out views, or
+/// raises it by less than the standard error. Where these views cannot tell, the volume with less
+/// noise is the better guess. The trials must be whole fits, since the end of a fit is what the
+/// prior replaces.
 TrialSettings choose_prior(const TrialSettings& start, FitTrials& trials);
 
 /// Returns the number of trials that the functions above, but for choose_prior(), usually make for

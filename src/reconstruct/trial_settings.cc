@@ -84,7 +84,8 @@ selection::Difference difference_to_chosen(const FitTrial& trial, const TunedFit
 
 std::optional<selection::Difference> gain_of_prior(const TunedFit& tuned) {
   if (tuned.last_trials.empty()) return std::nullopt;
-  return selection::difference(tuned.last_trials.front().score, tuned.last_trials.back().score);
+  return selection::difference_of_means(tuned.last_trials.front().score,
+                                        tuned.last_trials.back().score);
 }
 
 std::string describe(const TrialSettings& settings, const TrialSettings& usual) {

@@ -60,8 +60,8 @@ std::optional<TunedFit> searched(TrialFits& fits, selection::TrialFile* file,
 void log_prior(const TunedFit& tuned) {
   const selection::Difference gain = gain_of_prior(tuned).value();
   base::log_info(fmt::format(
-      "learned prior: patch by patch of the views left out, whole fits of some rows err "
-      "{:+.2f} % ± {:.2f} with it: {}",
+      "learned prior: whole fits of some rows predict the views that they leave out with "
+      "{:+.2f} % ± {:.2f} of the error with it: {}",
       -100 * gain.log_ratio, 100 * gain.standard_error,
       tuned.settings.prior == Prior::kLearned ? "it ends the fit"
                                               : "total variation alone ends the fit"));

@@ -26,7 +26,7 @@ struct HeldOutSummary {
 struct PriorSummary {
   bool is_used = false;
   /// By what part the prior lowers the error of held-out views in whole fits of some rows, as
-  /// selection::difference() compares them. None if no trial was made.
+  /// selection::difference_of_means() compares them. None if no trial was made.
   std::optional<selection::Difference> gain;
 };
 

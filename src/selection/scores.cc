@@ -17,6 +17,19 @@ constexpr int kMaxSteps = 4;
 // The standard deviation of a normal distribution, in units of its median absolute deviation.
 constexpr double kDeviationPerMedian = 1.4826;
 
+using Errors = std::pair<const std::vector<double>&, const std::vector<double>&>;
+
+// Returns the errors that two trials both have, of patches or else of views.
+Errors common_errors(const HeldOutScore& a, const HeldOutScore& b) {
+  const bool by_patch = !a.patch_error.empty() && a.patch_error.size() == b.patch_error.size();
+  if (by_patch) return {a.patch_error, b.patch_error};
+  return {a.view_error, b.view_error};
+}
+
+Difference of_totals(const HeldOutScore& a, const HeldOutScore& b) {
+  return {a.error > 0 && b.error > 0 ? std::log(a.error / b.error) : 0.0, 0.0};
+}
+
 }  // namespace
 
 bool most_views_prefer(const HeldOutScore& a, const HeldOutScore& b) {
@@ -27,13 +40,11 @@ bool most_views_prefer(const HeldOutScore& a, const HeldOutScore& b) {
 }
 
 Difference difference(const HeldOutScore& a, const HeldOutScore& b) {
-  const bool by_patch = !a.patch_error.empty() && a.patch_error.size() == b.patch_error.size();
-  const std::vector<double>& of_a = by_patch ? a.patch_error : a.view_error;
-  const std::vector<double>& of_b = by_patch ? b.patch_error : b.view_error;
+  const auto [of_a, of_b] = common_errors(a, b);
   std::vector<double> ratios;
   for (std::size_t i = 0; i < std::min(of_a.size(), of_b.size()); ++i)
     if (of_a[i] > 0 && of_b[i] > 0) ratios.push_back(std::log(of_a[i] / of_b[i]));
-  if (ratios.empty()) return {a.error > 0 && b.error > 0 ? std::log(a.error / b.error) : 0.0, 0.0};
+  if (ratios.empty()) return of_totals(a, b);
   std::vector<double> means;
   for (std::size_t i = 0; i < ratios.size(); ++i)
     for (std::size_t j = i; j < ratios.size(); ++j) means.push_back((ratios[i] + ratios[j]) / 2);
@@ -43,6 +54,21 @@ Difference difference(const HeldOutScore& a, const HeldOutScore& b) {
   const double count = static_cast<double>(ratios.size());
   return {location,
           kDeviationPerMedian * base::percentile(std::move(ratios), 50) / std::sqrt(count)};
+}
+
+Difference difference_of_means(const HeldOutScore& a, const HeldOutScore& b) {
+  const auto [of_a, of_b] = common_errors(a, b);
+  const std::size_t n = std::min(of_a.size(), of_b.size());
+  double sum_a = 0, sum_b = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    sum_a += of_a[i];
+    sum_b += of_b[i];
+  }
+  if (sum_a <= 0 || sum_b <= 0) return of_totals(a, b);
+  const double ratio = sum_a / sum_b;
+  double squares = 0;
+  for (std::size_t i = 0; i < n; ++i) squares += std::pow(of_a[i] - ratio * of_b[i], 2);
+  return {std::log(ratio), std::sqrt(squares) / sum_a};
 }
 
 std::vector<std::size_t> as_good_as_the_best(const std::vector<HeldOutScore>& scores,

@@ -34,6 +34,12 @@ struct Difference {
 /// that every trial predicts badly, such as one at the end of the tilt range, does not decide.
 Difference difference(const HeldOutScore& a, const HeldOutScore& b);
 
+/// Compares the mean errors of all patches, or views. A structure that fills a few patches counts
+/// here, while nearly empty ones decide difference(). A patch that both trials predict badly adds
+/// to the standard error, which is that of a ratio of means (Cochran, Sampling Techniques,
+/// 1977, 6.4).
+Difference difference_of_means(const HeldOutScore& a, const HeldOutScore& b);
+
 /// Returns the indices of the trials that the best one does not beat by more than `num_errors`
 /// standard errors of their difference, ascending. Held-out views cannot tell them from the best.
 std::vector<std::size_t> as_good_as_the_best(const std::vector<HeldOutScore>& scores,

@@ -53,6 +53,21 @@ HeldOutScore parabola(double weight, double best) {
   return {error, {error, error, error}};
 }
 
+TEST(DifferenceOfMeans, FollowsTheFewPatchesWithStructure) {
+  const HeldOutScore flat{.patch_error = {1, 1, 1, 1, 1, 1, 2, 2}};
+  const HeldOutScore detailed{.patch_error = {1.01, 1.01, 1.01, 1.01, 1.01, 1.01, 1.5, 1.5}};
+  EXPECT_GT(difference(detailed, flat).log_ratio, 0);
+  EXPECT_NEAR(difference_of_means(detailed, flat).log_ratio, std::log(9.06 / 10), 1e-12);
+}
+
+TEST(DifferenceOfMeans, HasTheScatterOfTheRatioOfTwoMeans) {
+  const HeldOutScore a{.patch_error = {1, 3}}, b{.patch_error = {2, 2}};
+  const Difference d = difference_of_means(a, b);
+  EXPECT_NEAR(d.log_ratio, 0, 1e-12);
+  EXPECT_NEAR(d.standard_error, std::sqrt(2.0) / 4, 1e-12);
+  EXPECT_EQ(difference_of_means(a, a).standard_error, 0);
+}
+
 TEST(SearchWeight, EndsWithinAStepOfTheBestFromAnywhereWithinItsReach) {
   for (const double first : {0.05, 1.0, 7.0, 800.0}) {
     const double found = search_weight(first, [](double weight) { return parabola(weight, 6); });
