@@ -27,8 +27,20 @@ namespace tomofield::python {
 namespace {
 
 namespace py = pybind11;
-using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
-using PointArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
+template <class Number>
+using Array = py::array_t<Number, py::array::c_style | py::array::forcecast>;
+
+// Returns an array of real numbers from whatever NumPy makes one of. All arrays of users pass here:
+// NumPy would drop imaginary parts, and read texts and dates as numbers.
+template <class Number>
+Array<Number> numbers_of(const py::object& object) {
+  const auto array = py::array::ensure(object);
+  if (!array) throw Error("an array of numbers is needed");
+  if (std::string_view("biuf").find(array.dtype().kind()) == std::string_view::npos)
+    throw Error("an array of real numbers is needed, not one of type " +
+                py::str(array.dtype()).cast<std::string>());
+  return Array<Number>::ensure(array);
+}
 
 // Hands a vector over to numpy without a copy.
 py::array_t<float> to_array(std::vector<float> values, std::vector<py::ssize_t> shape) {
@@ -48,23 +60,27 @@ void require_dimensions(const py::array& array, py::ssize_t wanted, const char* 
     throw Error(std::string(what) + ", not of " + std::to_string(array.ndim()) + " dimensions");
 }
 
-std::vector<float> values_of(const FloatArray& array) {
+std::vector<float> values_of(const Array<float>& array) {
   return {array.data(), array.data() + array.size()};
 }
 
-Tomogram to_tomogram(const FloatArray& array, double voxel_size_A) {
+Tomogram to_tomogram(const py::object& volume, double voxel_size_A) {
+  const Array<float> array = numbers_of<float>(volume);
   require_dimensions(array, 3, "a volume is an array [z, y, x]");
   return {.size = {array.shape(2), array.shape(1), array.shape(0)},
           .voxel_size_A = voxel_size_A,
           .values = values_of(array)};
 }
 
-TiltSeries series_of(const FloatArray& images, std::vector<double> tilt_deg) {
+TiltSeries series_of(const py::object& views, const py::object& tilts_deg) {
+  const Array<float> images = numbers_of<float>(views);
+  const Array<double> tilts = numbers_of<double>(tilts_deg);
   require_dimensions(images, 3, "a tilt series is an array [view, y, x]");
+  require_dimensions(tilts, 1, "tilt angles are an array");
   return TiltSeries::from_images({.values = values_of(images),
                                   .width = images.shape(2),
                                   .height = images.shape(1),
-                                  .tilt_deg = std::move(tilt_deg)});
+                                  .tilt_deg = {tilts.data(), tilts.data() + tilts.size()}});
 }
 
 // Calls Python after every step: the user's callback, if any, and the handlers of signals. Keeps
@@ -123,7 +139,8 @@ py::array_t<float> sample(const Model& model, const SampleBox& box) {
   return to_volume(std::move(values), box.size);
 }
 
-py::array_t<float> sample_points(const Model& model, const PointArray& points) {
+py::array_t<float> sample_points(const Model& model, const py::object& rows) {
+  const Array<double> points = numbers_of<double>(rows);
   if (points.ndim() != 2 || points.shape(1) != 3)
     throw Error("points are an array of N rows with x, y and z");
   std::vector<Point> list(static_cast<std::size_t>(points.shape(0)));
@@ -202,13 +219,13 @@ void add_evaluate(py::module_& module) {
       .def_readonly("voxels", &ShellCorrelation::voxels)
       .def("resolution_A", &resolution_A, py::arg("threshold") = 0.143,
            "Return where the correlation first falls below a threshold, in Å, or None.");
-  module.def("score_volume", [](const FloatArray& volume, const FloatArray& truth) {
+  module.def("score_volume", [](const py::object& volume, const py::object& truth) {
     const Tomogram a = to_tomogram(volume, 1.0), b = to_tomogram(truth, 1.0);
     const py::gil_scoped_release unlocked;
     return score_volume(a, b);
   });
   module.def("correlate_shells",
-             [](const FloatArray& first, const FloatArray& second, double voxel_size_A) {
+             [](const py::object& first, const py::object& second, double voxel_size_A) {
                const Tomogram a = to_tomogram(first, voxel_size_A);
                const Tomogram b = to_tomogram(second, voxel_size_A);
                const py::gil_scoped_release unlocked;

@@ -99,6 +99,13 @@ std::vector<CsvRecord> parse_csv(std::string_view text, char separator) {
   return records;
 }
 
+std::string spreadsheet_text(std::string_view text) {
+  const bool may_run =
+      !text.empty() && (std::string_view("=+-@").find(text.front()) != std::string_view::npos ||
+                        static_cast<unsigned char>(text.front()) < ' ');
+  return (may_run ? "'" : "") + std::string(text);
+}
+
 std::string csv_field(std::string_view text) {
   if (text.find_first_of(",\"\r\n\t") == std::string_view::npos && io::trim(text) == text)
     return std::string(text);

@@ -18,6 +18,10 @@ struct CsvRecord {
 /// Error, with the line, for a quote that is not closed and for text after a closing quote.
 std::vector<CsvRecord> parse_csv(std::string_view text, char separator);
 
+/// Returns a text with an apostrophe before it if a spreadsheet would take it for a formula and run
+/// it: if it begins with =, +, -, @ or a control character (OWASP, CSV Injection).
+std::string spreadsheet_text(std::string_view text);
+
 /// Returns a field as parse_csv() reads it, in quotes if it needs them.
 std::string csv_field(std::string_view text);
 

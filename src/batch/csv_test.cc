@@ -54,6 +54,12 @@ TEST(Csv, MistakesNameTheLine) {
   EXPECT_NE(refusal("a\nb,\"c\"d\n").find("line 2"), std::string::npos);
 }
 
+TEST(Csv, TextsAreNoFormulas) {
+  for (const char* const text : {"=1+1", "+1", "-x.mrc", "@sum", "\tx"})
+    EXPECT_EQ(spreadsheet_text(text), std::string("'") + text);
+  for (const char* const text : {"", "TS_01", "a=b", "'x"}) EXPECT_EQ(spreadsheet_text(text), text);
+}
+
 TEST(Csv, FieldsAreReadAsTheyAreWritten) {
   const Fields fields{"plain", "1,2", "a \"b\"", " x", "two\nlines", "", "tab\there"};
   std::string line;

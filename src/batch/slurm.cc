@@ -58,14 +58,29 @@ double minutes(const std::vector<Job>& jobs, int threads) {
   return std::ceil(kLeastMinutes + kMoreTime * most);
 }
 
-// Returns a name in an option of sbatch, which knows no quotes and reads % as a pattern.
+// Returns a name in an option of sbatch, which knows no quotes and reads % as a pattern. A line end
+// in a name would be a command of the script.
 std::string name_for_sbatch(const fs::path& path) {
   const std::string name = path.string();
-  if (name.find_first_of(" \t\"'\\%#") == std::string::npos) return name;
+  const auto is_safe = [](unsigned char c) {
+    return c > ' ' && c != 0x7f &&
+           std::string_view("\"'\\%#").find(char(c)) == std::string_view::npos;
+  };
+  if (std::ranges::all_of(name, is_safe)) return name;
   throw Error(
-      fmt::format("'{}' cannot be named in a script for sbatch: give -o a folder without "
-                  "spaces, quotes, '%' and '#' in its path",
-                  name));
+      fmt::format("{} cannot be named in a script for sbatch: give -o a folder without "
+                  "spaces, line ends, quotes, '%' and '#' in its path",
+                  io::quote(name)));
+}
+
+// Returns an option of the user for sbatch, which is one line of the script.
+std::string line_for_sbatch(const std::string& option) {
+  if (std::ranges::none_of(option, [](unsigned char c) { return c < ' ' || c == 0x7f; }))
+    return option;
+  throw Error(
+      fmt::format("{} cannot be an option for sbatch: it has a line end or another "
+                  "control character",
+                  io::quote(option)));
 }
 
 }  // namespace
@@ -94,7 +109,7 @@ std::string slurm_script(const SlurmOptions& options, const std::vector<Job>& jo
   add(fmt::format("--cpus-per-task={}", options.threads));
   add(fmt::format("--mem={}M", memory_MiB(jobs, options.threads)));
   add(fmt::format("--time={:.0f}", minutes(jobs, options.threads)));
-  for (const std::string& line : options.more) add(line);
+  for (const std::string& option : options.more) add(line_for_sbatch(option));
   add("--array=" + array_of(jobs));
   add("--ntasks=1");
   add("--chdir=" + name_for_sbatch(fs::current_path()));

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <string>
+#include <string_view>
 
 #include "scratch_directory.h"
 #include "tomofield/error.h"
@@ -37,6 +40,28 @@ TEST(SlurmScript, HasATaskForEveryJobAndRoomForTheLargest) {
 TEST(SlurmScript, NeedsAFolderThatSbatchCanRead) {
   EXPECT_THROW(
       slurm_script({.program = "p", .folder = "/data/my results", .more = {}}, {job(1, 1)}), Error);
+}
+
+TEST(SlurmScript, HasNoLineThatANameMade) {
+  const std::string usual =
+      slurm_script({.program = "p", .folder = "/data", .more = {}}, {job(1, 1)});
+  const auto num_lines = std::ranges::count(usual, '\n');
+  for (int c = 1; c < 256; ++c) {
+    const std::string name = "/data/a" + std::string(1, static_cast<char>(c)) + "b";
+    std::string script;
+    try {
+      script = slurm_script({.program = name, .folder = name, .more = {}}, {job(1, 1)});
+    } catch (const Error&) {
+      EXPECT_TRUE(c <= ' ' || c == 0x7f ||
+                  std::string_view("\"'\\%#").find(char(c)) != std::string::npos)
+          << c;
+      continue;
+    }
+    EXPECT_EQ(std::ranges::count(script, '\n'), num_lines) << c << script;
+  }
+  EXPECT_THROW(
+      slurm_script({.program = "p", .folder = "/data", .more = {"--mem=1G\nrm x"}}, {job(1, 1)}),
+      Error);
 }
 
 // Sets variables of the environment for one test.

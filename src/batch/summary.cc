@@ -94,18 +94,18 @@ std::string csv_text(const std::vector<Line>& lines) {
     const base::Costs& costs = line.state.costs;
     const Needs& needs = line.job->needs;
     const std::array fields{
-        line.job->name,
+        spreadsheet_text(line.job->name),
         name_of(line.state.progress),
-        line.state.reason,
-        line.job->output.string(),
+        spreadsheet_text(line.state.reason),
+        spreadsheet_text(line.job->output.string()),
         number(costs.wall_seconds, 1),
         number(costs.core_seconds, 1),
         optional_number(needs.core_seconds, 1),
         number(static_cast<double>(costs.peak_bytes) / kGibibyte, 3),
         number(static_cast<double>(needs.memory_bytes_of_one_thread) / kGibibyte, 3),
         optional_number(line.held_out_error, 5),
-        line.verdict,
-        fmt::format("{}", fmt::join(line.warnings, " ")),
+        spreadsheet_text(line.verdict),
+        spreadsheet_text(fmt::format("{}", fmt::join(line.warnings, " "))),
     };
     std::vector<std::string> quoted;
     for (const std::string& field : fields) quoted.push_back(csv_field(field));

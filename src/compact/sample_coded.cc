@@ -72,6 +72,7 @@ bool is_turned_across(const OrientedBox& box, std::int64_t rows) {
 }  // namespace
 
 void sample_box(const CodedField& coded, const OrientedBox& box, const field::BoxSink& sink) {
+  field::require_feasible(box);
   std::int64_t step = rows_at_once(coded, box);
   if (is_turned_across(box, step)) step = box.size[1];
   for (std::int64_t first = 0; first < box.size[1]; first += step) {

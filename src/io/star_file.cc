@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <stdexcept>
 #include <utility>
 
@@ -18,13 +19,32 @@ bool stands_for_nothing(const std::string& value) {
   return value.empty() || value == "None" || value == "none";
 }
 
+// Words that begin a part of a STAR file, in any case (Hall, J. Chem. Inf. Comput. Sci. 31, 326,
+// 1991).
+bool is_reserved(std::string_view value) {
+  std::string word(value);
+  std::ranges::transform(word, word.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return word.starts_with("data_") || word.starts_with("save_") || word == "loop_" ||
+         word == "stop_" || word == "global_";
+}
+
 std::string quoted_where_needed(const std::string& value) {
   if (value.empty()) return "\"\"";
-  const bool is_plain = value.find_first_of(" \t\"'#") == std::string::npos &&
-                        std::string_view("_$;").find(value.front()) == std::string_view::npos;
+  const bool has_lines = value.find_first_of("\r\n") != std::string::npos;
+  const auto needs_quotes = [](unsigned char c) {
+    return c <= ' ' || c > '~' || c == '"' || c == '\'' || c == '#';
+  };
+  const bool is_plain = std::ranges::none_of(value, needs_quotes) &&
+                        std::string_view("_$;[]").find(value.front()) == std::string_view::npos &&
+                        !is_reserved(value);
   if (is_plain) return value;
-  const char quote = value.find('"') == std::string::npos ? '"' : '\'';
-  return quote + value + quote;
+  for (const char quote : {'"', '\''})
+    if (!has_lines && value.find(quote) == std::string::npos) return quote + value + quote;
+  // A text field: it stands between lines that begin with a semicolon.
+  if (("\n" + value).find("\n;") != std::string::npos || value.find('\r') != std::string::npos)
+    throw Error(fmt::format("{} cannot be written into a STAR file", quote(value)));
+  return "\n;" + value + "\n;\n";
 }
 
 }  // namespace

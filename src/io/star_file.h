@@ -47,7 +47,8 @@ std::vector<StarTable> read_star_file(const std::filesystem::path& path);
 /// Returns the first table that has a column, or nothing.
 const StarTable* find_table(const std::vector<StarTable>& tables, std::string_view column);
 
-/// Returns a STAR file with one table, in RELION's form. Values with spaces are quoted.
+/// Returns a STAR file with one table, in RELION's form. Values that need it are quoted, so that
+/// read_star_file() finds them as they are. Throws Error for a value that no quotes can hold.
 std::string star_file_text(const StarTable& table);
 
 /// Reads the values of one row. Errors name the file, the table, the row (from 1) and the column.

@@ -80,6 +80,27 @@ TEST(StarFile, WritesWhatItReads) {
   EXPECT_EQ(tables[0].find(1, "rlnTomoReconstructedTomogram"), "_a.mrc");
 }
 
+TEST(StarFile, ReadsTheTextsThatItWrites) {
+  const ScratchDirectory scratch;
+  const std::vector<std::string> texts{
+      "data_x", "Data_",       "loop_",        "stop_", "save_1", "global_", "[x]", "two\nlines",
+      "$a",     "it's \"so\"", "a\n\"b\" 'c'", "_x",    "#1",     ";",       "ä",   "tab\tbed"};
+  StarTable table("global", {"rlnTomoName", "rlnTomoHand"});
+  for (const std::string& text : texts) table.add_row({text, text});
+  const auto tables = read_star_file(scratch.write("a.star", star_file_text(table)));
+  ASSERT_EQ(tables.at(0).num_rows(), texts.size());
+  for (std::size_t row = 0; row < texts.size(); ++row) {
+    EXPECT_EQ(tables[0].find(row, "rlnTomoName"), texts[row]);
+    EXPECT_EQ(tables[0].find(row, "rlnTomoHand"), texts[row]);
+  }
+}
+
+TEST(StarFile, RefusesATextThatNoQuotesHold) {
+  StarTable table("global", {"a"});
+  table.add_row({"x\n;y"});
+  EXPECT_THROW(star_file_text(table), Error);
+}
+
 TEST(StarFile, RemovesAColumn) {
   StarTable table("global", {"a", "b", "c"});
   table.add_row({"1", "2", "3"});

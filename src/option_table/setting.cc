@@ -13,6 +13,7 @@ nlohmann::json to_json(std::span<const Setting> settings) {
                     {"value", base::utf8_text(setting.value)},
                     {"file", base::utf8_text(setting.file.string())},
                     {"entry", base::utf8_text(setting.entry)}});
+    if (!setting.row.empty()) list.back()["row"] = base::utf8_text(setting.row);
   }
   return list;
 }

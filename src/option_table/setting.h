@@ -13,6 +13,7 @@ struct Setting {
   std::string value;           ///< as users type it; "true" for a flag
   std::filesystem::path file;  ///< "TS_01/tilt.com"
   std::string entry;           ///< the name in that file: "THICKNESS"
+  std::string row = {};        ///< the name of its row, if the file lists several series
 };
 
 /// Returns settings as an array of objects with the members of Setting, for the metrics.

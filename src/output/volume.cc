@@ -211,6 +211,7 @@ float largest_density(const Model& model) {
 void write_volume(const Model& model, const VolumeOptions& options,
                   const std::filesystem::path& path) {
   const OrientedBox box = options.box.value_or(region_box(model, 1.0));
+  field::require_feasible(box);
   const Bounds bounds(box);
   require_inside(model, bounds);
   if (options.box) warn_of_margin(model, bounds, 0.5 * box.voxel_px);

@@ -39,9 +39,9 @@ class Project {
   bool ignores(std::string_view entry);
 
   /// Sets an option, unless the user wants its entry not to be applied. A flag is set by "true".
-  /// An option is set once.
+  /// An option is set once. `row` names the row of a file that lists several series.
   void set(std::string_view option, std::string value, const std::filesystem::path& file,
-           std::string_view entry);
+           std::string_view entry, std::string row = {});
 
   /// Says something that the result does not show by itself.
   void warn(std::string message) { warnings_.push_back(std::move(message)); }

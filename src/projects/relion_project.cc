@@ -37,10 +37,10 @@ const io::RelionTomogram& choose_tomogram(const std::vector<io::RelionTomogram>&
 
 // Sets what a table of one tilt series says, and tells whether it has the defocus of its views.
 bool set_views(Project& project, const fs::path& views, const fs::path& named_by,
-               std::string_view entry) {
+               std::string_view entry, const std::string& row) {
   const io::ViewTable table = io::read_view_table(views);
   for (const io::ImageInFile& image : io::find_view_images(table)) project.add_file(image.file);
-  project.set("stack", views.string(), named_by, entry);
+  project.set("stack", views.string(), named_by, entry, row);
   const bool has_defocus = io::has_defocus(table);
   if (has_defocus) project.set("--ctf", views.string(), views, "rlnDefocusU");
   return has_defocus;
@@ -65,14 +65,14 @@ void set_optics(Project& project, const io::RelionTomogram& tomogram, const fs::
 void read_relion_project(Project& project) {
   const fs::path star = project.request().path;
   if (!io::lists_tomograms(star)) {
-    set_views(project, star, star, "rlnMicrographName");
+    set_views(project, star, star, "rlnMicrographName", {});
     return;
   }
   const auto tomograms = io::read_relion_tomograms(star).tomograms;
   const io::RelionTomogram& tomogram = choose_tomogram(tomograms, project.request());
   const fs::path views = io::find_listed_file(tomogram.tilt_series_star, star);
   project.add_file(views);
-  if (set_views(project, views, star, "rlnTomoTiltSeriesStarFile"))
+  if (set_views(project, views, star, "rlnTomoTiltSeriesStarFile", tomogram.name))
     set_optics(project, tomogram, star);
   if (tomogram.pixel_size_A) {
     project.set("--pixel-size", fmt::format("{}", *tomogram.pixel_size_A), star,

@@ -32,12 +32,17 @@ const option_table::Setting* find_origin(const ReconstructOptions& options) {
   return found == options.origins.end() ? nullptr : &*found;
 }
 
-// Returns the row of the tilt series that was reconstructed.
-std::size_t find_row(const io::RelionTomograms& all, const fs::path& star, const fs::path& stack) {
-  for (std::size_t row = 0; row < all.tomograms.size(); ++row)
-    if (io::find_listed_file(all.tomograms[row].tilt_series_star, star) == stack) return row;
-  throw Error(fmt::format("'{}' names '{}' no longer: it has changed since the run began",
-                          star.string(), stack.string()));
+// Returns the row of the tilt series that was reconstructed. Several rows may name the same file.
+std::size_t find_row(const io::RelionTomograms& all, const option_table::Setting& origin) {
+  for (std::size_t row = 0; row < all.tomograms.size(); ++row) {
+    const io::RelionTomogram& tomogram = all.tomograms[row];
+    if (tomogram.name == origin.row &&
+        io::find_listed_file(tomogram.tilt_series_star, origin.file) == origin.value)
+      return row;
+  }
+  throw Error(fmt::format(
+      "'{}' has no tomogram '{}' with '{}' any more: it has changed since the run began",
+      origin.file.string(), origin.row, origin.value));
 }
 
 // Says why RELION could not use the volume, or nothing if it can.
@@ -103,7 +108,7 @@ void write_relion_output(const ReconstructOptions& options, const fs::path& volu
     return;
   }
   const io::RelionTomograms all = io::read_relion_tomograms(origin->file);
-  const std::size_t row = find_row(all, origin->file, origin->value);
+  const std::size_t row = find_row(all, *origin);
   const io::MrcHeader header = io::MrcReader(volume).header();
   const double voxel_A = header.voxel_size_A[0];
   const double binning = voxel_A / all.tomograms[row].pixel_size_A.value_or(voxel_A);

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
 #include <vector>
 
 #include "io/image_stack.h"
@@ -51,6 +53,16 @@ TEST(ImagesInMemory, GiveTheViewsOfAFile) {
     memory.read_view(view, b, valid_b);
     EXPECT_EQ(a, b);
     EXPECT_EQ(valid_a, valid_b);
+  }
+}
+
+TEST(ImagesInMemory, RefuseTiltsThatAreNoUsableAngles) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const double tilt_deg : {std::nan(""), kInfinity, -kInfinity, 91.0}) {
+    TiltSeriesOptions options;
+    options.images =
+        io::image_stack_in_memory(all_values(), kWidth, kHeight, {-20.0, tilt_deg, 40.0}, 2.5);
+    EXPECT_THROW(TiltSeries{options}, Error) << tilt_deg;
   }
 }
 

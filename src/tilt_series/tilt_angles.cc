@@ -79,7 +79,7 @@ double require_usable_tilt(const TiltAngles& angles, std::int64_t section) {
     throw Error(fmt::format("'{}' has no tilt angle for section {}; leave it out with --exclude {}",
                             angles.source, section + 1, section + 1));
   }
-  if (std::fabs(angle->value) > kLargestTilt_deg) {
+  if (!(std::fabs(angle->value) <= kLargestTilt_deg)) {  // also if it is not a number
     const std::string line = angle->line > 0 ? fmt::format(", line {}", angle->line) : "";
     throw Error(
         fmt::format("'{}'{}: the tilt angle {}° of section {} is beyond ±{:.0f}°, which "

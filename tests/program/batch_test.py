@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 import time
@@ -103,6 +104,18 @@ def test_the_page_shows_all_series_and_opens(first):
          "--virtual-time-budget=2000", "file://" + os.path.join(folder, "index.html")],
         capture_output=True, text=True, timeout=60)
     assert shown.stdout.count("<tr>") == 4, shown.stderr
+
+
+def test_files_that_are_called_like_options_are_series(data):
+    folder = harness.fresh_directory("dashes")
+    for name in ("-x", "--config=x"):
+        for suffix in (".mrc", ".tlt"):
+            shutil.copy(os.path.join(data, "a" + suffix), os.path.join(folder, name + suffix))
+    harness.succeed("batch", "-o", "out", "--tlt", "{folder}/{name}.tlt", *QUICK, "--", "*.mrc",
+                    cwd=folder)
+    lines = summary(os.path.join(folder, "out"))
+    assert {line["state"] for line in lines.values()} == {"done"}
+    assert sorted(lines) == ["'--config=x", "'-x"]  # a spreadsheet would run them
 
 
 def test_finished_series_are_skipped_and_others_are_tried_again(data, first):

@@ -84,6 +84,13 @@ def test_a_part_knows_where_it_lies(whole, box):
     np.testing.assert_allclose(voxel_size.tolist(), PIXEL_A, rtol=1e-7)
 
 
+def test_a_box_that_no_machine_samples_is_refused_before_the_work():
+    result = harness.tomofield("export", "model.h5", "-o", "large.mrc", "--center", "0,0,0", "--size",
+                               "2147483647,2147483647,4")
+    assert result.returncode == 2 and "too large" in result.stderr
+    assert not pathlib.Path("large.mrc").exists()
+
+
 def test_a_box_outside_the_region_of_interest_has_a_warning():
     for x1, is_outside in ((X0 + WIDTH, False), (X0 + WIDTH + 3, True)):
         result = harness.tomofield("export", "model.h5", "-o", "box.mrc", "--overwrite", "--box",

@@ -214,6 +214,18 @@ def test_one_of_several_tomograms_is_asked_for(relion):
         assert result.returncode == 2 and all(word in result.stderr for word in words), result.stderr
 
 
+def test_the_row_of_the_series_is_taken_though_others_name_the_same_file(relion):
+    twice = relion.path("Tomograms/job009/twice.star")
+    with open(relion.star, encoding="utf-8") as file:
+        text = file.read().replace("tilt_series/TS_02.star", "tilt_series/TS_01.star")
+    with open(twice, "w", encoding="utf-8") as file:
+        file.write(text)
+    output = relion.path("second.mrc")
+    harness.succeed("reconstruct", twice, "--series", "TS_02", "-o", output, *QUICK, cwd=relion.folder)
+    (row,) = star_projects.read_rows(output[:-4] + ".star")
+    assert row["rlnTomoName"] == "TS_02"
+
+
 def test_a_missing_image_is_named(relion):
     star_projects.write_relion_views(relion.folder, "TS_02", ["gone/a.mrc"] * len(TILTS))
     result, _ = relion.run("--series", "TS_02", run=harness.tomofield)

@@ -53,6 +53,9 @@ def test_bad_input_is_refused_in_a_sentence(series, model):
         tomofield.Model("absent.h5")
     with pytest.raises(tomofield.Error, match="box of 0"):
         model.sample(tomofield.Box((0, 0, 0), (0, 1, 1)))
+    for size in ((2**21, 2**21, 2**22), (2**62, 4, 4), (4, 1, 2**62)):
+        with pytest.raises(tomofield.Error, match="too large"):
+            model.sample(tomofield.Box((0, 0, 0), size))
     with pytest.raises(tomofield.Error, match="N rows"):
         model.sample_points([1, 2, 3])
     with pytest.raises(tomofield.Error, match="finite"):

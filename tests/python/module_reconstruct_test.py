@@ -146,6 +146,13 @@ def test_bad_input_is_refused_in_a_sentence(series, quick):
         tomofield.reconstruct("absent.mrc", **quick)
     with pytest.raises(tomofield.Error, match="images of 32 × 32 pixels"):
         tomofield.reconstruct(views, tilts[:-1], **quick)
+    for wrong in (series.views + 1j, series.views.astype(str), series.views.astype("M8[s]")):
+        with pytest.raises(tomofield.Error, match="real numbers"):
+            tomofield.reconstruct(wrong, series.tilt_deg, thickness=16)
+    for tilt in (np.nan, np.inf):
+        with pytest.raises(tomofield.Error, match="tilt angle"):
+            tomofield.reconstruct(series.views, [tilt, *list(series.tilt_deg)[1:]], thickness=16,
+                                  contrast="bright")
     with pytest.raises(tomofield.Error, match="2 dimensions"):
         tomofield.reconstruct(views[0], tilts, **quick)
     with pytest.raises(tomofield.Error, match="tilt_deg"):

@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "base/check.h"
+#include "base/memory.h"
 #include "base/parallel.h"
 #include "field/sampling/aligned_rows.h"
+#include "tomofield/error.h"
 
 namespace tomofield::field {
 namespace {
@@ -114,11 +117,28 @@ OrientedBox box_between(const Point& low, const Point& high, double voxel_px) {
   return box;
 }
 
+void require_feasible(const OrientedBox& box) {
+  constexpr double kMostPoints = 1e13;  // hours to days of a machine
+  constexpr double kMostSide = std::numeric_limits<std::int32_t>::max();
+  double points = std::pow(std::max(1.0, std::ceil(box.voxel_px - 1e-9)), 3);
+  double side = 0;
+  for (const std::int64_t size : box.size) {
+    points *= static_cast<double>(size);
+    side = std::max(side, static_cast<double>(size));
+  }
+  if (points <= kMostPoints && side <= kMostSide) return;
+  throw Error(fmt::format(
+      "a box of {} × {} × {} voxels of {:g} px is too large: sampling it takes {:.2g} points, and "
+      "at most {:.0g} are allowed, with at most {:.0f} voxels along an axis",
+      box.size[0], box.size[1], box.size[2], box.voxel_px, points, kMostPoints, kMostSide));
+}
+
 std::int64_t points_per_voxel(const OrientedBox& box) {
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(box.voxel_px - 1e-9)));
 }
 
 void sample_box(const Field& field, const OrientedBox& box, const BoxSink& sink) {
+  require_feasible(box);
   sample_box(field, box, {0, static_cast<int>(box.size[1])}, sink);
 }
 
@@ -135,7 +155,11 @@ std::vector<float> sample_box(const Field& field, const OrientedBox& box) {
 }
 
 std::vector<float> gather_box(const OrientedBox& box, const BoxSource& source) {
+  require_feasible(box);
   const auto [nx, ny, nz] = box.size;
+  base::require_memory(static_cast<std::size_t>(nx * ny * nz) * sizeof(float),
+                       fmt::format("a box of {} × {} × {} voxels", nx, ny, nz).c_str(),
+                       "sample it in parts");
   std::vector<float> volume(static_cast<std::size_t>(nx * ny * nz));
   source([&, nx = nx, ny = ny](const BoxPart& part) {
     const auto rows = static_cast<std::ptrdiff_t>(part.num_rows * nx);

@@ -39,6 +39,11 @@ struct OrientedBox {
 /// fill it (at least one).
 OrientedBox box_between(const Point& low, const Point& high, double voxel_px);
 
+/// Throws Error for a box that cannot be sampled in reasonable time: with more than 10¹³ points in
+/// all of its voxels, or a side of 2³¹ voxels or more. All arithmetic on the sizes of a box is safe
+/// after that.
+void require_feasible(const OrientedBox& box);
+
 /// Returns the number of points along each axis whose mean is a voxel: 1 for voxels up to one
 /// pixel.
 std::int64_t points_per_voxel(const OrientedBox& box);
@@ -56,7 +61,7 @@ struct BoxPart {
 using BoxSink = std::function<void(const BoxPart&)>;
 /// Computes the densities of a box. A voxel larger than a pixel is the mean of ceil(voxel_px)³
 /// regularly spaced points, so that coarse boxes do not alias; other voxels are single points. The
-/// density is 0 outside the domain.
+/// density is 0 outside the domain. Throws Error as require_feasible() does.
 ///
 /// Boxes that are not rotated are evaluated 16 rows at a time, as in a fit. Rotated ones are
 /// evaluated point by point, which is tens of times slower. Memory: a few rows of the field's
@@ -71,7 +76,8 @@ std::vector<float> sample_box(const Field& field, const OrientedBox& box);
 
 /// Passes every voxel of a box to a sink.
 using BoxSource = std::function<void(const BoxSink&)>;
-/// Returns the densities that a source passes of a box, [z, y, x].
+/// Returns the densities that a source passes of a box, [z, y, x]. Throws Error as
+/// require_feasible() does, or if memory is too small for the whole box.
 std::vector<float> gather_box(const OrientedBox& box, const BoxSource& source);
 
 /// Returns the densities at points, 0 outside the domain.

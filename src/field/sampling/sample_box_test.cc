@@ -11,6 +11,7 @@
 #include "base/enum_names.h"
 #include "base/parallel.h"
 #include "random_arrays.h"
+#include "tomofield/error.h"
 #include "uneven_model.h"
 
 namespace tomofield::field {
@@ -150,6 +151,26 @@ TEST(SampleBox, BoxesFillTheirCornersWithWholeVoxels) {
   EXPECT_EQ(box_between({0, 0, 0}, {3, 3, 0.3}, 0.1).size,
             (std::array<std::int64_t, 3>{30, 30, 3}));
   EXPECT_EQ(box_between({0, 0, 0}, {3, 3, 3}, 5).size, (std::array<std::int64_t, 3>{1, 1, 1}));
+}
+
+TEST(SampleBox, BoxesThatNoMachineSamplesAreRefused) {
+  const auto refuses = [](std::array<std::int64_t, 3> size, double voxel_px) {
+    try {
+      require_feasible({.size = size, .voxel_px = voxel_px});
+      return false;
+    } catch (const Error&) {
+      return true;
+    }
+  };
+  constexpr std::int64_t k1 = 1;
+  EXPECT_TRUE(refuses({k1 << 21, k1 << 21, k1 << 22}, 1));  // 2⁶⁴ voxels
+  EXPECT_TRUE(refuses({k1 << 62, 4, 4}, 1));
+  EXPECT_TRUE(refuses({4, 1, k1 << 62}, 1));
+  EXPECT_TRUE(refuses({k1 << 31, 1, 1}, 1));
+  EXPECT_TRUE(refuses({8, 8, 8}, 1e300));
+  EXPECT_TRUE(refuses({8, 8, 8}, 1e9));
+  EXPECT_FALSE(refuses({4096, 4096, 1024}, 1));
+  EXPECT_FALSE(refuses({1, 1, 1}, 4096));
 }
 
 TEST(SampleBox, PartsCoverTheBoxOnceOnAnyNumberOfThreads) {
