@@ -144,7 +144,8 @@ void write_ome_zarr(const std::filesystem::path& mrc, const std::filesystem::pat
     arrays.push_back(std::move(coarser));
   }
   write_text(root / ".zattrs", attributes(name, header, static_cast<int>(arrays.size())));
-  write_text(root / kZarrMarker, {{"zarr_format", 2}});
+  write_text(root / ".zgroup", {{"zarr_format", 2}});
+  write_text(root / kZarrMarker, {{"made_by", library_version()}});
   folder.commit();
 }
 

@@ -5,8 +5,9 @@
 
 namespace tomofield::io {
 
-/// The file by which a folder is known as a Zarr group; only such a folder is replaced.
-inline constexpr const char* kZarrMarker = ".zgroup";
+/// The file by which a folder is known as a store that this program made; only such a folder is
+/// replaced.
+inline constexpr const char* kZarrMarker = ".tomofield";
 
 /// Writes an MRC volume as OME-Zarr 0.4 (a Zarr group of version 2,
 /// https://ngff.openmicroscopy.org/ 0.4): axes z, y, x in Å, the volume itself in the array "0",

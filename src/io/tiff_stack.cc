@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdarg>
 #include <cstdint>
 #include <cstdio>
@@ -40,6 +41,7 @@ int drop_message(TIFF*, void*, const char*, const char*, va_list) { return 1; }
 struct PageFormat {
   std::uint32_t width = 0, height = 0;
   std::uint16_t bits = 1, samples = 1, kind = SAMPLEFORMAT_UINT;
+  std::uint16_t photometric = PHOTOMETRIC_MINISBLACK;
   bool is_tiled = false;
 
   bool operator==(const PageFormat&) const = default;
@@ -84,6 +86,7 @@ class TiffFile {
     TIFFGetFieldDefaulted(handle_, TIFFTAG_BITSPERSAMPLE, &format.bits);
     TIFFGetFieldDefaulted(handle_, TIFFTAG_SAMPLESPERPIXEL, &format.samples);
     TIFFGetFieldDefaulted(handle_, TIFFTAG_SAMPLEFORMAT, &format.kind);
+    TIFFGetField(handle_, TIFFTAG_PHOTOMETRIC, &format.photometric);
     format.is_tiled = TIFFIsTiled(handle_) != 0;
     require_readable(format, page);
     return format;
@@ -113,11 +116,25 @@ class TiffFile {
     const bool is_integer = format.kind == SAMPLEFORMAT_UINT || format.kind == SAMPLEFORMAT_INT;
     const bool is_float = format.kind == SAMPLEFORMAT_IEEEFP && format.bits == 32;
     const bool has_bits = format.bits == 8 || format.bits == 16 || format.bits == 32;
-    if (format.samples == 1 && ((is_integer && has_bits) || is_float)) return;
+    if (format.samples == 1 && ((is_integer && has_bits) || is_float))
+      return require_grey(format, page);
     fail(fmt::format(
         "has {} {} of {} bits a pixel on page {}; grey values of 8, 16 or 32 bits can "
         "be read",
         format.samples, format.samples == 1 ? "value" : "values", format.bits, page + 1));
+  }
+
+  // Values may stand for colours of a palette, or count down from white (TIFF 6.0, page 37).
+  void require_grey(const PageFormat& format, std::size_t page) const {
+    const bool is_unsigned = format.kind == SAMPLEFORMAT_UINT;
+    if (format.photometric == PHOTOMETRIC_MINISBLACK ||
+        (format.photometric == PHOTOMETRIC_MINISWHITE && is_unsigned))
+      return;
+    fail(fmt::format("has {} on page {}; grey values from black can be read: convert it",
+                     format.photometric == PHOTOMETRIC_PALETTE      ? "numbers of a palette"
+                     : format.photometric == PHOTOMETRIC_MINISWHITE ? "signed values from white"
+                                                                    : "colours",
+                     page + 1));
   }
 
   std::filesystem::path path_;
@@ -135,8 +152,9 @@ void convert(const std::byte* raw, std::size_t count, float* out) {
   }
 }
 
-// Converts values of a page to floats.
-void decode(const PageFormat& format, const std::byte* raw, std::size_t count, float* out) {
+// Converts numbers of a page to floats.
+void convert_numbers(const PageFormat& format, const std::byte* raw, std::size_t count,
+                     float* out) {
   const bool is_signed = format.kind == SAMPLEFORMAT_INT;
   if (format.kind == SAMPLEFORMAT_IEEEFP) return convert<float>(raw, count, out);
   switch (format.bits) {
@@ -150,6 +168,14 @@ void decode(const PageFormat& format, const std::byte* raw, std::size_t count, f
       return is_signed ? convert<std::int32_t>(raw, count, out)
                        : convert<std::uint32_t>(raw, count, out);
   }
+}
+
+// Converts values of a page to floats that count up from black.
+void decode(const PageFormat& format, const std::byte* raw, std::size_t count, float* out) {
+  convert_numbers(format, raw, count, out);
+  if (format.photometric != PHOTOMETRIC_MINISWHITE) return;
+  const auto white = static_cast<float>(std::exp2(format.bits) - 1);
+  std::transform(out, out + count, out, [&](float value) { return white - value; });
 }
 
 // Reads the page that a file is at, its top row last.

@@ -76,7 +76,12 @@ double find_pixel_size(const TiltSeriesOptions& options, const io::ImageStack& s
     throw Error(fmt::format("the pixel size {} Å (--pixel-size) is not from {} to {} Å",
                             *options.pixel_size_A, base::kSmallestPixel_A, base::kLargestPixel_A));
   }
-  const double in_header_A = stack.header().voxel_size_A[0];
+  const auto& [in_header_A, height_A, depth_A] = stack.header().voxel_size_A;
+  if (height_A > 0.0 && std::fabs(in_header_A - height_A) > 0.001 * std::fabs(in_header_A))
+    throw Error(fmt::format(
+        "'{}' has pixels of {} × {} Å, and only square ones can be reconstructed: give their size "
+        "with --pixel-size if the header is wrong",
+        stack.name(), in_header_A, height_A));
   const bool is_default = in_header_A == 0.0 || in_header_A == 1.0;
   if (is_default && mdoc && base::is_plausible_pixel_size(mdoc->pixel_spacing_A.value_or(0.0)))
     return *mdoc->pixel_spacing_A;

@@ -429,6 +429,9 @@ def test_tiff_stacks_of_every_kind(series):
                           ("float32", {"tile": (16, 32), "compression": "zlib"})):
         tifffile.imwrite(tif, counts[:, ::-1].astype(kind), photometric="minisblack", **options)
         assert volume(tif) == expected, kind
+    for kind, white in (("uint8", 255), ("uint16", 65535)):
+        tifffile.imwrite(tif, (white - counts[:, ::-1]).astype(kind), photometric="miniswhite")
+        assert volume(tif) == expected, kind
     info = harness.succeed("info", tif).stdout
     assert f"{WIDTH} × {HEIGHT} × {NUM_VIEWS}" in info
 
@@ -439,6 +442,11 @@ def test_tiff_files_that_are_no_stack(series):
     common = ["--tlt", series.tlt, "--thickness", THICKNESS, *REST]
     tifffile.imwrite(tif, np.zeros((8, 8, 3), np.uint8), photometric="rgb")
     refuse(["a.tif", "3 values of 8 bits"], tif, *common)
+    tifffile.imwrite(tif, np.zeros((8, 8), np.uint8), photometric="palette",
+                     colormap=np.zeros((3, 256), np.uint16))
+    refuse(["a.tif", "palette"], tif, *common)
+    tifffile.imwrite(tif, np.zeros((8, 8), np.int16), photometric="miniswhite")
+    refuse(["a.tif", "from white"], tif, *common)
     tifffile.imwrite(tif, np.zeros((8, 8), np.float64))
     refuse(["a.tif", "64 bits"], tif, *common)
     with tifffile.TiffWriter(tif) as writer:

@@ -77,14 +77,17 @@ def test_a_folder_is_replaced_as_a_whole_or_not_at_all(finished):
     assert refused.returncode == 2 and "again.zarr' exists" in refused.stderr, refused.stderr
     harness.succeed(*command, "--overwrite")
     assert zarr.open(path + ".zarr", "r")["0"].shape == finished.volume.shape
-    # A folder of something else stays.
-    folder = os.path.join(harness.SCRATCH, "other")
+
+
+@pytest.mark.parametrize("name", ("precious", ".zgroup", "zarr.json"))
+def test_a_folder_of_something_else_stays(finished, name):
+    folder = os.path.join(harness.SCRATCH, "other" + name)
     os.makedirs(folder + ".zarr")
-    open(folder + ".zarr/precious", "w").close()
+    open(os.path.join(folder + ".zarr", name), "w").close()
     refused = harness.tomofield("export", finished.model_path, "-o", folder + ".mrc", "--zarr",
                                 "--overwrite")
     assert refused.returncode == 2 and "no folder of such results" in refused.stderr
-    assert os.listdir(folder + ".zarr") == ["precious"] and not os.path.exists(folder + ".mrc")
+    assert os.listdir(folder + ".zarr") == [name] and not os.path.exists(folder + ".mrc")
 
 
 def test_metadata_is_json_as_napari_reads_it(finished):
