@@ -261,7 +261,7 @@ constexpr Row kRows[] = {
                   "by three standard errors and by 1 %; else smooth",
      .help = "Kind of total variation: concave keeps edges sharp, smooth is the standard one"},
     {.key = "fit.prior", .flag = "--prior", MEMBER(Options, prior), .group = Group::kFit,
-     .automatic = "learned if a trial predicts held-out views better with it, else tv; tv if --tv or "
+     .automatic = "learned unless a trial predicts held-out views worse with it; tv if --tv or "
                   "--tv-penalty is given",
      .help = "learned: end the fit with a prior that simulated tilt series taught, for plain vertices "
              "a pixel apart. tv: total variation alone. light: little of it, as the training needs"},
