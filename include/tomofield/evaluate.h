@@ -8,8 +8,8 @@
 
 namespace tomofield {
 
-/// Says how similar a volume is to the truth, voxel by voxel. "Affine" scores are those of
-/// scale · volume + offset, the least-squares fit to the truth.
+/// The similarity of a volume to the truth, voxel by voxel. "Affine" scores are those of scale ·
+/// volume + offset, the least-squares fit to the truth.
 struct VolumeScores {
   double psnr_raw_dB = 0.0;  ///< 10 log10(peak² / mean squared difference); infinite if equal
   double psnr_affine_dB = 0.0;

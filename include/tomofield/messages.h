@@ -5,7 +5,7 @@
 
 namespace tomofield {
 
-/// Tells what was done, or what may be wrong with the input.
+/// kInfo: what was done; kWarning: what may be wrong with the input.
 enum class MessageKind { kInfo, kWarning };
 
 using MessageHandler = std::function<void(MessageKind, std::string_view)>;

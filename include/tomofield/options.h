@@ -7,7 +7,7 @@
 
 namespace tomofield {
 
-/// Says whether dense matter is dark (transmission images) or bright (phantoms, HAADF) in views.
+/// The look of dense matter in the views: dark (transmission images) or bright (phantoms, HAADF).
 enum class Contrast { kDark, kBright };
 /// The views stay where the files align them, or they are aligned further with the field itself,
 /// or they are aligned from a raw stack of which the direction of the tilt axis is known.
@@ -127,7 +127,7 @@ struct Options {
   /// How strongly to denoise: "light", "medium", "strong" or a factor. It multiplies the weight, be
   /// it given or chosen, by 0.5, 1, 2 or the factor.
   std::string denoise = "medium";
-  /// Says what ends the fit. If it is empty, a trial takes the learned prior if that predicts views
+  /// The end of the fit. If it is empty, a trial takes the learned prior if that predicts views
   /// better that were left out. With `penalty` or `density_variation`, empty means kTv.
   std::optional<Prior> prior;
   double boundary = 4.0;  ///< weight of the boundary consistency (eq. 6)

@@ -21,10 +21,10 @@ struct ViewImages {
   double pixel_size_A = 1.0;
 };
 
-/// Holds the input of a reconstruction: files, or arrays in memory. It is cheap to copy.
+/// The input of a reconstruction: files, or arrays in memory. It is cheap to copy.
 class TiltSeries {
  public:
-  /// Names the files; reconstruct() opens them.
+  /// Takes the names; reconstruct() opens the files.
   static TiltSeries from_files(SeriesFiles files);
   /// Takes the arrays. Throws Error if sizes do not agree.
   static TiltSeries from_images(ViewImages images);
@@ -36,7 +36,7 @@ class TiltSeries {
   std::shared_ptr<const Impl> impl_;
 };
 
-/// Says how far a reconstruction is.
+/// The state of a reconstruction at one moment, as the callback gets it.
 struct Progress {
   double fraction_done = 0.0;
   double seconds_elapsed = 0.0;
@@ -49,7 +49,7 @@ struct Progress {
 /// stop the reconstruction. May throw: the exception leaves reconstruct(), and nothing is saved.
 using ProgressCallback = std::function<bool(const Progress&)>;
 
-/// Holds the results of reconstruct().
+/// The results of reconstruct().
 struct Reconstruction {
   bool is_finished = false;  ///< false: the callback stopped it, and the rest is empty
   /// The density in the units and the contrast of the views, or in the other contrast with

@@ -24,7 +24,7 @@ constexpr std::int64_t kEpochsBefore = 2;
 // has one.
 constexpr int kSlowBin = 2;
 
-// Returns the bytes of a predicted view with pixels so many times as wide.
+// Returns the bytes of a predicted view with pixels `bin` times as wide.
 std::size_t prediction_bytes(const measurement::Measurement& measurement, int bin) {
   return measurement::bytes_of_prediction(
       measurement::SlabViews::binned_shape(measurement.rays_shape(), bin));
@@ -67,7 +67,7 @@ int bin_of_next_epoch(const fit::Fit& fit) {
   return next == fit.stages().end() ? stage.bin : next->bin;
 }
 
-// Lets a fit go on with views that are resampled anew.
+// Lets a fit go on with views that are resampled from the recorded ones.
 void resample(const FitInProgress& run, const distributed::Communicator& processes) {
   measurement::realign(run.problem.recorded, run.corrections, bin_of_next_epoch(run.fit),
                        run.problem.scratch_dir, fit::band_rows(run.field), processes,

@@ -51,7 +51,7 @@ measurement::Measurement aligning_measurement(const JointProblem& problem,
 ImagePair image_pair(const measurement::PredictedView& view,
                      const measurement::Measurement& measurement, const fit::Stage& stage);
 
-/// Says how local motion is registered in a stage.
+/// Returns the options of the registration of local motion in a stage.
 LocalRegistrationOptions local_options(const measurement::Measurement& measurement,
                                        const fit::Stage& stage);
 
@@ -71,7 +71,7 @@ std::vector<double> inner_residuals(const fit::Fit& fit,
                                     const measurement::Measurement& measurement,
                                     const fit::Stage& stage);
 
-/// Names a fit and the alignment of the views that it is made with.
+/// A fit and the alignment of the views that it is made with.
 struct FitInProgress {
   const JointProblem& problem;
   const fit::FieldOptions& field;

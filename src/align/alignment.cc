@@ -25,7 +25,7 @@ namespace {
 
 // Views are correlated in images of at most about this width and height.
 constexpr double kCorrelatedSize = 96;
-// A new alignment must predict held-out views better by so many standard errors.
+// Standard errors by which a new alignment must predict held-out views better.
 constexpr double kSure = 2.0;
 
 // Returns the views that do not resemble their projections.

@@ -15,14 +15,14 @@
 
 namespace tomofield::align {
 
-/// Holds the local motion of a series and what speaks for it.
+/// The local motion of a series, and whether held-out views are predicted better with it.
 struct LocalTrial {
   Comparison held_out;
   std::vector<double> steps_px;  ///< LocalAlignment::steps_px
   bool is_accepted = false;
 };
 
-/// Holds the alignment of a series and what speaks for it.
+/// The alignment of a series, and whether held-out views are predicted better with it.
 struct Alignment {
   std::vector<geometry::ViewCorrection> corrections;  ///< [view]; none if it was not accepted
   JointAlignment joint;
@@ -33,7 +33,7 @@ struct Alignment {
   std::vector<int> unaligned;          ///< views that do not resemble their projections, ascending
 };
 
-/// Describes fits of an alignment: so many times the first epochs of a fit.
+/// Fits of an alignment: the first epochs of a fit, several times.
 struct PlannedFits {
   fit::FitOptions options;
   std::int64_t epochs;

@@ -15,11 +15,11 @@ class AxisLine {
   /// Returns the residual of each view at a rotation in degrees.
   using Residuals = std::function<std::vector<double>(double)>;
 
-  /// A slope or a bend of the residuals counts if its mean over the views is above so many standard
-  /// errors.
+  /// A slope or a bend of the residuals counts if its mean over the views is above
+  /// `standard_errors` standard errors.
   AxisLine(Residuals residuals, double standard_errors);
 
-  /// Says whether the slope of the residuals between both sides of a rotation counts.
+  /// Returns true if the slope of the residuals between both sides of a rotation counts.
   bool leans(double axis_deg, double step_deg);
   /// Returns the rotation a step further downhill, if the residual is smaller there and the slope
   /// between both sides counts; else the rotation itself.

@@ -25,10 +25,10 @@ constexpr double kFarStep_deg = 4.0;
 constexpr double kNearStep_deg = 1.0, kLastStep_deg = 0.5;
 // A joint alignment leaves a smaller error of the axis.
 constexpr double kRefinedStep_deg = 1.0, kRefinedRange_deg = 3.0;
-// Noise makes residuals of fits differ as well: so many standard errors over the views are sure.
-// Views are aligned anew in each fit of the search, and that differs besides.
+// Standard errors over the views by which residuals of fits must differ, because noise makes them
+// differ as well. Each fit of the search also aligns the views again, which makes it less certain.
 constexpr double kSure = 2.0, kSureOfSearch = 3.0;
-// The fits that refine it have pixels so many times as wide.
+// The fits that refine the axis have pixels wider by this factor.
 constexpr int kAxisBin = 2;
 // In narrower views, other slow errors of an alignment move the lowest place by up to 0.4°.
 constexpr std::int64_t kNarrowest_px = 192;

@@ -26,7 +26,7 @@ std::vector<geometry::ViewCorrection> with_best_axis(
 /// Number of epochs of each fit of with_refined_axis(), and the usual number of these fits.
 inline constexpr int kAxisEpochs = 16, kAxisFits = 3;
 
-/// Says whether the views of a series are large enough for with_refined_axis(). In smaller ones,
+/// Returns true if the views of a series are large enough for with_refined_axis(). In smaller ones,
 /// other slow errors of an alignment hide the direction of the axis.
 bool can_refine_axis(const measurement::Measurement& plan);
 

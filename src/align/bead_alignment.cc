@@ -22,7 +22,7 @@ constexpr std::size_t kFewestBeads = 3;
 constexpr std::size_t kFewestSpots = 4;  // of a bead that counts
 constexpr int kModes = 6;                // cosines over the views, from the constant one on
 constexpr int kRounds = 8;               // of least squares
-// Beads are left out in so many turns at most, to see whether the others predict them.
+// Largest number of turns in which beads are left out, to see whether the others predict them.
 constexpr std::size_t kMostTurns = 8;
 constexpr double kSure = 1.0;  // standard errors by which the steps must pay
 
@@ -95,7 +95,8 @@ class BeadSet {
     return steps;
   }
 
-  // Weighs the distances anew, by their median size. The places of the beads depend on the weights.
+  // Renews the weights of the distances, by their median size. The places of the beads depend on
+  // the weights.
   void weigh(std::span<const ViewCorrection> steps) {
     constexpr int kTurns = 3;
     for (BeadEquations& bead : beads_) bead.weigh_equally();

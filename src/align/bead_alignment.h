@@ -19,13 +19,13 @@ struct BeadPoint {
   double x_px = 0.0, y_px = 0.0;
 };
 
-/// Says how the views look at the beads.
+/// The tilts and the tilt axis by which the views see the beads.
 struct BeadGeometry {
   std::vector<double> tilt_deg;
   double axis_px = 0.0;  ///< x of the tilt axis, relative to the centre
 };
 
-/// Holds what gold beads tell about an alignment.
+/// The steps of an alignment that gold beads ask for, and how far the beads lie from their places.
 struct BeadAlignment {
   std::vector<geometry::ViewCorrection> steps;  ///< [view], follow the given corrections
   bool is_accepted = false;                     ///< whether they pay
@@ -34,7 +34,7 @@ struct BeadAlignment {
   /// alignment of the files, with the corrections that were given, and after the steps. Outliers
   /// count less.
   double files_px = 0.0, before_px = 0.0, after_px = 0.0;
-  /// Says by which part the squared distances fall, over beads that do not decide about the steps.
+  /// The part by which the squared distances fall, over beads that do not decide about the steps.
   MeanGain gain;
 };
 

@@ -11,8 +11,8 @@
 
 namespace tomofield::align {
 
-/// Names an unknown: the coefficient of a mode, which is a function of the view, in a quantity that
-/// may change.
+/// An unknown: the coefficient of a mode, which is a function of the view, in a quantity that may
+/// change.
 struct BeadUnknown {
   enum Quantity { kX, kY, kRotation, kMagnification, kQuantities };
   Quantity quantity;

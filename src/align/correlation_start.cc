@@ -94,7 +94,7 @@ class PoseSearch {
     first_ = order.front();
   }
 
-  // Finds the shift of each view anew, from its neighbours on both sides.
+  // Finds the shift of each view again, from its neighbours on both sides.
   void compare_with_neighbours() {
     std::vector<std::size_t> all(poses_.size());
     std::iota(all.begin(), all.end(), 0);

@@ -8,20 +8,20 @@
 
 namespace tomofield::align {
 
-/// Holds a view for a coarse search: line integrals in any unit, and which pixels count.
+/// A view for a coarse search: line integrals in any unit, and which pixels count.
 struct CoarseView {
   tilt_series::MaskedImage image;
   double tilt_deg = 0.0;
 };
 
-/// Says what a correlation expects. Lengths are in pixels of the given images.
+/// Limits of a correlation. Lengths are in pixels of the given images.
 struct CorrelationOptions {
   double thickness_px = 0.0;    ///< of the specimen, roughly
   double largest_shift = 0.35;  ///< from one view to the next, as a share of the image's size
 };
 
-/// Holds what a correlation finds. A position q of a corrected view, relative to its centre, lies
-/// in the given image at q + shift. The view nearest to zero tilt has no shift.
+/// A position q of a corrected view, relative to its centre, lies in the given image at q + shift.
+/// The view nearest to zero tilt has no shift.
 struct CorrelationStart {
   std::vector<std::array<double, 2>> shift_px;  ///< of each view
   /// Height of each view's correlation peak above the mean, in standard deviations of the whole

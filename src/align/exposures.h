@@ -5,7 +5,7 @@
 
 namespace tomofield::align {
 
-/// Says whether the views of a series differ in exposure: whether the mean of a view typically
+/// Returns true if the views of a series differ in exposure: if the mean of a view typically
 /// differs from that of its two neighbours in tilt by more than a part of a view's contrast. Every
 /// process calls it and gets the same.
 bool exposures_differ(const measurement::Measurement& measurement,

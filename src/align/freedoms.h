@@ -2,7 +2,7 @@
 
 namespace tomofield::align {
 
-/// Names what a registration may change.
+/// The quantities of a view that a registration may change.
 struct Freedoms {
   bool shift = true;
   bool rotation = false;

@@ -25,13 +25,13 @@ namespace {
 
 using geometry::ViewCorrection;
 
-// A shift changes by at most so many pixels of the stage at once.
+// Largest change of a shift at once, in pixels of the stage.
 constexpr double kLongestStep = 2.0;
 // Rotations, magnifications and tilts are looked for in pixels at most this many times as wide.
 constexpr int kFreedomBin = 2;
 // Tilts open only if it is very sure: a shift that the field blurs looks like an error of the tilt.
 constexpr double kSureOfTilts = 5.0;
-// Tilts are looked for in every so many updates with these pixels: they cost two more predictions.
+// Tilts are looked for in every second update with these pixels: they cost two more predictions.
 constexpr int kTiltEvery = 2;
 constexpr double kSure = 3.0;  // standard errors by which a freedom must pay
 
@@ -189,7 +189,7 @@ class AligningFit {
     }
   }
 
-  // Says whether the error of the views falls by so many standard errors that it is no accident.
+  // Returns true if the error of the views falls by enough standard errors to be no accident.
   // One is too few, because the question comes up at every update.
   static bool pays(const std::vector<std::optional<Registration>>& registrations,
                    const Freedoms& without, const Freedoms& with) {

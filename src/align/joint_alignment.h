@@ -26,7 +26,7 @@ struct ViewAgreement {
   std::array<double, 2> error_px{};
 };
 
-/// Holds what a joint alignment finds.
+/// The result of align_jointly(), and how well each view agrees with its prediction.
 struct JointAlignment {
   std::vector<geometry::ViewCorrection> corrections;  ///< [view]
   std::vector<ViewAgreement> agreement;               ///< [view]
@@ -60,8 +60,8 @@ inline constexpr std::int64_t kResidualEpochs = 15;
 
 /// Aligns the views of a series with the projections of a field while the field is being fitted to
 /// them, from coarse to fine. After each epoch the field predicts all views. Each view is
-/// registered to its prediction (registration.h) and resampled anew from the recorded one. The part
-/// that the views cannot tell is removed (gauge.h), and the fit goes on. `start` are the
+/// registered to its prediction (registration.h) and resampled again from the recorded one. The
+/// part that the views cannot tell is removed (gauge.h), and the fit goes on. `start` are the
 /// corrections to begin with. Throws base::StopRequested if a stop was requested. Every process
 /// calls it and gets the same.
 JointAlignment align_jointly(const JointProblem& problem,

@@ -9,7 +9,7 @@
 
 namespace tomofield::align {
 
-/// Holds what a local alignment finds.
+/// The result of a local alignment: motion that the given corrections lack.
 struct LocalAlignment {
   std::vector<geometry::ViewCorrection> corrections;  ///< [view]; each has local motion
   std::vector<ViewAgreement> agreement;               ///< [view]

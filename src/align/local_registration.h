@@ -11,7 +11,7 @@
 
 namespace tomofield::align {
 
-/// Says how local motion is registered.
+/// Lengths and weights of the registration of local motion.
 struct LocalRegistrationOptions {
   geometry::ViewWarp frame;        ///< has the size of the aligned view, before binning
   double pixel = 1.0;              ///< size of a pixel of the stage, in pixels before binning

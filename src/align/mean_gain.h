@@ -5,7 +5,7 @@
 
 namespace tomofield::align {
 
-/// Holds a mean over the views and its standard error.
+/// A mean over the views and its standard error.
 struct MeanGain {
   double mean = 0.0, error = 0.0;
 

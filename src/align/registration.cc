@@ -100,7 +100,7 @@ class Registration::RowBatch {
     if (++count_ == kRows) add_up(sums);
   }
 
-  // Adds the products of the rows to `sums` and begins anew.
+  // Adds the products of the rows to `sums` and empties the rows.
   void add_up(Sums& sums) {
     sums.noalias() += weighted_.leftCols(count_) * rows_.leftCols(count_).transpose();
     count_ = 0;

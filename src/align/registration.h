@@ -13,7 +13,7 @@
 
 namespace tomofield::align {
 
-/// Holds a view and its prediction, both [y, x] in pixels of a stage.
+/// A view and its prediction, both [y, x] in pixels of a stage.
 struct ImagePair {
   std::int64_t width = 0, height = 0;
   double pixel = 1.0;  ///< size of a pixel of the stage, in pixels of the view before binning
@@ -24,7 +24,7 @@ struct ImagePair {
   std::span<const float> by_tilt = {};
 };
 
-/// Says how a registration compares images and what it expects.
+/// The blur of both images in a registration, and the sizes of the changes that it expects.
 struct RegistrationOptions {
   double blur_px = 1.0;  ///< of both images, in pixels of the stage
   // Standard deviations of the changes that are expected. They keep small what the pixels say

@@ -5,8 +5,8 @@
 
 namespace tomofield::align {
 
-/// Says whether a step of an iteration undoes more than a part of the last one, which went too far
-/// then. Both have the same size. A last step of zeros is never undone.
+/// Returns true if a step of an iteration undoes more than a part of the last one, which went too
+/// far then. Both have the same size. A last step of zeros is never undone.
 bool turns_back(std::span<const double> step, std::span<const double> last, double part);
 
 /// Chooses the factor by which the steps that registrations find are taken.

@@ -10,14 +10,14 @@ namespace tomofield::align {
 
 using fourier::ImageTransform;
 
-/// Holds the highest place of a correlation.
+/// The highest place of a correlation.
 struct ShiftPeak {
   std::array<double, 2> moved_px{};  ///< the reference at q is found in the image at q + moved_px
   double correlation = 0.0;          ///< at the peak, −1 to 1
   double prominence = 0.0;  ///< (peak − mean) / standard deviation of the whole correlation
 };
 
-/// Holds a reference: its values (0 where it has none) and how much each pixel counts.
+/// A reference: its values (0 where it has none) and how much each pixel counts.
 struct Reference {
   ImageTransform::Image values, weights;
 };

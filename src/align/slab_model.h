@@ -7,7 +7,7 @@
 
 namespace tomofield::align {
 
-/// Tells how alike the views of a slab are. A stretched view's transform at (kx, ky) is that of the
+/// The likeness of the views of a slab. A stretched view's transform at (kx, ky) is that of the
 /// specimen at (kx, ky, −kx tan θ). If the specimen is uncorrelated from place to place and fills a
 /// slab, its transform at two heights kz is correlated by the transform of the slab's profile at
 /// their difference (here that of a Gaussian with the standard deviation of the slab's thickness).

@@ -8,7 +8,7 @@ struct SlabPose {
   double pitch_deg = 0.0;     ///< is added to all tilt angles: the slab lies level with them
 };
 
-/// Holds the most likely pose, and how well it is known.
+/// The most likely pose, and the standard error of each of its numbers.
 struct FoundPose {
   SlabPose pose, error;
 };

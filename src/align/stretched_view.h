@@ -7,8 +7,8 @@
 
 namespace tomofield::align {
 
-/// Says how a view is seen: its tilt angle, and where the centre of the corrected view lies in the
-/// image, relative to the centre of the image.
+/// The tilt angle of a view, and where the centre of the corrected view lies in the image, relative
+/// to the centre of the image.
 struct ViewPose {
   double tilt_deg = 0.0;
   std::array<double, 2> shift_px{};

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::ptrdiff_t kNeighbours = 4;  // to each side, in order of tilt
 // A view is unalike if its correlation is below the first part of the median of its neighbours, or
-// below the second one and so many standard deviations less than views usually are.
+// below the second one and kDeviations standard deviations less than views usually are.
 constexpr double kUnalike = 0.2, kPerhapsUnalike = 0.75, kDeviations = 8.0;
 
 // Makes the errors of correlations equally large (Fisher 1915).

@@ -13,7 +13,7 @@
 
 namespace tomofield::base {
 
-/// Holds the time and the memory that a program took.
+/// The time and the memory that a program took.
 struct Costs {
   double core_seconds = 0, wall_seconds = 0;
   std::int64_t peak_bytes = 0;  ///< largest resident size

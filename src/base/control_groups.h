@@ -7,8 +7,8 @@
 
 namespace tomofield::base {
 
-/// Says how to read what the folder of one control group limits. Either function returns nothing if
-/// the group sets no limit.
+/// Reads what the folder of one control group limits. Either function returns nothing if the group
+/// sets no limit.
 struct GroupLimit {
   using OfGroup = std::function<std::optional<double>(const std::filesystem::path& group)>;
   std::string controller;  ///< name of the controller in version 1, as in "cpu"

@@ -10,8 +10,8 @@
 
 namespace tomofield::base {
 
-/// Names the values of an enum as the command line, JSON and model files write them. A
-/// specialisation holds `kNames`, a std::array of pairs (value, name).
+/// The names of an enum's values in the command line, JSON and model files. A specialisation holds
+/// `kNames`, a std::array of pairs (value, name).
 template <typename Enum>
 struct EnumNames;
 

@@ -6,7 +6,7 @@
 
 namespace tomofield::base {
 
-/// Says how much memory this process can get.
+/// The memory that this process can get, and what limits it.
 struct AvailableMemory {
   std::size_t bytes = 0;             ///< can be allocated now without swapping
   bool is_limited_by_group = false;  ///< a control group grants less than the machine has

@@ -85,7 +85,7 @@ std::string reason_not_to_bind(int count) {
   return "";
 }
 
-// The threads of the process, and why there are so many.
+// The threads of the process, and the reason for their number.
 class Threads {
  public:
   explicit Threads(Choice choice)

@@ -14,10 +14,11 @@ inline constexpr int kMostThreads = 1024;
 int thread_count();
 /// Sets the number of threads; 0 is the default. No loop may run.
 void set_thread_count(int count);
-/// Says that so many processes of one job share this machine, so that the default number of threads
-/// is a share of the processors. Processes that are bound to different processors do not share.
+/// Makes the default number of threads a share of the processors, for `processes` of one job on
+/// this machine. Processes that are bound to different processors do not share.
 void share_machine_with(int processes);
-/// Says in a sentence how many threads there are and why, and whether they are bound to processors.
+/// Returns a sentence with the number of threads, its reason, and whether they are bound to
+/// processors.
 std::string describe_threads();
 
 /// Returns the index of the calling thread inside a parallel_for, 0 <= index < thread_count().

@@ -13,12 +13,12 @@ inline constexpr double kLargestPosition_px = 1e7;
 inline constexpr double kSmallestPixel_A = 1e-3;
 inline constexpr double kLargestPixel_A = 1e7;
 
-/// Tells whether a number is finite and lies from −`largest` to `largest`.
+/// Returns true if a number is finite and lies from −`largest` to `largest`.
 inline bool is_plausible(double value, double largest = kLargestNumber) {
   return std::fabs(value) <= largest;  // false for nan
 }
 
-/// Tells whether a number can be the side of a pixel in Å.
+/// Returns true if a number can be the side of a pixel in Å.
 inline bool is_plausible_pixel_size(double size_A) {
   return size_A >= kSmallestPixel_A && size_A <= kLargestPixel_A;
 }

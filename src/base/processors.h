@@ -6,7 +6,7 @@
 
 namespace tomofield::base {
 
-/// Says how much of a machine's processors this process may use.
+/// The part of a machine's processors that this process may use.
 struct Processors {
   int online = 1;               ///< processors of the machine
   int allowed = 1;              ///< of these, the ones in the process's affinity mask
@@ -14,7 +14,7 @@ struct Processors {
 
   /// Returns the number of threads that can run at once, at least 1.
   int usable() const;
-  /// Says whether nothing keeps the process from using the whole machine.
+  /// Returns true if nothing keeps the process from using the whole machine.
   bool are_all_usable() const { return allowed == online && !quota; }
 };
 

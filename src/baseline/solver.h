@@ -48,7 +48,7 @@ struct IterationReport {
 /// Called after every iteration with the densities at its end. It may write their padding.
 using AfterIteration = std::function<void(const IterationReport&, VoxelVolume&)>;
 
-/// Holds the rays of a pair of slabs and some buffers of its samples for each thread of
+/// The rays of a pair of slabs and some buffers of its samples for each thread of
 /// base::parallel_for.
 class ThreadScratch {
  public:

@@ -11,9 +11,9 @@
 
 namespace tomofield::batch {
 
-/// Names the outputs of all series, and checks all that can be checked without running anything:
-/// that no two series share a name or an output, that no output is an input, and, unless existing
-/// results are skipped or replaced, that there are none. Throws Error with all mistakes.
+/// Gives the outputs of all series their names, and checks all that can be checked without running
+/// anything: that no two series share a name or an output, that no output is an input, and, unless
+/// existing results are skipped or replaced, that there are none. Throws Error with all mistakes.
 void settle_outputs(std::vector<Series>& all, const PlanOptions& options);
 
 /// Throws Error with every job that needs more memory than there is, also on one thread.

@@ -14,14 +14,14 @@
 
 namespace tomofield::batch {
 
-/// Says how often a batch chooses its total variation (penalty, weight and limit of spikes) and its
-/// prior.
+/// Whether the series of a batch share one choice of total variation (penalty, weight and limit of
+/// spikes) and of its prior.
 enum class Choose {
   kOnce,  ///< a few series make trials, and all get the same
   kEach   ///< every series makes trials of its own
 };
 
-/// Holds the settings that the series of a batch share.
+/// The settings that the series of a batch share.
 struct SharedSettings {
   Penalty penalty = Penalty::kSmooth;
   double variation = 0;           ///< weight in noise units, as --tv
@@ -29,20 +29,20 @@ struct SharedSettings {
   std::optional<Prior> prior;     ///< likewise
 };
 
-/// Holds what one series chose by its trials, or the reason why it has no vote.
+/// What one series chose by its trials, or the reason why it has no vote.
 struct Vote {
   std::string series;
   SharedSettings settings;
   std::string failure;  ///< empty if it has a vote
 };
 
-/// Holds the settings that all series of a batch get if they do not state their own.
+/// The settings that all series of a batch get if they do not state their own.
 struct Choice {
   SharedSettings settings;
   std::vector<Vote> votes;  ///< those without a vote are among them
 };
 
-/// Says where a batch has its choice from. All are empty if there is nothing to share.
+/// The source of a batch's choice. All members are empty if there is nothing to share.
 struct ChoicePlan {
   std::optional<Choice> stored;        ///< of the batch that this one continues
   std::vector<std::size_t> choosing;   ///< jobs that are to make trials

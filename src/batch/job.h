@@ -8,7 +8,7 @@
 
 namespace tomofield::batch {
 
-/// Says what a job needs, as `tomofield reconstruct --plan` estimates it.
+/// The time and the memory of a job, as `tomofield reconstruct --plan` estimates them.
 struct Needs {
   std::int64_t memory_bytes_of_one_thread = 0;
   std::int64_t memory_bytes_a_thread = 0;  ///< of every further thread
@@ -57,7 +57,7 @@ bool has_checkpoint(const std::filesystem::path& output);
 /// Returns whether a run can continue: there is a checkpoint, or an alignment.
 bool can_resume(const std::filesystem::path& output);
 
-/// Says what a run is to do with the files of an earlier one.
+/// What a run does with the files of an earlier one.
 struct EarlierFiles {
   bool resumes = false;     ///< continue from them if that is possible
   bool overwrites = false;  ///< else replace them

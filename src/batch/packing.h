@@ -9,7 +9,7 @@
 
 namespace tomofield::batch {
 
-/// Holds the resources that are free for jobs.
+/// The resources that are free for jobs.
 struct Room {
   int threads = 1;
   std::int64_t memory_bytes = 0;

@@ -10,7 +10,7 @@
 
 namespace tomofield::batch {
 
-/// Says how series become jobs.
+/// The options by which series become jobs.
 struct PlanOptions {
   std::filesystem::path program;  ///< tomofield itself
   std::filesystem::path folder;   ///< of the batch; it exists

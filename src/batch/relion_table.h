@@ -10,7 +10,8 @@ namespace tomofield::batch {
 /// Returns the path of the tomograms.star of a batch, in its folder.
 std::filesystem::path relion_table(const std::filesystem::path& folder);
 
-/// Tells whether jobs reconstruct series of a STAR file, so that their batch has a tomograms.star.
+/// Returns true if jobs reconstruct series of a STAR file, so that their batch has a
+/// tomograms.star.
 bool are_of_star_files(const std::vector<Job>& jobs);
 
 /// Writes a tomograms.star with the rows that the runs of these jobs have written beside their

@@ -9,14 +9,14 @@
 
 namespace tomofield::batch {
 
-/// Says what a table may do with an option of `reconstruct`.
+/// What a table may do with an option of `reconstruct`.
 enum class ColumnKind {
   kUnknown,   ///< there is no such option
   kNotHere,   ///< the batch itself sets it
   kFlag,      ///< an option without a value
   kWithValue  ///< an option with a value
 };
-/// Tells about an option by its flag, as in "--thickness".
+/// Returns the kind of an option, which is given by its flag, as in "--thickness".
 using KindOfColumn = std::function<ColumnKind(const std::string& flag)>;
 
 /// Reads a table: comma-separated values, or values separated by tabs if its name ends with .tsv.

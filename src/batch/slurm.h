@@ -10,7 +10,7 @@
 
 namespace tomofield::batch {
 
-/// Holds the resources that Slurm grants to the job in which this process runs.
+/// The resources that Slurm grants to the job in which this process runs.
 struct SlurmGrant {
   std::optional<int> threads;                ///< SLURM_CPUS_PER_TASK
   std::optional<std::int64_t> memory_bytes;  ///< SLURM_MEM_PER_NODE, or _PER_CPU times the threads
@@ -21,7 +21,7 @@ SlurmGrant slurm_grant();
 /// Seconds before the time limit at which a task is told to save its checkpoint (SIGUSR1).
 inline constexpr int kWarningSeconds = 120;
 
-/// Says how the tasks of a job array run.
+/// The options of the tasks of a job array.
 struct SlurmOptions {
   std::filesystem::path program;  ///< tomofield itself
   std::filesystem::path folder;   ///< of the batch, with the list of its jobs

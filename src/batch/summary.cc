@@ -202,7 +202,7 @@ std::string page_text(const fs::path& folder, const std::vector<Line>& lines) {
   return page.document();
 }
 
-// Locks a file that other processes lock for a moment only.
+// Locks a file that other processes never lock for long.
 io::OutputLock wait_for_lock(const fs::path& file) {
   constexpr int kTries = 200;
   constexpr auto kPause = std::chrono::milliseconds(50);

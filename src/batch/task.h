@@ -7,7 +7,7 @@
 
 namespace tomofield::batch {
 
-/// Says how a task of a job array ended.
+/// The end of a task of a job array.
 struct TaskResult {
   State state;
   std::string continued_by;  ///< the Slurm job that goes on, if the time limit was near

@@ -12,7 +12,7 @@ const CLI::App* find_command(const CLI::App& program, const std::vector<std::str
 /// Returns the words that call a command, such as "tomofield baseline tv".
 std::string full_name(const CLI::App& command);
 
-/// Tells whether the arguments give an option, as `--bin 4` or `--bin=4`.
+/// Returns true if the arguments give an option, as `--bin 4` or `--bin=4`.
 bool is_given(const CLI::Option& option, const std::vector<std::string>& arguments);
 
 }  // namespace tomofield::cli

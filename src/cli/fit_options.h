@@ -19,7 +19,7 @@ void add_non_negative(CLI::App& command, std::optional<bool>& value);
 /// Registers the --seed of a baseline.
 void add_seed(CLI::App& command, std::uint64_t& seed, const char* group);
 
-/// Holds the sizes of the views and of the tomogram.
+/// The sizes of the views and of the tomogram.
 struct Sizes {
   int num_views;
   std::int64_t view_width, view_height;

@@ -3,7 +3,7 @@
 namespace tomofield::cli {
 
 /// Lets Ctrl-C (SIGINT) and SIGTERM ask the program to stop instead of ending it. In a job of
-/// several processes SIGUSR1 does the same, because mpirun passes it on without a time limit.
+/// several processes SIGUSR1 asks for it too, because mpirun passes it on without a time limit.
 void stop_on_signals(bool is_job = false);
 
 /// Returns true if one of these signals has come.

@@ -4,7 +4,7 @@
 
 namespace tomofield::compact {
 
-/// Says how small or how close a compact model shall be.
+/// The limit of a compact model's size, or of its change.
 struct Budget {
   enum class Kind { kDecibels, kParameters, kBytes };
   Kind kind = Kind::kDecibels;

@@ -42,7 +42,7 @@ inline constexpr std::size_t kNoMemoryHolds = std::numeric_limits<std::size_t>::
 /// decoded, or kNoMemoryHolds if they are more than 2^40 numbers.
 std::size_t decoded_bytes(const std::vector<field::LeafShape>& shapes);
 
-/// Holds a field as codes, which take little memory (decode_field).
+/// A field as codes, which take little memory (decode_field).
 struct CodedField {
   field::Quadtree tree;
   double thickness = 0.0;

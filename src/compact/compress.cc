@@ -308,7 +308,7 @@ CompactField within_decibels(Compression& compression, double decibels) {
   return made;
 }
 
-// Returns the codes of at most so many parameters, if there are any.
+// Returns the codes of at most `parameters` parameters, if there are any.
 CodedField coded_parameters(Compression& compression, double parameters, double part_of_rounding) {
   compression.choose({.of_error = false, .most = parameters});
   return compression.code(compression.choice().error * part_of_rounding / (1 - part_of_rounding));
@@ -336,8 +336,8 @@ class ParameterSearch {
 
   double parameters() const { return parameters_; }
 
-  // Chooses the next number after a model of so many bytes of codes and of other bytes. Returns
-  // false if the model is as close to the size as wanted.
+  // Chooses the next number after a model of `of_codes` bytes of codes and `beside` other bytes.
+  // Returns false if the model is as close to the size as wanted.
   bool go_on(double of_codes, double beside) {
     const double part = beside < bytes_ ? of_codes / (bytes_ - beside) : kFar;
     if (part <= 1 && part > kClose) return false;

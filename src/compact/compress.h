@@ -13,7 +13,7 @@
 
 namespace tomofield::compact {
 
-/// Says what a compression did. Densities are in density units.
+/// The size and the change of a compressed field. Densities are in density units.
 struct CompressionReport {
   std::size_t parameters = 0;  ///< whole numbers that the file holds
   std::size_t bytes = 0;       ///< of their codes

@@ -12,10 +12,10 @@ namespace tomofield::compact {
 
 using FloatMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Holds the densities of a finished field at the vertices of a square of the specimen's plane, but
-/// for those on its upper faces, which the next squares have. The vertices are as far apart as
-/// those of the field. The voxels of the region of interest depend on the vertices inside it and on
-/// those next to them. All others are 0.
+/// The densities of a finished field at the vertices of a square of the specimen's plane, but for
+/// those on its upper faces, which the next squares have. The vertices are as far apart as those of
+/// the field. The voxels of the region of interest depend on the vertices inside it and on those
+/// next to them. All others are 0.
 struct PlaceDensities {
   int nx = 0, ny = 0, nz = 0;
   FloatMatrix values;                        ///< [nx, nz·ny], y fastest

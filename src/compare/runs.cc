@@ -76,7 +76,7 @@ Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
   if (!exclude.empty()) run.command.insert(run.command.end(), {"--exclude", exclude});
   if (purpose == Purpose::kHeldOutViews)
     run.command.insert(run.command.end(), {"--hold-out", std::to_string(options.hold_out)});
-  // Settings are tuned anew for every purpose: those chosen on all views have seen the held-out
+  // Settings are tuned again for every purpose: those chosen on all views have seen the held-out
   // ones.
   if (options.tune && method.tunes) run.command.push_back("--tune");
   run.inputs = io::input_files(options.files);

@@ -85,7 +85,7 @@ class Communicator {
   /// Sends `values` to rank `to`, which must receive as many. T is float or std::int64_t.
   template <typename T>
   void send(std::span<const T> values, int to) const;
-  /// Holds a message while it is sent. Its destructor waits until that is done.
+  /// A message that is being sent. The destructor waits until that is done.
   class Sending {
    public:
     Sending(Sending&&) noexcept;

@@ -9,7 +9,7 @@
 
 namespace tomofield::evaluate {
 
-/// Holds the faults of a reconstruction that its volume shows.
+/// The faults of a reconstruction that its volume shows.
 struct Artefacts {
   std::optional<double> speckle;  ///< none if the volume is too thin (speckle.h)
   std::optional<FaceJump> faces;  ///< none without a model, and if its leaves have no faces

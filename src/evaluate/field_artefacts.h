@@ -11,7 +11,7 @@
 
 namespace tomofield::evaluate {
 
-/// Holds the faults of a fit that its region shows, and how its density varies along z.
+/// The faults of a fit that its region shows, and how its density varies along z.
 struct FieldArtefacts {
   std::vector<double> section_mean, section_deviation;  ///< [z], in density units
   double deviation = 0.0;                               ///< standard deviation of all voxels

@@ -10,7 +10,7 @@
 
 namespace tomofield::fit {
 
-/// Holds the decay rates of the first and the second moment.
+/// The decay rates of the first and the second moment.
 struct AdamOptions {
   double beta1 = 0.9;
   double beta2 = 0.99;
@@ -30,7 +30,7 @@ class Adam {
   /// Takes one step on the bias; `gradient` is the derivative of the loss by it.
   void step_bias(field::Field& field, double gradient, double learning_rate);
 
-  /// Holds the whole state, for checkpoints and for changes of the tree.
+  /// The whole state, for checkpoints and for changes of the tree.
   struct State {
     base::AlignedBuffer<float> m, v;       ///< moments of every parameter
     std::vector<std::int64_t> leaf_steps;  ///< steps that each leaf has taken part in

@@ -164,13 +164,13 @@ void Fit::free_optimizer() {
   prior_state_.reset(0);
 }
 
-// Frees the gradient and the state of the optimiser, which begins anew.
+// Frees the gradient and the state of the optimiser, which begins again.
 void Fit::free_moments() {
   gradient_.reset(0);
   optimizer_.state() = {};
 }
 
-// Resamples the field to the vertices of the stage, or factorises it. The optimiser starts anew.
+// Resamples the field to the vertices of the stage, or factorises it. The optimiser restarts.
 void Fit::resample_field() {
   std::vector<field::LeafShape> shapes = domain_.shapes_in(field_->tree(), stage().bin);
   free_moments();  // before the other field needs memory

@@ -26,8 +26,8 @@
 
 namespace tomofield::fit {
 
-/// Holds the state of a fit between two steps, apart from the field and the optimiser. A resumed
-/// run continues from these three.
+/// The state of a fit between two steps, apart from the field and the optimiser. A resumed run
+/// continues from these three.
 struct Progress {
   std::int64_t step = 0;                          ///< number of steps done
   std::vector<measurement::ViewModel> views;      ///< models of each view
@@ -48,7 +48,7 @@ struct Progress {
 /// adaptive tree, as far as the options ask for it.
 ///
 /// A fit goes through stages (stages.h). At the end of a stage, the field is resampled to the
-/// vertices of the next one, or factorised, and the optimiser starts anew.
+/// vertices of the next one, or factorised, and the optimiser starts again.
 ///
 /// Several processes can share a fit. Each works on some rows and keeps the parameters of their
 /// leaves and of the leaves next to them. Sums over bands are all-reduced in a fixed order, so the
@@ -73,12 +73,12 @@ class Fit {
   void run(const AfterStep& after_step);
   /// Returns the last number of steps below `step` after which run() can stop.
   std::int64_t last_stop_before(std::int64_t step) const;
-  /// Says why a tree, or a progress and a field, that were read from a file are no state of this
-  /// fit. Returns an empty text if they are one.
+  /// Returns why a tree, or a progress and a field, that were read from a file are no state of this
+  /// fit, or an empty text if they are one.
   std::string fault_of(const field::Quadtree& tree) const;
   std::string fault_of(const Progress& progress, const field::Field& field) const;
   /// Takes over the progress and the field of another fit with the same options, which must have no
-  /// fault. The optimiser starts anew; the caller can restore its state.
+  /// fault. The optimiser starts again; the caller can restore its state.
   void go_on_from(Progress progress, std::unique_ptr<field::Field> field);
 
   /// Goes on where another fit has ended, which has the first stages of this one
@@ -91,7 +91,7 @@ class Fit {
   void reread_measurement();
 
   const Progress& progress() const { return progress_; }
-  /// Says whether every step is done, or the held-out error has not improved for
+  /// Returns true if every step is done, or the held-out error has not improved for
   /// FitOptions::patience epochs.
   bool is_done() const;
   int steps_per_epoch() const { return steps_per_epoch_; }
@@ -112,8 +112,7 @@ class Fit {
   /// Does the same, with a scale and an offset of each view if `fit_view_scale`, whatever the
   /// options say.
   measurement::ViewErrors held_out_error(bool fit_view_scale) const;
-  /// Holds the score of the held-out views and their predictions, scaled by the models of the
-  /// score.
+  /// The score of the held-out views and their predictions, scaled by the models of the score.
   struct HeldOut {
     measurement::ViewErrors errors;
     std::vector<measurement::PredictedView> views;
@@ -203,7 +202,7 @@ class Fit {
   std::vector<measurement::ViewModel> kept_views_;  // empty: the fit finds its own
   int steps_per_epoch_;
 
-  // These belong to one stage or one tree and are made anew for the next. The objective refers to
+  // These belong to one stage or one tree and are made again for the next. The objective refers to
   // the first two, so they must stay where they are when a fit is moved.
   std::unique_ptr<measurement::Measurement> binned_;
   measurement::DataFilters filters_;

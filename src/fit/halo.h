@@ -42,7 +42,7 @@ class Halo {
  public:
   /// Plans the exchange for a process with this share. Densities are covered up to `reach` pixels
   /// at full resolution beyond the rows: half the height of a pixel of the stage covers the centre
-  /// of the next row. The neighbours must have at least so many rows, or be at an end of the
+  /// of the next row. The neighbours must have at least these rows, or be at an end of the
   /// domain. `processes` must outlive the halo.
   Halo(const field::Field& field, const measurement::RowShare& share, double reach,
        const distributed::Communicator& processes);
@@ -58,7 +58,7 @@ class Halo {
   void unpack(std::span<float> parameters) const;
 
  private:
-  // Holds the places of parameters in the whole array, and a buffer for their values.
+  // The places of parameters in the whole array, and a buffer for their values.
   struct Part {
     std::vector<field::ParameterRuns> runs;
     std::vector<float> packed;

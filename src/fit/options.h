@@ -4,8 +4,7 @@
 
 namespace tomofield::fit {
 
-/// Says how finely the leaves of a field resolve the specimen. Lengths are pixels of the binned
-/// view.
+/// The resolution of the leaves of a field. Lengths are pixels of the binned view.
 struct FieldOptions {
   FieldKind kind = FieldKind::kVm;
   int leaf_size = 32;                  ///< side of a leaf, a multiple of 16
@@ -25,7 +24,7 @@ struct FieldOptions {
   double finest_spacing() const { return vertex_spacing / (tree == TreeKind::kAdaptive ? 2 : 1); }
 };
 
-/// Says how a field is fitted: the weights of the loss and the schedule.
+/// The weights of the loss and the schedule of a fit.
 struct FitOptions : objective::ObjectiveOptions {
   int epochs = 30;  ///< at full resolution, with the kind of field that was asked for
   /// Epochs of a stage before the last one, whose plain vertices then become factors; 0: none.

@@ -14,7 +14,7 @@ struct PlanOptions {
   double merge_factor = 1.1;   ///< predicted error of a merged leaf over the sum of the four
 };
 
-/// Holds the changes of a tree and what they are predicted to give.
+/// The changes of a tree, and the errors that they are predicted to leave.
 struct Plan {
   field::QuadtreeEdit edit;
   double predicted_error = 0.0;  ///< sum over the leaves of the region of interest after the edit

@@ -12,7 +12,7 @@ namespace {
 // time that is left.
 constexpr double kVertexCost = 0.4;
 
-// Returns the cost of a step with pixels so many times as wide, in steps at full resolution. A part
+// Returns the cost of a step with pixels `bin` times as wide, in steps at full resolution. A part
 // of it is for samples of rays, the rest for vertices (docs/results/speed.md).
 double cost_of_bin(int bin, double vertex_spacing) {
   // The time of vertices over that of samples, with 61 views and a vertex a pixel.

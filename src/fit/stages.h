@@ -23,7 +23,7 @@ struct Stage {
   bool has_answer = false;  ///< begins with the answer of the learned prior, and is pulled to it
 };
 
-/// Says how long a fit takes with the default options.
+/// The epochs and the learning rate of a fit with the default options.
 struct Schedule {
   int epochs;            ///< of the last stage
   double learning_rate;  ///< FitOptions::learning_rate
@@ -35,16 +35,16 @@ struct Schedule {
   int coarse_epochs_of(int fine) const;
 };
 
-/// Says whether a fit of factors begins with plain vertices by default. A step of plain vertices is
-/// cheaper, and a third of the epochs is enough (docs/results/ablation.md). They are used in
+/// Returns true if a fit of factors begins with plain vertices by default. A step of plain vertices
+/// is cheaper, and a third of the epochs is enough (docs/results/ablation.md). They are used in
 /// uniform trees with the slab engine if they need no more memory than the factors: a leaf has at
 /// most twice as many vertices along its side as the factors have ranks, and a leaf of the margin
 /// at most four times as many. A leaf must also have enough vertices along its side beyond the
 /// rank, so that each vector along z has something to hold.
 bool begins_with_vertices(const FieldOptions& field, const FitOptions& fit);
 
-/// Says whether a fit can end with the learned prior, which works on plain vertices a pixel apart
-/// in the uniform tree of the slab engine.
+/// Returns true if a fit can end with the learned prior, which works on plain vertices a pixel
+/// apart in the uniform tree of the slab engine.
 bool can_have_learned_prior(const FieldOptions& field, const FitOptions& fit);
 
 /// Returns the default schedule of a field. Plain vertices, and factors that begin with them,

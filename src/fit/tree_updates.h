@@ -17,7 +17,7 @@ struct TreeUpdate {
   std::vector<std::int64_t> leaves_by_level;  ///< leaves_by_level() after the update
 };
 
-/// Holds the history of an adaptive tree. It is a part of a fit's progress.
+/// The history of an adaptive tree, which is a part of a fit's progress.
 struct TreeProgress {
   bool is_frozen = false;  ///< the tree changes no more
   std::vector<TreeUpdate> updates;

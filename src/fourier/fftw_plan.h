@@ -8,8 +8,8 @@
 
 namespace tomofield::fourier {
 
-/// Holds a plan of FFTW, which makes and frees one plan at a time. `make` returns the plan. A plan
-/// that FFTW did not measure is the same in every run, so the results have the same bits: give
+/// A plan of FFTW, which makes and frees one plan at a time. `make` returns the plan. A plan that
+/// FFTW did not measure is the same in every run, so the results have the same bits: give
 /// FFTW_ESTIMATE.
 class FftwPlan {
  public:

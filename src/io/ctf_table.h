@@ -13,7 +13,7 @@ namespace tomofield::io {
 /// No file states a defocus beyond ± 1 mm.
 inline constexpr double kLargestDefocus_A = 1e7;
 
-/// Holds the contrast transfer of the views of a series, as a file of another program states it.
+/// The contrast transfer of the views of a series, as a file of another program states it.
 struct CtfTable {
   std::filesystem::path file;
   /// The defocus of each section, or of each row of a table of views, in their order; none: the
@@ -40,7 +40,7 @@ CtfTable read_imod_defocus(const std::filesystem::path& path);
 CtfTable read_relion_ctf(const std::filesystem::path& path);
 CtfTable read_warp_ctf(const std::filesystem::path& path);
 
-/// Holds what the writers below need of a section.
+/// The values of a section that the writers below need.
 struct WrittenCtf {
   double tilt_deg = 0.0;
   Defocus defocus;

@@ -16,8 +16,8 @@ namespace tomofield::io {
 /// copying it would need more stack than there is.
 nlohmann::json parse_json(std::string_view text);
 
-/// Says in a clause what is wrong with a document in which the JSON library found another entry
-/// than it was asked for.
+/// Returns a clause with the fault of a document in which the JSON library found another entry than
+/// it was asked for.
 std::string fault_text(const nlohmann::json::exception& fault);
 
 /// Reads and parses a file as parse_json() does. Throws Error also for a file that is not regular,

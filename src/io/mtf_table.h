@@ -5,7 +5,7 @@
 
 namespace tomofield::io {
 
-/// Holds how much of the signal a detector passes at rising frequencies.
+/// The part of the signal that a detector passes, at rising frequencies.
 struct MtfTable {
   std::vector<double> frequencies;  ///< cycles per pixel of the detector, rising
   std::vector<double> values;       ///< at each frequency; 1: all of the signal

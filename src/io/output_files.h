@@ -8,8 +8,8 @@
 
 namespace tomofield::io {
 
-/// Names a file that the program reads beside those of a series, as that of --config. It counts
-/// as an input of everything that the process writes from then on.
+/// Adds a file that the program reads beside those of a series, as that of --config. It counts as
+/// an input of everything that the process writes from then on.
 void add_input(const std::filesystem::path& file);
 
 /// Throws Error if a result would replace one of the `inputs` or of add_input().

@@ -41,7 +41,7 @@ class OutputSet {
   /// Returns where the contents of a result are until commit(): in its temporary file. For other
   /// files, returns `path`.
   std::filesystem::path location_of(const std::filesystem::path& path) const;
-  /// Says whether a file is in the set.
+  /// Returns true if a file is in the set.
   bool contains(const std::filesystem::path& path) const { return location_of(path) != path; }
 
   /// Gives all files their names. If one cannot get it, gives back the old files where that is

@@ -28,8 +28,8 @@ struct RelionTomograms {
   std::vector<RelionTomogram> tomograms;
 };
 
-/// Tells whether a STAR file lists tomograms; one of a single tilt series lists views. Throws Error
-/// if it is no STAR file.
+/// Returns true if a STAR file lists tomograms; one of a single tilt series lists views. Throws
+/// Error if it is no STAR file.
 bool lists_tomograms(const std::filesystem::path& path);
 
 /// Reads a tomograms.star. Throws Error with the row for what is missing or cannot be.

@@ -24,7 +24,7 @@ class ScratchMemory {
   ScratchMemory(ScratchMemory&& other) noexcept;
   ScratchMemory& operator=(ScratchMemory&&) = delete;
 
-  /// Returns the size of the file of so many bytes: 0 if they are kept in memory.
+  /// Returns the size of the file that holds `bytes` bytes: 0 if they are kept in memory.
   static std::size_t bytes_in_file(std::size_t bytes) { return bytes > kInMemoryBytes ? bytes : 0; }
 
   std::byte* data() const { return data_; }

@@ -7,7 +7,8 @@
 
 namespace tomofield::io {
 
-/// Tells by its first bytes whether a file is a TIFF file. Throws Error if it cannot be read.
+/// Returns true if the first bytes of a file are those of a TIFF file. Throws Error if it cannot be
+/// read.
 bool is_tiff(const std::filesystem::path& path);
 
 /// Opens a TIFF file as a stack, one page a section: grey values of 8, 16 or 32 bits, integers or

@@ -20,7 +20,7 @@ ImageInFile parse_image_name(std::string_view name);
 std::filesystem::path find_listed_file(const std::filesystem::path& name,
                                        const std::filesystem::path& list);
 
-/// Says which images of a view are meant: of all its frames, or of half of them.
+/// The images of a view: those of all its frames, or of half of them.
 enum class Frames { kAll, kEven, kOdd };
 
 /// Returns where the images of all views are. Warp's tables name movies: then it is the aligned

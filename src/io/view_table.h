@@ -25,7 +25,7 @@ struct Defocus {
   double phase_shift_deg = 0.0;
 };
 
-/// Holds what a file states of the microscope; none: it is not in the file.
+/// The microscope as a file states it; none: it is not in the file.
 struct StatedOptics {
   std::optional<double> voltage_kV, spherical_aberration_mm, amplitude_contrast;
 };
@@ -62,10 +62,10 @@ struct ViewTable {
   std::optional<int> defocus_hand{};
 };
 
-/// Says whether every view of a table that is used has a defocus.
+/// Returns true if every view of a table that is used has a defocus.
 bool has_defocus(const ViewTable& table);
 
-/// Tells by the end of its name whether a file is a table of views: .star, .tomostar, or .xml.
+/// Returns true if a name ends like that of a table of views: .star, .tomostar, or .xml.
 bool is_view_table(const std::filesystem::path& path);
 
 /// Reads a tilt-series STAR file of RELION 5, a .tomostar or an XML file of Warp. Throws Error with

@@ -33,7 +33,7 @@ struct Case {
   LaneTaps taps() const { return {lower.data(), fraction.data()}; }
 };
 
-// For one column, the reference's interpolation of rows of one float does the same.
+// For one column, the reference is the interpolation of rows of one float.
 TEST(ColumnInterpolation, AgreesWithTheReference) {
   testing::for_each_simd_target([] {
     Case c;

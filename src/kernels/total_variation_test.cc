@@ -46,7 +46,7 @@ class Slabs {
     }
   }
 
-  // Computes ranges of so many samples along x by themselves.
+  // Length of the ranges along x, in samples, that are computed by themselves.
   int range = 1 << 20;
 
   // Computes the slabs from `first` on. The flux of the row before comes from the last run or from

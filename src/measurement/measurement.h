@@ -29,8 +29,8 @@ struct Measurement {
   geometry::TiltGeometry geometry;
   Rectangle roi;
   std::shared_ptr<const SlabViews> rays = nullptr;  ///< divided by the unit; null in a plan
-  /// The rays are means over so many pixels on each axis, like those of binned(), and serve its
-  /// multiples alone. All else is in the pixels of the views.
+  /// The number of pixels on each axis over which rays are means, like those of binned(). They
+  /// serve its multiples alone. All else is in the pixels of the views.
   int rays_bin = 1;
   std::vector<double> noise_sigma = {};  ///< [view]
   double mean_density = 0.0;
@@ -79,7 +79,7 @@ struct Measurement {
 Measurement binned(const Measurement& fine, int bin);
 
 /// Returns the measurement of these views alone (ascending), on some rows of the region of
-/// interest, counted from its first one, on every process. Views are counted anew, from 0; of the
+/// interest, counted from its first one, on every process. Views are counted again from 0; of the
 /// views held out, those that are left stay held out. Undecided beads stay undecided. It must be of
 /// resampled views, whose rays stay in their row.
 Measurement some_rows(

@@ -18,8 +18,8 @@
 
 namespace tomofield::measurement {
 
-/// Holds what the user says about the specimen. Lengths and positions are pixels of the aligned
-/// view before binning.
+/// The specimen as the user describes it. Lengths and positions are pixels of the aligned view
+/// before binning.
 struct SpecimenOptions {
   double thickness = 0;          ///< of the volume along Z
   std::optional<Rectangle> roi;  ///< default: the whole field of view
@@ -69,7 +69,7 @@ tilt_series::MaskedImage read_aligned(const tilt_series::TiltSeries& recorded, s
 Measurement plan_realigned(const tilt_series::TiltSeries& recorded, const SpecimenOptions& specimen,
                            const distributed::Communicator& processes);
 
-/// Reads the rays of such a measurement, or reads them anew, each view with a correction of its
+/// Reads the rays of such a measurement, or reads them again, each view with a correction of its
 /// alignment. The density unit stays, and so do the stored pixels of the views. With
 /// `bin` above 1, the rays are nearly the means over squares of bin × bin pixels
 /// (Measurement::rays_bin): that is much less work, and all that binned() with this bin needs.

@@ -13,10 +13,10 @@
 
 namespace tomofield::measurement {
 
-/// Says how views become rays.
+/// The shape, the pixels and the unit of the rays that are read from views.
 struct RaySpec {
   SlabViews::Shape shape;      ///< of the views
-  int bin = 1;                 ///< the views are read in pixels so many times as wide
+  int bin = 1;                 ///< the views are read in pixels wider by this factor
   double unit = 1.0;           ///< the rays are divided by it, and by `bin`, as they count pixels
   std::int64_t band_rows = 0;  ///< of the bands that processes share (row_share.h)
   const std::filesystem::path& scratch_dir;

@@ -7,7 +7,7 @@
 
 namespace tomofield::measurement {
 
-/// Says which rows of a fit a process works on.
+/// The rows of a fit that a process works on.
 ///
 /// A process owns the leaves of whole bands (rows of root cells) and the slabs of these rows. Where
 /// whole bands would give some processes much more work than others, a process also works on the

@@ -19,7 +19,7 @@ namespace {
 // Bytes of a line: the pixels of a slab's rows with one x.
 constexpr std::size_t kRayBytes = kLanes * sizeof(float), kMaskBytes = sizeof(std::uint16_t);
 
-// Views are read so many at a time, as long as their buffers take no more than this memory.
+// Number of views that are read at a time, if their buffers take no more than this memory.
 constexpr std::size_t kMaxBuffers = 64, kBufferBytes = std::size_t{1} << 30;
 
 std::size_t buffer_bytes(const SlabViews::Shape& shape) {

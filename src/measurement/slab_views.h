@@ -46,8 +46,8 @@ class SlabViews {
     std::int64_t width = 0, height = 0;        ///< of a view
     std::int64_t first_row = 0, num_rows = 0;  ///< rows of the view that slabs cover
   };
-  /// Returns the memory that views take while so many slabs are in use. Of a series in a scratch
-  /// file, only what has not been released takes memory.
+  /// Returns the memory that views take while `slabs_in_use` slabs are in use. Of a series in a
+  /// scratch file, only what has not been released takes memory.
   static std::size_t resident_memory(const Shape& shape, int slabs_in_use);
   /// Returns the memory of the buffers into which views are read.
   static std::size_t filling_memory(const Shape& shape);
@@ -69,7 +69,7 @@ class SlabViews {
     int num_next = 0;
     Slabs all() const { return {own.begin, own.end + num_next}; }
   };
-  /// Holds some of the slabs; others must not be asked for.
+  /// Keeps some of the slabs; others must not be asked for.
   SlabViews(const Shape& shape, const Holding& holding, double unit, const ReadViews& read_views,
             const std::filesystem::path& scratch_dir,
             std::size_t in_memory_bytes = io::ScratchMemory::kInMemoryBytes);
@@ -85,7 +85,7 @@ class SlabViews {
   std::unique_ptr<SlabViews> rows(
       base::Range rows, std::span<const int> views,
       const distributed::Communicator& processes = distributed::Communicator::alone()) const;
-  /// Returns zeros in the place of so many views, none of which counts, in the same slabs.
+  /// Returns zeros in the place of `num_views` views, none of which counts, in the same slabs.
   std::unique_ptr<SlabViews> blank(std::size_t num_views) const;
   /// Returns the shape of binned views.
   static Shape binned_shape(const Shape& shape, int bin);
@@ -97,7 +97,7 @@ class SlabViews {
   const std::uint16_t* mask(int slab, int view) const;  ///< [x], bit = lane
   /// Removes a slab in a scratch file from the process's memory until it is used again.
   void release(int slab) const;
-  /// Tells whether the ray of a pixel counts; y is counted from the first row.
+  /// Returns true if the ray of a pixel counts; y is counted from the first row.
   bool counts(int view, std::int64_t x, std::int64_t y) const {
     return mask(static_cast<int>(y / kRows), view)[x] >> (y % kRows) & 1;
   }

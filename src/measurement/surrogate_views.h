@@ -31,7 +31,7 @@ void filter_predictions(std::span<const microscope::ViewFilter> filters, std::sp
 /// `largest_residual` limits the squares of residuals by the model (ViewSums::limited_squares).
 ViewSums sums_of(const PredictedView& view, const ViewModel& model);
 
-/// Holds what stands between the projections of the views and their data term.
+/// The filters between the projections of the views and their data term.
 struct DataFilters {
   std::vector<microscope::ViewFilter> transfers;  ///< [view]: H; empty: views are projections
   std::optional<NoiseColour> noise;               ///< W; none: the noise is white

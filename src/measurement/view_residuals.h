@@ -67,7 +67,7 @@ void fit_nuisances(const NuisancePrior& prior, const std::vector<ViewSums>& sums
 /// scale of `model`; 0 without rays.
 double mean_offset(const ViewSums& sums, const ViewModel& model);
 
-/// Says how well a field predicts views.
+/// The errors with which a field predicts views.
 struct ViewErrors {
   std::vector<int> views;
   std::vector<ViewModel> models;   ///< [i]: the model that views[i] was scored with

@@ -8,15 +8,15 @@
 
 namespace tomofield::measurement {
 
-/// Says whether a file has the contrast transfer of the views; --ctf none names no file.
+/// Returns true if a file has the contrast transfer of the views; --ctf none names no file.
 inline bool has_ctf_file(const SeriesFiles& files) { return files.ctf && *files.ctf != "none"; }
 
-/// Says whether the contrast transfer of the views is known.
+/// Returns true if the contrast transfer of the views is known.
 inline bool has_ctf(const SeriesFiles& files, const Options& options) {
   return has_ctf_file(files) || options.defocus_um;
 }
 
-/// Says whether the options ask for transfers of the views.
+/// Returns true if the options ask for transfers of the views.
 inline bool wants_transfers(const SeriesFiles& files, const Options& options) {
   return has_ctf(files, options) || options.dose_per_tilt.value_or(0.0) > 0.0 || files.mtf;
 }

@@ -5,7 +5,7 @@
 
 namespace tomofield::microscope {
 
-/// Holds what all views of a series have in common.
+/// The microscope, which all views of a series have in common.
 struct Optics {
   double voltage_kV = 300.0;
   double spherical_aberration_mm = 2.7;

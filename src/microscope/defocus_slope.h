@@ -13,8 +13,8 @@ struct DefocusSlope {
   double at(double x_px, double y_px) const { return at_centre_A + x_A * x_px + y_A * y_px; }
 };
 
-/// Tells which side of a tilted view is farther from focus. The geometry of tomofield says that it
-/// is the right side at a positive tilt, as IMOD has it; data of the other hand have the left one.
+/// The side of a tilted view that is farther from focus. The geometry of tomofield says that it is
+/// the right side at a positive tilt, as IMOD has it; data of the other hand have the left one.
 enum class DefocusHand { kRight = 1, kLeft = -1 };
 
 /// Returns the slope of a view that shows the plane Z = 0 of the specimen. The defocus of the view

@@ -4,7 +4,7 @@
 
 namespace tomofield::microscope {
 
-/// Holds the modulation transfer function (MTF) of a detector: how much of the signal it passes.
+/// The modulation transfer function (MTF) of a detector: the part of the signal that it passes.
 struct Detector {
   io::MtfTable mtf;
   double pixel_size_A = 1.0;  ///< of a pixel of the detector, on the specimen

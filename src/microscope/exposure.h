@@ -20,7 +20,7 @@ double critical_exposure(double k, double voltage_kV);
 /// exp(−exposure / (2 critical exposure)). All of it is left at frequency 0.
 double signal_after(double exposure, double k, double voltage_kV);
 
-/// Holds what a view received, in electrons per Å².
+/// The electrons per Å² that came before a view and that the view received.
 struct Exposure {
   double before = 0.0;   ///< by the specimen, when the view began
   double of_view = 0.0;  ///< by the view itself

@@ -5,8 +5,8 @@
 
 namespace tomofield::microscope {
 
-/// Holds a smooth function on an interval as values at equal distances, which is much faster than
-/// the function itself where it is needed for every pixel.
+/// A smooth function on an interval as values at equal distances, which is much faster than the
+/// function itself where it is needed for every pixel.
 class InterpolatedTable {
  public:
   /// Takes the values of `function` at `num_steps` + 1 places from 0 to `end`.

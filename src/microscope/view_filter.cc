@@ -26,7 +26,7 @@ std::pair<double, double> range_of(const DefocusSlope& slope, std::int64_t width
   return {slope.at_centre_A - half_A, slope.at_centre_A + half_A};
 }
 
-// The largest transfer is looked for in steps of so many cycles a pixel.
+// Step of the search for the largest transfer, in cycles a pixel.
 constexpr double kStepOfBound = 1.0 / 512;
 
 constexpr float kWienerConstant = 0.1f;

@@ -18,8 +18,8 @@ namespace tomofield::microscope {
 /// Returns how far the transfer moves what is in an image of this size, in pixels.
 std::int64_t reach_px(const ViewTransfer& view, std::int64_t width, std::int64_t height);
 
-/// Names what takes the contrast transfer of a view back, at each place by the transfer H of its
-/// defocus: the sign of H (phase flipping), H itself, or Wiener's filter H / (H² + 0.1).
+/// The filter that takes the contrast transfer of a view back, at each place by the transfer H of
+/// its defocus: the sign of H (phase flipping), H itself, or Wiener's filter H / (H² + 0.1).
 enum class CtfCorrection { kFlip, kMultiply, kWiener };
 
 /// Applies the transfer H of a view to images [y, x], and its transpose. H is −CTF times what
@@ -52,7 +52,7 @@ class ViewFilter {
   /// Returns the number of defoci, one for each hat function.
   std::int64_t num_defoci() const { return num_defoci_; }
 
-  /// Says whether H leaves at least half of the mean of an image.
+  /// Returns true if H leaves at least half of the mean of an image.
   bool passes_mean() const;
 
   /// Returns a bound of |H_s| at frequencies from one to another, in cycles a pixel, up to 1 / √2.

@@ -25,9 +25,9 @@ struct SliceShape {
   std::size_t size() const { return plane() * slices; }
 };
 
-/// Holds the spectra of a stack of slices [slice, v, u], with frequencies in the order 0, 1 … −1.
-/// It multiplies each slice by a Hann window and applies the unitary Fourier transform in x and y.
-/// Without a window, the step from one edge to the opposite one would make a streak on the axes.
+/// The spectra of a stack of slices [slice, v, u], with frequencies in the order 0, 1 … −1. Each
+/// slice is multiplied by a Hann window and transformed by the unitary Fourier transform in x and
+/// y. Without a window, the step from one edge to the opposite one would make a streak on the axes.
 /// The window keeps the variance of white noise, so amplitudes do not depend on the shape.
 class SliceSpectra {
  public:

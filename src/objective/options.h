@@ -6,8 +6,8 @@
 
 namespace tomofield::objective {
 
-/// Holds the weights of the loss (eq. 9), whose data term is ½ Σ (residual / σ)². The other terms
-/// use weight / σ, where σ is the typical noise of a ray in density units times pixels, so that the
+/// The weights of the loss (eq. 9), whose data term is ½ Σ (residual / σ)². The other terms use
+/// weight / σ, where σ is the typical noise of a ray in density units times pixels, so that the
 /// same weights serve every size and every series. A small σ gives the density's variation a larger
 /// weight (noise_scale.h).
 struct ObjectiveOptions {

@@ -14,8 +14,8 @@
 
 namespace tomofield::objective {
 
-/// Says which rays and densities count. Rays must meet the region of interest. Densities outside
-/// the support are 0.
+/// The rays and densities that count. Rays must meet the region of interest. Densities outside the
+/// support are 0.
 struct RayRegion {
   Rectangle roi;
   geometry::Extent2 support;

@@ -122,8 +122,8 @@ double SlabObjective::add_gradient(const Step& step, float* gradient,
   return grad_bias + sums.field.grad_bias;
 }
 
-// Threads meet but twice in a step, after the bands and after the leaves: on a machine with other
-// work, each meeting waits for the thread that is held up most.
+// Threads wait for each other only twice in a step, after the bands and after the leaves: on a
+// machine with other work, each wait lasts until the slowest thread is done.
 SlabObjective::Sums SlabObjective::add(const Step& step, float* gradient,
                                        std::span<measurement::ViewSums> view_sums,
                                        const LeafDone& leaf_done) const {

@@ -14,7 +14,7 @@
 
 namespace tomofield::objective {
 
-/// Holds the field, the views and the options of a slab objective.
+/// The field, the views and the options of a slab objective.
 struct SlabObjectiveContext {
   const field::Field& field;
   const projection::SlabProjector& projector;  ///< of the stage's pixels
@@ -56,13 +56,13 @@ class SlabObjective : public Objective {
 
   const projection::SlabSampler& sampler() const { return sampler_; }
 
-  /// Holds the sums of a pass over a pair of slabs.
+  /// The sums of a pass over a pair of slabs.
   struct PairSums {
     std::vector<measurement::ViewSums> views;  ///< one for each view of the step
     std::vector<TermValue> terms;              ///< Term::add_slabs() of each term; values alone
     double grad_bias = 0.0;                    ///< dL/d bias through the samples
   };
-  /// Holds the sums of all slabs and of all leaves.
+  /// The sums of all slabs and of all leaves.
   struct Sums {
     std::vector<PairSums> pairs;                ///< in the order of the slabs
     std::vector<std::vector<TermValue>> bands;  ///< of the leaves, for each term [band][term]

@@ -70,7 +70,7 @@ class Term {
  public:
   virtual ~Term() = default;
 
-  /// Holds what a term keeps for add_slabs() from one batch of a band to the next.
+  /// What a term keeps for add_slabs() from one batch of a band to the next.
   struct Scratch {
     virtual ~Scratch() = default;
     /// Returns what the next batch of the band depends on. Another process may go on from a copy.
@@ -81,8 +81,8 @@ class Term {
     return std::make_unique<Scratch>();
   }
 
-  /// Says whether add_slabs() replaces the batch's gradient, which then need not be cleared. Only
-  /// the first term may do so.
+  /// Returns true if add_slabs() replaces the batch's gradient, which then need not be cleared.
+  /// Only the first term may do so.
   virtual bool replaces_gradient() const { return false; }
   /// Adds the term of a batch of slabs: its gradient by the samples to batch.gradient(), sums of
   /// residuals to `view_sums` (one each of step.views). Returns its value. The batches of a band
@@ -119,8 +119,7 @@ class Term {
   }
 };
 
-/// Holds what terms are made from: a field on one tree, and the views at the resolution of one
-/// stage.
+/// What terms are made from: a field on one tree, and the views at the resolution of one stage.
 struct TermContext {
   const field::Field& field;
   const projection::SlabSampler& sampler;

@@ -38,8 +38,8 @@ kernels::DensityRow row_above(const SlabBatch& batch, int slab, const float* dec
   return first_row(batch, slab + 1, segment);
 }
 
-// A task has so many samples along x. Each one computes the flux along x into its first sample
-// anew, which is a sample more.
+// Samples of a task along x. Each task also computes the flux along x into its first sample, which
+// is a sample more.
 constexpr int kTaskWidth = 64;
 
 }  // namespace

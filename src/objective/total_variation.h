@@ -9,7 +9,7 @@
 
 namespace tomofield::objective {
 
-/// Says to which side the differences of a step go, along x and along z.
+/// The side to which the differences of a step go, along x and along z.
 struct DifferenceSides {
   bool backward_x = false, backward_z = false;
 };

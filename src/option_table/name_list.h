@@ -10,7 +10,7 @@ namespace tomofield::option_table {
 /// ones.
 std::vector<std::string> split_names(std::string_view list);
 
-/// Tells whether a name is among others, in upper or lower case.
+/// Returns true if a name is among others, in upper or lower case.
 bool has_name(const std::vector<std::string>& names, std::string_view name);
 
 }  // namespace tomofield::option_table

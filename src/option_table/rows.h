@@ -13,8 +13,8 @@
 
 namespace tomofield::option_table {
 
-/// Says which values a number may take. NaN and infinity are in no range but kAny, and numbers
-/// beyond base::kLargestNumber are in none that has no upper limit of its own.
+/// The values that a number may take. NaN and infinity are in no range but kAny, and numbers beyond
+/// base::kLargestNumber are in none that has no upper limit of its own.
 struct Range {
   enum class Kind { kAny, kBetween, kZeroOrBetween, kAbove, kAtLeast, kMultiple, kEither };
   Kind kind = Kind::kAny;

@@ -11,7 +11,7 @@
 
 namespace tomofield::option_table {
 
-/// Holds the values of all options.
+/// The values of all options.
 struct Choices {
   SeriesFiles files;
   Options options;

@@ -9,7 +9,7 @@
 
 namespace tomofield::output {
 
-/// Names the files of an alignment.
+/// The paths of the files of an alignment.
 struct AlignmentFiles {
   std::filesystem::path xf, tlt, xtilt, aln;
 

@@ -16,8 +16,7 @@ struct PartSize {
   int x = 128, z = 128, y = 64;
 };
 
-/// The answer in some rows of a lattice depends on the densities in at most so many rows before and
-/// after them.
+/// Number of rows before and after some rows of a lattice whose densities their answer depends on.
 inline constexpr int kRowsBeyond = Network::kReach + Network::kSideUnit;
 
 /// Returns the mean density of a lattice whose rows are divided among processes: `own` are those of

@@ -29,7 +29,7 @@ class Network {
  public:
   /// Channels of the input: the densities of the fit, and those of a fit with less smoothing.
   static constexpr int kInputs = 2;
-  /// An output depends on inputs at most so many vertices away along each axis.
+  /// Distance in vertices, along each axis, of the farthest inputs that an output depends on.
   static constexpr int kReach = 24;
   /// The sides of a box are multiples of this.
   static constexpr int kSideUnit = 4;

@@ -20,8 +20,8 @@ using kernels::SlabGroup;
 constexpr int kGroupsAtOnce = 2;  // groups of views
 constexpr int kSamplesAtOnce = 32;
 
-// A task has so many pixels or samples along x. The rays of the pixels of some views, or the
-// samples of a block of lines, then fit in L2.
+// Pixels or samples of a task along x. The rays of the pixels of some views, or the samples of a
+// block of lines, then fit in L2.
 constexpr int kTaskWidth = 64;
 
 // Repeats the last sample of cut sides in the padding, so that the field is constant up to the

@@ -45,7 +45,7 @@ struct PartialPixel {
   float low_weight = 0, high_weight = 0;
 };
 
-/// Holds what a list of views sees of some consecutive lines of a family.
+/// What a list of views sees of some consecutive lines of a family.
 struct LineBlock {
   static constexpr int kMaxLines = 8;
   struct View {
@@ -61,8 +61,8 @@ struct LineBlock {
   std::vector<PartialPixel> parts;  ///< by lines, then by views
 };
 
-/// Holds where the rays of a list of views cross the samples of a slab. It is the same for all
-/// slabs of a grid, so it is made once for all of them.
+/// The places where the rays of a list of views cross the samples of a slab. They are the same for
+/// all slabs of a grid, so they are made once for all of them.
 class ViewCrossings {
  public:
   /// The lines of one kind of one segment.

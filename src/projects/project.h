@@ -11,7 +11,7 @@
 
 namespace tomofield::projects {
 
-/// Names a file or folder of another program, and says how the user wants it to be read.
+/// A file or folder of another program, and the wishes of the user for reading it.
 struct Request {
   std::filesystem::path path = {};
   std::vector<std::string> ignored = {};  ///< names of entries that are not applied (--ignore)
@@ -19,7 +19,7 @@ struct Request {
   bool has_mdoc = false;  ///< the user gave --mdoc, so a folder may be that of its images
 };
 
-/// Holds what the files of another program say, as settings of this one.
+/// The files of another program as settings of this one, each with its origin.
 class Project {
  public:
   explicit Project(const Request& request) : request_(request) {}
@@ -32,10 +32,9 @@ class Project {
   /// Notes a file that was read. Results must not replace it.
   void add_file(const std::filesystem::path& file) { files_.push_back(file); }
 
-  /// Tells whether the user wants an entry of a file not to be applied, by its name in upper or
-  /// lower case. A format asks for every
-  /// entry that it knows, once it has found it in the file: an --ignore that nothing has asked for
-  /// is refused.
+  /// Returns true if the user wants an entry of a file not to be applied, by its name in upper or
+  /// lower case. A format asks for every entry that it knows, once it has found it in the file: an
+  /// --ignore that nothing has asked for is refused.
   bool ignores(std::string_view entry);
 
   /// Sets an option, unless the user wants its entry not to be applied. A flag is set by "true".
@@ -43,7 +42,7 @@ class Project {
   void set(std::string_view option, std::string value, const std::filesystem::path& file,
            std::string_view entry, std::string row = {});
 
-  /// Says something that the result does not show by itself.
+  /// Adds a warning about something that the result does not show by itself.
   void warn(std::string message) { warnings_.push_back(std::move(message)); }
 
   /// Throws Error if the user named an entry to ignore that no file has.
@@ -61,7 +60,7 @@ class Project {
 struct Format {
   std::string_view name;       ///< for messages: "AreTomo's alignment"
   std::string_view extension;  ///< of its main file, in lower case: ".aln"
-  /// Tells by its name whether a file of a folder is the main file of a project.
+  /// Returns true if a file of a folder is, by its name, the main file of a project.
   bool (*is_main_file)(std::string_view name);
   /// Reads the main file `project.request().path` and what lies beside it, and sets options. Throws
   /// Error if they cannot be honoured.

@@ -154,7 +154,7 @@ json make_record(const ReconstructOptions& options, const ReconstructHooks& hook
       series.views().size() - found.unaligned.size() < kFewestViewsToAlign)
     return alignment_record(series, found, running.seconds());
 
-  // Views at wrong places mislead the search for the tilt axis, so the others are aligned anew.
+  // Views at wrong places mislead the search for the tilt axis, so the others are aligned again.
   for (const int view : found.unaligned)
     recorded.left_out.push_back(series.views()[static_cast<std::size_t>(view)].section);
   std::ranges::sort(recorded.left_out);

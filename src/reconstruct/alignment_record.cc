@@ -244,7 +244,7 @@ void require_sound_view(const json& view, const json& record) {
   if (!flag_at(part(record, "local"), "accepted")) throw Error("'local' was not accepted");
 }
 
-// Refuses a record that no alignment of so many sections could have written.
+// Refuses a record that no alignment of `num_sections` sections could have written.
 void require_sound(const json& record, std::int64_t num_sections) {
   for (const char* flag : {"accepted", "rotation", "magnification", "tilt"}) flag_at(record, flag);
   require_comparison(record);

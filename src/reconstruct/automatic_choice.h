@@ -4,7 +4,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Says which settings a run leaves to trials.
+/// The settings that a run leaves to trials.
 struct OpenSettings {
   bool variation = false;   ///< penalty and weight of total variation
   bool spikes = false;      ///< the limit of isolated vertices
@@ -12,7 +12,7 @@ struct OpenSettings {
   bool background = false;  ///< subtraction of the series' background
   bool beads = false;       ///< masks of the beads that were found
   bool prior = false;       ///< the learned prior, once the others are chosen
-  /// Says whether there is one but for the prior, which has trials of its own.
+  /// Returns true if there is one but for the prior, which has trials of its own.
   bool any() const { return variation || spikes || view_scale || background || beads; }
   bool operator==(const OpenSettings&) const = default;
 };

@@ -7,10 +7,10 @@
 
 namespace tomofield::reconstruction {
 
-/// Tells in which direction the tilt axis of some views seems to lie. Sums of a view across the
-/// tilt axis are the same in every view, because a tilt moves matter across the axis alone: the
-/// profile along the axis is common to all views (the common line of their Fourier transforms).
-/// Profiles along other directions differ.
+/// The direction in which the tilt axis of some views seems to lie. Sums of a view across the tilt
+/// axis are the same in every view, because a tilt moves matter across the axis alone: the profile
+/// along the axis is common to all views (the common line of their Fourier transforms). Profiles
+/// along other directions differ.
 struct AxisCheck {
   /// Direction along which profiles agree most, in degrees counter-clockwise from the y axis, from
   /// −90 to 90. It is 0 for an axis that is vertical in the views.

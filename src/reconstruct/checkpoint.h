@@ -26,7 +26,7 @@ std::string fingerprint_of(const ReconstructOptions& options,
 std::vector<std::int64_t> as_numbers(const std::string& text);
 std::string as_text(const std::vector<std::int64_t>& numbers);
 
-/// Says what a fit was made from.
+/// What a fit was made from.
 struct FitOrigin {
   std::string fingerprint;        ///< fingerprint_of() its series and options
   std::optional<TunedFit> tuned;  ///< the trials that chose some of its options

@@ -22,7 +22,7 @@ constexpr double kStep = 0.01, kSlopeStep = 0.5;
 
 // A field is weaker than the specimen at some frequencies, by its priors and its vertices. A
 // residual therefore holds a part of the prediction, which is a smooth function of the frequency: a
-// polynomial in k² with so many terms stands for it.
+// polynomial in k² with kGains terms stands for it.
 constexpr int kGains = 4;
 constexpr int kDefocus = kGains, kSlope = kGains + 1, kColumns = kGains + 2;
 

@@ -8,9 +8,9 @@
 
 namespace tomofield::reconstruction {
 
-/// Tells whether the views have another defocus than the one that they were fitted with. Where it
-/// is wrong, the residual of a view has rings in its spectrum: it resembles the change of the
-/// filtered prediction with the defocus.
+/// The signs that views have another defocus than the one that they were fitted with. Where it is
+/// wrong, the residual of a view has rings in its spectrum: it resembles the change of the filtered
+/// prediction with the defocus.
 struct DefocusCheck {
   /// True defocus over the given one, less 1: the median of the views, and its standard error by
   /// their scatter.
@@ -18,7 +18,7 @@ struct DefocusCheck {
   /// Part of the residuals' squares that such a change explains, in the median view.
   double rings = 0.0;
 
-  /// Holds what the residuals say of the change of the defocus across tilted views.
+  /// The change of the defocus across tilted views, as the residuals show it.
   struct Slope {
     double error = 0.0, standard_error = 0.0;
   };

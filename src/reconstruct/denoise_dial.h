@@ -25,7 +25,7 @@ struct DialTrial {
 /// three different trials. `tuned` must outlive the result.
 std::vector<DialTrial> dial_trials(const TunedFit& tuned);
 
-/// Says which factor of --denoise a trial shows, and how that compares with the factor of its
+/// Returns the factor of --denoise that a trial shows, and how that compares with the factor of its
 /// place: "Factor 0.33: lighter than light (0.5)".
 std::string caption_of(const DialTrial& shown);
 

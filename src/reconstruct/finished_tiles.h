@@ -11,19 +11,19 @@
 
 namespace tomofield::reconstruction {
 
-/// Holds the codes of the own rows of a tile.
+/// The codes of the own rows of a tile.
 struct TileCodes {
   compact::CodedField coded;
   compact::CompressionReport report;
   double seconds = 0.0;  ///< of the compression
 };
 
-/// Removes the tiles that an earlier run left: a run that starts anew replaces them, and a resumed
+/// Removes the tiles that an earlier run left: a run from the start replaces them, and a resumed
 /// one must not take them for its own.
 void forget_old_tiles(const Run& run);
 
-/// Holds the codes of the tiles that a run has finished, from the first row of the region on. They
-/// are kept in a file, from which a run resumes.
+/// The codes of the tiles that a run has finished, from the first row of the region on. They are
+/// kept in a file, from which a run resumes.
 class FinishedTiles {
  public:
   /// Reads what an earlier run has finished, if the run resumes. Throws Error if the file is of

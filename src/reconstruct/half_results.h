@@ -10,7 +10,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Holds what the fits of all data and of both halves found.
+/// The fits of all data and of both halves after their last step.
 struct FinishedFits {
   Findings whole;
   std::optional<measurement::PredictedView> held_out_view;  ///< as the fit of all data predicts it

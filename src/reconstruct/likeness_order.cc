@@ -14,7 +14,7 @@ namespace {
 using evaluate::Image;
 
 // Fewer views are too far apart to tell an order: with 8 of them, those of correct series are no
-// more alike than those of some shuffled ones (docs/verdict.md).
+// more alike than those of some shuffled ones.
 constexpr int kFewestOrderedViews = 12;
 // Pixels by which the small images may be moved where they are compared, so that a stack that is
 // not aligned has its order all the same.

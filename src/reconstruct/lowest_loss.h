@@ -11,7 +11,7 @@ struct LossAt {
   double standard_error = 0;  ///< of `loss`
 };
 
-/// Says which curvature losses usually have: they grow by `loss_a_step` one step away from the
+/// The curvature that losses usually have: they grow by `loss_a_step` one step away from the
 /// lowest, and `deviation` says how far that varies from one series to another.
 struct UsualCurvature {
   double loss_a_step = 0;

@@ -25,7 +25,7 @@ namespace tomofield::reconstruction {
 /// out of range stay as they are; check_options() names them.
 Options resolve(const SeriesFiles& files, const Options& requested);
 
-/// Names the files of a reconstruction after its volume.
+/// The paths of the files of a reconstruction, which have the name of its volume.
 struct OutputPaths {
   std::filesystem::path volume, model, json;
   std::filesystem::path report;            ///< a page to look at (HTML)
@@ -49,12 +49,12 @@ struct OutputPaths {
 /// Returns the paths of the files beside `volume`.
 OutputPaths output_paths(const std::filesystem::path& volume);
 
-/// Holds everything that a reconstruction is made from. run_options() makes it.
+/// Everything that a reconstruction is made from. run_options() makes it.
 struct ReconstructOptions {
   SeriesFiles files;
   Options requested;  ///< as they were given
   Options resolved;   ///< the options that are used
-  /// Names the settings that trials choose. The trials start from those in `resolved`.
+  /// The settings that trials choose. The trials start from those in `resolved`.
   OpenSettings open;
   // The same options in the types of the layers below, with the constants of the method.
   tilt_series::TiltSeriesOptions input;
@@ -68,15 +68,15 @@ struct ReconstructOptions {
   nlohmann::json alignment = {};
   base::Stopwatch since_start = {};  ///< runs from run_options() on, before an alignment
 
-  /// Says whether the run also makes two fits of one half of the data each.
+  /// Returns true if the run also makes two fits of one half of the data each.
   bool makes_halves() const { return (files.even && files.odd) || resolved.split_tilts; }
-  /// Says whether the run may be fitted by tiles, whose codes it keeps in a file.
+  /// Returns true if the run may be fitted by tiles, whose codes it keeps in a file.
   bool may_use_tiles() const { return !resolved.budget.empty() && resolved.tile_rows != 0; }
   /// Returns the options of the longest fit: that with the learned prior if it is left to a trial.
   ReconstructOptions with_open_prior() const;
-  /// Says whether trials choose the weight of total variation, which --denoise multiplies.
+  /// Returns true if trials choose the weight of total variation, which --denoise multiplies.
   bool chooses_weight() const { return resolved.tune || open.variation; }
-  /// Says whether the fit filters views, which mixes their rows.
+  /// Returns true if the fit filters views, which mixes their rows.
   bool filters_views() const {
     return measurement::wants_transfers(files, resolved) ||
            fit.noise_model == NoiseModel::kColoured;

@@ -19,7 +19,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Holds the callbacks of a run.
+/// The callbacks of a run.
 struct ReconstructHooks {
   base::ProgressSink progress;       ///< receives the progress of the fit
   base::ProgressSink tune_progress;  ///< receives the progress of the trials before the fit
@@ -29,14 +29,14 @@ struct ReconstructHooks {
   WriteMore write_more = {};
 };
 
-/// Says how a run ended. A run that writes files can be resumed after a stop.
+/// The end of a run. A run that writes files can be resumed after a stop.
 enum class Outcome {
   kFinished,
   kStopped,        ///< during the fit; the checkpoint is saved
   kStoppedTuning,  ///< during the trials; those of --tune that are finished are stored
 };
 
-/// Holds the results of a run.
+/// The results of a run.
 struct RunResult {
   Outcome outcome = Outcome::kFinished;
   std::optional<Results> results = {};    ///< of a finished run
@@ -65,7 +65,7 @@ std::optional<nlohmann::json> choose_settings_alone(
     const ReconstructHooks& hooks,
     const distributed::Communicator& processes = distributed::Communicator::alone());
 
-/// Says what a run will do. Lengths are pixels of the binned views.
+/// The plan of a run. Lengths are pixels of the binned views.
 struct RunPlan {
   int num_views = 0;
   std::int64_t view_width = 0, view_height = 0;

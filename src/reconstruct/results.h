@@ -21,7 +21,7 @@ namespace tomofield::reconstruction {
 output::ModelInfo model_info(const measurement::Measurement& series,
                              const ReconstructOptions& options);
 
-/// Says what a finished fit tells of itself.
+/// What a finished fit tells of itself.
 struct Findings {
   nlohmann::json metrics;
   Verdict verdict;
@@ -32,7 +32,7 @@ struct Findings {
 Findings examine(const fit::Fit& fit, const measurement::Measurement& series,
                  const ReconstructOptions& options, const RunRecord& record);
 
-/// Holds the results of a run.
+/// The results of a run.
 struct Results {
   /// The model; each process has the parameters of its own leaves. A run with halves has none: its
   /// models are in files.
@@ -52,7 +52,7 @@ std::optional<measurement::PredictedView> central_held_out_view(
 /// Returns the content of the JSON file of a run.
 nlohmann::json run_json(const ReconstructOptions& options, nlohmann::json metrics);
 
-/// Holds what the files of a run are written from, beside its results.
+/// What the files of a run are written from, beside its results.
 struct ResultFiles {
   const ReconstructOptions& options;
   const FitOrigin& origin;

@@ -8,8 +8,8 @@
 
 namespace tomofield::reconstruction {
 
-/// Tells whether the rings in the power spectra of views (Thon rings) are those of the given
-/// defocus. No field takes part in it, so that it sees errors that a field cannot be fitted with.
+/// The agreement of the rings in the power spectra of views (Thon rings) with the given defocus. No
+/// field takes part in it, so that it sees errors that a field cannot be fitted with.
 struct RingCheck {
   /// True defocus over the given one: that with which spectra and transfers agree best, from 0.6
   /// to 1.65.

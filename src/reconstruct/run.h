@@ -7,7 +7,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Holds what the steps of a run share.
+/// What the steps of a run share.
 struct Run {
   const ReconstructHooks& hooks;
   const distributed::Communicator& processes;

@@ -24,9 +24,9 @@
 namespace tomofield::reconstruction {
 namespace {
 
-// Fitted to whole runs (docs/batch.md): what reading a series takes, in times of decoding its views
-// once, with the searches for beads and fixed patterns; and what a voxel takes at the end, when the
-// volume is written and judged.
+// Fitted to whole runs (docs/results/estimates.md): what reading a series takes, in times of
+// decoding its views once, with the searches for beads and fixed patterns; and what a voxel takes
+// at the end, when the volume is written and judged.
 constexpr double kReadingsOfAView = 1.3;
 constexpr double kSecondsAVoxel = 1e-7;
 constexpr double kStart = 0.1;  // seconds: the program, and plots
@@ -44,7 +44,7 @@ class FilterTimes {
  public:
   explicit FilterTimes(const measurement::Measurement& plan) : plan_(plan) {}
 
-  // Returns the time for pixels so many times as wide, on so many rows at most.
+  // Returns the time for pixels `bin` times as wide, on at most `max_rows` rows.
   double seconds(int bin, double max_rows) {
     const measurement::SlabViews::Shape shape = plan_.rays_shape();
     const auto height =
@@ -76,7 +76,7 @@ struct Work {
   double updates_of_views = 0;  // in times of align::seconds_of_update()
   double filter_seconds = 0;    // of filtering views for surrogates
 
-  // Adds the first epochs of a fit of at most so many rows, `times` times.
+  // Adds the first epochs of a fit of at most `max_rows` rows, `times` times.
   void add_fit(const measurement::Measurement& plan, const fit::FieldOptions& field,
                const fit::FitOptions& fit, int steps_an_epoch, double max_rows, double times,
                std::int64_t epochs = std::numeric_limits<std::int64_t>::max()) {
@@ -95,7 +95,7 @@ struct Work {
             epochs_of_all * plan.geometry.num_views() * filters.seconds(stage.bin, max_rows);
     }
   }
-  // Adds other work, so many times.
+  // Adds other work, `times` times.
   void add(const Work& other, double times) {
     steps_of_vertices += times * other.steps_of_vertices;
     samples_of_vertices += times * other.samples_of_vertices;

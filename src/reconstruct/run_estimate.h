@@ -9,7 +9,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Says what a run will take, beside its memory (RunPlan::memory_bytes).
+/// The cost of a run, beside its memory (RunPlan::memory_bytes).
 struct RunEstimate {
   /// Processor time of all threads and processes. Nothing for the ray engine and for leaves above
   /// 256 pixels, whose steps cannot be measured in a small volume.

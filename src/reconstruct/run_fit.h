@@ -14,7 +14,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Says what is fitted and where the checkpoint is.
+/// A fit to be made, and the place of its checkpoint.
 struct FitJob {
   const measurement::Measurement& measurement;  ///< must outlive the fit
   const std::filesystem::path& model;           ///< the checkpoint
@@ -26,7 +26,7 @@ struct FitJob {
   bool may_learn = true;  ///< with the prior that the options say; else with total variation alone
 };
 
-/// Holds a fit after its steps.
+/// A fit after its steps.
 struct FitRun {
   std::unique_ptr<fit::Fit> fit;
   double seconds = 0.0;      ///< of its steps in this run

@@ -7,7 +7,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Holds what a run knows beside its fit.
+/// What a run knows beside its fit.
 struct RunRecord {
   FitOrigin origin;
   /// Where the pixels of each aligned view come from in the stack.

@@ -9,7 +9,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Names what the report of a run is made from. Files may still have temporary names.
+/// What the report of a run is made from. Files may still have temporary names.
 struct ReportSource {
   const nlohmann::json& record;  ///< the content of the JSON file beside the volume
   const SeriesFiles& files;      ///< of the series

@@ -8,17 +8,17 @@
 
 namespace tomofield::reconstruction {
 
-/// Says what a step of a stage costs in processor time.
+/// The processor time of a step of a stage.
 struct StepTime {
   double fixed_seconds = 0, seconds_a_sample = 0;
 };
 
-/// Says what the steps of a fit cost, by the kind of its field.
+/// The processor time of the steps of a fit, by the kind of its field.
 struct StepTimes {
   StepTime vertices, factors;
 };
 
-/// Returns the samples of all slabs of a stage of a fit to `plan`, on at most so many rows.
+/// Returns the samples of all slabs of a stage of a fit to `plan`, on at most `max_rows` rows.
 double samples_of(const fit::Stage& stage, const measurement::Measurement& plan,
                   const fit::FieldOptions& field, double max_rows);
 

@@ -20,7 +20,8 @@ namespace {
 // Bytes of codes for each vertex of a fit (docs/results/compact.md, A 256 with 0.1dB).
 constexpr double kCodesOfAVertex = 0.13;
 
-// A coarse stage is fitted for the whole region if it has no more vertices than so many bands.
+// A coarse stage is fitted for the whole region if it has no more vertices than this number of
+// bands.
 constexpr int kBandsOfCoarse = 6;
 
 // Not all of the memory that is free now stays free.

@@ -7,13 +7,13 @@
 
 namespace tomofield::reconstruction {
 
-/// Names the rows of the region of interest that are fitted together, counted from its first one.
+/// The rows of the region of interest that are fitted together, counted from its first one.
 struct Tile {
   base::Range own;     ///< rows that the tile contributes
   base::Range fitted;  ///< these and the rows beside them, whose vertices are thrown away
 };
 
-/// Says how a region is fitted by tiles: first its coarse stages as a whole, then the other stages
+/// The order of a fit by tiles: first the coarse stages of the whole region, then the other stages
 /// of one tile after the other.
 struct TilePlan {
   int num_whole_stages = 0;           ///< 0: there are no tiles

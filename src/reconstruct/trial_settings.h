@@ -11,7 +11,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Holds the settings that trials choose. They replace options of the run.
+/// The settings that trials choose. They replace options of the run.
 struct TrialSettings {
   Penalty penalty = Penalty::kConcave;  ///< FitOptions::penalty
   double variation = 0;                 ///< FitOptions::density_variation
@@ -36,8 +36,8 @@ FitTrials make_trials(FitTrials::RunTrials run);
 /// fewer epochs than the fit, so epochs count only if a trial has those that were chosen.
 const FitTrial* chosen_trial(const TunedFit& tuned);
 
-/// Says whether a trial differs from the first one of its search in nothing but the penalty and the
-/// weight of total variation.
+/// Returns true if a trial differs from the first one of its search in nothing but the penalty and
+/// the weight of total variation.
 bool differs_from_first_in_variation_alone(const FitTrial& trial, const TunedFit& tuned);
 
 /// Compares a trial with the chosen one, patch by patch. If the chosen settings are a mixture that

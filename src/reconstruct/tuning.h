@@ -11,7 +11,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Says what a search may change in addition to the weight and the epochs.
+/// What a search may change in addition to the weight and the epochs.
 struct SearchSpace {
   bool penalty = true;  ///< compare the concave and the smooth penalty
   bool rank = true;     ///< compare ranks; the field must have one
@@ -33,13 +33,13 @@ TrialSettings search_settings(const TrialSettings& start, const SearchSpace& spa
 /// Returns the number of trials of a search whose best weight is near the first.
 int expected_trials(const SearchSpace& space);
 
-/// Holds the callbacks of a search. They are called in the thread that searches.
+/// The callbacks of a search. They are called in the thread that searches.
 struct TuneHooks {
   base::ProgressSink progress;
   std::function<bool()> stop_requested;  ///< is asked after every step
 };
 
-/// Says what one trial of a search is: a fit of at most so many rows with these options.
+/// The size of one trial of a search: a fit of at most `rows` rows with these options.
 struct TrialShape {
   std::int64_t rows = 0;
   fit::FieldOptions field;

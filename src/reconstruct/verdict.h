@@ -14,15 +14,14 @@
 
 namespace tomofield::reconstruction {
 
-/// Tells how well a field predicts views that it was not fitted to, in units of their noise
-/// variance.
+/// The errors of views that a field was not fitted to, in units of their noise variance.
 struct HeldOutSummary {
   double median = 0.0, worst = 0.0;
   double worst_tilt_deg = 0.0;
   bool is_of_trials = false;  ///< of the trials that chose the settings, not of the fit itself
 };
 
-/// Tells whether the learned prior ended the fit, and what a trial says of it.
+/// Whether the learned prior ended the fit, and the gain that a trial found.
 struct PriorSummary {
   bool is_used = false;
   /// By what part the prior lowers the error of held-out views in whole fits of some rows, as
@@ -30,7 +29,7 @@ struct PriorSummary {
   std::optional<selection::Difference> gain;
 };
 
-/// Tells how the density varies within the sections of the volume.
+/// The variation of the density within the sections of the volume.
 struct SectionProfile {
   /// Standard deviation in the outermost twentieth of the sections, at the face where it is
   /// smaller, over the median of the middle half.
@@ -48,7 +47,7 @@ struct Warning {
   std::string message;  ///< one sentence
 };
 
-/// Holds what a finished fit tells of itself and of its input.
+/// What a finished fit tells of itself and of its input.
 struct Verdict {
   double residual = 0.0;  ///< mean squared residual over the noise variance
   std::optional<HeldOutSummary> held_out;

@@ -11,7 +11,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Tells how the brightness of the views follows the length of their rays in the volume.
+/// The change of the brightness of the views with the length of their rays in the volume.
 struct PathEffect {
   double correlation = 0.0;
   /// Line through the means of all columns: its rise from the shortest to the longest ray, over the
@@ -19,7 +19,7 @@ struct PathEffect {
   double rise = 0.0;
 };
 
-/// Tells how some views of a series agree with the field that was fitted to them, and with each
+/// The agreement of some views of a series with the field that was fitted to them, and with each
 /// other.
 struct ViewAgreement {
   std::vector<int> views;           ///< those that were looked at, in order of tilt

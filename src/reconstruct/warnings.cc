@@ -17,8 +17,8 @@
 namespace tomofield::reconstruction {
 namespace {
 
-// The limits are from the series of docs/verdict.md. Beside each stand the values of correct series
-// and of those with the fault.
+// The limits are from the series of docs/results/archive/verdict.md. Beside each stand the values
+// of correct series and of those with the fault.
 
 // Rise of the brightness with the rays' length: 0.1 … 11 where the contrast is right, and the
 // opposite where it is wrong. Views that are normalised one by one may have no rise. A cell that

@@ -8,7 +8,7 @@
 
 namespace tomofield::reconstruction {
 
-/// Holds what the user said of the series.
+/// The input of the user that warnings judge.
 struct GivenInput {
   Contrast contrast = Contrast::kDark;
   /// Where the pixels of each aligned view come from in the stack.
@@ -20,8 +20,8 @@ struct GivenInput {
 
 /// Returns what is off in a run, the most serious first. Faults of the series as a whole (views
 /// that show nothing, contrast, order, alignment, axis) come alone, because nothing else can be
-/// judged then; a fit that is bad for no reason that is known is named last. docs/verdict.md has
-/// the measurements that the limits rest on.
+/// judged then; a fit that is bad for no reason that is known is named last. The
+/// limits rest on the measurements in docs/results/archive/verdict.md.
 std::vector<Warning> find_warnings(const Verdict& verdict, const GivenInput& input);
 
 }  // namespace tomofield::reconstruction

@@ -7,9 +7,9 @@
 
 namespace tomofield::report {
 
-/// Holds what an alignment changed in each view, and how well the view agrees with its projection
-/// then. Each vector has one number for each view, in any order of tilt. Tilts are finite. Another
-/// number that is not finite is not drawn.
+/// The changes of an alignment in each view, and how well the view agrees with its projection then.
+/// Each vector has one number for each view, in any order of tilt. Tilts are finite. Another number
+/// that is not finite is not drawn.
 struct AlignmentCurves {
   std::vector<double> tilt_deg;
   // The change from the alignment that was given to the one that was found. Shifts are in pixels

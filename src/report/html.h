@@ -27,7 +27,7 @@ struct HtmlCell {
   std::vector<HtmlLink> links = {};
 };
 
-/// Says whether the cells beside the first column of a table hold numbers, which are aligned to the
+/// The content of the cells beside the first column of a table: numbers, which are aligned to the
 /// right, or words.
 enum class TableOf { kNumbers, kWords };
 

@@ -7,7 +7,7 @@
 
 namespace tomofield::selection {
 
-/// Says how well a trial predicts the held-out views, and how clean its volume is.
+/// The errors with which a trial predicts the held-out views, and how clean its volume is.
 struct HeldOutScore {
   double error = 0;                      ///< mean squared residual over the noise variance
   std::vector<double> view_error = {};   ///< the same of each held-out view
@@ -16,12 +16,12 @@ struct HeldOutScore {
   std::optional<double> face_jump = {};  ///< evaluate/face_jump.h; none if no face is in the volume
 };
 
-/// Says whether `a` predicts more than half of the held-out views better than `b`. One view at the
-/// end of the tilt range, which every trial predicts badly, can decide the mean error, but not
+/// Returns true if `a` predicts more than half of the held-out views better than `b`. One view at
+/// the end of the tilt range, which every trial predicts badly, can decide the mean error, but not
 /// this.
 bool most_views_prefer(const HeldOutScore& a, const HeldOutScore& b);
 
-/// Says how much worse one trial predicts the held-out views than another.
+/// The difference between the errors with which two trials predict the held-out views.
 struct Difference {
   double log_ratio = 0;       ///< of the errors; 0.01 is about one per cent
   double standard_error = 0;  ///< of `log_ratio`

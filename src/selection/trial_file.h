@@ -45,7 +45,7 @@ class TrialFile {
 
   /// Returns the trial that was made with these settings, if there is one.
   std::optional<nlohmann::json> find(const nlohmann::json& settings) const;
-  /// Adds a trial (trial_json()) and writes the file anew.
+  /// Adds a trial (trial_json()) and rewrites the file.
   void add(nlohmann::json trial);
 
  private:

@@ -30,7 +30,7 @@ struct Trial {
   Section section = {};  ///< is empty if none was kept
 };
 
-/// Holds the chosen settings and all trials of a search.
+/// The chosen settings and all trials of a search.
 template <typename Settings>
 struct Tuned {
   Settings settings = {};

@@ -9,8 +9,8 @@
 
 namespace tomofield::simulate {
 
-/// Holds the sine and the cosine of the tilt of parallel rays. The ray through the pixel at (u, y)
-/// of the aligned view has the points x = u cos θ − t sin θ, y, z = u sin θ + t cos θ.
+/// The sine and the cosine of the tilt of parallel rays. The ray through the pixel at (u, y) of the
+/// aligned view has the points x = u cos θ − t sin θ, y, z = u sin θ + t cos θ.
 struct Beam {
   explicit Beam(double tilt_deg)
       : cosine(std::cos(tilt_deg * std::numbers::pi / 180.0)),

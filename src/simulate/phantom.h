@@ -94,7 +94,7 @@ struct Phantom {
 /// Returns the phantom without its gold beads.
 Phantom without_beads(Phantom phantom);
 
-/// Names what a slab is filled with.
+/// The contents of a slab.
 enum class Content {
   kHollowEllipsoids,  ///< hollow ellipsoids of constant densities
   kTextured,          ///< what textured_content.h places, in an extended slab only

@@ -24,7 +24,7 @@ struct ViewFrame {
   geometry::RawFromAligned raw_from_aligned{};  ///< its matrix is regular
   std::optional<geometry::ViewWarp> warp{};     ///< local motion
 
-  /// Tells whether y is constant in each recorded row.
+  /// Returns true if y is constant in each recorded row.
   bool keeps_rows() const {
     const geometry::RawFromAligned& m = raw_from_aligned;
     return m.m11 == 1.0 && m.m12 == 0.0 && m.m21 == 0.0 && m.m22 == 1.0 && !warp;

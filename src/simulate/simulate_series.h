@@ -8,7 +8,7 @@
 
 namespace tomofield::simulate {
 
-/// Holds metrics of a simulated series.
+/// Metrics of a simulated series.
 struct SimulationSummary {
   struct Truth {
     double min = 0.0, max = 0.0, mean = 0.0;

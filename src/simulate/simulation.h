@@ -27,7 +27,7 @@ struct TiltRange {
 /// Returns the usual tilts of a bounded or an extended specimen.
 TiltRange default_tilts(bool is_extended);
 
-/// Names the phantoms that every score of the project refers to (docs/index.md).
+/// The phantoms that every score of the project refers to (docs/index.md).
 enum class Yardstick {
   kA,  ///< a cell that ends in the field of view, in 94 views from −70° to 69.5°
   kB,  ///< a specimen that goes on outside it, in 61 views from −60° to 60°
@@ -77,7 +77,7 @@ struct SimulationOptions {
 /// 2560 × 2560 Å², and dark contrast.
 void apply_yardstick(Yardstick yardstick, SimulationOptions& options);
 
-/// Holds the tilt, the alignment and the gain of a simulated view.
+/// The tilt, the alignment and the gain of a simulated view.
 struct SimulatedView {
   double tilt_deg = 0.0;
   double tilt_error_deg = 0.0;  ///< of the angle that the microscope recorded

@@ -8,7 +8,7 @@
 
 namespace tomofield::tilt_series {
 
-/// Tells the values between the pixels of an image, without blurring it: frequencies up to 0.48
+/// Gives the values between the pixels of an image, without blurring it: frequencies up to 0.48
 /// cycles a pixel keep their amplitudes to 2·10⁻⁴, so that white noise stays white.
 ///
 /// The image is extended by its mirror images, and its Fourier transform is taken to a finer grid

@@ -9,7 +9,7 @@ namespace tomofield::tilt_series {
 enum class Half { kEven, kOdd };
 inline constexpr std::array kBothHalves{Half::kEven, Half::kOdd};
 
-/// Names the stacks of both halves of the frames.
+/// The stacks of both halves of the frames.
 struct HalfPaths {
   std::filesystem::path even, odd;
 };

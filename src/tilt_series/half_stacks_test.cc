@@ -31,7 +31,7 @@ float noise(std::int64_t x, std::int64_t y, std::int64_t section, std::uint64_t 
   return static_cast<float>(random.normal());
 }
 
-// Writes the sums of so many frames, and all of them times `scale` plus `offset`.
+// Writes the sums of some frames, and all of them times `scale` plus `offset`.
 struct Stacks {
   ScratchDirectory scratch;
   HalfPaths halves;

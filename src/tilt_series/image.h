@@ -6,7 +6,7 @@
 
 namespace tomofield::tilt_series {
 
-/// Tells what a pixel of a view is. Everything but 0 is a measurement.
+/// The use of a pixel of a view. Everything but 0 is a measurement.
 enum PixelState : std::uint8_t {
   kNoMeasurement = 0,
   kMeasurement = 1,

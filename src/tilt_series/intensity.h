@@ -9,7 +9,7 @@
 
 namespace tomofield::tilt_series {
 
-/// Says how stored intensities I become line integrals. I0 is the intensity of an empty beam.
+/// The conversion of stored intensities I to line integrals. I0 is the intensity of an empty beam.
 struct IntensityScale {
   Contrast contrast = Contrast::kDark;
   bool take_log = false;    ///< −ln(I / I0) instead of I0 − I; dark only

@@ -6,9 +6,9 @@
 
 namespace tomofield::tilt_series {
 
-/// Tells where each place of a view without local motion is found in the view with it. It holds the
-/// places on a lattice of 128 × 128 cells and interpolates linearly between them. Nodes that
-/// differ by a pixel from their neighbours make an error below 0.005 pixels.
+/// Maps each place of a view without local motion to its place in the view with it. The map holds
+/// places on a lattice of 128 × 128 cells and interpolates linearly between them. Nodes that differ
+/// by a pixel from their neighbours make an error below 0.005 pixels.
 class MotionMap {
  public:
   explicit MotionMap(const geometry::ViewWarp& warp);

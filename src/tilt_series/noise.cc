@@ -12,8 +12,8 @@ namespace tomofield::tilt_series {
 namespace {
 
 constexpr std::size_t kMinDifferences = 64;
-// Rows of larger images are left out: the median of so many sizes is right within a part in a
-// thousand.
+// Rows of larger images are left out: the median of this number of sizes is right within a
+// part in a thousand.
 constexpr std::int64_t kEnoughDifferences = 1 << 20;
 
 /// Returns the estimate from mixed second differences at the image's own scale; 0 if there are too

@@ -9,8 +9,7 @@
 
 namespace tomofield::tilt_series {
 
-/// Tells where places of an aligned view lie in the raw image. Centres are N/2 with pixel i at
-/// i + 1/2.
+/// Maps places of an aligned view to the raw image. Centres are N/2 with pixel i at i + 1/2.
 class RawPlaces {
  public:
   using Vector = geometry::ViewWarp::Vector;

@@ -21,8 +21,8 @@ struct AlignedSection {
   int line = 0;  ///< of the file that says so; 0: not known
 };
 
-/// Holds the angles and the alignment of each section that one file gives: AreTomo's .aln, or a
-/// table of views of RELION or Warp.
+/// The angles and the alignment of each section that one file gives: AreTomo's .aln, or a table of
+/// views of RELION or Warp.
 struct SectionTable {
   std::string source;                                     ///< the name of the file
   std::vector<std::optional<AlignedSection>> of_section;  ///< none: left out by that program

@@ -25,7 +25,7 @@ struct ViewTransfer;
 
 namespace tomofield::tilt_series {
 
-/// Names the files of a tilt series and says how its intensities are read.
+/// The files of a tilt series, and the reading of its intensities.
 struct TiltSeriesOptions {
   std::filesystem::path stack;                   ///< MRC or TIFF stack, raw or aligned
   std::shared_ptr<const io::ImageStack> images;  ///< views in memory, in place of `stack`
@@ -70,7 +70,7 @@ struct TiltSeriesOptions {
   std::optional<HalfPaths> halves = {};  ///< stacks of the even and the odd frames
 };
 
-/// Says what is done with the pixels of beads that were found.
+/// The use of the pixels of beads that were found.
 enum class BeadMasking {
   kNone,       ///< no beads were found, or nobody looked for them
   kMasked,     ///< they carry no loss
@@ -108,7 +108,7 @@ struct View {
 class TiltSeries {
  public:
   /// Opens the files, decodes every view, and checks counts, angles, sizes and all pixels.
-  /// Throws Error as docs/errors.md lists; warnings go to base/log.h.
+  /// Throws Error that names the file and the section; warnings go to base/log.h.
   explicit TiltSeries(const TiltSeriesOptions& options)
       : TiltSeries(options, distributed::Communicator::alone()) {}
   /// Does the same with several processes, each of which decodes some of the views.
@@ -133,7 +133,7 @@ class TiltSeries {
   /// outside a rotated image, masked beads, fiducials and what the user's mask leaves out, and
   /// kUndecidedBead for beads that are undecided.
   /// Pixels that are not measurements are 0. A view that is not in this process's store is
-  /// decoded anew. With the `transfer` of the view, the fringes that a contrast transfer makes of
+  /// decoded again. With the `transfer` of the view, the fringes that a contrast transfer makes of
   /// masked beads are subtracted (masks/subtract_beads.h). Thread-safe.
   void read_view(std::size_t view, std::span<float> image, std::span<std::uint8_t> valid,
                  const microscope::ViewTransfer* transfer = nullptr) const;
@@ -145,10 +145,10 @@ class TiltSeries {
 
   /// Gives up the stored pixels of a view that will not be read soon, to make room.
   void forget_view(std::size_t view) const;
-  /// Returns the memory that the stored views take at most, in a job of so many processes.
+  /// Returns the memory that the stored views take at most, in a job of `processes`.
   std::size_t stored_memory(const distributed::Communicator& processes) const;
 
-  /// Returns about the bytes that reading one view takes, if it is decoded anew.
+  /// Returns about the bytes that reading one view takes, if it is decoded again.
   std::size_t decoding_memory() const;
 
   /// Returns the standard deviation of each view's noise, in the units of read_view. Beads, also

@@ -16,7 +16,7 @@ struct ViewCheck {
   std::int64_t has_measurements = 0;
 };
 
-/// Tells whether any pixel is a measurement.
+/// Returns true if any pixel is a measurement.
 bool has_measurements(const MaskedImage& image);
 
 ViewCheck check_view(const PixelCensus& census, const MaskedImage& image);

@@ -22,7 +22,7 @@ class ViewStore {
             const std::filesystem::path& scratch_dir);
 
   void write(std::size_t view, const MaskedImage& image);
-  /// Tells whether a view was written and not discarded.
+  /// Returns true if a view was written and not discarded.
   bool holds(std::size_t view) const { return place_[view] != kNowhere; }
   /// Returns a view that the store holds.
   MaskedImage read(std::size_t view) const;

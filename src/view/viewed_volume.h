@@ -31,7 +31,7 @@ class ViewedVolume {
   double voxel_size_A() const { return voxel_size_A_; }
   /// Returns the values that are black and white at first.
   const report::Contrast& contrast() const { return contrast_; }
-  /// Says what the viewer should know, such as that the volume is reduced; may be empty.
+  /// Returns what the viewer should know, such as that the volume is reduced; it may be empty.
   const std::string& note() const { return note_; }
 
  protected:

@@ -142,7 +142,7 @@ def test_factors_begin_as_plain_vertices(command, psnr, with_vertices):
 def test_factors_go_on_where_vertices_were(with_vertices):
     found = residuals(with_vertices)
     last_of_vertices, first_of_factors = found[10 + 8 - 1], found[10 + 8]
-    # The optimiser starts anew. Factors of rank 3 would lose most of the values and have 2.2 times.
+    # The optimiser restarts. Factors of rank 3 would lose most of the values and have 2.2 times.
     assert first_of_factors < 1.5 * last_of_vertices, found
 
 

@@ -18,7 +18,7 @@ struct TvOptions {
   bool non_negative = true;
 
   /// Returns the default weight. A concave penalty counts large steps less, and so needs a larger
-  /// one (docs/baselines.md).
+  /// one.
   double usual_weight() const { return penalty == Penalty::kConcave ? 8.0 : 3.0; }
   /// Returns the facts of the method. Tuning may turn a penalty that is not given into the concave
   /// one, so only a smooth penalty that is given needs one volume less.
@@ -36,8 +36,8 @@ struct TvOptions {
 /// weight.
 ///
 /// The concave penalty is majorised by a weighted variation, Σ w |∇x| with w = 1 / (1 + |∇x| / τ)
-/// of an earlier x (Candès, Wakin and Boyd 2008). First w is constant; later it is computed anew
-/// several times.
+/// of an earlier x (Candès, Wakin and Boyd 2008). First w is constant; later it is renewed several
+/// times.
 ///
 /// The solver is the primal–dual hybrid gradient method of Chambolle and Pock (2011), with the
 /// diagonal preconditioning of Pock and Chambolle (2011), equation 10 with α = 1, over-relaxed

@@ -8,8 +8,8 @@
 
 namespace tomofield::tilt_series {
 
-/// Holds what stays at one place of the detector in all views, whatever lies in the beam. All
-/// members are in the frame of the stack, unbinned, and empty where there is no such pattern.
+/// What stays at one place of the detector in all views, whatever lies in the beam. All members are
+/// in the frame of the stack, unbinned, and empty where there is no such pattern.
 struct FixedPattern {
   std::vector<std::vector<float>> columns;  ///< [view][x]: added to a column, in the stack's units
   std::vector<std::vector<float>> rows;     ///< [view][y]: added to a row

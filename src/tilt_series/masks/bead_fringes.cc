@@ -6,10 +6,10 @@
 namespace tomofield::tilt_series {
 namespace {
 
-// A window reaches at least so many radii, to see the background as well.
+// Least half side of a window, in radii, which shows the background as well.
 constexpr double kSurroundings_radii = 4.0;
 
-// A projected sphere is sampled at so many places a pixel on each axis.
+// Samples of a projected sphere in a pixel, along each axis.
 constexpr int kSubpixels = 4;
 
 // The derivative by the radius is a difference over this part of it.

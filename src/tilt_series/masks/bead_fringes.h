@@ -22,7 +22,7 @@ struct Sphere {
   }
 };
 
-/// Holds what a contrast transfer makes of a sphere, in a square window of the view. The window may
+/// The image of a sphere after a contrast transfer, in a square window of the view. The window may
 /// reach beyond the view.
 struct BeadFringes {
   Sphere sphere;

@@ -21,7 +21,7 @@ struct BeadTrack {
 struct TrackedViews {
   std::vector<double> tilt_deg;
   double middle_x_px = 0.0;
-  /// Tells whether a view has a measurement at this place.
+  /// Returns true if a view has a measurement at this place.
   std::function<bool(std::size_t view, double x_px, double y_px)> is_measured;
 };
 
@@ -31,7 +31,7 @@ struct TrackRules {
   double seed_strength = 6.0;  ///< of both spots that suggest a track
   double min_part_of_visible =
       0.6;                    ///< at least this part of the views that see its place have a spot
-  std::size_t min_views = 4;  ///< and at least so many views
+  std::size_t min_views = 4;  ///< and at least this number of views
 };
 
 /// Returns the x of a track in a view.

@@ -29,8 +29,8 @@ constexpr double kDiameterStep = 1.4142135623730951;  // between the diameters t
 // Beads are taken as found if this many of them have spots in this part of all views each.
 constexpr std::size_t kMinBeads = 3;
 constexpr double kPartOfViews = 0.5;
-// Beads that few views see count if so many of these views, and this part of them, show a strong
-// spot. Specimens without beads have no such track.
+// Beads that few views see count if this number of these views, and this part of them, show a
+// strong spot. Specimens without beads have no such track.
 constexpr std::size_t kMinStrongViews = 4;
 constexpr double kStrongPartOfVisible = 0.6;  // spots at the border of a view are not found
 

@@ -8,13 +8,13 @@
 
 namespace tomofield::tilt_series {
 
-/// Says how each pixel of an image is correlated with those around it: its product with the mean of
-/// the 48 pixels around, after a local mean over 17 × 17 pixels was subtracted. White noise has
+/// The correlation of each pixel of an image with those around it: its product with the mean of the
+/// 48 pixels around, after a local mean over 17 × 17 pixels was subtracted. White noise has
 /// products of mean 0 and of a known spread.
 struct Correlation {
   explicit Correlation(MaskedImage image);
 
-  /// Averages everything over cells of so many pixels a side, at least 1.
+  /// Averages everything over cells with a side of `factor` pixels, at least 1.
   void reduce(double factor);
 
   // The valid pixels are the same in all of them.

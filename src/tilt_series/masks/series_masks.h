@@ -25,7 +25,7 @@ io::MrcReader open_mask(const std::filesystem::path& mask, const io::ImageStack&
 /// Marks the pixels that are 0 in the mask's section as no measurements.
 void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* image);
 
-/// Tells whether the options ask for a search for beads.
+/// Returns true if the options ask for a search for beads.
 bool searches_beads(const TiltSeriesOptions& options);
 
 /// Looks for the beads that the options ask for in aligned `views`.

@@ -23,7 +23,7 @@ constexpr int kMinDirections = 8;      // at the image's edge
 constexpr double kDistance = 1.25;     // of the discs that are compared, in diameters
 constexpr float kMinMeasured = 0.6f;   // part of a disc
 
-// The spread is at least so many standard deviations of the contrast, for images without noise.
+// Least spread, in standard deviations of the contrast, for images without noise.
 constexpr double kMinSpread = 0.5;
 
 constexpr float kUnknown = -std::numeric_limits<float>::infinity();

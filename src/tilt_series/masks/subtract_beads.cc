@@ -14,7 +14,7 @@
 namespace tomofield::tilt_series {
 namespace {
 
-// A bead has no say within so many radii and pixels of its middle.
+// Pixels within this distance of the middle of a bead do not decide about it.
 constexpr double kCore_radii = 1.1, kCore_px = 1.0;
 
 // The mask of a bead whose fringes were subtracted has a radius of 1.05 of its diameters.
