@@ -8,10 +8,10 @@
 #include "cli/help_formatter.h"
 #include "cli/run_reconstruction.h"
 #include "cli/table_options.h"
+#include "exchange/alignment_output.h"
 #include "io/output_set.h"
-#include "reconstruct/alignment_output.h"
-#include "reconstruct/options.h"
-#include "reconstruct/reconstruct.h"
+#include "options/run_options.h"
+#include "plan/plan.h"
 #include "tilt_series/tilt_series.h"
 #include "tomofield/error.h"
 
@@ -23,15 +23,14 @@ using option_table::Group;
 void run(const option_table::Choices& choices, const std::vector<option_table::Setting>& origins) {
   if (choices.options.align == Alignment::kOff)
     throw Error("there is nothing to do with --align off: give refine or full");
-  reconstruction::ReconstructOptions options =
-      reconstruction::run_options(choices.files, choices.options);
+  options::ReconstructOptions options = options::run_options(choices.files, choices.options);
   options.origins = origins;
-  const std::vector<io::OutputLock> locks = reconstruction::claim_alignment(options);
-  reconstruction::check_alignment_alone(options);
+  const std::vector<io::OutputLock> locks = exchange::claim_alignment(options);
+  plan::check_alignment_alone(options);
   io::OutputSet results;  // the record of the alignment joins the other files
   const tilt_series::TiltSeries series =
       align_and_open(options, distributed::Communicator::alone());
-  reconstruction::write_alignment_results(series, options);
+  exchange::write_alignment_results(series, options);
   results.commit();
   print_alignment(options);
 }

@@ -6,6 +6,7 @@
 #include "cli/progress_bar.h"
 #include "cli/stop_signal.h"
 #include "io/json.h"
+#include "plan/plan.h"
 #include "reconstruct/reconstruct.h"
 
 namespace tomofield::cli {
@@ -20,9 +21,9 @@ void add_choice_option(CLI::App& command, std::optional<std::filesystem::path>& 
 }
 
 void write_choice(const std::filesystem::path& file, const tilt_series::TiltSeries& series,
-                  const reconstruction::ReconstructOptions& options,
+                  const options::ReconstructOptions& options,
                   const distributed::Communicator& processes) {
-  processes.run_collectively([&] { require_possible_run(series, options, processes); });
+  processes.run_collectively([&] { plan::require_possible_run(series, options, processes); });
   stop_on_signals(processes.size() > 1);
   reconstruction::ReconstructHooks hooks{
       .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};

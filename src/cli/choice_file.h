@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "distributed/communicator.h"
-#include "reconstruct/options.h"
+#include "options/run_options.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::cli {
@@ -17,7 +17,7 @@ void add_choice_option(CLI::App& command, std::optional<std::filesystem::path>& 
 /// trials), for programs that give one choice to several runs (batch). Throws ExitStatus if it was
 /// stopped.
 void write_choice(const std::filesystem::path& file, const tilt_series::TiltSeries& series,
-                  const reconstruction::ReconstructOptions& options,
+                  const options::ReconstructOptions& options,
                   const distributed::Communicator& processes);
 
 }  // namespace tomofield::cli

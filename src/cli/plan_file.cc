@@ -10,7 +10,7 @@
 #include "cli/help_formatter.h"
 #include "io/json.h"
 #include "io/output_files.h"
-#include "reconstruct/reconstruct.h"
+#include "plan/plan.h"
 
 namespace tomofield::cli {
 namespace {
@@ -19,18 +19,18 @@ constexpr double kGibibyte = 1 << 30;
 
 // Returns the memory of a run on one thread. More threads need more.
 std::size_t memory_of_one_thread(const tilt_series::TiltSeries& series,
-                                 const reconstruction::ReconstructOptions& options,
+                                 const options::ReconstructOptions& options,
                                  const distributed::Communicator& processes) {
   const int threads = base::thread_count();
   base::set_thread_count(1);
-  const std::size_t bytes = plan_run(series, options, processes).memory_bytes;
+  const std::size_t bytes = plan::plan_run(series, options, processes).memory_bytes;
   base::set_thread_count(threads);
   return bytes;
 }
 
 // Says whether a run would take a setting that the options leave open from another run. With --tune
 // it looks for its own.
-bool is_left_to_runs(const reconstruction::ReconstructOptions& options, bool is_open) {
+bool is_left_to_runs(const options::ReconstructOptions& options, bool is_open) {
   return is_open && !options.resolved.tune;
 }
 
@@ -46,7 +46,7 @@ void add_plan_option(CLI::App& command, std::optional<std::filesystem::path>& fi
 }
 
 void check_answer_file(const std::optional<std::filesystem::path>& file, const char* flag,
-                       const reconstruction::ReconstructOptions& options) {
+                       const options::ReconstructOptions& options) {
   if (!file) return;
   io::check_output_files(
       {*file}, io::input_files(options.files), options.resolved.overwrite,
@@ -54,14 +54,14 @@ void check_answer_file(const std::optional<std::filesystem::path>& file, const c
 }
 
 void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries& series,
-                const reconstruction::ReconstructOptions& options,
+                const options::ReconstructOptions& options,
                 const distributed::Communicator& processes) {
   processes.run_collectively([&] {
-    const reconstruction::RunPlan plan = plan_run(series, options, processes);
+    const plan::RunPlan plan = plan::plan_run(series, options, processes);
     require_few_vertices(plan);
     const std::size_t of_one_thread = memory_of_one_thread(series, options, processes);
     if (!processes.is_root()) return;
-    const reconstruction::RunEstimate estimate = estimate_run(series, options, plan);
+    const plan::RunEstimate estimate = plan::estimate_run(series, options, plan);
     const nlohmann::json seconds =
         estimate.core_seconds ? nlohmann::json(*estimate.core_seconds) : nlohmann::json(nullptr);
     io::write_json(file, {{"tomofield", TOMOFIELD_VERSION},
@@ -84,7 +84,7 @@ void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries
   });
 }
 
-void print_estimate(const reconstruction::RunEstimate& estimate, int num_processes) {
+void print_estimate(const plan::RunEstimate& estimate, int num_processes) {
   if (estimate.core_seconds) {
     const int threads = base::thread_count() * num_processes;
     print("about {} of processor time, which is {} if nothing else runs on {}\n",

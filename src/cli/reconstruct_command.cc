@@ -11,8 +11,8 @@
 #include "cli/run_reconstruction.h"
 #include "cli/table_options.h"
 #include "cli/trace_option.h"
-#include "reconstruct/options.h"
-#include "reconstruct/reconstruct.h"
+#include "options/run_options.h"
+#include "output/output_paths.h"
 
 namespace tomofield::cli {
 namespace {
@@ -27,15 +27,15 @@ struct ReconstructArguments {
 
 void run(const ReconstructArguments& arguments, const distributed::Communicator& processes,
          const std::vector<option_table::Setting>& origins) {
-  reconstruction::ReconstructOptions options =
-      reconstruction::run_options(arguments.choices.files, arguments.choices.options);
+  options::ReconstructOptions options =
+      options::run_options(arguments.choices.files, arguments.choices.options);
   options.origins = origins;
   std::vector<io::OutputLock> locks;
   processes.run_collectively([&] {
     locks = claim_run(options, arguments.dry_run || arguments.plan || !processes.is_root());
     check_answer_file(arguments.plan, "--plan", options);
     check_answer_file(arguments.choice, "--choice", options);
-    const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
+    const output::OutputPaths paths = output::output_paths(options.resolved.output);
     check_trace_file(arguments.trace, {paths.volume, paths.model, paths.json}, options.files,
                      options.resolved.overwrite);
   });

@@ -13,6 +13,7 @@
 #include "base/enum_names.h"
 #include "base/log.h"
 #include "base/parallel.h"
+#include "base/progress.h"
 #include "base/stopwatch.h"
 #include "base/trace.h"
 #include "cli/console.h"
@@ -23,15 +24,20 @@
 #include "cli/progress_bar.h"
 #include "cli/stop_signal.h"
 #include "cli/table_options.h"
+#include "exchange/alignment_output.h"
+#include "exchange/exchange_files.h"
 #include "io/atomic_file.h"
 #include "io/output_set.h"
+#include "output/output_paths.h"
 #include "output/volume.h"
-#include "reconstruct/aligned_series.h"
-#include "reconstruct/alignment_output.h"
-#include "reconstruct/exchange_files.h"
-#include "reconstruct/run_report.h"
+#include "plan/plan.h"
+#include "realign/aligned_series.h"
+#include "reconstruct/reconstruct.h"
+#include "reconstruct/run_files.h"
 #include "report/pictures.h"
+#include "report/run_report.h"
 #include "tomofield/error.h"
+#include "verdict/verdict.h"
 
 namespace tomofield::cli {
 namespace {
@@ -69,8 +75,8 @@ std::string epochs_text(const std::vector<fit::Stage>& stages) {
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
-void print_plan(const reconstruction::ReconstructOptions& options,
-                const reconstruction::RunPlan& plan, int num_processes) {
+void print_plan(const options::ReconstructOptions& options, const plan::RunPlan& plan,
+                int num_processes) {
   print_sizes({plan.num_views, plan.view_width, plan.view_height, plan.pixel_size_A, plan.roi,
                plan.thickness, options.volume.axes});
   if (plan.num_trials > 0)
@@ -95,8 +101,8 @@ void print_plan(const reconstruction::ReconstructOptions& options,
   flush_output();  // the plan comes before other output, in a file too
 }
 
-void print_files_of_halves(const reconstruction::OutputPaths& paths, bool with_linear_volumes) {
-  for (const reconstruction::OutputPaths::OfHalf& half : paths.halves) {
+void print_files_of_halves(const output::OutputPaths& paths, bool with_linear_volumes) {
+  for (const output::OutputPaths::OfHalf& half : paths.halves) {
     print("half      {}, model {}\n", half.volume.string(), half.model.string());
     if (with_linear_volumes) print("linear    {}\n", half.linear_volume.string());
   }
@@ -104,8 +110,7 @@ void print_files_of_halves(const reconstruction::OutputPaths& paths, bool with_l
         paths.uncertainty.string(), paths.fsc_picture.string());
 }
 
-void print_files(const reconstruction::ReconstructOptions& options,
-                 const reconstruction::OutputPaths& paths) {
+void print_files(const options::ReconstructOptions& options, const output::OutputPaths& paths) {
   print("tomogram  {}\nmodel     {}\nmetrics   {}\nreport    {}\n", paths.volume.string(),
         paths.model.string(), paths.json.string(), paths.report.string());
   if (options.makes_halves()) print_files_of_halves(paths, options.resolved.denoising_halves);
@@ -116,8 +121,8 @@ void print_files(const reconstruction::ReconstructOptions& options,
 struct PicturesOfTrials {
   std::optional<std::filesystem::path> dial, prior;
 };
-PicturesOfTrials pictures_of_trials(const reconstruction::ReconstructOptions& options) {
-  const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
+PicturesOfTrials pictures_of_trials(const options::ReconstructOptions& options) {
+  const output::OutputPaths paths = output::output_paths(options.resolved.output);
   PicturesOfTrials drawn;
   if (options.chooses_weight() && std::filesystem::exists(paths.dial_picture))
     drawn.dial = paths.dial_picture;
@@ -128,29 +133,29 @@ PicturesOfTrials pictures_of_trials(const reconstruction::ReconstructOptions& op
 
 // Writes the report of a run beside its other results, which have temporary names yet.
 void write_report(const reconstruction::Results& results,
-                  const reconstruction::ReconstructOptions& options,
-                  const std::filesystem::path& volume, const std::filesystem::path& mask_picture) {
-  const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
+                  const options::ReconstructOptions& options, const std::filesystem::path& volume,
+                  const std::filesystem::path& mask_picture) {
+  const output::OutputPaths paths = output::output_paths(options.resolved.output);
   const io::OutputSet& written = *io::OutputSet::active();
   PicturesOfTrials of_trials = pictures_of_trials(options);
-  reconstruction::ReportSource source{.record = results.metrics,
-                                      .files = options.files,
-                                      .requested = options.requested,
-                                      .volume = volume,
-                                      .mask_picture = written.location_of(mask_picture),
-                                      .tree_picture = {},
-                                      .held_out_picture = {},
-                                      .dial_picture = std::move(of_trials.dial),
-                                      .prior_picture = std::move(of_trials.prior)};
+  report::ReportSource source{.record = results.metrics,
+                              .files = options.files,
+                              .requested = options.requested,
+                              .volume = volume,
+                              .mask_picture = written.location_of(mask_picture),
+                              .tree_picture = {},
+                              .held_out_picture = {},
+                              .dial_picture = std::move(of_trials.dial),
+                              .prior_picture = std::move(of_trials.prior)};
   if (options.field.tree == TreeKind::kAdaptive)
     source.tree_picture = written.location_of(paths.tree_picture);
   if (options.fit.hold_out > 0)
     source.held_out_picture = written.location_of(paths.held_out_picture);
-  io::write_text_file(paths.report, reconstruction::run_report(source));
+  io::write_text_file(paths.report, report::run_report(source));
 }
 
 ExitStatus stopped(const char* what_is_there, const std::filesystem::path& file,
-                   const reconstruction::ReconstructOptions& options) {
+                   const options::ReconstructOptions& options) {
   return {
       stop_status(),
       fmt::format("stopped; {} '{}': continue with the same command and --resume{}", what_is_there,
@@ -168,7 +173,7 @@ void add_run_options(CLI::App& command, option_table::Choices& choices, bool& dr
       ->group(std::string(title_of(option_table::Group::kRun)));
 }
 
-std::vector<io::OutputLock> claim_run(const reconstruction::ReconstructOptions& options,
+std::vector<io::OutputLock> claim_run(const options::ReconstructOptions& options,
                                       bool check_alone) {
   if (options.resolved.output.empty()) throw Error("-o '' names no file: name the tomogram");
   if (!check_alone) return reconstruction::claim_outputs(options);
@@ -176,47 +181,47 @@ std::vector<io::OutputLock> claim_run(const reconstruction::ReconstructOptions& 
   return {};
 }
 
-tilt_series::TiltSeries open_series(reconstruction::ReconstructOptions& options, bool dry_run,
+tilt_series::TiltSeries open_series(options::ReconstructOptions& options, bool dry_run,
                                     const distributed::Communicator& processes) {
   if (dry_run || options.resolved.align == Alignment::kOff)
     return tilt_series::TiltSeries(options.input, processes);
-  reconstruction::check_before_alignment(options, processes);
+  plan::check_before_alignment(options, processes);
   return align_and_open(options, processes);
 }
 
-tilt_series::TiltSeries align_and_open(reconstruction::ReconstructOptions& options,
+tilt_series::TiltSeries align_and_open(options::ReconstructOptions& options,
                                        const distributed::Communicator& processes) {
   stop_on_signals(processes.size() > 1);
-  reconstruction::ReconstructHooks hooks{
-      .progress = {}, .tune_progress = {}, .stop_requested = stop_was_requested};
-  if (processes.is_root()) hooks.tune_progress = make_progress_bar("align");
-  if (!reconstruction::align_series(options, hooks, processes))
+  base::ProgressSink progress;
+  if (processes.is_root()) progress = make_progress_bar("align");
+  if (!realign::align_series(options, {.progress = progress, .stop_requested = stop_was_requested},
+                             processes))
     throw ExitStatus{stop_status(), "stopped during the alignment"};
   return tilt_series::TiltSeries(options.input, processes);
 }
 
-void print_alignment(const reconstruction::ReconstructOptions& options) {
+void print_alignment(const options::ReconstructOptions& options) {
   if (options.resolved.align == Alignment::kOff) return;
-  print("alignment {}\n", reconstruction::output_paths(options.resolved.output).alignment.string());
-  for (const auto& file : reconstruction::alignment_results(options))
+  print("alignment {}\n", output::output_paths(options.resolved.output).alignment.string());
+  for (const auto& file : exchange::alignment_results(options))
     if (std::filesystem::exists(file)) print("          {}\n", file.string());
 }
 
 void run_reconstruction(const tilt_series::TiltSeries& series,
-                        const reconstruction::ReconstructOptions& options, bool dry_run,
+                        const options::ReconstructOptions& options, bool dry_run,
                         const distributed::Communicator& processes) {
   processes.run_collectively([&] {
-    const reconstruction::RunPlan plan = require_possible_run(series, options, processes);
+    const plan::RunPlan plan = plan::require_possible_run(series, options, processes);
     if (options.field.kind == FieldKind::kGrid && options.requested.rank != Options().rank)
       base::log_warning(
           "--rank changes nothing: it is for factors (--field vm), and this field has plain "
           "vertices");
     print_plan(options, plan, processes.size());
     if (dry_run && processes.is_root())
-      print_estimate(estimate_run(series, options, plan), processes.size());
+      print_estimate(plan::estimate_run(series, options, plan), processes.size());
   });
   if (dry_run) return;
-  const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
+  const output::OutputPaths paths = output::output_paths(options.resolved.output);
   const bool is_job = processes.size() > 1;
   stop_on_signals(is_job);
   if (is_job) processes.set_waiting_callback(tell_if_stuck(paths.model, processes));
@@ -226,7 +231,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   hooks.write_more = [&](const reconstruction::Results& results,
                          const std::filesystem::path& volume) {
     pictures = write_pictures(volume, series, results.bead_masking, paths.picture_prefix);
-    reconstruction::write_exchange_files(series, options, volume);
+    exchange::write_exchange_files(series, options, volume);
     if (options.field.tree == TreeKind::kAdaptive) {
       const base::TraceSpan span("draw tree");
       report::write_tree_picture(*results.model, paths.tree_picture);
@@ -254,7 +259,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   }
   if (!processes.is_root()) return;
   print_files(options, paths);
-  for (const auto& file : reconstruction::volume_descriptions(options))
+  for (const auto& file : exchange::volume_descriptions(options))
     print("exchange  {}\n", file.string());
   print_alignment(options);
   if (options.volume.zarr) print("OME-Zarr  {}\n", output::zarr_path(paths.volume).string());
@@ -262,7 +267,7 @@ void run_reconstruction(const tilt_series::TiltSeries& series,
   if (options.field.tree == TreeKind::kAdaptive)
     print("tree      {}\n", paths.tree_picture.string());
   flush_output();  // the verdict comes last
-  reconstruction::log_verdict(run.results->verdict);
+  verdict::log_verdict(run.results->verdict);
 }
 
 }  // namespace tomofield::cli

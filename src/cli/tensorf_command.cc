@@ -12,7 +12,8 @@
 #include "cli/run_reconstruction.h"
 #include "cli/table_options.h"
 #include "cli/trace_option.h"
-#include "reconstruct/options.h"
+#include "options/run_options.h"
+#include "output/output_paths.h"
 
 namespace tomofield::cli {
 namespace {
@@ -36,12 +37,11 @@ void run(TensorfArguments& arguments, const std::vector<option_table::Setting>& 
   Options& requested = arguments.choices.options;
   if (arguments.non_negative)
     requested.activation = *arguments.non_negative ? Activation::kSoftplus : Activation::kIdentity;
-  reconstruction::ReconstructOptions options =
-      reconstruction::run_options(arguments.choices.files, requested);
+  options::ReconstructOptions options = options::run_options(arguments.choices.files, requested);
   options.origins = origins;
   options.field.depth = 0;  // the tree is one node
   const std::vector<io::OutputLock> locks = claim_run(options, arguments.dry_run);
-  const reconstruction::OutputPaths paths = reconstruction::output_paths(options.resolved.output);
+  const output::OutputPaths paths = output::output_paths(options.resolved.output);
   check_trace_file(arguments.trace, {paths.volume, paths.model, paths.json}, options.files,
                    options.resolved.overwrite);
   options.input.keep_views = !arguments.dry_run;
