@@ -79,6 +79,16 @@ def test_catches_a_room_without_files():
     assert "'cli' has no source file" in output, output
 
 
+def test_folders_have_a_largest_size():
+    many = {f"src/field/a{i}.h": "" for i in range(39)}  # beside all.h
+    assert run_checker({**FILES, **many})[0] == 0
+    assert run_checker({**FILES, **many, "src/field/a_test.cc": "", "src/field/tree/a.h": ""})[0] == 0
+    status, output = run_checker({**FILES, "src/field/b.cc": "\n" * 5000})
+    assert status == 1 and "5001 lines in a folder" in output, output
+    status, output = run_checker({**FILES, **{f"src/field/a{i}.h": "" for i in range(40)}})
+    assert status == 1 and "41 files in a folder" in output, output
+
+
 def test_unit_tests_include_any_room_above_theirs():
     status, output = check("src/cli/a_test.cc", '#include "field/all.h"\n#include "base/all.h"\n')
     assert status == 0, output
