@@ -1,28 +1,42 @@
-# Defines one target a folder of src/: tomofield_base, tomofield_io, …
+# Defines one target a room (folder) of src/: tomofield_base, tomofield_io, …
 #
-# src/layers.txt has their order. A layer is compiled with an include folder of its own, which has
-# links to the layer itself and to those before it. So an include of a later layer finds no file.
+# src/layers.txt has their graph. A room is compiled with an include folder of its own, which has links
+# to the room itself, to those that its line names, and to those that their headers may include in
+# turn. So an include of any other room finds no file. tests/layers/check_layers.py refuses those that
+# are found although the line of the room does not name them.
 set(layers_file ${PROJECT_SOURCE_DIR}/src/layers.txt)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${layers_file})
-file(STRINGS ${layers_file} tomofield_layers REGEX "^[a-z_]+$")
+file(STRINGS ${layers_file} layer_lines REGEX "^[a-z_]+:")
+set(tomofield_layers)
+foreach(line IN LISTS layer_lines)
+  string(REGEX MATCHALL "[a-z_]+" visible ${line})
+  list(POP_FRONT visible layer)
+  list(APPEND tomofield_layers ${layer})
+  set(visible_${layer} ${layer})
+  foreach(included IN LISTS visible)
+    if(NOT included IN_LIST tomofield_layers)
+      message(FATAL_ERROR "src/layers.txt: '${layer}' names '${included}', which has no line above it.")
+    endif()
+    list(APPEND visible_${layer} ${visible_${included}})
+  endforeach()
+  list(REMOVE_DUPLICATES visible_${layer})
+endforeach()
 
 file(GLOB folders CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/*)
 foreach(folder IN LISTS folders)
   get_filename_component(layer ${folder} NAME)
   file(GLOB_RECURSE files ${folder}/*.h ${folder}/*.cc)
   if(IS_DIRECTORY ${folder} AND files AND NOT layer IN_LIST tomofield_layers)
-    message(FATAL_ERROR "src/${layer} has no place in src/layers.txt; write it there.")
+    message(FATAL_ERROR "src/${layer} has no line in src/layers.txt; write it there.")
   endif()
 endforeach()
 
 # Every layer's include folder ends in src, so that compilers, editors and clang-tidy show src/….
 set(tomofield_layers_dir ${PROJECT_BINARY_DIR}/layers)
 file(REMOVE_RECURSE ${tomofield_layers_dir})
-set(visible_layers)
 foreach(layer IN LISTS tomofield_layers)
-  list(APPEND visible_layers ${layer})
   file(MAKE_DIRECTORY ${tomofield_layers_dir}/${layer}/src)
-  foreach(visible IN LISTS visible_layers)
+  foreach(visible IN LISTS visible_${layer})
     file(CREATE_LINK ${PROJECT_SOURCE_DIR}/src/${visible}
       ${tomofield_layers_dir}/${layer}/src/${visible} SYMBOLIC)
   endforeach()

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/config_file.h"
+#include "cli/options/config_file.h"
 #include "fuzz_input.h"
 #include "option_table/values.h"
 

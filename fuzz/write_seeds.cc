@@ -11,12 +11,13 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "checkpoint/checkpoint.h"
 #include "compact/compress.h"
 #include "io/mrc.h"
-#include "reconstruct/checkpoint.h"
-#include "reconstruct/tuning.h"
-#include "selection/trial_file.h"
 #include "small_fit.h"
+#include "tune/trial_file.h"
+#include "tune/trial_settings.h"
+#include "tune/tuning.h"
 #include "uneven_model.h"
 
 namespace {
@@ -169,10 +170,10 @@ void write_series(const fs::path& folder, const std::string& stack) {
 }
 
 void write_trials(const fs::path& folder) {
-  using namespace reconstruction;
+  using namespace tune;
   const TrialSettings settings{Penalty::kSmooth, 5, 12, 30};
-  const selection::HeldOutScore score{1.25, {1.0, 1.5}};
-  const nlohmann::json trial = selection::trial_json(settings_json(settings), score, 2.5);
+  const tune::HeldOutScore score{1.25, {1.0, 1.5}};
+  const nlohmann::json trial = tune::trial_json(settings_json(settings), score, 2.5);
   write(folder / "file", nlohmann::json{{"fingerprint", "{}"}, {"trials", {trial, trial}}}.dump());
   const TunedFit tuned{
       .settings = settings, .trials = {{settings, score, 2.5}}, .predicted_views = {3, 9}};
@@ -195,8 +196,8 @@ void write_models(const fs::path& folder) {
     const auto fit = series.make();
     fit->run([&](const fit::Fit& f) { return f.progress().step != steps; });
     const fs::path path = folder / "checkpoint" / std::to_string(steps);
-    reconstruction::save_checkpoint(path, *fit, series.info(),
-                                    {.fingerprint = testing::SmallFit::kFingerprint, .tuned = {}});
+    checkpoint::save_checkpoint(path, *fit, series.info(),
+                                {.fingerprint = testing::SmallFit::kFingerprint, .tuned = {}});
     fs::copy_file(path, folder / "model" / ("checkpoint" + std::to_string(steps)),
                   fs::copy_options::overwrite_existing);
   }

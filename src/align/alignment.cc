@@ -1,5 +1,7 @@
 #include "align/alignment.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <limits>
 #include <optional>
@@ -19,6 +21,7 @@
 #include "measurement/prepare.h"
 #include "tilt_series/align_image.h"
 #include "tilt_series/binning.h"
+#include "tomofield/error.h"
 
 namespace tomofield::align {
 namespace {
@@ -70,6 +73,14 @@ void refine_slow_part(const JointProblem& problem, const distributed::Communicat
 }
 
 }  // namespace
+
+void require_views(std::size_t num_views) {
+  if (num_views < kFewestViews)
+    throw Error(
+        fmt::format("--align needs at least {} views, since it judges the alignment by "
+                    "views that it holds out, and there are {}",
+                    kFewestViews, num_views));
+}
 
 fit::FieldOptions planned_field(const fit::FieldOptions& field) { return aligning_field(field); }
 

@@ -15,6 +15,11 @@
 
 namespace tomofield::align {
 
+/// An alignment is judged by views that it holds out, so it needs some.
+constexpr std::size_t kFewestViews = 12;
+/// Throws Error if there are fewer.
+void require_views(std::size_t num_views);
+
 /// The local motion of a series, and whether held-out views are predicted better with it.
 struct LocalTrial {
   Comparison held_out;

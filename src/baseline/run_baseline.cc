@@ -27,8 +27,8 @@
 #include "output/metrics.h"
 #include "output/shared_options.h"
 #include "projection/sample_grid.h"
-#include "selection/trial_measurement.h"
 #include "tomofield/error.h"
+#include "tune/trial_measurement.h"
 
 namespace tomofield::baseline {
 namespace {
@@ -54,7 +54,7 @@ std::size_t estimate_memory(const measurement::Measurement& plan,
                             const projection::SampleGrid& grid, const MethodFacts& method,
                             const MethodSize& size, std::size_t stored_views, std::size_t decoding,
                             bool tunes) {
-  constexpr std::size_t kTrialSlabs = selection::kTrialRows / kLanes;
+  constexpr std::size_t kTrialSlabs = tune::kTrialRows / kLanes;
   constexpr std::size_t kFixed = std::size_t{24} << 20;  // program and libraries
   const std::size_t slabs = static_cast<std::size_t>((plan.roi.height() + kLanes - 1) / kLanes);
   const std::size_t rays = static_cast<std::size_t>(plan.geometry.num_views()) *
@@ -241,7 +241,7 @@ BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const Baseline
   // This and trial_views() throw if there are too few views.
   const std::vector<int> held_out =
       measurement::held_out_views(planned.geometry.tilt_deg, options.shared.hold_out);
-  if (options.shared.tune) selection::trial_views(planned.geometry.tilt_deg, held_out);
+  if (options.shared.tune) tune::trial_views(planned.geometry.tilt_deg, held_out);
   const projection::SampleGrid grid = grid_of(planned, options);
   BaselinePlan plan;
   plan.num_views = planned.geometry.num_views();

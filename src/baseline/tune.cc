@@ -13,14 +13,14 @@
 #include "base/stopwatch.h"
 #include "base/trace.h"
 #include "baseline/voxel_problem.h"
-#include "selection/scores.h"
-#include "selection/trial_file.h"
-#include "selection/trial_measurement.h"
+#include "tune/scores.h"
+#include "tune/trial_file.h"
+#include "tune/trial_measurement.h"
 
 namespace tomofield::baseline {
 namespace {
 
-using Trials = selection::Trials<Method>;
+using Trials = tune::Trials<Method>;
 
 constexpr int kLadderSteps = 4;  // factors of √2 up and down from the first number of iterations
 constexpr int kCutoffs = 7;      // candidates, each √2 times the one before
@@ -52,9 +52,8 @@ class TrialRuns {
   TrialRuns(const TrialData& data, const base::ProgressSink& progress)
       : data_(data),
         progress_(progress),
-        views_(selection::trial_views(data.measurement.geometry.tilt_deg, data.scored)),
-        measurement_(
-            selection::trial_measurement(data.measurement, views_, selection::kTrialRows)) {}
+        views_(tune::trial_views(data.measurement.geometry.tilt_deg, data.scored)),
+        measurement_(tune::trial_measurement(data.measurement, views_, tune::kTrialRows)) {}
 
   // Runs a method to its end.
   Trial whole_run(const Method& method) {
@@ -126,7 +125,7 @@ class TrialRuns {
 
   const TrialData& data_;
   const base::ProgressSink& progress_;
-  selection::TrialViews views_;
+  tune::TrialViews views_;
   measurement::Measurement measurement_;
   base::Stopwatch running_;
   int num_runs_ = 0, expected_runs_ = 0;
@@ -191,7 +190,7 @@ void choose_cutoff(Options& options, Trials& trials) {
 // Repeats the search with more iterations until the chosen trial is at its minimum.
 Method tuned(const TvOptions& start, TrialRuns& runs, Trials& trials) {
   for (TvOptions tried = start;;) {
-    const int expected = selection::kUsualWeights + (votes_on_penalty(tried) ? 1 : 0);
+    const int expected = tune::kUsualWeights + (votes_on_penalty(tried) ? 1 : 0);
     runs.expect(expected, expected * tried.iterations);
     TvOptions chosen = with_better_penalty(tried, trials);
     choose_weight(chosen, trials);
@@ -211,7 +210,7 @@ Method tuned(const TvOptions& start, TrialRuns& runs, Trials& trials) {
 
 template <typename Options>
 void expect_runs(const Options& options, TrialRuns& runs) {
-  constexpr int kWeights = HasWeight<Options> ? selection::kUsualWeights : 0;
+  constexpr int kWeights = HasWeight<Options> ? tune::kUsualWeights : 0;
   if constexpr (StopsEarly<Options>) {
     runs.expect(kWeights + 1,
                 kWeights * options.iterations + on_ladder(options.iterations, kLadderSteps));
@@ -241,6 +240,6 @@ Tuned tune(const Method& start, const TrialData& data, const base::ProgressSink&
   return {method, trials.made(), runs.predicted_views()};
 }
 
-nlohmann::json tuning_json(const Tuned& tuned) { return selection::tuned_json(tuned, json_of); }
+nlohmann::json tuning_json(const Tuned& tuned) { return tune::tuned_json(tuned, json_of); }
 
 }  // namespace tomofield::baseline

@@ -8,7 +8,7 @@
 #include "baseline/method.h"
 #include "measurement/prepare.h"
 #include "projection/sample_grid.h"
-#include "selection/trials.h"
+#include "tune/trials.h"
 
 namespace tomofield::baseline {
 
@@ -25,8 +25,8 @@ template <typename Options>
 concept Tunable = HasWeight<Options> || StopsEarly<Options> || HasCutoff<Options>;
 
 /// A method is the settings of its trials.
-using Trial = selection::Trial<Method>;
-using Tuned = selection::Tuned<Method>;
+using Trial = tune::Trial<Method>;
+using Tuned = tune::Tuned<Method>;
 
 /// The data of the trials.
 struct TrialData {
@@ -37,7 +37,7 @@ struct TrialData {
 };
 
 /// Chooses the settings that best predict views held out from the trials. Its rules, rows and views
-/// are those of the main method's tuning (selection/trials.h, selection/trial_measurement.h).
+/// are those of the main method's tuning (tune/trials.h, tune/trial_measurement.h).
 ///
 /// It chooses the penalty if neither the penalty nor a weight is given: the views vote on both
 /// penalties with their usual weights. It chooses the weight by search_weight(). For methods that

@@ -78,8 +78,7 @@ TEST_F(BaselineTune, TriesBothPenaltiesIfNothingIsSaid) {
   const Tuned found = tuned(tv({}));
   EXPECT_EQ(std::get<TvOptions>(found.trials[0].settings).penalty, Penalty::kConcave);
   EXPECT_EQ(std::get<TvOptions>(found.trials[1].settings).penalty, Penalty::kSmooth);
-  const bool votes_smooth =
-      selection::most_views_prefer(found.trials[1].score, found.trials[0].score);
+  const bool votes_smooth = tune::most_views_prefer(found.trials[1].score, found.trials[0].score);
   EXPECT_EQ(std::get<TvOptions>(found.settings).penalty,
             votes_smooth ? Penalty::kSmooth : Penalty::kConcave);
   TvOptions concave = tv({});

@@ -9,7 +9,7 @@
 #include "batch/read_json.h"
 #include "io/json.h"
 #include "io/json_numbers.h"
-#include "reconstruct/options.h"
+#include "output/output_paths.h"
 #include "tomofield/error.h"
 
 namespace tomofield::batch {
@@ -129,17 +129,17 @@ JobList read_jobs(const fs::path& file) {
 }
 
 bool has_results(const fs::path& output) {
-  const reconstruction::OutputPaths paths = reconstruction::output_paths(output);
+  const output::OutputPaths paths = output::output_paths(output);
   return fs::exists(paths.volume) && fs::exists(paths.json);
 }
 
 bool has_checkpoint(const fs::path& output) {
-  const reconstruction::OutputPaths paths = reconstruction::output_paths(output);
+  const output::OutputPaths paths = output::output_paths(output);
   return fs::exists(paths.model) || fs::exists(paths.trials);
 }
 
 bool can_resume(const fs::path& output) {
-  return has_checkpoint(output) || fs::exists(reconstruction::output_paths(output).alignment);
+  return has_checkpoint(output) || fs::exists(output::output_paths(output).alignment);
 }
 
 std::vector<std::string> command_of(const fs::path& program, const Job& job, int threads,

@@ -4,10 +4,10 @@
 #include <optional>
 #include <string>
 
+#include "exchange/relion_output.h"
 #include "io/atomic_file.h"
 #include "io/output_set.h"
 #include "io/star_file.h"
-#include "reconstruct/relion_output.h"
 
 namespace tomofield::batch {
 
@@ -40,7 +40,7 @@ bool are_of_star_files(const std::vector<Job>& jobs) {
 void write_relion_table(const fs::path& folder, const std::vector<Job>& finished) {
   std::optional<io::StarTable> all;
   for (const Job& job : finished) {
-    const auto row = reconstruction::read_relion_output(job.output);
+    const auto row = exchange::read_relion_output(job.output);
     if (row && all)
       add_row(*row, *all);
     else if (row)

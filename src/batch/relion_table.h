@@ -15,7 +15,7 @@ std::filesystem::path relion_table(const std::filesystem::path& folder);
 bool are_of_star_files(const std::vector<Job>& jobs);
 
 /// Writes a tomograms.star with the rows that the runs of these jobs have written beside their
-/// tomograms (reconstruct/relion_output.h), with all columns. A job without such a row has none. If
+/// tomograms (exchange/relion_output.h), with all columns. A job without such a row has none. If
 /// no job has one, removes an older file. An active io::OutputSet gives the file its name. Throws
 /// Error if it cannot be written.
 void write_relion_table(const std::filesystem::path& folder, const std::vector<Job>& finished);

@@ -22,7 +22,7 @@
 #include "io/json_numbers.h"
 #include "io/output_lock.h"
 #include "io/output_set.h"
-#include "reconstruct/options.h"
+#include "output/output_paths.h"
 #include "report/html.h"
 #include "tomofield/error.h"
 
@@ -74,8 +74,7 @@ std::vector<Line> read_lines(const fs::path& folder, const std::vector<Job>& job
   std::vector<Line> lines;
   for (const Job& job : jobs) {
     lines.push_back({&job, read_state(folder, job), {}, {}, {}});
-    if (has_result(lines.back()))
-      read_metrics(reconstruction::output_paths(job.output).json, lines.back());
+    if (has_result(lines.back())) read_metrics(output::output_paths(job.output).json, lines.back());
   }
   return lines;
 }
@@ -116,12 +115,12 @@ std::string csv_text(const std::vector<Line>& lines) {
 
 // Returns the links to the files of a series that are there.
 std::vector<report::HtmlLink> links_of(const fs::path& folder, const Job& job) {
-  const reconstruction::OutputPaths paths = reconstruction::output_paths(job.output);
+  const output::OutputPaths paths = output::output_paths(job.output);
   std::vector<report::HtmlLink> links;
   const auto add = [&](const char* text, const fs::path& file) {
     if (fs::exists(file)) links.push_back({text, fs::absolute(file).lexically_proximate(folder)});
   };
-  add("report", job.output.parent_path() / (job.output.stem().string() + "_report.html"));
+  add("report", paths.report);
   add("tomogram", paths.volume);
   add("metrics", paths.json);
   add("log", log_of(folder, job));
@@ -144,8 +143,7 @@ std::string mark_of(const Line& line) {
 
 std::vector<report::HtmlCell> page_row(const fs::path& folder, const Line& line) {
   const base::Costs& costs = line.state.costs;
-  const fs::path picture =
-      reconstruction::output_paths(line.job->output).picture_prefix.string() + "_xy.png";
+  const fs::path picture = output::output_paths(line.job->output).xy_picture;
   report::HtmlCell shown{.text = {}, .mark = "picture"};
   if (fs::exists(picture)) shown.picture = fs::absolute(picture).lexically_proximate(folder);
   const bool has_run = costs.wall_seconds > 0;

@@ -8,7 +8,7 @@
 #include "base/log.h"
 #include "batch/slurm.h"
 #include "batch/summary.h"
-#include "reconstruct/options.h"
+#include "output/output_paths.h"
 #include "tomofield/error.h"
 
 namespace tomofield::batch {
@@ -31,7 +31,7 @@ std::string memory_fault(const Job& job, int threads) {
 
 // Returns when a checkpoint or the trials were last written, or nothing if there are none.
 std::optional<fs::file_time_type> last_progress(const Job& job) {
-  const reconstruction::OutputPaths paths = reconstruction::output_paths(job.output);
+  const output::OutputPaths paths = output::output_paths(job.output);
   std::optional<fs::file_time_type> last;
   for (const fs::path& file : {paths.model, paths.trials}) {
     std::error_code error;

@@ -1,5 +1,5 @@
-#include "cli/console.h"
 #include "cli/program.h"
+#include "cli/terminal/console.h"
 #include "distributed/communicator.h"
 #include "tomofield/error.h"
 

@@ -14,10 +14,11 @@
 #include "evaluate/uncertainty.h"
 #include "io/json.h"
 #include "io/output_set.h"
+#include "output/output_paths.h"
 #include "output/volume.h"
-#include "reconstruct/choice_plot.h"
 #include "reconstruct/half_measurement.h"
-#include "reconstruct/stale_files.h"
+#include "reconstruct/run_files.h"
+#include "report/choice_plot.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
 
@@ -34,7 +35,7 @@ struct Agreement {
   evaluate::LocalResolution local;
 };
 
-const OutputPaths::OfHalf& paths_of(const Run& run, Half half) {
+const output::OutputPaths::OfHalf& paths_of(const Run& run, Half half) {
   return run.paths.halves[static_cast<std::size_t>(half)];
 }
 
@@ -117,7 +118,8 @@ json halves_json(const Run& run, const FinishedFits& fits, const Agreement& foun
     return evaluate::fsc_json(
         fsc, {.first = even, .second = odd, .mask = {}, .box = {}, .tilts = tilt_range(run)});
   };
-  const OutputPaths::OfHalf &even = paths_of(run, Half::kEven), &odd = paths_of(run, Half::kOdd);
+  const output::OutputPaths::OfHalf &even = paths_of(run, Half::kEven),
+                                    &odd = paths_of(run, Half::kOdd);
   const double voxel_A = run.measurement.pixel_size_A;
   json all = {{"of", run.options.resolved.split_tilts ? "tilts" : "frames"},
               {"fsc", fsc_json(found.fsc, even.volume, odd.volume)},
@@ -152,7 +154,8 @@ void log_halves(const Run& run, const evaluate::Fsc& fsc) {
       "the FSC of the halves falls below 0.5 {} and below 0.143 {}; it is too optimistic, because "
       "the errors of two regularised fits are alike",
       crossing_text(fsc, 0.5), crossing_text(fsc, 0.143)));
-  const OutputPaths::OfHalf &even = paths_of(run, Half::kEven), &odd = paths_of(run, Half::kOdd);
+  const output::OutputPaths::OfHalf &even = paths_of(run, Half::kEven),
+                                    &odd = paths_of(run, Half::kOdd);
   base::log_warning(fmt::format(
       "'{}' and '{}' are regularised: do not train cryoCARE, IsoNet or DeepDeWedge with them; {}",
       even.volume.string(), odd.volume.string(),
@@ -177,11 +180,11 @@ void log_halves(const Run& run, const evaluate::Fsc& fsc) {
 }
 
 void write_all(const tilt_series::TiltSeries& series, const Run& run, const FinishedFits& fits,
-               const std::optional<TunedFit>& tuned, Results& results) {
+               const std::optional<tune::TunedFit>& tuned, Results& results) {
   io::OutputSet outputs;
   const Agreement found = write_maps(series, run, outputs);
   write_fsc_plot(found, run.paths.fsc_picture);
-  if (tuned) write_choice_plot(*tuned, run.paths.choice_picture);
+  if (tuned) report::write_choice_plot(*tuned, run.paths.choice_picture);
   if (fits.held_out_view)
     report::write_held_out_picture(*fits.held_out_view, run.paths.held_out_picture);
   results.metrics["halves"] = halves_json(run, fits, found);
@@ -195,12 +198,12 @@ void write_all(const tilt_series::TiltSeries& series, const Run& run, const Fini
 }  // namespace
 
 Results write_half_results(const tilt_series::TiltSeries& series, const Run& run,
-                           const FinishedFits& fits, const std::optional<TunedFit>& tuned) {
-  Verdict verdict = fits.whole.verdict;
+                           const FinishedFits& fits, const std::optional<tune::TunedFit>& tuned) {
+  verdict::Verdict verdict = fits.whole.verdict;
   verdict.seconds = fits.halves.back().verdict.seconds;  // of all three fits
   verdict.peak_GiB = fits.halves.back().verdict.peak_GiB;
   json metrics = fits.whole.metrics;
-  metrics["verdict"] = verdict_json(verdict);
+  metrics["verdict"] = verdict::verdict_json(verdict);
   Results results{.model = {},
                   .metrics = run_json(run.options, std::move(metrics)),
                   .verdict = std::move(verdict),

@@ -5,8 +5,8 @@
 
 #include "reconstruct/results.h"
 #include "reconstruct/run.h"
-#include "reconstruct/tuning.h"
 #include "tilt_series/tilt_series.h"
+#include "tune/tuning.h"
 
 namespace tomofield::reconstruction {
 
@@ -23,6 +23,6 @@ struct FinishedFits {
 /// them appear together (io::OutputSet). If one cannot be written, none appears; the models stay,
 /// and Error is thrown. Every process calls it; the root writes.
 Results write_half_results(const tilt_series::TiltSeries& series, const Run& run,
-                           const FinishedFits& fits, const std::optional<TunedFit>& tuned);
+                           const FinishedFits& fits, const std::optional<tune::TunedFit>& tuned);
 
 }  // namespace tomofield::reconstruction

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/log.h"
-#include "reconstruct/checkpoint.h"
+#include "checkpoint/checkpoint.h"
 #include "reconstruct/half_measurement.h"
 #include "reconstruct/half_results.h"
 #include "reconstruct/results.h"
@@ -59,10 +59,10 @@ base::ProgressSink progress_of(const base::ProgressSink& all, const Part& part) 
 // Makes a fit, examines it, and saves its model. Returns nothing if a stop was requested; there is
 // a checkpoint then.
 std::optional<FinishedPart> fit_part(const Run& run, RunRecord record,
-                                     const std::optional<TunedFit>& tuned, const Part& part,
+                                     const std::optional<tune::TunedFit>& tuned, const Part& part,
                                      bool resumes) {
   base::log_info(fmt::format("{}: {} views", part.name, part.measurement.num_fitted_views()));
-  record.origin = {fingerprint_of(run.options, part.measurement, run.processes), tuned};
+  record.origin = {checkpoint::fingerprint_of(run.options, part.measurement, run.processes), tuned};
   const base::ProgressSink progress = progress_of(run.hooks.progress, part);
   const FitRun made = run_fit(run, {.measurement = part.measurement,
                                     .model = part.model,
@@ -79,8 +79,8 @@ std::optional<FinishedPart> fit_part(const Run& run, RunRecord record,
                         .held_out_view = {},
                         .took_steps = made.took_steps};
   finished.held_out_view = central_held_out_view(*made.fit, part.measurement, finished.findings);
-  save_fit(part.model, *made.fit, model_info(part.measurement, run.options),
-           progress_state(*made.fit, record.origin));
+  checkpoint::save_fit(part.model, *made.fit, checkpoint::model_info(part.measurement, run.options),
+                       checkpoint::progress_state(*made.fit, record.origin));
   return finished;
 }
 
@@ -95,7 +95,7 @@ void forget_old_model(const Run& run, Half half) {
 }  // namespace
 
 RunResult reconstruct_halves(const tilt_series::TiltSeries& series, const Run& run,
-                             const RunRecord& record, const std::optional<TunedFit>& tuned) {
+                             const RunRecord& record, const std::optional<tune::TunedFit>& tuned) {
   bool resumes = run.options.resolved.resume;
   // A half of the tilts has half of the views, and a half of the frames has all of them.
   const double of_half = run.options.resolved.split_tilts ? 1.0 / 4 : 1.0 / 3;

@@ -2,10 +2,10 @@
 
 #include <optional>
 
+#include "reconstruct/reconstruct.h"
 #include "reconstruct/run.h"
-#include "reconstruct/run_record.h"
-#include "reconstruct/tuning.h"
 #include "tilt_series/tilt_series.h"
+#include "tune/tuning.h"
 
 namespace tomofield::reconstruction {
 
@@ -16,6 +16,6 @@ namespace tomofield::reconstruction {
 /// what they tell. `run` has its settings chosen, by `tuned` if there were trials. Every process
 /// calls it.
 RunResult reconstruct_halves(const tilt_series::TiltSeries& series, const Run& run,
-                             const RunRecord& record, const std::optional<TunedFit>& tuned);
+                             const RunRecord& record, const std::optional<tune::TunedFit>& tuned);
 
 }  // namespace tomofield::reconstruction

@@ -18,6 +18,7 @@
 #include "base/range.h"
 #include "base/stopwatch.h"
 #include "base/trace.h"
+#include "checkpoint/checkpoint.h"
 #include "compact/budget.h"
 #include "compact/compress.h"
 #include "evaluate/artefacts.h"
@@ -25,13 +26,13 @@
 #include "io/output_set.h"
 #include "option_table/setting.h"
 #include "output/metrics.h"
-#include "output/shared_options.h"
+#include "output/output_paths.h"
 #include "output/volume.h"
-#include "reconstruct/choice_plot.h"
-#include "reconstruct/judge.h"
-#include "reconstruct/stale_files.h"
+#include "reconstruct/run_files.h"
+#include "report/choice_plot.h"
 #include "report/pictures.h"
 #include "tomofield/error.h"
+#include "verdict/judge.h"
 
 namespace tomofield::reconstruction {
 namespace {
@@ -48,7 +49,7 @@ measurement::PredictedView view_near_zero(const fit::Fit& fit,
 }
 
 nlohmann::json held_out_json(const fit::Fit& fit, const measurement::Measurement& series,
-                             const ReconstructOptions& options,
+                             const options::ReconstructOptions& options,
                              const std::optional<measurement::ViewErrors>& errors) {
   if (!errors) return nullptr;
   nlohmann::json json =
@@ -96,8 +97,8 @@ void write_all(const Writers& writers, const distributed::Communicator& processe
 
 // Writes the results of a fit into files.
 void write_results(Results& results, const ResultFiles& files) {
-  const std::optional<TunedFit>& tuned = files.origin.tuned;
-  const OutputPaths paths = output_paths(files.options.resolved.output);
+  const std::optional<tune::TunedFit>& tuned = files.origin.tuned;
+  const output::OutputPaths paths = output::output_paths(files.options.resolved.output);
   const distributed::Communicator& processes = files.share.processes;
   Writers writers;
   if (processes.size() == 1) {
@@ -117,7 +118,7 @@ void write_results(Results& results, const ResultFiles& files) {
   if (tuned) {
     writers.push_back([&] {
       processes.run_collectively([&] {
-        if (processes.is_root()) write_choice_plot(*tuned, paths.choice_picture);
+        if (processes.is_root()) report::write_choice_plot(*tuned, paths.choice_picture);
       });
     });
   }
@@ -187,7 +188,7 @@ void make_compact(const compact::Budget& budget, Results& results) {
 // Does the same. If that fails, keeps the finished fit.
 void make_compact_or_keep(const ResultFiles& files, std::optional<io::OutputSet>& outputs,
                           Results& results) {
-  const std::filesystem::path model = output_paths(files.options.resolved.output).model;
+  const std::filesystem::path model = output::output_paths(files.options.resolved.output).model;
   try {
     make_compact(compact::parse_budget(files.options.resolved.budget), results);
   } catch (const Error&) {
@@ -198,15 +199,8 @@ void make_compact_or_keep(const ResultFiles& files, std::optional<io::OutputSet>
 
 }  // namespace
 
-output::ModelInfo model_info(const measurement::Measurement& series,
-                             const ReconstructOptions& options) {
-  output::ModelInfo info = output::model_info(series, options.input.contrast);
-  info.options_json = options_json(options).dump();
-  return info;
-}
-
 Findings examine(const fit::Fit& fit, const measurement::Measurement& series,
-                 const ReconstructOptions& options, const RunRecord& record) {
+                 const options::ReconstructOptions& options, const RunRecord& record) {
   Findings found;
   found.metrics = output::metrics_json(fit, series, record.fit_seconds);
   found.metrics["tv_weight"] = options.fit.density_variation;
@@ -216,14 +210,15 @@ Findings examine(const fit::Fit& fit, const measurement::Measurement& series,
   }
   found.metrics["held_out"] = held_out_json(fit, series, options, found.held_out);
   found.metrics["processes"] = output::processes_json(fit, record.fit_seconds);
-  found.verdict =
-      judge({fit, series, options, record, volume_share(fit, series).rows}, found.held_out);
+  found.verdict = verdict::judge(
+      {fit, series, options, record.origin.tuned, record.alignment, volume_share(fit, series).rows},
+      found.held_out);
   found.metrics.update(
       evaluate::artefacts_json(found.verdict.artefacts.speckle, found.verdict.artefacts.faces));
-  found.metrics["verdict"] = verdict_json(found.verdict);
-  const std::optional<TunedFit>& tuned = record.origin.tuned;
+  found.metrics["verdict"] = verdict::verdict_json(found.verdict);
+  const std::optional<tune::TunedFit>& tuned = record.origin.tuned;
   found.metrics["alignment"] = options.alignment;
-  found.metrics["tuning"] = tuned ? tuning_json(*tuned) : nlohmann::json(nullptr);
+  found.metrics["tuning"] = tuned ? tune::tuning_json(*tuned) : nlohmann::json(nullptr);
   return found;
 }
 
@@ -233,30 +228,30 @@ std::optional<measurement::PredictedView> central_held_out_view(
   return view_near_zero(fit, series, *found.held_out);
 }
 
-nlohmann::json run_json(const ReconstructOptions& options, nlohmann::json metrics) {
+nlohmann::json run_json(const options::ReconstructOptions& options, nlohmann::json metrics) {
   return {{"tomofield", TOMOFIELD_VERSION},
-          {"options", options_json(options)},
+          {"options", options::options_json(options)},
           {"origins", option_table::to_json(options.origins)},
           {"metrics", std::move(metrics)}};
 }
 
 Results finish(fit::Fit& fit, const measurement::Measurement& series,
-               const ReconstructOptions& options, const RunRecord& record,
+               const options::ReconstructOptions& options, const RunRecord& record,
                const WriteMore& write_more) {
-  const FitOrigin& origin = record.origin;
+  const checkpoint::FitOrigin& origin = record.origin;
   const bool writes_files = !options.resolved.output.empty();
   fit.free_optimizer();  // the verdict and a compact model need the memory
   Findings found = examine(fit, series, options, record);
   std::optional<measurement::PredictedView> view;
   if (writes_files) view = central_held_out_view(fit, series, found);
   const output::VolumeShare share = volume_share(fit, series);
-  const output::ModelInfo info = model_info(series, options);
-  const OutputPaths paths = output_paths(options.resolved.output);
+  const output::ModelInfo info = checkpoint::model_info(series, options);
+  const output::OutputPaths paths = output::output_paths(options.resolved.output);
   const distributed::Communicator& processes = share.processes;
-  const output::TrainingState state = progress_state(fit, origin);
+  const output::TrainingState state = checkpoint::progress_state(fit, origin);
   std::optional<io::OutputSet> outputs;
   if (writes_files) outputs.emplace();
-  if (writes_files && processes.size() > 1) save_fit(paths.model, fit, info, state);
+  if (writes_files && processes.size() > 1) checkpoint::save_fit(paths.model, fit, info, state);
   Results results{.model = output::Model{info, fit.take_field(), std::nullopt},
                   .metrics = run_json(options, std::move(found.metrics)),
                   .verdict = std::move(found.verdict),
@@ -270,7 +265,7 @@ Results finish(fit::Fit& fit, const measurement::Measurement& series,
 
 void write_together(const ResultFiles& files, io::OutputSet& outputs, Results& results) {
   const distributed::Communicator& processes = files.share.processes;
-  const OutputPaths paths = output_paths(files.options.resolved.output);
+  const output::OutputPaths paths = output::output_paths(files.options.resolved.output);
   try {
     write_results(results, files);
     processes.run_collectively([&] {

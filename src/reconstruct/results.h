@@ -1,36 +1,31 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "checkpoint/checkpoint.h"
 #include "fit/fit.h"
 #include "io/output_set.h"
 #include "measurement/prepare.h"
+#include "options/run_options.h"
 #include "output/model_file.h"
 #include "output/volume.h"
-#include "reconstruct/checkpoint.h"
-#include "reconstruct/options.h"
-#include "reconstruct/run_record.h"
-#include "reconstruct/verdict.h"
+#include "reconstruct/run.h"
+#include "verdict/verdict.h"
 
 namespace tomofield::reconstruction {
-
-/// Returns the metadata of a fitted model: geometry, region, units, contrast and options.
-output::ModelInfo model_info(const measurement::Measurement& series,
-                             const ReconstructOptions& options);
 
 /// What a finished fit tells of itself.
 struct Findings {
   nlohmann::json metrics;
-  Verdict verdict;
+  verdict::Verdict verdict;
   std::optional<measurement::ViewErrors> held_out;
 };
 
 /// Measures what a finished fit tells. Every process calls it.
 Findings examine(const fit::Fit& fit, const measurement::Measurement& series,
-                 const ReconstructOptions& options, const RunRecord& record);
+                 const options::ReconstructOptions& options, const RunRecord& record);
 
 /// The results of a run.
 struct Results {
@@ -38,24 +33,21 @@ struct Results {
   /// models are in files.
   std::optional<output::Model> model;
   nlohmann::json metrics;  ///< the content of the JSON file beside the volume
-  Verdict verdict;
+  verdict::Verdict verdict;
   tilt_series::BeadMasking bead_masking = tilt_series::BeadMasking::kNone;
 };
-
-/// Writes more results of a run, whose volume is in the file `volume`.
-using WriteMore = std::function<void(const Results& results, const std::filesystem::path& volume)>;
 
 /// Predicts the held-out view nearest to zero tilt, if views are held out.
 std::optional<measurement::PredictedView> central_held_out_view(
     const fit::Fit& fit, const measurement::Measurement& series, const Findings& found);
 
 /// Returns the content of the JSON file of a run.
-nlohmann::json run_json(const ReconstructOptions& options, nlohmann::json metrics);
+nlohmann::json run_json(const options::ReconstructOptions& options, nlohmann::json metrics);
 
 /// What the files of a run are written from, beside its results.
 struct ResultFiles {
-  const ReconstructOptions& options;
-  const FitOrigin& origin;
+  const options::ReconstructOptions& options;
+  const checkpoint::FitOrigin& origin;
   const output::TrainingState& state;  ///< of the fit, for a model that can be continued
   const output::VolumeShare& share;
   const std::optional<measurement::PredictedView>& held_out_view;
@@ -71,7 +63,7 @@ void write_together(const ResultFiles& files, io::OutputSet& outputs, Results& r
 /// the volume, it writes the files (write_together()); the model is the checkpoint of the finished
 /// fit. Every process calls it.
 Results finish(fit::Fit& fit, const measurement::Measurement& series,
-               const ReconstructOptions& options, const RunRecord& record,
+               const options::ReconstructOptions& options, const RunRecord& record,
                const WriteMore& write_more);
 
 }  // namespace tomofield::reconstruction

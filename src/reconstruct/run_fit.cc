@@ -8,7 +8,7 @@
 #include "base/log.h"
 #include "base/stopwatch.h"
 #include "base/trace.h"
-#include "reconstruct/results.h"
+#include "checkpoint/checkpoint.h"
 #include "tomofield/error.h"
 
 namespace tomofield::reconstruction {
@@ -31,7 +31,7 @@ void resume(const FitJob& job, fit::Fit& fit) {
     base::log_info(fmt::format("no checkpoint {} yet: starting from the beginning", path.string()));
     return;
   }
-  read_checkpoint([&] { restore_fit(path, job.origin.fingerprint, fit); });
+  checkpoint::read_checkpoint([&] { checkpoint::restore_fit(path, job.origin.fingerprint, fit); });
   base::log_info(fmt::format("resuming {} at step {} of {}", path.string(), fit.progress().step,
                              fit.num_steps()));
 }
@@ -73,7 +73,8 @@ bool run_with_checkpoints(const Run& run, const FitJob& job, fit::Fit& fit) {
     const double wanted = run.processes.allreduce_max(stop ? 2.0 : is_due ? 1.0 : 0.0);
     stopped = wanted == 2.0;
     if (wanted > 0.0 && run.writes_files()) {
-      save_checkpoint(job.model, fit, model_info(job.measurement, run.options), job.origin);
+      checkpoint::save_checkpoint(job.model, fit,
+                                  checkpoint::model_info(job.measurement, run.options), job.origin);
       since_checkpoint.restart();
     }
     return !stopped;
@@ -82,15 +83,6 @@ bool run_with_checkpoints(const Run& run, const FitJob& job, fit::Fit& fit) {
 }
 
 }  // namespace
-
-void read_checkpoint(const std::function<void()>& read) {
-  try {
-    read();
-  } catch (const Error& error) {
-    throw Error(fmt::format(
-        "cannot resume: {}; to start over, give --overwrite instead of --resume", error.what()));
-  }
-}
 
 FitRun run_fit(const Run& run, const FitJob& job) {
   FitRun made{.fit = begin_fit(run, job)};

@@ -1,15 +1,14 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <vector>
 
 #include "base/progress.h"
+#include "checkpoint/checkpoint.h"
 #include "fit/fit.h"
 #include "measurement/measurement.h"
 #include "measurement/view_residuals.h"
-#include "reconstruct/checkpoint.h"
 #include "reconstruct/run.h"
 
 namespace tomofield::reconstruction {
@@ -18,7 +17,7 @@ namespace tomofield::reconstruction {
 struct FitJob {
   const measurement::Measurement& measurement;  ///< must outlive the fit
   const std::filesystem::path& model;           ///< the checkpoint
-  const FitOrigin& origin;
+  const checkpoint::FitOrigin& origin;
   bool resumes = false;  ///< from the checkpoint, if there is one
   const base::ProgressSink& progress;
   /// Models that the views keep (fit::Fit::keep_views()). Empty: the fit finds its own.
@@ -37,8 +36,5 @@ struct FitRun {
 /// Makes a fit, continues it from its checkpoint, and takes its steps. Saves checkpoints when they
 /// are due, if the run writes files. Every process calls it.
 FitRun run_fit(const Run& run, const FitJob& job);
-
-/// Calls a function that reads the checkpoint. If it throws, adds what the user can do.
-void read_checkpoint(const std::function<void()>& read);
 
 }  // namespace tomofield::reconstruction

@@ -13,11 +13,11 @@
 #include "base/memory.h"
 #include "base/stopwatch.h"
 #include "base/trace.h"
+#include "checkpoint/finished_tiles.h"
 #include "compact/budget.h"
 #include "compact/compress.h"
 #include "compact/decoded_field.h"
 #include "fit/fit.h"
-#include "reconstruct/finished_tiles.h"
 #include "reconstruct/run_fit.h"
 #include "tomofield/error.h"
 
@@ -37,7 +37,7 @@ struct CoarseStart {
 struct Example {
   Findings found;
   std::optional<measurement::PredictedView> held_out_view;
-  Tile tile;
+  plan::Tile tile;
 };
 
 // Passes on the progress of a part of the run.
@@ -56,7 +56,7 @@ base::ProgressSink part_of(const base::ProgressSink& whole, double done, double 
 }
 
 // Fits the coarse stages of the whole region. Returns nothing if the run was stopped.
-std::optional<CoarseStart> fit_coarse_stages(const Run& run, const TilePlan& plan,
+std::optional<CoarseStart> fit_coarse_stages(const Run& run, const plan::TilePlan& plan,
                                              const RunRecord& record) {
   Run coarse = run;
   coarse.options.fit.num_stages = plan.num_whole_stages;
@@ -76,8 +76,9 @@ std::optional<CoarseStart> fit_coarse_stages(const Run& run, const TilePlan& pla
   const FitRun made = run_fit(coarse, job);
   if (made.was_stopped) return std::nullopt;
   if (made.took_steps && run.writes_files())
-    save_checkpoint(run.paths.model, *made.fit, model_info(run.measurement, run.options),
-                    record.origin);
+    checkpoint::save_checkpoint(run.paths.model, *made.fit,
+                                checkpoint::model_info(run.measurement, run.options),
+                                record.origin);
   const double variance = compact::variance_of(made.fit->field(), run.measurement.roi);
   return CoarseStart{.progress = made.fit->progress(),
                      .field = made.fit->take_field(),
@@ -90,13 +91,13 @@ std::optional<CoarseStart> fit_coarse_stages(const Run& run, const TilePlan& pla
 class TileFits {
  public:
   TileFits(const Run& run, const RunRecord& record, const CoarseStart& start, int num_rows,
-           FinishedTiles& finished)
+           checkpoint::FinishedTiles& finished)
       : run_(run), record_(record), start_(start), num_rows_(num_rows), finished_(finished) {
     fit_options_.fit_view_scale = false;  // the coarse stages have found scales for all tiles
   }
 
   // Returns false if the run was stopped.
-  bool fit(const Tile& tile, std::optional<Example>* example) {
+  bool fit(const plan::Tile& tile, std::optional<Example>* example) {
     const base::TraceSpan span("tile");
     const base::Stopwatch running;
     std::vector<int> views(static_cast<std::size_t>(run_.measurement.geometry.num_views()));
@@ -121,13 +122,13 @@ class TileFits {
     }
     std::unique_ptr<field::Field> vertices = fit->take_field();
     fit.reset();  // compression needs the memory
-    finished_.add(tile, compressed(tile, std::move(vertices)), std::move(tile_json));
+    finished_.add(tile.own, compressed(tile, std::move(vertices)), std::move(tile_json));
     return true;
   }
 
  private:
   // Takes the steps of a tile. Returns false if the run was stopped.
-  bool take_steps(const Tile& tile, fit::Fit& fit) const {
+  bool take_steps(const plan::Tile& tile, fit::Fit& fit) const {
     const double of_tiles = 1 - start_.part_of_work;
     const auto rows = static_cast<double>(num_rows_);
     const base::ProgressSink progress =
@@ -152,7 +153,8 @@ class TileFits {
   }
 
   // Replaces the own rows of a tile by codes, with the budget's share of these rows.
-  TileCodes compressed(const Tile& tile, std::unique_ptr<field::Field> vertices) const {
+  checkpoint::TileCodes compressed(const plan::Tile& tile,
+                                   std::unique_ptr<field::Field> vertices) const {
     const base::Stopwatch running;
     compact::Budget budget = compact::parse_budget(run_.options.resolved.budget);
     if (budget.kind != compact::Budget::Kind::kDecibels)
@@ -163,7 +165,7 @@ class TileFits {
       const field::RootGrid& roots = vertices->tree().roots();
       rows.end = static_cast<int>(roots.y0 + roots.rows * roots.cell_size);
     }
-    const output::ModelInfo info = model_info(run_.measurement, run_.options);
+    const output::ModelInfo info = checkpoint::model_info(run_.measurement, run_.options);
     compact::CompactField made = compact::compress(
         *vertices, run_.measurement.roi, budget, rows, start_.variance,
         [&](const compact::CodedField& coded) { return output::coded_file_size(coded, info); });
@@ -174,13 +176,13 @@ class TileFits {
   const RunRecord& record_;
   const CoarseStart& start_;
   int num_rows_;
-  FinishedTiles& finished_;
+  checkpoint::FinishedTiles& finished_;
   fit::FitOptions fit_options_ = run_.options.fit;
 };
 
 // Returns the tile that is nearest to the middle of the region.
-std::size_t middle_tile(const std::vector<Tile>& tiles, int num_rows) {
-  const auto distance = [&](const Tile& tile) {
+std::size_t middle_tile(const std::vector<plan::Tile>& tiles, int num_rows) {
+  const auto distance = [&](const plan::Tile& tile) {
     return std::abs(tile.own.begin + tile.own.end - num_rows);
   };
   return static_cast<std::size_t>(std::ranges::min_element(tiles, {}, distance) - tiles.begin());
@@ -188,14 +190,15 @@ std::size_t middle_tile(const std::vector<Tile>& tiles, int num_rows) {
 
 // Returns the metrics of the run: those of the example where they are of one fit, and those of all
 // tiles.
-nlohmann::json metrics_of(const Run& run, const Example& example, const FinishedTiles& finished,
-                          const Verdict& verdict, double seconds) {
+nlohmann::json metrics_of(const Run& run, const Example& example,
+                          const checkpoint::FinishedTiles& finished,
+                          const verdict::Verdict& verdict, double seconds) {
   nlohmann::json metrics = example.found.metrics;
   const measurement::Measurement& series = run.measurement;
   metrics["size_px"] = {series.roi.width(), series.roi.height(), series.geometry.thickness};
   metrics["seconds"] = seconds;
   metrics["leaves"] = finished.coded().tree.num_leaves();
-  metrics["verdict"] = verdict_json(verdict);
+  metrics["verdict"] = verdict::verdict_json(verdict);
   metrics["example_tile"] = {example.tile.own.begin, example.tile.own.end};
   metrics["tiles"] = finished.tiles_json();
   metrics["compact"] =
@@ -204,19 +207,19 @@ nlohmann::json metrics_of(const Run& run, const Example& example, const Finished
 }
 
 // Writes the results of a run whose tiles are all finished.
-RunResult finish_tiles(const Run& run, RunRecord& record, FinishedTiles& finished, Example example,
-                       double seconds_of_coarse) {
+RunResult finish_tiles(const Run& run, RunRecord& record, checkpoint::FinishedTiles& finished,
+                       Example example, double seconds_of_coarse) {
   record.fit_seconds = seconds_of_coarse + finished.sum_of("seconds_fitting");
-  Verdict& verdict = example.found.verdict;
+  verdict::Verdict& verdict = example.found.verdict;
   verdict.residual = finished.mean_of("residual");
   verdict.seconds = run.options.since_start.seconds();
   verdict.peak_GiB = static_cast<double>(base::peak_memory()) / (1 << 30);
-  Results results{
-      .model = output::Model{model_info(run.measurement, run.options), nullptr, std::nullopt},
-      .metrics =
-          run_json(run.options, metrics_of(run, example, finished, verdict, record.fit_seconds)),
-      .verdict = std::move(verdict),
-      .bead_masking = run.measurement.masks.bead_masking};
+  Results results{.model = output::Model{checkpoint::model_info(run.measurement, run.options),
+                                         nullptr, std::nullopt},
+                  .metrics = run_json(
+                      run.options, metrics_of(run, example, finished, verdict, record.fit_seconds)),
+                  .verdict = std::move(verdict),
+                  .bead_masking = run.measurement.masks.bead_masking};
   results.model->coded = finished.take();
   if (!run.writes_files()) {
     results.model->field = compact::decode_field(*results.model->coded);
@@ -235,15 +238,16 @@ RunResult finish_tiles(const Run& run, RunRecord& record, FinishedTiles& finishe
 
 }  // namespace
 
-RunResult fit_by_tiles(const Run& run, const TilePlan& plan, RunRecord& record) {
+RunResult fit_by_tiles(const Run& run, const plan::TilePlan& plan, RunRecord& record) {
   const base::TraceSpan span("fit by tiles");
   const auto stopped = [&] {
     return RunResult{.outcome = Outcome::kStopped, .results = {}, .checkpoint = run.paths.model};
   };
-  FinishedTiles finished(run, record.origin);  // refuses tiles of another run before any work
+  checkpoint::FinishedTiles finished(
+      run.options, run.measurement, record.origin);  // refuses tiles of another run before any work
   const std::optional<CoarseStart> start = fit_coarse_stages(run, plan, record);
   if (!start) return stopped();
-  const std::vector<Tile> tiles = plan.tiles_from(finished.num_rows());
+  const std::vector<plan::Tile> tiles = plan.tiles_from(finished.num_rows());
   const std::size_t middle = middle_tile(tiles, plan.num_rows);
   TileFits fits(run, record, *start, plan.num_rows, finished);
   std::optional<Example> example;

@@ -1,9 +1,8 @@
 #pragma once
 
+#include "plan/tiles.h"
 #include "reconstruct/reconstruct.h"
 #include "reconstruct/run.h"
-#include "reconstruct/run_record.h"
-#include "reconstruct/tiles.h"
 
 namespace tomofield::reconstruction {
 
@@ -15,6 +14,6 @@ namespace tomofield::reconstruction {
 ///
 /// A stopped run goes on with --resume after the coarse stages' last checkpoint, or after the last
 /// tile that was finished.
-RunResult fit_by_tiles(const Run& run, const TilePlan& plan, RunRecord& record);
+RunResult fit_by_tiles(const Run& run, const plan::TilePlan& plan, RunRecord& record);
 
 }  // namespace tomofield::reconstruction

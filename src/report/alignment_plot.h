@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "report/curve_plot.h"
@@ -20,6 +21,9 @@ struct AlignmentCurves {
   std::vector<double> correlation;  ///< of the view with its projection
   std::vector<double> error_x_px, error_y_px;  ///< standard errors of the shift
 };
+
+/// Returns the curves of an alignment as the metrics of a run have it (realign/alignment_record.h).
+AlignmentCurves alignment_curves(const nlohmann::json& record);
 
 /// Returns plots over the tilt: shift, rotation, magnification, tilt angle, local motion,
 /// correlation, and standard error of the shift. A rotation, a magnification, a change of the tilt

@@ -1,31 +1,38 @@
 #!/usr/bin/python3
-"""Checks which folder includes which.
+"""Checks which room of src/ includes which.
 
   check_layers.py PROJECT_DIR
 
-A folder of src/ includes itself, the folders above it in src/layers.txt, and the
-public headers ("tomofield/..."); sub-folders count as their folder; unit tests
-may include helpers of tests/ as well. Public headers include each other and the
-standard library only. Prints every offence as
-FILE:LINE and exits with status 1 if there is one, 2 where it cannot check.
+A file includes its own room, the rooms that the line of its room in src/layers.txt names, and the
+public headers ("tomofield/..."); sub-folders count as their room. A line names no room that no file
+of its room includes. Unit tests may include any room above theirs in src/layers.txt, and helpers of
+tests/. Public headers include each other and the standard library only. docs/architecture.md has the
+drawing of the graph. No folder of src/ has more files or lines, without its unit tests, than LIMITS
+and OTHER_LIMITS say. Prints every offence as FILE:LINE and exits with status 1 if there is one, 2
+where it cannot check.
 """
 import pathlib
 import re
 import sys
+
+from rooms import BadGraph, read_rooms, with_drawing
+
+LIMITS = 40, 5000  # files and lines of a folder
+# The run alone has less room. The other folders were larger before there were limits.
+OTHER_LIMITS = {"reconstruct": (18, 1900), "io": (83, 7400), "align": (49, 5000),
+                "base": (43, 5000), "evaluate": (42, 5000), "tilt_series": (41, 5000)}
 
 SOURCES = {".h", ".cc", ".cu", ".cuh"}
 QUOTED_INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"')
 ANY_INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
 
 
-def read_layers(path):
-    """Returns the names in layers.txt, lowest first; a line that begins with # is a comment."""
-    lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
-    return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
-
-
 def source_files(folder):
     return sorted(p for p in folder.rglob("*") if p.suffix in SOURCES and p.is_file())
+
+
+def is_test(path):
+    return path.stem.endswith("_test")
 
 
 def includes(path, pattern):
@@ -36,22 +43,63 @@ def includes(path, pattern):
             yield number, match.group(1)
 
 
-def offences_in_src(src, tests, layers):
-    rank = {name: i for i, name in enumerate(layers)}
+def rooms_above(rooms):
+    """Returns {room: the rooms above it in layers.txt}, which its unit tests may include."""
+    names = list(rooms)
+    return {room: names[:i] for i, room in enumerate(names)}
+
+
+def offences_in_src(src, tests, rooms):
+    above = rooms_above(rooms)
     for path in source_files(src):
-        layer = path.relative_to(src).parts[0]
-        if layer not in rank:
-            yield path, 1, f"folder '{layer}' has no place in src/layers.txt"
+        room = path.relative_to(src).parts[0]
+        if room not in rooms:
+            yield path, 1, f"folder '{room}' has no line in src/layers.txt"
             continue
+        allowed = above[room] if is_test(path) else rooms[room]
         for number, included in includes(path, QUOTED_INCLUDE):
             top = included.split("/")[0]
-            is_test_helper = path.stem.endswith("_test") and (tests / included).is_file()
+            is_test_helper = is_test(path) and (tests / included).is_file()
             if top == "tomofield" or is_test_helper:
                 continue
-            if top not in rank or "/" not in included:
-                yield path, number, f'"{included}" is not named from src/ as "folder/file.h"'
-            elif rank[top] > rank[layer]:
-                yield path, number, f"'{layer}' includes \"{included}\", but '{top}' comes after it"
+            if top not in rooms or "/" not in included:
+                yield path, number, f'"{included}" is not named from src/ as "room/file.h"'
+            elif top != room and top not in allowed:
+                yield (path, number,
+                       f"'{room}' includes \"{included}\": its line does not name '{top}'")
+
+
+def line_of(text, room):
+    return next(i for i, line in enumerate(text.splitlines(), 1) if line.startswith(f"{room}:"))
+
+
+def stale_entries(src, rooms):
+    """Yields the rooms that a line names and no file of its room includes."""
+    layers = src / "layers.txt"
+    for room, named in rooms.items():
+        files = [path for path in source_files(src / room) if not is_test(path)]
+        used = {top.split("/")[0] for path in files for _, top in includes(path, QUOTED_INCLUDE)}
+        number = line_of(layers.read_text(encoding="utf-8"), room)
+        if not files:
+            yield layers, number, f"'{room}' has no source file"
+        for other in named:
+            if other not in used:
+                yield (layers, number,
+                       f"no file of '{room}' includes '{other}': remove it from the line")
+
+
+def offences_in_size(src):
+    files = {}
+    for path in source_files(src):
+        if not is_test(path):
+            files.setdefault(path.parent, []).append(path)
+    for folder, paths in files.items():
+        most_files, most_lines = OTHER_LIMITS.get(str(folder.relative_to(src)), LIMITS)
+        num_lines = sum(len(path.read_text(encoding="utf-8").splitlines()) for path in paths)
+        if len(paths) > most_files:
+            yield folder, 1, f"{len(paths)} files in a folder are more than {most_files}: divide it"
+        if num_lines > most_lines:
+            yield folder, 1, f"{num_lines} lines in a folder are more than {most_lines}: divide it"
 
 
 def offences_in_public_headers(include):
@@ -63,21 +111,34 @@ def offences_in_public_headers(include):
                 yield path, number, f"a public header includes '{included}'"
 
 
+def offences_in_drawing(page, rooms):
+    text = page.read_text(encoding="utf-8")
+    drawn = with_drawing(text, rooms)
+    if drawn is None:
+        yield page, 1, "there is no place for the drawing of the rooms, between two marks"
+    elif drawn != text:
+        yield page, 1, "the drawing of the rooms is out of date: run tools/draw_rooms"
+
+
 def main():
     if len(sys.argv) != 2:
         print(__doc__, file=sys.stderr)
         return 2
     project = pathlib.Path(sys.argv[1])
-    src, include = project / "src", project / "include"
+    src = project / "src"
     num_files = len(source_files(src))
     if num_files == 0:
         print(f"check_layers: no source file under {src}: is this the project?", file=sys.stderr)
         return 2
-    layers = read_layers(src / "layers.txt")
-    if not layers:
-        print(f"check_layers: {src / 'layers.txt'} does not list the layers", file=sys.stderr)
+    try:
+        rooms = read_rooms(src / "layers.txt")
+    except (BadGraph, OSError) as fault:
+        print(f"{src / 'layers.txt'}:{fault}", file=sys.stderr)
         return 2
-    offences = [*offences_in_src(src, project / "tests", layers), *offences_in_public_headers(include)]
+    offences = [*offences_in_src(src, project / "tests", rooms), *stale_entries(src, rooms),
+                *offences_in_size(src),
+                *offences_in_public_headers(project / "include"),
+                *offences_in_drawing(project / "docs" / "architecture.md", rooms)]
     for path, number, what in offences:
         print(f"{path.relative_to(project)}:{number}: {what}")
     print(f"check_layers: {num_files} files of src/, {len(offences)} offences")

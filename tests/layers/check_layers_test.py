@@ -1,76 +1,145 @@
-"""Shows that check_layers.py catches wrong includes. Each tree below has one include that is
-allowed or not, and the checker has to agree."""
+"""Shows that check_layers.py catches wrong includes and wrong graphs. Each tree below has one thing
+that is allowed or not, and the checker has to agree."""
 import pathlib
 import subprocess
 import sys
 import tempfile
 
+from rooms import drawing, read_rooms, with_drawing
+
 CHECKER = pathlib.Path(__file__).with_name("check_layers.py")
-LAYERS = "# lowest first\nbase\nio\nkernels\nfield\nprojection\ncli\n"
+LAYERS = "# a graph\nbase:\nio: base\nfield: base\ncli: io\n"
+# Each room has a file that includes what its line names.
+FILES = {"src/base/all.h": "", "src/io/all.h": '#include "base/all.h"\n',
+         "src/field/all.h": '#include "base/all.h"\n', "src/cli/all.h": '#include "io/all.h"\n'}
+MARKS = "<!-- rooms: tools/draw_rooms -->\n<!-- end of rooms -->\n"
 
 
-def run_checker(files, layers=LAYERS):
-    """Writes {path: text} into a scratch project; returns the exit status and the output."""
+def write(folder, files):
+    for name, text in files.items():
+        path = pathlib.Path(folder) / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def graph_of(layers):
     with tempfile.TemporaryDirectory() as scratch:
-        for name, text in {**files, "src/layers.txt": layers}.items():
-            path = pathlib.Path(scratch) / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
+        write(scratch, {"layers.txt": layers})
+        return read_rooms(pathlib.Path(scratch) / "layers.txt")
+
+
+def run_checker(files, layers=LAYERS, page=None):
+    """Writes {path: text} into a scratch project; returns the exit status and the output. Without
+    `page`, the project has the right drawing."""
+    with tempfile.TemporaryDirectory() as scratch:
+        write(scratch, {**files, "src/layers.txt": layers, "docs/architecture.md": page or MARKS})
+        if page is None:
+            drawn = pathlib.Path(scratch) / "docs/architecture.md"
+            drawn.write_text(with_drawing(MARKS, graph_of(LAYERS)), encoding="utf-8")
         done = subprocess.run([sys.executable, CHECKER, scratch], capture_output=True, text=True)
         return done.returncode, done.stdout + done.stderr
 
 
-def test_allows_own_lower_and_public_includes():
-    text = '#include <vector>\n#include "field/a.h"\n#include "base/b.h"\n#include "tomofield/error.h"\n'
-    status, output = run_checker({"src/field/a.cc": text})
+def check(name, text):
+    """Checks the scratch project with one more file."""
+    return run_checker({**FILES, name: text})
+
+
+def test_allows_own_named_and_public_includes():
+    status, output = check("src/cli/a.cc", '#include <vector>\n#include "cli/a.h"\n'
+                                           '#include "io/all.h"\n#include "tomofield/error.h"\n')
     assert status == 0, output
 
 
-def test_the_order_of_the_list_decides():
-    files = {"src/io/a.cc": '#include "base/a.h"\n'}
-    assert run_checker(files, "base\nio\n")[0] == 0
-    assert run_checker(files, "io\nbase\n")[0] == 1
-    assert run_checker(files, "# none\n")[0] == 2
-
-
-def test_catches_an_include_of_a_higher_folder():
-    status, output = run_checker({"src/io/a.cc": '#include "io/a.h"\n#include "field/b.h"\n'})
+def test_catches_an_include_of_a_room_that_the_line_does_not_name():
+    status, output = check("src/io/a.cc", '#include "io/all.h"\n#include "field/all.h"\n')
     assert status == 1, output
     assert "src/io/a.cc:2: " in output, output
+    assert check("src/base/a.h", '  #  include   "cli/all.h"\n')[0] == 1
 
 
-def test_catches_it_with_spaces_and_in_headers():
-    status, output = run_checker({"src/base/a.h": '  #  include   "cli/b.h"\n'})
+def test_a_room_behind_another_one_is_not_named_by_that():
+    status, output = check("src/cli/a.cc", '#include "base/all.h"\n')
     assert status == 1, output
+    assert "does not name 'base'" in output, output
 
 
-def test_subfolders_count_as_their_folder():
-    status, output = run_checker({"src/kernels/cpu/a.cc": '#include "kernels/reference/a.h"\n'})
+def test_catches_a_stale_entry():
+    status, output = run_checker({**FILES, "src/cli/all.h": ""})
+    assert status == 1, output
+    assert "src/layers.txt:5: no file of 'cli' includes 'io'" in output, output
+    # A unit test alone does not keep it.
+    tested = {**FILES, "src/cli/all.h": "", "src/cli/a_test.cc": '#include "io/all.h"\n'}
+    assert run_checker(tested)[0] == 1
+
+
+def test_catches_a_room_without_files():
+    status, output = run_checker({name: text for name, text in FILES.items() if "cli" not in name})
+    assert status == 1, output
+    assert "'cli' has no source file" in output, output
+
+
+def test_folders_have_a_largest_size():
+    many = {f"src/field/a{i}.h": "" for i in range(39)}  # beside all.h
+    assert run_checker({**FILES, **many})[0] == 0
+    assert run_checker({**FILES, **many, "src/field/a_test.cc": "", "src/field/tree/a.h": ""})[0] == 0
+    status, output = run_checker({**FILES, "src/field/b.cc": "\n" * 5000})
+    assert status == 1 and "5001 lines in a folder" in output, output
+    status, output = run_checker({**FILES, **{f"src/field/a{i}.h": "" for i in range(40)}})
+    assert status == 1 and "41 files in a folder" in output, output
+
+
+def test_unit_tests_include_any_room_above_theirs():
+    status, output = check("src/cli/a_test.cc", '#include "field/all.h"\n#include "base/all.h"\n')
     assert status == 0, output
-    status, output = run_checker({"src/kernels/cpu/a.cc": '#include "projection/a.h"\n'})
-    assert status == 1, output
+    assert check("src/io/a_test.cc", '#include "field/all.h"\n')[0] == 1
+
+
+def test_subfolders_count_as_their_room():
+    assert check("src/io/png/a.cc", '#include "io/tiff/a.h"\n')[0] == 0
+    assert check("src/io/png/a.cc", '#include "field/all.h"\n')[0] == 1
 
 
 def test_catches_relative_includes_and_unknown_folders():
-    assert run_checker({"src/io/a.cc": '#include "../cli/b.h"\n'})[0] == 1
-    assert run_checker({"src/io/a.cc": '#include "b.h"\n'})[0] == 1
-    assert run_checker({"src/novel/a.cc": "int a;\n"})[0] == 1
+    assert check("src/io/a.cc", '#include "../cli/b.h"\n')[0] == 1
+    assert check("src/io/a.cc", '#include "b.h"\n')[0] == 1
+    assert check("src/novel/a.cc", "int a;\n")[0] == 1
 
 
 def test_only_unit_tests_include_test_helpers():
-    files = {"tests/support/a.h": "", "src/io/a_test.cc": '#include "support/a.h"\n'}
+    files = {**FILES, "tests/support/a.h": "", "src/io/a_test.cc": '#include "support/a.h"\n'}
     assert run_checker(files)[0] == 0
     files["src/io/a.cc"] = '#include "support/a.h"\n'
     assert run_checker(files)[0] == 1
 
 
 def test_public_headers_stay_free_of_other_libraries():
-    files = {"src/base/a.cc": "int a;\n", "include/tomofield/a.h": "#include <vector>\n"}
-    assert run_checker(files)[0] == 0
-    files["include/tomofield/a.h"] = "#include <hwy/highway.h>\n"
-    assert run_checker(files)[0] == 1
-    files["include/tomofield/a.h"] = '#include "io/mrc.h"\n'
-    assert run_checker(files)[0] == 1
+    assert check("include/tomofield/a.h", "#include <vector>\n")[0] == 0
+    assert check("include/tomofield/a.h", "#include <hwy/highway.h>\n")[0] == 1
+    assert check("include/tomofield/a.h", '#include "io/mrc.h"\n')[0] == 1
+
+
+def test_refuses_what_is_no_graph_of_rooms():
+    faults = {"io: base\nbase:\n": "1: 'io' names 'base', which has no line above it",
+              "base: base\n": "1: 'base' names 'base', which has no line above it",
+              "base:\nbase:\n": "2: 'base' has a line above this one",
+              "base:\nio: base base\n": "2: 'io' names 'base' twice",
+              "base:\nio\n": "2: 'io' is not written as 'room: room room'"}
+    for layers, fault in faults.items():
+        status, output = run_checker(FILES, layers)
+        assert status == 2 and fault in output, output
+
+
+def test_the_page_has_the_drawing():
+    status, output = run_checker(FILES, page=MARKS)
+    assert status == 1, output
+    assert "run tools/draw_rooms" in output, output
+    assert run_checker(FILES, page="a page without marks\n")[0] == 1
+
+
+def test_the_drawing_has_levels_and_leaves_out_what_is_behind_another_room():
+    rooms = graph_of("base:\nio: base\nfield: base\ncli: base io\n")
+    assert drawing(rooms) == (" 2  cli    -> io\n 1  io     -> base\n    field  -> base\n 0  base\n")
 
 
 def test_refuses_a_tree_without_sources():

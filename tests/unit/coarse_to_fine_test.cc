@@ -12,10 +12,10 @@
 
 #include "base/enum_names.h"
 #include "base/parallel.h"
+#include "checkpoint/checkpoint.h"
 #include "fit/fit.h"
 #include "lone_bead_series.h"
 #include "output/model_file.h"
-#include "reconstruct/checkpoint.h"
 #include "scratch_directory.h"
 
 namespace tomofield::fit {
@@ -99,10 +99,10 @@ TEST_P(CoarseToFine, GoesOnFromACheckpointOfEitherStageToTheSameBits) {
     output::ModelInfo info;
     info.geometry = measurement_.geometry;
     info.roi = measurement_.roi;
-    reconstruction::save_checkpoint(scratch / "fit.h5", *first, info,
-                                    {.fingerprint = "{}", .tuned = {}});
+    checkpoint::save_checkpoint(scratch / "fit.h5", *first, info,
+                                {.fingerprint = "{}", .tuned = {}});
     const auto second = make_fit();
-    reconstruction::restore_fit(scratch / "fit.h5", "{}", *second);
+    checkpoint::restore_fit(scratch / "fit.h5", "{}", *second);
     EXPECT_EQ(second->progress().step, pause_at);
     second->run([](const Fit&) { return true; });
     EXPECT_TRUE(std::ranges::equal(second->field().parameters(), whole->field().parameters()))

@@ -6,12 +6,12 @@
 #include <string>
 
 #include "expect_parts.h"
-#include "reconstruct/options.h"
+#include "options/run_options.h"
 #include "scratch_directory.h"
 #include "simulate/simulate_series.h"
 #include "tomofield/error.h"
 
-namespace tomofield::reconstruction {
+namespace tomofield::measurement {
 namespace {
 
 using microscope::ViewTransfer;
@@ -47,7 +47,7 @@ Options options_of_run() {
 }
 
 std::vector<ViewTransfer> transfers_of(const SeriesFiles& files, const Options& options) {
-  const ReconstructOptions run = run_options(files, options);
+  const options::ReconstructOptions run = options::run_options(files, options);
   return measurement::view_transfers(run.files, run.resolved, run.input,
                                      tilt_series::TiltSeries(run.input));
 }
@@ -147,7 +147,7 @@ TEST(ViewTransfers, ContradictionsAreFaults) {
   const auto num_faults = [](const Options& options, const char* ctf) {
     SeriesFiles files;
     if (ctf != nullptr) files.ctf = ctf;
-    return run_options(files, options).faults().size();
+    return options::run_options(files, options).faults().size();
   };
   Options options = options_of_run();
   EXPECT_EQ(num_faults(options, "a.defocus"), 0u);
@@ -166,4 +166,4 @@ TEST(ViewTransfers, ContradictionsAreFaults) {
 }
 
 }  // namespace
-}  // namespace tomofield::reconstruction
+}  // namespace tomofield::measurement

@@ -1,0 +1,67 @@
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "cli/commands/commands.h"
+#include "cli/commands/run_reconstruction.h"
+#include "cli/options/common_options.h"
+#include "cli/options/help_formatter.h"
+#include "cli/options/table_options.h"
+#include "cli/terminal/console.h"
+#include "exchange/alignment_output.h"
+#include "io/output_set.h"
+#include "options/run_options.h"
+#include "plan/plan.h"
+#include "tilt_series/tilt_series.h"
+#include "tomofield/error.h"
+
+namespace tomofield::cli {
+namespace {
+
+using option_table::Group;
+
+void run(const option_table::Choices& choices, const std::vector<option_table::Setting>& origins) {
+  if (choices.options.align == Alignment::kOff)
+    throw Error("there is nothing to do with --align off: give refine or full");
+  options::ReconstructOptions options = options::run_options(choices.files, choices.options);
+  options.origins = origins;
+  const std::vector<io::OutputLock> locks = exchange::claim_alignment(options);
+  plan::check_alignment_alone(options);
+  io::OutputSet results;  // the record of the alignment joins the other files
+  const tilt_series::TiltSeries series =
+      align_and_open(options, distributed::Communicator::alone());
+  exchange::write_alignment_results(series, options);
+  results.commit();
+  print_alignment(options);
+}
+
+}  // namespace
+
+void add_align_command(CLI::App& program, const std::vector<option_table::Setting>& origins) {
+  CLI::App& command = *program.add_subcommand(
+      "align", "Align the views of a tilt series with each other, without a reconstruction");
+  auto choices = std::make_shared<option_table::Choices>();
+  add_input_options(command, *choices);
+  add_groups(command, *choices, {Group::kSpecimen});
+  choices->options.align = Alignment::kRefine;
+  for (const char* key : {"fit.align", "fit.seed", "running.output", "running.overwrite"})
+    add_row(command, key, *choices);
+  command.get_option("--output")
+      ->description(
+          "The alignment's files are called after it, and it is not written itself: "
+          "NAME_align.xf for NAME.mrc");
+  command.get_option("--align")
+      ->description(
+          "refine: begin with the alignment of the files; full: begin with views as they were "
+          "recorded")
+      ->type_name("refine|full");
+  add_common_options(command);
+  add_help_all(command);
+  command.footer(
+      "Example: tomofield align series.mrc --tlt series.tlt --align full --thickness 1200 \\\n"
+      "           -o series.mrc\nThe files are called after the output: series_align.xf, .tlt, "
+      ".aln, .json and .png");
+  command.callback([choices, &origins] { run(*choices, origins); });
+}
+
+}  // namespace tomofield::cli

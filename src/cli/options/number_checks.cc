@@ -1,0 +1,57 @@
+#include "cli/options/number_checks.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <string>
+
+#include "io/text_lines.h"
+
+namespace tomofield::cli {
+namespace {
+
+// Returns a check that accepts a finite number if `holds` is true for it. `wanted` describes these
+// numbers.
+template <typename Holds>
+CLI::Validator number_that(std::string wanted, Holds holds) {
+  return {[wanted, holds](std::string& text) -> std::string {
+            char* end = nullptr;
+            const double value = std::strtod(text.c_str(), &end);
+            const bool is_number = end != text.c_str() && *end == '\0' && std::isfinite(value);
+            if (is_number && holds(value)) return {};
+            return fmt::format("must be a number {}, not {}", wanted, text);
+          },
+          ""};
+}
+
+}  // namespace
+
+std::optional<std::vector<long long>> parse_whole_numbers(const std::string& text) {
+  std::vector<long long> values;
+  for (const std::string& word : CLI::detail::split(text, ',')) {
+    const std::optional<long long> value = io::parse_integer(word);
+    if (!value) return std::nullopt;
+    values.push_back(*value);
+  }
+  return values;
+}
+
+CLI::Validator number_above(double low) {
+  return number_that(fmt::format("above {:g}", low), [low](double value) { return value > low; });
+}
+
+CLI::Validator number_between(double low, double high) {
+  return number_that(fmt::format("from {:g} to {:g}", low, high),
+                     [low, high](double value) { return value >= low && value <= high; });
+}
+
+CLI::Validator seed_check() {
+  return {[](std::string& text) -> std::string {
+            const bool is_seed = !text.empty() && text.find_first_not_of("0123456789") == text.npos;
+            return is_seed ? "" : fmt::format("must be a whole number from 0, not {}", text);
+          },
+          ""};
+}
+
+}  // namespace tomofield::cli

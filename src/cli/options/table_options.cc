@@ -1,0 +1,117 @@
+#include "cli/options/table_options.h"
+
+#include <fmt/format.h>
+
+#include <string>
+#include <vector>
+
+#include "cli/options/project_arguments.h"
+
+namespace tomofield::cli {
+namespace {
+
+using option_table::Choices;
+using option_table::Group;
+using option_table::Row;
+
+// Returns the rows that share a flag, as --center does.
+std::vector<const Row*> rows_with(std::string_view flag) {
+  std::vector<const Row*> rows;
+  for (const Row& row : option_table::all_rows())
+    if (row.flag == flag) rows.push_back(&row);
+  return rows;
+}
+
+// Sets the rows of a flag, one from each part of a list. Returns what the text must be, or nothing.
+std::string set_rows(const std::vector<const Row*>& rows, const std::string& text,
+                     Choices& choices) {
+  if (rows.size() == 1) return set_from_text(*rows.front(), text, choices);
+  const std::vector<std::string> parts = CLI::detail::split(text, ',');
+  if (parts.size() > rows.size()) return fmt::format("at most {} numbers", rows.size());
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::string wanted = set_from_text(*rows[i], parts[i], choices);
+    if (!wanted.empty()) return wanted;
+  }
+  return {};
+}
+
+CLI::Option* add_flag(CLI::App& command, const Row& row, Choices& choices) {
+  const bool value = !row.flag.starts_with("--no-");
+  return command.add_flag_callback(
+      std::string(row.flag),
+      [&row, &choices, value] { set_from_text(row, value ? "true" : "false", choices); },
+      std::string(row.help));
+}
+
+CLI::Option* add_value(CLI::App& command, const Row& row, Choices& choices) {
+  const std::vector<const Row*> rows = rows_with(row.flag);
+  const auto check = [rows](const std::string& text) -> std::string {
+    Choices scratch;
+    const std::string wanted = set_rows(rows, text, scratch);
+    return wanted.empty() ? "" : fmt::format("must be {}, not '{}'", wanted, text);
+  };
+  return command
+      .add_option_function<std::string>(
+          std::string(row.flag),
+          [rows, &choices](const std::string& text) { set_rows(rows, text, choices); },
+          std::string(row.help))
+      ->check(CLI::Validator(check, ""))
+      ->type_name(option_table::label_of(row))
+      ->default_str(row.automatic.empty() ? option_table::text_of(row, choices).value_or("")
+                                          : std::string(row.automatic));
+}
+
+}  // namespace
+
+CLI::Option* add_row(CLI::App& command, const Row& row, Choices& choices) {
+  CLI::Option* option = option_table::is_flag(row) ? add_flag(command, row, choices)
+                                                   : add_value(command, row, choices);
+  // CLI11 lists positional arguments apart.
+  if (row.group != Group::kSeries) option->group(std::string(option_table::title_of(row.group)));
+  return option->required(row.is_required);
+}
+
+CLI::Option* add_row(CLI::App& command, std::string_view key, Choices& choices,
+                     std::string_view group) {
+  const Row& row = option_table::row_of(key);
+  CLI::Option* option = add_row(command, row, choices);
+  if (group.empty()) return option;
+  // The command has a default of its own.
+  option->default_str(option_table::text_of(row, choices).value_or(std::string(row.automatic)));
+  return option->group(std::string(group));
+}
+
+void add_groups(CLI::App& command, Choices& choices, std::initializer_list<Group> groups) {
+  for (const Group group : groups) {
+    for (const Row& row : option_table::all_rows()) {
+      if (row.group == group && rows_with(row.flag).front() == &row) add_row(command, row, choices);
+    }
+  }
+}
+
+void add_series_options(CLI::App& command, Choices& choices) {
+  add_groups(command, choices, {Group::kAlignment, Group::kImages, Group::kMasks});
+}
+
+void add_input_options(CLI::App& command, Choices& choices) {
+  add_groups(command, choices, {Group::kSeries});
+  add_project_options(command);
+  add_series_options(command, choices);
+}
+
+void add_place_options(CLI::App& command, Choices& choices) {
+  for (const char* key : {"specimen.roi", "specimen.hand", "specimen.axis_x", "field.with_margin"})
+    add_row(command, key, choices);
+}
+
+const Row* row_of_option(const CLI::Option& option) {
+  for (const Row& row : option_table::all_rows()) {
+    const std::string flag(row.flag);
+    const bool has_name = option.check_name(flag.substr(flag.rfind(',') + 1));
+    if (has_name && (option.get_positional() || option.get_group() == title_of(row.group)))
+      return &row;
+  }
+  return nullptr;
+}
+
+}  // namespace tomofield::cli

@@ -1,0 +1,52 @@
+#include "cli/terminal/console.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+
+namespace tomofield::cli {
+namespace {
+
+int g_output_error = 0;  // errno of the first failure
+
+void remember_failure(bool has_failed) {
+  if (has_failed && g_output_error == 0) g_output_error = errno;
+}
+
+}  // namespace
+
+void open_console() {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  // A stream that was closed cannot be written to: output_fault() says so.
+  int descriptor = ::open("/dev/null", O_RDONLY);
+  while (descriptor >= 0 && descriptor <= STDERR_FILENO) descriptor = ::open("/dev/null", O_RDONLY);
+  if (descriptor >= 0) ::close(descriptor);
+}
+
+void print_text(std::string_view text) {
+  remember_failure(std::fwrite(text.data(), 1, text.size(), stdout) != text.size());
+}
+
+std::string count_of(int number, std::string_view what) {
+  return fmt::format("{} {}{}", number, what, number == 1 ? "" : "s");
+}
+
+void flush_output() { remember_failure(std::fflush(stdout) != 0); }
+
+std::string output_fault() {
+  flush_output();
+  return g_output_error == 0 ? "" : std::strerror(g_output_error);
+}
+
+void say_text(std::string_view text) {
+  std::fwrite(text.data(), 1, text.size(), stderr);
+  std::fflush(stderr);
+  std::clearerr(stderr);
+}
+
+}  // namespace tomofield::cli

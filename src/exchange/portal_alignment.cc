@@ -1,0 +1,81 @@
+#include "exchange/portal_alignment.h"
+
+#include <array>
+#include <utility>
+
+#include "io/mrc.h"
+
+namespace tomofield::exchange {
+
+namespace fs = std::filesystem;
+namespace {
+
+using nlohmann::json;
+
+json vector_json(const std::array<double, 3>& values) {
+  return {{"x", values[0]}, {"y", values[1]}, {"z", values[2]}};
+}
+
+// A volume in the frame of the aligned view, in Å: Z points up, whatever the order of axes is.
+struct Place {
+  std::array<double, 3> size_A, middle_A;
+};
+
+Place place_of(const io::MrcHeader& header, VolumeAxes axes, double thickness_A) {
+  const std::array<std::int64_t, 3> voxels{header.nx, header.ny, header.nz};
+  Place place{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    place.size_A[a] = static_cast<double>(voxels[a]) * header.voxel_size_A[a];
+    place.middle_A[a] = header.origin_A[a] + place.size_A[a] / 2;
+  }
+  if (axes == VolumeAxes::kXzy) {  // rows count down from the upper face
+    std::swap(place.size_A[1], place.size_A[2]);
+    std::swap(place.middle_A[1], place.middle_A[2]);
+    place.middle_A[2] = thickness_A - place.middle_A[2];
+  }
+  return place;
+}
+
+json section_json(const tilt_series::TiltSeries& series, std::size_t index, int hand) {
+  const tilt_series::View& view = series.views()[index];
+  const geometry::RawFromAligned m = series.raw_from_aligned(index);
+  return {{"z_index", view.section},
+          {"tilt_angle", hand * view.tilt_deg},
+          {"volume_x_rotation", hand * view.x_tilt_deg},
+          {"in_plane_rotation", {{m.m11, m.m12}, {m.m21, m.m22}}},
+          {"x_offset", m.shift_x_px * series.bin_factor()},
+          {"y_offset", m.shift_y_px * series.bin_factor()}};
+}
+
+}  // namespace
+
+json portal_alignment(const tilt_series::TiltSeries& series,
+                      const options::ReconstructOptions& options, const fs::path& volume) {
+  const Options& resolved = options.resolved;
+  const double pixel_A = series.pixel_size_A() / series.bin_factor();
+  const Place place =
+      place_of(io::MrcReader(volume).header(), resolved.axes, resolved.thickness * pixel_A);
+  const double axis_z_px = resolved.axis_z.value_or(resolved.thickness / 2) + resolved.shift_z;
+  const std::array<double, 3> middle_of_series_A{
+      resolved.axis_x ? *resolved.axis_x * pixel_A
+                      : static_cast<double>(series.aligned_width()) / 2 * series.pixel_size_A(),
+      static_cast<double>(series.aligned_height()) / 2 * series.pixel_size_A(),
+      axis_z_px * pixel_A};
+  std::array<double, 3> offset_A{};
+  for (std::size_t a = 0; a < 3; ++a) offset_A[a] = place.middle_A[a] - middle_of_series_A[a];
+  json sections = json::array();
+  for (std::size_t i = 0; i < series.views().size(); ++i)
+    sections.push_back(section_json(series, i, resolved.hand));
+  return {
+      {"alignment_type", "GLOBAL"},
+      {"format", "TOMOFIELD"},
+      {"is_portal_standard", true},
+      {"affine_transformation_matrix", {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}},
+      {"tilt_offset", 0},
+      {"x_rotation_offset", 0},
+      {"volume_offset", vector_json(offset_A)},
+      {"volume_dimension", vector_json(place.size_A)},
+      {"per_section_alignment_parameters", sections}};
+}
+
+}  // namespace tomofield::exchange

@@ -1,0 +1,58 @@
+#include "exchange/relion_alignment.h"
+
+#include "output/output_paths.h"
+
+#include <cstddef>
+#include <numbers>
+#include <vector>
+
+#include "io/atomic_file.h"
+#include "io/relion_star.h"
+#include "io/view_table.h"
+#include "tilt_series/open_views.h"
+#include "tilt_series/section_table.h"
+
+namespace tomofield::exchange {
+
+namespace fs = std::filesystem;
+namespace {
+
+// Returns how a view of the series is aligned, in pixels before binning.
+tilt_series::AlignedSection aligned_section(const tilt_series::TiltSeries& series,
+                                            std::size_t view) {
+  const tilt_series::View& seen = series.views()[view];
+  const geometry::RawFromAligned map =
+      series.raw_from_aligned(view).binned(1.0 / series.bin_factor());
+  return {seen.tilt_deg, seen.x_tilt_deg, map.rotation_rad() * 180.0 / std::numbers::pi, map, 0};
+}
+
+}  // namespace
+
+std::optional<fs::path> relion_alignment(const options::ReconstructOptions& options) {
+  if (options.resolved.align == Alignment::kOff || options.input.images ||
+      options.input.stack.extension() != ".star")
+    return std::nullopt;
+  return output::output_paths(options.resolved.output).alignment_star;
+}
+
+void write_relion_alignment(const tilt_series::TiltSeries& series,
+                            const options::ReconstructOptions& options) {
+  const std::optional<fs::path> path = relion_alignment(options);
+  if (!path) return;
+  const io::ViewTable listed = io::read_relion_views(options.input.stack);
+  const auto stack = tilt_series::open_views(options.input);
+  const double pixel_size_A = series.pixel_size_A() / series.bin_factor();
+  std::vector<std::size_t> sections;
+  for (const tilt_series::View& view : series.views())
+    sections.push_back(static_cast<std::size_t>(view.section));
+  io::StarTable table = io::read_relion_rows(options.input.stack).only(sections);
+  for (std::size_t view = 0; view < sections.size(); ++view) {
+    io::ListedView aligned = listed.views.at(sections[view]);
+    tilt_series::set_alignment(aligned_section(series, view), listed.centre, stack->header(),
+                               pixel_size_A, aligned);
+    io::set_relion_alignment(aligned, view, table);
+  }
+  io::write_text_file(*path, io::star_file_text(table));
+}
+
+}  // namespace tomofield::exchange

@@ -1,0 +1,132 @@
+#include "exchange/relion_output.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/log.h"
+#include "exchange/relion_alignment.h"
+#include "io/atomic_file.h"
+#include "io/is_file.h"
+#include "io/mrc.h"
+#include "io/output_set.h"
+#include "io/relion_star.h"
+#include "io/view_images.h"
+#include "output/output_paths.h"
+#include "tomofield/error.h"
+
+namespace tomofield::exchange {
+
+namespace fs = std::filesystem;
+namespace {
+
+// The entry of a tomograms.star by which the stack was found (projects/relion_project.cc).
+constexpr const char* kEntry = "rlnTomoTiltSeriesStarFile";
+constexpr const char* kTomogram = "rlnTomoReconstructedTomogram";
+
+const option_table::Setting* find_origin(const options::ReconstructOptions& options) {
+  const auto found = std::ranges::find(options.origins, kEntry, &option_table::Setting::entry);
+  return found == options.origins.end() ? nullptr : &*found;
+}
+
+// Returns the row of the tilt series that was reconstructed. Several rows may name the same file.
+std::size_t find_row(const io::RelionTomograms& all, const option_table::Setting& origin) {
+  for (std::size_t row = 0; row < all.tomograms.size(); ++row) {
+    const io::RelionTomogram& tomogram = all.tomograms[row];
+    if (tomogram.name == origin.row &&
+        io::find_listed_file(tomogram.tilt_series_star, origin.file) == origin.value)
+      return row;
+  }
+  throw Error(fmt::format(
+      "'{}' has no tomogram '{}' with '{}' any more: it has changed since the run began",
+      origin.file.string(), origin.row, origin.value));
+}
+
+// Says why RELION could not use the volume, or nothing if it can.
+const char* obstacle(const Options& options) {
+  if (options.axes != VolumeAxes::kXyz) return "its axes are not in the order xyz";
+  if (options.roi) return "it is a part of the specimen (--roi)";
+  if (options.axis_x || options.axis_z || options.shift_z != 0)
+    return "its middle is not the point about which the series is aligned";
+  if (options.hand != 1) return "it is mirrored in Z (--hand -1)";
+  return nullptr;
+}
+
+// Removes a file when the results get their names.
+void remove_with_commit(const fs::path& file) {
+  if (io::OutputSet* const results = io::OutputSet::active()) results->remove_old(file);
+}
+
+// Names the linear halves if the run wrote them. RELION compares half maps and trains denoisers
+// with them, which needs independent errors: the errors of fitted halves are alike. Halves that
+// another program named belong to another tomogram.
+void set_halves(const fs::path& volume, io::StarTable& table) {
+  const io::OutputSet* const results = io::OutputSet::active();
+  const output::OutputPaths paths = output::output_paths(volume);
+  for (const std::size_t half : {0, 1}) {
+    const std::string column = fmt::format("{}Half{}", kTomogram, half + 1);
+    const fs::path& linear = paths.halves[half].linear_volume;
+    if (results != nullptr && results->contains(linear))
+      table.set(0, column, linear.string());
+    else
+      table.remove(column);
+  }
+}
+
+}  // namespace
+
+std::optional<fs::path> relion_output(const options::ReconstructOptions& options) {
+  if (find_origin(options) == nullptr || obstacle(options.resolved) != nullptr) return std::nullopt;
+  return output::output_paths(options.resolved.output).tomogram_star;
+}
+
+std::optional<io::StarTable> read_relion_output(const fs::path& volume) {
+  const fs::path star = output::output_paths(volume).tomogram_star;
+  if (!io::is_file(star)) return std::nullopt;
+  try {
+    for (const io::StarTable& table : io::read_star_file(star)) {
+      const auto named = table.num_rows() == 1 ? table.find(0, kTomogram) : std::nullopt;
+      if (named && fs::path(*named).filename() == volume.filename()) return table;
+    }
+  } catch (const Error&) {
+    // The file is of something else.
+  }
+  return std::nullopt;
+}
+
+void write_relion_output(const options::ReconstructOptions& options, const fs::path& volume) {
+  const option_table::Setting* const origin = find_origin(options);
+  const fs::path path = options.resolved.output;
+  if (!relion_output(options) && read_relion_output(path))
+    remove_with_commit(output::output_paths(path).tomogram_star);
+  if (origin == nullptr) return;
+  if (const char* const why = obstacle(options.resolved)) {
+    base::log_warning(
+        fmt::format("no STAR file is written for RELION beside '{}': {}", path.string(), why));
+    return;
+  }
+  const io::RelionTomograms all = io::read_relion_tomograms(origin->file);
+  const std::size_t row = find_row(all, *origin);
+  const io::MrcHeader header = io::MrcReader(volume).header();
+  const double voxel_A = header.voxel_size_A[0];
+  const double binning = voxel_A / all.tomograms[row].pixel_size_A.value_or(voxel_A);
+  io::StarTable table = all.table.only({row});
+  table.set(0, "rlnTomoTomogramBinning", fmt::format("{:.6f}", binning));
+  const auto unbinned = [&](std::int64_t voxels) {
+    return std::to_string(std::llround(static_cast<double>(voxels) * binning));
+  };
+  table.set(0, "rlnTomoSizeX", unbinned(header.nx));
+  table.set(0, "rlnTomoSizeY", unbinned(header.ny));
+  table.set(0, "rlnTomoSizeZ", unbinned(header.nz));
+  if (const auto aligned = relion_alignment(options)) table.set(0, kEntry, aligned->string());
+  table.set(0, kTomogram, path.string());
+  set_halves(path, table);
+  // Programs know the denoised tomogram by either name; RELION 5 by the second.
+  table.set(0, "rlnTomoDenoisedTomogram", path.string());
+  table.set(0, "rlnTomoReconstructedTomogramDenoised", path.string());
+  io::write_text_file(*relion_output(options), io::star_file_text(table));
+}
+
+}  // namespace tomofield::exchange

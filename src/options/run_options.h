@@ -1,0 +1,80 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "base/stopwatch.h"
+#include "fit/options.h"
+#include "measurement/prepare.h"
+#include "measurement/view_transfers.h"
+#include "option_table/setting.h"
+#include "output/volume.h"
+#include "tilt_series/tilt_series.h"
+#include "tomofield/options.h"
+#include "tune/automatic_choice.h"
+
+namespace tomofield::options {
+
+/// Fills in the options that follow from other options: leaves, epochs, learning rate, weights,
+/// activation and the scale of views. If neither the penalty nor its weight is given, both stay
+/// empty, because trials choose them. `files` say whether a microscope filtered the views. Values
+/// out of range stay as they are; check_options() names them.
+Options resolve(const SeriesFiles& files, const Options& requested);
+
+/// Everything that a reconstruction is made from. run_options() makes it.
+struct ReconstructOptions {
+  SeriesFiles files;
+  Options requested;  ///< as they were given
+  Options resolved;   ///< the options that are used
+  /// The settings that trials choose. The trials start from those in `resolved`.
+  tune::OpenSettings open;
+  // The same options in the types of the layers below, with the constants of the method.
+  tilt_series::TiltSeriesOptions input;
+  measurement::SpecimenOptions specimen;
+  fit::FieldOptions field;
+  fit::FitOptions fit;
+  output::VolumeOptions volume;
+  /// Settings that the files of a project made, for the metrics; they are among the options.
+  std::vector<option_table::Setting> origins;
+  /// Record of the alignment before the fit (realign/), for the metrics; null without one.
+  nlohmann::json alignment = {};
+  base::Stopwatch since_start = {};  ///< runs from run_options() on, before an alignment
+
+  /// Returns true if the run also makes two fits of one half of the data each.
+  bool makes_halves() const { return (files.even && files.odd) || resolved.split_tilts; }
+  /// Returns true if the run may be fitted by tiles, whose codes it keeps in a file.
+  bool may_use_tiles() const { return !resolved.budget.empty() && resolved.tile_rows != 0; }
+  /// Returns the options of the longest fit: that with the learned prior if it is left to a trial.
+  ReconstructOptions with_open_prior() const;
+  /// Returns true if trials choose the weight of total variation, which --denoise multiplies.
+  bool chooses_weight() const { return resolved.tune || open.variation; }
+  /// Returns true if the fit filters views, which mixes their rows.
+  bool filters_views() const {
+    return measurement::wants_transfers(files, resolved) ||
+           fit.noise_model == NoiseModel::kColoured;
+  }
+
+  /// Returns the expected number of trials before the fit, which choose the settings `to_choose`; 0
+  /// means that nothing is to be chosen. A series of few views cannot spare any of them for trials,
+  /// and trials cannot predict the rays of raw views.
+  int num_trials(int num_fitted_views, const tune::OpenSettings& to_choose) const;
+  /// Returns a sentence for each option that is out of range or does not go with another one.
+  std::vector<std::string> faults() const;
+  /// Returns a sentence for each option that a job of several processes cannot have.
+  std::vector<std::string> faults_of_job() const;
+
+ private:
+  std::vector<const char*> faults_of_halves() const;
+  std::vector<const char*> faults_of_transfer() const;
+};
+
+/// Resolves the options and hands them to the layers below. Where trials choose an option, it gets
+/// the value that the trials start from. A fit keeps that value if no trials are made.
+ReconstructOptions run_options(const SeriesFiles& files, const Options& requested);
+
+/// Writes the resolved options and the constants of the method for the metrics and the model file.
+nlohmann::json options_json(const ReconstructOptions& options);
+
+}  // namespace tomofield::options

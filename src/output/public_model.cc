@@ -1,0 +1,108 @@
+#include "output/public_model.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "field/sampling/sample_box.h"
+#include "output/sample_model.h"
+#include "output/volume.h"
+#include "tomofield/error.h"
+
+// The public class Model of include/tomofield/model.h.
+
+namespace tomofield {
+
+struct Model::Impl {
+  output::Model model;
+};
+
+Model ModelAccess::make(output::Model model) {
+  return Model(std::make_shared<Model::Impl>(Model::Impl{std::move(model)}));
+}
+
+namespace {
+
+bool is_usable_voxel(double voxel_px) { return std::isfinite(voxel_px) && voxel_px > 0; }
+
+void require_usable(const SampleBox& box) {
+  bool is_usable = is_usable_voxel(box.voxel_px);
+  for (std::size_t a = 0; a < 3; ++a) {
+    is_usable = is_usable && box.size[a] >= 1 && std::isfinite(box.centre_px[a]) &&
+                std::isfinite(box.euler_deg[a]);
+  }
+  if (!is_usable)
+    throw Error(fmt::format(
+        "a box of {} × {} × {} voxels of {} px cannot be sampled: sizes must be at least 1 and all "
+        "numbers finite",
+        box.size[0], box.size[1], box.size[2], box.voxel_px));
+}
+
+// Turns densities into values of the input's kind and contrast, or of the inverted contrast.
+void to_output(const output::ModelInfo& model, std::vector<float>& values, bool invert = false) {
+  const auto scale = static_cast<float>(invert ? -model.output_scale() : model.output_scale());
+  for (float& value : values) value = scale * value + 0.0f;  // no −0
+}
+
+}  // namespace
+
+namespace output {
+
+Tomogram sample_tomogram(const output::Model& model, bool invert) {
+  const field::OrientedBox box = output::region_box(model, 1.0);
+  Tomogram tomogram{.size = box.size,
+                    .voxel_size_A = model.pixel_size_A,
+                    .values = output::sample_box(model, box)};
+  to_output(model, tomogram.values, invert);
+  return tomogram;
+}
+
+}  // namespace output
+
+Model::Model(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
+
+Model::Model(const std::filesystem::path& path)
+    : impl_(std::make_shared<Impl>(Impl{output::load_to_sample(path)})) {}
+
+double Model::pixel_size_A() const { return impl_->model.pixel_size_A; }
+
+SampleBox Model::region(double voxel_px) const {
+  if (!is_usable_voxel(voxel_px))
+    throw Error(
+        fmt::format("voxels of {} px cannot be sampled: give a finite size above 0", voxel_px));
+  const field::OrientedBox box = output::region_box(impl_->model, voxel_px);
+  SampleBox region{.centre_px = box.centre_px, .size = box.size, .voxel_px = box.voxel_px};
+  // An x-axis tilt turns the box about X: these Euler angles have the same matrix.
+  if (!box.is_aligned())
+    region.euler_deg = {90, impl_->model.geometry.hand * impl_->model.x_tilt_deg, 270};
+  return region;
+}
+
+std::vector<float> Model::sample(const SampleBox& box) const {
+  require_usable(box);
+  const auto& [rot, tilt, psi] = box.euler_deg;
+  auto values = output::sample_box(impl_->model,
+                                   {.centre_px = box.centre_px,
+                                    .size = box.size,
+                                    .voxel_px = box.voxel_px,
+                                    .field_from_box = field::rotation_from_euler(rot, tilt, psi)});
+  to_output(impl_->model, values);
+  return values;
+}
+
+std::vector<float> Model::sample_points(std::span<const Point> points) const {
+  for (const Point& point : points)
+    if (!std::ranges::all_of(point, [](double number) { return std::isfinite(number); }))
+      throw Error(
+          fmt::format("a point at {}, {}, {} cannot be sampled: its coordinates must be "
+                      "finite",
+                      point[0], point[1], point[2]));
+  std::vector<float> values = output::sample_points(impl_->model, points);
+  to_output(impl_->model, values);
+  return values;
+}
+
+}  // namespace tomofield

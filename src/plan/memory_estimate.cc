@@ -1,0 +1,208 @@
+#include "plan/memory_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "field/vm/factorise.h"
+#include "fit/fit.h"
+#include "fit/halo.h"
+#include "kernels/lanes.h"
+#include "measurement/held_out.h"
+#include "measurement/row_share.h"
+#include "measurement/slab_views.h"
+#include "objective/ray_data_term.h"
+#include "prior/answer.h"
+#include "projection/slab_projector.h"
+
+namespace tomofield::plan {
+namespace {
+
+constexpr std::size_t kMpi = std::size_t{40} << 20;  // OpenMPI and its message buffers
+
+constexpr int kSlabsOfBand = projection::SlabProjector::kSlabsTogether;
+constexpr std::size_t kRow = kernels::kLanes * sizeof(float);
+
+// Returns the bytes of a band that is worked on: a pair of slabs with their gradient and the views
+// of a step, and rows for the total variation.
+std::size_t band_memory(const measurement::Measurement& plan, const fit::Domain& domain,
+                        int views_a_step) {
+  const std::size_t slab = domain.grid.size() * sizeof(float);
+  const std::size_t views =
+      static_cast<std::size_t>(views_a_step) * static_cast<std::size_t>(plan.geometry.width) * kRow;
+  return kSlabsOfBand * (2 * slab + views) + 3 * slab / kernels::kLanes;
+}
+
+// Returns the part of all parameters that this process keeps: its own and those of its neighbours
+// in `rows` rows beyond its bands.
+double part_of_parameters(const fit::Domain& domain, FieldKind kind,
+                          const distributed::Communicator& processes, std::int64_t rows = 1) {
+  if (processes.size() == 1) return 1.0;
+  const measurement::RowShare share =
+      measurement::row_share(domain.num_rows, domain.tree.roots().cell_size, processes);
+  std::vector<field::LeafShape> needed;
+  for (const int leaf : fit::needed_leaves(domain.tree, share, rows))
+    needed.push_back(domain.shapes[static_cast<std::size_t>(leaf)]);
+  return static_cast<double>(field::count_parameters(kind, needed)) /
+         static_cast<double>(field::count_parameters(kind, domain.shapes));
+}
+
+// Returns the bytes of the parameters, their gradient and two moments in the stage with the most.
+// When an adaptive tree changes, all but the gradient are there twice.
+double fitted_bytes(const fit::Domain& domain, const std::vector<fit::Stage>& stages,
+                    const fit::FieldOptions& options, const distributed::Communicator& processes) {
+  const double copies = options.tree == TreeKind::kAdaptive ? 7 : 4;
+  double largest = 0;
+  for (const fit::Stage& s : stages)
+    largest = std::max(largest, copies * parameter_bytes(domain, options, s.field_kind, processes));
+  return largest;
+}
+
+// Returns the bytes in use while plain vertices become factors; 0 if they do not.
+double factorising_bytes(const fit::Domain& domain, const std::vector<fit::Stage>& stages,
+                         const fit::FieldOptions& options,
+                         const distributed::Communicator& processes) {
+  if (stages.front().field_kind == options.kind) return 0;
+  std::size_t largest = 0;
+  for (const field::LeafShape& shape : domain.shapes)
+    largest = std::max(largest, field::factorising_memory(shape));
+  return parameter_bytes(domain, options, FieldKind::kGrid, processes) +
+         parameter_bytes(domain, options, options.kind, processes) +
+         static_cast<double>(largest) * base::thread_count();
+}
+
+// Returns the shape of the rays of the process that has the most rows.
+measurement::SlabViews::Shape own_part(measurement::SlabViews::Shape shape,
+                                       const fit::Domain& domain,
+                                       const distributed::Communicator& processes) {
+  const std::int64_t band_rows = domain.tree.roots().cell_size;
+  std::int64_t most = 0;
+  for (int rank = 0; rank < processes.size(); ++rank) {
+    const auto share = measurement::row_share(shape.num_rows, band_rows, rank, processes.size());
+    most = std::max(most, share.bands.size() * band_rows + share.rows_for_next);
+  }
+  shape.num_rows = std::min(shape.num_rows, most);
+  return shape;
+}
+
+// Returns the bytes that this process takes for an answer of the learned prior, with the rows that
+// it exchanges with its neighbours.
+std::size_t answer_memory(const measurement::Measurement& plan, const fit::Domain& domain,
+                          const distributed::Communicator& processes) {
+  const prior::BoxShape lattice{static_cast<int>(plan.roi.width()),
+                                static_cast<int>(std::lround(plan.geometry.thickness)),
+                                static_cast<int>(plan.roi.height())};
+  const std::int64_t band_rows = domain.tree.roots().cell_size;
+  const base::Range bands = measurement::row_share(domain.num_rows, band_rows, processes).bands;
+  const auto row_at = [&](int band) {
+    return static_cast<int>(std::min(band * band_rows, domain.num_rows));
+  };
+  const prior::BoxShape beyond{lattice.nx, lattice.nz, prior::kRowsBeyond};
+  const std::size_t exchanged = processes.size() > 1 ? 4 * beyond.size() * sizeof(float) : 0;
+  return prior::answer_memory(lattice, {row_at(bands.begin), row_at(bands.end)}) + exchanged;
+}
+
+// Returns the bytes that the learned prior adds to those of the fitted field: one more number for
+// each parameter, leaves of the neighbours that it alone reads, and what its answer takes beyond
+// the room that the gradient and the two moments make for it.
+double prior_memory(const PlannedFit& planned) {
+  const auto& [series, plan, domain, options, processes] = planned;
+  if (options.fit.prior == Prior::kTv) return 0;
+  const double parameters = parameter_bytes(domain, options.field, FieldKind::kGrid, processes);
+  const double with_rows_beyond =
+      parameters *
+      part_of_parameters(domain, FieldKind::kGrid, processes, fit::rows_beyond(options.fit.prior)) /
+      part_of_parameters(domain, FieldKind::kGrid, processes);
+  const double answer = options.fit.prior == Prior::kLearned
+                            ? static_cast<double>(answer_memory(plan, domain, processes))
+                            : 0.0;
+  return 2 * with_rows_beyond - parameters + std::max(0.0, answer - 3 * parameters);
+}
+
+}  // namespace
+
+std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domain& domain) {
+  std::size_t leaf = 0;
+  for (const field::LeafShape& shape : domain.shapes)
+    leaf = std::max(leaf, 2 * shape.vertices_xz() * kRow);
+  const std::size_t written = std::min(
+      std::size_t{16} << 20,
+      static_cast<std::size_t>(static_cast<double>(plan.roi.width()) * plan.geometry.thickness) *
+          kRow);
+  return leaf + written;
+}
+
+int num_fitted_views(const measurement::Measurement& plan, const fit::FitOptions& options) {
+  const auto held_out = measurement::held_out_views(plan.geometry.tilt_deg, options.hold_out);
+  return plan.geometry.num_views() - static_cast<int>(held_out.size());
+}
+
+int steps_an_epoch(const measurement::Measurement& plan, const fit::FitOptions& options) {
+  if (plan.ray_geometry) return objective::ray_steps_per_epoch(options, plan.rays_shape());
+  return std::min(options.subsets, num_fitted_views(plan, options));
+}
+
+std::size_t max_parameters(const fit::Domain& domain, const fit::FieldOptions& options,
+                           FieldKind kind) {
+  std::vector<field::LeafShape> shapes = domain.shapes, inside;
+  for (int i = 0; i < domain.tree.num_leaves(); ++i) {
+    if (domain.tree.leaf(i).region == field::Region::kInterest)
+      inside.push_back(domain.shapes[static_cast<std::size_t>(i)]);
+  }
+  const auto more = options.leaf_budget - static_cast<std::ptrdiff_t>(inside.size());
+  if (options.tree == TreeKind::kAdaptive && more > 0)
+    shapes.insert(shapes.end(), static_cast<std::size_t>(more), inside.front());
+  return field::count_parameters(kind, shapes);
+}
+
+double parameter_bytes(const fit::Domain& domain, const fit::FieldOptions& options, FieldKind kind,
+                       const distributed::Communicator& processes) {
+  return static_cast<double>(sizeof(float) * max_parameters(domain, options, kind)) *
+         part_of_parameters(domain, kind, processes);
+}
+
+std::size_t estimate_memory(const PlannedFit& planned, const std::vector<fit::Stage>& stages) {
+  using measurement::SlabViews;
+  const auto& [series, plan, domain, options, processes] = planned;
+  const auto parameters =
+      static_cast<std::size_t>(fitted_bytes(domain, stages, options.field, processes));
+  const auto factorising =
+      static_cast<std::size_t>(factorising_bytes(domain, stages, options.field, processes));
+  const SlabViews::Shape own_shape = own_part(plan.rays_shape(), domain, processes);
+  const std::int64_t num_bands =
+      (own_shape.num_rows + domain.tree.roots().cell_size - 1) / domain.tree.roots().cell_size;
+  const int bands_in_use =
+      static_cast<int>(std::min<std::int64_t>(base::thread_count(), num_bands));
+  const int slabs_in_use = kSlabsOfBand * bands_in_use;
+  // The rays of all frames stay beside those of a half.
+  const std::size_t ray_sets = options.files.even ? 2 : 1;
+  const std::size_t rays = ray_sets * SlabViews::resident_memory(own_shape, slabs_in_use);
+  std::size_t coarse_rays = 0;  // of the last coarse stage, which has the most
+  for (const fit::Stage& s : stages) {
+    if (s.bin == 1) continue;
+    coarse_rays =
+        SlabViews::resident_memory(SlabViews::binned_shape(own_shape, s.bin), slabs_in_use);
+  }
+  const int steps = steps_an_epoch(plan, options.fit);
+  const int views_a_step = plan.ray_geometry ? 0 : (plan.geometry.num_views() + steps - 1) / steps;
+  const std::size_t surrogates =
+      options.filters_views()
+          ? fit::surrogate_memory(own_shape, plan.rays_shape(), steps, slabs_in_use)
+          : 0;
+  const std::size_t fitting =
+      parameters + surrogates + static_cast<std::size_t>(prior_memory(planned)) +
+      static_cast<std::size_t>(bands_in_use) * band_memory(plan, domain, views_a_step) +
+      static_cast<std::size_t>(base::thread_count()) * thread_memory(plan, domain);
+  const std::size_t tracing =
+      plan.ray_geometry ? objective::RayDataTerm::working_memory(*plan.ray_geometry, domain.tree,
+                                                                 options.fit, plan.rays_shape())
+                        : 0;
+  const std::size_t program = kProgramBytes + (processes.size() > 1 ? kMpi : 0);
+  const std::size_t decoding = measurement::decoding_memory(series, plan, processes);
+  // The stored views make room for the rays one by one.
+  return program +
+         std::max(series.stored_memory(processes) + decoding,
+                  rays + coarse_rays + std::max({fitting + tracing, factorising, decoding}));
+}
+
+}  // namespace tomofield::plan

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "distributed/communicator.h"
+#include "fit/domain.h"
+#include "fit/stages.h"
+#include "measurement/measurement.h"
+#include "options/run_options.h"
+#include "tilt_series/tilt_series.h"
+
+namespace tomofield::plan {
+
+/// The resident part of the program and its libraries (measured: 24 MiB of files, 3 MiB of heap).
+constexpr std::size_t kProgramBytes = std::size_t{28} << 20;
+
+/// A fit whose memory is wanted. `plan` has no rays.
+struct PlannedFit {
+  const tilt_series::TiltSeries& series;
+  const measurement::Measurement& plan;
+  const fit::Domain& domain;
+  const options::ReconstructOptions& options;
+  const distributed::Communicator& processes;
+};
+
+/// Returns the peak memory of a process in a fit with these stages.
+std::size_t estimate_memory(const PlannedFit& planned, const std::vector<fit::Stage>& stages);
+
+/// Returns the bytes of a thread: the vertices of a leaf, and later a part of the volume.
+std::size_t thread_memory(const measurement::Measurement& plan, const fit::Domain& domain);
+
+int num_fitted_views(const measurement::Measurement& plan, const fit::FitOptions& options);
+int steps_an_epoch(const measurement::Measurement& plan, const fit::FitOptions& options);
+
+/// Returns the number of parameters as a field of this kind. An adaptive tree counts with all
+/// leaves of its budget.
+std::size_t max_parameters(const fit::Domain& domain, const fit::FieldOptions& options,
+                           FieldKind kind);
+
+/// Returns the bytes of the parameters of this process as a field of this kind.
+double parameter_bytes(const fit::Domain& domain, const fit::FieldOptions& options, FieldKind kind,
+                       const distributed::Communicator& processes);
+
+}  // namespace tomofield::plan

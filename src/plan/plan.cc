@@ -1,0 +1,197 @@
+#include "plan/plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "align/alignment.h"
+#include "base/check.h"
+#include "base/log_pause.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "baseline/run_baseline.h"
+#include "evaluate/block_fsc.h"
+#include "evaluate/local_resolution.h"
+#include "fit/domain.h"
+#include "fit/fit.h"
+#include "fit/stages.h"
+#include "measurement/held_out.h"
+#include "measurement/slab_views.h"
+#include "plan/memory_estimate.h"
+#include "plan/tile_plan.h"
+#include "tomofield/error.h"
+#include "tune/trial_measurement.h"
+
+namespace tomofield::plan {
+namespace {
+
+// Returns the peak memory of a process while it aligns the views.
+std::size_t memory_of_alignment(const tilt_series::TiltSeries& series,
+                                const measurement::Measurement& plan,
+                                options::ReconstructOptions options,
+                                const distributed::Communicator& processes) {
+  const bool from_raw = options.resolved.align == Alignment::kFull;
+  options.field = align::planned_field(options.field);
+  options.fit = align::planned_fits(plan, from_raw, options.fit.seed).front().options;
+  const fit::Domain domain = fit::make_domain(plan.geometry, plan.roi, options.field);
+  return estimate_memory({series, plan, domain, options, processes},
+                         fit::make_stages(options.field, options.fit)) +
+         series.stored_memory(processes) + align::memory_beside_fit(plan);
+}
+
+// Opens the series as the files describe it, whose views are not read. What there is to say of it
+// is said when they are.
+tilt_series::TiltSeries planned_series(const options::ReconstructOptions& options,
+                                       const distributed::Communicator& processes) {
+  const base::LogPause pause;
+  tilt_series::TiltSeriesOptions input = options.input;
+  input.look_at_views = false;
+  return tilt_series::TiltSeries(input, processes);
+}
+
+// Returns the bytes that writing the results of halves takes: the rays, and a model that is
+// sampled, or what compares the volumes or makes linear ones.
+std::size_t memory_of_halves(const tilt_series::TiltSeries& series,
+                             const measurement::Measurement& plan, const fit::Domain& domain,
+                             const options::ReconstructOptions& options) {
+  const auto model = static_cast<std::size_t>(parameter_bytes(
+      domain, options.field, options.field.kind, distributed::Communicator::alone()));
+  const base::Shape3 shape{plan.roi.width(), plan.roi.height(),
+                           static_cast<std::int64_t>(plan.geometry.thickness)};
+  const std::size_t linear = options.resolved.denoising_halves
+                                 ? baseline::plan_baseline(series, {options.files, options.resolved,
+                                                                    baseline::WbpOptions{}})
+                                       .memory_bytes
+                                 : 0;
+  const std::size_t sampling =
+      model + static_cast<std::size_t>(base::thread_count()) * thread_memory(plan, domain);
+  return kProgramBytes + measurement::SlabViews::resident_memory(plan.rays_shape(), 0) +
+         std::max({sampling, evaluate::block_fsc_memory(shape),
+                   evaluate::local_resolution_memory(shape), linear});
+}
+
+// Refuses tilts that cannot be divided: each half needs views over the whole range.
+void require_views_for_halves(const measurement::Measurement& plan,
+                              const options::ReconstructOptions& options) {
+  constexpr int kFewest = 8;
+  const int num_views = num_fitted_views(plan, options.fit);
+  if (!options.resolved.split_tilts || num_views >= kFewest) return;
+  throw Error(
+      fmt::format("--split-tilts needs {} views or more, and there are {}", kFewest, num_views));
+}
+
+void require_views_for_trials(const measurement::Measurement& plan,
+                              const fit::FitOptions& options) {
+  const std::vector<double>& tilt_deg = plan.geometry.tilt_deg;
+  tune::trial_views(tilt_deg, measurement::held_out_views(tilt_deg, options.hold_out));
+}
+
+// Returns the largest number of vertices along an axis of a leaf.
+int most_vertices(const fit::Domain& domain) {
+  int most = 0;
+  for (const field::LeafShape& shape : domain.shapes) most = std::max({most, shape.nx, shape.nz});
+  return most;
+}
+
+// Refuses views in which nothing can be seen.
+void require_pixels(std::int64_t width, std::int64_t height) {
+  constexpr std::int64_t kFewest = 8;
+  if (std::min(width, height) < kFewest)
+    throw Error(
+        fmt::format("views of {} × {} pixels show nothing: give a smaller --bin, so that they "
+                    "have at least {} along both sides",
+                    width, height, kFewest));
+}
+
+}  // namespace
+
+RunPlan plan_run(const tilt_series::TiltSeries& series, const options::ReconstructOptions& given,
+                 const distributed::Communicator& processes) {
+  const options::ReconstructOptions options = given.with_open_prior();
+  if (processes.size() > 1) base::require_no_faults(given.faults_of_job());
+  const measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
+  const fit::Domain domain = plan.ray_geometry
+                                 ? fit::make_domain(*plan.ray_geometry, plan.roi, options.field)
+                                 : fit::make_domain(plan.geometry, plan.roi, options.field);
+  RunPlan run;
+  run.num_views = plan.geometry.num_views();
+  run.view_width = plan.geometry.width;
+  run.view_height = plan.geometry.height;
+  require_pixels(run.view_width, run.view_height);
+  run.pixel_size_A = plan.pixel_size_A;
+  run.roi = plan.roi;
+  run.thickness = plan.geometry.thickness;
+  run.num_leaves = domain.tree.num_leaves();
+  run.num_parameters = max_parameters(domain, options.field, options.field.kind);
+  run.stages = fit::make_stages(options.field, options.fit);
+  const fit::Stage& last = run.stages.back();
+  // Only the views tell whether there is a background or an undecided bead.
+  run.num_trials = options.num_trials(num_fitted_views(plan, options.fit),
+                                      {.variation = options.open.variation,
+                                       .spikes = options.open.spikes,
+                                       .view_scale = options.open.view_scale});
+  if (run.num_trials > 0) require_views_for_trials(plan, options.fit);
+  run.steps_an_epoch = steps_an_epoch(plan, options.fit);
+  run.num_steps = (last.first_epoch + last.epochs) * run.steps_an_epoch;
+  run.tiles = plan_tiles({series, plan, domain, options, processes});
+  const bool aligns = options.resolved.align != Alignment::kOff;
+  if (aligns && options.alignment.is_null())
+    align::require_views(static_cast<std::size_t>(run.num_views));
+  run.memory_bytes = run.tiles.is_used()
+                         ? run.tiles.memory_bytes
+                         : estimate_memory({series, plan, domain, options, processes}, run.stages);
+  run.most_vertices = most_vertices(domain);
+  if (aligns && !plan.ray_geometry)
+    run.memory_bytes =
+        std::max(run.memory_bytes, memory_of_alignment(series, plan, options, processes));
+  if (options.makes_halves()) {
+    require_views_for_halves(plan, options);
+    run.num_fits = 3;
+    run.memory_bytes = std::max(run.memory_bytes, memory_of_halves(series, plan, domain, options));
+  }
+  return run;
+}
+
+void require_memory(const RunPlan& plan, const distributed::Communicator& processes) {
+  base::require_memory(plan.memory_bytes * static_cast<std::size_t>(processes.size_on_machine()),
+                       "this reconstruction",
+                       "use a larger --bin or --vertex-spacing, a smaller --roi or --thickness, "
+                       "fewer --threads, or --budget, which fits tiles and makes them compact");
+}
+
+RunPlan require_possible_run(const tilt_series::TiltSeries& series,
+                             const options::ReconstructOptions& options,
+                             const distributed::Communicator& processes) {
+  RunPlan plan = plan_run(series, options, processes);
+  require_memory(plan, processes);
+  require_few_vertices(plan);
+  return plan;
+}
+
+void check_before_alignment(const options::ReconstructOptions& options,
+                            const distributed::Communicator& processes) {
+  if (options.resolved.align == Alignment::kOff) return;
+  const tilt_series::TiltSeries series = planned_series(options, processes);
+  processes.run_collectively([&] { require_possible_run(series, options, processes); });
+}
+
+void check_alignment_alone(const options::ReconstructOptions& options) {
+  const distributed::Communicator& alone = distributed::Communicator::alone();
+  const tilt_series::TiltSeries series = planned_series(options, alone);
+  const measurement::Measurement plan = measurement::plan_measurement(series, options.specimen);
+  align::require_views(series.views().size());
+  base::require_memory(memory_of_alignment(series, plan, options, alone), "this alignment",
+                       "use a larger --bin, a smaller --roi or --thickness, or fewer --threads");
+}
+
+void require_few_vertices(const RunPlan& plan) {
+  if (plan.most_vertices <= field::LeafShape::kMaxVertices) return;
+  throw Error(fmt::format(
+      "{} vertices along an axis of a leaf are more than {}: use a larger --vertex-spacing or "
+      "--bin, or a smaller --thickness",
+      plan.most_vertices, field::LeafShape::kMaxVertices));
+}
+
+}  // namespace tomofield::plan

@@ -1,0 +1,172 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "base/log.h"
+#include "pixel_stack.h"
+#include "plan/plan.h"
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+#include "tomofield/options.h"
+
+namespace tomofield::plan {
+namespace {
+
+constexpr std::int64_t kWidth = 64, kHeight = 48;
+constexpr int kNumViews = 15;
+
+// Plans reconstructions of a small series.
+class Plan : public ::testing::Test {
+ protected:
+  Plan() {
+    options_.input.contrast = Contrast::kBright;
+    options_.input.stack = testing::write_stack(scratch_ / "series.mrc", kWidth, kHeight, kNumViews,
+                                                testing::some_value, 2.5);
+    std::string tilts;
+    for (int view = 0; view < kNumViews; ++view) tilts += std::to_string(8 * view - 56) + "\n";
+    options_.input.tlt = scratch_.write("series.tlt", tilts);
+    options_.specimen.thickness = 24;
+    options_.specimen.with_margin = false;
+    options_.field.kind = FieldKind::kGrid;
+    options_.field.leaf_size = 16;
+    options_.field.with_margin = false;
+    options_.fit.epochs = 5;
+    options_.fit.subsets = 4;
+  }
+
+  RunPlan plan() const { return plan_run(tilt_series::TiltSeries(options_.input), options_); }
+
+  testing::ScratchDirectory scratch_;
+  options::ReconstructOptions options_;
+};
+
+TEST_F(Plan, HasTheSizesOfTheSeriesAndTheField) {
+  const RunPlan run = plan();
+  EXPECT_EQ(run.num_views, kNumViews);
+  EXPECT_EQ(run.view_width, kWidth);
+  EXPECT_EQ(run.view_height, kHeight);
+  EXPECT_NEAR(run.pixel_size_A, 2.5, 1e-6);
+  EXPECT_EQ(run.thickness, 24);
+  EXPECT_EQ(run.roi.width(), kWidth);
+  EXPECT_EQ(run.roi.height(), kHeight);
+  // Root cells are 32 px high, so the height of 48 px takes two rows of them.
+  constexpr std::size_t kLeaves = 16, kN = 17, kNz = 24;
+  EXPECT_EQ(run.num_leaves, static_cast<int>(kLeaves));
+  EXPECT_EQ(run.num_parameters, kLeaves * kN * kN * kNz);
+  options_.field.kind = FieldKind::kVm;
+  options_.field.rank = 5;
+  EXPECT_EQ(plan().num_parameters, kLeaves * 5 * (2 * kN + kNz + kN * kN + 2 * kN * kNz));
+}
+
+TEST_F(Plan, BinnedViewsAndARegionOfInterestAreSmaller) {
+  options_.input.bin = 2;
+  options_.specimen.roi = Rectangle{8, 4, 56, 44};
+  const RunPlan run = plan();
+  EXPECT_EQ(run.view_width, kWidth / 2);
+  EXPECT_EQ(run.view_height, kHeight / 2);
+  EXPECT_NEAR(run.pixel_size_A, 5.0, 1e-6);
+  EXPECT_EQ(run.thickness, 12);
+  EXPECT_EQ(run.roi.width(), 24);
+  EXPECT_EQ(run.roi.height(), 20);
+}
+
+TEST_F(Plan, CountsTheStepsOfAllStages) {
+  EXPECT_EQ(plan().num_steps, 5 * 4);
+  options_.fit.coarse_epochs = 8;
+  options_.field.leaf_size = 32;
+  const RunPlan coarse = plan();
+  EXPECT_EQ(coarse.num_steps, (5 + 8) * 4);
+  std::int64_t epochs = 0;
+  for (const fit::Stage& stage : coarse.stages) epochs += stage.epochs;
+  EXPECT_EQ(epochs, 5 + 8);
+  EXPECT_GT(coarse.stages.front().bin, 1);
+  EXPECT_EQ(coarse.stages.back().bin, 1);
+}
+
+TEST_F(Plan, AnEpochHasAtMostOneStepForEachFittedView) {
+  options_.fit.subsets = 100;
+  EXPECT_EQ(plan().num_steps, 5 * kNumViews);
+  options_.fit.hold_out = 5;  // positions 2, 7 and 12
+  EXPECT_EQ(plan().num_steps, 5 * (kNumViews - 3));
+}
+
+TEST_F(Plan, CountsTheTrials) {
+  EXPECT_EQ(plan().num_trials, 0);
+  options_.open.view_scale = true;
+  EXPECT_EQ(plan().num_trials, 2);
+  options_.open.variation = true;
+  EXPECT_EQ(plan().num_trials, 5);
+  options_.fit.hold_out = 3;  // 10 views are left, and short trials need 12
+  EXPECT_EQ(plan().num_trials, 0);
+  options_.resolved.tune = true;
+  EXPECT_GT(plan().num_trials, 2);
+  options_.fit.hold_out = 2;
+  options_.input.exclude = "1-9";
+  const std::string message = testing::message_of<Error>([&] { plan(); });
+  EXPECT_NE(message.find("views"), std::string::npos) << message;
+}
+
+TEST_F(Plan, MoreParametersNeedMoreMemory) {
+  const std::size_t few = plan().memory_bytes;
+  options_.field.vertex_spacing = 0.25;
+  const RunPlan fine = plan();
+  // The parameters, their gradient and two moments of floats.
+  EXPECT_GT(fine.memory_bytes, few);
+  EXPECT_GE(fine.memory_bytes, 16 * fine.num_parameters);
+}
+
+TEST_F(Plan, RefusesWhatTheMachineCannotHold) {
+  RunPlan run = plan();
+  EXPECT_NO_THROW(require_memory(run));
+  run.memory_bytes = std::size_t{1} << 50;
+  const std::string message = testing::message_of<Error>([&] { require_memory(run); });
+  EXPECT_NE(message.find("GiB"), std::string::npos) << message;
+  EXPECT_NE(message.find("--bin"), std::string::npos) << message;
+}
+
+TEST_F(Plan, RefusesTooFewViewsForAnAlignmentBeforeIt) {
+  options_.resolved.align = Alignment::kRefine;
+  plan();
+  check_before_alignment(options_);
+  check_alignment_alone(options_);
+  options_.input.exclude = "1-4";
+  const auto refusal = [](const auto& check) {
+    const std::string message = testing::message_of<Error>(check);
+    EXPECT_NE(message.find("at least 12 views"), std::string::npos) << message;
+    EXPECT_NE(message.find("11"), std::string::npos) << message;
+  };
+  refusal([&] { plan(); });
+  refusal([&] { check_before_alignment(options_); });
+  refusal([&] { check_alignment_alone(options_); });
+  options_.alignment = {{"accepted", true}};  // it may have left views out
+  plan();
+}
+
+TEST_F(Plan, RefusesTooMuchMemoryBeforeAnAlignment) {
+  options_.resolved.align = Alignment::kRefine;
+  options_.input.stack =
+      testing::write_stack(scratch_ / "wide.mrc", 512, 512, kNumViews, testing::some_value, 2.5);
+  options_.specimen.thickness = 1e6;
+  const auto refusal = [](const auto& check) {
+    const std::string message = testing::message_of<Error>(check);
+    EXPECT_NE(message.find("GiB"), std::string::npos) << message;
+  };
+  refusal([&] { check_before_alignment(options_); });
+  refusal([&] { check_alignment_alone(options_); });
+}
+
+TEST_F(Plan, BeforeAnAlignmentIsSilent) {
+  options_.resolved.align = Alignment::kRefine;
+  options_.input.stack = testing::write_stack(scratch_ / "unscaled.mrc", kWidth, kHeight, kNumViews,
+                                              testing::some_value, 1.0);
+  int num_messages = 0;
+  base::set_log_sink([&](base::LogLevel, std::string_view) { ++num_messages; });
+  check_before_alignment(options_);
+  EXPECT_EQ(num_messages, 0);
+  base::log_info("the pause is over");
+  EXPECT_EQ(num_messages, 1);
+  base::set_log_sink({});
+}
+
+}  // namespace
+}  // namespace tomofield::plan

@@ -1,0 +1,114 @@
+#include "reconstruct/run_files.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <filesystem>
+#include <string>
+
+#include "base/check.h"
+#include "base/log.h"
+#include "checkpoint/checkpoint.h"
+#include "exchange/exchange_files.h"
+#include "io/output_files.h"
+#include "output/output_paths.h"
+#include "output/volume.h"
+
+namespace tomofield::reconstruction {
+namespace {
+
+void add_half_files(const output::OutputPaths& paths, bool with_linear_volumes,
+                    std::vector<std::filesystem::path>& files) {
+  files.insert(files.end(), {paths.fsc_picture, paths.local_resolution, paths.uncertainty});
+  for (const output::OutputPaths::OfHalf& half : paths.halves) {
+    files.insert(files.end(), {half.volume, half.model});
+    if (with_linear_volumes) files.push_back(half.linear_volume);
+  }
+}
+
+// Says whether the run resumes. Without a checkpoint there is nothing to resume: then the other
+// files are from another run.
+bool can_resume(const options::ReconstructOptions& options, const output::OutputPaths& paths) {
+  const Options& resolved = options.resolved;
+  const auto has = [](const std::filesystem::path& file) { return std::filesystem::exists(file); };
+  return resolved.resume && (has(paths.model) || (resolved.tune && has(paths.trials)) ||
+                             (resolved.align != Alignment::kOff && has(paths.alignment)) ||
+                             (options.may_use_tiles() && has(paths.tiles)));
+}
+
+// Returns the files that the run writes, but for the pictures of slices.
+std::vector<std::filesystem::path> result_files(const options::ReconstructOptions& options,
+                                                const output::OutputPaths& paths) {
+  const Options& resolved = options.resolved;
+  std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json, paths.report};
+  if (options.field.tree == TreeKind::kAdaptive) results.push_back(paths.tree_picture);
+  if (options.may_use_tiles()) results.push_back(paths.tiles);
+  if (resolved.tune) results.push_back(paths.trials);
+  if (resolved.align != Alignment::kOff) results.push_back(paths.alignment);
+  if (options.fit.hold_out > 0) results.push_back(paths.held_out_picture);
+  if (options.makes_halves()) add_half_files(paths, resolved.denoising_halves, results);
+  if (resolved.tune || options.open.any()) results.push_back(paths.choice_picture);
+  if (options.chooses_weight()) results.push_back(paths.dial_picture);
+  if (options.open.prior) results.push_back(paths.prior_picture);
+  for (const auto& file : exchange::exchange_files(options)) results.push_back(file);
+  return results;
+}
+
+// Returns the pictures that only some runs draw.
+std::vector<std::filesystem::path> optional_pictures(const output::OutputPaths& paths) {
+  return {paths.tree_picture, paths.held_out_picture, paths.choice_picture, paths.fsc_picture};
+}
+
+}  // namespace
+
+void check_options(const options::ReconstructOptions& options) {
+  base::require_no_faults(options.faults());
+  if (options.resolved.output.empty()) return;
+  const Options& resolved = options.resolved;
+  io::require_volume_name(resolved.output);
+  const output::OutputPaths paths = output::output_paths(resolved.output);
+  const bool may_replace = resolved.overwrite || can_resume(options, paths);
+  const char* const advice =
+      resolved.resume ? "there is no checkpoint to resume, so give --overwrite to start over and "
+                        "replace it, or another name with -o"
+                      : "give --overwrite to replace it, --resume to continue the run that made "
+                        "it, or another name with -o";
+  io::check_result_files(result_files(options, paths), paths.picture_prefix, options.files,
+                         may_replace, advice);
+  if (resolved.zarr) output::check_zarr(paths.volume, may_replace, advice);
+}
+
+std::vector<io::OutputLock> claim_outputs(const options::ReconstructOptions& options) {
+  const output::OutputPaths paths = output::output_paths(options.resolved.output);
+  std::vector<std::filesystem::path> files{paths.volume, paths.model, paths.json};
+  if (options.makes_halves())
+    for (const output::OutputPaths::OfHalf& half : paths.halves) files.push_back(half.model);
+  if (options.may_use_tiles()) files.push_back(paths.tiles);
+  if (options.resolved.align != Alignment::kOff) files.push_back(paths.alignment);
+  if (options.resolved.output.empty()) files.clear();
+  return io::claim_outputs(files, [&] {
+    check_options(options);
+    if (options.resolved.resume && std::filesystem::exists(paths.model))
+      checkpoint::read_checkpoint([&] { checkpoint::require_state_of_fit(paths.model); });
+  });
+}
+
+void remove_stale_files(const options::ReconstructOptions& options, io::OutputSet& results) {
+  if (!options.resolved.overwrite) return;
+  const output::OutputPaths paths = output::output_paths(options.resolved.output);
+  std::vector<std::filesystem::path> stale;
+  if (!options.chooses_weight()) stale.push_back(paths.dial_picture);
+  if (!options.open.prior) stale.push_back(paths.prior_picture);
+  for (const std::filesystem::path& picture : optional_pictures(paths))
+    if (!results.contains(picture)) stale.push_back(picture);
+  std::vector<std::string> removed;
+  for (const std::filesystem::path& picture : stale) {
+    if (!std::filesystem::is_regular_file(picture)) continue;
+    results.remove_old(picture);
+    removed.push_back(picture.filename().string());
+  }
+  if (!removed.empty())
+    base::log_info(fmt::format("removes pictures of an earlier run: {}", fmt::join(removed, ", ")));
+}
+
+}  // namespace tomofield::reconstruction

@@ -1,0 +1,453 @@
+#include "report/run_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "base/trace.h"
+#include "base/version.h"
+#include "io/json_numbers.h"
+#include "io/mrc.h"
+#include "report/alignment_plot.h"
+#include "report/embedded_volume.h"
+#include "report/html.h"
+#include "report/reduced_volume.h"
+#include "report/reported_options.h"
+#include "report/run_plots.h"
+#include "tomofield/version.h"
+
+namespace tomofield::report {
+namespace {
+
+using nlohmann::json;
+
+std::string size_text(const std::array<std::int64_t, 3>& size) {
+  return fmt::format("{} × {} × {}", size[0], size[1], size[2]);
+}
+
+std::string time_text(double seconds) {
+  if (seconds < 100) return fmt::format("{:.1f} s", seconds);
+  if (seconds < 6000) return fmt::format("{:.0f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
+
+// Returns the metrics of each fit: of all data, and of the halves, if the run made some.
+AllFits fits_of(const json& record) {
+  for (const json* object : {&record, &record.at("metrics")}) {
+    const auto halves = object->find("halves");
+    if (halves == object->end() || !halves->contains("even") || !halves->contains("odd")) continue;
+    return {{"all data", record.at("metrics")},
+            {"even half", halves->at("even").at("metrics")},
+            {"odd half", halves->at("odd").at("metrics")}};
+  }
+  return {{"", record.at("metrics")}};
+}
+
+// Returns the lowest and the highest tilt.
+std::pair<double, double> tilt_range(const json& metrics) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const json& view : metrics.at("views")) {
+    low = std::min(low, io::number_or_nan(view.at("tilt_deg")));
+    high = std::max(high, io::number_or_nan(view.at("tilt_deg")));
+  }
+  return {low, high};
+}
+
+void add_verdict(const json& verdict, HtmlPage& page) {
+  const json& warnings = verdict.at("warnings");
+  std::vector<std::string> texts;
+  for (const json& warning : warnings) {
+    std::string text = warning.at("message");
+    if (!text.empty()) text.front() = static_cast<char>(std::toupper(text.front()));
+    texts.push_back(text + ".");
+  }
+  if (texts.empty()) {
+    const char* const checked =
+        verdict.at("views").is_object()
+            ? "Contrast, order of the tilts, alignment, tilt axis, thickness, noise and residual "
+              "were "
+              "checked"
+            : "The thickness was checked, which is all that --engine ray allows";
+    page.add_notice("No warning",
+                    {fmt::format("{}, and nothing seems off. No check can see a wrong hand, or a "
+                                 "thickness that is a little too small.",
+                                 checked)},
+                    false);
+    return;
+  }
+  page.add_notice(texts.size() == 1 ? "One warning" : fmt::format("{} warnings", texts.size()),
+                  texts, true);
+}
+
+std::vector<HtmlFact> facts_of_size(const AllFits& fits, const EmbeddedVolume& volume) {
+  const json& metrics = fits.front().metrics;
+  const auto [low, high] = tilt_range(metrics);
+  const auto& size = volume.file_size;
+  std::vector<HtmlFact> facts{
+      {"Tomogram", size_text(size), "Voxels along x, y and z of the file."}};
+  if (volume.voxel_size_A > 0) {
+    const auto nm = [&](std::size_t axis) {
+      return static_cast<double>(size[axis]) * volume.voxel_size_A / 10;
+    };
+    facts.push_back(
+        {"Voxel", fmt::format("{:.4g} Å", volume.voxel_size_A),
+         fmt::format("The tomogram has {:.4g} × {:.4g} × {:.4g} nm.", nm(0), nm(1), nm(2))});
+  }
+  facts.push_back({"Views", fmt::format("{}", metrics.at("views").size()),
+                   fmt::format("Tilts from {:.1f}° to {:.1f}°.", low, high)});
+  return facts;
+}
+
+// Adds how far gold beads lie from their places, if an alignment followed some.
+void add_beads(const json& alignment, std::vector<HtmlFact>& facts) {
+  if (!alignment.is_object() || !alignment.contains("beads")) return;
+  const json &beads = alignment.at("beads"), &distance_px = beads.at("distance_px");
+  const bool is_new = alignment.at("accepted").get<bool>();
+  const char* of_new = beads.at("accepted").get<bool>() ? "after" : "before";
+  facts.push_back(
+      {"Gold beads",
+       fmt::format("{:.2f} px", io::number_or_nan(distance_px.at(is_new ? of_new : "files"))),
+       fmt::format("{} beads lie so far from their places (root mean square in x and y). With the "
+                   "alignment {}: {:.2f} px.",
+                   beads.at("beads").get<int>(),
+                   is_new ? "of the files" : "that was tried and not taken",
+                   io::number_or_nan(distance_px.at(is_new ? "files" : of_new)))});
+}
+
+// Adds what an alignment found of the specimen's pose.
+void add_pose(const json& alignment, std::vector<HtmlFact>& facts) {
+  if (!alignment.is_object() || !alignment.contains("pose")) return;
+  const json& pose = alignment.at("pose");
+  facts.push_back(
+      {"Thickness and pitch",
+       fmt::format(
+           "{:.0f} ± {:.0f} px, {:.1f} ± {:.1f}°", io::number_or_nan(pose.at("thickness_px")),
+           io::number_or_nan(pose.at("thickness_error_px")),
+           io::number_or_nan(pose.at("pitch_deg")), io::number_or_nan(pose.at("pitch_error_deg"))),
+       "What the specimen seems to have, in unbinned pixels, and in degrees against the tilt "
+       "angles. "
+       "Noisy views give rough values, whatever their errors say: look at the XZ plane first. The "
+       "alignment applied neither; --thickness and --tilt-offset do that."});
+}
+
+void add_prior(const json& prior, std::vector<HtmlFact>& facts) {
+  const bool is_used = prior.at("learned").get<bool>();
+  const double gain = io::number_or_nan(prior.at("gain"));
+  if (!is_used && !std::isfinite(gain)) return;
+  std::string note =
+      "A network that was trained on simulated series suggested what is shown, and the views "
+      "corrected it. ";
+  if (!is_used) note = "A trial of the learned prior predicted held-out views no better. ";
+  if (std::isfinite(gain))
+    note += fmt::format("Error of held-out views with it, in trials: {:+.2f} % ± {:.2f}.",
+                        -100 * gain, 100 * io::number_or_nan(prior.at("standard_error")));
+  facts.push_back({"Learned prior", is_used ? "yes" : "no", note});
+}
+
+std::vector<HtmlFact> facts_of_fit(const json& verdict, const json& metrics) {
+  std::vector<HtmlFact> facts;
+  facts.push_back({"Residual", fmt::format("{:.2f}", io::number_or_nan(verdict.at("residual"))),
+                   "What the tomogram leaves of the views, over the noise's variance: about 1 if "
+                   "nothing but noise is left, more if it cannot explain the views."});
+  if (const json& held_out = verdict.at("held_out"); held_out.is_object()) {
+    facts.push_back(
+        {held_out.at("of_trials").get<bool>() ? "Held-out views, in trials" : "Held-out views",
+         fmt::format("{:.2f}", io::number_or_nan(held_out.at("median"))),
+         fmt::format("The same of views that were not fitted (median): near the residual if the "
+                     "tomogram has no structure that only the fitted views want. Worst {:.2f} at "
+                     "{:.1f}°.",
+                     io::number_or_nan(held_out.at("worst")),
+                     io::number_or_nan(held_out.at("worst_tilt_deg")))});
+  }
+  add_prior(verdict.at("prior"), facts);
+  if (const json& views = verdict.at("views"); views.is_object()) {
+    facts.push_back({"Alignment",
+                     fmt::format("{:.2g} px", io::number_or_nan(views.at("usual_displacement_px"))),
+                     "9 of 10 views lie closer than this to where the tomogram predicts them."});
+  }
+  add_beads(metrics.value("alignment", json()), facts);
+  add_pose(metrics.value("alignment", json()), facts);
+  if (const double speckle = io::number_or_nan(verdict.value("speckle", json()));
+      std::isfinite(speckle))
+    facts.push_back(
+        {"Speckle", fmt::format("{:.3f} %", 100 * speckle),
+         "Voxels that stick out from all their neighbours. Hardly anybody sees less than "
+         "0.02 %."});
+  facts.push_back(
+      {"Masked",
+       fmt::format("{:.1f} %", 100 * io::number_or_nan(metrics.at("mask").at("masked_part"))),
+       "Pixels of the views that did not count: beads, fill, bad pixels."});
+  facts.push_back(
+      {"Time and memory",
+       fmt::format("{}, {:.2g} GiB", time_text(io::number_or_nan(verdict.at("seconds"))),
+                   io::number_or_nan(verdict.at("peak_GiB"))),
+       fmt::format("Threads: {}.", metrics.at("threads").get<int>())});
+  return facts;
+}
+
+void add_volume(const json& record, const EmbeddedVolume& volume, HtmlPage& page) {
+  page.add_heading("The tomogram");
+  page.add_paragraph(
+      "Turn the wheel over a plane to scroll through it (with Ctrl: to zoom), click to move the "
+      "other two planes there, drag to pan. Arrow keys, + and − work on the plane that was "
+      "clicked.");
+  page.add_volume(volume);
+  std::string text = fmt::format(
+      "8-bit copy for this page, {} voxels{}; values below {:.4g} and above {:.4g} are clipped.",
+      size_text(volume.size),
+      volume.size == volume.file_size ? "" : " (each the mean of the file's voxels that it covers)",
+      volume.limits.first, volume.limits.second);
+  if (record.at("options").at("volume").at("axes") == "xzy")
+    text += " Planes are named after the axes of the file, whose y is the specimen's thickness.";
+  page.add_paragraph(
+      text + " The command tomofield view shows the file itself, and the model at any zoom.");
+}
+
+std::vector<HtmlCell> option_cells(const ReportedOption& option) {
+  return {{option.flag, ""},
+          {option.value, option.is_default ? "" : "given"},
+          {option.origin, ""},
+          {option.meaning, ""}};
+}
+
+// Says whether the views of a dark series were fitted without a contrast transfer.
+bool lacks_transfer(const nlohmann::json& input) {
+  const auto is_given = [&](const char* key) {
+    return input.contains(key) && !input[key].is_null() && input[key] != "" && input[key] != "none";
+  };
+  return input.at("contrast") == "dark" && !is_given("ctf") && !is_given("defocus_um");
+}
+
+void add_input(const ReportSource& source, HtmlPage& page) {
+  page.add_heading("What went in, and what was assumed");
+  if (lacks_transfer(source.record.at("options").at("input")))
+    page.add_paragraph(
+        "CTF and dose: the views are taken as plain projections of the specimen, because no "
+        "contrast transfer was given (--ctf or --defocus). So fringes of defocus stay in the "
+        "tomogram. What was corrected in the stack before stays corrected.");
+  using Rows = std::vector<std::vector<HtmlCell>>;
+  Rows chosen{{{"option", ""}, {"value", ""}, {"from", ""}, {"meaning", ""}}}, defaults = chosen;
+  for (const ReportedOption& option :
+       reported_options(source.record, source.files, source.requested))
+    (option.is_default ? defaults : chosen).push_back(option_cells(option));
+  page.add_table(chosen, TableOf::kWords);
+  page.begin_folded(fmt::format("{} options have their defaults", defaults.size() - 1));
+  page.add_table(defaults, TableOf::kWords);
+  page.end_folded();
+}
+
+std::string mask_text(const json& mask) {
+  const int beads = mask.at("beads").get<int>();
+  std::string text = "Pixels in red did not count in the fit. ";
+  if (beads == 0)
+    text += "No beads were found";
+  else if (mask.at("bead_masking") == "masked")
+    text += fmt::format("{} beads of {:.3g} nm were found and masked", beads,
+                        io::number_or_nan(mask.at("bead_diameter_nm")));
+  else
+    text += fmt::format(
+        "{} beads of {:.3g} nm were found and kept (blue), because that predicts views better",
+        beads, io::number_or_nan(mask.at("bead_diameter_nm")));
+  return text + fmt::format("; {} hot or dead pixels; {:.1f} % of all pixels are masked.",
+                            mask.at("bad_pixels").get<std::int64_t>(),
+                            100 * io::number_or_nan(mask.at("masked_part")));
+}
+
+void add_pictures(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
+  const json& metrics = fits.front().metrics;
+  page.add_heading("Masks");
+  page.add_paragraph(mask_text(metrics.at("mask")));
+  page.add_figures({{source.mask_picture, "The view of lowest tilt"}}, FigureSize::kLarge);
+  if (const std::string plot = masked_plot(fits); !plot.empty()) page.add_svg(plot);
+  if (!source.tree_picture) return;
+  page.add_heading("Tree");
+  page.add_paragraph(
+      "Leaves of the adaptive tree over the central XY plane. They are small where the density "
+      "varies much.");
+  page.add_figures(
+      {{*source.tree_picture, fmt::format("{} leaves", metrics.at("leaves").get<int>())}},
+      FigureSize::kLarge);
+}
+
+// Adds a plot with its heading and explanation, if there is one.
+void add_plot(const char* heading, const char* text, const std::string& svg, HtmlPage& page) {
+  if (svg.empty()) return;
+  page.add_heading(heading);
+  page.add_svg(svg, text);
+}
+
+// Adds what the alignment before the fit found, if there was one.
+void add_alignment(const json& metrics, HtmlPage& page) {
+  const auto record = metrics.find("alignment");
+  if (record == metrics.end() || !record->is_object()) return;
+  const json& error = record->at("held_out_error");
+  page.add_heading("Views: alignment before the fit");
+  page.add_paragraph(fmt::format(
+      "The views were aligned with the projections of a field that was fitted to all of them. "
+      "Views that such a field did not see are predicted with an error of {:.4f} of their "
+      "variance; with the alignment of the files it is {:.4f}. {}",
+      error.at("after").get<double>(), error.at("before").get<double>(),
+      record->at("accepted").get<bool>() ? "So the new alignment is used."
+                                         : "So the alignment of the files is kept."));
+  for (const CurvePlot& plot : alignment_plots(alignment_curves(*record)))
+    page.add_svg(curve_plot_svg(plot.axes, plot.curves), "");
+}
+
+// Says why no section shows what another place of the dial would do.
+const char* why_no_dial(const Options& requested) {
+  if (requested.penalty || requested.density_variation)
+    return "No sections show what --denoise would do: the weight of total variation was given to "
+           "this run (by --tv, --tv-penalty, or a batch that chose once for all its series), so it "
+           "tried no others.";
+  return "No sections show what --denoise would do: this run has no trials with three weights near "
+         "half of the chosen one, the chosen one, and twice it.";
+}
+
+// Shows what another place of the dial would do.
+void add_dial(const ReportSource& source, HtmlPage& page) {
+  page.add_heading("Lighter or stronger denoising");
+  if (!source.dial_picture) return page.add_paragraph(why_no_dial(source.requested));
+  page.add_paragraph(fmt::format(
+      "The same section from three short fits. This run was made with --denoise {}. Where the "
+      "strong one loses what you want to see, give --denoise light; where the medium one is too "
+      "grainy, give --denoise strong, or any factor such as 1.5. The whole fit is a little "
+      "smoother than these.",
+      source.record.at("options").at("fit").at("denoise").get<std::string>()));
+  page.add_figures({{*source.dial_picture,
+                     "The trials whose weights are nearest to half of the chosen one, to the "
+                     "chosen one, and to twice it. --denoise takes the factors"}},
+                   FigureSize::kLarge);
+}
+
+// Shows what the learned prior changes, if trials have compared it.
+void add_prior_picture(const ReportSource& source, HtmlPage& page) {
+  if (!source.prior_picture) return;
+  const bool is_used = source.record.at("options").at("fit").at("prior") == "learned";
+  page.add_heading("The learned prior");
+  page.add_paragraph(fmt::format(
+      "The same section from two fits of some rows, without some views. {} (docs/prior.md).",
+      is_used
+          ? "With the prior the views left out were predicted better, so it ended this fit. Look "
+            "whether you trust what it adds; --prior tv does without"
+          : "With the prior the views left out were not predicted better, so this fit does "
+            "without"));
+  page.add_figures(
+      {{*source.prior_picture, "Without the prior, with it, and the difference in the same greys"}},
+      FigureSize::kLarge);
+}
+
+void add_fit(const ReportSource& source, const AllFits& fits, HtmlPage& page) {
+  add_plot(
+      "Settings that trials chose",
+      "Short fits without some views were tried before the fit. Lower is better, and the chosen "
+      "settings are at 0; bars are two standard errors long. Errors are compared patch by patch of "
+      "these views (the median over pairs of patches). The weight lies between those that were "
+      "tried, and a concave penalty is taken only if it is surely better (docs/fitting.md).",
+      trials_plot(fits.front().metrics), page);
+  add_dial(source, page);
+  add_prior_picture(source, page);
+  add_alignment(fits.front().metrics, page);
+  add_plot("Loss",
+           "The fit begins with coarse pixels, whose noise is lower; the curves jump where it goes "
+           "on with finer ones. Held-out views that get worse while the fitted ones improve would "
+           "say that noise is fitted.",
+           loss_plot(fits), page);
+  add_plot("Views: residual",
+           "A view far above its neighbours is damaged, badly aligned or has another tilt than its "
+           "file says: look at it, and leave it out with --exclude if it is.",
+           residual_plot(fits), page);
+  if (source.held_out_picture) {
+    page.add_paragraph(
+        "A view that was held out: measured, predicted by the tomogram, and the difference, which "
+        "should look like noise.");
+    page.add_figures({{*source.held_out_picture, "Measured, predicted, measured − predicted"}},
+                     FigureSize::kLarge);
+  }
+}
+
+void add_views(const AllFits& fits, HtmlPage& page) {
+  add_plot("Views: scale and weight",
+           "The scale is the view's brightness in comparison with the tomogram (1 if it is not "
+           "fitted: --view-scale). Views that the tomogram explains less well than their noise "
+           "allows have a weight below 1.",
+           scale_plot(fits), page);
+  add_plot("Views: offset and noise",
+           "The offset is what is added to a predicted view. The noise is measured on each view "
+           "before the fit.",
+           offset_plot(fits), page);
+  add_plot(
+      "Views: alignment",
+      "How far measured views lie from where the tomogram predicts them. A trend along the tilt "
+      "or a view far from 0 speaks for a better alignment.",
+      displacement_plot(fits), page);
+}
+
+void add_halves(const json& record, HtmlPage& page) {
+  for (const json* object : {&record, &record.at("metrics")}) {
+    const auto halves = object->find("halves");
+    if (halves == object->end() || !halves->is_object() || !halves->contains("fsc")) continue;
+    add_plot("Halves",
+             "Fourier shell correlation of two fits to halves of the data. Both fits prefer smooth "
+             "volumes in the same way, so the curve says more about what they share than about the "
+             "resolution of the specimen.",
+             halves_plot(halves->at("fsc")), page);
+  }
+}
+
+void add_costs(const json& verdict, const json& metrics, HtmlPage& page) {
+  page.add_heading("Time and memory");
+  page.add_paragraph(fmt::format(
+      "The whole run took {}, of which the fit {} ({} steps, {} parameters); at most {:.2f} GiB of "
+      "memory. {}.",
+      time_text(io::number_or_nan(verdict.at("seconds"))),
+      time_text(io::number_or_nan(metrics.at("seconds"))), metrics.at("steps").get<std::int64_t>(),
+      metrics.at("parameters").get<std::int64_t>(), io::number_or_nan(verdict.at("peak_GiB")),
+      metrics.at("threads_why").get<std::string>()));
+  std::vector<std::vector<HtmlCell>> rows{
+      {{"stage", ""}, {"epochs", ""}, {"pixels binned by", ""}, {"field", ""}}};
+  for (const json& stage : metrics.at("stages"))
+    rows.push_back(
+        {{fmt::format("{}", rows.size()), ""},
+         {fmt::format("{}", stage.at("epochs").get<int>()), ""},
+         {fmt::format("{}", stage.at("bin").get<int>()), ""},
+         {stage.at("field").get<std::string>() == "grid" ? "plain vertices" : "factors", ""}});
+  page.add_table(rows);
+}
+
+}  // namespace
+
+std::string run_report(const ReportSource& source) {
+  const base::TraceSpan span("report");
+  const AllFits fits = fits_of(source.record);
+  const json& metrics = fits.front().metrics;
+  const json& verdict = source.record.at("metrics").at("verdict");
+  const std::vector<float> sample = sample_voxels(io::MrcReader(source.volume));
+  const EmbeddedVolume volume = embed_volume(source.volume);
+  HtmlPage page("Tomogram of " + source.files.stack.filename().string());
+  page.add_paragraph(fmt::format("{}, reconstructed with tomofield {} ({})",
+                                 source.files.stack.string(), library_version(),
+                                 base::source_commit()));
+  add_verdict(verdict, page);
+  std::vector<HtmlFact> facts = facts_of_size(fits, volume);
+  std::ranges::move(facts_of_fit(verdict, metrics), std::back_inserter(facts));
+  page.add_facts(facts);
+  add_volume(source.record, volume, page);
+  add_input(source, page);
+  add_pictures(source, fits, page);
+  add_fit(source, fits, page);
+  add_views(fits, page);
+  add_halves(source.record, page);
+  add_plot("Histogram",
+           "Densities of up to 32 evenly spaced sections of the tomogram. One narrow peak with a "
+           "tail on the side of dense matter is usual.",
+           histogram_plot(sample), page);
+  add_costs(verdict, metrics, page);
+  return page.document();
+}
+
+}  // namespace tomofield::report

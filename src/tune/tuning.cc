@@ -1,0 +1,220 @@
+#include "tune/tuning.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <utility>
+
+#include "base/enum_names.h"
+#include "base/log.h"
+#include "measurement/surrogate_views.h"
+#include "objective/options.h"
+#include "tune/trial_fits.h"
+
+namespace tomofield::tune {
+namespace {
+
+// Short trials: with these rows and parts of the usual epochs, weights rank as after whole fits.
+constexpr std::int64_t kShortRows = 32;
+// More rows at the ends choose no better weights (docs/results/ctf.md, "Trials").
+constexpr std::int64_t kMostRowsBeside = 8;
+constexpr double kShortPart = 0.2, kShortCoarsePart = 0.25;
+
+// Returns the options of a short trial with plain vertices. If `fit` is shorter than usual for
+// `field`, the trial is shorter in proportion.
+fit::FitOptions short_trial_options(const fit::FieldOptions& plain, const fit::FieldOptions& field,
+                                    const fit::FitOptions& fit) {
+  const fit::Schedule usual = fit::usual_schedule(plain, fit);
+  const double part =
+      std::min(1.0, static_cast<double>(fit.epochs) / fit::usual_schedule(field, fit).epochs);
+  const auto epochs = [&](double of_usual) {
+    return std::max(1, static_cast<int>(std::lround(part * of_usual)));
+  };
+  fit::FitOptions shorter = fit;
+  shorter.epochs = epochs(kShortPart * usual.epochs);
+  if (fit.coarse_epochs > 0)
+    shorter.coarse_epochs = epochs(kShortCoarsePart * usual.coarse_epochs_of(usual.epochs));
+  shorter.vertex_epochs = 0;
+  shorter.learning_rate = usual.learning_rate;
+  return shorter;
+}
+
+// Searches on every process, with the same trials and so with the same result. Returns nothing if a
+// stop was requested.
+std::optional<TunedFit> searched(TrialFits& fits, TrialFile* file,
+                                 const std::function<TrialSettings(FitTrials&)>& search) {
+  FitTrials trials =
+      make_trials([&](const std::vector<TrialSettings>& batch) { return fits.run(batch, file); });
+  try {
+    const TrialSettings found = search(trials);
+    return TunedFit{found, trials.made(), fits.predicted_views()};
+  } catch (const base::StopRequested&) {
+    return std::nullopt;
+  }
+}
+
+// Says how the trial with the learned prior compares with that without it.
+void log_prior(const TunedFit& tuned) {
+  const Difference gain = gain_of_prior(tuned).value();
+  base::log_info(fmt::format(
+      "learned prior: whole fits of some rows predict the views that they leave out with "
+      "{:+.2f} % ± {:.2f} of the error with it: {}",
+      -100 * gain.log_ratio, 100 * gain.standard_error,
+      tuned.settings.prior == Prior::kLearned ? "it ends the fit"
+                                              : "total variation alone ends the fit"));
+}
+
+// Compares fits with and without the learned prior, if that is open.
+std::optional<TunedFit> with_prior(std::optional<TunedFit> tuned,
+                                   const measurement::Measurement& measurement,
+                                   const fit::FieldOptions& field, const fit::FitOptions& fit,
+                                   const OpenSettings& open, TrialFile* file,
+                                   const TuneHooks& hooks,
+                                   const distributed::Communicator& processes) {
+  if (!tuned || !open.prior) return tuned;
+  const TrialShape shape = prior_trial(field, fit);
+  TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
+                 open.view_scale || fit.fit_view_scale, hooks, kPriorTrials, processes);
+  const std::optional<TunedFit> compared = searched(
+      fits, file, [&](FitTrials& trials) { return choose_prior(tuned->settings, trials); });
+  if (!compared) return std::nullopt;
+  tuned->settings.prior = compared->settings.prior;
+  tuned->last_trials = compared->trials;
+  log_prior(*tuned);
+  return tuned;
+}
+
+// Writes a line for each trial: its settings, and how much worse than the chosen one it predicts.
+// Says how these are compared.
+void log_trials(const TunedFit& tuned) {
+  const char* const reference =
+      chosen_trial(tuned) != nullptr ? "the chosen settings" : "the best trial";
+  for (const FitTrial& t : tuned.trials) {
+    const Difference d = difference_to_chosen(t, tuned);
+    base::log_info(fmt::format(
+        "tried {}, rank {}, epochs {}: patch by patch {:+.2f} % ± {:.2f} from "
+        "{}; mean held-out error {:.5f}{}",
+        describe(t.settings, tuned.trials.front().settings), t.settings.rank, t.settings.epochs,
+        100 * d.log_ratio, 100 * d.standard_error, reference, t.score.error,
+        t.score.speckle ? fmt::format(", speckle {:.3f} %", 100 * *t.score.speckle)
+                        : std::string()));
+  }
+  base::log_info(
+      "the choice compares the errors of trials patch by patch of the views left out (median over "
+      "pairs of patches); a patch that all predict badly moves the mean error, but not this");
+}
+
+}  // namespace
+
+int expected_trials(const SearchSpace& space) {
+  return kUsualWeights + 2 + (space.penalty ? 1 : 0) + (space.rank ? 2 : 0);
+}
+
+TrialShape trial_of_tune(const fit::FieldOptions& field, const fit::FitOptions& fit) {
+  return {kTrialRows, field, fit};
+}
+
+TrialShape prior_trial(const fit::FieldOptions& field, const fit::FitOptions& fit) {
+  return {kTrialRows, field, fit};
+}
+
+TrialShape short_trial(const fit::FieldOptions& field, const fit::FitOptions& fit,
+                       std::int64_t reach_px) {
+  fit::FieldOptions plain = field;
+  plain.kind = FieldKind::kGrid;
+  return {kShortRows + 2 * std::min(reach_px, kMostRowsBeside), plain,
+          short_trial_options(plain, field, fit)};
+}
+
+OpenSettings open_settings(OpenSettings wanted, const measurement::Measurement& measurement) {
+  wanted.background = wanted.background && measurement.background != 0.0;
+  wanted.beads = wanted.beads && !measurement.undecided_beads.empty();
+  return wanted;
+}
+
+TrialSettings search_settings(const TrialSettings& start, const SearchSpace& space,
+                              FitTrials& trials) {
+  TrialSettings best = space.penalty ? choose_penalty(start, trials) : start;
+  best = trials.with_best_weight(best, best.variation, [](TrialSettings& settings, double weight) {
+    settings.variation = weight;
+  });
+  if (space.rank) {
+    std::vector<TrialSettings> candidates;
+    for (const int thirds : {1, 2, 3}) {
+      candidates.push_back(best);
+      candidates.back().rank = std::max(thirds * best.rank / 3, 1);
+    }
+    best = trials.first_as_good(candidates);
+  }
+  std::vector<TrialSettings> candidates;
+  for (const int epochs : {std::max(best.epochs / 2, 1), best.epochs, 2 * best.epochs}) {
+    candidates.push_back(best);
+    candidates.back().epochs = epochs;
+  }
+  return trials.first_as_good(candidates);
+}
+
+std::optional<TunedFit> tune(const measurement::Measurement& measurement,
+                             const fit::FieldOptions& field, const fit::FitOptions& fit,
+                             const OpenSettings& open, TrialFile& file, const TuneHooks& hooks,
+                             const distributed::Communicator& processes) {
+  const SearchSpace space{.penalty = open.variation, .rank = field.kind == FieldKind::kVm};
+  const TrialShape shape = trial_of_tune(field, fit);
+  TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
+                 open.view_scale || fit.fit_view_scale, hooks, expected_trials(space), processes);
+  // A run without total variation still needs a weight to search from.
+  const double first =
+      fit.density_variation > 0 ? fit.density_variation : objective::usual_variation(fit.penalty);
+  const TrialSettings start = with_safe_corrections({.penalty = fit.penalty,
+                                                     .variation = first,
+                                                     .rank = field.rank,
+                                                     .epochs = fit.epochs,
+                                                     .fits_view_scale = fit.fit_view_scale,
+                                                     .spike_rank = fit.spike_rank},
+                                                    open);
+  const std::optional<TunedFit> tuned = searched(fits, &file, [&](FitTrials& trials) {
+    TrialSettings best = search_settings(start, space, trials);
+    if (open.spikes) best = choose_spike_rank(best, trials);
+    return choose_corrections(best, open, trials);
+  });
+  if (!tuned) return std::nullopt;
+  log_trials(*tuned);
+  base::log_info(fmt::format(
+      "tuned: --tv-penalty {} --tv {:.3f} --rank {} --epochs {} "
+      "--vertex-epochs {} --coarse-epochs {}",
+      base::name_of(tuned->settings.penalty), tuned->settings.variation, tuned->settings.rank,
+      tuned->settings.epochs, fit.vertex_epochs, fit.coarse_epochs));
+  return with_prior(tuned, measurement, field, fit, open, &file, hooks, processes);
+}
+
+std::optional<TunedFit> choose_by_short_trials(const measurement::Measurement& measurement,
+                                               const fit::FieldOptions& field,
+                                               const fit::FitOptions& fit, const OpenSettings& open,
+                                               const TuneHooks& hooks,
+                                               const distributed::Communicator& processes) {
+  const TrialShape shape = short_trial(field, fit, measurement::largest_reach_px(measurement));
+  TrialFits fits(measurement, shape.rows, shape.field, shape.fit,
+                 open.view_scale || fit.fit_view_scale, hooks, usual_trials(open), processes);
+  const TrialSettings start = with_safe_corrections({.penalty = fit.penalty,
+                                                     .variation = fit.density_variation,
+                                                     .rank = field.rank,
+                                                     .epochs = shape.fit.epochs,
+                                                     .fits_view_scale = fit.fit_view_scale,
+                                                     .spike_rank = fit.spike_rank},
+                                                    open);
+  std::optional<TunedFit> tuned = searched(fits, nullptr, [&](FitTrials& trials) {
+    TrialSettings best = open.variation ? choose_variation(start, trials) : start;
+    if (open.spikes) best = choose_spike_rank(best, trials);
+    return choose_corrections(best, open, trials);
+  });
+  if (!tuned) return std::nullopt;
+  log_trials(*tuned);
+  base::log_info("chose " + describe(tuned->settings, TrialSettings{}));
+  tuned->settings.epochs = fit.epochs;
+  return with_prior(std::move(tuned), measurement, field, fit, open, nullptr, hooks, processes);
+}
+
+}  // namespace tomofield::tune
