@@ -41,12 +41,12 @@ def read(path):
 
 def check_row(path, number, row):
     if not isinstance(row, dict) or not isinstance(row.get("name"), str):
-        raise BadFile(f"row {number} of '{path}' has no name; make the file anew with bench/run")
+        raise BadFile(f"row {number} of '{path}' has no name; make the file again with bench/run")
     figures = row.get("figures")
     values = list(figures.values()) if isinstance(figures, dict) else []
     if not values or not all(is_list_of_numbers(value) for value in values):
         raise BadFile(f"row {number} of '{path}', '{row['name']}', has no figures that are lists of "
-                      "numbers; make the file anew with bench/run")
+                      "numbers; make the file again with bench/run")
 
 
 def is_list_of_numbers(value):

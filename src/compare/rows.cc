@@ -21,7 +21,7 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr const char* kAdvice =
-    "give another folder with -o, or --overwrite to make everything in this one anew";
+    "give another folder with -o, or --overwrite to make everything in this one again";
 
 // Returns what `read` makes of a JSON file. Mistakes in the file are errors that name it.
 template <typename Read>

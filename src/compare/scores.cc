@@ -152,7 +152,7 @@ Scores add_scores(const CompareOptions& options, const std::vector<Purpose>& pur
   if (options.hold_out > 0) add_held_out_errors(rows_for(Purpose::kHeldOutViews), table);
   if (options.hold_out > 0 && options.tune)
     scores.remark +=
-        " Held-out errors are of runs that were tuned anew, without the views that score them.";
+        " Held-out errors are of runs that were tuned again, without the views that score them.";
   return scores;
 }
 

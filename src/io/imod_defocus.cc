@@ -68,7 +68,7 @@ Form form_of(const std::filesystem::path& path, const TextLine& first) {
   throw Error(fmt::format(
       "'{}', line {}: '{}' does not begin a .defocus file of IMOD, whose first line ends with the "
       "version 2 or 3, and the file has no columns of CTFFIND or AreTomo either: give one of these "
-      "(ctfplotter saves an old file anew)",
+      "(ctfplotter saves an old file again)",
       path.string(), first.number, quote(first.text)));
 }
 

@@ -200,7 +200,7 @@ constexpr Row kRows[] = {
     {.key = "field.tile_rows", .flag = "--tile-rows", MEMBER(Options, tile_rows),
      .group = Group::kField, .unit = kBinned, .range = Range::between(0, kMaxCount),
      .automatic = "all rows, or with --budget as many as there is memory for",
-     .help = "Fit so many rows of the region at a time, and make each such tile compact before the "
+     .help = "Rows of the region that are fitted at a time; each such tile is made compact before the "
              "next one (with --budget). 0: all rows"},
 
     // Fit

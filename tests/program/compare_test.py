@@ -156,7 +156,7 @@ def test_every_method_that_can_be_is_tuned(series):
         scored = {view["view"] for view in held_out["views"]}
         assert scored and not scored & set(tuning["predicted_views"])
     assert tuning["chosen"]["weight"] < 90
-    assert "tuned anew" in read(folder, "report.html")
+    assert "tuned again" in read(folder, "report.html")
 
 
 def wait_for_line(run, start):
