@@ -359,6 +359,7 @@ def test_a_stack_of_nothing_is_answered_in_little_memory(out, path, stack, text_
     header = bytearray(read_bytes(stack)[:1024])
     header[0:12] = struct.pack("<3i", 4096, 4096, 61)
     header[28:40] = struct.pack("<3i", 4096, 4096, 61)
+    header[40:52] = struct.pack("<3f", 40960, 40960, 61)
     empty = path("empty.mrc")
     with open(empty, "wb") as file:
         file.write(header)
