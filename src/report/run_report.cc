@@ -142,7 +142,7 @@ void add_prior(const json& prior, std::vector<HtmlFact>& facts) {
   std::string note =
       "A network that was trained on simulated series suggested what is shown, and the views "
       "corrected it. ";
-  if (!is_used) note = "A trial of the learned prior predicted held-out views no better. ";
+  if (!is_used) note = "A trial with the learned prior predicted held-out views worse. ";
   if (std::isfinite(gain))
     note += fmt::format("Error of held-out views with it, in trials: {:+.2f} % ± {:.2f}.",
                         -100 * gain, 100 * io::number_or_nan(prior.at("standard_error")));
@@ -332,10 +332,10 @@ void add_prior_picture(const ReportSource& source, HtmlPage& page) {
   page.add_paragraph(fmt::format(
       "The same section from two fits of some rows, without some views. {} (docs/prior.md).",
       is_used
-          ? "With the prior the views left out were predicted better, so it ended this fit. Look "
-            "whether you trust what it adds; --prior tv does without"
-          : "With the prior the views left out were not predicted better, so this fit does "
-            "without"));
+          ? "With the prior the views left out were not predicted clearly worse, so it ended this "
+            "fit. "
+            "Look whether you trust what it adds; --prior tv does without"
+          : "With the prior the views left out were predicted worse, so this fit does without"));
   page.add_figures(
       {{*source.prior_picture, "Without the prior, with it, and the difference in the same greys"}},
       FigureSize::kLarge);

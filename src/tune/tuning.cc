@@ -60,8 +60,8 @@ std::optional<TunedFit> searched(TrialFits& fits, TrialFile* file,
 void log_prior(const TunedFit& tuned) {
   const Difference gain = gain_of_prior(tuned).value();
   base::log_info(fmt::format(
-      "learned prior: whole fits of some rows predict the views that they leave out with "
-      "{:+.2f} % ± {:.2f} of the error with it: {}",
+      "learned prior: in fits of some rows it changes the error of the views left out by "
+      "{:+.2f} % ± {:.2f}: {}",
       -100 * gain.log_ratio, 100 * gain.standard_error,
       tuned.settings.prior == Prior::kLearned ? "it ends the fit"
                                               : "total variation alone ends the fit"));

@@ -79,9 +79,9 @@ nlohmann::json prior_json(const PriorSummary& prior) {
 
 std::string prior_text(const PriorSummary& prior) {
   if (!prior.gain) return "learned prior";
-  return fmt::format("{}learned prior: {:+.2f} % ± {:.2f} of the held-out error in trials",
-                     prior.is_used ? "" : "no ", -100 * prior.gain->log_ratio,
-                     100 * prior.gain->standard_error);
+  return fmt::format(
+      "{}learned prior, which changes the held-out error by {:+.2f} % ± {:.2f} in trials",
+      prior.is_used ? "" : "no ", -100 * prior.gain->log_ratio, 100 * prior.gain->standard_error);
 }
 
 std::string held_out_text(const HeldOutSummary& held_out) {
