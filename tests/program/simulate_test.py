@@ -258,6 +258,14 @@ def test_yardstick_c_says_how_it_is_reconstructed():
     harness.succeed(*command, "--dry-run")
 
 
+@pytest.mark.parametrize("kind", ("c", "d"))
+def test_the_command_for_a_small_series_runs_though_its_beads_are_too_large_to_be_found(kind):
+    said = harness.succeed("simulate", harness.fresh_directory("small" + kind), "--yardstick", kind,
+                           "--size", 64, "--no-truth").stdout
+    assert "--bead-diameter 0 " in said
+    harness.succeed(*said.split("reconstruct it with: tomofield ")[1].split(), "--dry-run")
+
+
 SMALL = ["--size", 48, "--thickness", 30, "--tilts", "-60:60:10"]
 FILES = ["tilt_series.mrc", "clean.mrc", "truth.mrc", "tilt_series.tlt", "phantom.json"]
 

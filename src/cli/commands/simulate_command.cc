@@ -12,6 +12,7 @@
 #include "cli/options/number_checks.h"
 #include "cli/terminal/console.h"
 #include "simulate/simulate_series.h"
+#include "tilt_series/masks/series_masks.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {
@@ -140,9 +141,13 @@ std::string how_to_reconstruct(const std::filesystem::path& directory,
     more +=
         fmt::format(" --ctf {} --mdoc {}", file("tilt_series_ctf.txt"), file("tilt_series.mdoc"));
   if (options.gain_spread > 0.0) more += " --view-scale on";
-  if (options.cell.num_beads > 0)
+  if (options.cell.num_beads > 0) {
+    const double diameter_px = options.cell.bead_diameter_px;
+    const bool can_be_found =
+        diameter_px <= tilt_series::largest_bead_px(static_cast<double>(options.cell.size_px));
     more += fmt::format(" --bead-diameter {:g}",
-                        options.cell.bead_diameter_px * options.voxel_size_A / 10.0);
+                        can_be_found ? diameter_px * options.voxel_size_A / 10.0 : 0.0);
+  }
   return fmt::format(
       "reconstruct it with: tomofield reconstruct {} --tlt {}{} --thickness {} --contrast {}{} -o "
       "{}",

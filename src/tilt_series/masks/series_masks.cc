@@ -32,13 +32,14 @@ double shorter_side_px(const SeriesPlan& plan) {
 double given_diameter_px(double diameter_nm, const SeriesPlan& plan) {
   const double pixel_A = binned_pixel_A(plan);
   const double diameter_px = diameter_nm * kAngstromsANanometre / pixel_A;
-  const double largest_px = kLargestPart * shorter_side_px(plan);
+  const double largest_px = largest_bead_px(shorter_side_px(plan));
   if (diameter_px >= kSmallestGiven_px && diameter_px <= largest_px) return diameter_px;
   throw Error(fmt::format(
       "--bead-diameter {:g} nm is {:.3g} pixels of {:.4g} Å; beads can be found from {:g} to {:g} "
-      "pixels: give the diameter in nm, check the pixel size (--pixel-size) and the binning, or "
+      "pixels in views of {:g}: give the diameter in nm, check the pixel size (--pixel-size) and "
+      "the binning, or "
       "turn the search off with --bead-diameter 0",
-      diameter_nm, diameter_px, pixel_A, kSmallestGiven_px, largest_px));
+      diameter_nm, diameter_px, pixel_A, kSmallestGiven_px, largest_px, shorter_side_px(plan)));
 }
 
 BeadSearchOptions search_options(const TiltSeriesOptions& options, const SeriesPlan& plan) {
@@ -49,7 +50,7 @@ BeadSearchOptions search_options(const TiltSeriesOptions& options, const SeriesP
   }
   const double px_per_nm = kAngstromsANanometre / binned_pixel_A(plan);
   search.smallest_px = std::max(kSmallest_px, kSmallest_nm * px_per_nm);
-  search.largest_px = std::min(kLargest_nm * px_per_nm, kLargestPart * shorter_side_px(plan));
+  search.largest_px = std::min(kLargest_nm * px_per_nm, largest_bead_px(shorter_side_px(plan)));
   return search;
 }
 
@@ -138,6 +139,8 @@ void add_fiducials(const TiltSeriesOptions& options, const SeriesPlan& plan,
 }
 
 }  // namespace
+
+double largest_bead_px(double shorter_side_px) { return kLargestPart * shorter_side_px; }
 
 io::MrcReader open_mask(const std::filesystem::path& mask, const io::ImageStack& stack) {
   io::MrcReader reader(mask);

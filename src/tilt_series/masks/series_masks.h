@@ -25,6 +25,9 @@ io::MrcReader open_mask(const std::filesystem::path& mask, const io::ImageStack&
 /// Marks the pixels that are 0 in the mask's section as no measurements.
 void apply_mask(const io::MrcReader& mask, std::int64_t section, MaskedImage* image);
 
+/// Returns the largest diameter of beads that can be found in views with this shorter side.
+double largest_bead_px(double shorter_side_px);
+
 /// Returns true if the options ask for a search for beads.
 bool searches_beads(const TiltSeriesOptions& options);
 
