@@ -14,8 +14,8 @@
 
 namespace tomofield::batch {
 
-/// Whether the series of a batch share one choice of total variation (penalty, weight and limit of
-/// spikes) and of its prior.
+/// The series of a batch share one choice of total variation (penalty, weight and limit of spikes)
+/// and of its prior, or each makes its own.
 enum class Choose {
   kOnce,  ///< a few series make trials, and all get the same
   kEach   ///< every series makes trials of its own
@@ -29,7 +29,7 @@ struct SharedSettings {
   std::optional<Prior> prior;     ///< likewise
 };
 
-/// What one series chose by its trials, or the reason why it has no vote.
+/// A series votes with what its trials chose. It may have no vote, for a reason that is kept here.
 struct Vote {
   std::string series;
   SharedSettings settings;

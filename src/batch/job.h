@@ -57,7 +57,7 @@ bool has_checkpoint(const std::filesystem::path& output);
 /// Returns whether a run can continue: there is a checkpoint, or an alignment.
 bool can_resume(const std::filesystem::path& output);
 
-/// What a run does with the files of an earlier one.
+/// A run may continue or replace the files of an earlier one.
 struct EarlierFiles {
   bool resumes = false;     ///< continue from them if that is possible
   bool overwrites = false;  ///< else replace them

@@ -9,7 +9,7 @@
 
 namespace tomofield::batch {
 
-/// What a table may do with an option of `reconstruct`.
+/// A column of a table names an option of `reconstruct`, which a table may or may not set.
 enum class ColumnKind {
   kUnknown,   ///< there is no such option
   kNotHere,   ///< the batch itself sets it

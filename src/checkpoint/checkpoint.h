@@ -31,7 +31,7 @@ std::string fingerprint_of(const options::ReconstructOptions& options,
 std::vector<std::int64_t> as_numbers(const std::string& text);
 std::string as_text(const std::vector<std::int64_t>& numbers);
 
-/// What a fit was made from.
+/// A fit continues only if it has the same origin.
 struct FitOrigin {
   std::string fingerprint;              ///< fingerprint_of() its series and options
   std::optional<tune::TunedFit> tuned;  ///< the trials that chose some of its options

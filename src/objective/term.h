@@ -70,7 +70,7 @@ class Term {
  public:
   virtual ~Term() = default;
 
-  /// What a term keeps for add_slabs() from one batch of a band to the next.
+  /// A term keeps this for add_slabs() from one batch of a band to the next.
   struct Scratch {
     virtual ~Scratch() = default;
     /// Returns what the next batch of the band depends on. Another process may go on from a copy.
@@ -119,7 +119,7 @@ class Term {
   }
 };
 
-/// What terms are made from: a field on one tree, and the views at the resolution of one stage.
+/// Terms are made from a field on one tree and the views at the resolution of one stage.
 struct TermContext {
   const field::Field& field;
   const projection::SlabSampler& sampler;

@@ -18,7 +18,7 @@ struct OutputPaths {
   std::filesystem::path trials;            ///< trials of --tune (JSON)
   std::filesystem::path alignment;         ///< of --align, from which a run resumes (JSON)
   std::filesystem::path xy_picture;        ///< the slice across Z
-  /// Of an aligned series: the files for IMOD and AreTomo begin with this.
+  /// The files of an aligned series for IMOD and AreTomo begin with this.
   std::filesystem::path alignment_prefix;
   std::filesystem::path alignment_picture;
   std::filesystem::path alignment_star;    ///< for views of RELION
