@@ -1,4 +1,4 @@
-"""Models how threads share out the tasks of a step (trace_tree.Task), as src/base/worker_threads.cc
+"""Models how threads share out the tasks of a step (trace_tree.Task), as src/base/threads/worker_threads.cc
 does.
 
 The rules: A loop's tasks are taken in the order of their index. The thread that runs into a loop

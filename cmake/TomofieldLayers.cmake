@@ -61,17 +61,17 @@ endif()
 list(TRANSFORM unused_sources PREPEND ${PROJECT_SOURCE_DIR}/src/)
 
 # The head of this source says why.
-set_source_files_properties(${PROJECT_SOURCE_DIR}/src/io/star_parser.cc PROPERTIES
+set_source_files_properties(${PROJECT_SOURCE_DIR}/src/io/tables/star_parser.cc PROPERTIES
   COMPILE_OPTIONS -std=c++17 SKIP_PRECOMPILE_HEADERS ON)
 
 # The presets compile eight sources of a layer at a time (CMAKE_UNITY_BUILD), which halves the time of
 # a clean build. The sources of kernels include themselves once for each instruction set, and these
 # have a name in their unnamed namespace that another source of their layer has as well.
 set(sources_alone
-  align/axis_search.cc align/bead_alignment.cc batch/task.cc evaluate/field_artefacts.cc
-  evaluate/similarity.cc field/vm/vm_field.cc io/ctffind_table.cc io/hdf5_reader.cc io/star_parser.cc
-  objective/ray_data_term.cc projects/imod_project.cc report/slice.cc simulate/rasterize.cc
-  tilt_series/band_limited_image.cc
+  align/start/axis_search.cc align/beads/bead_alignment.cc batch/task.cc evaluate/field_artefacts.cc
+  evaluate/similarity.cc field/vm/vm_field.cc io/tables/ctffind_table.cc io/hdf5/hdf5_reader.cc
+  io/tables/star_parser.cc objective/ray_data_term.cc projects/imod_project.cc report/slice.cc simulate/rasterize.cc
+  tilt_series/resampling/band_limited_image.cc
   tilt_series/fixed_pattern/pixel_pattern.cc tilt_series/masks/straight_fill.cc)
 list(TRANSFORM sources_alone PREPEND ${PROJECT_SOURCE_DIR}/src/)
 set_source_files_properties(${sources_alone} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
@@ -89,7 +89,8 @@ endfunction()
 function(tomofield_compile_as_layer target layer)
   target_include_directories(${target} PRIVATE
     ${tomofield_layers_dir}/${layer}/src ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include)
-  # base/parallel.h alone starts threads: with Eigen's own, sums would depend on their number.
+  # base/threads/parallel.h alone starts threads: with Eigen's own, sums would depend on their
+  # number.
   target_compile_definitions(${target} PRIVATE
     TOMOFIELD_VERSION="${PROJECT_VERSION}" EIGEN_DONT_PARALLELIZE)
   target_link_libraries(${target} PRIVATE

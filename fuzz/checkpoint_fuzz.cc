@@ -1,4 +1,4 @@
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "checkpoint/checkpoint.h"
 #include "hdf5_input.h"
 #include "small_fit.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "fuzz_input.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "projects/project.h"
 
 namespace {

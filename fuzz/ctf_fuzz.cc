@@ -1,5 +1,5 @@
 #include "fuzz_input.h"
-#include "io/ctf_table.h"
+#include "io/tables/ctf_table.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const tomofield::fuzz::InputFile file(data, size);

@@ -1,5 +1,5 @@
 #include "fuzz_input.h"
-#include "io/fiducial_points.h"
+#include "io/tables/fiducial_points.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const tomofield::fuzz::InputFile file(data, size);

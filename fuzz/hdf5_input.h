@@ -6,7 +6,7 @@
 
 #include "fuzz_input.h"
 #include "hdf5_edits.h"
-#include "io/hdf5_objects.h"
+#include "io/hdf5/hdf5_objects.h"
 
 namespace tomofield::fuzz {
 

@@ -1,7 +1,7 @@
 #include <vector>
 
 #include "fuzz_input.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const tomofield::fuzz::InputFile file(data, size);

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "base/log.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "fuzz_input.h"
 #include "tilt_series/tilt_series.h"
 

@@ -1,7 +1,7 @@
 #include "fuzz_input.h"
-#include "io/relion_star.h"
-#include "io/star_file.h"
-#include "io/view_table.h"
+#include "io/tables/relion_star.h"
+#include "io/tables/star_file.h"
+#include "io/tables/view_table.h"
 
 // A STAR file is read as each of the tables that it may be, and written again.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

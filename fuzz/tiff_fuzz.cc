@@ -1,7 +1,7 @@
 #include <vector>
 
 #include "fuzz_input.h"
-#include "io/tiff_stack.h"
+#include "io/images/tiff_stack.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const tomofield::fuzz::InputFile file(data, size);

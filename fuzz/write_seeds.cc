@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "checkpoint/checkpoint.h"
 #include "compact/compress.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "small_fit.h"
 #include "tune/trial_file.h"
 #include "tune/trial_settings.h"

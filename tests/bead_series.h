@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/random.h"
-#include "io/image_stack.h"
+#include "io/images/image_stack.h"
 #include "tilt_series/masks/beads.h"
 #include "tomofield/options.h"
 

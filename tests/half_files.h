@@ -4,7 +4,7 @@
 #include <span>
 
 #include "base/volume.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "scratch_directory.h"
 
 namespace tomofield::testing {

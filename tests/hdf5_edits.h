@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "base/xxhash64.h"
-#include "io/lookup3.h"
+#include "io/hdf5/lookup3.h"
 
 namespace tomofield::testing {
 

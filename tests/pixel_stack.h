@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 
 namespace tomofield::testing {
 

@@ -8,7 +8,7 @@
 #include "align/joint_alignment.h"
 #include "base/random.h"
 #include "gaussian_scene.h"
-#include "io/image_stack.h"
+#include "io/images/image_stack.h"
 #include "measurement/prepare.h"
 #include "scratch_directory.h"
 

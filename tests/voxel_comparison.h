@@ -7,7 +7,7 @@
 #include <cstring>
 #include <limits>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "baseline/voxel_problem.h"
 #include "baseline/voxel_volume.h"
 #include "kernels/lanes.h"

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/version.h"
 
 namespace tomofield::bench {

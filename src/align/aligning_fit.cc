@@ -7,9 +7,9 @@
 #include <numeric>
 #include <vector>
 
-#include "base/parallel.h"
 #include "base/stop_requested.h"
 #include "base/stopwatch.h"
+#include "base/threads/parallel.h"
 #include "measurement/prepare.h"
 
 namespace tomofield::align {

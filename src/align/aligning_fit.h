@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "align/joint_alignment.h"
-#include "align/local_registration.h"
+#include "align/local/local_registration.h"
 #include "align/registration.h"
 #include "distributed/communicator.h"
 #include "fit/fit.h"

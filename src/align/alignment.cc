@@ -8,19 +8,19 @@
 #include <utility>
 
 #include "align/aligning_fit.h"
-#include "align/axis_search.h"
-#include "align/correlation_start.h"
 #include "align/gauge.h"
-#include "align/local_alignment.h"
+#include "align/local/local_alignment.h"
 #include "align/registration.h"
+#include "align/start/axis_search.h"
+#include "align/start/correlation_start.h"
 #include "align/trial.h"
 #include "align/unalike.h"
-#include "base/parallel.h"
 #include "base/stopwatch.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "measurement/prepare.h"
-#include "tilt_series/align_image.h"
-#include "tilt_series/binning.h"
+#include "tilt_series/resampling/align_image.h"
+#include "tilt_series/resampling/binning.h"
 #include "tomofield/error.h"
 
 namespace tomofield::align {

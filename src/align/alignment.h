@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "align/bead_alignment.h"
+#include "align/beads/bead_alignment.h"
 #include "align/joint_alignment.h"
 #include "align/trial.h"
 #include "distributed/communicator.h"

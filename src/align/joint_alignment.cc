@@ -6,15 +6,15 @@
 #include <utility>
 
 #include "align/aligning_fit.h"
-#include "align/exposures.h"
 #include "align/gauge.h"
-#include "align/local_registration.h"
+#include "align/local/local_registration.h"
+#include "align/local/slow_modes.h"
 #include "align/mean_gain.h"
 #include "align/prediction_by_tilt.h"
 #include "align/registration.h"
 #include "align/relaxation.h"
-#include "align/slab_pose_search.h"
-#include "align/slow_modes.h"
+#include "align/start/exposures.h"
+#include "align/start/slab_pose_search.h"
 #include "base/trace.h"
 #include "fit/fit.h"
 #include "fit/stages.h"
@@ -33,7 +33,7 @@ constexpr int kFreedomBin = 2;
 constexpr double kSureOfTilts = 5.0;
 // Tilts are looked for in every second update with these pixels: they cost two more predictions.
 constexpr int kTiltEvery = 2;
-constexpr double kSure = 3.0;  // standard errors by which a freedom must pay
+constexpr double kSurePay = 3.0;  // standard errors by which a freedom must pay
 
 // A fit and the corrections of the views that it is made with.
 class AligningFit {
@@ -133,7 +133,7 @@ class AligningFit {
     std::vector<double> rotations;
     for (const ViewCorrection& step : steps) rotations.push_back(step.rotation_rad);
     const MeanGain common = mean_gain(rotations);
-    if (std::abs(common.mean) > kSure * common.error) return;
+    if (std::abs(common.mean) > kSurePay * common.error) return;
     for (ViewCorrection& step : steps) step.rotation_rad -= common.mean;
   }
 
@@ -198,7 +198,7 @@ class AligningFit {
       const double before = registration->predicted_error(without);
       if (before > 0.0) gains.push_back(1.0 - registration->predicted_error(with) / before);
     }
-    return mean_gain(gains).exceeds(with.tilt && !without.tilt ? kSureOfTilts : kSure);
+    return mean_gain(gains).exceeds(with.tilt && !without.tilt ? kSureOfTilts : kSurePay);
   }
 
   const JointProblem& problem_;

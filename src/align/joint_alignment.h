@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "align/freedoms.h"
-#include "align/slab_pose.h"
+#include "align/start/slab_pose.h"
 #include "base/progress.h"
 #include "distributed/communicator.h"
 #include "fit/options.h"

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "shifted_series.h"
 
 namespace tomofield::align {

@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include "align/freedoms.h"
-#include "align/local_registration.h"
+#include "align/local/local_registration.h"
 #include "geometry/view_correction.h"
 
 namespace tomofield::align {

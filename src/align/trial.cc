@@ -7,7 +7,7 @@
 
 #include "align/aligning_fit.h"
 #include "align/registration.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "measurement/held_out.h"
 #include "measurement/prepare.h"

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 

@@ -6,7 +6,7 @@
 
 #include "base/progress.h"
 #include "baseline/method.h"
-#include "io/output_lock.h"
+#include "io/saving/output_lock.h"
 #include "measurement/prepare.h"
 #include "microscope/view_filter.h"
 #include "option_table/setting.h"

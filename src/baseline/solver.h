@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/aligned_buffer.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "baseline/voxel_problem.h"
 #include "baseline/voxel_volume.h"
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "base/aligned_buffer.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 
 namespace tomofield::baseline {
 

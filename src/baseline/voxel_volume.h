@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/aligned_buffer.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "kernels/lanes.h"
 #include "projection/sample_grid.h"
 #include "projection/slab_projector.h"

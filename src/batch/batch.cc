@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "base/memory.h"
+#include "base/system/memory.h"
 #include "batch/faults.h"
 #include "batch/relion_table.h"
 #include "batch/series_list.h"
@@ -14,7 +14,7 @@
 #include "batch/state.h"
 #include "batch/summary.h"
 #include "io/is_file.h"
-#include "io/output_files.h"
+#include "io/saving/output_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::batch {

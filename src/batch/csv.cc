@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "io/text_lines.h"
+#include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::batch {

@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
-#include "base/child_process.h"
 #include "base/log.h"
+#include "base/system/child_process.h"
 #include "batch/slurm.h"
 #include "batch/state.h"
 #include "batch/summary.h"

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "base/child_process.h"
+#include "base/system/child_process.h"
 #include "batch/faults.h"
-#include "io/scratch_folder.h"
+#include "io/saving/scratch_folder.h"
 
 namespace tomofield::batch {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 
 #include "exchange/relion_output.h"
-#include "io/atomic_file.h"
-#include "io/output_set.h"
-#include "io/star_file.h"
+#include "io/saving/atomic_file.h"
+#include "io/saving/output_set.h"
+#include "io/tables/star_file.h"
 
 namespace tomofield::batch {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "base/child_process.h"
+#include "base/system/child_process.h"
 #include "batch/job.h"
 #include "batch/packing.h"
 #include "batch/state.h"

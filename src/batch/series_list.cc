@@ -11,8 +11,8 @@
 #include "base/utf8.h"
 #include "batch/csv.h"
 #include "batch/faults.h"
-#include "io/relion_star.h"
-#include "io/text_lines.h"
+#include "io/tables/relion_star.h"
+#include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::batch {

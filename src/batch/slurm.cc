@@ -7,10 +7,10 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "base/child_process.h"
+#include "base/system/child_process.h"
 #include "batch/packing.h"
 #include "batch/state.h"
-#include "io/text_lines.h"
+#include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::batch {

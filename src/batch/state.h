@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "base/child_process.h"
+#include "base/system/child_process.h"
 #include "batch/job.h"
 
 namespace tomofield::batch {

@@ -1,5 +1,5 @@
 #include "cli/program.h"
-#include "base/program_path.h"
+#include "base/system/program_path.h"
 
 #include <fmt/format.h>
 
@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "base/log.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/version.h"
 #include "cli/commands/commands.h"
 #include "cli/options/config_file.h"
@@ -24,7 +24,7 @@
 #include "cli/options/unknown_options.h"
 #include "cli/terminal/console.h"
 #include "cli/terminal/exit_status.h"
-#include "io/text_lines.h"
+#include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {

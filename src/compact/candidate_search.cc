@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "compact/truncation.h"
 
 namespace tomofield::compact {

@@ -10,7 +10,7 @@
 #include <optional>
 #include <utility>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "compact/candidate_search.h"
 #include "compact/decoded_field.h"

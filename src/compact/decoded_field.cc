@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "base/check.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "compact/leaf_code.h"
 #include "compact/quantise.h"
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "base/memory.h"
+#include "base/system/memory.h"
 #include "compact/decoded_field.h"
 #include "kernels/lanes.h"
 

@@ -7,8 +7,8 @@
 #include <iterator>
 #include <string>
 
-#include "io/output_files.h"
-#include "io/output_target.h"
+#include "io/saving/output_files.h"
+#include "io/saving/output_target.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {

@@ -6,7 +6,7 @@
 
 #include "base/check.h"
 #include "evaluate/volume_pair.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 

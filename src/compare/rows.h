@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "base/child_process.h"
+#include "base/system/child_process.h"
 #include "compare/methods.h"
 
 namespace tomofield::compare {

@@ -8,13 +8,13 @@
 #include <optional>
 #include <string>
 
-#include "base/child_process.h"
+#include "base/system/child_process.h"
 #include "compare/grid.h"
 #include "evaluate/box.h"
 #include "io/is_file.h"
-#include "io/output_files.h"
-#include "io/scratch_folder.h"
-#include "io/text_lines.h"
+#include "io/saving/output_files.h"
+#include "io/saving/scratch_folder.h"
+#include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {

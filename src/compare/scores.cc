@@ -9,7 +9,7 @@
 
 #include "evaluate/artefacts.h"
 #include "evaluate/contrast.h"
-#include "evaluate/fsc.h"
+#include "evaluate/resolution/fsc.h"
 #include "evaluate/similarity.h"
 #include "report/pictures.h"
 

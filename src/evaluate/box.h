@@ -4,7 +4,7 @@
 #include <string>
 
 #include "base/volume.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 
 namespace tomofield::evaluate {
 

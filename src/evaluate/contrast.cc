@@ -7,7 +7,7 @@
 #include <limits>
 #include <numeric>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "tomofield/error.h"
 
 namespace tomofield::evaluate {

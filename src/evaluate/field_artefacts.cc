@@ -5,7 +5,7 @@
 #include <numeric>
 #include <span>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/speckle.h"
 #include "evaluate/voxel_block.h"

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "evaluate/speckle.h"
 #include "field/sampling/sample_box.h"
 #include "output/volume.h"

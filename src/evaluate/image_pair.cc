@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "base/check.h"
-#include "evaluate/fsc.h"
+#include "evaluate/resolution/fsc.h"
 
 namespace tomofield::evaluate {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 
 namespace tomofield::evaluate {
 

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "evaluate/fsc.h"
+#include "evaluate/resolution/fsc.h"
 #include "evaluate/similarity.h"
 #include "tomofield/error.h"
 

@@ -9,7 +9,7 @@
 
 #include "base/aligned_buffer.h"
 #include "base/check.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/utf8.h"
 #include "evaluate/box.h"
 #include "kernels/lanes.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "random_arrays.h"
 #include "tomofield/error.h"
 

@@ -8,7 +8,7 @@
 
 #include "base/check.h"
 #include "base/gaussian_kernel.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/utf8.h"
 #include "evaluate/volume_pair.h"
 #include "tomofield/error.h"

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/volume.h"
-#include "evaluate/detection.h"
+#include "evaluate/matching/detection.h"
 
 namespace tomofield::evaluate {
 

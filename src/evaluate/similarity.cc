@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/check.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/utf8.h"
 #include "tomofield/error.h"
 

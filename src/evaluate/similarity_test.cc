@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 #include "tomofield/error.h"
 
 namespace tomofield::evaluate {

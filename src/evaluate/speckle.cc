@@ -8,7 +8,7 @@
 #include <numeric>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "tomofield/error.h"
 
 namespace tomofield::evaluate {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/check.h"
-#include "base/parallel.h"
 #include "base/range.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/box.h"
 #include "evaluate/map_like.h"

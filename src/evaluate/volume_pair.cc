@@ -7,7 +7,7 @@
 #include <string>
 
 #include "base/log.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "tomofield/error.h"
 
 namespace tomofield::evaluate {

@@ -2,7 +2,7 @@
 
 #include "base/check.h"
 #include "exchange/relion_alignment.h"
-#include "io/output_files.h"
+#include "io/saving/output_files.h"
 #include "output/alignment_files.h"
 #include "output/output_paths.h"
 #include "report/alignment_plot.h"

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "io/output_lock.h"
+#include "io/saving/output_lock.h"
 #include "options/run_options.h"
 #include "tilt_series/tilt_series.h"
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <utility>
 
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 
 namespace tomofield::exchange {
 

@@ -6,9 +6,9 @@
 #include <numbers>
 #include <vector>
 
-#include "io/atomic_file.h"
-#include "io/relion_star.h"
-#include "io/view_table.h"
+#include "io/saving/atomic_file.h"
+#include "io/tables/relion_star.h"
+#include "io/tables/view_table.h"
 #include "tilt_series/open_views.h"
 #include "tilt_series/section_table.h"
 

@@ -8,12 +8,12 @@
 
 #include "base/log.h"
 #include "exchange/relion_alignment.h"
-#include "io/atomic_file.h"
+#include "io/images/mrc.h"
+#include "io/images/view_images.h"
 #include "io/is_file.h"
-#include "io/mrc.h"
-#include "io/output_set.h"
-#include "io/relion_star.h"
-#include "io/view_images.h"
+#include "io/saving/atomic_file.h"
+#include "io/saving/output_set.h"
+#include "io/tables/relion_star.h"
 #include "output/output_paths.h"
 #include "tomofield/error.h"
 

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "io/star_file.h"
+#include "io/tables/star_file.h"
 #include "options/run_options.h"
 
 namespace tomofield::exchange {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/check.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "field/grid/grid_field.h"
 #include "field/merge_target.h"
 #include "field/sampling/resample.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/enum_names.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "central_difference.h"
 #include "field/array_variation.h"
 #include "random_arrays.h"

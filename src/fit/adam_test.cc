@@ -6,8 +6,8 @@
 #include <memory>
 #include <vector>
 
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 #include "random_arrays.h"
 
 namespace tomofield::fit {

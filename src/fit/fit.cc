@@ -8,8 +8,8 @@
 
 #include "base/check.h"
 #include "base/log.h"
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "field/vm/factorise.h"
 #include "measurement/noise_fit.h"

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "fit/fit.h"
 #include "measurement/surrogate_views.h"

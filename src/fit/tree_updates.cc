@@ -6,8 +6,8 @@
 #include <numeric>
 #include <utility>
 
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 #include "fit/plan_update.h"
 
 namespace tomofield::fit {

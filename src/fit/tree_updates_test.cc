@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "random_arrays.h"
 
 namespace tomofield::fit {

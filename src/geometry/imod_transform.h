@@ -1,7 +1,7 @@
 #pragma once
 
 #include "geometry/raw_from_aligned.h"
-#include "io/alignment_files.h"
+#include "io/tables/alignment_files.h"
 
 namespace tomofield::geometry {
 

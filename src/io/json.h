@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "io/atomic_file.h"
+#include "io/saving/atomic_file.h"
 
 namespace tomofield::io {
 

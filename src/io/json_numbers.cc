@@ -6,7 +6,7 @@
 #include <limits>
 #include <string>
 
-#include "io/text_lines.h"
+#include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {

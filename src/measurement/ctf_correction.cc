@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "measurement/surrogate_views.h"
 
 namespace tomofield::measurement {

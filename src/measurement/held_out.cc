@@ -10,7 +10,7 @@
 
 #include "base/aligned_buffer.h"
 #include "base/log.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "geometry/tilt_order.h"
 #include "kernels/lanes.h"
 #include "tomofield/error.h"

@@ -12,7 +12,7 @@
 #include "base/range.h"
 #include "distributed/communicator.h"
 #include "distributed/partition.h"
-#include "io/scratch_memory.h"
+#include "io/saving/scratch_memory.h"
 #include "kernels/lanes.h"
 #include "tilt_series/masks/mask_disc.h"
 
@@ -37,7 +37,7 @@ ReadViews read_on_all_threads(ReadView read_view);
 /// The measured rays in the order in which slabs use them: [slab, view, x, lane]
 /// with 16 rows a slab, and a bit mask [slab, view, x] of the rays that count
 /// (rows past the last one are masked). Small series lie in memory, large ones in a scratch file
-/// (io/scratch_memory.h). Each process of a job holds some of the slabs.
+/// (io/saving/scratch_memory.h). Each process of a job holds some of the slabs.
 class SlabViews {
  public:
   using Slabs = base::Range;

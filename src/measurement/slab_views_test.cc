@@ -11,8 +11,8 @@
 #include <set>
 #include <span>
 
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 
 namespace tomofield::measurement {
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "bead_series.h"
-#include "io/image_stack.h"
+#include "io/images/image_stack.h"
 #include "scratch_directory.h"
 
 namespace tomofield::measurement {

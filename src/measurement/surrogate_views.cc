@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 
 namespace tomofield::measurement {
 namespace {

@@ -10,10 +10,10 @@
 #include <utility>
 
 #include "base/log.h"
-#include "io/alignment_files.h"
-#include "io/ctf_table.h"
-#include "io/mtf_table.h"
-#include "io/view_table.h"
+#include "io/tables/alignment_files.h"
+#include "io/tables/ctf_table.h"
+#include "io/tables/mtf_table.h"
+#include "io/tables/view_table.h"
 #include "microscope/exposure.h"
 #include "tilt_series/open_views.h"
 #include "tomofield/error.h"

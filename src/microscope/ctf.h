@@ -1,7 +1,7 @@
 #pragma once
 
 #include "geometry/raw_from_aligned.h"
-#include "io/view_table.h"
+#include "io/tables/view_table.h"
 
 namespace tomofield::microscope {
 

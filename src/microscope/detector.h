@@ -1,6 +1,6 @@
 #pragma once
 
-#include "io/mtf_table.h"
+#include "io/tables/mtf_table.h"
 
 namespace tomofield::microscope {
 

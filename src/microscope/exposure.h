@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "io/alignment_files.h"
-#include "io/view_table.h"
+#include "io/tables/alignment_files.h"
+#include "io/tables/view_table.h"
 
 namespace tomofield::microscope {
 

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "io/view_table.h"
+#include "io/tables/view_table.h"
 #include "microscope/ctf.h"
 #include "microscope/defocus_slope.h"
 #include "microscope/detector.h"

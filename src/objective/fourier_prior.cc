@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 
 namespace tomofield::objective {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "base/aligned_buffer.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "kernels/lanes.h"
 
 namespace tomofield::objective {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "base/check.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "kernels/lanes.h"
 #include "objective/terms.h"
 

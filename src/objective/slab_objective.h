@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "base/pool.h"
 #include "base/range.h"
+#include "base/threads/pool.h"
 #include "distributed/communicator.h"
 #include "measurement/row_share.h"
 #include "objective/objective.h"

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "base/aligned_buffer.h"
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 #include "kernels/lanes.h"
 
 namespace tomofield::objective {

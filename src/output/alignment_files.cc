@@ -9,8 +9,8 @@
 #include "base/check.h"
 #include "base/log.h"
 #include "geometry/imod_transform.h"
-#include "io/output_set.h"
-#include "io/write_alignment.h"
+#include "io/saving/output_set.h"
+#include "io/tables/write_alignment.h"
 
 namespace tomofield::output {
 

@@ -27,8 +27,8 @@ AlignmentFiles alignment_files(const std::filesystem::path& prefix);
 ///   section that is left out has the mean rotation of the views, no shift, and angles on a
 ///   straight line through those of the nearest views. Shifts are in pixels before binning.
 /// - The .xtilt is written if a view has an x-axis tilt. Otherwise an old one is removed when the
-///   results are committed (io/output_set.h). It belongs to the .xf as well as to the .aln, which
-///   has no x-axis tilts.
+///   results are committed (io/saving/output_set.h). It belongs to the .xf as well as to the .aln,
+///   which has no x-axis tilts.
 /// - The .aln counts sections from 1. A section that is left out is a dark frame. The format has a
 ///   rotation and a shift for each view: AreTomo applies no magnification (GMAG is 1), and neither
 ///   does the reader of this program. So a view has the rotation that is nearest to its matrix. If

@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "expect_parts.h"
-#include "io/alignment_files.h"
-#include "io/output_set.h"
+#include "io/saving/output_set.h"
+#include "io/tables/alignment_files.h"
 #include "loaded_view.h"
 #include "scratch_directory.h"
 #include "warning_catcher.h"

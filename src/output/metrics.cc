@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/enum_names.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 
 namespace tomofield::output {
 namespace {

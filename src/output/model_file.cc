@@ -9,11 +9,11 @@
 #include <utility>
 
 #include "base/enum_names.h"
-#include "base/memory.h"
-#include "base/parallel.h"
 #include "base/plausible.h"
+#include "base/system/memory.h"
+#include "base/threads/parallel.h"
 #include "compact/decoded_field.h"
-#include "io/hdf5_reader.h"
+#include "io/hdf5/hdf5_reader.h"
 #include "output/model_format.h"
 #include "tomofield/error.h"
 #include "tomofield/version.h"

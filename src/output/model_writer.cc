@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "base/enum_names.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
-#include "io/atomic_file.h"
-#include "io/hdf5_file.h"
+#include "io/hdf5/hdf5_file.h"
+#include "io/saving/atomic_file.h"
 #include "output/model_file.h"
 #include "output/model_format.h"
 #include "tomofield/error.h"

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "field/sampling/sample_box.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "output/model_file.h"
 #include "output/volume.h"
 #include "scratch_directory.h"

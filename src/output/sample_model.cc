@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "base/memory.h"
+#include "base/system/memory.h"
 #include "compact/sample_coded.h"
 
 namespace tomofield::output {

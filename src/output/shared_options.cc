@@ -1,6 +1,6 @@
 #include "output/shared_options.h"
 
-#include "io/scratch_memory.h"
+#include "io/saving/scratch_memory.h"
 
 namespace tomofield::output {
 namespace {

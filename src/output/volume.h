@@ -9,7 +9,7 @@
 #include "base/range.h"
 #include "distributed/communicator.h"
 #include "field/sampling/sample_box.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "output/model_file.h"
 #include "tomofield/options.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 #include "uneven_model.h"

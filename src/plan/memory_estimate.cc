@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "field/vm/factorise.h"
 #include "fit/fit.h"
 #include "fit/halo.h"

@@ -12,7 +12,7 @@
 #include "align/alignment.h"
 #include "base/stopwatch.h"
 #include "fit/stages.h"
-#include "io/scratch_memory.h"
+#include "io/saving/scratch_memory.h"
 #include "measurement/prepare.h"
 #include "measurement/slab_views.h"
 #include "measurement/surrogate_views.h"

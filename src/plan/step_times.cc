@@ -7,10 +7,10 @@
 #include <optional>
 #include <span>
 
-#include "base/parallel.h"
 #include "base/percentile.h"
 #include "base/random.h"
 #include "base/stopwatch.h"
+#include "base/threads/parallel.h"
 #include "fit/domain.h"
 #include "fit/fit.h"
 #include "kernels/lanes.h"

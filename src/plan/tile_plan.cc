@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "base/memory.h"
+#include "base/system/memory.h"
 #include "checkpoint/checkpoint.h"
 #include "compact/budget.h"
 #include "measurement/slab_views.h"

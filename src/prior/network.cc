@@ -4,7 +4,7 @@
 #include <array>
 
 #include "base/check.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "prior/weights.h"
 
 namespace tomofield::prior {

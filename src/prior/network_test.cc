@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "random_arrays.h"
 
 namespace tomofield::prior {

@@ -5,8 +5,8 @@
 
 #include "base/aligned_buffer.h"
 #include "base/check.h"
-#include "base/parallel.h"
 #include "base/range.h"
+#include "base/threads/parallel.h"
 #include "kernels/lanes.h"
 
 namespace tomofield::projection {

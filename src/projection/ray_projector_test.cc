@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "base/enum_names.h"
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 #include "central_difference.h"
 #include "kernels/lanes.h"
 #include "projection/slab_projector.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "kernels/lanes.h"
 
 namespace tomofield::projection {

@@ -3,7 +3,7 @@
 #include <array>
 #include <system_error>
 
-#include "io/alignment_files.h"
+#include "io/tables/alignment_files.h"
 #include "projects/formats.h"
 #include "tomofield/error.h"
 

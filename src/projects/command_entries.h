@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "io/command_file.h"
+#include "io/tables/command_file.h"
 #include "projects/project.h"
 
 namespace tomofield::projects {

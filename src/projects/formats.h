@@ -14,7 +14,7 @@ void read_imod_project(Project& project);
 void read_aretomo_project(Project& project);
 
 /// Reads RELION 5's tomograms.star, or the STAR file of one tilt series. The latter becomes the
-/// stack: it lists the images (io/view_table.h).
+/// stack: it lists the images (io/tables/view_table.h).
 void read_relion_project(Project& project);
 
 /// Reads a .tomostar or an XML file of Warp, which becomes the stack.

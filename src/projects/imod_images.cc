@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "io/image_stack.h"
+#include "io/images/image_stack.h"
 #include "io/is_file.h"
 #include "tilt_series/series_plan.h"
 #include "tomofield/error.h"

@@ -8,9 +8,9 @@
 #include <system_error>
 #include <vector>
 
-#include "io/alignment_files.h"
 #include "io/is_file.h"
-#include "io/text_lines.h"
+#include "io/tables/alignment_files.h"
+#include "io/tables/text_lines.h"
 #include "projects/command_entries.h"
 #include "projects/formats.h"
 #include "projects/imod_images.h"

@@ -5,9 +5,9 @@
 #include <string>
 #include <string_view>
 
-#include "io/alignment_files.h"
 #include "io/is_file.h"
-#include "io/mdoc_images.h"
+#include "io/tables/alignment_files.h"
+#include "io/tables/mdoc_images.h"
 #include "projects/formats.h"
 #include "tomofield/error.h"
 

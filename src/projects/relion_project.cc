@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "io/relion_star.h"
-#include "io/view_images.h"
-#include "io/view_table.h"
+#include "io/images/view_images.h"
+#include "io/tables/relion_star.h"
+#include "io/tables/view_table.h"
 #include "projects/formats.h"
 #include "tomofield/error.h"
 

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
-#include "io/view_images.h"
-#include "io/view_table.h"
+#include "io/images/view_images.h"
+#include "io/tables/view_table.h"
 #include "projects/formats.h"
 
 namespace tomofield::projects {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "align/alignment.h"
-#include "align/axis_search.h"
+#include "align/start/axis_search.h"
 #include "base/log.h"
 #include "base/stop_requested.h"
 #include "base/stopwatch.h"

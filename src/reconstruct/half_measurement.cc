@@ -2,7 +2,7 @@
 
 #include "base/trace.h"
 #include "fit/domain.h"
-#include "io/scratch_memory.h"
+#include "io/saving/scratch_memory.h"
 
 namespace tomofield::reconstruction {
 

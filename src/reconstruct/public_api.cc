@@ -3,9 +3,9 @@
 #include <utility>
 
 #include "base/log.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "exchange/exchange_files.h"
-#include "io/image_stack.h"
+#include "io/images/image_stack.h"
 #include "io/json.h"
 #include "options/run_options.h"
 #include "output/public_model.h"

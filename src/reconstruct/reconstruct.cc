@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "base/log.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "checkpoint/checkpoint.h"
 #include "checkpoint/finished_tiles.h"
 #include "fit/domain.h"
-#include "io/scratch_memory.h"
+#include "io/saving/scratch_memory.h"
 #include "measurement/background.h"
 #include "measurement/held_out.h"
 #include "measurement/undecided_beads.h"

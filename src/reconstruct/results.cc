@@ -14,16 +14,16 @@
 #include <utility>
 #include <vector>
 
-#include "base/parallel.h"
 #include "base/range.h"
 #include "base/stopwatch.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "checkpoint/checkpoint.h"
 #include "compact/budget.h"
 #include "compact/compress.h"
 #include "evaluate/artefacts.h"
 #include "io/json.h"
-#include "io/output_set.h"
+#include "io/saving/output_set.h"
 #include "option_table/setting.h"
 #include "output/metrics.h"
 #include "output/output_paths.h"

@@ -6,7 +6,7 @@
 
 #include "checkpoint/checkpoint.h"
 #include "fit/fit.h"
-#include "io/output_set.h"
+#include "io/saving/output_set.h"
 #include "measurement/prepare.h"
 #include "options/run_options.h"
 #include "output/model_file.h"

@@ -10,7 +10,7 @@
 #include "base/log.h"
 #include "checkpoint/checkpoint.h"
 #include "exchange/exchange_files.h"
-#include "io/output_files.h"
+#include "io/saving/output_files.h"
 #include "output/output_paths.h"
 #include "output/volume.h"
 

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "io/output_lock.h"
-#include "io/output_set.h"
+#include "io/saving/output_lock.h"
+#include "io/saving/output_set.h"
 #include "options/run_options.h"
 
 namespace tomofield::reconstruction {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "base/log.h"
-#include "base/memory.h"
 #include "base/stopwatch.h"
+#include "base/system/memory.h"
 #include "base/trace.h"
 #include "checkpoint/finished_tiles.h"
 #include "compact/budget.h"

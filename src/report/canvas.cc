@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "io/png.h"
+#include "io/images/png.h"
 
 namespace tomofield::report {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "base/parallel.h"
 #include "base/percentile.h"
+#include "base/threads/parallel.h"
 
 namespace tomofield::report {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 
 namespace tomofield::report {
 

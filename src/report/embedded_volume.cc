@@ -4,9 +4,9 @@
 #include <cmath>
 #include <span>
 
-#include "base/parallel.h"
-#include "io/jpeg.h"
-#include "io/mrc.h"
+#include "base/threads/parallel.h"
+#include "io/images/jpeg.h"
+#include "io/images/mrc.h"
 #include "report/base64.h"
 #include "report/contrast.h"
 #include "report/reduced_volume.h"

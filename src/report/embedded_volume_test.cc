@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "base/random.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "report/contrast.h"
 #include "scratch_directory.h"
 

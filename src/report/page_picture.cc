@@ -8,8 +8,8 @@
 #include <iterator>
 #include <vector>
 
-#include "io/jpeg.h"
-#include "io/png.h"
+#include "io/images/jpeg.h"
+#include "io/images/png.h"
 #include "report/base64.h"
 #include "tomofield/error.h"
 

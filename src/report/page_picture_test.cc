@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/random.h"
-#include "io/png.h"
+#include "io/images/png.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"
 

@@ -11,7 +11,7 @@
 
 #include "base/percentile.h"
 #include "field/sampling/middle_plane.h"
-#include "io/png.h"
+#include "io/images/png.h"
 #include "report/canvas.h"
 #include "report/contrast.h"
 #include "report/slice.h"

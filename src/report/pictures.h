@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "evaluate/fsc.h"
+#include "evaluate/resolution/fsc.h"
 #include "measurement/held_out.h"
 #include "output/model_file.h"
 #include "report/curve_plot.h"

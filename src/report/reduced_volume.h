@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 
 namespace tomofield::report {
 

@@ -11,8 +11,8 @@
 
 #include "base/trace.h"
 #include "base/version.h"
+#include "io/images/mrc.h"
 #include "io/json_numbers.h"
-#include "io/mrc.h"
 #include "report/alignment_plot.h"
 #include "report/embedded_volume.h"
 #include "report/html.h"

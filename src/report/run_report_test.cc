@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "io/mrc.h"
-#include "io/png.h"
+#include "io/images/mrc.h"
+#include "io/images/png.h"
 #include "options/run_options.h"
 #include "scratch_directory.h"
 

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "base/check.h"
-#include "base/parallel.h"
-#include "io/mrc.h"
-#include "io/png.h"
+#include "base/threads/parallel.h"
+#include "io/images/mrc.h"
+#include "io/images/png.h"
 
 namespace tomofield::report {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "png_picture.h"
 
 namespace tomofield::report {

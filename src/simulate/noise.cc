@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "fourier/image_transform.h"
 
 namespace tomofield::simulate {

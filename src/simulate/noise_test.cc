@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 
 namespace tomofield::simulate {
 namespace {

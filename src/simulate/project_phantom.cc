@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/check.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "simulate/gaussian_rows.h"
 #include "simulate/line_integrals.h"
 #include "simulate/project_pixels.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/check.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "simulate/gaussian_rows.h"
 
 namespace tomofield::simulate {

@@ -3,12 +3,12 @@
 #include <cmath>
 #include <utility>
 
-#include "tilt_series/align_image.h"
-#include "tilt_series/band_limited_image.h"
-#include "tilt_series/binning.h"
 #include "tilt_series/masks/bad_pixels.h"
 #include "tilt_series/masks/fill.h"
 #include "tilt_series/masks/series_masks.h"
+#include "tilt_series/resampling/align_image.h"
+#include "tilt_series/resampling/band_limited_image.h"
+#include "tilt_series/resampling/binning.h"
 
 namespace tomofield::tilt_series {
 namespace {

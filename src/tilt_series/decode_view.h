@@ -5,8 +5,8 @@
 #include <optional>
 #include <utility>
 
-#include "io/image_stack.h"
-#include "io/mrc.h"
+#include "io/images/image_stack.h"
+#include "io/images/mrc.h"
 #include "tilt_series/fixed_pattern/fixed_pattern.h"
 #include "tilt_series/fixed_pattern/pattern_search.h"
 #include "tilt_series/half_stacks.h"

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "io/image_stack.h"
+#include "io/images/image_stack.h"
 #include "tilt_series/half.h"
 #include "tilt_series/image.h"
 

@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "io/image_stack.h"
+#include "io/images/image_stack.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tilt_series/tilt_series.h"

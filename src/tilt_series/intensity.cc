@@ -6,7 +6,7 @@
 #include <numeric>
 #include <span>
 
-#include "tilt_series/binning.h"
+#include "tilt_series/resampling/binning.h"
 
 namespace tomofield::tilt_series {
 namespace {

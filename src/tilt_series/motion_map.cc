@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 
 namespace tomofield::tilt_series {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/random.h"
-#include "tilt_series/align_image.h"
+#include "tilt_series/resampling/align_image.h"
 
 namespace tomofield::tilt_series {
 namespace {

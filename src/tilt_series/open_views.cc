@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "io/mdoc_images.h"
+#include "io/tables/mdoc_images.h"
 
 namespace tomofield::tilt_series {
 

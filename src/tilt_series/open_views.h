@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "io/image_stack.h"
+#include "io/images/image_stack.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::tilt_series {

@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "base/log.h"
-#include "io/alignment_files.h"
+#include "io/tables/alignment_files.h"
 #include "tilt_series/tilt_angles.h"
 #include "tomofield/error.h"
 

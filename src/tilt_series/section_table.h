@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "geometry/raw_from_aligned.h"
-#include "io/image_stack.h"
-#include "io/view_table.h"
+#include "io/images/image_stack.h"
+#include "io/tables/view_table.h"
 
 namespace tomofield::tilt_series {
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "io/image_stack.h"
-#include "tilt_series/align_image.h"
+#include "io/images/image_stack.h"
+#include "tilt_series/resampling/align_image.h"
 #include "tilt_series/tilt_series.h"
 
 namespace tomofield::tilt_series {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "io/alignment_files.h"
-#include "io/image_stack.h"
+#include "io/images/image_stack.h"
+#include "io/tables/alignment_files.h"
 #include "tilt_series/section_table.h"
 #include "tilt_series/tilt_series.h"
 

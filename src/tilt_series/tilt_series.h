@@ -12,7 +12,7 @@
 #include "distributed/communicator.h"
 #include "geometry/raw_from_aligned.h"
 #include "geometry/view_correction.h"
-#include "io/image_stack.h"
+#include "io/images/image_stack.h"
 #include "tilt_series/fixed_pattern/fixed_pattern.h"
 #include "tilt_series/half.h"
 #include "tilt_series/masks/bead_spot.h"

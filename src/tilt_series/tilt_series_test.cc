@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 #include "expect_parts.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "loaded_view.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "io/scratch_memory.h"
+#include "io/saving/scratch_memory.h"
 #include "tilt_series/image.h"
 
 namespace tomofield::tilt_series {
@@ -17,7 +17,7 @@ namespace tomofield::tilt_series {
 class ViewStore {
  public:
   /// Makes room for `capacity` of the `num_views` views of a series. Throws Error if there is none
-  /// (io/scratch_memory.h).
+  /// (io/saving/scratch_memory.h).
   ViewStore(std::size_t num_views, std::size_t capacity, std::int64_t width, std::int64_t height,
             const std::filesystem::path& scratch_dir);
 

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "scratch_directory.h"
 
 namespace tomofield::tilt_series {

@@ -1,6 +1,6 @@
 #include "tilt_series/views_at_once.h"
 
-#include "base/memory.h"
+#include "base/system/memory.h"
 
 namespace tomofield::tilt_series {
 

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "base/enum_names.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/field_artefacts.h"
 #include "field/sampling/middle_plane.h"

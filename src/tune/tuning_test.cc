@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "measurement/held_out.h"
 #include "scratch_directory.h"
 #include "sphere_series.h"

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <numbers>
 
-#include "base/parallel.h"
 #include "base/percentile.h"
+#include "base/threads/parallel.h"
 
 namespace tomofield::verdict {
 namespace {

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "base/parallel.h"
 #include "base/percentile.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "microscope/view_filter.h"
 #include "verdict/view_agreement.h"

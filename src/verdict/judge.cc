@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "base/memory.h"
 #include "base/percentile.h"
+#include "base/system/memory.h"
 #include "verdict/warnings.h"
 
 namespace tomofield::verdict {

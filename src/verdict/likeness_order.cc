@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "base/parallel.h"
 #include "base/percentile.h"
+#include "base/threads/parallel.h"
 
 namespace tomofield::verdict {
 namespace {

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <numbers>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "fourier/image_transform.h"
 
 namespace tomofield::verdict {

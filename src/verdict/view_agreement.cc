@@ -5,8 +5,8 @@
 #include <span>
 #include <utility>
 
-#include "base/parallel.h"
 #include "base/percentile.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/image_pair.h"
 #include "geometry/tilt_order.h"

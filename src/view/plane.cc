@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "base/plausible.h"
-#include "io/text_lines.h"
+#include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::view {

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/memory.h"
-#include "base/parallel.h"
-#include "io/mrc.h"
+#include "base/system/memory.h"
+#include "base/threads/parallel.h"
+#include "io/images/mrc.h"
 #include "report/reduced_volume.h"
 #include "tomofield/error.h"
 #include "view/viewed_volume.h"

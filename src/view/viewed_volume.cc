@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "io/hdf5_reader.h"
+#include "io/hdf5/hdf5_reader.h"
 
 namespace tomofield::view {
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "output/volume.h"
 #include "scratch_directory.h"
 #include "tomofield/error.h"

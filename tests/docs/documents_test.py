@@ -82,7 +82,7 @@ def test_wrong_options_are_found(known_options):
 
 
 def test_missing_files_are_found():
-    text = ("`src/base/`, `src/base/none.h`, `base/parallel.h`, `base/none.h`, `./test`, `./none`, "
+    text = ("`src/base/`, `src/base/none.h`, `base/threads/parallel.h`, `base/none.h`, `./test`, `./none`, "
             "`docs/index.md`, `none.md`, `tests/program/NAME_test.py`, `tests/program/NAME_none.py`, "
             "`build/none`, `/field/tree`, `run.json`\n")
     assert documents.missing_paths(text, PROJECT) == [

@@ -116,7 +116,7 @@ def test_only_unit_tests_include_test_helpers():
 def test_public_headers_stay_free_of_other_libraries():
     assert check("include/tomofield/a.h", "#include <vector>\n")[0] == 0
     assert check("include/tomofield/a.h", "#include <hwy/highway.h>\n")[0] == 1
-    assert check("include/tomofield/a.h", '#include "io/mrc.h"\n')[0] == 1
+    assert check("include/tomofield/a.h", '#include "io/images/mrc.h"\n')[0] == 1
 
 
 def test_refuses_what_is_no_graph_of_rooms():

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/enum_names.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "checkpoint/checkpoint.h"
 #include "fit/fit.h"
 #include "lone_bead_series.h"

@@ -10,8 +10,8 @@
 #include <tuple>
 #include <vector>
 
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 #include "fit/domain.h"
 #include "fit/fit.h"
 #include "scratch_directory.h"

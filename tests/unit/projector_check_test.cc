@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "kernels/lanes.h"
 #include "projected_slab.h"
 #include "shared_data.h"

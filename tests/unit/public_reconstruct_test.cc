@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "base/random.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "simulate/project_phantom.h"

@@ -8,8 +8,8 @@
 #include <tuple>
 #include <vector>
 
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 #include "central_difference.h"
 #include "fit/fit.h"
 #include "random_arrays.h"

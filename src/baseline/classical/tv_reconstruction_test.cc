@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "baseline/classical/sirt.h"
 #include "voxel_comparison.h"
 

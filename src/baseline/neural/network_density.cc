@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "fit/domain.h"
 #include "fit/options.h"
 #include "kernels/lanes.h"

@@ -6,8 +6,8 @@
 #include <memory>
 #include <vector>
 
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 #include "baseline/neural/encodings.h"
 #include "central_difference.h"
 #include "kernels/lanes.h"

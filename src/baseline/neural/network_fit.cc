@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/parallel.h"
 #include "base/random.h"
+#include "base/threads/parallel.h"
 #include "baseline/neural/network_density.h"
 #include "kernels/adam.h"
 #include "kernels/lanes.h"

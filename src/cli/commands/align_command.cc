@@ -9,7 +9,7 @@
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
 #include "exchange/alignment_output.h"
-#include "io/output_set.h"
+#include "io/saving/output_set.h"
 #include "options/run_options.h"
 #include "plan/plan.h"
 #include "tilt_series/tilt_series.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/enum_names.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "baseline/run_baseline.h"
 #include "baseline/tune.h"
 #include "cli/commands/commands.h"
@@ -22,7 +22,7 @@
 #include "cli/terminal/console.h"
 #include "cli/terminal/progress_bar.h"
 #include "distributed/communicator.h"
-#include "io/output_set.h"
+#include "io/saving/output_set.h"
 #include "output/shared_options.h"
 
 namespace tomofield::cli {

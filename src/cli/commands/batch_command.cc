@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "base/log.h"
-#include "base/parallel.h"
-#include "base/program_path.h"
+#include "base/system/program_path.h"
+#include "base/threads/parallel.h"
 #include "base/time_text.h"
 #include "batch/batch.h"
 #include "batch/choice.h"
@@ -30,9 +30,9 @@
 #include "cli/terminal/console.h"
 #include "cli/terminal/exit_status.h"
 #include "cli/terminal/stop_signal.h"
-#include "io/atomic_file.h"
-#include "io/output_folder.h"
-#include "io/output_lock.h"
+#include "io/saving/atomic_file.h"
+#include "io/saving/output_folder.h"
+#include "io/saving/output_lock.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/log.h"
-#include "base/program_path.h"
+#include "base/system/program_path.h"
 #include "cli/commands/commands.h"
 #include "cli/options/common_options.h"
 #include "cli/options/config_file.h"

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "cli/terminal/console.h"
 #include "report/pictures.h"

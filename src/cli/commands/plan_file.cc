@@ -4,12 +4,12 @@
 
 #include <string>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "base/time_text.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
 #include "io/json.h"
-#include "io/output_files.h"
+#include "io/saving/output_files.h"
 #include "plan/plan.h"
 
 namespace tomofield::cli {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "cli/options/number_checks.h"
 
 namespace tomofield::cli {

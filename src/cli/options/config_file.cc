@@ -12,8 +12,8 @@
 
 #include "cli/options/command_line.h"
 #include "cli/options/help_formatter.h"
-#include "io/output_files.h"
-#include "io/text_lines.h"
+#include "io/saving/output_files.h"
+#include "io/tables/text_lines.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {

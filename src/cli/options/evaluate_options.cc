@@ -10,7 +10,7 @@
 #include "cli/options/number_checks.h"
 #include "cli/options/place_options.h"
 #include "cli/options/table_options.h"
-#include "io/output_files.h"
+#include "io/saving/output_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {

@@ -7,9 +7,9 @@
 
 #include "evaluate/box.h"
 #include "evaluate/contrast.h"
-#include "evaluate/fsc.h"
 #include "evaluate/profile.h"
-#include "io/output_lock.h"
+#include "evaluate/resolution/fsc.h"
+#include "io/saving/output_lock.h"
 #include "option_table/values.h"
 
 namespace tomofield::cli {

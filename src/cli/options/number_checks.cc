@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "io/text_lines.h"
+#include "io/tables/text_lines.h"
 
 namespace tomofield::cli {
 namespace {

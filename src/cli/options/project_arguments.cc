@@ -12,7 +12,7 @@
 #include "cli/options/command_line.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
-#include "io/output_files.h"
+#include "io/saving/output_files.h"
 #include "option_table/name_list.h"
 #include "projects/project.h"
 #include "tomofield/error.h"

@@ -8,8 +8,8 @@
 #include "base/trace.h"
 #include "cli/options/help_formatter.h"
 #include "cli/terminal/console.h"
-#include "io/atomic_file.h"
-#include "io/output_files.h"
+#include "io/saving/atomic_file.h"
+#include "io/saving/output_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::cli {

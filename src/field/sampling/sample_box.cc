@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "base/check.h"
-#include "base/memory.h"
-#include "base/parallel.h"
+#include "base/system/memory.h"
+#include "base/threads/parallel.h"
 #include "field/sampling/aligned_rows.h"
 #include "tomofield/error.h"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/enum_names.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "random_arrays.h"
 #include "tomofield/error.h"
 #include "uneven_model.h"

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/check.h"
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "field/merge_target.h"
 #include "field/vm/vm_field.h"
 

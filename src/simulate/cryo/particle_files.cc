@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "io/star_file.h"
+#include "io/tables/star_file.h"
 #include "simulate/gaussian_rows.h"
 #include "simulate/rasterize.h"
 

@@ -10,9 +10,9 @@
 #include <numbers>
 #include <string>
 
-#include "base/parallel.h"
 #include "base/random.h"
-#include "io/image_stack.h"
+#include "base/threads/parallel.h"
+#include "io/images/image_stack.h"
 #include "scratch_directory.h"
 #include "tilt_series/tilt_series.h"
 

@@ -5,8 +5,8 @@
 #include <span>
 
 #include "base/statistics.h"
-#include "tilt_series/box_sums.h"
 #include "tilt_series/masks/bad_pixels.h"
+#include "tilt_series/resampling/box_sums.h"
 
 namespace tomofield::tilt_series {
 namespace {

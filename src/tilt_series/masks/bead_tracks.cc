@@ -8,7 +8,7 @@
 #include <optional>
 #include <tuple>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 
 namespace tomofield::tilt_series {
 namespace {

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <span>
 
-#include "base/parallel.h"
+#include "base/threads/parallel.h"
 #include "tilt_series/masks/bead_profile.h"
 #include "tilt_series/masks/bead_tracks.h"
 #include "tilt_series/masks/spots.h"

@@ -7,8 +7,8 @@
 #include <filesystem>
 
 #include "bead_series.h"
-#include "io/alignment_files.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
+#include "io/tables/alignment_files.h"
 #include "shared_data.h"
 #include "tilt_series/masks/fill.h"
 

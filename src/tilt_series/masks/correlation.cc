@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "base/percentile.h"
-#include "tilt_series/binning.h"
-#include "tilt_series/box_sums.h"
+#include "tilt_series/resampling/binning.h"
+#include "tilt_series/resampling/box_sums.h"
 
 namespace tomofield::tilt_series {
 namespace {

@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "base/random.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "shared_data.h"
 #include "tilt_series/masks/straight_fill.h"
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "base/percentile.h"
-#include "tilt_series/binning.h"
 #include "tilt_series/masks/correlation.h"
+#include "tilt_series/resampling/binning.h"
 
 namespace tomofield::tilt_series {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "io/fiducial_points.h"
-#include "tilt_series/binning.h"
+#include "io/tables/fiducial_points.h"
+#include "tilt_series/resampling/binning.h"
 #include "tomofield/error.h"
 
 namespace tomofield::tilt_series {

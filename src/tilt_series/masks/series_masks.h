@@ -4,8 +4,8 @@
 #include <functional>
 #include <vector>
 
-#include "io/image_stack.h"
-#include "io/mrc.h"
+#include "io/images/image_stack.h"
+#include "io/images/mrc.h"
 #include "tilt_series/masks/beads.h"
 #include "tilt_series/series_plan.h"
 #include "tilt_series/tilt_series.h"

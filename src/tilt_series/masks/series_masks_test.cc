@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "bead_series.h"
-#include "io/mrc.h"
+#include "io/images/mrc.h"
 #include "pixel_stack.h"
 #include "scratch_directory.h"
 #include "tilt_series/tilt_series.h"

@@ -6,10 +6,10 @@
 #include <limits>
 #include <numbers>
 
-#include "base/parallel.h"
 #include "base/statistics.h"
-#include "tilt_series/binning.h"
+#include "base/threads/parallel.h"
 #include "tilt_series/masks/spot_place.h"
+#include "tilt_series/resampling/binning.h"
 
 namespace tomofield::tilt_series {
 namespace {

@@ -1,0 +1,161 @@
+#include "base/threads/parallel.h"
+
+#include <fmt/format.h>
+#include <sched.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "base/system/processors.h"
+#include "base/threads/worker_threads.h"
+#include "base/trace.h"
+
+namespace tomofield::base {
+namespace {
+
+// Another program counts as running if the machine was this busy, in processors, on average over
+// the last minute.
+constexpr double kIdleLoad = 0.5;
+
+int g_asked_count = 0;  // by set_thread_count()
+int g_processes_on_machine = 1;
+
+const Processors& processors() {
+  static const Processors found = processors_of_this_process();
+  return found;
+}
+
+// Returns the processors in this thread's affinity mask.
+std::vector<int> processors_in_mask() {
+  cpu_set_t mask;
+  std::vector<int> list;
+  if (sched_getaffinity(0, sizeof mask, &mask) != 0) return list;
+  for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu)
+    if (CPU_ISSET(cpu, &mask)) list.push_back(cpu);
+  return list;
+}
+
+// Holds a number of threads and the reason for it.
+struct Choice {
+  int count;
+  std::string reason;
+};
+
+Choice choose_count() {
+  const Processors& p = processors();
+  if (g_asked_count > 0) return {g_asked_count, "as asked for"};
+  const char* variable = std::getenv("OMP_NUM_THREADS");
+  if (const long wanted = variable ? std::strtol(variable, nullptr, 10) : 0; wanted > 0) {
+    if (wanted <= kMostThreads) return {static_cast<int>(wanted), "as OMP_NUM_THREADS says"};
+    return {kMostThreads,
+            fmt::format("the most there can be, since OMP_NUM_THREADS says {}", wanted)};
+  }
+  if (p.are_all_usable() && g_processes_on_machine > 1) {
+    return {std::max(1, p.online / g_processes_on_machine),
+            fmt::format("the share of each of {} processes on this machine with {} processors",
+                        g_processes_on_machine, p.online)};
+  }
+  if (p.usable() < p.allowed) {
+    return {p.usable(),
+            fmt::format("as the control group grants the time of {:.2g} processors of {}", *p.quota,
+                        p.online)};
+  }
+  if (p.allowed < p.online) {
+    return {p.allowed,
+            fmt::format("as the affinity mask allows {} of {} processors", p.allowed, p.online)};
+  }
+  return {p.online, fmt::format("one for each of the machine's processors")};
+}
+
+// Says why threads are not bound to processors, or nothing if they are to be bound: the process has
+// the machine to itself, and a thread for each processor.
+std::string reason_not_to_bind(int count) {
+  const Processors& p = processors();
+  if (!p.are_all_usable()) return "it may not use the whole machine";
+  if (g_processes_on_machine > 1) return "it shares the machine with other processes of its job";
+  if (count != p.online || count == 1) return "there is not one for each processor";
+  const std::optional<double> load = load_average();
+  if (!load) return "the load of the machine is unknown";
+  if (*load >= kIdleLoad)
+    return fmt::format("other work may be running: the load average is {:.2g}", *load);
+  return "";
+}
+
+// The threads of the process, and the reason for their number.
+class Threads {
+ public:
+  explicit Threads(Choice choice)
+      : wanted_(choice.count),
+        why_unbound_(reason_not_to_bind(choice.count)),
+        why_count_(std::move(choice.reason)),
+        workers_(choice.count, why_unbound_.empty() ? processors_in_mask() : std::vector<int>{}) {}
+
+  WorkerThreads& workers() { return workers_; }
+  std::string description() const {
+    const int count = workers_.count();
+    return fmt::format("{} thread{}, {}{}; {}", count, count == 1 ? "" : "s", why_count_,
+                       count < wanted_ ? fmt::format(" (the system grants no {})", wanted_) : "",
+                       why_unbound_.empty() ? "each is bound to a processor"
+                                            : "not bound to processors, since " + why_unbound_);
+  }
+
+ private:
+  int wanted_;
+  std::string why_unbound_, why_count_;
+  WorkerThreads workers_;
+};
+
+std::unique_ptr<Threads>& current_threads() {
+  static std::unique_ptr<Threads> threads;
+  return threads;
+}
+
+Threads& threads() {
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  std::unique_ptr<Threads>& current = current_threads();
+  if (!current) current = std::make_unique<Threads>(choose_count());
+  return *current;
+}
+
+}  // namespace
+
+int thread_count() { return threads().workers().count(); }
+
+void set_thread_count(int count) {
+  g_asked_count = std::max(count, 0);
+  current_threads().reset();
+}
+
+void share_machine_with(int processes) {
+  g_processes_on_machine = std::max(1, processes);
+  current_threads().reset();
+}
+
+std::string describe_threads() { return threads().description(); }
+
+int thread_index() { return WorkerThreads::number(); }
+
+void detail::run_loop(const char* what, std::int64_t count, void (*call)(void*, std::int64_t),
+                      void* body) {
+  if (count <= 0) return;
+  TraceLoop loop(what, count);
+  const auto run_index = [&](std::int64_t i) {
+    loop.run_task(i, thread_index(), [&] { call(body, i); });
+  };
+  WorkerThreads& workers = threads().workers();
+  if (workers.count() == 1 || count == 1) {
+    for (std::int64_t i = 0; i < count; ++i) run_index(i);
+    return;
+  }
+  using Body = decltype(run_index);
+  workers.run(
+      count, [](const void* of_loop, std::int64_t i) { (*static_cast<const Body*>(of_loop))(i); },
+      &run_index);
+}
+
+}  // namespace tomofield::base

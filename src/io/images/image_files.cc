@@ -1,0 +1,84 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "base/check.h"
+#include "io/images/image_stack.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+// A stack whose sections lie in several files.
+class FilesStack : public ImageStack {
+ public:
+  FilesStack(const std::vector<ImageInFile>& images, std::string name) : name_(std::move(name)) {
+    std::map<std::filesystem::path, std::shared_ptr<const ImageStack>> opened;
+    for (const ImageInFile& image : images) {
+      std::shared_ptr<const ImageStack>& stack = opened[image.file];
+      if (!stack) stack = open_image_stack(image.file);
+      require_fits(image, stack->header());
+      sections_.push_back({stack, image.section.value_or(0)});
+    }
+    header_.nz = std::ssize(images);
+  }
+
+  const MrcHeader& header() const override { return header_; }
+  std::string name() const override { return name_; }
+
+  void read_section(std::int64_t section, std::span<float> out) const override {
+    const Section& found = sections_.at(static_cast<std::size_t>(section));
+    found.stack->read_section(found.index, out);
+  }
+
+ private:
+  struct Section {
+    std::shared_ptr<const ImageStack> stack;
+    std::int64_t index;
+  };
+
+  // Takes sizes from the first file, and throws Error if an image has others or is not there.
+  void require_fits(const ImageInFile& image, const MrcHeader& found) {
+    if (sections_.empty()) {
+      header_.nx = found.nx;
+      header_.ny = found.ny;
+      header_.voxel_size_A = found.voxel_size_A;
+    }
+    const std::string file = image.file.string();
+    if (!image.section && found.nz != 1) {
+      throw Error(
+          fmt::format("'{}' has {} images, and one view is expected ({}): give averages of "
+                      "movies, each in a file",
+                      file, found.nz, name_));
+    }
+    if (image.section.value_or(0) < 0 || image.section.value_or(0) >= found.nz) {
+      throw Error(fmt::format("{} asks for image {} of '{}', which has {}", name_,
+                              *image.section + 1, file, found.nz));
+    }
+    constexpr double kSamePixel = 1e-3;
+    const double pixel_A = header_.voxel_size_A[0];
+    if (found.nx != header_.nx || found.ny != header_.ny ||
+        std::fabs(found.voxel_size_A[0] - pixel_A) > kSamePixel * pixel_A) {
+      throw Error(fmt::format(
+          "'{}' has {} × {} pixels of {:g} Å, and the first image of {} {} × {} "
+          "of {:g} Å: the views of a series have one size",
+          file, found.nx, found.ny, found.voxel_size_A[0], name_, header_.nx, header_.ny, pixel_A));
+    }
+  }
+
+  std::string name_;
+  std::vector<Section> sections_;
+  MrcHeader header_;
+};
+
+}  // namespace
+
+std::shared_ptr<const ImageStack> image_stack_of_files(const std::vector<ImageInFile>& images,
+                                                       std::string name) {
+  if (images.empty()) throw Error(fmt::format("{} names no image", name));
+  return std::make_shared<FilesStack>(images, std::move(name));
+}
+
+}  // namespace tomofield::io

@@ -1,0 +1,385 @@
+#include "io/images/mrc_format.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+
+#include "base/check.h"
+#include "base/plausible.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+
+static_assert(std::endian::native == std::endian::little,
+              "MRC files are written in the machine's order, which the stamp calls little-endian");
+
+namespace {
+
+// Byte offsets of MRC2014 (Cheng et al. 2015), and of IMOD's fields in the free area.
+enum Offset : std::size_t {
+  kSize = 0,
+  kMode = 12,
+  kSampling = 28,
+  kCell = 40,
+  kAngles = 52,
+  kAxes = 64,
+  kMin = 76,
+  kMax = 80,
+  kMean = 84,
+  kSpaceGroup = 88,
+  kExtendedBytes = 92,
+  kExtendedType = 104,
+  kVersion = 108,
+  kBytesPerSection = 128,  // IMOD and SerialEM: int16
+  kSectionFlags = 130,     // IMOD and SerialEM: int16
+  kImodStamp = 152,
+  kImodFlags = 156,
+  kOrigin = 196,
+  kMap = 208,
+  kMachineStamp = 212,
+  kRms = 216,
+  kNumLabels = 220,
+  kLabels = 224
+};
+constexpr std::size_t kLabelBytes = 80;
+constexpr int kMaxLabels = 10;
+constexpr std::int32_t kImodStampValue = 1146047817;
+constexpr std::int32_t kImodSignedBytes = 1;
+constexpr std::int32_t kImodOriginInverted = 4;  // ORIGIN has the sign of MRC2014
+
+// Reads numbers of either byte order from the header.
+class Fields {
+ public:
+  Fields(const MrcHeaderBytes& bytes, bool swapped) : bytes_(bytes), swapped_(swapped) {}
+
+  std::int32_t int32(std::size_t offset) const { return get<std::int32_t>(offset); }
+  std::int16_t int16(std::size_t offset) const { return get<std::int16_t>(offset); }
+  double float32(std::size_t offset) const { return get<float>(offset); }
+  std::string text(std::size_t offset, std::size_t length) const {
+    const auto* first = reinterpret_cast<const char*>(bytes_.data() + offset);
+    std::string result(first, std::find(first, first + length, '\0'));
+    for (char& c : result) {
+      if (static_cast<unsigned char>(c) < ' ') c = '?';  // terminals show labels
+    }
+    result.erase(result.find_last_not_of(' ') + 1);
+    return result;
+  }
+
+ private:
+  template <typename T>
+  T get(std::size_t offset) const {
+    std::array<std::byte, sizeof(T)> raw;
+    std::copy_n(bytes_.data() + offset, sizeof(T), raw.begin());
+    if (swapped_) std::reverse(raw.begin(), raw.end());
+    return std::bit_cast<T>(raw);
+  }
+  const MrcHeaderBytes& bytes_;
+  bool swapped_;
+};
+
+bool is_known_mode(std::int32_t mode) {
+  return mode == 0 || mode == 1 || mode == 2 || mode == 6 || mode == 12;
+}
+
+bool detect_byte_swap(const MrcHeaderBytes& bytes) {
+  const auto stamp = std::to_integer<int>(bytes[kMachineStamp]);
+  if (stamp == 0x44) return false;
+  if (stamp == 0x11) return true;
+  // Files from before MRC2014 have no stamp. Then the byte order is the one in which the mode makes
+  // sense. Mode 0 is the same in both orders, so the size decides.
+  const Fields native(bytes, false), swapped(bytes, true);
+  if (native.int32(kMode) != 0) return !is_known_mode(native.int32(kMode));
+  return static_cast<std::uint32_t>(native.int32(kSize)) >
+         static_cast<std::uint32_t>(swapped.int32(kSize));
+}
+
+MrcMode decode_mode(std::int32_t mode, const std::string& name) {
+  if (is_known_mode(mode)) return static_cast<MrcMode>(mode);
+  const char* hint = mode == 3 || mode == 4 ? "complex values"
+                     : mode == 101 ? "4-bit values; expand them first (IMOD's newstack -mode 1)"
+                                   : "no mode of MRC2014, so this is probably no MRC file";
+  throw Error(fmt::format("'{}': MRC mode {} cannot be read ({}); modes 0, 1, 2, 6 and 12 can",
+                          name, mode, hint));
+}
+
+void require_sizes(const MrcHeader& header, const std::string& name) {
+  if (header.nx > 0 && header.ny > 0 && header.nz > 0) return;
+  throw Error(fmt::format(
+      "'{}': the header says {} × {} × {} values; every size must be at least 1, so the file is "
+      "damaged or no MRC file",
+      name, header.nx, header.ny, header.nz));
+}
+
+void require_axis_order(const Fields& fields, const std::string& name) {
+  const std::array<std::int32_t, 3> axes{fields.int32(kAxes), fields.int32(kAxes + 4),
+                                         fields.int32(kAxes + 8)};
+  const bool absent = axes == std::array<std::int32_t, 3>{0, 0, 0};
+  if (absent || axes == std::array<std::int32_t, 3>{1, 2, 3}) return;
+  throw Error(fmt::format(
+      "'{}': the axes are stored in the order {}, {}, {} (MAPC, MAPR, MAPS); only 1, 2, 3 can be "
+      "read, so bring the axes into that order first",
+      name, axes[0], axes[1], axes[2]));
+}
+
+// Returns cell length over number of samples, never rounded; 0 if the header has none, or one that
+// cannot be.
+double decode_voxel_size(const Fields& fields, std::size_t axis) {
+  const double cell_A = fields.float32(kCell + 4 * axis);
+  const auto samples = static_cast<double>(fields.int32(kSampling + 4 * axis));
+  const double size_A = samples > 0 ? cell_A / samples : 0.0;
+  return base::is_plausible_pixel_size(size_A) ? size_A : 0.0;
+}
+
+// Returns the bytes a section that SerialEM's flags announce (IMOD's description of the header).
+int bytes_of_section_flags(int flags) {
+  int bytes = 0;
+  constexpr std::array<int, 6> kBytesOfFlag{2, 6, 4, 2, 2, 4};
+  for (std::size_t bit = 0; bit < kBytesOfFlag.size(); ++bit) {
+    if ((flags >> bit) & 1) bytes += kBytesOfFlag[bit];
+  }
+  return bytes;
+}
+
+SeriLayout decode_seri_layout(const Fields& fields, const MrcHeader& header) {
+  const std::int64_t bytes = fields.int16(kBytesPerSection);
+  const int flags = fields.int16(kSectionFlags);
+  // Files older than the type code are recognised by sizes that agree.
+  const bool is_seri =
+      header.extended_header_type == "SERI" ||
+      (header.extended_header_type.empty() && bytes == bytes_of_section_flags(flags));
+  const bool fits = bytes >= 2 && bytes * header.nz <= header.extended_header_bytes;
+  return {is_seri && (flags & 1) && fits ? bytes : 0};
+}
+
+// Tells whether ORIGIN has IMOD's sign, the opposite of MRC2014's. Versions of this program that
+// did not write IMOD's stamp wrote it so.
+bool has_imod_origin(const Fields& fields, const MrcHeader& header) {
+  if (fields.int32(kImodStamp) == kImodStampValue)
+    return (fields.int32(kImodFlags) & kImodOriginInverted) == 0;
+  return std::ranges::any_of(
+      header.labels, [](const std::string& label) { return label.starts_with("tomofield "); });
+}
+
+template <typename T>
+void put(MrcHeaderBytes& bytes, std::size_t offset, std::type_identity_t<T> value) {
+  std::memcpy(bytes.data() + offset, &value, sizeof value);
+}
+
+}  // namespace
+
+std::size_t bytes_per_value(MrcMode mode) {
+  if (mode == MrcMode::kInt8) return 1;
+  return mode == MrcMode::kFloat32 ? 4 : 2;
+}
+
+std::string describe(MrcMode mode) {
+  const char* name = mode == MrcMode::kInt8      ? "8-bit integers"
+                     : mode == MrcMode::kInt16   ? "16-bit integers"
+                     : mode == MrcMode::kUint16  ? "16-bit unsigned integers"
+                     : mode == MrcMode::kFloat16 ? "16-bit floats"
+                                                 : "32-bit floats";
+  return fmt::format("{} (mode {})", name, static_cast<int>(mode));
+}
+
+MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name,
+                            SeriLayout* seri) {
+  if (std::memcmp(bytes.data(), "\x89HDF", 4) == 0) {
+    throw Error(fmt::format(
+        "'{}' is an HDF5 file, not MRC: if it is a model, `tomofield export` writes a volume of it",
+        name));
+  }
+  MrcHeader header;
+  header.is_byte_swapped = detect_byte_swap(bytes);
+  const Fields fields(bytes, header.is_byte_swapped);
+  header.mode = decode_mode(fields.int32(kMode), name);
+  header.nx = fields.int32(kSize);
+  header.ny = fields.int32(kSize + 4);
+  header.nz = fields.int32(kSize + 8);
+  require_sizes(header, name);
+  require_axis_order(fields, name);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    header.voxel_size_A[axis] = decode_voxel_size(fields, axis);
+    header.origin_A[axis] = fields.float32(kOrigin + 4 * axis);
+  }
+  header.min = fields.float32(kMin);
+  header.max = fields.float32(kMax);
+  header.mean = fields.float32(kMean);
+  header.rms = fields.float32(kRms);
+  header.is_volume = fields.int32(kSpaceGroup) == 1;
+  header.bytes_are_unsigned = header.mode == MrcMode::kInt8 &&
+                              fields.int32(kImodStamp) == kImodStampValue &&
+                              (fields.int32(kImodFlags) & kImodSignedBytes) == 0;
+  header.extended_header_bytes = fields.int32(kExtendedBytes);
+  if (header.extended_header_bytes < 0) {
+    throw Error(
+        fmt::format("'{}': the header says that its extended part has {} bytes; the file "
+                    "is damaged or no MRC file",
+                    name, header.extended_header_bytes));
+  }
+  if (header.extended_header_bytes > 0) header.extended_header_type = fields.text(kExtendedType, 4);
+  const int num_labels = std::clamp(fields.int32(kNumLabels), 0, kMaxLabels);
+  for (int i = 0; i < num_labels; ++i) {
+    header.labels.push_back(
+        fields.text(kLabels + kLabelBytes * static_cast<std::size_t>(i), kLabelBytes));
+  }
+  if (has_imod_origin(fields, header)) {
+    for (double& origin_A : header.origin_A) origin_A = origin_A == 0.0 ? 0.0 : -origin_A;
+  }
+  *seri = decode_seri_layout(fields, header);
+  return header;
+}
+
+std::int64_t expected_file_bytes(const MrcHeader& header, const std::string& name) {
+  std::int64_t bytes = 0;
+  const bool overflows =
+      __builtin_mul_overflow(header.nx * header.ny, header.nz, &bytes) ||
+      __builtin_mul_overflow(bytes, static_cast<std::int64_t>(bytes_per_value(header.mode)),
+                             &bytes) ||
+      __builtin_add_overflow(
+          bytes, static_cast<std::int64_t>(kMrcHeaderBytes) + header.extended_header_bytes, &bytes);
+  if (overflows) {
+    throw Error(
+        fmt::format("'{}': {} × {} × {} values are more than any file can hold; the header "
+                    "is damaged or this is no MRC file",
+                    name, header.nx, header.ny, header.nz));
+  }
+  return bytes;
+}
+
+std::vector<double> decode_seri_tilts(std::span<const std::byte> extended_header,
+                                      const SeriLayout& seri, const MrcHeader& header) {
+  std::vector<double> tilts;
+  for (std::int64_t section = 0; section < header.nz; ++section) {
+    const auto at = static_cast<std::size_t>(section * seri.bytes_per_section);
+    std::array<std::byte, 2> raw{extended_header[at], extended_header[at + 1]};
+    if (header.is_byte_swapped) std::swap(raw[0], raw[1]);
+    tilts.push_back(std::bit_cast<std::int16_t>(raw) / 100.0);
+  }
+  return tilts;
+}
+
+MrcHeaderBytes encode_mrc_header(const MrcHeader& header) {
+  MrcHeaderBytes bytes{};
+  const std::array<std::int64_t, 3> sizes{header.nx, header.ny, header.nz};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto size = static_cast<std::int32_t>(sizes[axis]);
+    put<std::int32_t>(bytes, kSize + 4 * axis, size);
+    put<std::int32_t>(bytes, kSampling + 4 * axis, size);
+    put<float>(bytes, kCell + 4 * axis,
+               static_cast<float>(header.voxel_size_A[axis] * static_cast<double>(size)));
+    put<float>(bytes, kAngles + 4 * axis, 90.0f);
+    put<std::int32_t>(bytes, kAxes + 4 * axis, static_cast<std::int32_t>(axis) + 1);
+    put<float>(bytes, kOrigin + 4 * axis, static_cast<float>(header.origin_A[axis]));
+  }
+  put<std::int32_t>(bytes, kMode, static_cast<std::int32_t>(header.mode));
+  put<float>(bytes, kMin, static_cast<float>(header.min));
+  put<float>(bytes, kMax, static_cast<float>(header.max));
+  put<float>(bytes, kMean, static_cast<float>(header.mean));
+  put<float>(bytes, kRms, static_cast<float>(header.rms));
+  put<std::int32_t>(bytes, kSpaceGroup, header.is_volume ? 1 : 0);
+  put<std::int32_t>(bytes, kVersion, 20141);
+  put<std::int32_t>(bytes, kImodStamp, kImodStampValue);
+  const std::int32_t signed_bytes = header.mode == MrcMode::kInt8 ? kImodSignedBytes : 0;
+  put<std::int32_t>(bytes, kImodFlags, kImodOriginInverted | signed_bytes);
+  std::memcpy(bytes.data() + kMap, "MAP ", 4);
+  bytes[kMachineStamp] = bytes[kMachineStamp + 1] = std::byte{0x44};
+  const std::size_t num_labels = std::min<std::size_t>(header.labels.size(), kMaxLabels);
+  put<std::int32_t>(bytes, kNumLabels, static_cast<std::int32_t>(num_labels));
+  for (std::size_t i = 0; i < num_labels; ++i) {
+    const std::string& label = header.labels[i];
+    auto* at = bytes.data() + kLabels + kLabelBytes * i;
+    std::memset(at, ' ', kLabelBytes);
+    std::memcpy(at, label.data(), std::min(label.size(), kLabelBytes));
+  }
+  return bytes;
+}
+
+namespace {
+
+template <typename T, typename Convert>
+void decode_as(std::span<const std::byte> raw, std::span<float> out, Convert convert) {
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    T value;
+    std::memcpy(&value, raw.data() + i * sizeof(T), sizeof(T));
+    out[i] = convert(value);
+  }
+}
+
+template <typename T, typename Convert, typename Restore>
+void encode_as(std::span<const float> values, std::span<std::byte> raw, std::span<float> stored,
+               Convert convert, Restore restore) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const T value = convert(values[i]);
+    std::memcpy(raw.data() + i * sizeof(T), &value, sizeof(T));
+    stored[i] = restore(value);
+  }
+}
+
+template <typename T>
+void encode_integers(std::span<const float> values, std::span<std::byte> raw,
+                     std::span<float> stored) {
+  const auto round_and_clamp = [](float value) {
+    if (std::isnan(value)) return T{0};
+    constexpr auto kLow = static_cast<float>(std::numeric_limits<T>::min());
+    constexpr auto kHigh = static_cast<float>(std::numeric_limits<T>::max());
+    return static_cast<T>(std::nearbyint(std::clamp(value, kLow, kHigh)));
+  };
+  encode_as<T>(values, raw, stored, round_and_clamp, [](T v) { return static_cast<float>(v); });
+}
+
+void swap_bytes(std::span<std::byte> raw, std::size_t width) {
+  for (std::size_t i = 0; i + width <= raw.size(); i += width) {
+    std::reverse(raw.data() + i, raw.data() + i + width);
+  }
+}
+
+}  // namespace
+
+void decode_values(const MrcHeader& header, std::span<std::byte> raw, std::span<float> out) {
+  const std::size_t width = bytes_per_value(header.mode);
+  TOMOFIELD_CHECK(raw.size() == out.size() * width, "raw bytes must match the values");
+  if (header.is_byte_swapped && width > 1) swap_bytes(raw, width);
+  const auto to_float = [](auto value) { return static_cast<float>(value); };
+  switch (header.mode) {
+    case MrcMode::kInt8:
+      return header.bytes_are_unsigned ? decode_as<std::uint8_t>(raw, out, to_float)
+                                       : decode_as<std::int8_t>(raw, out, to_float);
+    case MrcMode::kInt16:
+      return decode_as<std::int16_t>(raw, out, to_float);
+    case MrcMode::kUint16:
+      return decode_as<std::uint16_t>(raw, out, to_float);
+    case MrcMode::kFloat16:
+      return decode_as<std::uint16_t>(raw, out, float_from_half);
+    case MrcMode::kFloat32:
+      return decode_as<float>(raw, out, to_float);
+  }
+}
+
+void encode_values(MrcMode mode, std::span<const float> values, std::span<std::byte> raw,
+                   std::span<float> stored) {
+  TOMOFIELD_CHECK(
+      raw.size() == values.size() * bytes_per_value(mode) && stored.size() == values.size(),
+      "raw bytes and stored values must match the values");
+  switch (mode) {
+    case MrcMode::kInt8:
+      return encode_integers<std::int8_t>(values, raw, stored);
+    case MrcMode::kInt16:
+      return encode_integers<std::int16_t>(values, raw, stored);
+    case MrcMode::kUint16:
+      return encode_integers<std::uint16_t>(values, raw, stored);
+    case MrcMode::kFloat16:
+      return encode_as<std::uint16_t>(values, raw, stored, half_from_float, float_from_half);
+    case MrcMode::kFloat32:
+      std::memcpy(raw.data(), values.data(), raw.size());
+      std::copy(values.begin(), values.end(), stored.begin());
+      return;
+  }
+}
+
+}  // namespace tomofield::io

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/images/mrc.h"
+
+namespace tomofield::io {
+
+/// The size of the fixed part of an MRC2014 header in bytes; the extended header follows, then the
+/// data.
+inline constexpr std::size_t kMrcHeaderBytes = 1024;
+using MrcHeaderBytes = std::array<std::byte, kMrcHeaderBytes>;
+
+std::size_t bytes_per_value(MrcMode mode);
+
+/// Returns a name for messages, such as "float32 (mode 2)".
+std::string describe(MrcMode mode);
+
+/// The layout of tilt angles in the extended header, if it holds one for each section.
+struct SeriLayout {
+  std::int64_t bytes_per_section = 0;  ///< 0 if there are no angles
+};
+
+/// Reads the fixed header; `name` stands for the file in errors. Throws Error for sizes that are
+/// not positive or overflow, unknown modes, a negative extended header, and axes that are not in x,
+/// y, z order.
+MrcHeader decode_mrc_header(const MrcHeaderBytes& bytes, const std::string& name, SeriLayout* seri);
+
+/// Returns the bytes that a file with this header has. Throws Error if 63 bits cannot hold them.
+std::int64_t expected_file_bytes(const MrcHeader& header, const std::string& name);
+
+/// Returns the tilt angles in degrees, one a section. The first signed 16-bit number of each
+/// section's record holds it in hundredths of a degree.
+std::vector<double> decode_seri_tilts(std::span<const std::byte> extended_header,
+                                      const SeriLayout& seri, const MrcHeader& header);
+
+/// Returns the fixed header of a new file, little-endian, without an extended one.
+MrcHeaderBytes encode_mrc_header(const MrcHeader& header);
+
+/// Converts the bytes of a file to floats. `raw` holds out.size() values of the header's mode and
+/// byte order; they may be byte-swapped in place.
+void decode_values(const MrcHeader& header, std::span<std::byte> raw, std::span<float> out);
+
+/// Converts floats to the bytes of a little-endian file. Integers round to the nearest and are
+/// clamped to their range, half floats to ±65504; NaN becomes the integer 0. `stored` receives the
+/// values that a reader will find.
+void encode_values(MrcMode mode, std::span<const float> values, std::span<std::byte> raw,
+                   std::span<float> stored);
+
+/// Converts IEEE 754 binary16 bits to float, exactly for every input.
+inline float float_from_half(std::uint16_t half) {
+  const std::uint32_t sign = (half & 0x8000u) << 16;
+  const std::uint32_t exponent = (half >> 10) & 0x1fu;
+  const std::uint32_t fraction = half & 0x3ffu;
+  if (exponent == 0) {  // zero or subnormal: fraction · 2⁻²⁴
+    const float magnitude = static_cast<float>(fraction) * 0x1p-24f;
+    return sign != 0 ? -magnitude : magnitude;
+  }
+  const std::uint32_t wide_exponent = exponent == 0x1f ? 0xffu : exponent + 112;
+  return std::bit_cast<float>(sign | (wide_exponent << 23) | (fraction << 13));
+}
+
+/// Converts to the nearest binary16, ties to even; finite values beyond ±65504 become ±65504.
+inline std::uint16_t half_from_float(float value) {
+  constexpr float kLargest = 65504.0f;
+  const auto sign =
+      static_cast<std::uint16_t>((std::bit_cast<std::uint32_t>(value) >> 16) & 0x8000u);
+  if (std::isnan(value)) return sign | 0x7e00u;
+  if (std::isinf(value)) return sign | 0x7c00u;
+  const float magnitude = std::min(std::fabs(value), kLargest);
+  if (magnitude < 0x1p-14f) {  // subnormal: a multiple of 2⁻²⁴
+    return sign | static_cast<std::uint16_t>(std::lrint(magnitude * 0x1p24f));
+  }
+  const auto bits = std::bit_cast<std::uint32_t>(magnitude);
+  const std::uint32_t ties_to_even = 0xfffu + ((bits >> 13) & 1u);
+  return sign | static_cast<std::uint16_t>((bits + ties_to_even - (112u << 23)) >> 13);
+}
+
+}  // namespace tomofield::io

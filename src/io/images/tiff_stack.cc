@@ -1,0 +1,311 @@
+#include "io/images/tiff_stack.h"
+
+#include <fmt/format.h>
+#include <tiffio.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdarg>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/check.h"
+#include "io/saving/positioned_file.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+constexpr std::uint32_t kLargestSide = std::uint32_t{1} << 24;
+constexpr std::size_t kMostPages = 100'000;
+// No compression of libtiff makes images smaller than this part of their size; deflate's limit is
+// 1/1032.
+constexpr double kLargestCompression = 4096;
+
+int keep_first_message(TIFF*, void* user_data, const char*, const char* format, va_list arguments) {
+  auto& message = *static_cast<std::string*>(user_data);
+  std::array<char, 200> text{};
+  std::vsnprintf(text.data(), text.size(), format, arguments);
+  if (message.empty()) message = text.data();
+  return 1;
+}
+
+int drop_message(TIFF*, void*, const char*, const char*, va_list) { return 1; }
+
+// Describes the size of a page and the type of its values.
+struct PageFormat {
+  std::uint32_t width = 0, height = 0;
+  std::uint16_t bits = 1, samples = 1, kind = SAMPLEFORMAT_UINT;
+  std::uint16_t photometric = PHOTOMETRIC_MINISBLACK;
+  bool is_tiled = false;
+
+  bool operator==(const PageFormat&) const = default;
+  double bytes() const { return static_cast<double>(width) * height * bits / 8; }
+};
+
+// An open TIFF file. libtiff keeps the page that it is at, so each thread opens its own.
+class TiffFile {
+ public:
+  explicit TiffFile(const std::filesystem::path& path) : path_(path) {
+    file_bytes_ = PositionedFile(path, PositionedFile::Access::kRead).size();
+    TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
+    TIFFOpenOptionsSetErrorHandlerExtR(options, keep_first_message, &message_);
+    TIFFOpenOptionsSetWarningHandlerExtR(options, drop_message, nullptr);
+    TIFFOpenOptionsSetMaxSingleMemAlloc(options, static_cast<tmsize_t>(most_bytes()));
+    // Without a memory map (m), a file that becomes shorter is an error and no signal.
+    handle_ = TIFFOpenExt(path.c_str(), "rm", options);
+    TIFFOpenOptionsFree(options);
+    if (handle_ == nullptr) fail("cannot be opened as a TIFF file");
+  }
+  ~TiffFile() {
+    if (handle_ != nullptr) TIFFClose(handle_);
+  }
+  TiffFile(const TiffFile&) = delete;
+  TiffFile& operator=(const TiffFile&) = delete;
+
+  TIFF* handle() const { return handle_; }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(fmt::format("'{}' {}{}", path_.string(), what,
+                            message_.empty() ? "" : fmt::format(" ({})", message_)));
+  }
+
+  // Returns the most bytes that a page of this file can have.
+  double most_bytes() const { return kLargestCompression * static_cast<double>(file_bytes_); }
+
+  // Returns the format of the page that the file is at. Throws Error for one that is not read.
+  PageFormat format(std::size_t page) const {
+    PageFormat format;
+    TIFFGetField(handle_, TIFFTAG_IMAGEWIDTH, &format.width);
+    TIFFGetField(handle_, TIFFTAG_IMAGELENGTH, &format.height);
+    TIFFGetFieldDefaulted(handle_, TIFFTAG_BITSPERSAMPLE, &format.bits);
+    TIFFGetFieldDefaulted(handle_, TIFFTAG_SAMPLESPERPIXEL, &format.samples);
+    TIFFGetFieldDefaulted(handle_, TIFFTAG_SAMPLEFORMAT, &format.kind);
+    TIFFGetField(handle_, TIFFTAG_PHOTOMETRIC, &format.photometric);
+    format.is_tiled = TIFFIsTiled(handle_) != 0;
+    require_readable(format, page);
+    return format;
+  }
+
+  // Returns the size of a pixel in Å by the resolution tags, or 0.
+  double pixel_size_A() const {
+    float per_unit = 0;
+    std::uint16_t unit = RESUNIT_NONE;
+    TIFFGetField(handle_, TIFFTAG_XRESOLUTION, &per_unit);
+    TIFFGetFieldDefaulted(handle_, TIFFTAG_RESOLUTIONUNIT, &unit);
+    const double unit_A = unit == RESUNIT_CENTIMETER ? 1e8 : unit == RESUNIT_INCH ? 2.54e8 : 0.0;
+    constexpr double kSmallest_A = 0.05, kLargest_A = 1000;  // printers have 72 to 2400 an inch
+    const double size_A = per_unit > 0 ? unit_A / static_cast<double>(per_unit) : 0.0;
+    return size_A >= kSmallest_A && size_A <= kLargest_A ? size_A : 0.0;
+  }
+
+ private:
+  void require_readable(const PageFormat& format, std::size_t page) const {
+    if (format.width < 1 || format.height < 1 || format.width > kLargestSide ||
+        format.height > kLargestSide || format.bytes() > most_bytes()) {
+      fail(
+          fmt::format("says that page {} has {} × {} pixels, which its {} bytes cannot hold: it "
+                      "is damaged",
+                      page + 1, format.width, format.height, file_bytes_));
+    }
+    const bool is_integer = format.kind == SAMPLEFORMAT_UINT || format.kind == SAMPLEFORMAT_INT;
+    const bool is_float = format.kind == SAMPLEFORMAT_IEEEFP && format.bits == 32;
+    const bool has_bits = format.bits == 8 || format.bits == 16 || format.bits == 32;
+    if (format.samples == 1 && ((is_integer && has_bits) || is_float))
+      return require_grey(format, page);
+    fail(fmt::format(
+        "has {} {} of {} bits a pixel on page {}; grey values of 8, 16 or 32 bits can "
+        "be read",
+        format.samples, format.samples == 1 ? "value" : "values", format.bits, page + 1));
+  }
+
+  // Values may stand for colours of a palette, or count down from white (TIFF 6.0, page 37).
+  void require_grey(const PageFormat& format, std::size_t page) const {
+    const bool is_unsigned = format.kind == SAMPLEFORMAT_UINT;
+    if (format.photometric == PHOTOMETRIC_MINISBLACK ||
+        (format.photometric == PHOTOMETRIC_MINISWHITE && is_unsigned))
+      return;
+    fail(fmt::format("has {} on page {}; grey values from black can be read: convert it",
+                     format.photometric == PHOTOMETRIC_PALETTE      ? "numbers of a palette"
+                     : format.photometric == PHOTOMETRIC_MINISWHITE ? "signed values from white"
+                                                                    : "colours",
+                     page + 1));
+  }
+
+  std::filesystem::path path_;
+  std::int64_t file_bytes_ = 0;
+  std::string message_;  // the first that libtiff gave
+  TIFF* handle_ = nullptr;
+};
+
+template <typename T>
+void convert(const std::byte* raw, std::size_t count, float* out) {
+  for (std::size_t i = 0; i < count; ++i) {
+    T value;
+    std::memcpy(&value, raw + i * sizeof(T), sizeof(T));
+    out[i] = static_cast<float>(value);
+  }
+}
+
+// Converts numbers of a page to floats.
+void convert_numbers(const PageFormat& format, const std::byte* raw, std::size_t count,
+                     float* out) {
+  const bool is_signed = format.kind == SAMPLEFORMAT_INT;
+  if (format.kind == SAMPLEFORMAT_IEEEFP) return convert<float>(raw, count, out);
+  switch (format.bits) {
+    case 8:
+      return is_signed ? convert<std::int8_t>(raw, count, out)
+                       : convert<std::uint8_t>(raw, count, out);
+    case 16:
+      return is_signed ? convert<std::int16_t>(raw, count, out)
+                       : convert<std::uint16_t>(raw, count, out);
+    default:
+      return is_signed ? convert<std::int32_t>(raw, count, out)
+                       : convert<std::uint32_t>(raw, count, out);
+  }
+}
+
+// Converts values of a page to floats that count up from black.
+void decode(const PageFormat& format, const std::byte* raw, std::size_t count, float* out) {
+  convert_numbers(format, raw, count, out);
+  if (format.photometric != PHOTOMETRIC_MINISWHITE) return;
+  const auto white = static_cast<float>(std::exp2(format.bits) - 1);
+  std::transform(out, out + count, out, [&](float value) { return white - value; });
+}
+
+// Reads the page that a file is at, its top row last.
+class PageReader {
+ public:
+  PageReader(const TiffFile& file, const PageFormat& format, std::span<float> out)
+      : file_(file), format_(format), out_(out) {}
+
+  void read() {
+    if (format_.is_tiled)
+      read_tiles();
+    else
+      read_strips();
+  }
+
+ private:
+  std::size_t bytes_per_value() const { return format_.bits / 8; }
+
+  float* row(std::uint32_t from_top) const {
+    return out_.data() + static_cast<std::size_t>(format_.height - 1 - from_top) * format_.width;
+  }
+
+  std::vector<std::byte> buffer(tmsize_t bytes) const {
+    if (bytes < 1 || static_cast<double>(bytes) > file_.most_bytes()) file_.fail("is damaged");
+    return std::vector<std::byte>(static_cast<std::size_t>(bytes));
+  }
+
+  void read_strips() const {
+    std::uint32_t rows_of_strip = format_.height;
+    TIFFGetFieldDefaulted(file_.handle(), TIFFTAG_ROWSPERSTRIP, &rows_of_strip);
+    rows_of_strip = std::clamp(rows_of_strip, std::uint32_t{1}, format_.height);
+    const std::size_t row_bytes = format_.width * bytes_per_value();
+    std::vector<std::byte> raw = buffer(static_cast<tmsize_t>(rows_of_strip * row_bytes));
+    for (std::uint32_t first = 0; first < format_.height; first += rows_of_strip) {
+      const std::uint32_t rows = std::min(rows_of_strip, format_.height - first);
+      const auto wanted = static_cast<tmsize_t>(rows * row_bytes);
+      const std::uint32_t strip = TIFFComputeStrip(file_.handle(), first, 0);
+      if (TIFFReadEncodedStrip(file_.handle(), strip, raw.data(), wanted) != wanted)
+        file_.fail("is truncated or damaged");
+      for (std::uint32_t i = 0; i < rows; ++i)
+        decode(format_, raw.data() + i * row_bytes, format_.width, row(first + i));
+    }
+  }
+
+  void read_tiles() const {
+    std::uint32_t width = 0, height = 0;
+    TIFFGetField(file_.handle(), TIFFTAG_TILEWIDTH, &width);
+    TIFFGetField(file_.handle(), TIFFTAG_TILELENGTH, &height);
+    if (width < 1 || height < 1 || width > kLargestSide || height > kLargestSide)
+      file_.fail("is damaged");
+    const std::size_t row_bytes = width * bytes_per_value();
+    const auto tile_bytes = static_cast<tmsize_t>(height * row_bytes);
+    std::vector<std::byte> raw = buffer(tile_bytes);
+    for (std::uint32_t y = 0; y < format_.height; y += height) {
+      for (std::uint32_t x = 0; x < format_.width; x += width) {
+        const std::uint32_t tile = TIFFComputeTile(file_.handle(), x, y, 0, 0);
+        if (TIFFReadEncodedTile(file_.handle(), tile, raw.data(), tile_bytes) != tile_bytes)
+          file_.fail("is truncated or damaged");
+        for (std::uint32_t i = 0; i < std::min(height, format_.height - y); ++i)
+          decode(format_, raw.data() + i * row_bytes, std::min(width, format_.width - x),
+                 row(y + i) + x);
+      }
+    }
+  }
+
+  const TiffFile& file_;
+  const PageFormat& format_;
+  std::span<float> out_;
+};
+
+class TiffStack : public ImageStack {
+ public:
+  explicit TiffStack(std::filesystem::path path) : path_(std::move(path)) {
+    const TiffFile file(path_);
+    format_ = file.format(0);
+    header_.voxel_size_A.fill(file.pixel_size_A());
+    do {
+      const PageFormat of_page = file.format(pages_.size());
+      if (of_page != format_) {
+        file.fail(
+            fmt::format("has pages of several kinds: page {} has {} × {} pixels of {} bits, "
+                        "and the first {} × {} of {}",
+                        pages_.size() + 1, of_page.width, of_page.height, of_page.bits,
+                        format_.width, format_.height, format_.bits));
+      }
+      pages_.push_back(TIFFCurrentDirOffset(file.handle()));
+      if (pages_.size() > kMostPages) file.fail("has more pages than any tilt series");
+    } while (TIFFReadDirectory(file.handle()) != 0);
+    header_.nx = format_.width;
+    header_.ny = format_.height;
+    header_.nz = std::ssize(pages_);
+  }
+
+  const MrcHeader& header() const override { return header_; }
+  std::string name() const override { return path_.string(); }
+
+  void read_section(std::int64_t section, std::span<float> out) const override {
+    TOMOFIELD_CHECK(
+        section >= 0 && section < header_.nz && std::ssize(out) == header_.nx * header_.ny,
+        "a section of the stack is read into as many values");
+    const TiffFile file(path_);
+    if (TIFFSetSubDirectory(file.handle(), pages_[static_cast<std::size_t>(section)]) == 0 ||
+        file.format(static_cast<std::size_t>(section)) != format_)
+      file.fail("has changed while it was read");
+    PageReader(file, format_, out).read();
+  }
+
+ private:
+  std::filesystem::path path_;
+  PageFormat format_;
+  std::vector<std::uint64_t> pages_;  // places of their directories in the file
+  MrcHeader header_;
+};
+
+}  // namespace
+
+bool is_tiff(const std::filesystem::path& path) {
+  const PositionedFile file(path, PositionedFile::Access::kRead);
+  std::array<char, 4> start{};
+  if (file.size() < std::ssize(start)) return false;
+  file.read_at(0, start.data(), start.size());
+  const std::string_view text(start.data(), start.size());
+  using namespace std::string_view_literals;
+  for (const std::string_view magic : {"II*\0"sv, "MM\0*"sv, "II+\0"sv, "MM\0+"sv})
+    if (text == magic) return true;
+  return false;
+}
+
+std::shared_ptr<const ImageStack> open_tiff_stack(const std::filesystem::path& path) {
+  return std::make_shared<TiffStack>(path);
+}
+
+}  // namespace tomofield::io

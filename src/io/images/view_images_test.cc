@@ -1,0 +1,87 @@
+#include "io/images/view_images.h"
+
+#include <gtest/gtest.h>
+
+#include "expect_parts.h"
+#include "io/images/mrc.h"
+#include "pixel_stack.h"
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+using testing::expect_parts;
+using testing::message_of;
+using testing::ScratchDirectory;
+using testing::write_stack;
+
+// Writes a stack whose pixels are 100 times the section plus `base`.
+std::filesystem::path stack(const std::filesystem::path& path, std::int64_t num_sections,
+                            float base, std::int64_t width = 4) {
+  std::filesystem::create_directories(path.parent_path());
+  return write_stack(path, width, 3, num_sections,
+                     [=](std::int64_t, std::int64_t, std::int64_t section) {
+                       return base + 100.0f * static_cast<float>(section);
+                     });
+}
+
+TEST(ViewImages, HaveTheNamesOfRelion) {
+  EXPECT_EQ(parse_image_name("d/a.mrc").file, "d/a.mrc");
+  EXPECT_EQ(parse_image_name("d/a.mrc").section, std::nullopt);
+  EXPECT_EQ(parse_image_name("000012@d/s.mrcs").file, "d/s.mrcs");
+  EXPECT_EQ(parse_image_name("000012@d/s.mrcs").section, 11);
+  for (const char* bad : {"0@s.mrc", "-1@s.mrc", "x@s.mrc", "@s.mrc"})
+    expect_parts(message_of<Error>([&] { parse_image_name(bad); }), {bad, "000001@"});
+}
+
+TEST(ViewImages, AreFoundFromTheProjectsFolder) {
+  const ScratchDirectory scratch;
+  stack(scratch / "Motion/a.mrc", 1, 1.0f);
+  std::filesystem::create_directories(scratch / "Tomograms/job009");
+  const auto list = scratch / "Tomograms/job009/TS.star";
+  EXPECT_EQ(find_listed_file("Motion/a.mrc", list), scratch / "Motion/a.mrc");
+  expect_parts(message_of<Error>([&] { find_listed_file("Motion/b.mrc", list); }),
+               {"TS.star", "Motion/b.mrc", "project's folder"});
+}
+
+TEST(ViewImages, MayBeSectionsOfAStack) {
+  const ScratchDirectory scratch;
+  stack(scratch / "s.mrc", 3, 2.0f);
+  const std::string head =
+      "data_t\nloop_\n_rlnMicrographName #1\n_rlnTomoYTilt #2\n_rlnTomoZRot #3\n"
+      "_rlnTomoXShiftAngst #4\n_rlnTomoYShiftAngst #5\n";
+  const auto images =
+      open_image_stack(scratch.write("t.star", head + "3@s.mrc 0 0 0 0\n1@s.mrc 3 0 0 0\n"));
+  EXPECT_EQ(images->header().nz, 2);
+  std::vector<float> image(12);
+  images->read_section(0, image);
+  EXPECT_EQ(image[0], 202.0f);
+  // A table that names itself would never end.
+  expect_parts(message_of<Error>([&] {
+                 open_image_stack(scratch.write("self.star", head + "self.star 0 0 0 0\n"));
+               }),
+               {"self.star", "row 1", "no file of images"});
+}
+
+TEST(ViewImages, OfWarpAreTheAveragesBesideTheMovies) {
+  const ScratchDirectory scratch;
+  stack(scratch / "frames/average/a.mrc", 1, 1.0f);
+  stack(scratch / "frames/average/even/a.mrc", 1, 2.0f);
+  std::filesystem::create_directories(scratch / "tomostar");
+  const auto tomostar =
+      scratch.write("tomostar/a.tomostar",
+                    "data_\nloop_\n_wrpMovieName #1\n_wrpAngleTilt #2\n../frames/a.eer 3\n");
+  const auto first_pixel = [&](const std::string& frames) {
+    std::vector<float> image(12);
+    open_image_stack(frames + tomostar.string())->read_section(0, image);
+    return image[0];
+  };
+  EXPECT_EQ(first_pixel(""), 1.0f);
+  EXPECT_EQ(first_pixel("even@"), 2.0f);
+  expect_parts(message_of<Error>([&] { first_pixel("odd@"); }),
+               {"a.tomostar", "row 1", "average/odd/a.mrc", "--out_average_halves"});
+}
+
+}  // namespace
+}  // namespace tomofield::io

@@ -1,0 +1,190 @@
+#include "io/saving/output_set.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <set>
+#include <utility>
+
+#include "base/check.h"
+#include "base/log.h"
+#include "io/saving/output_target.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace fs = std::filesystem;
+namespace {
+
+std::atomic<OutputSet*> g_active{nullptr};
+
+[[noreturn]] void throw_cannot_replace(const fs::path& target) {
+  const int error = errno;
+  throw Error(fmt::format("cannot replace '{}': {}", target.string(), std::strerror(error)));
+}
+
+bool rename_file(const fs::path& from, const fs::path& to) {
+  return std::rename(from.c_str(), to.c_str()) == 0;
+}
+
+// Flushes a folder, so that a power cut does not undo a rename. Some file systems cannot do that;
+// then the rename alone must suffice.
+void flush_folder(const fs::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool is_flushed = descriptor >= 0 && ::fsync(descriptor) == 0;
+  const int error = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!is_flushed && error != EINVAL && error != ENOTSUP && error != EACCES)
+    base::log_warning(fmt::format("the folder '{}' cannot be flushed to the disk: {}",
+                                  folder.string(), std::strerror(error)));
+}
+
+}  // namespace
+
+// A file or a folder that got its name, or a file that was removed, and what had the name before.
+struct OutputSet::Change {
+  fs::path target;
+  fs::path old;  // empty: there was none
+  bool is_removal = false;
+  bool is_folder = false;
+
+  // Keeps the file that is there under another name: as a second name where the file system has
+  // that, so that the first is never missing.
+  static Change begin(const fs::path& target, bool is_removal) {
+    Change change{target, {}, is_removal, false};
+    std::error_code absent;
+    const fs::file_status status = fs::symlink_status(target, absent);
+    if (!fs::exists(status)) return change;
+    errno = EISDIR;
+    if (fs::is_directory(status)) throw_cannot_replace(target);
+    change.old = unused_temporary_name(target);
+    const bool has_second_name = !is_removal && ::link(target.c_str(), change.old.c_str()) == 0;
+    if (!has_second_name && !rename_file(target, change.old)) throw_cannot_replace(target);
+    return change;
+  }
+
+  // Keeps the folder that is there under another name.
+  static Change begin_folder(const fs::path& target) {
+    Change change{target, {}, false, true};
+    std::error_code absent;
+    if (!fs::exists(fs::symlink_status(target, absent))) return change;
+    change.old = unused_temporary_name(target);
+    if (!rename_file(target, change.old)) throw_cannot_replace(target);
+    return change;
+  }
+
+  // Removes what was replaced.
+  void forget_old() const {
+    std::error_code ignored;
+    if (is_folder && !old.empty()) fs::remove_all(old, ignored);
+    if (!is_folder && !old.empty()) ::unlink(old.c_str());
+  }
+
+  // Gives back the old file or folder. Returns false if that is not possible.
+  bool undo() const {
+    if (is_folder) {
+      std::error_code failed;
+      fs::remove_all(target, failed);
+      return !failed && (old.empty() || rename_file(old, target));
+    }
+    if (old.empty()) return is_removal || ::unlink(target.c_str()) == 0 || errno == ENOENT;
+    std::error_code absent;
+    if (fs::equivalent(old, target, absent)) return ::unlink(old.c_str()) == 0;
+    return rename_file(old, target);
+  }
+};
+
+OutputSet::OutputSet() {
+  OutputSet* none = nullptr;
+  is_active_ = g_active.compare_exchange_strong(none, this);
+  TOMOFIELD_CHECK(is_active_, "there is another set of results already");
+}
+
+OutputSet::~OutputSet() {
+  if (is_active_) g_active = nullptr;
+}
+
+OutputSet* OutputSet::active() { return g_active; }
+
+void OutputSet::add(AtomicFile file) {
+  const std::lock_guard guard(mutex_);
+  files_.push_back(std::move(file));
+}
+
+void OutputSet::add(AtomicFolder folder) {
+  const std::lock_guard guard(mutex_);
+  folders_.push_back(std::move(folder));
+}
+
+void OutputSet::remove_old(const fs::path& path) {
+  const std::lock_guard guard(mutex_);
+  to_remove_.push_back(path);
+}
+
+fs::path OutputSet::location_of(const fs::path& path) const {
+  const std::lock_guard guard(mutex_);
+  for (const AtomicFile& file : files_)
+    if (file.path() == path) return file.temporary_path();
+  return path;
+}
+
+void OutputSet::make_changes(std::vector<Change>& changes) const {
+  for (const fs::path& path : to_remove_) changes.push_back(Change::begin(path, true));
+  for (const AtomicFile& file : files_) {
+    changes.push_back(Change::begin(file.target_, false));
+    if (!rename_file(file.temporary_path_, file.target_)) throw_cannot_replace(file.path_);
+  }
+  for (const AtomicFolder& folder : folders_) {
+    changes.push_back(Change::begin_folder(folder.path_));
+    if (!rename_file(folder.temporary_path_, folder.path_)) throw_cannot_replace(folder.path_);
+  }
+}
+
+void OutputSet::commit() {
+  const std::lock_guard guard(mutex_);
+  std::vector<Change> changes;
+  try {
+    make_changes(changes);
+  } catch (const Error& error) {
+    std::string lost;
+    for (auto change = changes.rbegin(); change != changes.rend(); ++change) {
+      if (change->undo()) continue;
+      lost += change->old.empty()
+                  ? fmt::format("; '{}' is new, and cannot be removed", change->target.string())
+                  : fmt::format("; what was in '{}' is now in '{}'", change->target.string(),
+                                change->old.string());
+    }
+    throw Error(error.what() + lost);
+  }
+  std::set<fs::path> folders;
+  for (const Change& change : changes) folders.insert(folder_of(change.target));
+  for (const fs::path& folder : folders) flush_folder(folder);
+  for (const Change& change : changes) change.forget_old();
+  for (AtomicFile& file : files_) file.temporary_path_.clear();
+  for (AtomicFolder& folder : folders_) folder.temporary_path_.clear();
+  files_.clear();
+  folders_.clear();
+  to_remove_.clear();
+}
+
+bool OutputSet::commit_only(const fs::path& path) {
+  bool is_in_set = false;
+  {
+    const std::lock_guard guard(mutex_);
+    std::vector<AtomicFile> kept;
+    for (AtomicFile& file : files_)
+      if (file.path() == path) kept.push_back(std::move(file));
+    is_in_set = !kept.empty();
+    files_.swap(kept);
+    folders_.clear();
+    to_remove_.clear();
+  }
+  if (is_in_set) commit();
+  return is_in_set;
+}
+
+}  // namespace tomofield::io

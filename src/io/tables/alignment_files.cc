@@ -1,0 +1,109 @@
+#include "io/tables/alignment_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "io/tables/text_lines.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+[[noreturn]] void throw_line_error(const std::filesystem::path& path, const TextLine& line,
+                                   std::string_view expected) {
+  throw Error(fmt::format("'{}', line {}: '{}' is not {}", path.string(), line.number,
+                          quote(line.text), expected));
+}
+
+// Tells whether a matrix is invertible and stretches no direction by less than 1 / kLargestStretch
+// or more than kLargestStretch. `determinant` is positive or, with a mirror, negative.
+bool is_plausible_matrix(const ImodTransform& t) {
+  constexpr double kLargestStretch = 100.0;
+  const double determinant = std::fabs(t.a11 * t.a22 - t.a12 * t.a21);
+  const double squares = t.a11 * t.a11 + t.a12 * t.a12 + t.a21 * t.a21 + t.a22 * t.a22;
+  // The singular values: their squares have the sum `squares` and the product determinant².
+  const double difference =
+      std::sqrt(std::max(squares * squares - 4 * determinant * determinant, 0.0));
+  const double largest = std::sqrt((squares + difference) / 2);
+  return determinant > 0 && largest <= kLargestStretch && determinant >= largest / kLargestStretch;
+}
+
+}  // namespace
+
+std::vector<NumberLine> read_number_column(const std::filesystem::path& path,
+                                           std::string_view quantity) {
+  std::vector<NumberLine> numbers;
+  for (const TextLine& line : read_text_lines(path)) {
+    const auto words = split_words(line.text);
+    if (words.size() > 1) {
+      throw_line_error(path, line,
+                       fmt::format("one number: the file must have one column ({}); with several, "
+                                   "keep the right one alone",
+                                   quantity));
+    }
+    const auto value = parse_number(words.front(), base::kLargestAngle_deg);
+    if (!value) {
+      throw_line_error(path, line, fmt::format("{} from -360 to 360", quantity));
+    }
+    numbers.push_back({*value, line.number});
+  }
+  return numbers;
+}
+
+std::vector<ImodTransform> read_imod_transforms(const std::filesystem::path& path) {
+  std::vector<ImodTransform> transforms;
+  for (const TextLine& line : read_text_lines(path)) {
+    const auto words = split_words(line.text);
+    std::array<double, 6> values{};
+    bool is_valid = words.size() == values.size();
+    for (std::size_t i = 0; is_valid && i < values.size(); ++i) {
+      const auto value = parse_number(words[i], base::kLargestPosition_px);
+      is_valid = value.has_value();
+      values[i] = value.value_or(0.0);
+    }
+    if (!is_valid)
+      throw_line_error(path, line, "a transform of six numbers: A11 A12 A21 A22 DX DY");
+    const auto [a11, a12, a21, a22, dx, dy] = values;
+    transforms.push_back({a11, a12, a21, a22, dx, dy});
+    if (!is_plausible_matrix(transforms.back())) {
+      throw_line_error(path, line,
+                       "an alignment: A11 A12 A21 A22 must keep every direction, and stretch none "
+                       "by less than 0.01 or more than 100");
+    }
+  }
+  return transforms;
+}
+
+std::vector<std::int64_t> parse_section_list(std::string_view text, std::int64_t num_sections) {
+  std::vector<std::int64_t> sections;
+  std::string_view rest = trim(text);
+  while (!rest.empty()) {
+    const std::size_t comma = std::min(rest.find(','), rest.size());
+    const std::string_view item = trim(rest.substr(0, comma));
+    const std::size_t dash = item.find('-');
+    const auto first = parse_integer(trim(item.substr(0, dash)));
+    const auto last =
+        dash == std::string_view::npos ? first : parse_integer(trim(item.substr(dash + 1)));
+    if (!first || !last || *first > *last) {
+      throw Error(fmt::format(
+          "'{}' in the list of sections '{}' is neither a number nor a range such as 1-3",
+          quote(item), quote(text)));
+    }
+    if (*first < 1 || *last > num_sections) {
+      throw Error(
+          fmt::format("the list of sections '{}' asks for {}, but the stack has sections 1 "
+                      "to {}",
+                      quote(text), quote(item), num_sections));
+    }
+    for (auto section = *first; section <= *last; ++section) sections.push_back(section - 1);
+    rest.remove_prefix(std::min(comma + 1, rest.size()));
+  }
+  std::sort(sections.begin(), sections.end());
+  sections.erase(std::unique(sections.begin(), sections.end()), sections.end());
+  return sections;
+}
+
+}  // namespace tomofield::io

@@ -1,0 +1,299 @@
+#include "io/tables/alignment_files.h"
+
+#include <gtest/gtest.h>
+
+#include "expect_parts.h"
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+using testing::expect_parts;
+using testing::message_of;
+using testing::ScratchDirectory;
+using Sections = std::vector<std::int64_t>;
+
+TEST(NumberColumn, ReadsAnglesWithTheirLines) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.tlt", "  -60.5\r\n+3 \n\n1e1\n");
+  const auto numbers = read_number_column(path, "an angle");
+  ASSERT_EQ(numbers.size(), 3u);
+  EXPECT_EQ(numbers[0].value, -60.5);
+  EXPECT_EQ(numbers[1].value, 3.0);
+  EXPECT_EQ(numbers[2].value, 10.0);
+  EXPECT_EQ(numbers[2].line, 4);
+}
+
+TEST(NumberColumn, NamesFileLineAndText) {
+  const ScratchDirectory scratch;
+  for (const std::string bad : {"abc", "1.5x", "nan", "inf", "1,5", "--3", "1e999", "361", "1 2"}) {
+    const auto path = scratch.write("a.tlt", "1\n" + bad + "\n");
+    expect_parts(message_of<Error>([&] { read_number_column(path, "an angle"); }),
+                 {"a.tlt", "line 2", bad, "an angle"});
+  }
+  EXPECT_THROW(read_number_column(scratch / "absent.tlt", "an angle"), Error);
+  EXPECT_THROW(read_number_column(scratch.write("b.tlt", std::string(2000, '\0')), "an angle"),
+               Error);
+}
+
+TEST(NumberColumn, QuotesLongLinesInPart) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.tlt", std::string(1 << 20, 'x'));
+  const auto said = message_of<Error>([&] { read_number_column(path, "an angle"); });
+  EXPECT_LT(said.size(), 400u);
+  expect_parts(said, {"a.tlt", "line 1", "xxx"});
+}
+
+TEST(NumberColumn, RefusesFilesThatAreTooLarge) {
+  const ScratchDirectory scratch;
+  const auto read = [&](const std::string& text) {
+    const auto path = scratch.write("a.tlt", text);
+    return message_of<Error>([&] { read_number_column(path, "an angle"); });
+  };
+  std::string lines;
+  for (int i = 0; i < (1 << 20) + 1; ++i) lines += "1\n";
+  expect_parts(read(lines), {"a.tlt", "lines"});
+  expect_parts(read(std::string((16 << 20) + 1, '\n')), {"a.tlt", "16777217", "16 MiB"});
+}
+
+TEST(ImodTransforms, ReadsSixNumbersALine) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.xf", "   0.9 0.1 -0.1 0.9   12.5  -3\n1 0 0 1 0 0\n");
+  const auto transforms = read_imod_transforms(path);
+  ASSERT_EQ(transforms.size(), 2u);
+  EXPECT_EQ(transforms[0].a12, 0.1);
+  EXPECT_EQ(transforms[0].a21, -0.1);
+  EXPECT_EQ(transforms[0].shift_x_px, 12.5);
+  EXPECT_EQ(transforms[0].shift_y_px, -3.0);
+}
+
+TEST(ImodTransforms, ReadsMirrorsAndChangesOfScale) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.xf", "-1 0 0 1 0 0\n4 0 0 4 0 0\n0.25 0 0 0.3 9999 0\n");
+  EXPECT_EQ(read_imod_transforms(path).size(), 3u);
+}
+
+TEST(ImodTransforms, RefusesMalformedLines) {
+  const ScratchDirectory scratch;
+  for (const std::string bad :
+       {"1 0 0 1 0", "1 0 0 1 0 0 0", "1 0 0 1 0 nan", "1 2 2 4 0 0", "0 0 0 0 0 0",
+        "1e200 1e200 1e200 2e200 0 0", "1e-160 0 0 1e160 0 0", "1e9 0 0 1e9 0 0",
+        "1000 999.999 999.999 1000 0 0", "1e-3 0 0 1e-3 0 0", "1 0 0 1 1e300 0"}) {
+    const auto path = scratch.write("a.xf", "1 0 0 1 0 0\n" + bad + "\n");
+    expect_parts(message_of<Error>([&] { read_imod_transforms(path); }), {"a.xf", "line 2", bad});
+  }
+}
+
+TEST(Mdoc, ReadsSectionsInAnyOrder) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.mdoc", R"(PixelSpacing = 2.17
+ImageFile = a.st
+
+[T = SerialEM: Tilt axis angle = 85.9, binning = 1]
+
+[ZValue = 1]
+ExposureDose = 3
+TiltAngle = 3.001
+SomeNewKey = what=ever
+
+[ZValue = 0]
+TiltAngle = -0.002
+RotationAngle = 175.9
+)");
+  const Mdoc mdoc = read_mdoc(path);
+  EXPECT_EQ(mdoc.pixel_spacing_A, 2.17);
+  ASSERT_EQ(mdoc.sections.size(), 2u);
+  EXPECT_EQ(mdoc.sections[0].section, 0);
+  EXPECT_EQ(mdoc.sections[0].tilt_deg, -0.002);
+  EXPECT_EQ(mdoc.sections[1].tilt_deg, 3.001);
+  EXPECT_EQ(mdoc.sections[1].line, 8);
+}
+
+TEST(Mdoc, RefusesWhatContradictsItself) {
+  const ScratchDirectory scratch;
+  expect_parts(message_of<Error>(
+                   [&] { read_mdoc(scratch.write("a.mdoc", "[ZValue = 0]\nTiltAngle = up\n")); }),
+               {"a.mdoc", "line 2", "TiltAngle = up"});
+  expect_parts(message_of<Error>(
+                   [&] { read_mdoc(scratch.write("a.mdoc", "[ZValue = 0]\n[ZValue = 0]\n")); }),
+               {"a.mdoc", "line 2", "twice"});
+  for (const char* bad : {"[ZValue = first]\n", "[ZValue = 0]\nTiltAngle = nan\n",
+                          "[ZValue = 0]\nTiltAngle = 1e300\n", "PixelSpacing = inf\n[ZValue = 0]\n",
+                          "[ZValue = 9999999999999]\n"})
+    EXPECT_THROW(read_mdoc(scratch.write("a.mdoc", bad)), Error) << bad;
+}
+
+TEST(Mdoc, AxisComesFromTheTitleAndNeverFromRotationAngle) {
+  const ScratchDirectory scratch;
+  const auto axis = [&](const std::string& text) {
+    return read_mdoc(scratch.write("a.mdoc", text + "\n[ZValue = 0]\nRotationAngle = 175\n"))
+        .tilt_axis_deg;
+  };
+  const std::string title = "[T =     Tilt axis angle = -94.8, binning = 1  spot = 8  camera = 0]";
+  EXPECT_EQ(axis(title)->value, -94.8);
+  EXPECT_EQ(axis("TiltAxisAngle = 176.5\n" + title)->value, -94.8);
+  EXPECT_EQ(axis("TiltAxisAngle = 176.5\n" + title)->line, 2);
+  EXPECT_EQ(axis(title + "\nTiltAxisAngle = 176.5")->value, -94.8);
+  EXPECT_EQ(axis("TiltAxisAngle = 176.5")->value, 176.5);
+  EXPECT_EQ(axis("[T = SerialEM: Digitized on EMBL Krios]"), std::nullopt);
+  expect_parts(message_of<Error>([&] { axis("[T = Tilt axis angle = steep, binning = 1]"); }),
+               {"a.mdoc", "line 1", "steep"});
+}
+
+std::vector<std::size_t> order_of(const std::vector<std::string>& entries) {
+  const ScratchDirectory scratch;
+  std::string text;
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    text += "[ZValue = " + std::to_string(i) + "]\n" + entries[i] + "\n";
+  return acquisition_order(read_mdoc(scratch.write("a.mdoc", text)));
+}
+
+TEST(Mdoc, OrderIsByTimeElseByDoseElseByNumber) {
+  using Order = std::vector<std::size_t>;
+  EXPECT_EQ(order_of({"DateTime = 01-Mar-21  00:00:03\nPriorRecordDose = 0",
+                      "DateTime = 28-Feb-21  23:59:59\nPriorRecordDose = 6",
+                      "DateTime = 01-Mar-21  00:00:01\nPriorRecordDose = 3"}),
+            (Order{1, 2, 0}));
+  EXPECT_EQ(order_of({"DateTime = 2024-03-01 00:00:03", "DateTime = 2024-02-29 23:59:59"}),
+            (Order{1, 0}));
+  // One of the times is none, or two are the same.
+  EXPECT_EQ(order_of({"DateTime = 31-Feb-21 00:00:01\nPriorRecordDose = 3",
+                      "DateTime = 01-Feb-21 00:00:01\nPriorRecordDose = 0"}),
+            (Order{1, 0}));
+  EXPECT_EQ(order_of({"DateTime = 01-Feb-21 00:00:01\nPriorRecordDose = 3",
+                      "DateTime = 01-Feb-21 00:00:01\nPriorRecordDose = 0"}),
+            (Order{1, 0}));
+  EXPECT_EQ(order_of({"PriorRecordDose = 0", "PriorRecordDose = 0"}), (Order{0, 1}));
+  EXPECT_EQ(order_of({"PriorRecordDose = 5", ""}), (Order{0, 1}));
+}
+
+TEST(Mdoc, FilesAreNamedWithoutTheirFolders) {
+  const ScratchDirectory scratch;
+  const Mdoc mdoc = read_mdoc(scratch.write(
+      "a.mdoc",
+      "ImageFile = D:\\data\\a.st\n[ZValue = 0]\nSubFramePath = X:\\fr ames\\a_1.eer\n"
+      "[ZValue = 1]\nSubFramePath = /mnt/a_2.tif\n"));
+  EXPECT_EQ(mdoc.image_file, "a.st");
+  EXPECT_EQ(mdoc.sections[0].frame_name, "a_1.eer");
+  EXPECT_EQ(mdoc.sections[1].frame_name, "a_2.tif");
+}
+
+std::string aln_row(int section) {
+  return std::to_string(section) + " 85.5 1.0 3.5 -2.25 nan 1.0 1.0 0.0 " +
+         std::to_string(10 * section - 20) + "\n";
+}
+
+TEST(AreTomoAlignment, ReadsHeaderGlobalAndLocalRows) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("a.aln", R"(# AreTomo Alignment / Priims bprmMn
+# RawSize = 64 48 3
+# NumPatches = 1
+# DarkFrame =     0    1   -10.00
+# AlphaOffset =     1.50
+# BetaOffset =     0.25
+# Thickness = 1240
+# SEC     ROT         GMAG       TX          TY      SMEAN     SFIT    SCALE     BASE     TILT
+)" + aln_row(0) + aln_row(2) + "# Local Alignment\n0 0 1.0 2.0 0.1 0.2 1.0\n1 0 1 2 0 0 1\n");
+  const AreTomoAlignment alignment = read_aretomo_alignment(path);
+  EXPECT_EQ(*alignment.raw_size, (std::array<std::int64_t, 3>{64, 48, 3}));
+  EXPECT_EQ(alignment.dark_sections, Sections{1});
+  EXPECT_EQ(alignment.alpha_offset_deg, 1.5);
+  EXPECT_EQ(alignment.beta_offset_deg, 0.25);
+  EXPECT_EQ(alignment.dark_tilt_deg, std::vector<double>{-10});
+  EXPECT_EQ(alignment.thickness, 1240);
+  ASSERT_EQ(alignment.rows.size(), 2u);
+  EXPECT_EQ(alignment.rows[1].section, 2);
+  EXPECT_EQ(alignment.rows[1].rotation_deg, 85.5);
+  EXPECT_EQ(alignment.rows[1].shift_x_px, 3.5);
+  EXPECT_EQ(alignment.rows[1].shift_y_px, -2.25);
+  EXPECT_EQ(alignment.rows[1].tilt_deg, 0.0);
+  EXPECT_EQ(alignment.num_local_rows, 2);
+}
+
+TEST(AreTomoAlignment, RefusesMalformedRows) {
+  const ScratchDirectory scratch;
+  for (const std::string bad :
+       {"0 85 1 2 3 4 5 6 7", "x 85 1 0 0 0 0 0 0 10", "0 85 1 0 0 0 0 0 0 steep",
+        "-1 85 1 0 0 0 0 0 0 10", "0 1e300 1 0 0 0 0 0 0 10", "0 85 1 1e300 0 0 0 0 0 10",
+        "0 85 1 0 0 0 0 0 0 inf", "99999999999 85 1 0 0 0 0 0 0 10"}) {
+    const auto path = scratch.write("a.aln", aln_row(0) + bad + "\n");
+    expect_parts(message_of<Error>([&] { read_aretomo_alignment(path); }),
+                 {"a.aln", "line 2", bad});
+  }
+  EXPECT_THROW(read_aretomo_alignment(scratch.write("a.aln", "# RawSize = 1 2 3\n")), Error);
+  EXPECT_THROW(read_aretomo_alignment(scratch.write("a.aln", "# RawSize = 1 2\n" + aln_row(0))),
+               Error);
+  EXPECT_THROW(
+      read_aretomo_alignment(scratch.write("a.aln", "# RawSize = 1e30 2 3\n" + aln_row(0))), Error);
+}
+
+Sections assign(const Sections& rows, const Sections& dark, std::int64_t num_sections) {
+  AreTomoAlignment alignment;
+  alignment.dark_sections = dark;
+  for (const auto section : rows) {
+    alignment.rows.emplace_back();
+    alignment.rows.back().section = section;
+  }
+  return assign_aretomo_sections(alignment, "a.aln", num_sections, "a.st");
+}
+
+TEST(AreTomoSections, EveryWayOfCounting) {
+  EXPECT_EQ(assign({0, 1, 2}, {}, 3), (Sections{0, 1, 2}));
+  EXPECT_EQ(assign({1, 2, 3}, {}, 3), (Sections{0, 1, 2}));
+  EXPECT_EQ(assign({2, 0, 1}, {}, 3), (Sections{2, 0, 1}));   // sorted by tilt
+  EXPECT_EQ(assign({0, 2, 3}, {1}, 4), (Sections{0, 2, 3}));  // before removal
+  EXPECT_EQ(assign({2, 3, 4}, {1}, 4), (Sections{1, 2, 3}));  // before removal, from 1
+  EXPECT_EQ(assign({0, 1, 2}, {1}, 4), (Sections{0, 2, 3}));  // after removal
+  EXPECT_EQ(assign({1, 2, 3}, {2}, 4), (Sections{0, 2, 3}));  // after removal, from 1
+  EXPECT_EQ(assign({0, 2, 3}, {1}, 3), (Sections{0, 1, 2}));  // dark frames removed from the stack
+  EXPECT_EQ(assign({0, 1, 2}, {1}, 3), (Sections{0, 1, 2}));
+}
+
+// Assigns rows of these tilts, numbered from `first`, beside dark frames whose section is 0.
+Sections assign_by_tilt(const std::vector<double>& tilts, const std::vector<double>& dark,
+                        std::int64_t first, double alpha_deg = 0) {
+  AreTomoAlignment alignment;
+  alignment.alpha_offset_deg = alpha_deg;
+  alignment.dark_sections.assign(dark.size(), 0);
+  alignment.dark_tilt_deg = dark;
+  for (const double tilt_deg : tilts) {
+    alignment.rows.emplace_back();
+    alignment.rows.back().section = first + std::ssize(alignment.rows) - 1;
+    alignment.rows.back().tilt_deg = tilt_deg;
+  }
+  return assign_aretomo_sections(alignment, "a.aln", std::ssize(tilts) + std::ssize(dark), "a.st");
+}
+
+TEST(AreTomoSections, DarkFramesWithoutSectionsAreFoundByTilt) {
+  for (const std::int64_t first : {0, 1, 3}) {
+    EXPECT_EQ(assign_by_tilt({-20, 0, 20}, {-10, 30}, first), (Sections{0, 2, 3}));
+    EXPECT_EQ(assign_by_tilt({20, 0, -20}, {-10, 30}, first), (Sections{1, 2, 4}));
+    EXPECT_EQ(assign_by_tilt({-18, 2, 22}, {-10, 30}, first, 2), (Sections{0, 2, 3}));
+  }
+  // The offset decides, rows are in no order, or a tilt is there twice.
+  EXPECT_THROW(assign_by_tilt({-18, 2, 22}, {1}, 1, 2), Error);
+  EXPECT_THROW(assign_by_tilt({0, -20, 20}, {10}, 1), Error);
+  EXPECT_THROW(assign_by_tilt({-20, 0, 20}, {20}, 1), Error);
+}
+
+TEST(AreTomoSections, NeverAssumes) {
+  expect_parts(message_of<Error>([] {
+                 assign({0, 1, 2}, {3}, 7);
+               }),
+               {"3", "1 dark", "7", "a.aln", "a.st"});
+  EXPECT_THROW(assign({0, 2, 5}, {}, 3), Error);
+  EXPECT_THROW(assign({0, 1, 1}, {}, 3), Error);
+}
+
+TEST(SectionList, NumbersAndRanges) {
+  EXPECT_EQ(parse_section_list("1-3,40", 41), (Sections{0, 1, 2, 39}));
+  EXPECT_EQ(parse_section_list(" 4 , 2 - 3,3", 4), (Sections{1, 2, 3}));
+  EXPECT_TRUE(parse_section_list("", 4).empty());
+  for (const char* bad : {"0", "5", "3-2", "a", "1-", "-2", "1,,2", "2-9", "1.5"}) {
+    EXPECT_THROW(parse_section_list(bad, 4), Error) << bad;
+  }
+}
+
+}  // namespace
+}  // namespace tomofield::io

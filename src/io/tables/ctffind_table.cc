@@ -1,0 +1,111 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <string_view>
+
+#include "io/saving/atomic_file.h"
+#include "io/tables/ctf_table.h"
+#include "io/tables/text_lines.h"
+#include "tomofield/error.h"
+
+// CTFFIND's text (cisTEM, src/programs/ctffind/ctffind.cpp; version 5 adds columns 8 to 10) and
+// AreTomo3's (CSaveCtfResults.cpp, which adds the hand as column 8) have the same first columns:
+// number, defocus 1 and 2 in Å, the direction of defocus 1 in degrees, phase shift in radians.
+
+namespace tomofield::io {
+namespace {
+
+constexpr double kRadians = std::numbers::pi / 180.0;
+constexpr std::int64_t kMostSections = 100000;
+
+// Returns the number that follows a key of a comment, as in "acceleration voltage: 300.0 keV".
+std::optional<double> number_after(std::string_view text, std::string_view key) {
+  const std::size_t at = text.find(key);
+  if (at == std::string_view::npos) return std::nullopt;
+  const auto words = split_words(text.substr(at + key.size()));
+  return words.empty() ? std::nullopt : parse_number(words.front());
+}
+
+void read_comment(std::string_view text, StatedOptics& optics) {
+  const auto take = [&](std::string_view key, std::optional<double>& value) {
+    if (const auto number = number_after(text, key)) value = number;
+  };
+  take("acceleration voltage:", optics.voltage_kV);
+  take("spherical aberration:", optics.spherical_aberration_mm);
+  take("amplitude contrast:", optics.amplitude_contrast);
+}
+
+struct Row {
+  std::int64_t section = 0;  // from 0
+  Defocus defocus;
+};
+
+Row parse_row(const std::filesystem::path& path, const TextLine& line) {
+  constexpr std::array kLargest{double(kMostSections), kLargestDefocus_A, kLargestDefocus_A,
+                                base::kLargestAngle_deg, 10.0};
+  const auto words = split_words(line.text);
+  std::array<double, kLargest.size()> values{};
+  // The quality of the fit follows. It may be inf or nan and is not used.
+  bool is_valid = words.size() >= kLargest.size() + 2;
+  for (std::size_t i = 0; is_valid && i < values.size(); ++i) {
+    const auto value = parse_number(words[i], kLargest[i]);
+    is_valid = value.has_value();
+    values[i] = value.value_or(0.0);
+  }
+  const auto [number, u_A, v_A, angle_deg, phase_rad] = values;
+  if (!is_valid || number < 1 || number != std::floor(number)) {
+    throw Error(fmt::format(
+        "'{}', line {}: '{}' is not a row of CTFFIND or AreTomo: number of the micrograph, defocus "
+        "1 and 2 in Å, azimuth in degrees, phase shift in radians, correlation, resolution",
+        path.string(), line.number, quote(line.text)));
+  }
+  return {static_cast<std::int64_t>(number) - 1, {u_A, v_A, angle_deg, phase_rad / kRadians}};
+}
+
+}  // namespace
+
+CtfTable read_ctffind(const std::filesystem::path& path) {
+  CtfTable table{path, {}, {}, {}};
+  for (const TextLine& line : read_text_lines(path)) {
+    if (line.text.starts_with('#')) {
+      read_comment(line.text, table.optics);
+      continue;
+    }
+    const Row row = parse_row(path, line);
+    const auto section = static_cast<std::size_t>(row.section);
+    if (section >= table.views.size()) table.views.resize(section + 1);
+    if (table.views[section]) {
+      throw Error(fmt::format("'{}', line {}: micrograph {} comes twice", path.string(),
+                              line.number, section + 1));
+    }
+    table.views[section] = row.defocus;
+  }
+  return table;
+}
+
+void write_ctffind(const std::filesystem::path& path, std::span<const WrittenCtf> sections,
+                   const StatedOptics& optics, double pixel_size_A) {
+  std::string text = fmt::format(
+      "# Output from tomofield simulate, in the form of CTFFind version 4\n"
+      "# Number of micrographs: {}\n"
+      "# Pixel size: {:.3f} Angstroms ; acceleration voltage: {:.1f} keV ; spherical aberration: "
+      "{} mm ; amplitude contrast: {}\n"
+      "# Columns: #1 - micrograph number; #2 - defocus 1 [Angstroms]; #3 - defocus 2; #4 - azimuth "
+      "of astigmatism; #5 - additional phase shift [radians]; #6 - cross correlation; #7 - spacing "
+      "(in Angstroms) up to which CTF rings were fit successfully\n",
+      sections.size(), pixel_size_A, optics.voltage_kV.value(),
+      optics.spherical_aberration_mm.value(), optics.amplitude_contrast.value());
+  for (std::size_t i = 0; i < sections.size(); ++i) {
+    const Defocus& defocus = sections[i].defocus;
+    text += fmt::format("{}.000000 {:.6f} {:.6f} {:.6f} {:.6f} 1.000000 {:.6f}\n", i + 1,
+                        defocus.u_A, defocus.v_A, defocus.angle_deg,
+                        kRadians * defocus.phase_shift_deg, 2 * pixel_size_A);
+  }
+  write_text_file(path, text);
+}
+
+}  // namespace tomofield::io

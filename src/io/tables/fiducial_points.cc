@@ -1,0 +1,59 @@
+#include "io/tables/fiducial_points.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "io/tables/text_lines.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+constexpr std::size_t kMinColumns = 3, kMaxColumns = 5;
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const TextLine& line,
+                         const std::string& fault) {
+  throw Error(
+      fmt::format("'{}', line {}: '{}' {}; a line of a fiducial model is 'x y z', 'contour "
+                  "x y z' or 'object contour x y z', as model2point writes it",
+                  path.string(), line.number, quote(line.text), fault));
+}
+
+FiducialPoint parse_point(const std::filesystem::path& path, const TextLine& line,
+                          const std::vector<std::string_view>& words) {
+  std::vector<double> numbers;
+  for (const std::string_view word : words) {
+    const auto number = parse_number(word, base::kLargestPosition_px);
+    if (!number) {
+      refuse(path, line, fmt::format("has '{}', which is no position", quote(word)));
+    }
+    numbers.push_back(*number);
+  }
+  const std::size_t first = numbers.size() - 3;
+  return {numbers[first], numbers[first + 1], numbers[first + 2], line.number};
+}
+
+}  // namespace
+
+std::vector<FiducialPoint> read_fiducial_points(const std::filesystem::path& path) {
+  std::vector<FiducialPoint> points;
+  std::size_t num_columns = 0;
+  for (const TextLine& line : read_text_lines(path)) {
+    const auto words = split_words(line.text);
+    if (words.size() < kMinColumns || words.size() > kMaxColumns) {
+      refuse(path, line, fmt::format("has {} columns", words.size()));
+    }
+    if (num_columns != 0 && words.size() != num_columns) {
+      refuse(
+          path, line,
+          fmt::format("has {} columns where the lines before have {}", words.size(), num_columns));
+    }
+    num_columns = words.size();
+    points.push_back(parse_point(path, line, words));
+  }
+  if (points.empty()) throw Error(fmt::format("'{}' holds no fiducial points", path.string()));
+  return points;
+}
+
+}  // namespace tomofield::io

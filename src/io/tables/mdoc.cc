@@ -1,0 +1,205 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "io/tables/alignment_files.h"
+#include "io/tables/text_lines.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+struct KeyValue {
+  std::string_view key, value;
+};
+
+// Splits "key = value". Returns an empty key for lines of another form.
+KeyValue split_key_value(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string_view::npos) return {};
+  return {trim(text.substr(0, equals)), trim(text.substr(equals + 1))};
+}
+
+double require_number(const std::filesystem::path& path, const TextLine& line,
+                      std::string_view word, double largest) {
+  const auto value = parse_number(word, largest);
+  if (value) return *value;
+  throw Error(fmt::format("'{}', line {}: '{}' does not give a number from -{} to {}",
+                          path.string(), line.number, quote(line.text), largest, largest));
+}
+
+// Returns what a path, of Windows or of Unix, names in its folder.
+std::string without_folders(std::string_view path) {
+  return std::string(path.substr(path.find_last_of("/\\") + 1));
+}
+
+// Returns the angle of "[T = Tilt axis angle = 85.9, binning = 1 …]", and nothing for other
+// titles.
+std::optional<double> axis_of_title(const std::filesystem::path& path, const TextLine& line) {
+  constexpr std::string_view kKey = "ilt axis angle";
+  const std::string_view text = line.text;
+  const std::size_t key = text.find(kKey);
+  if (!text.starts_with("[T") || key == std::string_view::npos) return std::nullopt;
+  const std::size_t equals = text.find('=', key);
+  if (equals == std::string_view::npos) return std::nullopt;
+  const std::string_view value = trim(text.substr(equals + 1));
+  return require_number(path, line, value.substr(0, value.find_first_of(" ,]\t")),
+                        base::kLargestAngle_deg);
+}
+
+// Returns n of "[ZValue = n]", and nothing for other heads such as "[T = …]" and
+// "[MontSection = …]".
+std::optional<std::int64_t> parse_section_head(const std::filesystem::path& path,
+                                               const TextLine& line) {
+  const std::string_view inside = std::string_view(line.text).substr(1, line.text.find(']') - 1);
+  const KeyValue head = split_key_value(inside);
+  if (head.key != "ZValue") return std::nullopt;
+  const auto section = parse_integer(head.value);
+  if (section && *section >= 0) return *section;
+  throw Error(fmt::format("'{}', line {}: '{}' does not give a section number", path.string(),
+                          line.number, quote(line.text)));
+}
+
+void sort_and_require_unique(const std::filesystem::path& path, Mdoc* mdoc) {
+  auto& sections = mdoc->sections;
+  std::stable_sort(
+      sections.begin(), sections.end(),
+      [](const MdocSection& a, const MdocSection& b) { return a.section < b.section; });
+  for (std::size_t i = 1; i < sections.size(); ++i) {
+    if (sections[i].section == sections[i - 1].section) {
+      throw Error(fmt::format("'{}', line {}: section [ZValue = {}] comes twice", path.string(),
+                              sections[i].line, sections[i].section));
+    }
+  }
+}
+
+// Returns the number of a month's name, or 0.
+std::int64_t month_named(std::string_view name) {
+  constexpr std::string_view kMonths = "JanFebMarAprMayJunJulAugSepOctNovDec";
+  const std::size_t at = name.size() == 3 ? kMonths.find(name) : std::string_view::npos;
+  return at == std::string_view::npos || at % 3 != 0 ? 0 : static_cast<std::int64_t>(at / 3 + 1);
+}
+
+// Splits "12:30:05" or "2021-03-12" into three parts; they are empty if there are not three.
+std::array<std::string_view, 3> three_parts(std::string_view text, char separator) {
+  const std::size_t first = text.find(separator);
+  const std::size_t second =
+      first == std::string_view::npos ? first : text.find(separator, first + 1);
+  if (second == std::string_view::npos) return {};
+  return {text.substr(0, first), text.substr(first + 1, second - first - 1),
+          text.substr(second + 1)};
+}
+
+// Reads "12-Mar-21  15:31:02", "12-Mar-2021 15:31:02" or "2021-03-12 15:31:02". Returns nothing
+// for another form.
+std::optional<std::int64_t> parse_time(std::string_view text) {
+  const auto words = split_words(text);
+  if (words.size() != 2) return std::nullopt;
+  auto date = three_parts(words[0], '-');
+  if (date[0].size() == 4) std::swap(date[0], date[2]);
+  const std::int64_t named = month_named(date[1]);
+  const auto day = parse_integer(date[0]), year = parse_integer(date[2]);
+  const auto month = named > 0 ? std::optional(named) : parse_integer(date[1]);
+  std::int64_t seconds = 0;
+  for (const std::string_view part : three_parts(words[1], ':')) {
+    const auto number = parse_integer(part);
+    if (!number || *number < 0 || *number > 60) return std::nullopt;
+    seconds = 60 * seconds + *number;
+  }
+  const auto is_small = [](std::int64_t number) { return number >= 0 && number <= 9999; };
+  if (!day || !month || !year || !is_small(*day) || !is_small(*month) || !is_small(*year))
+    return std::nullopt;
+  const std::chrono::year_month_day on_day{std::chrono::year(static_cast<int>(*year)),
+                                           std::chrono::month(static_cast<unsigned>(*month)),
+                                           std::chrono::day(static_cast<unsigned>(*day))};
+  if (!on_day.ok()) return std::nullopt;
+  const std::chrono::seconds midnight = std::chrono::sys_days(on_day).time_since_epoch();
+  return midnight.count() + seconds;
+}
+
+// Sets what an entry of a section says.
+void read_section_entry(const std::filesystem::path& path, const TextLine& line,
+                        const KeyValue& entry, MdocSection* section) {
+  if (entry.key == "TiltAngle") {
+    section->tilt_deg = require_number(path, line, entry.value, base::kLargestAngle_deg);
+    section->line = line.number;
+  } else if (entry.key == "PriorRecordDose") {
+    section->prior_dose = parse_number(entry.value);
+  } else if (entry.key == "ExposureDose") {
+    section->dose = parse_number(entry.value);
+  } else if (entry.key == "DateTime") {
+    section->time_s = parse_time(entry.value);
+  } else if (entry.key == "SubFramePath") {
+    section->frame_name = without_folders(entry.value);
+  }
+}
+
+// Returns the order of sections by a key, if all have it and no two are equal.
+template <typename Key>
+std::optional<std::vector<std::size_t>> order_by(const std::vector<MdocSection>& sections,
+                                                 std::optional<Key> MdocSection::*key) {
+  std::vector<std::size_t> order(sections.size());
+  std::iota(order.begin(), order.end(), 0);
+  if (!std::ranges::all_of(sections, [&](const MdocSection& s) { return (s.*key).has_value(); }))
+    return std::nullopt;
+  const auto value = [&](std::size_t i) { return *(sections[i].*key); };
+  std::ranges::sort(order, {}, value);
+  const bool is_unique = std::ranges::adjacent_find(order, {}, value) == order.end();
+  return is_unique ? std::optional(order) : std::nullopt;
+}
+
+}  // namespace
+
+Mdoc read_mdoc(const std::filesystem::path& path) {
+  Mdoc mdoc;
+  bool is_in_section = false;
+  for (const TextLine& line : read_text_lines(path)) {
+    if (line.text.starts_with('[')) {
+      const auto section = parse_section_head(path, line);
+      // Titles "[T = …]" stand anywhere. They do not end a section.
+      if (section) {
+        mdoc.sections.emplace_back();
+        mdoc.sections.back().section = *section;
+        mdoc.sections.back().line = line.number;
+      }
+      if (const auto axis_deg = axis_of_title(path, line))
+        mdoc.tilt_axis_deg = AxisAngle{*axis_deg, line.number};
+      is_in_section = is_in_section || section.has_value();
+      continue;
+    }
+    const KeyValue entry = split_key_value(line.text);
+    if (entry.key == "PixelSpacing") {
+      const double spacing_A = require_number(path, line, entry.value, base::kLargestNumber);
+      if (!mdoc.pixel_spacing_A) mdoc.pixel_spacing_A = spacing_A;
+      if (is_in_section) mdoc.sections.back().pixel_spacing_A = spacing_A;
+    } else if (entry.key == "TiltAxisAngle") {
+      const double axis_deg = require_number(path, line, entry.value, base::kLargestAngle_deg);
+      if (!mdoc.tilt_axis_deg) mdoc.tilt_axis_deg = AxisAngle{axis_deg, line.number};
+    } else if (is_in_section) {
+      read_section_entry(path, line, entry, &mdoc.sections.back());
+    } else if (entry.key == "ImageFile") {
+      mdoc.image_file = without_folders(entry.value);
+    }
+  }
+  if (mdoc.sections.empty()) {
+    throw Error(fmt::format("'{}' has no sections, [ZValue = 0] and so on: is it an .mdoc file?",
+                            path.string()));
+  }
+  sort_and_require_unique(path, &mdoc);
+  return mdoc;
+}
+
+std::vector<std::size_t> acquisition_order(const Mdoc& mdoc) {
+  if (auto by_time = order_by(mdoc.sections, &MdocSection::time_s)) return *by_time;
+  if (auto by_dose = order_by(mdoc.sections, &MdocSection::prior_dose)) return *by_dose;
+  std::vector<std::size_t> as_numbered(mdoc.sections.size());
+  std::iota(as_numbered.begin(), as_numbered.end(), 0);
+  return as_numbered;
+}
+
+}  // namespace tomofield::io

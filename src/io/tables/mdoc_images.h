@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "io/images/image_stack.h"
+
+namespace tomofield::io {
+
+/// Opens the images of the views of an .mdoc file, which lie in `folder` in a file each, as a stack
+/// in the order of its sections. An image is named after the movie that it is the average of
+/// (SubFramePath): "TS_01_003.mrc" or "TS_01_003_….mrc" (or .tif) for "D:\…\TS_01_003.eer". Throws
+/// Error for a section that names no movie, and if a movie has no image, or several.
+std::shared_ptr<const ImageStack> open_mdoc_images(const std::filesystem::path& mdoc,
+                                                   const std::filesystem::path& folder);
+
+}  // namespace tomofield::io

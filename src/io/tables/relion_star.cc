@@ -1,0 +1,157 @@
+#include "io/tables/relion_star.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "io/tables/ctf_table.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+constexpr double kLargestShift_A = base::kLargestPosition_px;
+constexpr double kLargestDose = 1e6;
+
+std::optional<std::array<std::int64_t, 3>> size_of(const StarRow& row) {
+  std::array<std::int64_t, 3> size{};
+  constexpr std::array kColumns{"rlnTomoSizeX", "rlnTomoSizeY", "rlnTomoSizeZ"};
+  for (std::size_t axis = 0; axis < size.size(); ++axis) {
+    const auto pixels = row.find_number(kColumns[axis], base::kLargestPosition_px);
+    if (!pixels || *pixels < 1) return std::nullopt;
+    size[axis] = static_cast<std::int64_t>(*pixels);
+  }
+  return size;
+}
+
+std::optional<Defocus> defocus_of(const StarRow& row) {
+  const auto u_A = row.find_number("rlnDefocusU", kLargestDefocus_A);
+  if (!u_A) return std::nullopt;
+  Defocus defocus;
+  defocus.u_A = *u_A;
+  defocus.v_A = row.find_number("rlnDefocusV", kLargestDefocus_A).value_or(*u_A);
+  defocus.angle_deg = row.find_number("rlnDefocusAngle", base::kLargestAngle_deg).value_or(0.0);
+  defocus.phase_shift_deg = row.find_number("rlnPhaseShift", base::kLargestAngle_deg).value_or(0.0);
+  return defocus;
+}
+
+// Returns what find(column) finds in the columns of the microscope.
+template <typename Find>
+StatedOptics optics_by(const Find& find) {
+  return {find("rlnVoltage"), find("rlnSphericalAberration"), find("rlnAmplitudeContrast")};
+}
+
+// Returns the number in the first row of whichever table has the column.
+std::optional<double> first_number(const std::filesystem::path& path,
+                                   const std::vector<StarTable>& tables, std::string_view column) {
+  const StarTable* const table = find_table(tables, column);
+  if (table == nullptr || table->num_rows() == 0) return std::nullopt;
+  return StarRow(path, *table, 0).find_number(column);
+}
+
+// Returns the table that lists views.
+const StarTable& rows_of_views(const std::filesystem::path& path,
+                               const std::vector<StarTable>& tables) {
+  const StarTable* const table = find_table(tables, "rlnMicrographName");
+  if (table != nullptr) return *table;
+  throw Error(fmt::format(
+      "'{}' has no column _rlnMicrographName, so it is no tilt series of RELION 5", path.string()));
+}
+
+StatedOptics optics_of(const std::filesystem::path& path, const std::vector<StarTable>& tables) {
+  return optics_by([&](const char* column) { return first_number(path, tables, column); });
+}
+
+ListedView view_of(const StarRow& row) {
+  ListedView view;
+  view.image = row.text("rlnMicrographName");
+  view.even = row.find_text("rlnMicrographNameEven").value_or("");
+  view.odd = row.find_text("rlnMicrographNameOdd").value_or("");
+  view.tilt_deg = row.number("rlnTomoYTilt", base::kLargestAngle_deg);
+  view.x_tilt_deg = row.find_number("rlnTomoXTilt", base::kLargestAngle_deg).value_or(0.0);
+  view.rotation_deg = row.number("rlnTomoZRot", base::kLargestAngle_deg);
+  view.shift_x_A = row.number("rlnTomoXShiftAngst", kLargestShift_A);
+  view.shift_y_A = row.number("rlnTomoYShiftAngst", kLargestShift_A);
+  view.dose_before = row.find_number("rlnMicrographPreExposure", kLargestDose);
+  view.defocus = defocus_of(row);
+  return view;
+}
+
+}  // namespace
+
+bool lists_tomograms(const std::filesystem::path& path) {
+  return find_table(read_star_file(path), "rlnTomoTiltSeriesStarFile") != nullptr;
+}
+
+RelionTomograms read_relion_tomograms(const std::filesystem::path& path) {
+  const std::vector<StarTable> tables = read_star_file(path);
+  const StarTable* const table = find_table(tables, "rlnTomoTiltSeriesStarFile");
+  if (table == nullptr) {
+    throw Error(
+        fmt::format("'{}' has no column _rlnTomoTiltSeriesStarFile, so it is no "
+                    "tomograms.star of RELION 5 (those of RELION 4 are not read)",
+                    path.string()));
+  }
+  RelionTomograms all{*table, {}};
+  for (std::size_t i = 0; i < table->num_rows(); ++i) {
+    const StarRow row(path, *table, i);
+    RelionTomogram tomogram;
+    tomogram.name = row.text("rlnTomoName");
+    tomogram.tilt_series_star = row.text("rlnTomoTiltSeriesStarFile");
+    tomogram.pixel_size_A = row.find_number("rlnTomoTiltSeriesPixelSize");
+    tomogram.hand = row.find_number("rlnTomoHand");
+    tomogram.optics = optics_by([&](const char* column) { return row.find_number(column); });
+    tomogram.size_px = size_of(row);
+    all.tomograms.push_back(std::move(tomogram));
+  }
+  if (all.tomograms.empty())
+    throw Error(fmt::format("'{}' lists no tomograms: its table is empty", path.string()));
+  return all;
+}
+
+StarTable read_relion_rows(const std::filesystem::path& path) {
+  return rows_of_views(path, read_star_file(path));
+}
+
+void set_relion_alignment(const ListedView& view, std::size_t row, StarTable& table) {
+  const auto set = [&](const char* column, double value) {
+    table.set(row, column, fmt::format("{:.6f}", value));
+  };
+  set("rlnTomoXTilt", view.x_tilt_deg);
+  set("rlnTomoYTilt", view.tilt_deg);
+  set("rlnTomoZRot", view.rotation_deg);
+  set("rlnTomoXShiftAngst", view.shift_x_A);
+  set("rlnTomoYShiftAngst", view.shift_y_A);
+}
+
+ViewTable read_relion_views(const std::filesystem::path& path) {
+  const std::vector<StarTable> tables = read_star_file(path);
+  const StarTable& table = rows_of_views(path, tables);
+  if (!table.has_column("rlnTomoYTilt")) {
+    throw Error(
+        fmt::format("'{}' has no column _rlnTomoYTilt, so the tilt series is not aligned "
+                    "yet: give the table that RELION's job 'Align tilt-series' wrote",
+                    path.string()));
+  }
+  ViewTable views{path, CentreRule::kWholePixel, false, {}, {}, {}, optics_of(path, tables)};
+  for (std::size_t i = 0; i < table.num_rows(); ++i)
+    views.views.push_back(view_of(StarRow(path, table, i)));
+  return views;
+}
+
+CtfTable read_relion_ctf(const std::filesystem::path& path) {
+  const std::vector<StarTable> tables = read_star_file(path);
+  const StarTable* const table = find_table(tables, "rlnDefocusU");
+  if (table == nullptr) {
+    throw Error(fmt::format(
+        "'{}' has no column _rlnDefocusU: give the table of a tilt series that RELION's "
+        "job 'CTF estimation' or a later one wrote",
+        path.string()));
+  }
+  CtfTable ctf{path, {}, optics_of(path, tables), {}};
+  for (std::size_t i = 0; i < table->num_rows(); ++i)
+    ctf.views.push_back(defocus_of(StarRow(path, *table, i)));
+  return ctf;
+}
+
+}  // namespace tomofield::io

@@ -1,0 +1,167 @@
+#include "io/tables/star_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <stdexcept>
+#include <utility>
+
+#include "base/check.h"
+#include "io/tables/star_parser.h"
+#include "io/tables/text_lines.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+bool stands_for_nothing(const std::string& value) {
+  return value.empty() || value == "None" || value == "none";
+}
+
+// Words that begin a part of a STAR file, in any case (Hall, J. Chem. Inf. Comput. Sci. 31, 326,
+// 1991).
+bool is_reserved(std::string_view value) {
+  std::string word(value);
+  std::ranges::transform(word, word.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return word.starts_with("data_") || word.starts_with("save_") || word == "loop_" ||
+         word == "stop_" || word == "global_";
+}
+
+std::string quoted_where_needed(const std::string& value) {
+  if (value.empty()) return "\"\"";
+  const bool has_lines = value.find_first_of("\r\n") != std::string::npos;
+  const auto needs_quotes = [](unsigned char c) {
+    return c <= ' ' || c > '~' || c == '"' || c == '\'' || c == '#';
+  };
+  const bool is_plain = std::ranges::none_of(value, needs_quotes) &&
+                        std::string_view("_$;[]").find(value.front()) == std::string_view::npos &&
+                        !is_reserved(value);
+  if (is_plain) return value;
+  for (const char quote : {'"', '\''})
+    if (!has_lines && value.find(quote) == std::string::npos) return quote + value + quote;
+  // A text field: it stands between lines that begin with a semicolon.
+  if (("\n" + value).find("\n;") != std::string::npos || value.find('\r') != std::string::npos)
+    throw Error(fmt::format("{} cannot be written into a STAR file", quote(value)));
+  return "\n;" + value + "\n;\n";
+}
+
+}  // namespace
+
+StarTable::StarTable(std::string name, std::vector<std::string> columns)
+    : name_(std::move(name)), columns_(std::move(columns)) {}
+
+std::optional<std::size_t> StarTable::index_of(std::string_view column) const {
+  const auto found = std::find(columns_.begin(), columns_.end(), column);
+  if (found == columns_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - columns_.begin());
+}
+
+std::optional<std::string> StarTable::find(std::size_t row, std::string_view column) const {
+  const auto index = index_of(column);
+  if (!index) return std::nullopt;
+  return cells_[row * columns_.size() + *index];
+}
+
+StarTable StarTable::only(const std::vector<std::size_t>& rows) const {
+  StarTable table(name_, columns_);
+  for (const std::size_t row : rows) {
+    const auto first = cells_.begin() + static_cast<std::ptrdiff_t>(row * columns_.size());
+    table.add_row({first, first + std::ssize(columns_)});
+  }
+  return table;
+}
+
+void StarTable::add_row(std::vector<std::string> cells) {
+  TOMOFIELD_CHECK(cells.size() == columns_.size(), "a row has one value a column");
+  std::move(cells.begin(), cells.end(), std::back_inserter(cells_));
+}
+
+void StarTable::set(std::size_t row, const std::string& column, std::string value) {
+  if (!has_column(column)) {
+    const std::size_t rows = num_rows(), width = columns_.size();
+    for (std::size_t i = rows; i-- > 0;)
+      cells_.insert(cells_.begin() + static_cast<std::ptrdiff_t>((i + 1) * width), "None");
+    columns_.push_back(column);
+  }
+  cells_[row * columns_.size() + *index_of(column)] = std::move(value);
+}
+
+void StarTable::remove(std::string_view column) {
+  const auto index = index_of(column);
+  if (!index) return;
+  const std::size_t width = columns_.size();
+  for (std::size_t row = num_rows(); row-- > 0;)
+    cells_.erase(cells_.begin() + static_cast<std::ptrdiff_t>(row * width + *index));
+  columns_.erase(columns_.begin() + static_cast<std::ptrdiff_t>(*index));
+}
+
+std::vector<StarTable> read_star_file(const std::filesystem::path& path) {
+  std::string text = read_text_file(path);
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
+  std::vector<StarTable> tables;
+  try {
+    for (ParsedTable& parsed : parse_star(text)) {
+      StarTable& table = tables.emplace_back(std::move(parsed.name), std::move(parsed.columns));
+      for (auto& row : parsed.rows) table.add_row(std::move(row));
+    }
+  } catch (const std::runtime_error& error) {
+    // gemmi writes "line:NUMBER:COLUMN: what"
+    throw Error(
+        fmt::format("'{}' is no STAR file, or a damaged one: {}", path.string(), error.what()));
+  }
+  return tables;
+}
+
+const StarTable* find_table(const std::vector<StarTable>& tables, std::string_view column) {
+  const auto found = std::find_if(tables.begin(), tables.end(),
+                                  [&](const StarTable& table) { return table.has_column(column); });
+  return found == tables.end() ? nullptr : &*found;
+}
+
+std::string star_file_text(const StarTable& table) {
+  std::string text = fmt::format("\n# version 50001\n\ndata_{}\n\nloop_\n", table.name());
+  int number = 0;
+  for (const std::string& column : table.columns())
+    text += fmt::format("_{} #{}\n", column, ++number);
+  for (std::size_t row = 0; row < table.num_rows(); ++row) {
+    for (const std::string& column : table.columns())
+      text += quoted_where_needed(*table.find(row, column)) + '\t';
+    text.back() = '\n';
+  }
+  return text;
+}
+
+std::string StarRow::where() const {
+  return fmt::format("'{}', table 'data_{}', row {}", path_.string(), table_.name(), row_ + 1);
+}
+
+std::optional<std::string> StarRow::find_text(std::string_view column) const {
+  const auto value = table_.find(row_, column);
+  return value && !stands_for_nothing(*value) ? value : std::nullopt;
+}
+
+std::string StarRow::text(std::string_view column) const {
+  if (const auto value = find_text(column)) return *value;
+  throw Error(table_.has_column(column) ? fmt::format("{}: _{} is empty", where(), column)
+                                        : fmt::format("'{}': the table 'data_{}' has no column _{}",
+                                                      path_.string(), table_.name(), column));
+}
+
+std::optional<double> StarRow::find_number(std::string_view column, double largest) const {
+  const auto value = find_text(column);
+  if (!value) return std::nullopt;
+  const auto number = parse_number(*value, largest);
+  if (number) return number;
+  throw Error(fmt::format("{}: '{}' in the column _{} is not a number from -{} to {}", where(),
+                          quote(*value), column, largest, largest));
+}
+
+double StarRow::number(std::string_view column, double largest) const {
+  text(column);  // refuses a column that is not there
+  return *find_number(column, largest);
+}
+
+}  // namespace tomofield::io

@@ -1,0 +1,210 @@
+#include "io/tables/view_table.h"
+
+#include <gtest/gtest.h>
+
+#include "expect_parts.h"
+#include "io/tables/relion_star.h"
+#include "scratch_directory.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+namespace {
+
+using testing::expect_parts;
+using testing::message_of;
+using testing::ScratchDirectory;
+
+std::string refusal_of_views(const std::filesystem::path& path) {
+  return message_of<Error>([&] { read_view_table(path); });
+}
+
+const std::string kRelionHead =
+    "\n# version 50001\n\ndata_TS_01\n\nloop_\n_rlnMicrographName #1\n_rlnMicrographNameEven #2\n"
+    "_rlnTomoXTilt #3\n_rlnTomoYTilt #4\n_rlnTomoZRot #5\n_rlnTomoXShiftAngst #6\n"
+    "_rlnTomoYShiftAngst #7\n_rlnMicrographPreExposure #8\n_rlnDefocusU #9\n_rlnDefocusV #10\n"
+    "_rlnDefocusAngle #11\n_rlnPhaseShift #12\n";
+
+TEST(ViewTable, ReadsATiltSeriesOfRelion) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write(
+      "TS_01.star", kRelionHead +
+                        "M/a.mrc M/a_EVN.mrc 0.5 -60.25 85.3 -13.5 7 3 40000 39000 -45 90\n"
+                        "2@s.mrcs None 0.5 -57 85.3 0 0 0 40000 39000 -45 0\n");
+  const ViewTable table = read_view_table(path);
+  EXPECT_EQ(table.centre, CentreRule::kWholePixel);
+  ASSERT_EQ(table.views.size(), 2u);
+  const ListedView& view = table.views[0];
+  EXPECT_EQ(view.image, "M/a.mrc");
+  EXPECT_EQ(view.even, "M/a_EVN.mrc");
+  EXPECT_EQ(view.odd, "");
+  EXPECT_EQ(view.tilt_deg, -60.25);
+  EXPECT_EQ(view.x_tilt_deg, 0.5);
+  EXPECT_EQ(view.rotation_deg, 85.3);
+  EXPECT_EQ(view.shift_x_A, -13.5);
+  EXPECT_EQ(view.shift_y_A, 7.0);
+  EXPECT_EQ(view.dose_before, 3.0);
+  ASSERT_TRUE(view.defocus);
+  EXPECT_EQ(view.defocus->u_A, 40000.0);
+  EXPECT_EQ(view.defocus->v_A, 39000.0);
+  EXPECT_EQ(view.defocus->angle_deg, -45.0);
+  EXPECT_EQ(view.defocus->phase_shift_deg, 90.0);
+  EXPECT_EQ(table.views[1].even, "");
+}
+
+TEST(ViewTable, RefusesViewsOfRelionThatAreIncomplete) {
+  const ScratchDirectory scratch;
+  expect_parts(
+      refusal_of_views(scratch.write("a.star", "data_t\nloop_\n_rlnMicrographName #1\na.mrc\n")),
+      {"a.star", "rlnTomoYTilt", "not aligned"});
+  expect_parts(refusal_of_views(scratch.write("a.star", "data_t\nloop_\n_rlnX #1\n1\n")),
+               {"rlnMicrographName"});
+  expect_parts(
+      refusal_of_views(scratch.write("a.star", kRelionHead + "a.mrc None 0 400 0 0 0 0 0 0 0 0\n")),
+      {"row 1", "400", "rlnTomoYTilt"});
+  expect_parts(refusal_of_views(scratch.write("a.star", kRelionHead)), {"lists no views"});
+}
+
+TEST(RelionTomograms, AreReadWithTheirColumns) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write(
+      "tomograms.star",
+      "data_global\nloop_\n_rlnTomoName #1\n_rlnTomoTiltSeriesStarFile #2\n_rlnTomoHand #3\n"
+      "_rlnTomoTiltSeriesPixelSize #4\n_rlnTomoSizeX #5\n_rlnTomoSizeY #6\n_rlnTomoSizeZ #7\n"
+      "_rlnAmplitudeContrast #8\nTS_01 t/TS_01.star -1.0 2.39 4092 4000 1392 0.1\n"
+      "TS_02 t/TS_02.star -1.0 2.39 4092 4000 None 0.1\n");
+  EXPECT_TRUE(lists_tomograms(path));
+  const RelionTomograms all = read_relion_tomograms(path);
+  ASSERT_EQ(all.tomograms.size(), 2u);
+  EXPECT_EQ(all.tomograms[0].name, "TS_01");
+  EXPECT_EQ(all.tomograms[0].tilt_series_star, "t/TS_01.star");
+  EXPECT_EQ(all.tomograms[0].pixel_size_A, 2.39);
+  EXPECT_EQ(all.tomograms[0].hand, -1.0);
+  EXPECT_EQ(all.tomograms[0].optics.amplitude_contrast, 0.1);
+  EXPECT_EQ(all.tomograms[0].optics.voltage_kV, std::nullopt);
+  EXPECT_EQ(all.tomograms[0].size_px, (std::array<std::int64_t, 3>{4092, 4000, 1392}));
+  EXPECT_EQ(all.tomograms[1].size_px, std::nullopt);
+  EXPECT_EQ(all.table.columns().size(), 8u);
+  const auto views = scratch.write("TS_01.star", kRelionHead);
+  EXPECT_FALSE(lists_tomograms(views));
+  expect_parts(message_of<Error>([&] { read_relion_tomograms(views); }),
+               {"TS_01.star", "rlnTomoTiltSeriesStarFile"});
+}
+
+TEST(ViewTable, ReadsATomostarWithTheSignsOfWarp) {
+  const ScratchDirectory scratch;
+  const std::string head =
+      "\ndata_\n\nloop_\n_wrpMovieName #1\n_wrpAngleTilt #2\n_wrpAxisAngle #3\n_wrpDose #4\n";
+  const ViewTable table = read_view_table(scratch.write(
+      "a.tomostar", head + "_wrpAxisOffsetX #5\n_wrpAxisOffsetY #6\n"
+                           "  ../frames/a_031_-45.00.eer   45.01  83.94 116.1 3 -4\n"));
+  EXPECT_EQ(table.centre, CentreRule::kHalfSize);
+  ASSERT_EQ(table.views.size(), 1u);
+  EXPECT_EQ(table.views[0].image, "../frames/a_031_-45.00.eer");
+  EXPECT_EQ(table.views[0].tilt_deg, -45.01);
+  EXPECT_EQ(table.views[0].rotation_deg, 83.94);
+  EXPECT_EQ(table.views[0].shift_x_A, 3.0);
+  EXPECT_EQ(table.views[0].shift_y_A, -4.0);
+  EXPECT_EQ(table.views[0].dose_before, 116.1);
+  EXPECT_TRUE(table.not_applied.empty());
+  const auto without = read_view_table(scratch.write("b.tomostar", head + "a.eer 1 2 3\n"));
+  ASSERT_EQ(without.not_applied.size(), 1u);
+  expect_parts(without.not_applied[0], {"shifts"});
+}
+
+const std::string kSeriesXml =
+    "<TiltSeries LevelAngleX=\"0.5\" LevelAngleY=\"-1\" AreAnglesInverted=\"True\">\n"
+    "\t<Angles>-60\n-57.5</Angles>\n\t<Dose>3\n0</Dose>\n\t<UseTilt>True\nFalse</UseTilt>\n"
+    "\t<AxisAngle>-4.3\n-4.3</AxisAngle>\n\t<AxisOffsetX>271.8\n1</AxisOffsetX>\n"
+    "\t<AxisOffsetY>1.5\n2</AxisOffsetY>\n\t<MoviePath>../2/a.tif\n../2/b.tif</MoviePath>\n";
+
+std::string grid(const std::string& name, const std::string& shape, const std::string& nodes) {
+  return "<" + name + " " + shape + ">" + nodes + "</" + name + ">\n";
+}
+
+TEST(ViewTable, ReadsTheXmlOfWarp) {
+  const ScratchDirectory scratch;
+  const auto path = scratch.write("TS.xml", kSeriesXml + "</TiltSeries>");
+  const ViewTable table = read_view_table(path);
+  ASSERT_EQ(table.views.size(), 2u);
+  EXPECT_EQ(table.views[0].image, "../2/a.tif");
+  EXPECT_EQ(table.views[0].tilt_deg, 61.0);
+  EXPECT_EQ(table.views[0].x_tilt_deg, 0.5);
+  EXPECT_EQ(table.views[0].rotation_deg, -4.3);
+  EXPECT_EQ(table.views[0].shift_x_A, 271.8);
+  EXPECT_EQ(table.views[1].shift_y_A, 2.0);
+  EXPECT_EQ(table.views[0].dose_before, 3.0);
+  EXPECT_TRUE(table.views[0].is_used);
+  EXPECT_FALSE(table.views[1].is_used);
+  EXPECT_TRUE(table.not_applied.empty());
+  EXPECT_EQ(table.defocus_hand, 1);
+}
+
+TEST(ViewTable, KnowsTheHandOfTheDefocusOfWarp) {
+  const ScratchDirectory scratch;
+  const auto hand = [&](const std::string& attribute) {
+    return read_view_table(scratch.write("TS.xml", "<TiltSeries" + attribute +
+                                                       "><Angles>-60</Angles>\n<MoviePath>a.tif"
+                                                       "</MoviePath></TiltSeries>"))
+        .defocus_hand;
+  };
+  EXPECT_EQ(hand(" AreAnglesInverted=\"True\""), 1);
+  EXPECT_EQ(hand(" AreAnglesInverted=\"False\""), -1);
+  EXPECT_EQ(hand(""), std::nullopt);
+}
+
+TEST(ViewTable, ReadsXmlInUtf16) {
+  const ScratchDirectory scratch;
+  std::string utf16 = "\xFF\xFE";
+  for (const char c :
+       "<?xml version=\"1.0\" encoding=\"utf-16\"?>\n" + kSeriesXml + "</TiltSeries>")
+    utf16 += {c, '\0'};
+  EXPECT_EQ(read_view_table(scratch.write("TS.xml", utf16)).views[0].tilt_deg, 61.0);
+}
+
+TEST(ViewTable, SubtractsRigidMovementsOfWarpAndNamesOthers) {
+  const ScratchDirectory scratch;
+  const std::string rigid =
+      grid("GridMovementX", "Width=\"1\" Height=\"1\" Depth=\"2\"",
+           "<Node X=\"0\" Y=\"0\" Z=\"0\" Value=\"1\"/><Node X=\"0\" Y=\"0\" Z=\"1\" "
+           "Value=\"2\"/>") +
+      grid("GridMovementY", "Width=\"1\" Height=\"1\" Depth=\"1\"", "<Node Value=\"0.5\"/>");
+  const auto moved = read_view_table(scratch.write("a.xml", kSeriesXml + rigid + "</TiltSeries>"));
+  EXPECT_DOUBLE_EQ(moved.views[0].shift_x_A, 270.8);
+  EXPECT_DOUBLE_EQ(moved.views[1].shift_x_A, -1.0);
+  EXPECT_DOUBLE_EQ(moved.views[1].shift_y_A, 1.5);
+  const std::string local =
+      grid("GridMovementX", "Width=\"2\" Height=\"1\" Depth=\"1\"",
+           "<Node X=\"0\" Z=\"0\" Value=\"1\"/><Node X=\"1\" Z=\"0\" Value=\"2\"/>") +
+      grid("GridVolumeWarpZ", "Width=\"1\"", "<Node Value=\"3\"/>");
+  const auto left = read_view_table(scratch.write("b.xml", kSeriesXml + local + "</TiltSeries>"));
+  EXPECT_DOUBLE_EQ(left.views[0].shift_x_A, 271.8);
+  ASSERT_EQ(left.not_applied.size(), 2u);
+  expect_parts(left.not_applied[0], {"GridMovementX"});
+  expect_parts(left.not_applied[1], {"GridVolumeWarpZ"});
+}
+
+TEST(ViewTable, RefusesXmlThatIsNoSeries) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::string& text) {
+    return refusal_of_views(scratch.write("a.xml", text));
+  };
+  expect_parts(refusal("<TiltSeries><Angles>1"), {"a.xml", "no XML file"});
+  expect_parts(refusal("<Movie/>"), {"a.xml", "no tilt series"});
+  expect_parts(refusal(kSeriesXml + "<Angles>3</Angles></TiltSerie>"), {"a.xml"});
+  std::string bad = kSeriesXml + "</TiltSeries>";
+  bad.replace(bad.find("-57.5"), 5, "tilt");
+  expect_parts(refusal(bad), {"a.xml", "'tilt'", "Angles"});
+  bad = kSeriesXml + "</TiltSeries>";
+  bad.replace(bad.find("\n-4.3<"), 5, "");
+  expect_parts(refusal(bad), {"AxisAngle", "1", "2"});
+}
+
+TEST(ViewTable, CentresAreThoseOfThePrograms) {
+  EXPECT_EQ(distance_from_middle_px(CentreRule::kWholePixel, 8), 0.5);
+  EXPECT_EQ(distance_from_middle_px(CentreRule::kWholePixel, 9), 0.0);
+  EXPECT_EQ(distance_from_middle_px(CentreRule::kHalfSize, 8), 0.5);
+  EXPECT_EQ(distance_from_middle_px(CentreRule::kHalfSize, 9), 0.5);
+}
+
+}  // namespace
+}  // namespace tomofield::io

@@ -1,0 +1,37 @@
+#include <fmt/format.h>
+
+#include "io/tables/star_file.h"
+#include "io/tables/view_table.h"
+#include "tomofield/error.h"
+
+namespace tomofield::io {
+
+// Warp projects a point of the specimen by Rz(axis angle) Ry(−angle) and adds the offset
+// (WarpLib's TiltSeries.GetPositionInAllTilts with Matrix3.Euler). `ts_import` negates the angles
+// of the microscope, so that −wrpAngleTilt is the tilt angle as IMOD has it.
+ViewTable read_warp_tomostar(const std::filesystem::path& path) {
+  const std::vector<StarTable> tables = read_star_file(path);
+  if (tables.size() != 1) {
+    throw Error(fmt::format("'{}' has {} tables, but a .tomostar of Warp has one", path.string(),
+                            tables.size()));
+  }
+  ViewTable views{path, CentreRule::kHalfSize, true, {}, {}, {}};
+  for (std::size_t i = 0; i < tables.front().num_rows(); ++i) {
+    const StarRow row(path, tables.front(), i);
+    ListedView view;
+    view.image = row.text("wrpMovieName");
+    view.tilt_deg = -row.number("wrpAngleTilt", base::kLargestAngle_deg);
+    view.rotation_deg = row.find_number("wrpAxisAngle", base::kLargestAngle_deg).value_or(0.0);
+    view.shift_x_A = row.find_number("wrpAxisOffsetX", base::kLargestPosition_px).value_or(0.0);
+    view.shift_y_A = row.find_number("wrpAxisOffsetY", base::kLargestPosition_px).value_or(0.0);
+    view.dose_before = row.find_number("wrpDose");
+    views.views.push_back(std::move(view));
+  }
+  if (!tables.front().has_column("wrpAxisOffsetX"))
+    views.not_applied.emplace_back(
+        "it has no shifts, so the views are aligned only by angles; "
+        "the XML file of an aligned series has them");
+  return views;
+}
+
+}  // namespace tomofield::io
