@@ -61,6 +61,7 @@ void add_reconstruct_command(CLI::App& program, const distributed::Communicator&
   add_trace_option(command, arguments->trace);
   add_plan_option(command, arguments->plan);
   add_choice_option(command, arguments->choice);
+  add_groups(command, arguments->choices, {Group::kResearch});
   add_help_all(command);
   command.footer(
       "Example: tomofield reconstruct series.mrc --tlt series.tlt --xf series.xf --bin 4 \\\n"
