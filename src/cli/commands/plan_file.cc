@@ -11,6 +11,7 @@
 #include "io/json.h"
 #include "io/saving/output_files.h"
 #include "plan/plan.h"
+#include "reconstruct/run_files.h"
 
 namespace tomofield::cli {
 namespace {
@@ -32,6 +33,12 @@ std::size_t memory_of_one_thread(const tilt_series::TiltSeries& series,
 // it looks for its own.
 bool is_left_to_runs(const options::ReconstructOptions& options, bool is_open) {
   return is_open && !options.resolved.tune;
+}
+
+std::vector<std::string> texts_of(const std::vector<std::filesystem::path>& files) {
+  std::vector<std::string> texts;
+  for (const auto& file : files) texts.push_back(file.string());
+  return texts;
 }
 
 }  // namespace
@@ -80,7 +87,9 @@ void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries
                           {"core_seconds", seconds},
                           {"sample_steps", estimate.sample_steps},
                           {"result_bytes", estimate.result_bytes},
-                          {"disk_bytes", estimate.disk_bytes}});
+                          {"disk_bytes", estimate.disk_bytes},
+                          {"inputs", texts_of(io::input_files(options.files))},
+                          {"results", texts_of(reconstruction::result_files(options))}});
   });
 }
 

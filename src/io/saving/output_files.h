@@ -16,6 +16,9 @@ void add_input(const std::filesystem::path& file);
 void require_no_input_is_replaced(const std::vector<std::filesystem::path>& results,
                                   const std::vector<std::filesystem::path>& inputs);
 
+/// Throws Error if two results would be one file (file_identity.h).
+void require_distinct(const std::vector<std::filesystem::path>& results);
+
 /// Checks before any work that results can be written. Throws Error if two results would be one
 /// file, if one would replace one of the `inputs` or of add_input() (even if it may replace
 /// results), if one cannot be written at its place, or, unless `may_replace`, if one exists. In the
@@ -27,11 +30,14 @@ void check_output_files(const std::vector<std::filesystem::path>& results,
 /// Throws Error if the name of an MRC volume ends in the extension of another format.
 void require_volume_name(const std::filesystem::path& volume);
 
-/// Returns every file that a series is read from.
+/// Returns every file that a series is read from, and those of add_input().
 std::vector<std::filesystem::path> input_files(const SeriesFiles& files);
 
+/// Returns the pictures of slices whose names begin with `prefix` (report/slice.h).
+std::vector<std::filesystem::path> picture_files(const std::filesystem::path& prefix);
+
 /// Checks that the results of a series can be written (check_output_files()) and that none replaces
-/// a file that the series is read from. Pictures of slices (report/slice.h) are results too. Throws
+/// a file that the series is read from. picture_files() are results too. Throws
 /// Error, with `advice`, otherwise.
 void check_result_files(std::vector<std::filesystem::path> results,
                         const std::filesystem::path& picture_prefix, const SeriesFiles& input,
