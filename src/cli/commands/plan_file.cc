@@ -69,6 +69,8 @@ void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries
     const std::size_t of_one_thread = memory_of_one_thread(series, options, processes);
     if (!processes.is_root()) return;
     const plan::RunEstimate estimate = plan::estimate_run(series, options, plan);
+    std::vector<std::filesystem::path> inputs = io::input_files(options.files);
+    for (const auto& added : io::added_inputs()) inputs.push_back(added);
     const nlohmann::json seconds =
         estimate.core_seconds ? nlohmann::json(*estimate.core_seconds) : nlohmann::json(nullptr);
     io::write_json(file, {{"tomofield", TOMOFIELD_VERSION},
@@ -88,7 +90,7 @@ void write_plan(const std::filesystem::path& file, const tilt_series::TiltSeries
                           {"sample_steps", estimate.sample_steps},
                           {"result_bytes", estimate.result_bytes},
                           {"disk_bytes", estimate.disk_bytes},
-                          {"inputs", texts_of(io::input_files(options.files))},
+                          {"inputs", texts_of(inputs)},
                           {"results", texts_of(reconstruction::result_files(options))}});
   });
 }

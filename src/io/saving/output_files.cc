@@ -23,6 +23,8 @@ std::vector<fs::path>& other_inputs() {
 
 void add_input(const fs::path& file) { other_inputs().push_back(file); }
 
+const std::vector<fs::path>& added_inputs() { return other_inputs(); }
+
 void require_no_input_is_replaced(const std::vector<fs::path>& results,
                                   const std::vector<fs::path>& inputs) {
   std::map<FileIdentity, fs::path> read;
@@ -73,8 +75,7 @@ void require_volume_name(const std::filesystem::path& volume) {
 }
 
 std::vector<fs::path> input_files(const SeriesFiles& input) {
-  std::vector<fs::path> files = other_inputs();
-  files.push_back(input.stack);
+  std::vector<fs::path> files{input.stack};
   for (const auto& file : {input.tlt, input.xf, input.xtilt, input.aln, input.mdoc, input.fiducials,
                            input.mask, input.even, input.odd, input.ctf, input.mtf}) {
     if (file) files.push_back(*file);

@@ -12,6 +12,9 @@ namespace tomofield::io {
 /// an input of everything that the process writes from then on.
 void add_input(const std::filesystem::path& file);
 
+/// Returns the files of add_input().
+const std::vector<std::filesystem::path>& added_inputs();
+
 /// Throws Error if a result would replace one of the `inputs` or of add_input().
 void require_no_input_is_replaced(const std::vector<std::filesystem::path>& results,
                                   const std::vector<std::filesystem::path>& inputs);
@@ -30,7 +33,7 @@ void check_output_files(const std::vector<std::filesystem::path>& results,
 /// Throws Error if the name of an MRC volume ends in the extension of another format.
 void require_volume_name(const std::filesystem::path& volume);
 
-/// Returns every file that a series is read from, and those of add_input().
+/// Returns every file that a series is read from.
 std::vector<std::filesystem::path> input_files(const SeriesFiles& files);
 
 /// Returns the pictures of slices whose names begin with `prefix` (report/slice.h).
