@@ -84,7 +84,8 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
           base::run_child(plan_command(options, job, plan), log, options.stop_requested);
       if (options.stop_requested && options.stop_requested()) return list;
       if (result.exit_status != 0)
-        faults.add(fmt::format("{}: {}", series.source, base::reason_of_failure(log)));
+        faults.add(
+            fmt::format("{}: {}", series.source, base::reason_of_failure(result.exit_status, log)));
       else
         add_plan(read_plan(plan), job);
     }
