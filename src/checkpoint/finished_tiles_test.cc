@@ -31,9 +31,9 @@ json tile(int begin, int end) {
 class FinishedTilesTest : public ::testing::Test {
  protected:
   FinishedTilesTest() : model_(testing::uneven_model(FieldKind::kGrid)) {
-    options_.resolved.output = scratch_ / "run.mrc";
-    options_.resolved.resume = true;
-    options_.resolved.budget = "0.1dB";
+    options_.run.output = scratch_ / "run.mrc";
+    options_.run.resume = true;
+    options_.field.budget = "0.1dB";
     series_.roi = {0, 0, 64, 128};
     origin_.fingerprint = "the fingerprint";
     model_.coded =
@@ -46,7 +46,7 @@ class FinishedTilesTest : public ::testing::Test {
                                       .integers = {{"fingerprint", numbers_of("the fingerprint")},
                                                    {"budget", numbers_of("0.1dB")},
                                                    {"tiles", numbers_of(tiles.dump())}}};
-    output::save_coded(output::output_paths(options_.resolved.output).tiles, *model_.coded, model_,
+    output::save_coded(output::output_paths(options_.run.output).tiles, *model_.coded, model_,
                        &state);
     return {options_, series_, origin_};
   }

@@ -25,37 +25,29 @@ struct ReconstructArguments {
   std::optional<std::filesystem::path> trace, plan, choice;
 };
 
-void run(const ReconstructArguments& arguments, const distributed::Communicator& processes,
-         const std::vector<option_table::Setting>& origins) {
+void run(ReconstructArguments& arguments, const distributed::Communicator& processes,
+         const std::vector<Setting>& origins) {
+  option_table::note_settings(origins, arguments.choices);
   options::ReconstructOptions options =
       options::run_options(arguments.choices.files, arguments.choices.options);
-  options.origins = origins;
-  std::vector<io::OutputLock> locks;
   processes.run_collectively([&] {
-    locks = claim_run(options, arguments.dry_run || arguments.plan || !processes.is_root());
     check_answer_file(arguments.plan, "--plan", options);
     check_answer_file(arguments.choice, "--choice", options);
     check_trace_file(arguments.trace, reconstruction::result_files(options), options.files,
-                     options.resolved.overwrite);
+                     options.run.overwrite);
   });
-  if (arguments.plan) {
-    options.input.look_at_views = false;
-    return write_plan(*arguments.plan, tilt_series::TiltSeries(options.input, processes), options,
-                      processes);
-  }
-  options.input.keep_views = !arguments.dry_run;
+  if (arguments.plan) return write_plan(*arguments.plan, options, processes);
   run_traced(arguments.dry_run ? std::nullopt : arguments.trace, processes, [&] {
-    const tilt_series::TiltSeries series = open_series(options, arguments.dry_run, processes);
     if (arguments.choice && !arguments.dry_run)
-      return write_choice(*arguments.choice, series, options, processes);
-    run_reconstruction(series, options, arguments.dry_run, processes);
+      return write_choice(*arguments.choice, options, processes);
+    run_reconstruction(options, arguments.dry_run, processes);
   });
 }
 
 }  // namespace
 
 void add_reconstruct_command(CLI::App& program, const distributed::Communicator& processes,
-                             const std::vector<option_table::Setting>& origins) {
+                             const std::vector<Setting>& origins) {
   CLI::App& command = *program.add_subcommand(
       "reconstruct", "Reconstruct a tomogram and a model from a tilt series");
   auto arguments = std::make_shared<ReconstructArguments>();
