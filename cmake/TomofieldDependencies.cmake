@@ -10,7 +10,6 @@ find_path(GEMMI_INCLUDE_DIR gemmi/cif.hpp REQUIRED)  # headers alone, as is what
 find_path(PEGTL_INCLUDE_DIR tao/pegtl.hpp REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(TURBOJPEG REQUIRED IMPORTED_TARGET libturbojpeg)
-pkg_check_modules(HTTPLIB REQUIRED IMPORTED_TARGET cpp-httplib)
 find_package(kissfft REQUIRED COMPONENTS float SHARED)
 pkg_check_modules(LZMA REQUIRED IMPORTED_TARGET liblzma)
 find_package(fmt REQUIRED)
@@ -36,7 +35,6 @@ set(TOMOFIELD_tune_LIBRARIES $<BUILD_INTERFACE:Eigen3::Eigen>)
 set(TOMOFIELD_verdict_LIBRARIES $<BUILD_INTERFACE:Eigen3::Eigen>)
 set(TOMOFIELD_evaluate_LIBRARIES kissfft::kissfft-float)
 set(TOMOFIELD_baseline_LIBRARIES kissfft::kissfft-float)
-set(TOMOFIELD_view_LIBRARIES PkgConfig::HTTPLIB)
 set(TOMOFIELD_cli_LIBRARIES CLI11::CLI11 tomlplusplus::tomlplusplus)
 
 set(TOMOFIELD_UNUSED_PACKAGES)  # of packages.txt, for the bill of materials

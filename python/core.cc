@@ -24,6 +24,7 @@
 
 #include "option_table/rows.h"
 #include "options.h"
+#include "unlocked.h"
 
 namespace tomofield::python {
 namespace {
@@ -92,6 +93,7 @@ class Listener {
   explicit Listener(py::object callback) : callback_(std::move(callback)) {}
 
   bool operator()(const Progress& progress) {
+    if (must_stop()) return false;
     const py::gil_scoped_acquire locked;
     try {
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -140,7 +142,7 @@ bool align_series(const TiltSeries& series, const option_table::Choices& choices
   Listener listener(std::move(callback));
   bool is_finished = false;
   {
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     is_finished = align(series, choices.options,
                         [&](const Progress& progress) { return listener(progress); });
   }
@@ -152,7 +154,7 @@ py::dict run(const TiltSeries& series, const option_table::Choices& choices, py:
   Listener listener(std::move(callback));
   Reconstruction made;
   {
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     made = reconstruct(series, choices.options,
                        [&](const Progress& progress) { return listener(progress); });
   }
@@ -170,7 +172,7 @@ py::dict run(const TiltSeries& series, const option_table::Choices& choices, py:
 py::array_t<float> sample(const Model& model, const SampleBox& box) {
   std::vector<float> values;
   {
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     values = model.sample(box);
   }
   return to_volume(std::move(values), box.size);
@@ -186,7 +188,7 @@ py::array_t<float> sample_points(const Model& model, const py::object& rows) {
       list[i][axis] = points.at(static_cast<py::ssize_t>(i), static_cast<py::ssize_t>(axis));
   std::vector<float> values;
   {
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     values = model.sample_points(list);
   }
   return to_array(std::move(values), {points.shape(0)});
@@ -223,7 +225,7 @@ void add_model(py::module_& module) {
       .def_readonly("voxel_px", &SampleBox::voxel_px)
       .def_readonly("euler_deg", &SampleBox::euler_deg);
   py::class_<Model>(module, "Model")
-      .def(py::init<const std::filesystem::path&>(), py::call_guard<py::gil_scoped_release>())
+      .def(py::init<const std::filesystem::path&>(), py::call_guard<Unlocked>())
       .def("pixel_size_A", &Model::pixel_size_A)
       .def("region", &Model::region)
       .def("sample", &sample)
@@ -249,14 +251,14 @@ void add_evaluate(py::module_& module) {
            "Return where the correlation first falls below a threshold, in Å, or None.");
   module.def("score_volume", [](const py::object& volume, const py::object& truth) {
     const Tomogram a = to_tomogram(volume, 1.0), b = to_tomogram(truth, 1.0);
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     return score_volume(a, b);
   });
   module.def("correlate_shells",
              [](const py::object& first, const py::object& second, double voxel_size_A) {
                const Tomogram a = to_tomogram(first, voxel_size_A);
                const Tomogram b = to_tomogram(second, voxel_size_A);
-               const py::gil_scoped_release unlocked;
+               const Unlocked unlocked;
                return correlate_shells(a, b);
              });
 }
@@ -269,6 +271,7 @@ PYBIND11_MODULE(_core, module) {
   pybind11::register_exception<Error>(module, "Error", PyExc_RuntimeError);
   module.attr("__version__") = library_version();
   set_message_handler(python::log);
+  python::wait_at_exit();
   python::add_options(module);
   python::add_reconstruct(module);
   python::add_model(module);

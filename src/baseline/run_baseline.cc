@@ -22,6 +22,7 @@
 #include "measurement/ctf_correction.h"
 #include "measurement/held_out.h"
 #include "measurement/undecided_beads.h"
+#include "measurement/view_size.h"
 #include "measurement/view_transfers.h"
 #include "option_table/setting.h"
 #include "option_table/values.h"
@@ -234,6 +235,7 @@ std::vector<io::OutputLock> claim_outputs(const BaselineOptions& options) {
 BaselinePlan plan_baseline(const tilt_series::TiltSeries& series, const BaselineOptions& options) {
   const measurement::Measurement planned =
       measurement::plan_measurement(series, options.shared.specimen);
+  measurement::require_pixels(planned.geometry.width, planned.geometry.height);
   if (planned.x_tilt_deg != 0.0) {
     throw Error(fmt::format(
         "the series has an x-axis tilt of {}°, which this baseline does not turn back: leave "

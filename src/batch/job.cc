@@ -44,6 +44,11 @@ int trials_at(const json& object) {
   return static_cast<int>(io::integer_at(object, "trials", 0, kMostTrials));
 }
 
+std::vector<fs::path> files_at(const json& object, const char* key) {
+  const auto names = object.at(key).get<std::vector<std::string>>();
+  return {names.begin(), names.end()};
+}
+
 std::string checked_text(const std::string& text) {
   if (base::utf8_text(text) == text) return text;
   throw Error(
@@ -86,14 +91,16 @@ Job job_from(const json& object) {
                     .open_spike_rank = object.at("open_spike_rank").get<bool>(),
                     .open_prior = object.at("open_prior").get<bool>(),
                     .num_trials = trials_at(object)},
-          .is_skipped = object.at("skipped").get<bool>()};
+          .is_skipped = object.at("skipped").get<bool>(),
+          .files = {}};
 }
 
 }  // namespace
 
-Needs read_needs(const fs::path& file) {
+JobPlan read_plan(const fs::path& file) {
   return read_job_file(file, "the plan of a run", [](const json& plan) {
-    Needs needs;
+    JobPlan read;
+    Needs& needs = read.needs;
     const std::int64_t threads = io::integer_at(plan, "threads", 1, kMostThreads);
     const std::int64_t most = bytes_at(plan, "memory_bytes");
     needs.memory_bytes_of_one_thread = bytes_at(plan, "memory_bytes_of_one_thread");
@@ -108,7 +115,8 @@ Needs read_needs(const fs::path& file) {
     needs.open_spike_rank = plan.at("open_spike_rank").get<bool>();
     needs.open_prior = plan.at("open_prior").get<bool>();
     needs.num_trials = trials_at(plan);
-    return needs;
+    read.files = {files_at(plan, "inputs"), files_at(plan, "results")};
+    return read;
   });
 }
 

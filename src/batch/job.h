@@ -26,6 +26,11 @@ struct Needs {
   }
 };
 
+/// The files that a job reads and writes.
+struct JobFiles {
+  std::vector<std::filesystem::path> inputs, results;
+};
+
 /// The reconstruction of one series.
 struct Job {
   std::string name;
@@ -33,6 +38,7 @@ struct Job {
   std::vector<std::string> command;  ///< words after `tomofield`, with the output's name
   Needs needs;
   bool is_skipped = false;  ///< its results were there before
+  JobFiles files;           ///< those of its plan; a list of jobs does not have them
 };
 
 /// All jobs of a batch, in the order of its series.
@@ -41,8 +47,13 @@ struct JobList {
   bool overwrites = false;  ///< replace what other runs have left
 };
 
+/// What a job needs and which files it has.
+struct JobPlan {
+  Needs needs;
+  JobFiles files;
+};
 /// Reads the JSON of --plan. Throws Error for anything else.
-Needs read_needs(const std::filesystem::path& file);
+JobPlan read_plan(const std::filesystem::path& file);
 
 /// Writes the list of a batch, from which the tasks of a job array read their jobs. Throws Error if
 /// it cannot be written, and for words that are no UTF-8.

@@ -13,22 +13,27 @@ using testing::ScratchDirectory;
 
 TEST(Jobs, AreReadAsTheyAreWritten) {
   const ScratchDirectory directory;
-  JobList list{
-      .jobs = {{.name = "a",
-                .output = "out/ä b.mrc",
-                .command = {"reconstruct", "a.mrc", "--center=-3,4"},
-                .needs = {.memory_bytes_of_one_thread = 1000,
-                          .memory_bytes_a_thread = 10,
-                          .core_seconds = 2.5,
-                          .sample_steps = 1e9,
-                          .result_bytes = 20,
-                          .disk_bytes = 30,
-                          .open_variation = true,
-                          .open_spike_rank = false,
-                          .open_prior = true,
-                          .num_trials = 6}},
-               {.name = "b", .output = "b.mrc", .command = {}, .needs = {}, .is_skipped = true}},
-      .overwrites = true};
+  JobList list{.jobs = {{.name = "a",
+                         .output = "out/ä b.mrc",
+                         .command = {"reconstruct", "a.mrc", "--center=-3,4"},
+                         .needs = {.memory_bytes_of_one_thread = 1000,
+                                   .memory_bytes_a_thread = 10,
+                                   .core_seconds = 2.5,
+                                   .sample_steps = 1e9,
+                                   .result_bytes = 20,
+                                   .disk_bytes = 30,
+                                   .open_variation = true,
+                                   .open_spike_rank = false,
+                                   .open_prior = true,
+                                   .num_trials = 6},
+                         .files = {}},
+                        {.name = "b",
+                         .output = "b.mrc",
+                         .command = {},
+                         .needs = {},
+                         .is_skipped = true,
+                         .files = {}}},
+               .overwrites = true};
   write_jobs(directory / "batch.json", list);
   const JobList read = read_jobs(directory / "batch.json");
   EXPECT_TRUE(read.overwrites);
@@ -63,20 +68,24 @@ TEST(Jobs, OfADamagedListAreRefused) {
 TEST(Needs, ComeFromThePlanOfARun) {
   const ScratchDirectory directory;
   const auto read = [&](const std::string& threads, const std::string& seconds) {
-    return read_needs(directory.write(
+    return read_plan(directory.write(
         "plan.json", R"({"threads": )" + threads + R"(, "memory_bytes": 1300,
                          "memory_bytes_of_one_thread": 1000, "core_seconds": )" +
                          seconds +
                          R"(, "sample_steps": 5, "result_bytes": 7, "disk_bytes": 9, "trials": 6,
-                         "open_variation": true, "open_spike_rank": false, "open_prior": true})"));
+                         "open_variation": true, "open_spike_rank": false, "open_prior": true,
+                         "inputs": ["a.mrc"], "results": ["out/a.mrc", "out/a.h5"]})"));
   };
-  EXPECT_EQ(read("4", "1.5").memory_bytes(2), 1100);
-  EXPECT_EQ(read("1", "1.5").memory_bytes(2), 1000);
-  EXPECT_FALSE(read("4", "null").core_seconds.has_value());
-  EXPECT_EQ(read("4", "2").disk_bytes, 9);
-  EXPECT_TRUE(read("4", "2").open_variation);
-  EXPECT_FALSE(read("4", "2").open_spike_rank);
-  EXPECT_EQ(read("4", "2").num_trials, 6);
+  EXPECT_EQ(read("4", "1.5").files.results,
+            (std::vector<std::filesystem::path>{"out/a.mrc", "out/a.h5"}));
+  EXPECT_EQ(read("4", "1.5").files.inputs, std::vector<std::filesystem::path>{"a.mrc"});
+  EXPECT_EQ(read("4", "1.5").needs.memory_bytes(2), 1100);
+  EXPECT_EQ(read("1", "1.5").needs.memory_bytes(2), 1000);
+  EXPECT_FALSE(read("4", "null").needs.core_seconds.has_value());
+  EXPECT_EQ(read("4", "2").needs.disk_bytes, 9);
+  EXPECT_TRUE(read("4", "2").needs.open_variation);
+  EXPECT_FALSE(read("4", "2").needs.open_spike_rank);
+  EXPECT_EQ(read("4", "2").needs.num_trials, 6);
   EXPECT_THROW(read("0", "1"), Error);
   EXPECT_THROW(read("4", "-1"), Error);
   EXPECT_THROW(read("4", "\"x\""), Error);

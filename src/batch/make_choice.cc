@@ -31,7 +31,7 @@ Vote vote_of(const RunOptions& options, const Job& job, int threads) {
   if (result.exit_status == 0) return read_vote(job, answer);
   Vote none;
   none.series = job.name;
-  none.failure = base::reason_of_failure(log);
+  none.failure = base::reason_of_failure(result.exit_status, log);
   return none;
 }
 

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "base/system/child_process.h"
 #include "batch/faults.h"
+#include "batch/file_conflicts.h"
 #include "io/saving/scratch_folder.h"
 
 namespace tomofield::batch {
@@ -39,6 +41,11 @@ std::vector<std::string> plan_command(const PlanOptions& options, const Job& job
   return words;
 }
 
+void add_plan(JobPlan plan, Job& job) {
+  job.needs = plan.needs;
+  job.files = std::move(plan.files);
+}
+
 }  // namespace
 
 fs::path output_of(const Series& series, const fs::path& folder) {
@@ -69,20 +76,23 @@ JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options) {
             .output = series.output,
             .command = command_of(series, options.common),
             .needs = {},
-            .is_skipped = options.skips_existing && has_results(series.output)};
+            .is_skipped = options.skips_existing && has_results(series.output),
+            .files = {.inputs = {series.input}, .results = {}}};
     if (!job.is_skipped) {
       fs::remove(plan);
       const base::ChildResult result =
           base::run_child(plan_command(options, job, plan), log, options.stop_requested);
       if (options.stop_requested && options.stop_requested()) return list;
       if (result.exit_status != 0)
-        faults.add(fmt::format("{}: {}", series.source, base::reason_of_failure(log)));
+        faults.add(
+            fmt::format("{}: {}", series.source, base::reason_of_failure(result.exit_status, log)));
       else
-        job.needs = read_needs(plan);
+        add_plan(read_plan(plan), job);
     }
     list.jobs.push_back(std::move(job));
   }
   faults.require_none();
+  require_own_files(options.folder, options.list, list.jobs);
   return list;
 }
 

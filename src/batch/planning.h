@@ -13,6 +13,7 @@ namespace tomofield::batch {
 /// The options by which series become jobs.
 struct PlanOptions {
   std::filesystem::path program;  ///< tomofield itself
+  std::filesystem::path list;     ///< what names the series: a table, a STAR file or a pattern
   std::filesystem::path folder;   ///< of the batch; it exists
   /// Options of all series, which an option of a series replaces. {name} in a value stands for the
   /// name of a series' file without its ending, {folder} for its folder.
@@ -32,7 +33,8 @@ std::vector<std::string> command_of(const Series& series,
 
 /// Makes a job of every series, and runs each with --plan to check it and to find what it needs.
 /// Does not check series that are skipped. The outputs of the series are there. Throws Error with
-/// the mistakes of all series. Returns fewer jobs if it was asked to stop.
+/// the mistakes of all series, also if a file would be written twice or is an input
+/// (file_conflicts.h). Returns fewer jobs if it was asked to stop.
 JobList plan_jobs(const std::vector<Series>& all, const PlanOptions& options);
 
 }  // namespace tomofield::batch

@@ -22,15 +22,6 @@ bool continues(const RunOptions& options, const Job& job, const State& before) {
   return can_resume(job.output) && (has_run || !options.overwrites);
 }
 
-std::string why_it_failed(int status, const fs::path& log) {
-  constexpr int kKilled = 128 + SIGKILL;
-  if (status == kKilled) return "it was killed, as the system does when memory runs out";
-  const std::string reason = base::reason_of_failure(log);
-  if (status > 128)
-    return fmt::format("signal {} ended it; it said last: {}", status - 128, reason);
-  return reason.empty() ? fmt::format("it failed with status {}", status) : reason;
-}
-
 bool was_stopped(int status) {
   return status == 128 + SIGTERM || status == 128 + SIGINT;  // with a checkpoint
 }
@@ -67,7 +58,7 @@ bool RunningJob::has_ended() {
     state.reason = base::reason_of_failure(log_of(options_->folder, *job_));
   } else {
     state.progress = Progress::kFailed;
-    state.reason = why_it_failed(result->exit_status, log_of(options_->folder, *job_));
+    state.reason = base::reason_of_failure(result->exit_status, log_of(options_->folder, *job_));
   }
   write_state(options_->folder, *job_, state);
   return true;

@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/log.h"
 #include "base/trace.h"
@@ -15,6 +18,8 @@
 
 namespace tomofield::checkpoint {
 namespace {
+
+constexpr double kLargestOfTile = 1e15;  // number that a record of a tile can have
 
 double rows_of(const nlohmann::json& tile) {
   return tile.at("rows").at(1).get<double>() - tile.at("rows").at(0).get<double>();
@@ -56,12 +61,31 @@ void FinishedTiles::read() {
     throw Error(fmt::format("'{}' was made with --budget {}: give the same", path, text("budget")));
   try {
     tiles_ = io::parse_json(text("tiles"));
-    for (const nlohmann::json& tile : tiles_) report_of(tile);
-    if (num_rows() <= 0) throw Error("it has no tiles");
+    require_whole_tiles();
   } catch (const std::exception& error) {
     throw Error(fmt::format("'{}' is damaged: {}", path, error.what()));
   }
   coded_ = std::move(model.coded);
+}
+
+// Throws unless the tiles lie side by side from the first row on, and leave rows for another one.
+void FinishedTiles::require_whole_tiles() const {
+  const std::int64_t region = series_.roi.height();
+  std::int64_t first = 0;
+  for (const nlohmann::json& tile : tiles_) {
+    const std::vector<double> rows =
+        io::numbers_at(tile, "rows", 0, static_cast<double>(region - 1));
+    if (rows.size() != 2 || rows[0] != static_cast<double>(first) || rows[1] <= rows[0] ||
+        rows[1] != std::floor(rows[1]))
+      throw Error("its tiles do not follow each other");
+    first = static_cast<std::int64_t>(rows[1]);
+    for (const char* key : {"residual", "seconds_fitting", "seconds_compressing", "variance",
+                            "mean_square_change", "decibels", "volume"})
+      io::number_at(tile, key, -kLargestOfTile, kLargestOfTile);
+    for (const char* key : {"parameters", "bytes"})
+      io::integer_at(tile, key, 0, std::int64_t{1} << 48);
+  }
+  if (first == 0) throw Error("it has no tiles");
 }
 
 void FinishedTiles::add(base::Range rows, TileCodes codes, nlohmann::json json) {
@@ -71,6 +95,11 @@ void FinishedTiles::add(base::Range rows, TileCodes codes, nlohmann::json json) 
   base::log_info(fmt::format("rows {} to {}: {} parameters in {} bytes", rows.begin, rows.end,
                              report.parameters, report.bytes));
   tiles_.push_back(std::move(json));
+  if (coded_ && !is_joinable(*coded_, codes.coded))
+    throw Error(
+        fmt::format("'{}' is damaged: its field does not end where its tiles do; "
+                    "--overwrite starts over",
+                    path_.string()));
   if (coded_)
     append(*coded_, codes.coded);
   else

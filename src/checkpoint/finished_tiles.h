@@ -36,7 +36,7 @@ class FinishedTiles {
                 const FitOrigin& origin);
 
   /// Appends a tile: its own rows, counted from the first one of the region. `json` says how it was
-  /// fitted.
+  /// fitted. Throws Error if it does not follow the tiles of the file, which somebody has changed.
   void add(base::Range rows, TileCodes codes, nlohmann::json json);
   /// Writes the file, unless the run writes none.
   void save() const;
@@ -54,6 +54,7 @@ class FinishedTiles {
  private:
   bool writes_file() const { return !options_.run.output.empty(); }
   void read();
+  void require_whole_tiles() const;
 
   const options::ReconstructOptions& options_;
   const measurement::Measurement& series_;

@@ -1,15 +1,28 @@
 #include "compact/coded_field.h"
 
+#include <algorithm>
+#include <functional>
+#include <numeric>
+
 #include "base/check.h"
 #include "field/tree/quadtree_bands.h"
 
 namespace tomofield::compact {
 namespace {
 
-// Returns how many numbers a leaf has in memory while it is decoded: its factors and its vertices.
-std::size_t decoded_numbers(const field::LeafShape& shape) {
-  return field::count_parameters(FieldKind::kVm, {shape}) +
-         field::count_parameters(FieldKind::kGrid, {with_upper_faces(shape)});
+std::size_t num_factors(const field::LeafShape& shape) {
+  return field::count_parameters(FieldKind::kVm, {shape});
+}
+
+std::size_t num_vertices(const field::LeafShape& shape) {
+  return field::count_parameters(FieldKind::kGrid, {with_upper_faces(shape)});
+}
+
+// Returns the bytes that decode_leaf() (decoded_field.cc) holds beside the field: of each factor a
+// whole number, a float and its copy as a mode, which are more than the whole number and its packed
+// bytes before; and of each vertex a float.
+std::size_t bytes_while_decoding(const field::LeafShape& shape) {
+  return num_factors(shape) * 3 * sizeof(float) + num_vertices(shape) * sizeof(float);
 }
 
 }  // namespace
@@ -28,19 +41,39 @@ field::LeafShape with_upper_faces(const field::LeafShape& shape) {
   return {.nx = shape.nx + 1, .ny = shape.ny + 1, .nz = shape.nz};
 }
 
-std::size_t decoded_bytes(const std::vector<field::LeafShape>& shapes) {
+bool has_possible_ranks(const field::LeafShape& shape) {
+  const auto is_possible = [](std::int64_t rank, std::int64_t n, std::int64_t m, std::int64_t k) {
+    return rank <= n && rank <= m * k;
+  };
+  return is_possible(shape.rank_x, shape.nx, shape.ny, shape.nz) &&
+         is_possible(shape.rank_y, shape.ny, shape.nx, shape.nz) &&
+         is_possible(shape.rank_z, shape.nz, shape.nx, shape.ny);
+}
+
+std::size_t decoded_bytes(const std::vector<field::LeafShape>& shapes, int num_threads) {
   constexpr std::size_t kMost = std::size_t{1} << 40;
-  std::size_t numbers = 0;
+  std::size_t numbers = 0, vertices = 0;
+  std::vector<std::size_t> while_decoding;
   for (const field::LeafShape& shape : shapes) {
-    const std::size_t more = decoded_numbers(shape);
+    const std::size_t more = num_factors(shape) + num_vertices(shape);
     if (more > kMost - numbers) return kNoMemoryHolds;  // the sum could wrap
     numbers += more;
+    vertices += num_vertices(shape);
+    while_decoding.push_back(bytes_while_decoding(shape));
   }
-  return numbers * sizeof(float);
+  const auto at_once = std::min(while_decoding.size(), static_cast<std::size_t>(num_threads));
+  std::ranges::partial_sort(while_decoding, while_decoding.begin() + std::ptrdiff_t(at_once),
+                            std::greater());
+  return std::accumulate(while_decoding.begin(), while_decoding.begin() + std::ptrdiff_t(at_once),
+                         vertices * sizeof(float));
+}
+
+bool is_joinable(const CodedField& lower, const CodedField& upper) {
+  return lower.thickness == upper.thickness && field::is_joinable(lower.tree, upper.tree);
 }
 
 void append(CodedField& lower, const CodedField& upper) {
-  TOMOFIELD_CHECK(lower.thickness == upper.thickness, "bands of one field");
+  TOMOFIELD_CHECK(is_joinable(lower, upper), "bands of one field");
   lower.tree = field::joined(lower.tree, upper.tree);
   LeafCodes& to = lower.codes;
   const LeafCodes& from = upper.codes;

@@ -35,12 +35,17 @@ inline constexpr field::LeafShape kNoLeaf{.nx = 1, .ny = 1, .nz = 2};
 /// Returns the shape of a leaf with its upper faces.
 field::LeafShape with_upper_faces(const field::LeafShape& shape);
 
+/// Says whether the ranks of a leaf are those of modes, whose vectors are orthonormal
+/// (truncation.h). Then its factors are at most about three times as many as its vertices.
+bool has_possible_ranks(const field::LeafShape& shape);
+
 /// Stands for more bytes than any memory has.
 inline constexpr std::size_t kNoMemoryHolds = std::numeric_limits<std::size_t>::max();
 
-/// Returns the bytes that the factors and the vertices of leaves take in memory while they are
-/// decoded, or kNoMemoryHolds if they are more than 2^40 numbers.
-std::size_t decoded_bytes(const std::vector<field::LeafShape>& shapes);
+/// Returns the bytes that leaves take at most in memory while they are decoded by some threads: the
+/// vertices of all, and what each thread holds for the leaf that it decodes. Returns kNoMemoryHolds
+/// if there are more than 2^40 numbers.
+std::size_t decoded_bytes(const std::vector<field::LeafShape>& shapes, int num_threads);
 
 /// A field as codes, which take little memory (decode_field).
 struct CodedField {
@@ -48,6 +53,9 @@ struct CodedField {
   double thickness = 0.0;
   LeafCodes codes;
 };
+
+/// Says whether the bands of a field follow those of `lower`.
+bool is_joinable(const CodedField& lower, const CodedField& upper);
 
 /// Appends bands that follow those of `lower`.
 void append(CodedField& lower, const CodedField& upper);

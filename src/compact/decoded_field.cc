@@ -6,9 +6,11 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/plausible.h"
 #include "base/threads/parallel.h"
 #include "compact/leaf_code.h"
 #include "compact/quantise.h"
+#include "tomofield/error.h"
 
 namespace tomofield::compact {
 namespace {
@@ -176,6 +178,8 @@ void decode_leaf(const LeafCodes& codes, int leaf, Field& field) {
   const double step = codes.step[static_cast<std::size_t>(field.tree().band_of_leaf(leaf))];
   const FloatMatrix values =
       values_of(dequantised_modes(decode(codes.code(leaf), own), step), own.nx, own.ny, own.nz);
+  if (!values.allFinite() || !base::is_plausible(static_cast<double>(values.cwiseAbs().maxCoeff())))
+    throw Error("the code of a leaf stands for numbers that are no densities");
   const LeafShape& s = field.shape(leaf);
   float* to = field.parameters().data() + field.offset(leaf);
   for (int i = 0; i < own.nx; ++i) {

@@ -11,7 +11,8 @@ namespace tomofield::compact {
 /// Returns the field of plain vertices (field::FieldKind::kGrid) that the codes stand for:
 /// densities without an activation. A vertex on an upper face gets the density of the leaf that
 /// begins there, interpolated between that leaf's own vertices if these are elsewhere; at the end
-/// of the field, that of the nearest vertex. Throws Error if a code is damaged.
+/// of the field, that of the nearest vertex. Throws Error if a code is damaged
+/// or stands for numbers that are no plausible densities.
 std::unique_ptr<field::Field> decode_field(const CodedField& coded);
 
 /// Returns the weight with which neighbouring vertices across the faces of leaves differ as much,

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/system/memory.h"
+#include "base/threads/parallel.h"
 #include "compact/decoded_field.h"
 #include "kernels/lanes.h"
 
@@ -32,7 +33,7 @@ base::Range bands_for(const field::RootGrid& roots, double low, double high) {
 
 std::unique_ptr<field::Field> decode_bands(const CodedField& coded, double low, double high) {
   const CodedField bands = some_bands(coded, bands_for(coded.tree.roots(), low, high));
-  const std::size_t bytes = decoded_bytes(bands.codes.shapes);
+  const std::size_t bytes = decoded_bytes(bands.codes.shapes, base::thread_count());
   constexpr std::size_t kSmall = std::size_t{1} << 24;
   if (bytes > kSmall)
     base::require_memory(bytes, "this part of a compact model",

@@ -50,6 +50,7 @@ void check_folder(const CompareOptions& options, const std::vector<Row>& rows) {
     std::ranges::copy(files_of(row), std::back_inserter(results));
   }
   io::require_no_input_is_replaced(results, inputs);
+  io::require_distinct(results);
   for (const fs::path& file : results) io::output_target(file);  // throws for what is no file
   const fs::path pictures = options.folder / "pictures";
   if (fs::exists(pictures) && !fs::is_directory(pictures))

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 
 #include "compact/budget.h"
 #include "fit/constants.h"
@@ -112,6 +113,9 @@ std::vector<std::string> ReconstructOptions::faults() const {
     if (is_fault) all.emplace_back(sentence);
   };
   const bool is_ray = fit.engine == Engine::kRay;
+  refuse_if(fit.coarse_bin > 0 && !std::has_single_bit(static_cast<unsigned>(fit.coarse_bin)),
+            "--coarse-bin is the largest of binnings that are halved from stage to stage: give a "
+            "power of two, such as 2, 4 or 8");
   refuse_if(field.tree == TreeKind::kAdaptive && !fit::can_solve_integer_programs(),
             "--tree adaptive needs COIN-OR CBC, and this tomofield was built without it: take "
             "--tree uniform, or build tomofield with -DTOMOFIELD_WITH_CBC=ON");

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -78,6 +79,47 @@ TEST(CompactModel, IsSampledWithoutBeingDecoded) {
     points.push_back({random.uniform(-50, 150), random.uniform(-50, 150), random.uniform(-2, 25)});
   EXPECT_EQ(sample_points(decoded, points), sample_points(undecoded, points));
   EXPECT_TRUE(sample_points(undecoded, {}).empty());
+}
+
+// Somebody may have changed numbers and made the checksums right again.
+TEST(CompactModel, NumbersThatNoModelHasAreRefused) {
+  const ScratchDirectory scratch;
+  const auto refusal = [&](const std::function<void(Model&)>& change, std::size_t most_bytes) {
+    Model model = compact_model();
+    change(model);
+    save_model(scratch / "model.h5", model);
+    return message_of<Error>([&] {
+      const Model loaded = load_to_sample(scratch / "model.h5", most_bytes);
+      sample_box(loaded, region_box(loaded, 1.0));
+    });
+  };
+  for (const std::size_t most_bytes : {std::size_t{1000}, std::size_t{1} << 30}) {
+    for (const double number : {1e300, 1e15, 1e10}) {
+      EXPECT_NE(refusal([&](Model& model) { model.coded->codes.step[0] = number; }, most_bytes), "")
+          << number;
+    }
+    for (const double unit : {1e300, 1e16})
+      EXPECT_NE(refusal([&](Model& model) { model.density_unit = unit; }, most_bytes), "") << unit;
+    const auto more_components = [](Model& model) {
+      model.coded->codes.shapes[1].rank_x = model.coded->codes.shapes[1].nx + 1;
+    };
+    EXPECT_NE(refusal(more_components, most_bytes).find("components"), std::string::npos);
+    // Every number is plausible, but not what they make together.
+    EXPECT_NE(refusal([](Model& model) { model.coded->codes.step[0] = 9e8; }, most_bytes), "");
+    EXPECT_EQ(refusal([](Model&) {}, most_bytes), "");
+  }
+}
+
+TEST(CompactModel, TheMemoryToDecodeItCountsWhatEachThreadHolds) {
+  const field::LeafShape leaf{
+      .nx = 16, .ny = 16, .nz = 32, .rank_x = 16, .rank_y = 16, .rank_z = 32};
+  const std::size_t factors = 16 * (16 + 512) + 16 * (16 + 512) + 32 * (32 + 256);
+  const std::size_t vertices = 17 * 17 * 32;
+  const std::vector<field::LeafShape> leaves(10, leaf);
+  for (const int threads : {1, 4, 100})
+    EXPECT_EQ(compact::decoded_bytes(leaves, threads),
+              4 * (10 * vertices) +
+                  static_cast<std::size_t>(std::min(threads, 10)) * (12 * factors + 4 * vertices));
 }
 
 TEST(CompactModel, APartHasTheLeavesThatAreChosen) {

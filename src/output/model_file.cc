@@ -22,6 +22,10 @@ namespace tomofield::output {
 namespace {
 
 using io::StoredGroup;
+
+// Densities within plausible numbers, times this, are finite floats.
+constexpr double kLargestDensityUnit = 1e15;
+
 using Integers = std::vector<std::int64_t>;
 
 // Copies floats that arrive in pieces, one a parameter, and keeps those of the leaves that a field
@@ -154,7 +158,7 @@ class ModelReader {
     info.written_by = root.text("written_by");
     require(base::is_plausible(info.x_tilt_deg, base::kLargestAngle_deg) &&
                 base::is_plausible_pixel_size(info.pixel_size_A) &&
-                std::isfinite(info.density_unit),
+                base::is_plausible(info.density_unit, kLargestDensityUnit),
             "its pixel size or density unit is no usable number");
     read_geometry(root.group("geometry"), info);
   }
@@ -289,7 +293,7 @@ class ModelReader {
     } else {
       group.read_array<float>("parameters", field->parameters());
     }
-    require_finite_parameters(*field, fmt::format("'{}' is a damaged model", path_));
+    require_plausible_parameters(*field, fmt::format("'{}' is a damaged model", path_));
     return field;
   }
 
@@ -300,7 +304,7 @@ class ModelReader {
       compact::CodedField coded{read_tree(group.group("tree")), read_thickness(group), {}};
       if (choose) kept = choose(coded.tree);
       coded.codes = read_codes(group, coded.tree);
-      const std::size_t bytes = compact::decoded_bytes(coded.codes.shapes);
+      const std::size_t bytes = compact::decoded_bytes(coded.codes.shapes, base::thread_count());
       require(bytes < compact::kNoMemoryHolds, "its leaves need more numbers than any file holds");
       if (bytes <= most_decoded_bytes) {
         constexpr std::size_t kSmall = std::size_t{1} << 24;
@@ -314,7 +318,7 @@ class ModelReader {
     if (!model.field) return;
     read_decoder(group, *model.field);
     if (choose) model.field->keep_only(kept);
-    require_finite_parameters(*model.field, fmt::format("'{}' is a damaged model", path_));
+    require_plausible_parameters(*model.field, fmt::format("'{}' is a damaged model", path_));
   }
 
   compact::LeafCodes read_codes(const StoredGroup& field, const field::Quadtree& tree) const {
@@ -325,11 +329,13 @@ class ModelReader {
                              .shapes = read_shapes(field.group("leaves"), num_leaves, 1),
                              .offset = group.read_array<std::int64_t>("offset"),
                              .bytes = group.read_array<std::uint8_t>("bytes")};
+    require(std::ranges::all_of(codes.shapes, compact::has_possible_ranks),
+            "a leaf has more components than vertices");
     const auto num_bands = tree.roots().rows;
-    require(
-        std::ssize(codes.step) == num_bands &&
-            std::ranges::all_of(codes.step, [](double s) { return s >= 0 && std::isfinite(s); }),
-        "its steps are no usable numbers");
+    require(std::ssize(codes.step) == num_bands &&
+                std::ranges::all_of(codes.step,
+                                    [](double s) { return s >= 0 && base::is_plausible(s); }),
+            "its steps are no usable numbers");
     require(std::ssize(codes.face_weight) == num_bands &&
                 std::ranges::all_of(codes.face_weight, [](double w) { return w >= 0 && w <= 0.5; }),
             "the weights of its faces are no usable numbers");

@@ -13,7 +13,8 @@ inline constexpr const char* kFormat = "tomofield model";
 inline constexpr std::int64_t kFormatVersion = 2;
 inline constexpr std::int64_t kCompactVersion = 3;  ///< of models with codes in place of parameters
 
-/// Throws Error, which begins with `complaint`, if a parameter that a field keeps is not finite.
-void require_finite_parameters(const field::Field& field, const std::string& complaint);
+/// Throws Error, which begins with `complaint`, if a parameter that a field keeps is not
+/// plausible (base/plausible.h).
+void require_plausible_parameters(const field::Field& field, const std::string& complaint);
 
 }  // namespace tomofield::output

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/enum_names.h"
+#include "base/plausible.h"
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "io/hdf5/hdf5_file.h"
@@ -150,7 +151,7 @@ void write_model(const std::filesystem::path& path, const ModelInfo& info, std::
 
 }  // namespace
 
-void require_finite_parameters(const field::Field& field, const std::string& complaint) {
+void require_plausible_parameters(const field::Field& field, const std::string& complaint) {
   const std::span<const float> parameters = field.parameters();
   std::vector<std::size_t> bad(static_cast<std::size_t>(field.tree().num_leaves()),
                                parameters.size());  // the first one of each leaf
@@ -159,7 +160,8 @@ void require_finite_parameters(const field::Field& field, const std::string& com
     if (!field.keeps(leaf)) return;
     const auto first = parameters.begin() + std::ptrdiff_t(field.offset(leaf)),
                end = parameters.begin() + std::ptrdiff_t(field.offset(leaf + 1));
-    const auto found = std::find_if(first, end, [](float value) { return !std::isfinite(value); });
+    const auto found = std::find_if(
+        first, end, [](float value) { return !base::is_plausible(static_cast<double>(value)); });
     if (found != end)
       bad[static_cast<std::size_t>(i)] = static_cast<std::size_t>(found - parameters.begin());
   });
@@ -169,9 +171,9 @@ void require_finite_parameters(const field::Field& field, const std::string& com
 }
 
 void require_finite(const field::Field& field, const std::filesystem::path& path) {
-  require_finite_parameters(field, fmt::format("the fit diverged, so '{}' is left as it was; a "
-                                               "lower learning rate may help",
-                                               path.string()));
+  require_plausible_parameters(field, fmt::format("the fit diverged, so '{}' is left as it was; a "
+                                                  "lower learning rate may help",
+                                                  path.string()));
 }
 
 void save_model(const std::filesystem::path& path, const field::Field& field, const ModelInfo& info,

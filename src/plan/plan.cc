@@ -19,10 +19,12 @@
 #include "fit/stages.h"
 #include "measurement/held_out.h"
 #include "measurement/slab_views.h"
+#include "measurement/view_size.h"
 #include "plan/memory_estimate.h"
 #include "plan/tile_plan.h"
 #include "tomofield/error.h"
 #include "tune/trial_measurement.h"
+#include "tune/tuning.h"
 
 namespace tomofield::plan {
 namespace {
@@ -72,6 +74,27 @@ std::size_t memory_of_halves(const tilt_series::TiltSeries& series,
                    evaluate::local_resolution_memory(shape), linear});
 }
 
+// Returns the peak memory of trials, which are fits of a few rows side by side. Where leaves are
+// larger than the region, the field of a trial is as large as that of the run.
+std::size_t memory_of_trials(const measurement::Measurement& plan,
+                             const options::ReconstructOptions& options,
+                             const distributed::Communicator& processes) {
+  constexpr int kMostSideBySide = 4;  // tune/automatic_choice.cc
+  constexpr int kCopies = 5;  // parameters, gradient, two moments, and a change of the stage
+  constexpr std::int64_t kRowsBeyond = 16;  // tune::short_trial()
+  const tune::TrialShape trial = options.fit.tune ? tune::trial_of_tune(options.field, options.fit)
+                                                  : tune::short_trial(options.field, options.fit);
+  Rectangle rows = plan.roi;
+  rows.y1 = std::min(rows.y1, rows.y0 + trial.rows + kRowsBeyond);
+  const fit::Domain domain = fit::make_domain(plan.geometry, rows, trial.field);
+  std::size_t parameters = 0;
+  for (const fit::Stage& stage : fit::make_stages(trial.field, trial.fit))
+    parameters = std::max(parameters, max_parameters(domain, trial.field, stage.field_kind));
+  const int at_once = (kMostSideBySide + processes.size() - 1) / processes.size();
+  return kProgramBytes + measurement::SlabViews::resident_memory(plan.rays_shape(), 0) +
+         static_cast<std::size_t>(at_once * kCopies) * parameters * sizeof(float);
+}
+
 // Refuses tilts that cannot be divided: each half needs views over the whole range.
 void require_views_for_halves(const measurement::Measurement& plan,
                               const options::ReconstructOptions& options) {
@@ -94,16 +117,6 @@ int most_vertices(const fit::Domain& domain) {
   return most;
 }
 
-// Refuses views in which nothing can be seen.
-void require_pixels(std::int64_t width, std::int64_t height) {
-  constexpr std::int64_t kFewest = 8;
-  if (std::min(width, height) < kFewest)
-    throw Error(
-        fmt::format("views of {} × {} pixels show nothing: give a smaller --bin, so that they "
-                    "have at least {} along both sides",
-                    width, height, kFewest));
-}
-
 }  // namespace
 
 RunPlan plan_run(const tilt_series::TiltSeries& series, const options::ReconstructOptions& given,
@@ -118,7 +131,7 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const options::Reconstru
   run.num_views = plan.geometry.num_views();
   run.view_width = plan.geometry.width;
   run.view_height = plan.geometry.height;
-  require_pixels(run.view_width, run.view_height);
+  measurement::require_pixels(run.view_width, run.view_height);
   run.pixel_size_A = plan.pixel_size_A;
   run.roi = plan.roi;
   run.thickness = plan.geometry.thickness;
@@ -141,6 +154,8 @@ RunPlan plan_run(const tilt_series::TiltSeries& series, const options::Reconstru
   run.memory_bytes = run.tiles.is_used()
                          ? run.tiles.memory_bytes
                          : estimate_memory({series, plan, domain, options, processes}, run.stages);
+  if (run.num_trials > 0 && !plan.ray_geometry)
+    run.memory_bytes = std::max(run.memory_bytes, memory_of_trials(plan, options, processes));
   run.most_vertices = most_vertices(domain);
   if (aligns && !plan.ray_geometry)
     run.memory_bytes =

@@ -231,11 +231,12 @@ void require_sound_motion(const json& rows) {
 }
 
 void require_sound_view(const json& view, const json& record) {
-  constexpr double kLargestLog = 5.0;
+  constexpr double kLargestLog = 1.0, kLargestTilt_deg = 90.0, kLargestTiltChange_deg = 30.0;
   positions_at(view, "shift_px");
   positions_at(view, "shift_error_px");
-  for (const char* angle : {"tilt_deg", "rotation_deg", "tilt_change_deg"})
-    io::number_at(view, angle, -base::kLargestAngle_deg, base::kLargestAngle_deg);
+  io::number_at(view, "tilt_deg", -kLargestTilt_deg, kLargestTilt_deg);
+  io::number_at(view, "rotation_deg", -base::kLargestAngle_deg, base::kLargestAngle_deg);
+  io::number_at(view, "tilt_change_deg", -kLargestTiltChange_deg, kLargestTiltChange_deg);
   io::number_at(view, "log_magnification", -kLargestLog, kLargestLog);
   number_at(view, "correlation");
   flag_at(view, "left_out");

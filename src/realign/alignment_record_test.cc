@@ -172,6 +172,9 @@ TEST_F(AlignmentRecord, IsRefusedIfItIsDamaged) {
   refuse_change("/views/3/shift_px/1", nullptr, "shift_px");
   refuse_change("/views/3/shift_px", json::array({1}), "shift_px");
   refuse_change("/views/3/rotation_deg", "1", "rotation_deg");
+  refuse_change("/views/3/tilt_change_deg", 360, "tilt_change_deg");
+  refuse_change("/views/3/tilt_deg", 200, "tilt_deg");
+  refuse_change("/views/3/log_magnification", 3, "log_magnification");
   refuse_change("/views/3/left_out", 1, "left_out");
   refuse_change("/views/3/local_px/4/4/1", nullptr, "local_px");
   refuse_change("/views/3/local_px/4", json::array({0}), "local_px");

@@ -36,8 +36,8 @@ bool can_resume(const options::ReconstructOptions& options, const output::Output
 }
 
 // Returns the files that the run writes, but for the pictures of slices.
-std::vector<std::filesystem::path> result_files(const options::ReconstructOptions& options,
-                                                const output::OutputPaths& paths) {
+std::vector<std::filesystem::path> files_without_slices(const options::ReconstructOptions& options,
+                                                        const output::OutputPaths& paths) {
   std::vector<std::filesystem::path> results{paths.volume, paths.model, paths.json, paths.report};
   if (options.field.tree == TreeKind::kAdaptive) results.push_back(paths.tree_picture);
   if (options.may_use_tiles()) results.push_back(paths.tiles);
@@ -59,6 +59,15 @@ std::vector<std::filesystem::path> optional_pictures(const output::OutputPaths& 
 
 }  // namespace
 
+std::vector<std::filesystem::path> result_files(const options::ReconstructOptions& options) {
+  if (options.run.output.empty()) return {};
+  const output::OutputPaths paths = output::output_paths(options.run.output);
+  std::vector<std::filesystem::path> files = files_without_slices(options, paths);
+  for (const auto& picture : io::picture_files(paths.picture_prefix)) files.push_back(picture);
+  if (options.volume.zarr) files.push_back(output::zarr_path(paths.volume));
+  return files;
+}
+
 void check_options(const options::ReconstructOptions& options) {
   base::require_no_faults(options.faults());
   if (options.run.output.empty()) return;
@@ -71,7 +80,7 @@ void check_options(const options::ReconstructOptions& options) {
             "replace it, or another name with -o"
           : "give --overwrite to replace it, --resume to continue the run that made "
             "it, or another name with -o";
-  io::check_result_files(result_files(options, paths), paths.picture_prefix, options.files,
+  io::check_result_files(files_without_slices(options, paths), paths.picture_prefix, options.files,
                          may_replace, advice);
   if (options.volume.zarr) output::check_zarr(paths.volume, may_replace, advice);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <vector>
 
 #include "io/saving/output_lock.h"
@@ -7,6 +8,9 @@
 #include "options/run_options.h"
 
 namespace tomofield::reconstruction {
+
+/// Returns all files that a run may write; none if the options name no output.
+std::vector<std::filesystem::path> result_files(const options::ReconstructOptions& options);
 
 /// Throws Error for faulty options. Throws Error also if a result would replace an input, or an
 /// existing file without --overwrite or --resume, or cannot be written at its path. Reads no file.

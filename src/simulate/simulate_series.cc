@@ -74,9 +74,12 @@ struct OutputFiles {
 };
 
 // Checks that the files can be written, and locks the series, which every simulation writes.
-std::vector<io::OutputLock> claim_files(const OutputFiles& files, bool overwrite) {
+std::vector<io::OutputLock> claim_files(const OutputFiles& files, const SimulationOptions& options,
+                                        bool overwrite) {
+  std::vector<fs::path> inputs;
+  for (const ParticleFile& file : options.particle_files) inputs.push_back(file.path);
   return io::claim_outputs({files.series}, [&] {
-    io::check_output_files(files.all(), {}, overwrite,
+    io::check_output_files(files.all(), inputs, overwrite,
                            "give another directory, or --overwrite to replace it");
   });
 }
@@ -398,7 +401,7 @@ SimulationSummary simulate_series(const fs::path& directory, const SimulationOpt
   const Phantom reference = options.reference_has_beads ? phantom : without_beads(phantom);
   const OutputFiles files(directory, specimen ? specimen->kinds : std::vector<ParticleKind>());
   const io::OutputFolder folder(directory);
-  const std::vector<io::OutputLock> locks = claim_files(files, overwrite);
+  const std::vector<io::OutputLock> locks = claim_files(files, options, overwrite);
 
   // Files of an earlier run that this one does not replace would contradict the others.
   io::OutputSet results;

@@ -13,19 +13,19 @@
 namespace tomofield::tilt_series {
 namespace {
 
-/// Marks pixels that are NaN or infinite as no measurements, and counts them.
-PixelCensus mask_not_finite(MaskedImage* image) {
+/// Marks pixels that are no usable numbers as no measurements, and counts them.
+PixelCensus mask_unusable(MaskedImage* image) {
   PixelCensus census;
   const float* first_finite = nullptr;
   for (std::size_t i = 0; i < image->values.size(); ++i) {
-    if (!std::isfinite(image->values[i])) {
+    if (!(std::fabs(image->values[i]) <= kLargestPixelValue)) {
       image->valid[i] = 0;
       image->values[i] = 0.0f;
       ++census.num_not_finite;
       continue;
     }
     if (first_finite == nullptr) first_finite = &image->values[i];
-    if (image->values[i] != *first_finite) census.is_constant = 0;
+    if (std::fabs(image->values[i] - *first_finite) > kSmallestDifference) census.is_constant = 0;
   }
   return census;
 }
@@ -90,7 +90,7 @@ MaskedImage ViewDecoder::read_and_mask(std::size_t view, PixelCensus& census) co
   const std::int64_t section = plan_.views[view].view.section;
   MaskedImage image(stack_.header().nx, stack_.header().ny);
   stack_.read_section(section, image.values);
-  census = mask_not_finite(&image);
+  census = mask_unusable(&image);
   if (!plan_.is_raw) mask_fill(contrast_, &image);
   if (mask_) apply_mask(*mask_, section, &image);
   census.num_bad = mask_bad_pixels(&image);

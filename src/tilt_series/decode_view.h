@@ -16,11 +16,16 @@
 
 namespace tomofield::tilt_series {
 
+/// Values of pixels that are larger are no measurements: squares and sums of those up to it are
+/// finite floats. A view whose pixels differ by no more than the smallest difference is constant.
+inline constexpr float kLargestPixelValue = 1e15f;
+inline constexpr float kSmallestDifference = 1e-18f;
+
 /// Counts of the raw pixels of a section.
 struct PixelCensus {
-  std::int64_t num_not_finite = 0;
-  std::int64_t num_bad = 0;      ///< hot or dead pixels
-  std::int64_t is_constant = 1;  ///< 0 or 1, an integer as the other members, to be summed
+  std::int64_t num_not_finite = 0;  ///< or beyond kLargestPixelValue
+  std::int64_t num_bad = 0;         ///< hot or dead pixels
+  std::int64_t is_constant = 1;     ///< 0 or 1, an integer as the other members, to be summed
 };
 
 /// Frames in which a view is wanted.

@@ -122,6 +122,15 @@ std::vector<double> find_x_tilts(const TiltSeriesOptions& options, const io::Ima
     for (std::size_t i = 0; i < x_tilts_deg.size(); ++i)
       if (table->of_section[i]) x_tilts_deg[i] = table->of_section[i]->x_tilt_deg;
   }
+  constexpr double kLargest_deg = 80.0;
+  for (std::size_t i = 0; i < x_tilts_deg.size(); ++i) {
+    if (std::fabs(x_tilts_deg[i]) <= kLargest_deg) continue;
+    throw Error(
+        fmt::format("section {} of '{}' has an x-axis tilt of {}°, and they must be within "
+                    "±{}°: mend it in '{}'",
+                    i + 1, stack.name(), x_tilts_deg[i], kLargest_deg,
+                    options.xtilt ? options.xtilt->string() : stack.name()));
+  }
   return x_tilts_deg;
 }
 

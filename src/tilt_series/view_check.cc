@@ -27,15 +27,16 @@ void require_usable(const ViewCheck& found, const std::string& name, std::int64_
   const double part = static_cast<double>(found.num_not_finite) / static_cast<double>(num_pixels);
   if (part > kMaxPartNotFinite) {
     throw Error(
-        fmt::format("{} has {} NaN or infinite pixels, {:.1f} % of all and more than the "
-                    "1 % that can be left out; repair it or give --exclude {}",
-                    name, found.num_not_finite, 100.0 * part, section));
+        fmt::format("{} has {} NaN or infinite pixels (or beyond ±{:.0e}), {:.1f} % of all and "
+                    "more than the 1 % that can be left out; repair it or give --exclude {}",
+                    name, found.num_not_finite, static_cast<double>(kLargestPixelValue),
+                    100.0 * part, section));
   }
   if (found.is_constant) {
     throw Error(
-        fmt::format("{} is constant: every pixel has the same value; leave it out with "
-                    "--exclude {}",
-                    name, section));
+        fmt::format("{} is constant: every pixel has the same value, or they differ by less than "
+                    "{:.0e}; leave it out with --exclude {}",
+                    name, static_cast<double>(kSmallestDifference), section));
   }
   if (!found.has_measurements) {
     throw Error(
@@ -44,8 +45,9 @@ void require_usable(const ViewCheck& found, const std::string& name, std::int64_
                     name, section));
   }
   if (found.num_not_finite > 0) {
-    base::log_warning(fmt::format("{} has {} NaN or infinite pixels, which are left out", name,
-                                  found.num_not_finite));
+    base::log_warning(
+        fmt::format("{} has {} NaN or infinite pixels (or beyond ±{:.0e}), which are left out",
+                    name, found.num_not_finite, static_cast<double>(kLargestPixelValue)));
   }
 }
 

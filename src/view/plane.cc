@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kSmallestStep = 1e-6;
 
-std::string text_of(const Parameters& parameters, const char* name) {
-  if (auto text = parameters(name)) return *std::move(text);
+const std::string& text_of(const Parameters& parameters, const char* name) {
+  if (const auto at = parameters.find(name); at != parameters.end()) return at->second;
   throw Error(fmt::format("'{}' is missing", name));
 }
 
@@ -25,7 +25,7 @@ double number_from(std::string_view text, const char* name) {
 }
 
 Point point_from(const Parameters& parameters, const char* name) {
-  const std::string text = text_of(parameters, name);
+  const std::string& text = text_of(parameters, name);
   std::string_view rest = text;
   Point point{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -61,7 +61,7 @@ Point Plane::position(double column, double row) const {
 
 std::int64_t requested_number(const Parameters& parameters, const char* name,
                               std::int64_t largest) {
-  const std::string text = text_of(parameters, name);
+  const std::string& text = text_of(parameters, name);
   const auto number = io::parse_integer(text);
   if (number && *number >= 0 && *number <= largest) return *number;
   throw Error(fmt::format("'{}' must be a whole number from 0 to {}, not '{}'", name, largest,

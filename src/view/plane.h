@@ -2,10 +2,8 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
-#include <optional>
+#include <map>
 #include <string>
-#include <vector>
 
 namespace tomofield::view {
 
@@ -26,8 +24,8 @@ struct Plane {
   Point position(double column, double row) const;
 };
 
-/// Returns the value of a parameter of a request, or nothing if the request does not have it.
-using Parameters = std::function<std::optional<std::string>(const char* name)>;
+/// The parameters of a request by their names.
+using Parameters = std::map<std::string, std::string>;
 
 /// Reads the plane that a request asks for: "center", "right" and "up" (x,y,z), "width", "height"
 /// and "step". Throws Error with the name of a parameter that is absent, is no number or is out of

@@ -2,30 +2,18 @@
 
 #include <gtest/gtest.h>
 
-#include <map>
-
 #include "tomofield/error.h"
 
 namespace tomofield::view {
 namespace {
 
-using Request = std::map<std::string, std::string>;
-
-Request good_request() {
+Parameters good_request() {
   return {{"center", "1,-2,3.5"}, {"right", "0,0,1"}, {"up", "0,1,0"},
           {"width", "4096"},      {"height", "2"},    {"step", "0.25"}};
 }
 
-Plane plane_of(const Request& request) {
-  return requested_plane([&](const char* name) -> std::optional<std::string> {
-    const auto found = request.find(name);
-    if (found == request.end()) return std::nullopt;
-    return found->second;
-  });
-}
-
 TEST(RequestedPlane, IsWhatTheRequestSays) {
-  const Plane plane = plane_of(good_request());
+  const Plane plane = requested_plane(good_request());
   EXPECT_EQ(plane.centre, (Point{1, -2, 3.5}));
   EXPECT_EQ(plane.width, 4096);
   EXPECT_EQ(plane.height, 2);
@@ -41,14 +29,14 @@ TEST(RequestedPlane, RefusesEveryOtherText) {
       {"height", "1e9"},      {"height", "../../etc"}, {"step", "0"},         {"step", "-1"},
       {"step", "inf"},        {"step", "1 "}};
   for (const auto& [name, text] : faults) {
-    Request request = good_request();
+    Parameters request = good_request();
     request[name] = text;
-    EXPECT_THROW(plane_of(request), Error) << name << "=" << text;
+    EXPECT_THROW(requested_plane(request), Error) << name << "=" << text;
   }
   for (const auto& [name, text] : good_request()) {
-    Request request = good_request();
+    Parameters request = good_request();
     request.erase(name);
-    EXPECT_THROW(plane_of(request), Error) << name;
+    EXPECT_THROW(requested_plane(request), Error) << name;
   }
 }
 

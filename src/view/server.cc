@@ -1,28 +1,22 @@
 #include "view/server.h"
 
 #include <fmt/format.h>
-#include <httplib.h>
 
-#include <atomic>
 #include <bit>
-#include <chrono>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <string_view>
-#include <thread>
+#include <utility>
 
 #include "base/utf8.h"
 #include "report/page_texts.h"
-#include "tomofield/error.h"
+#include "view/http/http_server.h"
 #include "view/page_texts.h"
 
 namespace tomofield::view {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "the page reads little-endian numbers");
-
-constexpr const char* kHost = "127.0.0.1";
 
 // Returns 128 random bits in hexadecimal.
 std::string random_key() {
@@ -40,101 +34,59 @@ nlohmann::json description(const ViewedVolume& volume) {
           {"contrast", {volume.contrast().black, volume.contrast().white}}};
 }
 
-void refuse(int status, std::string_view reason, httplib::Response& response) {
-  response.status = status;
-  response.set_content(std::string(reason) + "\n", "text/plain; charset=utf-8");
-}
-
-void give(std::string_view text, const char* type, httplib::Response& response) {
-  response.set_content(text.data(), text.size(), type);
+Response give(std::string_view text, const char* type) {
+  return {.type = type, .body = std::string(text), .more_headers = {}};
 }
 
 }  // namespace
 
 struct Server::Impl {
+  Impl(std::vector<std::unique_ptr<ViewedVolume>> shown, int port)
+      : volumes(std::move(shown)), http(port) {}
+
+  std::string own_host() const { return fmt::format("127.0.0.1:{}", http.port()); }
+  Answer answer(const Request& request) const;
+  Answer plane(const Request& request) const;
+  std::string info() const;
+
   std::vector<std::unique_ptr<ViewedVolume>> volumes;
   std::string key = random_key();
-  int port = 0;
-  httplib::Server http;
-  std::mutex one_plane;  // a plane is computed on all threads
-
-  void listen(int wanted_port);
-  void answer(const httplib::Request& request, httplib::Response& response);
-  void give_plane(const httplib::Request& request, httplib::Response& response);
-  std::string info() const;
+  HttpServer http;
 };
 
-void Server::Impl::listen(int wanted_port) {
-  // Without SO_REUSEPORT, which httplib sets by default: two servers would share a port.
-  http.set_socket_options([](int socket) {
-    const int yes = 1;
-    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  });
-  http.new_task_queue = [] { return new httplib::ThreadPool(8); };
-  http.set_keep_alive_timeout(1);  // the server waits for that long when it ends
-  http.set_keep_alive_max_count(10000);
-  http.set_tcp_nodelay(true);
-  http.set_default_headers({{"Cache-Control", "no-store"},
-                            {"X-Content-Type-Options", "nosniff"},
-                            {"Referrer-Policy", "no-referrer"},
-                            {"Cross-Origin-Resource-Policy", "same-origin"},
-                            {"Content-Security-Policy",
-                             "default-src 'none'; connect-src 'self'; script-src 'self'; "
-                             "style-src 'self'; img-src data:; frame-ancestors 'none'"}});
-  http.set_pre_routing_handler(
-      [this](const httplib::Request& request, httplib::Response& response) {
-        try {
-          answer(request, response);
-        } catch (const Error& error) {
-          refuse(400, error.what(), response);
-        } catch (const std::exception& error) {
-          refuse(500, error.what(), response);
-        }
-        return httplib::Server::HandlerResponse::Handled;
-      });
-  port = wanted_port;
-  if (wanted_port == 0) port = http.bind_to_any_port(kHost);
-  if (port <= 0 || (wanted_port != 0 && !http.bind_to_port(kHost, wanted_port)))
-    throw Error(
-        fmt::format("port {} of {} cannot be used: another program has it, or it needs "
-                    "more rights; leave --port out, and a free one is taken",
-                    wanted_port, kHost));
-}
-
-void Server::Impl::answer(const httplib::Request& request, httplib::Response& response) {
-  const std::string host = request.get_header_value("Host");
-  if (host != fmt::format("{}:{}", kHost, port) && host != fmt::format("localhost:{}", port))
-    return refuse(403, "this server is for the browsers of its own machine", response);
+Answer Server::Impl::answer(const Request& request) const {
+  if (request.host != own_host() && request.host != fmt::format("localhost:{}", http.port()))
+    return refusal(403, "this server is for the browsers of its own machine");
   if (request.method != "GET") {
-    response.set_header("Allow", "GET");
-    return refuse(405, "only GET is answered", response);
+    Response response = refusal(405, "only GET is answered");
+    response.more_headers = "Allow: GET\r\n";
+    return response;
   }
   const std::string start = "/" + key + "/";
   if (!request.path.starts_with(start))
-    return refuse(404, "there is no such page: open the address that tomofield printed", response);
+    return refusal(404, "there is no such page: open the address that tomofield printed");
   const std::string name = request.path.substr(start.size());
   constexpr const char* kScript = "text/javascript; charset=utf-8";
-  if (name.empty()) return give(view_page(), "text/html; charset=utf-8", response);
-  if (name == "page.css") return give(report::page_style(), "text/css; charset=utf-8", response);
-  if (name == "planes.js") return give(report::planes_script(), kScript, response);
-  if (name == "view.js") return give(view_script(), kScript, response);
-  if (name == "info") return give(info(), "application/json", response);
-  if (name == "plane") return give_plane(request, response);
-  refuse(404, "there is no such page", response);
+  if (name.empty()) return give(view_page(), "text/html; charset=utf-8");
+  if (name == "page.css") return give(report::page_style(), "text/css; charset=utf-8");
+  if (name == "planes.js") return give(report::planes_script(), kScript);
+  if (name == "view.js") return give(view_script(), kScript);
+  if (name == "info") return give(info(), "application/json");
+  if (name == "plane") return plane(request);
+  return refusal(404, "there is no such page");
 }
 
-void Server::Impl::give_plane(const httplib::Request& request, httplib::Response& response) {
-  const Parameters parameters = [&](const char* name) -> std::optional<std::string> {
-    if (!request.has_param(name)) return std::nullopt;
-    return request.get_param_value(name);
-  };
+Answer Server::Impl::plane(const Request& request) const {
   const auto last = static_cast<std::int64_t>(volumes.size()) - 1;
-  const auto index = static_cast<std::size_t>(requested_number(parameters, "volume", last));
-  const Plane plane = requested_plane(parameters);
-  const std::lock_guard lock(one_plane);
-  const std::vector<float> values = volumes[index]->sample(plane);
-  response.set_content(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float),
-                       "application/octet-stream");
+  const auto index = static_cast<std::size_t>(requested_number(request.parameters, "volume", last));
+  const ViewedVolume& volume = *volumes[index];
+  return [&volume, plane = requested_plane(request.parameters)](const StopCheck& must_stop) {
+    const std::vector<float> values = volume.sample(plane, must_stop);
+    const auto* bytes = reinterpret_cast<const char*>(values.data());
+    return Response{.type = "application/octet-stream",
+                    .body = std::string(bytes, values.size() * sizeof(float)),
+                    .more_headers = {}};
+  };
 }
 
 std::string Server::Impl::info() const {
@@ -144,28 +96,16 @@ std::string Server::Impl::info() const {
 }
 
 Server::Server(std::vector<std::unique_ptr<ViewedVolume>> volumes, int port)
-    : impl_(std::make_unique<Impl>()) {
-  impl_->volumes = std::move(volumes);
-  impl_->listen(port);
-}
+    : impl_(std::make_unique<Impl>(std::move(volumes), port)) {}
 
 Server::~Server() = default;
 
 std::string Server::address() const {
-  return fmt::format("http://{}:{}/{}/", kHost, impl_->port, impl_->key);
+  return fmt::format("http://{}/{}/", impl_->own_host(), impl_->key);
 }
 
 void Server::run(const std::function<bool()>& must_stop) {
-  using std::chrono_literals::operator""ms;
-  std::atomic<bool> has_ended = false;
-  std::thread watch([&] {
-    while (!has_ended && !(must_stop() && impl_->http.is_running()))
-      std::this_thread::sleep_for(100ms);
-    impl_->http.stop();
-  });
-  impl_->http.listen_after_bind();
-  has_ended = true;
-  watch.join();
+  impl_->http.run([&](const Request& request) { return impl_->answer(request); }, must_stop);
 }
 
 }  // namespace tomofield::view

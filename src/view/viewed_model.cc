@@ -35,17 +35,33 @@ class ViewedModel : public ViewedVolume {
 
  private:
   std::vector<float> sample_voxels(const Plane& plane) const override {
-    const int across = axis_of(plane.right), up = axis_of(plane.up);
-    std::vector<float> values = region_.is_aligned() && across >= 0 && up >= 0
-                                    ? aligned_values(plane, across, up)
-                                    : point_values(plane);
+    std::vector<float> values =
+        is_aligned(plane) ? aligned_values(plane) : point_values(plane, points_along_side(plane));
     const auto scale = static_cast<float>(model_.output_scale());
     for (float& value : values) value = scale * value + 0.0f;  // no −0
     return values;
   }
 
+  std::int64_t points_per_pixel(const Plane& plane) const override {
+    const auto points = static_cast<std::int64_t>(std::ceil(plane.step));
+    return is_aligned(plane) ? points * points * points
+                             : points_along_side(plane) * points_along_side(plane);
+  }
+
+  // Says whether a plane can be sampled the fast way. Pixels that are larger than all that a page
+  // shows are no means over their depth, which would take without end.
+  bool is_aligned(const Plane& plane) const {
+    constexpr double kLargestMean_px = 64;
+    return plane.step <= kLargestMean_px && region_.is_aligned() && axis_of(plane.right) >= 0 &&
+           axis_of(plane.up) >= 0;
+  }
+
+  // Returns 2 for pixels that are larger than those of the fit.
+  static std::int64_t points_along_side(const Plane& plane) { return plane.step > 1 ? 2 : 1; }
+
   // Samples a box of one voxel's thickness, the fast way.
-  std::vector<float> aligned_values(const Plane& plane, int across, int up) const {
+  std::vector<float> aligned_values(const Plane& plane) const {
+    const int across = axis_of(plane.right), up = axis_of(plane.up);
     field::OrientedBox box{
         .centre_px = region_.position(plane.centre), .size = {1, 1, 1}, .voxel_px = plane.step};
     box.size[static_cast<std::size_t>(across)] = plane.width;
@@ -64,34 +80,17 @@ class ViewedModel : public ViewedVolume {
     return turned;
   }
 
-  // Evaluates the field at the middle of every pixel, or at four points of one that is larger than
-  // a pixel of the fit.
-  std::vector<float> point_values(const Plane& plane) const {
-    constexpr std::int64_t kPointsAtOnce = 4 << 20;
-    const std::int64_t side = plane.step > 1 ? 2 : 1;
-    const std::int64_t rows_at_once =
-        std::max<std::int64_t>(1, kPointsAtOnce / (plane.width * side * side));
-    std::vector<float> values;
-    for (std::int64_t row = 0; row < plane.height; row += rows_at_once) {
-      const std::vector<float> rows =
-          values_of_rows(plane, row, std::min(row + rows_at_once, plane.height), side);
-      values.insert(values.end(), rows.begin(), rows.end());
-    }
-    return values;
-  }
-
-  // Returns the means of side × side points of each pixel of some rows of a plane.
-  std::vector<float> values_of_rows(const Plane& plane, std::int64_t first, std::int64_t end,
-                                    std::int64_t side) const {
+  // Evaluates the field and returns the means of side × side points of each pixel.
+  std::vector<float> point_values(const Plane& plane, std::int64_t side) const {
     const auto of_pixel = static_cast<std::size_t>(side * side);
-    const auto num_pixels = static_cast<std::size_t>((end - first) * plane.width);
+    const auto num_pixels = static_cast<std::size_t>(plane.height * plane.width);
     std::vector<field::Point> points;
     points.reserve(num_pixels * of_pixel);
     const auto place = [side](std::int64_t pixel, std::int64_t i) {
       return static_cast<double>(pixel) +
              (static_cast<double>(i) + 0.5) / static_cast<double>(side);
     };
-    for (std::int64_t row = first; row < end; ++row)
+    for (std::int64_t row = 0; row < plane.height; ++row)
       for (std::int64_t column = 0; column < plane.width; ++column)
         for (std::int64_t i = 0; i < side * side; ++i)
           points.push_back(

@@ -52,15 +52,27 @@ class ViewedMrc : public ViewedVolume {
     });
   }
 
+  Point scale() const {  // voxels in memory of a voxel of the file
+    Point of_axis;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      of_axis[axis] = static_cast<double>(held_[axis]) / static_cast<double>(size_[axis]);
+    return of_axis;
+  }
+
+  int points_along_side(const Plane& plane) const {
+    constexpr double kMostPoints = 8;
+    return static_cast<int>(
+        std::clamp(std::ceil(plane.step * scale()[0] - 1e-9), 1.0, kMostPoints));
+  }
+  std::int64_t points_per_pixel(const Plane& plane) const override {
+    return std::int64_t{points_along_side(plane)} * points_along_side(plane);
+  }
+
   // A pixel that is smaller than a voxel has the voxel's value in a plane along the axes, so that
   // voxels can be seen, and is interpolated in other planes. A larger one is a mean.
   std::vector<float> sample_voxels(const Plane& plane) const override {
-    constexpr int kMostPoints = 8;  // along a side of a pixel
-    Point scale;
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      scale[axis] = static_cast<double>(held_[axis]) / static_cast<double>(size_[axis]);
-    const int points =
-        std::clamp(static_cast<int>(std::ceil(plane.step * scale[0] - 1e-9)), 1, kMostPoints);
+    const Point scale = this->scale();
+    const int points = points_along_side(plane);
     const bool is_turned = !is_along_axes(plane.right) || !is_along_axes(plane.up);
     std::vector<float> values(static_cast<std::size_t>(plane.width * plane.height));
     base::parallel_for("view plane", plane.height, [&](std::int64_t row) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -21,8 +22,11 @@ class ViewedVolume {
   ViewedVolume& operator=(const ViewedVolume&) = delete;
 
   /// Returns the values of the pixels of a plane, [row, column] with row 0 at the bottom; NaN
-  /// outside of the volume.
-  std::vector<float> sample(const Plane& plane) const;
+  /// where the middle of a pixel is outside of the volume, which costs next to nothing. Throws
+  /// base::StopRequested after `must_stop` has returned true, which is asked several times a
+  /// second.
+  std::vector<float> sample(
+      const Plane& plane, const std::function<bool()>& must_stop = [] { return false; }) const;
 
   const std::string& title() const { return title_; }
   /// Returns the number of voxels.
@@ -38,6 +42,8 @@ class ViewedVolume {
   ViewedVolume() = default;
   /// Returns the values of a plane, with any value outside of the volume.
   virtual std::vector<float> sample_voxels(const Plane& plane) const = 0;
+  /// Returns how many points a pixel of a plane is the mean of.
+  virtual std::int64_t points_per_pixel(const Plane& plane) const = 0;
 
   std::string title_, note_;
   std::array<std::int64_t, 3> size_{};

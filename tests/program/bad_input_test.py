@@ -1,5 +1,6 @@
 """Tests what reconstruct refuses: it exits with 2, says one sentence and writes nothing."""
 
+import json
 import os
 import re
 import resource
@@ -206,6 +207,19 @@ def test_pixels_that_are_no_measurements(good, out, refuse_series, stack, stack_
     name = stack_file("constant.mrc", values)
     refuse_series([name, "section 3", "constant", "--exclude 3"], name)
     harness.succeed("reconstruct", name, "-o", out, *good, "--dry-run", "--exclude", 3)
+    for scale in (1e-30, 1e-42):
+        tiny = stack_file("tiny.mrc", views * np.float32(scale))
+        refuse_series([tiny, "section 1", "constant"], tiny)
+    for factor in (1e30, 1e16):
+        values = views.copy()
+        values[4] *= np.float32(factor)
+        large = stack_file("factor.mrc", values)
+        refuse_series([large, "section 5", "beyond", "--exclude 5"], large)
+    values = views.copy()
+    values[4, 3, 3] = 1e38
+    name = stack_file("one.mrc", values)
+    result = harness.succeed("reconstruct", name, "-o", out, *good, "--dry-run")
+    assert re.search("warning: .*section 5.* 1 NaN or infinite", result.stderr), result.stderr
     refuse_series(["8", "1 to 7"], stack, "--exclude", 8)
     refuse_series(["two"], stack, "--exclude", "two")
     refuse_series([stack], stack, "--exclude", f"1-{NUM_VIEWS}")  # none is left
@@ -214,6 +228,22 @@ def test_pixels_that_are_no_measurements(good, out, refuse_series, stack, stack_
     refuse_series([negative, "--log"], negative, "--contrast", "dark", "--log")
     away = text_file("away.xf", "1 0 0 1 1000 0\n" * NUM_VIEWS)
     refuse_series([stack, "section 1"], stack, "--xf", away)
+
+
+def test_contrast_transfers_that_no_view_can_show(refuse_series, stack, path):
+    """The rings of the transfer would be narrower than the view can tell apart."""
+    for options in (["--defocus", 1000], ["--defocus", 3, "--pixel-size", 0.001]):
+        refuse_series(["section 1", "defocus", "pixel size"], stack, *options, "--voltage", 300,
+                      "--cs", 2.7, "--amplitude-contrast", 0.07)
+
+
+def test_exposures_that_are_none(path, refuse_series, stack, text_file):
+    for key in ("ExposureDose", "PriorRecordDose"):
+        for value in ("nan", "-3", "much"):
+            sections = [f"[ZValue = {i}]\nTiltAngle = {tilt}\n{key} = {value if i == 2 else 3}\n"
+                        for i, tilt in enumerate(TILTS)]
+            mdoc = text_file("doses.mdoc", "PixelSpacing = 10\n\n" + "\n".join(sections))
+            refuse_series([mdoc, "line 13", value], stack, "--mdoc", mdoc)
 
 
 def test_options_that_make_no_sense(good, out, refuse, refuse_series, stack, tlt):
@@ -387,6 +417,41 @@ def test_volumes_have_no_name_of_another_format(tmp_path):
     for name in ("x.tif", "x.H5"):
         result = harness.tomofield("reconstruct", stack, "--thickness", 4, "-o", tmp_path / name)
         assert result.returncode == 2 and "the volume is an MRC file" in result.stderr, result.stderr
+
+
+def test_strips_are_no_views(tmp_path):
+    stack, angles = tmp_path / "strips.mrc", tmp_path / "strips.tlt"
+    write_stack(stack, np.random.default_rng(1).normal(100, 1, (14, 1, 32)).astype(np.float32))
+    np.savetxt(angles, np.linspace(-50, 50, 14))
+    for command in (["reconstruct"], ["baseline", "wbp"], ["baseline", "sirt"]):
+        result = harness.tomofield(*command, stack, "--tlt", angles, "--thickness", 16, "-o",
+                                   tmp_path / "x.mrc", "--contrast", "bright")
+        assert result.returncode == 2 and "views of 32 × 1 pixels" in result.stderr, result.stderr
+
+
+def test_x_axis_tilts_and_bins_that_make_no_sense(refuse_series, stack, text_file):
+    for tilt in ("91", "-80.5"):
+        file = text_file("steep.xtilt", "0\n" * 3 + tilt + "\n" + "0\n" * (NUM_VIEWS - 4))
+        refuse_series([file, "section 4", "80"], stack, "--xtilt", file)
+    for number in (3, 6, 12):
+        refuse_series(["--coarse-bin", "power of two"], stack, "--coarse-bin", number)
+
+
+def test_memory_is_that_of_leaves_larger_than_the_region(tmp_path):
+    """Trials have fields of their own, which are as large as that of the run."""
+    if is_sanitized():
+        pytest.skip("sanitizers use memory of their own")
+    stack, angles, plan = (tmp_path / name for name in ("large.mrc", "large.tlt", "plan.json"))
+    write_stack(stack, np.random.default_rng(1).normal(100, 10, (14, 64, 64)).astype(np.float32))
+    np.savetxt(angles, np.linspace(-50, 50, 14))
+    command = ["reconstruct", stack, "--tlt", angles, "--thickness", 64, "--contrast", "bright",
+               "--epochs", 1, "--coarse-epochs", 2, "--prior", "tv", "--leaf-size", 512,
+               "--no-margin", "-o", tmp_path / "x.mrc"]
+    harness.succeed(*command, "--plan", plan)
+    status, said, peak_MiB = run_measured(*command)
+    assert status == 0, said
+    planned_MiB = json.loads(plan.read_text())["memory_bytes"] / 2**20
+    assert 0.5 * planned_MiB < peak_MiB < 1.1 * planned_MiB, (peak_MiB, planned_MiB)
 
 
 def test_views_of_few_pixels_are_refused(tmp_path):

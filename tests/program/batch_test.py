@@ -237,6 +237,69 @@ def test_all_mistakes_are_found_before_anything_starts(data):
     assert nothing.returncode == 2 and "*.st" in nothing.stderr
 
 
+def test_no_file_is_written_twice_or_replaces_an_input(data):
+    """Every spelling of a file is the file, and a batch has files of its own."""
+    folder = harness.fresh_directory("conflicts")
+    results = os.path.join(folder, "results")
+    os.makedirs(results)
+    os.symlink(results, os.path.join(folder, "link"))
+    os.symlink(os.path.join(results, "new.mrc"), os.path.join(folder, "pointer.mrc"))
+    for name in "ab":
+        for ending in (".mrc", ".tlt"):
+            shutil.copy(os.path.join(data, name + ending), folder)
+    a, b = (os.path.join(folder, name) for name in ("a.mrc", "b.mrc"))
+    before = {path: harness.read_bytes(path) for path in (a, b)}
+
+    def refusal(output_a, output_b, *options, table=os.path.join(folder, "list.csv"), name=""):
+        write_table(table, [["stack", "tlt", "name", "output"],
+                            [a, a[:-4] + ".tlt", name, output_a],
+                            [b, b[:-4] + ".tlt", "", output_b]])
+        written = harness.read_bytes(table)
+        result = harness.tomofield("batch", table, *QUICK, "-o", results, *options)
+        assert result.returncode == 2, (output_a, output_b, result.stderr)
+        assert harness.read_bytes(table) == written, "the table is whole"
+        assert {path: harness.read_bytes(path) for path in (a, b)} == before
+        assert not os.path.exists(os.path.join(results, "batch.json")), "nothing has begun"
+        return result.stderr
+
+    def path(*parts):
+        return os.path.join(folder, *parts)
+
+    for options in ([], ["--overwrite"]):
+        for one, other in ((path("one.mrc"), path("one.rec")),
+                           (path("results", "new.mrc"), path("pointer.mrc")),
+                           (path("results", "one.mrc"), path("link", "one.mrc")),
+                           (path("results", "one.rec"), path("link", ".", "one.mrc"))):
+            said = refusal(one, other, *options)
+            assert "the series 'a' and the series 'b' would both write" in said, said
+        said = refusal(path("results", "..", "results", "batch.rec"), "", *options)
+        assert "the batch itself and the series 'a'" in said, said
+        for name in ("batch", "choice"):
+            said = refusal("", "", *options, name=name)
+            assert f"the batch itself and the series '{name}'" in said, said
+        said = refusal(path("results", "..", "b.mrc"), "", *options)
+        assert "the series 'b' is read from" in said or "the input" in said, said
+    own = path("results", "summary.csv")
+    said = refusal("", "", table=own)
+    assert "the batch itself would replace" in said and "the list of the series" in said, said
+    os.remove(own)
+    shutil.move(b[:-4] + ".tlt", b[:-4] + "_align.json")
+    said = harness.tomofield("batch", path("?.mrc"), "--tlt", b[:-4] + "_align.json", *QUICK, "-o",
+                             folder, "--overwrite")
+    assert said.returncode == 2 and "the input" in said.stderr, said.stderr
+
+
+def test_a_tomogram_does_not_take_the_place_of_the_table_for_relion():
+    folder = harness.fresh_directory("relion_name")
+    star = star_projects.write_relion(folder, harness.Series("source"))
+    text = pathlib.Path(star).read_text(encoding="utf-8")
+    pathlib.Path(star).write_text(text.replace("TS_01 ", "tomograms ", 1), encoding="utf-8")
+    results = os.path.join(folder, "results")
+    said = harness.tomofield("batch", star, *QUICK[2:], "-o", results)
+    assert said.returncode == 2 and "would both write" in said.stderr, said.stderr
+    assert "tomograms.star" in said.stderr and not os.path.exists(results)
+
+
 def test_dry_run_tells_what_is_needed_and_makes_nothing(data):
     results = os.path.join(harness.fresh_directory("dry"), "results")
     said = harness.succeed("batch", *pattern(data), *QUICK, "--dry-run", "-o", results).stdout

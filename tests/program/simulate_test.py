@@ -206,6 +206,15 @@ def test_particles_of_yardstick_d_are_found_in_its_truth(counted):
     assert kinds["ribosome"]["average_precision"] < 0.5
 
 
+def test_a_density_is_not_replaced_by_the_series_that_is_made_of_it(counted):
+    density = counted.path("truth.mrc")
+    before = harness.read_bytes(density)
+    said = run("simulate", os.path.dirname(density), *COUNTED, "--particles", f"{density},2",
+               "--overwrite")
+    assert said.returncode == 2 and "would replace the input" in said.stderr, said.stderr
+    assert harness.read_bytes(density) == before
+
+
 def test_particles_of_files_take_the_place_of_random_proteins(counted):
     source = os.path.join(counted.directory, "particle_ribosome.mrc")
     ours = simulate("files", *COUNTED, "--particles", f"{source},12")

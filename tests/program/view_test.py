@@ -121,6 +121,84 @@ def test_garbage_does_not_end_it(viewer):
     assert viewer.plane(4, 4)[0] == 200
 
 
+def connect(viewer, text):
+    """Returns a connection that has sent a text."""
+    connection = socket.create_connection(("127.0.0.1", viewer.port), timeout=10)
+    connection.sendall(text)
+    return connection
+
+
+def resident_bytes(viewer):
+    with open(f"/proc/{viewer.run.pid}/statm", encoding="ascii") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def test_a_head_without_end_takes_no_memory(viewer):
+    before = resident_bytes(viewer)
+    with contextlib.ExitStack() as stack:
+        for _ in range(8):
+            connection = stack.enter_context(connect(viewer, b"GET / HTTP/1.1\r\n"))
+            with contextlib.suppress(ConnectionError, socket.timeout):
+                for number in range(1000):
+                    connection.sendall(b"X-%d: " % number + b"a" * 8000 + b"\r\n")
+        assert resident_bytes(viewer) - before < 16 << 20, "64 MB were sent"
+        assert viewer.plane(4, 4)[0] == 200
+
+
+def test_neither_slow_nor_idle_connections_keep_the_page_away(viewer):
+    starts = (b"", b"G", b"GET / HTTP/1.1\r\nHost: 127.0", b"GET / HTTP/1.1\r\nA: b\r\n\r")
+    with contextlib.ExitStack() as stack:
+        for number in range(300):
+            stack.enter_context(connect(viewer, starts[number % 4]))
+        for _ in range(3):
+            assert viewer.request(viewer.path)[0] == 200
+
+
+def test_a_connection_serves_for_several_requests(viewer):
+    request = (f"GET {viewer.path} HTTP/1.1\r\nHost: 127.0.0.1:{viewer.port}\r\n{{}}\r\n")
+    both = request.format("") + request.format("Connection: close\r\n")
+    with connect(viewer, both.encode()) as connection:
+        answer = b"".join(iter(lambda: connection.recv(1 << 16), b""))
+    assert answer.count(b"HTTP/1.1 200 OK") == 2 and answer.count(b"</html>") == 2, answer[:400]
+
+
+def test_the_work_of_a_request_is_bounded(viewer):
+    for volume in (0, 1):
+        for right in (X, "0.8,0.6,0"):
+            up = Y if right == X else "-0.6,0.8,0"
+            status, _, body = viewer.plane(4096, 4096, step=1e9, volume=volume, right=right, up=up)
+            values = np.frombuffer(body, "<f4")
+            assert status == 200 and values.size == 4096 ** 2
+            assert np.count_nonzero(np.isfinite(values)) <= 1, "one pixel is larger than all"
+
+
+def test_ranges_are_not_served(viewer):
+    query = urllib.parse.urlencode({"volume": 0, "center": "24,18,12.5", "right": X, "up": Y,
+                                    "width": 64, "height": 64, "step": 0.1})
+    ranges = "bytes=" + ",".join(["0-"] * 1500)
+    status, _, body = viewer.request(viewer.path + "plane?" + query, headers={"Range": ranges})
+    assert status == 200 and len(body) == 64 * 64 * 4
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_waits_for_nobody(results, stop):
+    """Twenty planes of 16 million pixels would take a minute."""
+    run = harness.start("view", results.model_path)
+    viewer = Viewer(run)
+    plane = (f"GET {viewer.path}plane?volume=0&center=24,18,12&right=1,0,0&up=0,1,0&width=4096"
+             f"&height=4096&step=0.003 HTTP/1.1\r\nHost: 127.0.0.1:{viewer.port}\r\n\r\n")
+    with contextlib.ExitStack() as stack:
+        for _ in range(20):
+            stack.enter_context(connect(viewer, plane.encode()))
+        stack.enter_context(connect(viewer, b"GET / HTTP/1.1\r\n"))
+        assert viewer.request(viewer.path)[0] == 200, "pages do not wait for planes"
+        run.send_signal(stop)
+        try:
+            assert run.wait(timeout=10) == 0, run.stderr.read()
+        finally:
+            run.kill()
+
+
 def test_it_listens_on_loopback_alone(viewer):
     with open("/proc/net/tcp", encoding="ascii") as file:
         lines = [line.split() for line in file][1:]

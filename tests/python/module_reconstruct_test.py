@@ -6,6 +6,8 @@ import json
 import os
 import pathlib
 import re
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -195,3 +197,35 @@ def test_options_keep_what_they_are_set_to():
         assert (tuple(found) if name == "roi" else found) == value
     core.penalty = core.roi = core.leaf_size = None
     assert core.penalty is None and core.roi is None and core.leaf_size is None
+
+
+@pytest.mark.parametrize("work", [
+    "tomofield.reconstruct(views, tilts, epochs=1000, thickness=16, contrast='bright', "
+    "density_variation=1.0, prior='tv')",
+    "[tomofield.score_volume(views, views) for _ in iter(int, 1)]"])
+def test_the_interpreter_ends_in_order_beside_a_daemon_thread(work):
+    script = f"""
+import threading, time
+import numpy as np
+import tomofield
+views = np.random.default_rng(1).normal(100, 10, (21, 32, 32)).astype(np.float32)
+tilts = np.linspace(-60, 60, 21)
+begun = threading.Event()
+def work():
+    begun.set()
+    {work}
+threading.Thread(target=work, daemon=True).start()
+begun.wait()
+time.sleep(1)
+
+class Last:  # lets other threads run while the interpreter ends
+    def __del__(self, sleep=time.sleep):
+        sleep(1)
+
+last = Last()
+"""
+    module = os.path.dirname(os.path.dirname(tomofield.__file__))
+    for _ in range(3):
+        ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
+                               env={**os.environ, "PYTHONPATH": module}, timeout=60, check=False)
+        assert ended.returncode == 0, (ended.returncode, ended.stderr)

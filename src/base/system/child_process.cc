@@ -126,6 +126,17 @@ ChildResult run_child(const std::vector<std::string>& command, const std::filesy
   }
 }
 
+std::string reason_of_failure(int exit_status, const std::filesystem::path& log) {
+  constexpr int kSignal = 128;
+  if (exit_status == kSignal + SIGKILL)
+    return "it was killed, as the system does when memory runs out";
+  const std::string said = reason_of_failure(log);
+  if (exit_status > kSignal)
+    return fmt::format("signal {} ended it{}", exit_status - kSignal,
+                       said.empty() ? ", and it said nothing" : "; it said last: " + said);
+  return said.empty() ? fmt::format("it failed with status {}", exit_status) : said;
+}
+
 std::string reason_of_failure(const std::filesystem::path& log) {
   constexpr std::string_view kSpeaker = "tomofield: ";
   std::ifstream file(log);

@@ -61,6 +61,10 @@ void pause_between_polls();
 ChildResult run_child(const std::vector<std::string>& command, const std::filesystem::path& log,
                       const std::function<bool()>& stop_requested);
 
+/// Returns the reason why a child with an exit status other than 0 failed, from the file `log` of
+/// its output: its error message, or what else is known if it has said none.
+std::string reason_of_failure(int exit_status, const std::filesystem::path& log);
+
 /// Returns the reason why tomofield failed, from the file `log` of its output: its error message
 /// without the program's name, or the last line if there is none.
 std::string reason_of_failure(const std::filesystem::path& log);

@@ -213,6 +213,7 @@ void run(const CLI::App& command, const BatchArguments& arguments,
   if (arguments.task) return run_task(command, arguments);
   stop_on_signals();
   batch::PlanOptions options{.program = base::program_path(),
+                             .list = arguments.list,
                              .folder = arguments.folder,
                              .common = given_options(command, own_options),
                              .threads = threads_of(command, arguments),

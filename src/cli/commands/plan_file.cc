@@ -36,6 +36,12 @@ bool is_left_to_runs(const options::ReconstructOptions& options, bool is_open) {
   return is_open && !options.fit.tune;
 }
 
+std::vector<std::string> texts_of(const std::vector<std::filesystem::path>& files) {
+  std::vector<std::string> texts;
+  for (const auto& file : files) texts.push_back(file.string());
+  return texts;
+}
+
 }  // namespace
 
 void add_plan_option(CLI::App& command, std::optional<std::filesystem::path>& file) {
@@ -67,6 +73,8 @@ void write_plan(const std::filesystem::path& file, const options::ReconstructOpt
     const std::size_t of_one_thread = memory_of_one_thread(series, options, processes);
     if (!processes.is_root()) return;
     const plan::RunEstimate estimate = plan::estimate_run(series, options, plan);
+    std::vector<std::filesystem::path> inputs = io::input_files(options.files);
+    for (const auto& added : io::added_inputs()) inputs.push_back(added);
     const nlohmann::json seconds =
         estimate.core_seconds ? nlohmann::json(*estimate.core_seconds) : nlohmann::json(nullptr);
     io::write_json(file,
@@ -86,7 +94,9 @@ void write_plan(const std::filesystem::path& file, const options::ReconstructOpt
                     {"core_seconds", seconds},
                     {"sample_steps", estimate.sample_steps},
                     {"result_bytes", estimate.result_bytes},
-                    {"disk_bytes", estimate.disk_bytes}});
+                    {"disk_bytes", estimate.disk_bytes},
+                    {"inputs", texts_of(inputs)},
+                    {"results", texts_of(reconstruction::result_files(options))}});
   });
 }
 

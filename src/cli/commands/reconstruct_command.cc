@@ -12,7 +12,7 @@
 #include "cli/options/table_options.h"
 #include "cli/options/trace_option.h"
 #include "options/run_options.h"
-#include "output/output_paths.h"
+#include "reconstruct/run_files.h"
 
 namespace tomofield::cli {
 namespace {
@@ -33,8 +33,7 @@ void run(ReconstructArguments& arguments, const distributed::Communicator& proce
   processes.run_collectively([&] {
     check_answer_file(arguments.plan, "--plan", options);
     check_answer_file(arguments.choice, "--choice", options);
-    const output::OutputPaths paths = output::output_paths(options.run.output);
-    check_trace_file(arguments.trace, {paths.volume, paths.model, paths.json}, options.files,
+    check_trace_file(arguments.trace, reconstruction::result_files(options), options.files,
                      options.run.overwrite);
   });
   if (arguments.plan) return write_plan(*arguments.plan, options, processes);

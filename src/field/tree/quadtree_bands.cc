@@ -60,13 +60,17 @@ Quadtree some_bands(const Quadtree& tree, base::Range bands) {
   return {roots, std::move(nodes)};
 }
 
-Quadtree joined(const Quadtree& lower, const Quadtree& upper) {
-  RootGrid roots = lower.roots();
-  RootGrid expected = roots;
-  expected.y0 += roots.rows * roots.cell_size;
+bool is_joinable(const Quadtree& lower, const Quadtree& upper) {
+  RootGrid expected = lower.roots();
+  expected.y0 += expected.rows * expected.cell_size;
   expected.rows = upper.roots().rows;
-  TOMOFIELD_CHECK(upper.roots() == expected, "bands that follow each other");
-  roots.rows += expected.rows;
+  return upper.roots() == expected;
+}
+
+Quadtree joined(const Quadtree& lower, const Quadtree& upper) {
+  TOMOFIELD_CHECK(is_joinable(lower, upper), "bands that follow each other");
+  RootGrid roots = lower.roots();
+  roots.rows += upper.roots().rows;
   std::vector<QuadtreeNode> nodes;
   NodeCopy copy(nodes);
   for (const Quadtree* tree : {&lower, &upper})

@@ -9,8 +9,11 @@ namespace tomofield::field {
 /// order.
 Quadtree some_bands(const Quadtree& tree, base::Range bands);
 
+/// Says whether two trees have the same columns, and `upper` begins where `lower` ends.
+bool is_joinable(const Quadtree& lower, const Quadtree& upper);
+
 /// Returns a tree of the bands of both trees. Those of `upper` follow those of `lower`, and so do
-/// its leaves. Both must have the same columns, and `upper` begins where `lower` ends.
+/// its leaves. They must be joinable.
 Quadtree joined(const Quadtree& lower, const Quadtree& upper);
 
 /// Returns the leaves of some bands; their numbers are consecutive.

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cctype>
-#include <system_error>
+#include <map>
 
+#include "io/saving/file_identity.h"
 #include "io/saving/output_target.h"
 #include "tomofield/error.h"
 
@@ -19,38 +19,42 @@ std::vector<fs::path>& other_inputs() {
   return files;
 }
 
-void require_no_input(const fs::path& result, const std::vector<fs::path>& inputs) {
-  for (const fs::path& file : inputs) {
-    std::error_code absent;
-    if (!fs::equivalent(result, file, absent)) continue;
-    throw Error(
-        fmt::format("the result '{}' would replace the input '{}': give another name or directory",
-                    result.string(), file.string()));
-  }
-}
-
 }  // namespace
 
 void add_input(const fs::path& file) { other_inputs().push_back(file); }
 
+const std::vector<fs::path>& added_inputs() { return other_inputs(); }
+
 void require_no_input_is_replaced(const std::vector<fs::path>& results,
                                   const std::vector<fs::path>& inputs) {
+  std::map<FileIdentity, fs::path> read;
+  for (const fs::path& file : inputs) read.emplace(identity_of(file), file);
+  for (const fs::path& file : other_inputs()) read.emplace(identity_of(file), file);
   for (const fs::path& result : results) {
-    require_no_input(result, inputs);
-    require_no_input(result, other_inputs());
+    const auto input = read.find(identity_of(result));
+    if (input == read.end()) continue;
+    throw Error(
+        fmt::format("the result '{}' would replace the input '{}': give another name or directory",
+                    result.string(), input->second.string()));
+  }
+}
+
+void require_distinct(const std::vector<fs::path>& results) {
+  std::map<FileIdentity, fs::path> written;
+  for (const fs::path& result : results) {
+    const auto [same, is_new] = written.emplace(identity_of(result), result);
+    if (is_new) continue;
+    throw Error(fmt::format(
+        "two results would both be '{}'{}: give them different names (a "
+        "volume's ends in .mrc)",
+        result.string(),
+        same->second == result ? "" : fmt::format(", which is also '{}'", same->second.string())));
   }
 }
 
 void check_output_files(const std::vector<fs::path>& results, const std::vector<fs::path>& inputs,
                         bool may_replace, const std::string& advice) {
-  for (auto it = results.begin(); it != results.end(); ++it) {
-    if (std::find(it + 1, results.end(), *it) != results.end()) {
-      throw Error(
-          fmt::format("two results would both be '{}': give them different names (a volume's "
-                      "ends in .mrc)",
-                      it->string()));
-    }
-  }
+  require_distinct(results);
   require_no_input_is_replaced(results, inputs);
   for (const fs::path& result : results) {
     if (!may_replace && fs::exists(result))
@@ -79,10 +83,16 @@ std::vector<fs::path> input_files(const SeriesFiles& input) {
   return files;
 }
 
+std::vector<fs::path> picture_files(const fs::path& prefix) {
+  std::vector<fs::path> files;
+  for (const char* picture : {"_xy.png", "_xz.png", "_yz.png", "_mask.png"})
+    files.emplace_back(prefix.string() + picture);
+  return files;
+}
+
 void check_result_files(std::vector<fs::path> results, const fs::path& picture_prefix,
                         const SeriesFiles& input, bool may_replace, const std::string& advice) {
-  for (const char* picture : {"_xy.png", "_xz.png", "_yz.png", "_mask.png"})
-    results.emplace_back(picture_prefix.string() + picture);
+  for (const fs::path& picture : picture_files(picture_prefix)) results.push_back(picture);
   check_output_files(results, input_files(input), may_replace, advice);
 }
 

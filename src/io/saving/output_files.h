@@ -12,9 +12,15 @@ namespace tomofield::io {
 /// an input of everything that the process writes from then on.
 void add_input(const std::filesystem::path& file);
 
+/// Returns the files of add_input().
+const std::vector<std::filesystem::path>& added_inputs();
+
 /// Throws Error if a result would replace one of the `inputs` or of add_input().
 void require_no_input_is_replaced(const std::vector<std::filesystem::path>& results,
                                   const std::vector<std::filesystem::path>& inputs);
+
+/// Throws Error if two results would be one file (file_identity.h).
+void require_distinct(const std::vector<std::filesystem::path>& results);
 
 /// Checks before any work that results can be written. Throws Error if two results would be one
 /// file, if one would replace one of the `inputs` or of add_input() (even if it may replace
@@ -30,8 +36,11 @@ void require_volume_name(const std::filesystem::path& volume);
 /// Returns every file that a series is read from.
 std::vector<std::filesystem::path> input_files(const SeriesFiles& files);
 
+/// Returns the pictures of slices whose names begin with `prefix` (report/slice.h).
+std::vector<std::filesystem::path> picture_files(const std::filesystem::path& prefix);
+
 /// Checks that the results of a series can be written (check_output_files()) and that none replaces
-/// a file that the series is read from. Pictures of slices (report/slice.h) are results too. Throws
+/// a file that the series is read from. picture_files() are results too. Throws
 /// Error, with `advice`, otherwise.
 void check_result_files(std::vector<std::filesystem::path> results,
                         const std::filesystem::path& picture_prefix, const SeriesFiles& input,

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "io/saving/file_identity.h"
 #include "tomofield/error.h"
 
 namespace tomofield::io {
@@ -65,7 +66,7 @@ fs::path output_target(const fs::path& path) {
   }
   fs::path target = path;
   if (fs::is_symlink(path, error)) {
-    target = fs::weakly_canonical(path, error);
+    target = fs::weakly_canonical(end_of_links(path), error);
     if (error) target = path;
   }
   require_replaceable(target);

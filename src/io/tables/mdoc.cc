@@ -122,6 +122,15 @@ std::optional<std::int64_t> parse_time(std::string_view text) {
   return midnight.count() + seconds;
 }
 
+// Returns the dose that an entry says, which must be a number of 0 or more.
+double require_dose(const std::filesystem::path& path, const TextLine& line,
+                    const KeyValue& entry) {
+  const double dose = require_number(path, line, entry.value, base::kLargestNumber);
+  if (dose >= 0.0) return dose;
+  throw Error(fmt::format("'{}', line {}: {} is {}, and a dose cannot be negative", path.string(),
+                          line.number, entry.key, dose));
+}
+
 // Sets what an entry of a section says.
 void read_section_entry(const std::filesystem::path& path, const TextLine& line,
                         const KeyValue& entry, MdocSection* section) {
@@ -129,9 +138,9 @@ void read_section_entry(const std::filesystem::path& path, const TextLine& line,
     section->tilt_deg = require_number(path, line, entry.value, base::kLargestAngle_deg);
     section->line = line.number;
   } else if (entry.key == "PriorRecordDose") {
-    section->prior_dose = parse_number(entry.value);
+    section->prior_dose = require_dose(path, line, entry);
   } else if (entry.key == "ExposureDose") {
-    section->dose = parse_number(entry.value);
+    section->dose = require_dose(path, line, entry);
   } else if (entry.key == "DateTime") {
     section->time_s = parse_time(entry.value);
   } else if (entry.key == "SubFramePath") {

@@ -11,7 +11,6 @@ namespace tomofield::io {
 namespace {
 
 constexpr double kLargestShift_A = base::kLargestPosition_px;
-constexpr double kLargestDose = 1e6;
 
 std::optional<std::array<std::int64_t, 3>> size_of(const StarRow& row) {
   std::array<std::int64_t, 3> size{};
@@ -72,7 +71,7 @@ ListedView view_of(const StarRow& row) {
   view.rotation_deg = row.number("rlnTomoZRot", base::kLargestAngle_deg);
   view.shift_x_A = row.number("rlnTomoXShiftAngst", kLargestShift_A);
   view.shift_y_A = row.number("rlnTomoYShiftAngst", kLargestShift_A);
-  view.dose_before = row.find_number("rlnMicrographPreExposure", kLargestDose);
+  view.dose_before = row.find_dose("rlnMicrographPreExposure");
   view.defocus = defocus_of(row);
   return view;
 }

@@ -159,6 +159,13 @@ std::optional<double> StarRow::find_number(std::string_view column, double large
                           quote(*value), column, largest, largest));
 }
 
+std::optional<double> StarRow::find_dose(std::string_view column) const {
+  constexpr double kLargestDose = 1e6;
+  const auto dose = find_number(column, kLargestDose);
+  if (!dose || *dose >= 0.0) return dose;
+  throw Error(fmt::format("{}: the dose {} in the column _{} is negative", where(), *dose, column));
+}
+
 double StarRow::number(std::string_view column, double largest) const {
   text(column);  // refuses a column that is not there
   return *find_number(column, largest);

@@ -24,7 +24,7 @@ ViewTable read_warp_tomostar(const std::filesystem::path& path) {
     view.rotation_deg = row.find_number("wrpAxisAngle", base::kLargestAngle_deg).value_or(0.0);
     view.shift_x_A = row.find_number("wrpAxisOffsetX", base::kLargestPosition_px).value_or(0.0);
     view.shift_y_A = row.find_number("wrpAxisOffsetY", base::kLargestPosition_px).value_or(0.0);
-    view.dose_before = row.find_number("wrpDose");
+    view.dose_before = row.find_dose("wrpDose");
     views.views.push_back(std::move(view));
   }
   if (!tables.front().has_column("wrpAxisOffsetX"))

@@ -203,6 +203,9 @@ ViewTable read_warp_xml(const std::filesystem::path& path) {
     view.rotation_deg = axes[i];
     view.shift_x_A = offsets_x[i];
     view.shift_y_A = offsets_y[i];
+    if (doses[i] < 0.0)
+      throw Error(
+          fmt::format("'{}': the dose {} of view {} is negative", path.string(), doses[i], i + 1));
     view.dose_before = doses[i];
     table.views.push_back(std::move(view));
   }

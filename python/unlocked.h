@@ -1,0 +1,35 @@
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace tomofield::python {
+
+/// Gives up the interpreter's lock while C++ works, and takes it back at the end.
+///
+/// A daemon thread may be in C++ when the interpreter ends. Python would end that thread at its
+/// next wish for the lock, through C++ that cannot be unwound, and the process would abort. So the
+/// interpreter waits for all objects of this class before it ends (wait_at_exit()), reconstructions
+/// stop at their next step (must_stop()), and none can be made afterwards: the constructor throws
+/// Error.
+class Unlocked {
+ public:
+  Unlocked();
+  Unlocked(const Unlocked&) = delete;
+  Unlocked& operator=(const Unlocked&) = delete;
+
+ private:
+  struct Counted {
+    Counted();
+    ~Counted();
+  };
+  Counted counted_;  // the first member: it counts until the lock is taken back
+  pybind11::gil_scoped_release released_;
+};
+
+/// Returns true once the interpreter ends.
+bool must_stop();
+
+/// Lets the interpreter wait at its end for what runs in C++.
+void wait_at_exit();
+
+}  // namespace tomofield::python

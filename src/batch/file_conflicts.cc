@@ -1,0 +1,97 @@
+#include "batch/file_conflicts.h"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <string>
+
+#include "batch/choice.h"
+#include "batch/faults.h"
+#include "batch/relion_table.h"
+#include "batch/slurm.h"
+#include "batch/state.h"
+#include "batch/summary.h"
+#include "io/saving/file_identity.h"
+#include "io/saving/output_files.h"
+#include "output/output_paths.h"
+
+namespace tomofield::batch {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Returns the files of the batch itself.
+std::vector<fs::path> files_of_batch(const fs::path& folder, const std::vector<Job>& jobs) {
+  std::vector<fs::path> files{list_of(folder), summary_table(folder), summary_page(folder),
+                              choice_file(folder), script_of(folder)};
+  if (are_of_star_files(jobs)) files.push_back(relion_table(folder));
+  for (const Job& job : jobs) {
+    files.push_back(log_of(folder, job));
+    files.push_back(state_file_of(folder, job));
+  }
+  return files;
+}
+
+std::vector<fs::path> results_of(const Job& job) {
+  if (!job.is_skipped) return job.files.results;
+  const output::OutputPaths paths = output::output_paths(job.output);
+  std::vector<fs::path> files{paths.volume, paths.model, paths.json, paths.report};
+  for (const fs::path& picture : io::picture_files(paths.picture_prefix)) files.push_back(picture);
+  return files;
+}
+
+// Collects who writes which files, and finds those that are written twice or read.
+class Writers {
+ public:
+  explicit Writers(Faults& faults) : faults_(faults) {}
+
+  void add(const std::string& writer, const std::vector<fs::path>& files) {
+    for (const fs::path& file : files) {
+      const auto [first, is_new] = writers_.emplace(io::identity_of(file), Written{writer, file});
+      if (is_new || first->second.writer == writer) continue;
+      faults_.add(fmt::format("{} and {} would both write '{}'{}: give one another name or output",
+                              first->second.writer, writer, file.string(),
+                              other_spelling(first->second.file, file)));
+      return;  // one sentence for two writers
+    }
+  }
+
+  void require_none_reads(const std::string& reader, const std::vector<fs::path>& files) {
+    for (const fs::path& file : files) {
+      const auto found = writers_.find(io::identity_of(file));
+      if (found == writers_.end()) continue;
+      faults_.add(fmt::format(
+          "{} would replace '{}'{}, which {} is read from: give it another name or output",
+          found->second.writer, found->second.file.string(),
+          other_spelling(file, found->second.file), reader));
+    }
+  }
+
+ private:
+  struct Written {
+    std::string writer;
+    fs::path file;
+  };
+
+  static std::string other_spelling(const fs::path& file, const fs::path& named) {
+    return file == named ? "" : fmt::format(", which is '{}'", file.string());
+  }
+
+  Faults& faults_;
+  std::map<io::FileIdentity, Written> writers_;
+};
+
+}  // namespace
+
+void require_own_files(const fs::path& folder, const fs::path& list, const std::vector<Job>& jobs) {
+  Faults faults;
+  Writers writers(faults);
+  const auto name_of = [](const Job& job) { return fmt::format("the series '{}'", job.name); };
+  writers.add("the batch itself", files_of_batch(folder, jobs));
+  for (const Job& job : jobs) writers.add(name_of(job), results_of(job));
+  writers.require_none_reads("the list of the series", {list});
+  for (const Job& job : jobs) writers.require_none_reads(name_of(job), job.files.inputs);
+  faults.require_none();
+}
+
+}  // namespace tomofield::batch
