@@ -42,7 +42,8 @@ def test_help_fits_on_a_screen():
 def test_help_all_has_every_option_of_the_page():
     text = harness.succeed("reconstruct", "--help-all").stdout
     page = set(flags_of_keys().values())
-    assert options_in(text) == page | COMMON | {"--trace", "--series", "--plan", "--choice"}, options_in(text) ^ (page | COMMON)
+    assert options_in(text) == page | COMMON | {"--trace", "--series", "--plan", "--choice",
+                                               "--grid"}, options_in(text) ^ (page | COMMON)
     assert max(map(len, text.splitlines())) <= 100
 
 
