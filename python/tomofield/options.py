@@ -66,37 +66,20 @@ class Options(TypedDict, total=False):
     field: Optional[Literal["vm", "grid"]]
     leaf_size: Optional[int]
     tree: Literal["uniform", "adaptive"]
-    leaf_budget: int
     vertex_spacing: float
     rank: Optional[int]
-    activation: Optional[Literal["softplus", "identity"]]
     budget: str
     tile_rows: Optional[int]
 
     # Fit
     align: Literal["off", "refine", "full"]
     epochs: Optional[int]
-    vertex_epochs: Optional[int]
-    coarse_epochs: Optional[int]
-    coarse_bin: int
-    subsets: int
-    engine: Literal["slab", "ray"]
-    ray_samples: int
-    rays_per_step: int
-    learning_rate: Optional[float]
     denoise: str
     density_variation: Optional[float]
-    factor_variation: float
     penalty: Optional[Literal["concave", "smooth"]]
     prior: Optional[Literal["tv", "light", "learned"]]
-    boundary: float
-    fourier: float
-    fourier_ring: Literal["mean", "max"]
-    spike_rank: Optional[int]
-    fit_noise: bool
     noise_model: Literal["white", "coloured"]
     fit_view_scale: Optional[bool]
-    margin_spacing: float
     hold_out: int
     tune: bool
     patience: int
@@ -120,3 +103,22 @@ class Options(TypedDict, total=False):
     resume: bool
     checkpoint_minutes: float
     alignment_json: bool
+
+    # For research
+    leaf_budget: int
+    activation: Optional[Literal["softplus", "identity"]]
+    vertex_epochs: Optional[int]
+    coarse_epochs: Optional[int]
+    coarse_bin: int
+    subsets: int
+    engine: Literal["slab", "ray"]
+    ray_samples: int
+    rays_per_step: int
+    learning_rate: Optional[float]
+    factor_variation: float
+    boundary: float
+    fourier: float
+    fourier_ring: Literal["mean", "max"]
+    spike_rank: Optional[int]
+    fit_noise: bool
+    margin_spacing: float

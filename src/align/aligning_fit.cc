@@ -52,10 +52,8 @@ bool is_update_due(const fit::Stage& stage, std::int64_t epochs_done, bool is_do
 base::ProgressReport report(const fit::Fit& fit, double seconds,
                             const std::vector<double>& steps_px) {
   const double part = fit.work(fit.progress().step) / fit.work(fit.num_steps());
-  return {.fraction_done = part,
-          .seconds_elapsed = seconds,
-          .seconds_left = (1 - part) / part * seconds,
-          .detail = steps_px.empty() ? "" : fmt::format("last step {:.3f} px", steps_px.back())};
+  return base::progress_at(
+      part, seconds, steps_px.empty() ? "" : fmt::format("last step {:.3f} px", steps_px.back()));
 }
 
 // Returns how wide the pixels of the next epoch are. At the end of a stage, the fit enters the next

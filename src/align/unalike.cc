@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "geometry/tilt_order.h"
 
 namespace tomofield::align {
@@ -31,13 +31,12 @@ std::vector<int> unalike(std::span<const double> tilt_deg, std::span<const doubl
       if (j != i) neighbours.push_back(correlation[by_tilt[static_cast<std::size_t>(j)]]);
     if (neighbours.empty()) continue;
     const std::size_t view = by_tilt[static_cast<std::size_t>(i)];
-    expected[view] = base::percentile(neighbours, 50);
+    expected[view] = base::median(neighbours);
     lacks[view] = stretched(expected[view]) - stretched(correlation[view]);
     sizes.push_back(std::abs(lacks[view]));
   }
   if (sizes.empty()) return {};
-  // Half of the values of a Gaussian lie within 1 / 1.4826 standard deviations.
-  const double deviation = 1.4826 * base::percentile(sizes, 50);
+  const double deviation = base::kSigmaOfMedianDeviation * base::median(sizes);
   std::vector<int> views;
   for (std::size_t v = 0; v < tilt_deg.size(); ++v) {
     const bool is_unalike = correlation[v] < kUnalike * expected[v];

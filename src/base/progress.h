@@ -21,4 +21,20 @@ inline ProgressReport progress_at(double fraction_done, double seconds_elapsed,
 }
 using ProgressSink = std::function<void(const ProgressReport&)>;
 
+/// Returns a sink for a part of a computation that another sink receives: the part begins at the
+/// fraction `begin` of the whole and takes `size` of it. Details begin with `name`. The part must
+/// not outlive `whole`. Without a `whole` there is none.
+inline ProgressSink part_of(const ProgressSink& whole, double begin, double size,
+                            std::string name) {
+  if (!whole) return {};
+  return [&whole, begin, size, name = std::move(name)](const ProgressReport& part) {
+    ProgressReport report = part;
+    report.fraction_done = begin + size * part.fraction_done;
+    const double seconds_of_part = part.seconds_elapsed + part.seconds_left;
+    report.seconds_left += seconds_of_part * (1 - begin - size) / size;
+    report.detail = name + "  " + part.detail;
+    whole(report);
+  };
+}
+
 }  // namespace tomofield::base

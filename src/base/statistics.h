@@ -2,14 +2,44 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <utility>
 #include <vector>
+
+#include "base/check.h"
 
 namespace tomofield::base {
 
+/// The standard deviation of normally distributed values over their median absolute deviation:
+/// 1 / Φ⁻¹(3/4).
+inline constexpr double kSigmaOfMedianDeviation = 1.4826;
+
+/// Returns the value below which `percent` of the values lie, interpolated linearly between
+/// neighbours as numpy does by default. Takes a copy, which it reorders. `values` must not be empty
+/// and must not contain NaN.
+template <typename Value = float>
+double percentile(std::vector<Value> values, double percent) {
+  TOMOFIELD_CHECK(!values.empty(), "percentile of nothing");
+  const double position = percent / 100.0 * static_cast<double>(values.size() - 1);
+  const auto low = static_cast<std::ptrdiff_t>(position);
+  std::nth_element(values.begin(), values.begin() + low, values.end());
+  const auto below = static_cast<double>(values[static_cast<std::size_t>(low)]);
+  if (low + 1 == static_cast<std::ptrdiff_t>(values.size())) return below;
+  const auto above = static_cast<double>(*std::min_element(values.begin() + low + 1, values.end()));
+  return below + (above - below) * (position - static_cast<double>(low));
+}
+
+/// Returns the median, which is the mean of the two in the middle of an even number of values.
+template <typename Value = float>
+double median(std::vector<Value> values) {
+  return percentile(std::move(values), 50);
+}
+
 /// Returns the median of `values`, the upper one of the two in the middle; 0 without values. The
 /// values are in another order afterwards.
-inline float median_in_place(std::vector<float>& values) {
-  if (values.empty()) return 0.0f;
+template <typename Value>
+Value median_in_place(std::vector<Value>& values) {
+  if (values.empty()) return 0;
   const auto middle = values.begin() + std::ssize(values) / 2;
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
@@ -19,9 +49,8 @@ inline float median_in_place(std::vector<float>& values) {
 /// deviation have, which outliers hardly change; 0 without values. The values become their
 /// distances from the median.
 inline double robust_deviation_in_place(std::vector<float>& values) {
-  constexpr double kSigmaOfMedianDeviation = 1.4826;  // 1 / Φ⁻¹(3/4)
-  const float median = median_in_place(values);
-  for (float& value : values) value = std::fabs(value - median);
+  const float middle = median_in_place(values);
+  for (float& value : values) value = std::fabs(value - middle);
   return kSigmaOfMedianDeviation * static_cast<double>(median_in_place(values));
 }
 

@@ -2,8 +2,18 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 namespace tomofield::base {
 namespace {
+
+TEST(Statistics, PercentilesInterpolatesLikeNumpy) {
+  const std::vector<float> values{5.0f, 1.0f, 4.0f, 2.0f};
+  EXPECT_DOUBLE_EQ(percentile(values, 0.0), 1.0);
+  EXPECT_DOUBLE_EQ(percentile(values, 50.0), 3.0);
+  EXPECT_DOUBLE_EQ(percentile(values, 90.0), 4.7);
+  EXPECT_DOUBLE_EQ(percentile(values, 100.0), 5.0);
+}
 
 TEST(Statistics, MedianIsTheUpperOneOfTwoInTheMiddle) {
   std::vector<float> odd = {5, 1, 3}, even = {4, 1, 3, 2}, none;

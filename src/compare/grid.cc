@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <regex>
+#include <nlohmann/json.hpp>
 
-#include "base/check.h"
 #include "evaluate/volume_pair.h"
 #include "io/images/mrc.h"
+#include "io/json_numbers.h"
 #include "tomofield/error.h"
 
 namespace tomofield::compare {
@@ -26,11 +26,9 @@ Grid read_grid(const std::filesystem::path& mrc) {
   return {{header.nx, header.ny, header.nz}, header.voxel_size_A[0]};
 }
 
-Grid planned_grid(const std::string& said) {
-  static const std::regex sizes(", ([^ ]+) Å; tomogram ([0-9]+) × ([0-9]+) × ([0-9]+) voxels");
-  std::smatch found;
-  TOMOFIELD_CHECK(std::regex_search(said, found, sizes), "a --dry-run without sizes: " + said);
-  return {{std::stoll(found[2]), std::stoll(found[3]), std::stoll(found[4])}, std::stod(found[1])};
+Grid read_planned_grid(const std::filesystem::path& file) {
+  const nlohmann::json grid = io::read_json(file).at("grid");
+  return {grid.at("size"), grid.at("voxel_A")};
 }
 
 void require_one_grid(const NamedGrid& main, const NamedGrid& other) {

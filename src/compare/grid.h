@@ -16,9 +16,8 @@ struct Grid {
 /// Reads the grid from the header of an MRC volume.
 Grid read_grid(const std::filesystem::path& mrc);
 
-/// Reads the grid from what a command that reconstructs prints under --dry-run (cli::print_sizes).
-/// Its voxel size has four digits.
-Grid planned_grid(const std::string& said);
+/// Reads the grid of a volume that is to be made, from what --dry-run --grid FILE writes.
+Grid read_planned_grid(const std::filesystem::path& file);
 
 /// The grid of a volume and the name of its maker.
 struct NamedGrid {

@@ -14,12 +14,12 @@ namespace {
 using testing::message_of;
 using testing::ScratchDirectory;
 
-TEST(PlannedGrid, IsWhatADryRunSays) {
-  const Grid grid = planned_grid(
-      "warning: something\n20 views of 48 × 36 pixels, 13.37 Å; tomogram 48 × 24 × 36 voxels (x, "
-      "z, y)\nmore\n");
+TEST(PlannedGrid, IsWhatADryRunWrites) {
+  const ScratchDirectory scratch;
+  const Grid grid = read_planned_grid(
+      scratch.write("grid.json", R"({"grid": {"size": [48, 24, 36], "voxel_A": 13.372}})"));
   EXPECT_EQ(grid.size, (std::array<std::int64_t, 3>{48, 24, 36}));
-  EXPECT_EQ(grid.voxel_A, 13.37);
+  EXPECT_EQ(grid.voxel_A, 13.372);
 }
 
 TEST(OneGrid, IsRequiredOfAllVolumes) {

@@ -89,14 +89,14 @@ Run plan_run(Purpose purpose, const Method& method, const std::string& exclude,
 std::optional<Grid> grid_to_be(const CompareOptions& options, const RunHooks& hooks, const Row& row,
                                const fs::path& scratch) {
   if (is_done(row)) return read_grid(row.volume);
-  const fs::path log = scratch / "log";
+  const fs::path log = scratch / "log", grid = scratch / "grid.json";
   auto command = full_command(options.program, row, row.volume);
-  command.emplace_back("--dry-run");
+  command.insert(command.end(), {"--dry-run", "--grid", grid.string()});
   const base::ChildResult result = base::run_child(command, log, hooks.stop_requested);
   if (hooks.must_stop()) return std::nullopt;
   if (result.exit_status != 0)
     throw Error(fmt::format("{}: {}", row.run.name, base::reason_of_failure(log)));
-  return planned_grid(io::read_text_file(log));
+  return read_planned_grid(grid);
 }
 
 // Throws Error unless the regions and the profile that are given lie in the volumes.

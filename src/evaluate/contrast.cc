@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "base/statistics.h"
 #include "base/threads/parallel.h"
 #include "tomofield/error.h"
 
@@ -91,9 +92,8 @@ std::vector<base::Box> lattice_cubes(const base::Shape3& shape) {
 std::size_t background_cube(const std::vector<Moments>& cubes) {
   std::vector<double> means;
   for (const Moments& cube : cubes) means.push_back(cube.mean);
-  std::ranges::sort(means);
   const std::size_t n = means.size();
-  const double median = 0.5 * (means[(n - 1) / 2] + means[n / 2]);
+  const double median = base::median(std::move(means));
   std::vector<std::size_t> nearest(n);
   std::iota(nearest.begin(), nearest.end(), std::size_t{0});
   std::ranges::stable_sort(nearest, {},

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 
 namespace tomofield::measurement {
 namespace {
@@ -29,7 +29,7 @@ void fit_noise(std::span<const double> noise_weight, std::span<const int> fitted
     variance.push_back(noise_weight[view] * sums[view].limited_squares / sums[view].n);
   }
   if (views.empty()) return;
-  const double usual = base::percentile({variance.begin(), variance.end()}, 50);
+  const double usual = base::median({variance.begin(), variance.end()});
   double measured = 0.0, weighted = 0.0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     ViewModel& model = models[views[i]];

@@ -184,18 +184,11 @@ constexpr Row kRows[] = {
     {.key = "field.tree", .flag = "--tree", MEMBER(options.field, tree), .group = Group::kField,
      .help = "uniform: all leaves are alike; adaptive: leaves are finer where the density varies "
              "more"},
-    {.key = "field.leaf_budget", .flag = "--leaf-budget", MEMBER(options.field, leaf_budget),
-     .group = Group::kField, .range = Range::between(0, kMaxCount),
-     .help = "Largest number of leaves of an adaptive tree. 0: as many as at the start"},
     {.key = "field.vertex_spacing", .flag = "--vertex-spacing", MEMBER(options.field, vertex_spacing),
      .group = Group::kField, .unit = kBinned, .range = Range::between(0.25, 64),
      .help = "Distance between vertices, in leaves of --leaf-size"},
     {.key = "field.rank", .flag = "--rank", MEMBER(options.field, rank), .group = Group::kField,
      .range = Range::between(1, 256), .automatic = "24; --tune tries others", .help = "Number of components of each mode (with --field vm)"},
-    {.key = "field.activation", .flag = "--activation", MEMBER(options.field, activation),
-     .group = Group::kField,
-     .automatic = "identity for dark contrast, whose zero is uncertain, else softplus",
-     .help = "softplus keeps densities above zero; identity lets them have either sign"},
     {.key = "field.budget", .flag = "--budget", MEMBER(options.field, budget), .group = Group::kField,
      .label = "AMOUNT",
      .help = "Replace the finished fit by a compact model: within decibels of PSNR (0.1dB), "
@@ -216,37 +209,6 @@ constexpr Row kRows[] = {
                   "that do not begin with vertices; half for vertices 2 or more pixels apart (4 or "
                   "more in an adaptive tree)",
      .help = "Passes over all views at full resolution"},
-    {.key = "fit.vertex_epochs", .flag = "--vertex-epochs", MEMBER(options.fit, vertex_epochs),
-     .group = Group::kFit, .range = Range::between(0, kMaxCount),
-     .automatic = "as many as --epochs, at most 10, where vertices take no more memory than "
-                  "factors, else 0",
-     .help = "Passes at full resolution with plain vertices, before those of --epochs; the vertices "
-             "are then factorised. 0: fit factors from the start"},
-    {.key = "fit.coarse_epochs", .flag = "--coarse-epochs", MEMBER(options.fit, coarse_epochs),
-     .group = Group::kFit, .range = Range::between(0, kMaxCount),
-     .automatic = "160; fewer in proportion where --epochs is below its own default",
-     .help = "Passes over binned views, before all passes at full resolution. 0: none"},
-    {.key = "fit.coarse_bin", .flag = "--coarse-bin", MEMBER(options.fit, coarse_bin),
-     .group = Group::kFit, .unit = "pixels on each axis", .range = Range::between(2, 64),
-     .help = "Largest binning of the coarse passes: a power of two that divides a sixteenth of a "
-             "leaf's side. Passes with half of it follow, down to 2"},
-    {.key = "fit.subsets", .flag = "--subsets", MEMBER(options.fit, subsets), .group = Group::kFit,
-     .range = Range::between(1, kMaxCount),
-     .help = "Number of steps in a pass; each step uses one interleaved subset of the views"},
-    {.key = "fit.engine", .flag = "--engine", MEMBER(options.fit, engine), .group = Group::kFit,
-     .help = "slab: fast, for one tilt axis; ray: any geometry of the views, which are not "
-             "resampled"},
-    {.key = "fit.ray_samples", .flag = "--ray-samples", MEMBER(options.fit, ray_samples),
-     .group = Group::kFit, .range = Range::between(0, 1 << 20),
-     .help = "Samples along a leaf's diagonal (with --engine ray). 0: one for each pixel"},
-    {.key = "fit.rays_per_step", .flag = "--rays-per-step", MEMBER(options.fit, rays_per_step),
-     .group = Group::kFit, .range = Range::between(0, kMaxCount),
-     .help = "Approximate number of rays in a step (with --engine ray). 0: all rays divided by "
-             "--subsets"},
-    {.key = "fit.learning_rate", .flag = "--learning-rate", MEMBER(options.fit, learning_rate),
-     .group = Group::kFit, .range = Range::above(0), .automatic = "0.05; 0.035 for --field grid",
-     .help = "Learning rate of the first step; it decays exponentially. Vertices that are "
-             "factorised later take 0.7 of it, the factors made of them 0.3"},
     {.key = "fit.denoise", .flag = "--denoise", MEMBER(options.fit, denoise), .group = Group::kFit,
      .label = "STRENGTH", .help = "Smoothness: light, medium, strong or a factor",
      .is_common = true},
@@ -255,9 +217,6 @@ constexpr Row kRows[] = {
      .automatic = "14; with the smooth penalty 5, or 0.9 to 29 by trials if the penalty is left to "
                   "them too",
      .help = "Weight of the density's total variation"},
-    {.key = "fit.factor_variation", .flag = "--tv-factors", MEMBER(options.fit, factor_variation),
-     .group = Group::kFit, .unit = "noise units", .range = Range::at_least(0),
-     .help = "Weight of the factors' total variation"},
     {.key = "fit.penalty", .flag = "--tv-penalty", MEMBER(options.fit, penalty),
      .group = Group::kFit,
      .automatic = "concave if --tv is given, or if it predicts held-out views better in short trials "
@@ -268,25 +227,6 @@ constexpr Row kRows[] = {
                   "--tv-penalty is given",
      .help = "learned: end the fit with a prior that simulated tilt series taught, for plain vertices "
              "a pixel apart. tv: total variation alone. light: little of it, as the training needs"},
-    {.key = "fit.boundary", .flag = "--bcc", MEMBER(options.fit, boundary), .group = Group::kFit,
-     .range = Range::at_least(0),
-     .help = "Weight of the boundary consistency: neighbouring leaves agree on their faces"},
-    {.key = "fit.fourier", .flag = "--ifp", MEMBER(options.fit, fourier), .group = Group::kFit,
-     .range = Range::at_least(0),
-     .help = "Weight of the isotropic Fourier prior, which acts against streaks along X and Y"},
-    {.key = "fit.fourier_ring", .flag = "--ifp-ring", MEMBER(options.fit, fourier_ring),
-     .group = Group::kFit,
-     .help = "Compare the Fourier axes with the mean or the maximum of each ring"},
-    {.key = "fit.spike_rank", .flag = "--spike-rank", MEMBER(options.fit, spike_rank),
-     .group = Group::kFit, .range = Range::between(0, 8),
-     .automatic = "3, or 0 if trials with the smooth penalty clearly prefer it",
-     .help = "After each epoch, plain vertices are at most as large as the one of this rank among "
-             "the 26 around them, and as small: single black and white voxels go. 0: no limit"},
-    {.key = "fit.fit_noise", .flag = "--no-noise-fit", MEMBER(options.fit, fit_noise),
-     .group = Group::kFit,
-     .help = "Weight each view by the noise measured on it alone, and residuals of any size fully. "
-             "By default views that the volume predicts worse than others count less, and a "
-             "residual counts at most as one of 4 standard deviations"},
     {.key = "fit.noise_model", .flag = "--noise-model", MEMBER(options.fit, noise_model),
      .group = Group::kFit,
      .help = "coloured: late in the fit, weight the frequencies of each view by the inverse of the "
@@ -294,9 +234,6 @@ constexpr Row kRows[] = {
     {.key = "fit.fit_view_scale", .flag = "--view-scale", MEMBER(options.fit, fit_view_scale),
      .group = Group::kFit, .automatic = "what trials prefer; without trials on for dark contrast, else off",
      .help = "Fit a scale and an offset for every view"},
-    {.key = "field.margin_spacing", .flag = "--margin-spacing", MEMBER(options.field, margin_spacing),
-     .group = Group::kFit, .unit = kBinned, .range = Range::between(1, 64),
-     .help = "Distance between samples of the margin around the region of interest"},
     {.key = "fit.hold_out", .flag = "--hold-out", MEMBER(options.fit, hold_out),
      .group = Group::kFit, .range = Range::zero_or_between(2, kMaxCount),
      .help = "Leave every Nth view out of the fit and score it. 0: none"},
@@ -349,6 +286,71 @@ constexpr Row kRows[] = {
     {.key = "running.alignment_json", .flag = "--alignment-json", MEMBER(options.run, alignment_json),
      .group = Group::kRun,
      .help = "Also write the alignment as the CryoET Data Portal has it, in NAME_alignment.json"},
+
+    // For research
+    {.key = "field.leaf_budget", .flag = "--leaf-budget", MEMBER(options.field, leaf_budget),
+     .group = Group::kResearch, .range = Range::between(0, kMaxCount),
+     .help = "Largest number of leaves of an adaptive tree. 0: as many as at the start"},
+    {.key = "field.activation", .flag = "--activation", MEMBER(options.field, activation),
+     .group = Group::kResearch,
+     .automatic = "identity for dark contrast, whose zero is uncertain, else softplus",
+     .help = "softplus keeps densities above zero; identity lets them have either sign"},
+    {.key = "fit.vertex_epochs", .flag = "--vertex-epochs", MEMBER(options.fit, vertex_epochs),
+     .group = Group::kResearch, .range = Range::between(0, kMaxCount),
+     .automatic = "as many as --epochs, at most 10, where vertices take no more memory than "
+                  "factors, else 0",
+     .help = "Passes at full resolution with plain vertices, before those of --epochs; the vertices "
+             "are then factorised. 0: fit factors from the start"},
+    {.key = "fit.coarse_epochs", .flag = "--coarse-epochs", MEMBER(options.fit, coarse_epochs),
+     .group = Group::kResearch, .range = Range::between(0, kMaxCount),
+     .automatic = "160; fewer in proportion where --epochs is below its own default",
+     .help = "Passes over binned views, before all passes at full resolution. 0: none"},
+    {.key = "fit.coarse_bin", .flag = "--coarse-bin", MEMBER(options.fit, coarse_bin),
+     .group = Group::kResearch, .unit = "pixels on each axis", .range = Range::between(2, 64),
+     .help = "Largest binning of the coarse passes: a power of two that divides a sixteenth of a "
+             "leaf's side. Passes with half of it follow, down to 2"},
+    {.key = "fit.subsets", .flag = "--subsets", MEMBER(options.fit, subsets), .group = Group::kResearch,
+     .range = Range::between(1, kMaxCount),
+     .help = "Number of steps in a pass; each step uses one interleaved subset of the views"},
+    {.key = "fit.engine", .flag = "--engine", MEMBER(options.fit, engine), .group = Group::kResearch,
+     .help = "slab: fast, for one tilt axis; ray: any geometry of the views, which are not "
+             "resampled"},
+    {.key = "fit.ray_samples", .flag = "--ray-samples", MEMBER(options.fit, ray_samples),
+     .group = Group::kResearch, .range = Range::between(0, 1 << 20),
+     .help = "Samples along a leaf's diagonal (with --engine ray). 0: one for each pixel"},
+    {.key = "fit.rays_per_step", .flag = "--rays-per-step", MEMBER(options.fit, rays_per_step),
+     .group = Group::kResearch, .range = Range::between(0, kMaxCount),
+     .help = "Approximate number of rays in a step (with --engine ray). 0: all rays divided by "
+             "--subsets"},
+    {.key = "fit.learning_rate", .flag = "--learning-rate", MEMBER(options.fit, learning_rate),
+     .group = Group::kResearch, .range = Range::above(0), .automatic = "0.05; 0.035 for --field grid",
+     .help = "Learning rate of the first step; it decays exponentially. Vertices that are "
+             "factorised later take 0.7 of it, the factors made of them 0.3"},
+    {.key = "fit.factor_variation", .flag = "--tv-factors", MEMBER(options.fit, factor_variation),
+     .group = Group::kResearch, .unit = "noise units", .range = Range::at_least(0),
+     .help = "Weight of the factors' total variation"},
+    {.key = "fit.boundary", .flag = "--bcc", MEMBER(options.fit, boundary), .group = Group::kResearch,
+     .range = Range::at_least(0),
+     .help = "Weight of the boundary consistency: neighbouring leaves agree on their faces"},
+    {.key = "fit.fourier", .flag = "--ifp", MEMBER(options.fit, fourier), .group = Group::kResearch,
+     .range = Range::at_least(0),
+     .help = "Weight of the isotropic Fourier prior, which acts against streaks along X and Y"},
+    {.key = "fit.fourier_ring", .flag = "--ifp-ring", MEMBER(options.fit, fourier_ring),
+     .group = Group::kResearch,
+     .help = "Compare the Fourier axes with the mean or the maximum of each ring"},
+    {.key = "fit.spike_rank", .flag = "--spike-rank", MEMBER(options.fit, spike_rank),
+     .group = Group::kResearch, .range = Range::between(0, 8),
+     .automatic = "3, or 0 if trials with the smooth penalty clearly prefer it",
+     .help = "After each epoch, plain vertices are at most as large as the one of this rank among "
+             "the 26 around them, and as small: single black and white voxels go. 0: no limit"},
+    {.key = "fit.fit_noise", .flag = "--no-noise-fit", MEMBER(options.fit, fit_noise),
+     .group = Group::kResearch,
+     .help = "Weight each view by the noise measured on it alone, and residuals of any size fully. "
+             "By default views that the volume predicts worse than others count less, and a "
+             "residual counts at most as one of 4 standard deviations"},
+    {.key = "field.margin_spacing", .flag = "--margin-spacing", MEMBER(options.field, margin_spacing),
+     .group = Group::kResearch, .unit = kBinned, .range = Range::between(1, 64),
+     .help = "Distance between samples of the margin around the region of interest"},
 };
 // clang-format on
 #undef MEMBER
@@ -428,6 +430,8 @@ std::string_view title_of(Group group) {
       return "Halves";
     case Group::kRun:
       return "Running";
+    case Group::kResearch:
+      return "For research";
   }
   return {};
 }

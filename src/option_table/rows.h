@@ -53,7 +53,8 @@ enum class Group {
   kFit,
   kVolume,
   kHalves,
-  kRun
+  kRun,
+  kResearch  ///< the method's own settings, which nobody needs to turn
 };
 std::string_view title_of(Group group);
 

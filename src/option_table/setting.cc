@@ -24,6 +24,7 @@ void note_settings(std::vector<Setting> settings, Choices& choices) {
 std::vector<Setting> settings_in_use(const Choices& choices) {
   std::vector<Setting> in_use = choices.options.settings;
   std::erase_if(in_use, [&](const Setting& setting) {
+    if (rows_of_flag(setting.option).empty()) return false;  // an option of another command
     Choices as_set = choices;
     set_flag_from_text(setting.option, setting.value, as_set);
     return std::ranges::any_of(rows_of_flag(setting.option), [&](const Row& row) {

@@ -7,8 +7,8 @@
 #include <optional>
 #include <span>
 
-#include "base/percentile.h"
 #include "base/random.h"
+#include "base/statistics.h"
 #include "base/stopwatch.h"
 #include "base/threads/parallel.h"
 #include "fit/domain.h"
@@ -75,8 +75,7 @@ std::vector<double> seconds_of_steps(fit::Fit& fit) {
     return stage + 1 < times.size() || (done - 1) % steps < kStepsOfLastStage;
   });
   std::vector<double> medians;
-  for (const std::vector<double>& of_stage : times)
-    medians.push_back(base::percentile(of_stage, 50));
+  for (const std::vector<double>& of_stage : times) medians.push_back(base::median(of_stage));
   return medians;
 }
 

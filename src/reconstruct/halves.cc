@@ -46,18 +46,6 @@ struct FinishedPart {
   bool took_steps = false;
 };
 
-// Puts the progress of one fit into that of all.
-base::ProgressSink progress_of(const base::ProgressSink& all, const Part& part) {
-  if (!all) return {};
-  return [&all, name = part.name, share = part.share](base::ProgressReport report) {
-    const double of_this = report.seconds_elapsed + report.seconds_left;
-    report.seconds_left += of_this * (1 - share.begin - share.size) / share.size;
-    report.fraction_done = share.begin + share.size * report.fraction_done;
-    report.detail = fmt::format("{}  {}", name, report.detail);
-    all(report);
-  };
-}
-
 // Makes a fit, examines it, and saves its model. Returns nothing if a stop was requested; there is
 // a checkpoint then.
 std::optional<FinishedPart> fit_part(const Run& run, const std::optional<tune::TunedFit>& tuned,
@@ -65,7 +53,8 @@ std::optional<FinishedPart> fit_part(const Run& run, const std::optional<tune::T
   base::log_info(fmt::format("{}: {} views", part.name, part.measurement.num_fitted_views()));
   FitRecord record{
       {checkpoint::fingerprint_of(run.options, part.measurement, run.processes), tuned}};
-  const base::ProgressSink progress = progress_of(run.observer.fit, part);
+  const base::ProgressSink progress =
+      base::part_of(run.observer.fit, part.share.begin, part.share.size, part.name);
   const FitRun made = run_fit(run, {.measurement = part.measurement,
                                     .model = part.model,
                                     .origin = record.origin,

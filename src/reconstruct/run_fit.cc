@@ -40,20 +40,19 @@ void resume(const FitJob& job, fit::Fit& fit) {
 
 base::ProgressReport progress_report(const fit::Fit& fit, std::int64_t first_step,
                                      const base::Stopwatch& running) {
-  base::ProgressReport report;
   const std::int64_t step = fit.progress().step;
-  const double done = fit.work(step), all = fit.work(fit.num_steps());
-  report.fraction_done = done / all;
-  report.seconds_elapsed = running.seconds();
-  report.seconds_left = (all - done) / (done - fit.work(first_step)) * report.seconds_elapsed;
-  const double rate = static_cast<double>(step - first_step) / report.seconds_elapsed;
+  const double first = fit.work(first_step), done = fit.work(step), all = fit.work(fit.num_steps());
+  const double seconds = running.seconds();
+  const double rate = static_cast<double>(step - first_step) / seconds;
   const auto& loss = fit.progress().data_loss;
   const std::int64_t epoch = (step - 1) / fit.steps_per_epoch() + 1;
   const auto& held_out = fit.progress().held_out_error;
-  report.detail =
+  base::ProgressReport report = base::progress_at(
+      (done - first) / (all - first), seconds,
       fmt::format("epoch {}/{}  loss {}{}  {:.1f} steps/s", epoch, fit.num_epochs(),
                   loss.empty() ? "-" : fmt::format("{:.4f}", loss.back()),
-                  held_out.empty() ? "" : fmt::format("  held out {:.4f}", held_out.back()), rate);
+                  held_out.empty() ? "" : fmt::format("  held out {:.4f}", held_out.back()), rate));
+  report.fraction_done = done / all;
   return report;
 }
 

@@ -41,21 +41,6 @@ struct Example {
   plan::Tile tile;
 };
 
-// Passes on the progress of a part of the run.
-base::ProgressSink part_of(const base::ProgressSink& whole, double done, double part,
-                           std::string name) {
-  if (!whole) return {};
-  return [=, name = std::move(name)](const base::ProgressReport& report) {
-    const double all = done + part * report.fraction_done;
-    base::ProgressReport of_run = report;
-    of_run.fraction_done = all;
-    of_run.seconds_left =
-        report.seconds_elapsed / std::max(part * report.fraction_done, 1e-9) * (1 - all);
-    of_run.detail = fmt::format("{}  {}", name, report.detail);
-    whole(of_run);
-  };
-}
-
 // Fits the coarse stages of the whole region. Returns nothing if the run was stopped.
 std::optional<CoarseStart> fit_coarse_stages(const Run& run, const plan::TilePlan& plan,
                                              const FitRecord& record) {
@@ -66,7 +51,7 @@ std::optional<CoarseStart> fit_coarse_stages(const Run& run, const plan::TilePla
     if (&stage - stages.data() < plan.num_whole_stages) of_coarse += stage.epochs * stage.step_cost;
   }
   const base::ProgressSink progress =
-      part_of(run.observer.fit, 0.0, of_coarse / work, "whole region");
+      base::part_of(run.observer.fit, 0.0, of_coarse / work, "whole region");
   const FitJob job{.measurement = run.measurement,
                    .model = run.paths.model,
                    .origin = record.origin,
@@ -132,9 +117,9 @@ class TileFits {
     const double of_tiles = 1 - start_.part_of_work;
     const auto rows = static_cast<double>(num_rows_);
     const base::ProgressSink progress =
-        part_of(run_.observer.fit, start_.part_of_work + of_tiles * tile.own.begin / rows,
-                of_tiles * tile.own.size() / rows,
-                fmt::format("rows {} to {} of {}", tile.own.begin, tile.own.end, num_rows_));
+        base::part_of(run_.observer.fit, start_.part_of_work + of_tiles * tile.own.begin / rows,
+                      of_tiles * tile.own.size() / rows,
+                      fmt::format("rows {} to {} of {}", tile.own.begin, tile.own.end, num_rows_));
     const base::Stopwatch running;
     const double first = fit.work(fit.progress().step), all = fit.work(fit.num_steps()) - first;
     bool stopped = false;

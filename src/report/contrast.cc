@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "base/threads/parallel.h"
 
 namespace tomofield::report {
@@ -27,7 +27,7 @@ std::array<std::int64_t, 3> middle_size(const std::array<std::int64_t, 3>& size)
 Contrast contrast_of(std::vector<float> values) {
   std::erase_if(values, [](float value) { return !std::isfinite(value); });
   if (values.empty()) return {};
-  const double median = base::percentile(values, 50);
+  const double median = base::median(values);
   const auto limit = [&](double outer, double inner) {
     const double from_median = base::percentile(values, outer) - median;
     const double most = kMostTimes * (base::percentile(values, inner) - median);

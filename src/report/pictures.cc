@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "field/sampling/middle_plane.h"

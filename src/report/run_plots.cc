@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "io/json_numbers.h"
 #include "report/choice_plot.h"
 #include "report/curve_plot.h"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "geometry/imod_transform.h"
 #include "io/images/mrc.h"
 #include "io/json.h"

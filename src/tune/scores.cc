@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 
 namespace tomofield::tune {
 namespace {
@@ -15,7 +15,6 @@ namespace {
 constexpr int kMaxSteps = 4;
 
 // The standard deviation of a normal distribution, in units of its median absolute deviation.
-constexpr double kDeviationPerMedian = 1.4826;
 
 using Errors = std::pair<const std::vector<double>&, const std::vector<double>&>;
 
@@ -48,12 +47,12 @@ Difference difference(const HeldOutScore& a, const HeldOutScore& b) {
   std::vector<double> means;
   for (std::size_t i = 0; i < ratios.size(); ++i)
     for (std::size_t j = i; j < ratios.size(); ++j) means.push_back((ratios[i] + ratios[j]) / 2);
-  const double centre = base::percentile(ratios, 50);
-  const double location = base::percentile(std::move(means), 50);
+  const double centre = base::median(ratios);
+  const double location = base::median(std::move(means));
   for (double& ratio : ratios) ratio = std::abs(ratio - centre);
   const double count = static_cast<double>(ratios.size());
   return {location,
-          kDeviationPerMedian * base::percentile(std::move(ratios), 50) / std::sqrt(count)};
+          base::kSigmaOfMedianDeviation * base::median(std::move(ratios)) / std::sqrt(count)};
 }
 
 Difference difference_of_means(const HeldOutScore& a, const HeldOutScore& b) {

@@ -44,6 +44,7 @@ class TrialFits::Running {
     options.patience = 0;
     scores_with_view_scale_ = trials.scores_with_view_scale_;
     measurement_ = &trials.measurement_for(settings_);
+    if (field.kind == FieldKind::kVm) rank_ = fmt::format("  rank {}", settings_.rank);
     fit_ = std::make_unique<fit::Fit>(*measurement_, field, options,
                                       distributed::Communicator::alone(),
                                       fit::FitPart{.scores_epochs = false});
@@ -58,8 +59,8 @@ class TrialFits::Running {
     fit_->run([](const fit::Fit&) { return false; });
     const bool is_last = fit_->is_done();
     part_done_ = is_last ? 1.0 : fit_->work(fit_->progress().step) / fit_->work(fit_->num_steps());
-    detail_ = fmt::format("{} tv {:.3g}  rank {}  epochs {}{}", base::name_of(settings_.penalty),
-                          settings_.variation, settings_.rank, settings_.epochs,
+    detail_ = fmt::format("{} tv {:.3g}{}  epochs {}{}", base::name_of(settings_.penalty),
+                          settings_.variation, rank_, settings_.epochs,
                           settings_.prior == Prior::kLearned ? "  learned prior" : "");
     if (is_last)
       finished_ = FitTrial{.settings = settings_,
@@ -103,7 +104,7 @@ class TrialFits::Running {
   std::optional<FitTrial> finished_;
   bool took_step_ = false;
   double part_done_ = 0, seconds_ = 0;
-  std::string detail_;
+  std::string rank_, detail_;  // factors alone have a rank
 };
 
 TrialFits::TrialFits(const measurement::Measurement& measurement, std::int64_t rows,

@@ -89,15 +89,16 @@ std::optional<TunedFit> with_prior(std::optional<TunedFit> tuned,
 
 // Writes a line for each trial: its settings, and how much worse than the chosen one it predicts.
 // Says how these are compared.
-void log_trials(const TunedFit& tuned) {
+void log_trials(const TunedFit& tuned, FieldKind kind) {
   const char* const reference =
       chosen_trial(tuned) != nullptr ? "the chosen settings" : "the best trial";
   for (const FitTrial& t : tuned.trials) {
     const Difference d = difference_to_chosen(t, tuned);
     base::log_info(fmt::format(
-        "tried {}, rank {}, epochs {}: patch by patch {:+.2f} % ± {:.2f} from "
+        "tried {}{}, epochs {}: patch by patch {:+.2f} % ± {:.2f} from "
         "{}; mean held-out error {:.5f}{}",
-        describe(t.settings, tuned.trials.front().settings), t.settings.rank, t.settings.epochs,
+        describe(t.settings, tuned.trials.front().settings),
+        kind == FieldKind::kVm ? fmt::format(", rank {}", t.settings.rank) : "", t.settings.epochs,
         100 * d.log_ratio, 100 * d.standard_error, reference, t.score.error,
         t.score.speckle ? fmt::format(", speckle {:.3f} %", 100 * *t.score.speckle)
                         : std::string()));
@@ -179,7 +180,7 @@ std::optional<TunedFit> tune(const measurement::Measurement& measurement, const 
     return choose_corrections(best, open, trials);
   });
   if (!tuned) return std::nullopt;
-  log_trials(*tuned);
+  log_trials(*tuned, field.kind);
   base::log_info(fmt::format(
       "tuned: --tv-penalty {} --tv {:.3f} --rank {} --epochs {} "
       "--vertex-epochs {} --coarse-epochs {}",
@@ -208,7 +209,7 @@ std::optional<TunedFit> choose_by_short_trials(const measurement::Measurement& m
     return choose_corrections(best, open, trials);
   });
   if (!tuned) return std::nullopt;
-  log_trials(*tuned);
+  log_trials(*tuned, field.kind);
   base::log_info("chose " + describe(tuned->settings, TrialSettings{}));
   tuned->settings.epochs = fit.epochs;
   return with_prior(std::move(tuned), measurement, field, fit, open, nullptr, hooks, processes);

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <numbers>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "base/threads/parallel.h"
 
 namespace tomofield::verdict {
@@ -130,7 +130,7 @@ std::optional<AxisCheck> check_axis(const std::vector<evaluate::Image>& views,
   AxisCheck check{.direction_deg = direction_of(static_cast<int>(best - agreement.begin())),
                   .best = static_cast<double>(*best),
                   .vertical = -1.0,
-                  .usual = base::percentile(agreement, 50)};
+                  .usual = base::median(agreement)};
   for (int d = 0; d < kDirections; ++d)
     if (std::abs(direction_of(d)) <= kNearVertical_deg)
       check.vertical =

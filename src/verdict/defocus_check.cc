@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "microscope/view_filter.h"
@@ -207,13 +207,12 @@ std::optional<DefocusCheck> check_defocus(const fit::Fit& fit,
   }
   if (std::ssize(errors) < kFewestViews) return std::nullopt;
   DefocusCheck check;
-  check.error = base::percentile(errors, 50);
-  check.rings = base::percentile(rings, 50);
+  check.error = base::median(errors);
+  check.rings = base::median(rings);
   for (float& error : errors) error = std::abs(error - static_cast<float>(check.error));
-  // The standard deviation of normal numbers is 1.48 times their median deviation, and their median
-  // scatters by 1.25 times as much as their mean.
-  check.standard_error =
-      1.25 * 1.48 * base::percentile(errors, 50) / std::sqrt(static_cast<double>(errors.size()));
+  // The median of normal numbers scatters by 1.25 times as much as their mean.
+  check.standard_error = 1.25 * base::kSigmaOfMedianDeviation * base::median(errors) /
+                         std::sqrt(static_cast<double>(errors.size()));
   check.slope = mean_slope(found);
   check.spectra = check_spectra(found, series, views);
   return check;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "base/system/memory.h"
 #include "verdict/warnings.h"
 
@@ -14,7 +14,7 @@ HeldOutSummary summary_of(const std::vector<double>& errors, const std::vector<i
                           const std::vector<double>& tilt_deg) {
   const auto worst = std::ranges::max_element(errors);
   const int view = views[static_cast<std::size_t>(worst - errors.begin())];
-  return {.median = base::percentile({errors.begin(), errors.end()}, 50),
+  return {.median = base::median({errors.begin(), errors.end()}),
           .worst = *worst,
           .worst_tilt_deg = tilt_deg[static_cast<std::size_t>(view)]};
 }

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "base/threads/parallel.h"
 
 namespace tomofield::verdict {
@@ -28,7 +28,7 @@ constexpr double kMedianOfNoise = 5.0, kStandsOut = 3.7;
 // Says whether the likenesses of all pairs of images of that many pixels are those of noise.
 bool is_of_noise(const std::vector<double>& likeness, std::size_t num_pixels) {
   const double deviation = 1 / std::sqrt(static_cast<double>(num_pixels));
-  const double median = base::percentile({likeness.begin(), likeness.end()}, 50);
+  const double median = base::median({likeness.begin(), likeness.end()});
   return median < kMedianOfNoise * deviation &&
          std::ranges::max(likeness) - median < kStandsOut * deviation;
 }

@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "base/log.h"
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "evaluate/artefacts.h"
 
 namespace tomofield::verdict {
@@ -98,8 +98,7 @@ SectionProfile section_profile(const std::vector<double>& deviation) {
   const std::ptrdiff_t count = std::ssize(values), outer = std::max<std::ptrdiff_t>(count / 20, 1);
   const double top = std::accumulate(deviation.begin(), deviation.begin() + outer, 0.0);
   const double bottom = std::accumulate(deviation.end() - outer, deviation.end(), 0.0);
-  const double middle =
-      base::percentile({values.begin() + count / 4, values.end() - count / 4}, 50);
+  const double middle = base::median({values.begin() + count / 4, values.end() - count / 4});
   const double limit = 0.3 * base::percentile(values, 80);
   const auto empty = std::ranges::count_if(deviation, [&](double d) { return d < limit; });
   SectionProfile profile;

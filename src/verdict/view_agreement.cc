@@ -5,7 +5,7 @@
 #include <span>
 #include <utility>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/image_pair.h"
@@ -112,7 +112,7 @@ std::array<double, 2> medians(const std::vector<std::array<double, 2>>& pairs) {
   for (const std::size_t axis : {0, 1}) {
     std::vector<float> values;
     for (const auto& pair : pairs) values.push_back(static_cast<float>(pair[axis]));
-    found[axis] = base::percentile(values, 50);
+    found[axis] = base::median(values);
   }
   return found;
 }

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 
 namespace tomofield::verdict {
 namespace {

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "align/beads/bead_equations.h"
+#include "base/statistics.h"
 #include "base/trace.h"
 #include "geometry/tilt_order.h"
 #include "tilt_series/tilt_series.h"
@@ -128,10 +129,7 @@ class BeadSet {
     std::vector<double> sizes;
     for (const BeadEquations& bead : beads_)
       for (const double distance : bead.distances(steps)) sizes.push_back(std::abs(distance));
-    constexpr double kSigmaOfMedian = 1.4826;  // for a normal distribution
-    const auto middle = sizes.begin() + std::ssize(sizes) / 2;
-    std::ranges::nth_element(sizes, middle);
-    return kSigmaOfMedian * *middle;
+    return base::kSigmaOfMedianDeviation * base::median_in_place(sizes);
   }
 
   // Returns the variance of the part of the distances that changes slowly over the tilts. It is

@@ -13,7 +13,7 @@
 #include "align/start/slab_model.h"
 #include "align/start/stretched_view.h"
 #include "base/check.h"
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "base/threads/parallel.h"
 #include "fourier/image_transform.h"
 
@@ -144,7 +144,7 @@ class PoseSearch {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       std::vector<double> shifts;
       for (const std::size_t view : views) shifts.push_back(poses_[view].shift_px[axis]);
-      median[axis] = base::percentile(shifts, 50);
+      median[axis] = base::median(shifts);
     }
     return median;
   }

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "base/threads/parallel.h"
 #include "geometry/tilt_order.h"
 #include "kernels/lanes.h"
@@ -62,7 +62,7 @@ bool exposures_differ(const measurement::Measurement& measurement,
     jumps.push_back(std::abs(view.mean() - usual));
     contrasts.push_back(view.deviation());
   }
-  return !jumps.empty() && base::percentile(jumps, 50) > kPart * base::percentile(contrasts, 50);
+  return !jumps.empty() && base::median(jumps) > kPart * base::median(contrasts);
 }
 
 }  // namespace tomofield::align

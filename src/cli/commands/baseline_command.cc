@@ -38,14 +38,21 @@ struct BaselineArguments {
   Method method;
   microscope::CtfCorrection ctf_correction = microscope::CtfCorrection::kFlip;
   std::optional<bool> non_negative;
-  bool dry_run = false;
+  DryRun dry_run;
   std::optional<std::filesystem::path> trace;
 };
 
-void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts& method,
-                VolumeAxes axes) {
-  print_sizes({plan.num_views, plan.geometry.width, plan.geometry.height, plan.pixel_size_A,
-               plan.roi, plan.geometry.thickness, axes});
+Sizes sizes_of(const baseline::BaselinePlan& plan, VolumeAxes axes) {
+  return {plan.num_views,
+          plan.geometry.width,
+          plan.geometry.height,
+          plan.pixel_size_A,
+          plan.roi,
+          plan.geometry.thickness,
+          axes};
+}
+
+void print_plan(const baseline::BaselinePlan& plan, const baseline::MethodFacts& method) {
   print("{} voxels with the margins, {} parameters; {} on {}; about {:.2f} GiB of memory\n",
         plan.num_voxels, plan.num_parameters, count_of(method.iterations, "iteration"),
         count_of(base::thread_count(), "thread"),
@@ -63,15 +70,19 @@ void print_summary(const baseline::BaselineSummary& summary) {
 
 // Runs a baseline whose options have been checked.
 void run_method(const baseline::BaselineOptions& options, const baseline::MethodFacts& method,
-                const baseline::BaselinePaths& paths, bool dry_run) {
+                const baseline::BaselinePaths& paths, const DryRun& dry_run) {
   const Options& shared = options.shared;
   tilt_series::TiltSeriesOptions input = output::series_options(options.files, shared);
-  input.keep_views = !dry_run;
+  input.keep_views = !dry_run.is_wanted;
   const tilt_series::TiltSeries series(input);
-  print_plan(baseline::plan_baseline(series, options), method, shared.volume.axes);
+  const baseline::BaselinePlan plan = baseline::plan_baseline(series, options);
+  const Sizes sizes = sizes_of(plan, shared.volume.axes);
+  print_sizes(sizes);
+  print_plan(plan, method);
   if (shared.fit.tune) print("short trials first, that choose settings by held-out views\n");
   flush_output();  // the plan comes before other output, in a file too
-  if (dry_run) return;
+  if (dry_run.is_wanted && dry_run.grid) write_grid(*dry_run.grid, sizes);
+  if (dry_run.is_wanted) return;
   io::OutputSet results;
   const baseline::BaselineSummary summary = baseline::run_baseline(
       series, options, {make_progress_bar("tune"), make_progress_bar("baseline")});
@@ -93,14 +104,15 @@ void run(BaselineArguments<Method>& arguments, const Origins& origins) {
   const baseline::BaselineOptions options{arguments.choices.files, shared, method,
                                           arguments.ctf_correction};
   std::vector<io::OutputLock> locks;
-  if (arguments.dry_run)
+  if (arguments.dry_run.is_wanted)
     baseline::check_options(options);
   else
     locks = baseline::claim_outputs(options);
   const baseline::BaselinePaths paths = baseline::baseline_paths(shared.run.output);
   check_trace_file(arguments.trace, {paths.volume, paths.json}, options.files,
                    shared.run.overwrite);
-  run_traced(arguments.dry_run ? std::nullopt : arguments.trace, distributed::Communicator::alone(),
+  run_traced(arguments.dry_run.is_wanted ? std::nullopt : arguments.trace,
+             distributed::Communicator::alone(),
              [&] { run_method(options, method.facts(), paths, arguments.dry_run); });
 }
 
@@ -132,9 +144,10 @@ void add_run_options(CLI::App& command, BaselineArguments<Method>& arguments) {
   for (const char* key : {"running.output", "running.overwrite"})
     add_row(command, key, arguments.choices);
   command
-      .add_flag("--dry-run", arguments.dry_run,
+      .add_flag("--dry-run", arguments.dry_run.is_wanted,
                 "Check everything and print the plan and the memory it needs")
       ->group(std::string(title_of(Group::kRun)));
+  add_grid_option(command, arguments.dry_run.grid);
 }
 
 template <typename Method>

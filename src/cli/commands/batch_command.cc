@@ -324,6 +324,7 @@ void add_batch_command(CLI::App& program) {
   add_groups(command, arguments->choices,
              {Group::kTransfer, Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume});
   add_row(command, "running.checkpoint_minutes", arguments->choices);
+  add_groups(command, arguments->choices, {Group::kResearch});
   for (CLI::Option* option : command.get_options()) {  // a table may have what a series needs
     const bool is_required_of_a_run = row_of_option(*option) != nullptr && option->get_required();
     if (is_required_of_a_run) option->required(false)->default_str("");

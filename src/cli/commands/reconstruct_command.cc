@@ -21,7 +21,7 @@ using option_table::Group;
 
 struct ReconstructArguments {
   option_table::Choices choices;
-  bool dry_run = false;
+  DryRun dry_run;
   std::optional<std::filesystem::path> trace, plan, choice;
 };
 
@@ -37,8 +37,8 @@ void run(ReconstructArguments& arguments, const distributed::Communicator& proce
                      options.run.overwrite);
   });
   if (arguments.plan) return write_plan(*arguments.plan, options, processes);
-  run_traced(arguments.dry_run ? std::nullopt : arguments.trace, processes, [&] {
-    if (arguments.choice && !arguments.dry_run)
+  run_traced(arguments.dry_run.is_wanted ? std::nullopt : arguments.trace, processes, [&] {
+    if (arguments.choice && !arguments.dry_run.is_wanted)
       return write_choice(*arguments.choice, options, processes);
     run_reconstruction(options, arguments.dry_run, processes);
   });
@@ -60,6 +60,7 @@ void add_reconstruct_command(CLI::App& program, const distributed::Communicator&
   add_trace_option(command, arguments->trace);
   add_plan_option(command, arguments->plan);
   add_choice_option(command, arguments->choice);
+  add_groups(command, arguments->choices, {Group::kResearch});
   add_help_all(command);
   command.footer(
       "Example: tomofield reconstruct series.mrc --tlt series.tlt --xf series.xf --bin 4 \\\n"

@@ -67,10 +67,14 @@ std::string epochs_text(const std::vector<fit::Stage>& stages) {
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
+Sizes sizes_of(const plan::RunPlan& plan, const options::ReconstructOptions& options) {
+  return {plan.num_views, plan.view_width, plan.view_height,   plan.pixel_size_A,
+          plan.roi,       plan.thickness,  options.volume.axes};
+}
+
 void print_plan(const options::ReconstructOptions& options, const plan::RunPlan& plan,
                 int num_processes) {
-  print_sizes({plan.num_views, plan.view_width, plan.view_height, plan.pixel_size_A, plan.roi,
-               plan.thickness, options.volume.axes});
+  print_sizes(sizes_of(plan, options));
   if (plan.num_trials > 0)
     print("about {} short trials first, that choose settings by held-out views\n", plan.num_trials);
   const std::string processes =
@@ -156,13 +160,14 @@ void print_results(const reconstruction::RunResult& run, const options::Reconstr
 
 }  // namespace
 
-void add_run_options(CLI::App& command, option_table::Choices& choices, bool& dry_run) {
+void add_run_options(CLI::App& command, option_table::Choices& choices, DryRun& dry_run) {
   add_groups(command, choices, {option_table::Group::kRun});
   command.get_option("--resume")->excludes("--overwrite");
   command
-      .add_flag("--dry-run", dry_run,
+      .add_flag("--dry-run", dry_run.is_wanted,
                 "Check everything, and print the plan with its memory, time and disk")
       ->group(std::string(title_of(option_table::Group::kRun)));
+  add_grid_option(command, dry_run.grid);
 }
 
 reconstruction::Observer terminal_observer(const distributed::Communicator& processes) {
@@ -190,17 +195,19 @@ void print_alignment(const options::ReconstructOptions& options) {
     if (std::filesystem::exists(file)) print("          {}\n", file.string());
 }
 
-void run_reconstruction(const options::ReconstructOptions& options, bool dry_run,
+void run_reconstruction(const options::ReconstructOptions& options, const DryRun& dry_run,
                         const distributed::Communicator& processes) {
   if (options.run.output.empty()) throw Error("-o '' names no file: name the tomogram");
   const auto show_plan = [&](const plan::RunPlan& plan) {
     warn_of_unused_rank(options);
     print_plan(options, plan, processes.size());
   };
-  if (dry_run) {
+  if (dry_run.is_wanted) {
     const reconstruction::Preview preview = reconstruction::preview(options, processes);
     show_plan(preview.plan);
-    if (processes.is_root()) print_estimate(preview.estimate, processes.size());
+    if (!processes.is_root()) return;
+    print_estimate(preview.estimate, processes.size());
+    if (dry_run.grid) write_grid(*dry_run.grid, sizes_of(preview.plan, options));
     return;
   }
   const output::OutputPaths paths = output::output_paths(options.run.output);

@@ -24,7 +24,7 @@ namespace {
 struct TensorfArguments {
   option_table::Choices choices{{}, baseline::tensorf_defaults()};
   std::optional<bool> non_negative;
-  bool dry_run = false;
+  DryRun dry_run;
   std::optional<std::filesystem::path> trace;
 };
 
@@ -56,7 +56,8 @@ void run(TensorfArguments& arguments, const std::vector<Setting>& origins) {
                    options.run.overwrite);
   base::require_no_faults(options.faults());
   options.field.leaf_size = size_of_node(options);
-  run_traced(arguments.dry_run ? std::nullopt : arguments.trace, distributed::Communicator::alone(),
+  run_traced(arguments.dry_run.is_wanted ? std::nullopt : arguments.trace,
+             distributed::Communicator::alone(),
              [&] { run_reconstruction(options, arguments.dry_run); });
 }
 

@@ -4,11 +4,24 @@
 #include <string>
 #include <utility>
 
+#include "cli/options/help_formatter.h"
 #include "cli/options/number_checks.h"
 #include "cli/options/table_options.h"
 #include "cli/terminal/console.h"
+#include "io/json.h"
 
 namespace tomofield::cli {
+namespace {
+
+// Returns the voxels along the axes of the file.
+std::array<std::int64_t, 3> voxels_of(const Sizes& sizes) {
+  std::array<std::int64_t, 3> voxels{sizes.roi.width(), sizes.roi.height(),
+                                     std::llround(sizes.thickness)};
+  if (sizes.axes == VolumeAxes::kXzy) std::swap(voxels[1], voxels[2]);
+  return voxels;
+}
+
+}  // namespace
 
 void add_shared_fit_options(CLI::App& command, option_table::Choices& choices) {
   for (const char* key : {"fit.fit_view_scale", "field.margin_spacing", "fit.hold_out"})
@@ -38,12 +51,22 @@ void add_seed(CLI::App& command, std::uint64_t& seed, const char* group) {
 }
 
 void print_sizes(const Sizes& sizes) {
-  std::int64_t ny = sizes.roi.height(), nz = std::llround(sizes.thickness);
-  const bool swaps = sizes.axes == VolumeAxes::kXzy;
-  if (swaps) std::swap(ny, nz);
+  const auto [nx, ny, nz] = voxels_of(sizes);
   print("{} views of {} × {} pixels, {:.4g} Å; tomogram {} × {} × {} voxels{}\n", sizes.num_views,
-        sizes.view_width, sizes.view_height, sizes.pixel_size_A, sizes.roi.width(), ny, nz,
-        swaps ? " (x, z, y)" : "");
+        sizes.view_width, sizes.view_height, sizes.pixel_size_A, nx, ny, nz,
+        sizes.axes == VolumeAxes::kXzy ? " (x, z, y)" : "");
+}
+
+void add_grid_option(CLI::App& command, std::optional<std::filesystem::path>& file) {
+  command
+      .add_option("--grid", file, "Also write the voxels of the tomogram to a file, for programs")
+      ->type_name("FILE.json")
+      ->needs("--dry-run")
+      ->group(kHelpAllGroup);
+}
+
+void write_grid(const std::filesystem::path& file, const Sizes& sizes) {
+  io::write_json(file, {{"grid", {{"size", voxels_of(sizes)}, {"voxel_A", sizes.pixel_size_A}}}});
 }
 
 }  // namespace tomofield::cli

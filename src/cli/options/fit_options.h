@@ -1,7 +1,9 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 
 #include "geometry/tilt_geometry.h"
@@ -29,7 +31,14 @@ struct Sizes {
   VolumeAxes axes;
 };
 /// Prints the first line of a plan: the number and the sizes of the views, and the sizes of the
-/// tomogram in the order of its file. compare::planned_grid() reads it.
+/// tomogram in the order of its file.
 void print_sizes(const Sizes& sizes);
+
+/// Registers --grid, which goes with --dry-run.
+void add_grid_option(CLI::App& command, std::optional<std::filesystem::path>& file);
+
+/// Writes the voxels that the tomogram will have along the axes of its file, and their size, for
+/// programs (compare::read_planned_grid()).
+void write_grid(const std::filesystem::path& file, const Sizes& sizes);
 
 }  // namespace tomofield::cli

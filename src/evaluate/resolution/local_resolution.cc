@@ -11,7 +11,7 @@
 #include <span>
 
 #include "base/check.h"
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "base/threads/parallel.h"
 #include "base/trace.h"
 #include "evaluate/box.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "evaluate/box.h"
 #include "evaluate/volume_pair.h"
 #include "tomofield/error.h"

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "tilt_series/fixed_pattern/known_mean.h"
 
 namespace tomofield::tilt_series {

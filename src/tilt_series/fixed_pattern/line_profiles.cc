@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "base/statistics.h"
 #include "tilt_series/fixed_pattern/known_mean.h"
 
 namespace tomofield::tilt_series {
@@ -29,9 +30,7 @@ std::vector<float> without_median(const std::vector<float>& profile) {
       around.push_back(after);
     }
     if (std::ssize(around) <= 2 * kFewestAround || std::isnan(around.front())) continue;
-    const auto middle = around.begin() + std::ssize(around) / 2;
-    std::nth_element(around.begin(), middle, around.end());
-    result[static_cast<std::size_t>(line)] = value_at(line) - *middle;
+    result[static_cast<std::size_t>(line)] = value_at(line) - base::median_in_place(around);
   }
   return result;
 }

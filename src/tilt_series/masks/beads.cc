@@ -5,6 +5,7 @@
 #include <numeric>
 #include <span>
 
+#include "base/statistics.h"
 #include "base/threads/parallel.h"
 #include "tilt_series/masks/bead_profile.h"
 #include "tilt_series/masks/bead_tracks.h"
@@ -268,12 +269,9 @@ std::vector<MaskDisc> loose_discs(const std::vector<Spot>& spots, const std::vec
                                   std::vector<double> bead_contrasts, double radius) {
   std::vector<MaskDisc> discs;
   if (bead_contrasts.empty()) return discs;
-  const auto middle =
-      bead_contrasts.begin() + static_cast<std::ptrdiff_t>(bead_contrasts.size() / 2);
-  std::nth_element(bead_contrasts.begin(), middle, bead_contrasts.end());
+  const double usual = base::median_in_place(bead_contrasts);
   for (std::size_t i = 0; i < spots.size(); ++i) {
-    if (is_taken[i] || spots[i].strength < kLikely ||
-        spots[i].contrast < kPartOfContrast * *middle) {
+    if (is_taken[i] || spots[i].strength < kLikely || spots[i].contrast < kPartOfContrast * usual) {
       continue;
     }
     discs.push_back({spots[i].x_px, spots[i].y_px, radius});

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "tilt_series/resampling/binning.h"
 #include "tilt_series/resampling/box_sums.h"
 

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <utility>
 
-#include "base/percentile.h"
+#include "base/statistics.h"
 #include "tilt_series/masks/correlation.h"
 #include "tilt_series/resampling/binning.h"
 
