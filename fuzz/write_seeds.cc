@@ -83,6 +83,20 @@ const std::string kConfig =
     "thickness = 24\ntv = 1.5\nfield = \"grid\"\nroi = [0, 0, 16, 16]\nno-margin = true\n"
     "center = \"12,10\"\nmode = 12\nseed = 7\n";
 
+const std::string kRequest =
+    "GET /k/plane?volume=0&center=1%2C2,3&right=1,0,0&up=0,1,0&width=4&height=3&step=0.5 "
+    "HTTP/1.1\r\nHost: 127.0.0.1:80\r\nConnection: close";
+const std::string kPlan =
+    R"({"threads":2,"memory_bytes":1300,"memory_bytes_of_one_thread":1000,"core_seconds":1.5,)"
+    R"("sample_steps":5,"result_bytes":7,"disk_bytes":9,"trials":6,"open_variation":true,)"
+    R"("open_spike_rank":false,"open_prior":true,"inputs":["a.mrc"],"results":["o/a.mrc"]})";
+const std::string kJobs =
+    R"({"overwrites":true,"jobs":[{"name":"a","output":"o/a.mrc","command":["reconstruct"],)"
+    R"("skipped":false,"memory_bytes_of_one_thread":1,"memory_bytes_a_thread":1,)"
+    R"("core_seconds":null,"sample_steps":1,"result_bytes":1,"disk_bytes":1,)"
+    R"("open_variation":true,"open_spike_rank":true,"open_prior":true,"trials":3}]})";
+const std::string kCells("a\0'b \"c\0data_x\0loop_\0\ntwo\nlines\0None\0", 37);
+
 // Describes a file of text for the fuzz target of one reader.
 struct Seed {
   const char* reader;
@@ -127,10 +141,17 @@ void write_tiffs(const fs::path& folder) {
     std::uint16_t bits, format, compression;
     bool is_tiled;
   };
-  for (const Kind kind :
-       {Kind{"bytes", 8, SAMPLEFORMAT_UINT, COMPRESSION_NONE, false},
-        Kind{"shorts", 16, SAMPLEFORMAT_INT, COMPRESSION_LZW, false},
-        Kind{"floats", 32, SAMPLEFORMAT_IEEEFP, COMPRESSION_ADOBE_DEFLATE, true}}) {
+  for (const Kind kind : {Kind{"bytes", 8, SAMPLEFORMAT_UINT, COMPRESSION_NONE, false},
+                          Kind{"shorts", 16, SAMPLEFORMAT_INT, COMPRESSION_LZW, false},
+                          Kind{"floats", 32, SAMPLEFORMAT_IEEEFP, COMPRESSION_ADOBE_DEFLATE, true},
+                          Kind{"packbits", 8, SAMPLEFORMAT_UINT, COMPRESSION_PACKBITS, false},
+                          Kind{"deflate", 16, SAMPLEFORMAT_UINT, COMPRESSION_DEFLATE, false},
+                          Kind{"lzma", 16, SAMPLEFORMAT_UINT, COMPRESSION_LZMA, true},
+                          Kind{"zstd", 32, SAMPLEFORMAT_IEEEFP, COMPRESSION_ZSTD, false},
+                          Kind{"lerc", 32, SAMPLEFORMAT_IEEEFP, COMPRESSION_LERC, true},
+                          Kind{"jpeg", 8, SAMPLEFORMAT_UINT, COMPRESSION_JPEG, false},
+                          Kind{"webp", 8, SAMPLEFORMAT_UINT, COMPRESSION_WEBP, false}}) {
+    if (!TIFFIsCODECConfigured(kind.compression)) continue;
     TIFF* file = TIFFOpen((folder / kind.name).c_str(), "w");
     for (int page = 0; page < 2; ++page) {
       TIFFSetField(file, TIFFTAG_IMAGEWIDTH, kWidth);
@@ -180,6 +201,26 @@ void write_trials(const fs::path& folder) {
   write(folder / "tuning", tuning_json(tuned).dump());
 }
 
+// Writes the tiles of a run as checkpoint::FinishedTiles does.
+void write_tiles(const fs::path& folder, const output::Model& model) {
+  fs::create_directories(folder);
+  const nlohmann::json tile{{"rows", {0, 64}},           {"residual", 1.0},
+                            {"seconds_fitting", 2.0},    {"seconds_compressing", 1.0},
+                            {"parameters", 10},          {"bytes", 100},
+                            {"mean_square_change", 0.1}, {"variance", 1.0},
+                            {"decibels", 0.1},           {"volume", 9.0}};
+  const auto numbers_of = [](const std::string& text) {
+    return std::vector<std::int64_t>(text.begin(), text.end());
+  };
+  const output::TrainingState state{
+      .floats = {},
+      .doubles = {},
+      .integers = {{"fingerprint", numbers_of("the fingerprint")},
+                   {"budget", numbers_of("0.1dB")},
+                   {"tiles", numbers_of(nlohmann::json::array({tile}).dump())}}};
+  output::save_coded(folder / "tiles", *model.coded, model, &state);
+}
+
 void write_models(const fs::path& folder) {
   fs::create_directories(folder / "model");
   fs::create_directories(folder / "checkpoint");
@@ -191,6 +232,7 @@ void write_models(const fs::path& folder) {
   small.field = std::move(made.field);
   small.coded = std::move(made.coded);
   output::save_model(folder / "model" / "compact", small);
+  write_tiles(folder / "tiles", small);
   const testing::SmallFit series;
   for (const int steps : {1, 7, 12}) {
     const auto fit = series.make();
@@ -228,6 +270,11 @@ int main(int argc, char** argv) {
       {"fiducials", "text", kFiducials},
       {"config", "toml", kConfig},
       {"table", "csv", kTable},
+      {"query", "request", kRequest},
+      {"query", "query", "volume=0&center=1,2,3&right=1,0,0&up=0,1,0&width=4&height=3&step=1"},
+      {"batch", "plan", kPlan},
+      {"batch", "jobs", kJobs},
+      {"star_text", "cells", kCells},
       {"command_file", "tilt", kTiltCom},
       {"command_file", "both", kTiltCom + '\1' + kNewstCom},
   };
