@@ -98,6 +98,7 @@ void add_files(py::module_& module) {
 void add_views_and_specimen(Class& options) {
   options.def_readwrite("tilt_offset_deg", &Options::tilt_offset_deg)
       .def_readwrite("x_axis_tilt_deg", &Options::x_axis_tilt_deg)
+      .def_readwrite("tilt_axis_deg", &Options::tilt_axis_deg)
       .def_readwrite("exclude", &Options::exclude)
       .def_readwrite("ignore", &Options::ignore)
       .def_readwrite("bin", &Options::bin)

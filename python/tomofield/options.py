@@ -16,6 +16,7 @@ class Options(TypedDict, total=False):
     # Views
     tilt_offset_deg: float
     x_axis_tilt_deg: float
+    tilt_axis_deg: float | None
     exclude: str
     ignore: str
     bin: float

@@ -20,8 +20,8 @@ namespace {
 std::vector<const void*> members_of(const Choices& choices) {
   const auto& [stack, tlt, xf, xtilt, aln, mdoc, mask, fiducials, even, odd, ctf, mtf] =
       choices.files;
-  const auto& [tilt_offset, x_axis_tilt, exclude, ignore, bin, angpix, pixel_size, contrast,
-               take_log, log_base, black_level, bead_diameter, fixed_pattern, defocus,
+  const auto& [tilt_offset, x_axis_tilt, tilt_axis, exclude, ignore, bin, angpix, pixel_size,
+               contrast, take_log, log_base, black_level, bead_diameter, fixed_pattern, defocus,
                phase_flipped, defocus_hand, voltage, spherical_aberration, amplitude_contrast,
                dose_per_tilt, dose_weighted, thickness, roi, hand, axis_x, axis_z, shift_z,
                with_margin, field, leaf_size, tree, leaf_budget, vertex_spacing, rank, activation,
@@ -45,6 +45,7 @@ std::vector<const void*> members_of(const Choices& choices) {
           &mtf,
           &tilt_offset,
           &x_axis_tilt,
+          &tilt_axis,
           &exclude,
           &ignore,
           &bin,

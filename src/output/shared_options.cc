@@ -33,6 +33,8 @@ tilt_series::TiltSeriesOptions series_options(const SeriesFiles& files, const Op
   series.x_axis_tilt_deg = options.x_axis_tilt_deg;
   if (files.even && files.odd) series.halves = {*files.even, *files.odd};
   series.exclude = options.exclude;
+  series.tilt_axis_deg = options.tilt_axis_deg;
+  series.starts_raw = options.align == Alignment::kFull;
   series.ignore = options.ignore;
   series.bin = options.bin;
   series.angpix = options.angpix;

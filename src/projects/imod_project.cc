@@ -89,19 +89,7 @@ std::optional<fs::path> find_newst(const fs::path& tilt) {
   return newst;
 }
 
-void refuse_what_is_missing(Project& project, CommandEntries& tilt, CommandEntries* newst) {
-  for (const Refusal& refusal : kRefusals) tilt.refuse(refusal.entry, refusal.why);
-  const auto local = tilt.text("LOCALFILE");
-  const auto global = newst == nullptr ? std::nullopt : newst->text("TransformFile");
-  if (local && local == global) {
-    project.warn(
-        fmt::format("'{}': LOCALFILE names the transforms of the whole views, as AreTomo "
-                    "writes it; they are applied once",
-                    tilt.file().string()));
-  } else {
-    tilt.refuse("LOCALFILE",
-                "aligns parts of the views by themselves, which this program cannot do");
-  }
+void warn_of_what_differs(Project& project, CommandEntries& tilt) {
   if (tilt.has("PARALLEL")) {
     project.warn(
         fmt::format("'{}': PARALLEL mirrors the volume, and this program does not (--axes "
@@ -114,6 +102,39 @@ void refuse_what_is_missing(Project& project, CommandEntries& tilt, CommandEntri
   }
 }
 
+// Refuses all entries at once without which the reconstruction is another one.
+void refuse_what_is_missing(Project& project, CommandEntries& tilt, CommandEntries* newst) {
+  std::vector<std::string> faults;
+  std::vector<std::string_view> entries;
+  const auto refuse = [&](std::string_view entry, std::string_view why) {
+    const auto fault = tilt.fault_of(entry, why);
+    if (!fault) return;
+    faults.push_back(*fault);
+    entries.push_back(entry);
+  };
+  for (const Refusal& refusal : kRefusals) refuse(refusal.entry, refusal.why);
+  const auto local = tilt.text("LOCALFILE");
+  const auto global = newst == nullptr ? std::nullopt : newst->text("TransformFile");
+  if (local && local == global) {
+    project.warn(
+        fmt::format("'{}': LOCALFILE names the transforms of the whole views, as AreTomo "
+                    "writes it; they are applied once",
+                    tilt.file().string()));
+  } else {
+    refuse("LOCALFILE", "aligns parts of the views by themselves, which this program cannot do");
+  }
+  if (const auto xtilt = tilt.path("XTILTFILE"); xtilt && !io::is_file(*xtilt)) {
+    refuse("XTILTFILE",
+           fmt::format("names the x-axis tilts '{}', which are not there", xtilt->string()));
+  }
+  if (!faults.empty()) {
+    throw Error(fmt::format("'{}', {}; --ignore {} goes on without {}", tilt.file().string(),
+                            fmt::join(faults, "; "), fmt::join(entries, ","),
+                            faults.size() == 1 ? "it" : "them"));
+  }
+  warn_of_what_differs(project, tilt);
+}
+
 void set_angles(Project& project, CommandEntries& tilt) {
   for (const char* name : {"TILTFILE", "AngleFile"}) {
     if (const auto tlt = tilt.path(name)) {
@@ -121,13 +142,8 @@ void set_angles(Project& project, CommandEntries& tilt) {
       break;
     }
   }
-  if (const auto xtilt = tilt.path("XTILTFILE")) {
-    if (!io::is_file(*xtilt)) {
-      tilt.refuse("XTILTFILE",
-                  fmt::format("names the x-axis tilts '{}', which are not there", xtilt->string()));
-    }
+  if (const auto xtilt = tilt.path("XTILTFILE"))
     project.set("--xtilt", xtilt->string(), tilt.file(), "XTILTFILE");
-  }
   const auto x_axis_tilt = tilt.number("XAXISTILT");
   if (x_axis_tilt.value_or(0) != 0)
     project.set("--x-axis-tilt", fmt::format("{}", *x_axis_tilt), tilt.file(), "XAXISTILT");
@@ -178,8 +194,10 @@ void set_intensities(Project& project, CommandEntries& tilt) {
 
 }  // namespace
 
-void read_imod_project(Project& project) {
-  CommandEntries tilt(project, project.request().path, "tilt");
+void read_imod_project(Project& project) { read_imod_project(project, project.request().path); }
+
+void read_imod_project(Project& project, const fs::path& tilt_com) {
+  CommandEntries tilt(project, tilt_com, "tilt");
   std::optional<CommandEntries> newst_com;
   if (const auto path = find_newst(tilt.file())) newst_com.emplace(project, *path, "newstack");
   CommandEntries* newst = newst_com ? &*newst_com : nullptr;

@@ -65,8 +65,9 @@ struct Format {
   /// Reads the main file `project.request().path` and what lies beside it, and sets options. Throws
   /// Error if they cannot be honoured.
   void (*read)(Project& project);
-  /// Metadata beside a series: a folder is read by it only if it has no other project.
-  bool is_metadata = false;
+  /// A folder is read by the main files of the lowest rank that it has: files that say how a series
+  /// is aligned come before those that only accompany it.
+  int rank = 0;
 };
 
 /// Returns all kinds of projects.

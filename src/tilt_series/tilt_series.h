@@ -36,11 +36,15 @@ struct TiltSeriesOptions {
   std::optional<std::filesystem::path> mdoc;   ///< SerialEM metadata (angles, pixel size)
   double tilt_offset_deg = 0;                  ///< added to all tilt angles
   double x_axis_tilt_deg = 0;                  ///< subtracted from all x-axis tilts
-  std::string ignore;                          ///< entries of files that are not applied
-  std::string exclude;                         ///< 1-based sections left out: "1-3,40"
-  double bin = 1.0;                            ///< reduce views by this factor, >= 1
-  std::optional<double> angpix;                ///< or to this pixel size in Å
-  std::optional<double> pixel_size_A;          ///< overrides the header's pixel size
+  std::optional<double> tilt_axis_deg;  ///< of a raw stack, counter-clockwise from +Y; 0: vertical
+  /// The views will be aligned from the direction of their tilt axis on, as files state it. Else a
+  /// stack whose stated axis is not vertical needs an alignment.
+  bool starts_raw = false;
+  std::string ignore;                  ///< entries of files that are not applied
+  std::string exclude;                 ///< 1-based sections left out: "1-3,40"
+  double bin = 1.0;                    ///< reduce views by this factor, >= 1
+  std::optional<double> angpix;        ///< or to this pixel size in Å
+  std::optional<double> pixel_size_A;  ///< overrides the header's pixel size
   Contrast contrast = Contrast::kDark;
   bool take_log = false;  ///< −ln(I / I0) instead of I0 − I; dark only
   double log_base = 0;    ///< is added to intensities before the logarithm

@@ -13,6 +13,7 @@
 #include "cli/options/trace_option.h"
 #include "options/run_options.h"
 #include "output/output_paths.h"
+#include "tomofield/error.h"
 
 namespace tomofield::cli {
 namespace {
@@ -25,10 +26,20 @@ struct ReconstructArguments {
   std::optional<std::filesystem::path> trace, plan, choice;
 };
 
+// Returns the options, with a name for the tomogram that a dry run needs and does not write.
+Options with_output(Options options, bool dry_run) {
+  if (!options.output.empty()) return options;
+  if (!dry_run)
+    throw Error("--output is required: name the tomogram with -o (--dry-run needs none)");
+  options.output = "tomofield_dry_run.mrc";
+  options.overwrite = true;
+  return options;
+}
+
 void run(const ReconstructArguments& arguments, const distributed::Communicator& processes,
          const std::vector<option_table::Setting>& origins) {
-  options::ReconstructOptions options =
-      options::run_options(arguments.choices.files, arguments.choices.options);
+  options::ReconstructOptions options = options::run_options(
+      arguments.choices.files, with_output(arguments.choices.options, arguments.dry_run));
   options.origins = origins;
   std::vector<io::OutputLock> locks;
   processes.run_collectively([&] {
@@ -65,6 +76,8 @@ void add_reconstruct_command(CLI::App& program, const distributed::Communicator&
              {Group::kTransfer, Group::kSpecimen, Group::kField, Group::kFit, Group::kVolume,
               Group::kHalves});
   add_run_options(command, arguments->choices, arguments->dry_run);
+  CLI::Option* const output = command.get_option("--output")->required(false);
+  output->description(output->get_description() + " (required without --dry-run)");
   add_common_options(command);
   add_trace_option(command, arguments->trace);
   add_plan_option(command, arguments->plan);
