@@ -44,6 +44,10 @@ struct JobList {
 /// Reads the JSON of --plan. Throws Error for anything else.
 Needs read_needs(const std::filesystem::path& file);
 
+/// Returns the stack of the run that this JSON of --plan describes, or an empty text. Throws Error
+/// for anything else.
+std::string read_stack(const std::filesystem::path& file);
+
 /// Writes the list of a batch, from which the tasks of a job array read their jobs. Throws Error if
 /// it cannot be written, and for words that are no UTF-8.
 void write_jobs(const std::filesystem::path& file, const JobList& list);

@@ -58,12 +58,13 @@ Sections sections_of(const tilt_series::TiltSeriesOptions& input,
 }
 
 // Returns the row of a table for each section. A table that has not one row a section is matched by
-// the rows of AreTomo's alignment, whose dark frames it may leave out, or by tilt. `what` names the
-// contents of the rows. Throws Error if neither tells.
+// the rows of AreTomo's alignment, whose dark frames it may leave out, or by tilt. Rows have the
+// contrast transfer (`is_ctf`) or doses. Throws Error if neither tells.
 std::vector<std::optional<std::size_t>> rows_of_sections(
     const Sections& sections, std::size_t num_rows,
     std::span<const std::optional<double>> row_tilt_deg, const std::filesystem::path& file,
-    const char* what) {
+    bool is_ctf) {
+  const char* const what = is_ctf ? "contrast transfer" : "doses";
   std::vector<std::optional<std::size_t>> rows(static_cast<std::size_t>(sections.count));
   if (static_cast<std::int64_t>(num_rows) == sections.count) {
     for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = i;
@@ -83,10 +84,11 @@ std::vector<std::optional<std::size_t>> rows_of_sections(
     if (const auto matched = tilt_series::match_by_tilt(sections.tilt_deg, row_tilt_deg))
       return *matched;
   throw Error(fmt::format(
-      "'{}' has the {} of {} sections, but '{}' has {}, and {}: give the file of this stack",
+      "'{}' has the {} of {} sections, but '{}' has {}, and {}: give the file of this stack{}",
       file.string(), what, num_rows, sections.stack, sections.count,
       row_tilt_deg.empty() ? "it has no tilts to tell which belong together"
-                           : "their tilts do not tell which belong together"));
+                           : "their tilts do not tell which belong together",
+      is_ctf ? " (--ctf none goes on without it)" : ""));
 }
 
 // Puts the rows of a table of contrast transfer into the order of the sections.
@@ -97,7 +99,7 @@ void match_sections(const Sections& sections, io::CtfTable& table) {
     return;
   }
   const auto rows = rows_of_sections(sections, table.views.size(), table.tilt_deg, table.file,
-                                     "contrast transfer");
+                                     /*is_ctf=*/true);
   std::vector<std::optional<io::Defocus>> matched(count);
   for (std::size_t i = 0; i < count; ++i)
     if (rows[i]) matched[i] = table.views[*rows[i]];
@@ -250,8 +252,8 @@ std::optional<Exposures> find_exposures(const SeriesFiles& files, const Options&
                          : fmt::format("dose: from '{}'", recording->file.string()));
   const Exposures of_row =
       of_view ? microscope::exposures_in_order(recording->order, *of_view) : *recording->doses;
-  const auto rows =
-      rows_of_sections(sections, of_row.size(), recording->tilt_deg, recording->file, "doses");
+  const auto rows = rows_of_sections(sections, of_row.size(), recording->tilt_deg, recording->file,
+                                     /*is_ctf=*/false);
   Exposures of_section(static_cast<std::size_t>(sections.count));
   for (std::size_t i = 0; i < of_section.size(); ++i)
     if (rows[i]) of_section[i] = of_row[*rows[i]];

@@ -3,6 +3,7 @@
 #include "io/tables/alignment_files.h"
 #include "projects/formats.h"
 #include "projects/stack_beside.h"
+#include "projects/transfer_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::projects {
@@ -29,6 +30,7 @@ void read_aretomo_project(Project& project) {
   const io::AreTomoAlignment alignment = io::read_aretomo_alignment(aln, /*needs_tilt=*/false);
   project.set("stack", find_stack(aln).string(), aln, "RawSize");
   project.set("--aln", aln.string(), aln, "SEC");
+  set_transfer_files(project, aln.parent_path(), aln.stem().string());
   if (alignment.thickness)
     project.set("--thickness", fmt::format("{}", *alignment.thickness), aln, "Thickness");
   if (alignment.alpha_offset_deg != 0) {

@@ -77,14 +77,29 @@ bool is_montage(const fs::path& tilt) {
   return is_file(tilt.parent_path() / name) && name != tilt.filename().string();
 }
 
-// Finds the raw files by eTomo's names: NAME.st or NAME.mrc, and NAME.xf, for NAME_ali.mrc or
-// NAME.ali.
+// Returns eTomo's name of a dataset by that of its aligned stack: NAME_ali.mrc or NAME.ali.
+std::string series_name_of(CommandEntries& tilt) {
+  const auto aligned = tilt.path("InputProjections");
+  std::string name = aligned ? aligned->filename().string() : std::string();
+  for (const std::string_view end : {"_ali.mrc", ".ali"})
+    if (name.ends_with(end)) name.erase(name.size() - end.size());
+  return name;
+}
+
+// Tells whether the labels of a stack say that a program has made it, by its name in lower case.
+bool went_through(const io::MrcHeader& header, std::string_view program) {
+  return std::ranges::any_of(header.labels, [&](std::string label) {
+    std::ranges::transform(label, label.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return label.find(program) != std::string::npos;
+  });
+}
+
+// Finds the raw files by eTomo's names: NAME.st or NAME.mrc, and NAME.xf.
 std::optional<RawFiles> usual_raw_files(Project& project, CommandEntries& tilt) {
   const auto aligned = tilt.path("InputProjections");
   if (!aligned || project.ignores("TransformFile") || is_montage(tilt.file())) return std::nullopt;
-  std::string name = aligned->filename().string();
-  for (const std::string_view end : {"_ali.mrc", ".ali"})
-    if (name.ends_with(end)) name.erase(name.size() - end.size());
+  const std::string name = series_name_of(tilt);
   const fs::path folder = aligned->parent_path();
   const fs::path xf = folder / (name + ".xf");
   if (!is_file(xf)) return std::nullopt;
@@ -109,16 +124,12 @@ std::string_view what_hinders_raw(CommandEntries* newst) {
 // Warns if the aligned stack has corrections that the raw one does not have.
 void warn_of_corrections(Project& project, const fs::path& aligned) {
   const auto stack = io::open_image_stack(aligned);
-  for (std::string label : stack->header().labels) {
-    std::ranges::transform(label, label.begin(),
-                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    for (const std::string_view program : kCorrections) {
-      if (label.find(program) == std::string::npos) continue;
-      project.warn(fmt::format(
-          "the aligned stack '{}' went through {}, which the raw stack that is read did not: "
-          "--ignore TransformFile reads the aligned stack",
-          aligned.string(), program));
-    }
+  for (const std::string_view program : kCorrections) {
+    if (!went_through(stack->header(), program)) continue;
+    project.warn(fmt::format(
+        "the aligned stack '{}' went through {}, which the raw stack that is read did not: "
+        "--ignore TransformFile reads the aligned stack",
+        aligned.string(), program));
   }
 }
 
@@ -194,6 +205,7 @@ ImodImages read_raw(Project& project, const RawFiles& raw, CommandEntries& tilt,
   images.stack = raw.stack.path;
   images.num_sections = stack->header().nz;
   images.is_raw = true;
+  images.series_name = series_name_of(tilt);
   images.bin = find_bin(project, tilt, newst, true);
   images.has_newst = newst != nullptr;
   images.width = images.imod_width = static_cast<double>(size[0]);
@@ -214,6 +226,8 @@ ImodImages read_aligned(Project& project, const NamedFile& aligned, CommandEntri
   ImodImages images;
   images.stack = aligned.path;
   images.num_sections = stack->header().nz;
+  images.series_name = series_name_of(tilt);
+  images.is_phase_flipped = went_through(stack->header(), "ctfphaseflip");
   images.bin = images.unit = find_bin(project, tilt, newst, false);
   images.width = images.imod_width = static_cast<double>(stack->header().nx) * images.unit;
   images.height = images.imod_height = static_cast<double>(stack->header().ny) * images.unit;

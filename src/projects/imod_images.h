@@ -20,6 +20,8 @@ struct ImodImages {
   double imod_width = 0, imod_height = 0;       ///< of the aligned stack
   double imod_offset_x = 0, imod_offset_y = 0;  ///< its centre, from that of the views
   bool has_newst = false;
+  bool is_phase_flipped = false;  ///< the stack went through ctfphaseflip, as its labels say
+  std::string series_name;        ///< eTomo's name of the dataset: "TS_01" of "TS_01_ali.mrc"
   std::string
       size_entry;  ///< what the size of the aligned stack follows from; empty: from its file
 };

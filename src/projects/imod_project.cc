@@ -15,6 +15,7 @@
 #include "projects/formats.h"
 #include "projects/imod_images.h"
 #include "projects/imod_volume.h"
+#include "projects/transfer_files.h"
 #include "tomofield/error.h"
 
 namespace tomofield::projects {
@@ -207,6 +208,11 @@ void read_imod_project(Project& project, const fs::path& tilt_com) {
   set_imod_volume(project, tilt, images);
   set_excluded(project, tilt, images.num_sections);
   set_intensities(project, tilt);
+  const bool has_defocus =
+      set_transfer_files(project, tilt.file().parent_path(), images.series_name);
+  if (has_defocus && images.is_phase_flipped)
+    project.set("--ctf-phase-flipped", "true", images.stack, "ctfphaseflip");
+  set_imod_optics(project, tilt.file(), has_defocus || project.request().has_transfer);
   tilt.know(kHarmless);
   tilt.warn_about_others();
   if (newst != nullptr) newst->warn_about_others();

@@ -4,6 +4,7 @@
 #include "io/tables/mdoc_images.h"
 #include "projects/formats.h"
 #include "projects/stack_beside.h"
+#include "projects/transfer_files.h"
 
 namespace tomofield::projects {
 
@@ -18,6 +19,9 @@ void read_mdoc_project(Project& project) {
     project.set("stack", mdoc.string(), mdoc, "SubFramePath");
   }
   project.set("--mdoc", mdoc.string(), mdoc, "ZValue");
+  fs::path stem = mdoc.stem();
+  if (stem.has_extension()) stem = stem.stem();  // "TS_01" of "TS_01.mrc.mdoc"
+  set_transfer_files(project, mdoc.parent_path(), stem.string());
   if (contents.voltage_kV)
     project.set("--voltage", fmt::format("{}", *contents.voltage_kV), mdoc, "Voltage");
 }

@@ -16,7 +16,8 @@ struct Request {
   std::filesystem::path path = {};
   std::vector<std::string> ignored = {};  ///< names of entries that are not applied (--ignore)
   std::string series = {};                ///< of a project that has several (--series); empty: all
-  bool has_mdoc = false;  ///< the user gave --mdoc, so a folder may be that of its images
+  bool has_mdoc = false;      ///< the user gave --mdoc, so a folder may be that of its images
+  bool has_transfer = false;  ///< the user gave a contrast transfer, which optics describe
 };
 
 /// The files of another program as settings of this one, each with its origin.

@@ -299,6 +299,44 @@ def test_the_pixel_size_of_a_binned_record():
     expect(dry(folder, "TS_01.mdoc"), "pixels of 1.35 Å")
 
 
+def test_the_contrast_transfer_beside_a_project_is_used():
+    folder = write_etomo("etomo_ctf", 0.0, newst="", tilt="FULLIMAGE 72 56\n")
+    defocus = "".join(f"{i + 1} {i + 1} {tilt:.2f} {tilt:.2f} 3000{' 2' if i == 0 else ''}\n"
+                      for i, tilt in enumerate(TILTS))
+    write(folder, "TS.defocus", defocus)
+    write(folder, "ctfcorrection.com", "$ctfphaseflip -StandardInput\nInputStack TS_ali.mrc\n"
+          "DefocusFile TS.defocus\nVoltage 200\nSphericalAberration 2.2\nAmplitudeContrast 0.1\n")
+    expect(dry(folder, "."), "--ctf ./TS.defocus from", "--voltage 200 from ./ctfcorrection.com: Voltage",
+           "--cs 2.2 from", "--amplitude-contrast 0.1 from", "the defocus of each view from")
+    for off in (["--ctf", "none"], ["--ignore", "CTF"], ["--engine", "ray"]):
+        assert "the defocus of each view from" not in dry(folder, ".", *off)
+    expect(dry(folder, ".", "--ignore", "CTF", "--defocus", 3), "--cs 2.2 from")
+    # An aligned stack whose phases IMOD flipped.
+    os.remove(os.path.join(folder, "TS.st"))
+    aligned = os.path.join(folder, "TS_ali.mrc")
+    harness.write_stack(aligned, bead_views(0, (56, 72)), PIXEL_A)
+    assert "--ctf-phase-flipped" not in dry(folder, ".")
+    write_titles(aligned, ["NEWSTACK: Images copied, transformed", "ctfPhaseFlip: CTF correction"])
+    expect(dry(folder, "."), "--ctf-phase-flipped true from ./TS_ali.mrc: ctfphaseflip")
+
+
+@pytest.mark.parametrize("ending", ["_CTF.txt", "_ctf.star"])
+def test_the_contrast_transfer_beside_an_alignment_is_used(ending):
+    folder = write_series("beside")
+    write(folder, "TS_01.aln", "# RawSize = 72 56 15\n" + "".join(
+        f"{i + 1} 0 1 0 0 1 1 1 0 {tilt}\n" for i, tilt in enumerate(TILTS)))
+    star = "data_\n\nloop_\n_rlnDefocusU #1\n_rlnDefocusV #2\n" + "30000 29000\n" * len(TILTS)
+    write(folder, "TS_01" + ending, ctf_text([30000] * len(TILTS)) if ending[-1] == "t" else star)
+    mtf = "data_\n\nloop_\n_rlnResolutionInversePixel #1\n_rlnMtfValue #2\n0 1\n0.5 0.4\n"
+    write(folder, "K3_mtf.star", mtf)
+    printed = dry(folder, "TS_01.aln")
+    expect(printed, f"--ctf TS_01{ending} from", "--mtf K3_mtf.star from", "what the detector passes")
+    write(folder, "other_mtf.star", mtf)
+    assert "--mtf" not in dry(folder, "TS_01.aln")  # nothing says which
+    write(folder, "TS_01.mrc.mdoc", mdoc_text())
+    expect(dry(folder, "TS_01.mrc.mdoc"), f"--ctf TS_01{ending} from")
+
+
 # --------------------------------------------------------------- tables and sections that differ
 
 def exposure_line(printed):
@@ -384,6 +422,20 @@ def test_a_tomogram_is_no_stack():
     harness.succeed(*words, cwd=folder)
     harness.succeed(*words, "--overwrite", cwd=folder)
     expect(dry(folder, "TS_01.mrc", "--tlt", "TS_01.rawtlt", status=2), "'TS_01.mrc'", "tomofield wrote")
+
+
+def test_a_batch_takes_a_stack_once():
+    folder = write_series("batch")
+    write(folder, "TS_01.mrc.mdoc", mdoc_text())
+    words = ["batch", "TS_01.mr*", "--tlt", "TS_01.rawtlt", "--thickness", 24, "--contrast", "bright",
+             "-o", "res"]
+    result = harness.tomofield(*words, "--dry-run", cwd=folder)
+    assert result.returncode == 2
+    expect(result.stderr, "'TS_01.mrc' and 'TS_01.mrc.mdoc'", "the same stack", "leave one of them out")
+    # Rows of a table may try several settings on one stack.
+    write(folder, "two.csv", "stack,bin,name\nTS_01.mrc,1,a\nTS_01.mrc,2,b\n")
+    words[1] = "two.csv"
+    harness.succeed(*words, "--dry-run", cwd=folder)
 
 
 # ------------------------------------------------------------------------------------ the program
